@@ -1,0 +1,147 @@
+"""The H-Anim LOA-1 figure: a root and 17 joints, as the paper's channels name them (paper 2, 3).
+
+Frame: right-handed, metres, y up, z the way the figure faces, x to its left. At rest every local rotation is the identity
+and the figure stands in H-Anim's I-pose, arms down. World positions: P[k] = P[parent] + R[parent] offset[k].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bunraku.motion import rotation
+from bunraku.motion.rotation import Array
+
+ROOT = "humanoid_root"
+JOINTS: tuple[str, ...] = (
+    ROOT,
+    "sacroiliac",
+    "l_hip",
+    "l_knee",
+    "l_ankle",
+    "l_midtarsal",
+    "r_hip",
+    "r_knee",
+    "r_ankle",
+    "r_midtarsal",
+    "vl5",
+    "skullbase",
+    "l_shoulder",
+    "l_elbow",
+    "l_wrist",
+    "r_shoulder",
+    "r_elbow",
+    "r_wrist",
+)
+"""Channel order: index 0 is the root (channels 1 and 2), index k > 0 is channel k + 2."""
+
+PARENTS: tuple[int, ...] = (-1, 0, 1, 2, 3, 4, 1, 6, 7, 8, 0, 10, 10, 12, 13, 10, 15, 16)
+INDEX: dict[str, int] = {name: index for index, name in enumerate(JOINTS)}
+JOINT_COUNT = len(JOINTS)
+CHANNEL_COUNT = 19
+TIPS: tuple[int, ...] = (INDEX["skullbase"], INDEX["l_wrist"], INDEX["r_wrist"], INDEX["l_midtarsal"], INDEX["r_midtarsal"])
+"""Joints that carry a tip beyond them: crown, finger tips, toe tips."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """Limb lengths of one dancer: `offsets` (18, 3), each joint from its parent (row 0: the root's rest position), and
+    `tips` (18, 3), from a joint of `TIPS` to its tip (zero elsewhere); metres in the rest pose."""
+
+    offsets: Array
+    tips: Array
+
+    def __post_init__(self) -> None:
+        if self.offsets.shape != (JOINT_COUNT, 3) or self.tips.shape != (JOINT_COUNT, 3):
+            raise ValueError(f"a figure has offsets and tips of ({JOINT_COUNT}, 3), metres")
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """One dance, `n` frames at a steady rate.
+
+    `root` (n, 3) is the root's position in metres; `rotations` (n, 18, 4) the unit quaternions of the joints in the frame
+    of their parent (row 0: the root's orientation in the world); `fps` frames per second.
+    """
+
+    figure: Figure
+    fps: float
+    root: Array
+    rotations: Array
+
+    def __post_init__(self) -> None:
+        n = len(self.root)
+        if n < 1 or self.root.shape != (n, 3) or self.rotations.shape != (n, JOINT_COUNT, 4):
+            raise ValueError(f"a motion has root (n, 3) and rotations (n, {JOINT_COUNT}, 4), n >= 1")
+        if not self.fps > 0:
+            raise ValueError("a motion has a frame rate above zero")
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return len(self.root)
+
+    @property
+    def duration(self) -> float:
+        """Seconds: frames / fps, so that a loop has no gap."""
+        return len(self.root) / self.fps
+
+
+def standard_figure() -> Figure:
+    """The figure of the H-Anim specification's LOA-1 example, 1.75 m tall, its hand and toe tips included."""
+    left = {
+        "l_hip": (0.0961, 0.9124, -0.0001),
+        "l_knee": (0.1040, 0.4867, 0.0308),
+        "l_ankle": (0.1101, 0.0656, -0.0736),
+        "l_midtarsal": (0.1086, 0.0001, 0.0368),
+        "l_shoulder": (0.2029, 1.4376, -0.0387),
+        "l_elbow": (0.2014, 1.1357, -0.0682),
+        "l_wrist": (0.1984, 0.8663, -0.0583),
+    }
+    centres = {
+        ROOT: (0.0, 0.8240, 0.0277),
+        "sacroiliac": (0.0, 0.9149, 0.0016),
+        "vl5": (0.0028, 1.0568, -0.0776),
+        "skullbase": (0.0044, 1.6209, 0.0236),
+        **left,
+        **{"r" + name[1:]: (-x, y, z) for name, (x, y, z) in left.items()},
+    }
+    position = np.array([centres[name] for name in JOINTS])
+    offsets = position.copy()
+    offsets[1:] -= position[list(PARENTS[1:])]
+    tips = np.zeros((JOINT_COUNT, 3))
+    tips[INDEX["skullbase"]] = np.array([0.0050, 1.7504, 0.0055]) - position[INDEX["skullbase"]]
+    tips[INDEX["l_wrist"]] = np.array([0.2056, 0.6743, -0.0482]) - position[INDEX["l_wrist"]]
+    tips[INDEX["r_wrist"]] = tips[INDEX["l_wrist"]] * [-1.0, 1.0, 1.0]
+    tips[INDEX["l_midtarsal"]] = tips[INDEX["r_midtarsal"]] = (0.0, 0.0, 0.07)
+    return Figure(offsets, tips)
+
+
+def world(figure: Figure, root: Array, rotations: Array) -> tuple[Array, Array]:
+    """World positions (..., 18, 3) in metres and orientations (..., 18, 4) of all joints.
+
+    `root` (..., 3) and `rotations` (..., 18, 4) are one pose or many, as in `Motion`.
+    """
+    position = np.empty((*root.shape[:-1], JOINT_COUNT, 3))
+    orientation = np.empty((*root.shape[:-1], JOINT_COUNT, 4))
+    position[..., 0, :] = root
+    orientation[..., 0, :] = rotations[..., 0, :]
+    for k in range(1, JOINT_COUNT):
+        p = PARENTS[k]
+        position[..., k, :] = position[..., p, :] + rotation.rotate(orientation[..., p, :], figure.offsets[k])
+        orientation[..., k, :] = rotation.multiply(orientation[..., p, :], rotations[..., k, :])
+    return position, orientation
+
+
+def points(figure: Figure, root: Array, rotations: Array) -> Array:
+    """World positions (..., 23, 3) in metres of the 18 joints and the 5 tips: where the codec's error is measured."""
+    position, orientation = world(figure, root, rotations)
+    tip = [position[..., k, :] + rotation.rotate(orientation[..., k, :], figure.tips[k]) for k in TIPS]
+    return np.concatenate([position, np.stack(tip, axis=-2)], axis=-2)
+
+
+def channels(motion: Motion) -> list[Array]:
+    """The paper's 19 channels: root position (n, 3) in metres, then root and 17 joints as axis and angle (n, 4)."""
+    turned = rotation.to_axis_angle(motion.rotations)
+    return [motion.root, *(turned[:, k] for k in range(JOINT_COUNT))]
