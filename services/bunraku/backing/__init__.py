@@ -1,0 +1,1 @@
+"""I/O: what the services stand on."""

@@ -1,0 +1,1 @@
+"""The Python SDK: upload, list, watch, pull."""

@@ -1,0 +1,1 @@
+"""Pure: channels to blocks and back."""

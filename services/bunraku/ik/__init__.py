@@ -1,0 +1,1 @@
+"""The service that gives arm tables and solves limbs."""

@@ -1,0 +1,1 @@
+"""The service that takes files and makes motions of them."""

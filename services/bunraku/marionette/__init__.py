@@ -1,0 +1,1 @@
+"""Pure: limbs on strings, and who holds them."""

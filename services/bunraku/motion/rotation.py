@@ -1,8 +1,8 @@
 """Rotations as unit quaternions, over whole arrays.
 
-A quaternion is an array (..., 4), order w x y z, and turns column vectors: `rotate(q, v)` is q v q*. A rotation vector is
-an array (..., 3): axis times angle in radians. Frames are right-handed. All functions broadcast over the leading axes and
-return float64.
+A quaternion is an array (..., 4), order w x y z, and turns column vectors: `rotate(q, v)` is q v q*. A rotation
+vector is an array (..., 3): axis times angle in radians. Frames are right-handed. All functions broadcast over the
+leading axes and return float64.
 """
 
 from __future__ import annotations
@@ -32,13 +32,15 @@ def multiply(a: Array, b: Array) -> Array:
 
 def conjugate(q: Array) -> Array:
     """The opposite rotation of a unit quaternion (..., 4)."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    turned: Array = q * np.array([1.0, -1.0, -1.0, -1.0])
+    return turned
 
 
 def normalise(q: Array) -> Array:
     """`q` (..., n) at unit length; a zero stays zero."""
     length = np.linalg.norm(q, axis=-1, keepdims=True)
-    return np.divide(q, length, out=np.zeros_like(q, dtype=np.float64), where=length > 0)
+    unit: Array = np.divide(q, length, out=np.zeros_like(q, dtype=np.float64), where=length > 0)
+    return unit
 
 
 def rotate(q: Array, v: Array) -> Array:
@@ -146,14 +148,15 @@ def slerp(a: Array, b: Array, t: Array | float) -> Array:
 def continuous(v: Array) -> Array:
     """Rotation vectors (n, ..., 3) of the same rotations, each the nearest equivalent to the one before.
 
-    A rotation vector may be lengthened by any multiple of 2 pi along its axis; choosing the nearest leaves a track without
-    the jumps at pi that a transform would have to pay for.
+    A rotation vector may be lengthened by any multiple of 2 pi along its axis; choosing the nearest leaves a track
+    without the jumps at pi that a transform would have to pay for.
     """
     out = np.array(v, dtype=np.float64)
     for i in range(1, len(out)):
         here, before = out[i], out[i - 1]
         angle = np.linalg.norm(here, axis=-1, keepdims=True)
-        axis = np.divide(here, angle, out=np.zeros_like(here), where=angle > 1e-9)
+        # where nothing is turned any axis will do: the one so far
+        axis = np.where(angle > 1e-9, here / np.where(angle > 1e-9, angle, 1.0), normalise(before))
         along = np.sum(axis * before, axis=-1, keepdims=True)
         turns = np.round((along - angle) / (2.0 * np.pi))
         out[i] = here + axis * turns * (2.0 * np.pi)

@@ -1,7 +1,7 @@
 """The H-Anim LOA-1 figure: a root and 17 joints, as the paper's channels name them (paper 2, 3).
 
-Frame: right-handed, metres, y up, z the way the figure faces, x to its left. At rest every local rotation is the identity
-and the figure stands in H-Anim's I-pose, arms down. World positions: P[k] = P[parent] + R[parent] offset[k].
+Frame: right-handed, metres, y up, z the way the figure faces, x to its left. At rest every local rotation is the
+identity and the figure stands in H-Anim's I-pose, arms down. World positions: P[k] = P[parent] + R[parent] offset[k].
 """
 
 from __future__ import annotations
@@ -40,7 +40,13 @@ PARENTS: tuple[int, ...] = (-1, 0, 1, 2, 3, 4, 1, 6, 7, 8, 0, 10, 10, 12, 13, 10
 INDEX: dict[str, int] = {name: index for index, name in enumerate(JOINTS)}
 JOINT_COUNT = len(JOINTS)
 CHANNEL_COUNT = 19
-TIPS: tuple[int, ...] = (INDEX["skullbase"], INDEX["l_wrist"], INDEX["r_wrist"], INDEX["l_midtarsal"], INDEX["r_midtarsal"])
+TIPS: tuple[int, ...] = (
+    INDEX["skullbase"],
+    INDEX["l_wrist"],
+    INDEX["r_wrist"],
+    INDEX["l_midtarsal"],
+    INDEX["r_midtarsal"],
+)
 """Joints that carry a tip beyond them: crown, finger tips, toe tips."""
 
 
@@ -61,8 +67,8 @@ class Figure:
 class Motion:
     """One dance, `n` frames at a steady rate.
 
-    `root` (n, 3) is the root's position in metres; `rotations` (n, 18, 4) the unit quaternions of the joints in the frame
-    of their parent (row 0: the root's orientation in the world); `fps` frames per second.
+    `root` (n, 3) is the root's position in metres; `rotations` (n, 18, 4) the unit quaternions of the joints in the
+    frame of their parent (row 0: the root's orientation in the world); `fps` frames per second.
     """
 
     figure: Figure

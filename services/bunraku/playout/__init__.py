@@ -1,0 +1,1 @@
+"""Pure: what to show and what to send, and when."""

@@ -1,0 +1,1 @@
+"""The service that holds the stage: timeline, puppeteers, merge."""

@@ -1,0 +1,1 @@
+"""The service that viewers watch: the only fan-out."""

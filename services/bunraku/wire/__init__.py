@@ -1,0 +1,1 @@
+"""Pure: messages to bytes and back."""

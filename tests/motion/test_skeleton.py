@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bunraku.motion import rotation
+from bunraku.motion.skeleton import (
+    CHANNEL_COUNT,
+    INDEX,
+    JOINT_COUNT,
+    PARENTS,
+    Figure,
+    Motion,
+    channels,
+    points,
+    standard_figure,
+    world,
+)
+
+
+def still(frames: int = 1) -> Motion:
+    return Motion(standard_figure(), 30.0, np.zeros((frames, 3)), np.tile(rotation.IDENTITY, (frames, JOINT_COUNT, 1)))
+
+
+def test_parents_come_before_their_children() -> None:
+    assert all(parent < joint for joint, parent in enumerate(PARENTS))
+
+
+def test_standard_figure_stands_as_the_specification_says() -> None:
+    motion = still()
+    position, _ = world(motion.figure, motion.figure.offsets[0], motion.rotations[0])
+    np.testing.assert_allclose(position[INDEX["l_wrist"]], [0.1984, 0.8663, -0.0583], atol=1e-9)
+    np.testing.assert_allclose(position[INDEX["r_ankle"]], [-0.1101, 0.0656, -0.0736], atol=1e-9)
+    crown = points(motion.figure, motion.figure.offsets[0], motion.rotations[0])[18]
+    np.testing.assert_allclose(crown, [0.0050, 1.7504, 0.0055], atol=1e-9)
+
+
+def test_a_turned_parent_carries_its_children() -> None:
+    motion = still()
+    motion.rotations[0, INDEX["l_shoulder"]] = rotation.about_axis(2, np.array(np.pi / 2))
+    position, orientation = world(motion.figure, motion.root, motion.rotations)
+    arm = position[0, INDEX["l_elbow"]] - position[0, INDEX["l_shoulder"]]
+    assert arm[0] == pytest.approx(0.3019, abs=1e-3)  # from hanging down to pointing left
+    np.testing.assert_allclose(orientation[0, INDEX["l_wrist"]], orientation[0, INDEX["l_shoulder"]])
+
+
+def test_channels_are_the_papers_nineteen() -> None:
+    made = channels(still(5))
+    assert len(made) == CHANNEL_COUNT
+    assert made[0].shape == (5, 3)
+    assert all(channel.shape == (5, 4) for channel in made[1:])
+
+
+def test_wrong_shapes_are_refused() -> None:
+    with pytest.raises(ValueError, match="offsets and tips"):
+        Figure(np.zeros((17, 3)), np.zeros((18, 3)))
+    with pytest.raises(ValueError, match="frame rate"):
+        Motion(standard_figure(), 0.0, np.zeros((1, 3)), np.zeros((1, JOINT_COUNT, 4)))
+    with pytest.raises(ValueError, match="rotations"):
+        Motion(standard_figure(), 30.0, np.zeros((2, 3)), np.zeros((1, JOINT_COUNT, 4)))
