@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec import transform
+from bunraku.motion.rotation import Array
 
 
 @given(st.integers(1, 90), st.integers(0, 99))
@@ -21,8 +22,8 @@ def test_it_is_the_orthonormal_cosine_transform(frames: int, seed: int) -> None:
 def test_between_frames_it_follows_a_smooth_track() -> None:
     t = np.arange(40, dtype=np.float64)
 
-    def swing(x: transform.Array) -> transform.Array:
-        track: transform.Array = np.cos(2 * np.pi * x / 37.0)[:, None]
+    def swing(x: Array) -> Array:
+        track: Array = np.cos(2 * np.pi * x / 37.0)[:, None]
         return track
 
     halves = t[3:-3] + 0.5
