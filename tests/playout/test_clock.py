@@ -61,3 +61,14 @@ def test_impossible_answers_are_ignored() -> None:
     clock.pong(1_000, 500_000, 502_000, 2_000)
     assert not clock.ready
     assert clock.at(7) == 7
+
+
+def test_a_guess_serves_until_an_answer_comes() -> None:
+    clock = ReferenceClock()
+    clock.guess(5_000_000, 1_000_000)
+    assert clock.at(1_500_000) == 5_500_000
+    assert not clock.ready
+    answer(clock, 2_000_000, 10_000, 10_000)
+    assert clock.at(2_020_050) == 2_020_050 + OFFSET
+    clock.guess(0, 0)
+    assert clock.at(2_020_060) == 2_020_060 + OFFSET

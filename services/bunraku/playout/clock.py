@@ -41,8 +41,13 @@ class ReferenceClock:
         if trip < 0 or answered < received:
             return
         self._samples.append(Sample(((received - sent) + (answered - arrived)) / 2, trip))
-        if self._shown_at is None or abs(self.offset - self._shown) > STEP:
+        if len(self._samples) == 1 or abs(self.offset - self._shown) > STEP:
             self._shown, self._shown_at = self.offset, arrived
+
+    def guess(self, reference: int, local: int) -> None:
+        """A first idea of the time, from a message that said it: used until an answer says it well."""
+        if self._shown_at is None:
+            self._shown, self._shown_at = float(reference - local), local
 
     @property
     def ready(self) -> bool:
