@@ -14,6 +14,7 @@ import numpy as np
 
 from bunraku.motion.bvh import Bvh
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.kinematics import chain
 from bunraku.motion.naming import Naming, common_ancestor, is_below
 from bunraku.motion.rotation import Array
 
@@ -75,8 +76,7 @@ def find_head(bvh: Bvh, joints: dict[str, int]) -> int | None:
     legs = [joints["l_hip"], joints["r_hip"]]
     leg = lengths[joints["l_knee"]] + lengths[joints.get("l_ankle", joints["l_knee"])]
     chest = common_ancestor(bvh.parents, arms)
-    barred = {joint for joint in range(len(bvh.names)) if joint in {*arms, *legs}}
-    barred |= {joint for joint in range(len(bvh.names)) if any(is_below(bvh.parents, limb, joint) for limb in arms + legs)}
+    barred = {joint for limb in arms + legs for joint in chain(bvh, limb)}
     barred.discard(chest)
     way = _longest_way(bvh, lengths, chest, barred)
     above = 0.0
