@@ -60,7 +60,9 @@ def read(data: bytes) -> Bvh:
     """
     text = _plain(data)
     if not text or text.isspace():
-        raise UnreadableMotion("Empty file", "there is nothing in it", hint="export the motion again and send that file")
+        raise UnreadableMotion(
+            "Empty file", "there is nothing in it", hint="export the motion again and send that file"
+        )
     hierarchy = read_hierarchy(text)
     width = sum(len(channels) for channels in hierarchy.channels)
     if width == 0:

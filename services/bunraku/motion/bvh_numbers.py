@@ -67,7 +67,8 @@ def _parse(data: Bytes, comma: int, powers: Array, out: Array) -> int:
                 return start
             power = 0
             while position < length and 48 <= data[position] <= 57:
-                power = min(power * 10 + np.int64(data[position] - 48), 1_000_000)
+                if power < 100_000:
+                    power = power * 10 + int(data[position] - 48)
                 position += 1
             exponent += -power if down else power
         if position < length and not (data[position] <= 32 or (comma == 2 and data[position] == 44)):
@@ -101,13 +102,8 @@ def _per_line(data: Bytes, comma: int, out: npt.NDArray[np.int64]) -> None:
             line += 1
 
 
-def _compiled(function: Callable[..., int | None]) -> Callable[..., int]:
-    made: Callable[..., int] = numba.njit(cache=True, nogil=True)(function)
-    return made
-
-
-_parse_compiled = _compiled(_parse)
-_per_line_compiled = _compiled(_per_line)
+_parse_compiled: Callable[..., int] = numba.njit(cache=True, nogil=True)(_parse)
+_per_line_compiled: Callable[..., None] = numba.njit(cache=True, nogil=True)(_per_line)
 
 
 def parse(data: Bytes, count: int, comma: int) -> tuple[Array, int]:

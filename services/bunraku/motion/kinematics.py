@@ -46,7 +46,8 @@ def pose(bvh: Bvh, joints: list[int], frames: npt.NDArray[np.int64] | None = Non
     position = np.zeros((len(values), len(bvh.names), 3))
     orientation = np.zeros((len(values), len(bvh.names), 4))
     column = first_channels(bvh)
-    for joint in sorted({ancestor for joint in joints for ancestor in chain(bvh, joint)}):
+    used = {ancestor for joint in joints for ancestor in chain(bvh, joint)}
+    for joint in sorted(used):
         parent = bvh.parents[joint]
         local, offset = _local(bvh, joint, values, column[joint])
         if parent < 0:

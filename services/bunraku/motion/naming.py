@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ REQUIRED = ("hip", "knee", "shoulder", "elbow")
 
 @dataclass(frozen=True, slots=True)
 class Naming:
-    """H-Anim joint names and the index of the source joint for each; `guessed` are sentences on what was not certain."""
+    """H-Anim joint names and the source joint's index for each; `guessed` are sentences on what was not certain."""
 
     profile: str
     joints: dict[str, int]
@@ -38,15 +39,19 @@ def is_below(parents: Sequence[int], joint: int, ancestor: int) -> bool:
 
 def common_ancestor(parents: Sequence[int], joints: Sequence[int]) -> int:
     """The lowest joint that is, or is above, all of `joints`."""
-    ways = []
-    for joint in joints:
-        way = []
-        while joint >= 0:
-            way.append(joint)
+    ways: list[list[int]] = []
+    for below in joints:
+        joint, way = below, [below]
+        while parents[joint] >= 0:
             joint = parents[joint]
+            way.append(joint)
         ways.append(way[::-1])
-    common = [step[0] for step in zip(*ways, strict=False) if len(set(step)) == 1]
-    return common[-1]
+    common = 0
+    for step in zip(*ways, strict=False):
+        if len(set(step)) > 1:
+            break
+        common = step[0]
+    return common
 
 
 def by_name(names: Sequence[str], parents: Sequence[int]) -> Naming | None:
@@ -97,6 +102,6 @@ def _hangs_right(joints: dict[str, int], parents: Sequence[int]) -> bool:
             return False
         for chain in (LIMB_JOINTS[:4], LIMB_JOINTS[4:]):
             there = [joints[f"{side}_{joint}"] for joint in chain if f"{side}_{joint}" in joints]
-            if not all(is_below(parents, below, above) for above, below in zip(there, there[1:], strict=False)):
+            if not all(is_below(parents, below, above) for above, below in itertools.pairwise(there)):
                 return False
     return True

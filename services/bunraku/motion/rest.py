@@ -13,7 +13,7 @@ import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.bvh import Bvh
-from bunraku.motion.kinematics import pose, rest_positions
+from bunraku.motion.kinematics import rest_positions
 from bunraku.motion.rotation import Array
 
 LEG = 0.82
@@ -25,7 +25,6 @@ TOLERANCE = np.log(1.55)
 SAMPLES = 256
 """Frames looked at to tell unit, axes and sides."""
 
-LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 AXES: Array = np.concatenate([np.eye(3), -np.eye(3)])
 
 
@@ -226,7 +225,7 @@ def _straightness(position: Array, joints: dict[str, int], up: Array) -> Array:
 
     end = _legs_end(joints)
     across = way("r_hip", "l_hip")
-    score = 2.0 * _up(position, joints) @ up + np.sum(across * way("r_shoulder", "l_shoulder"), axis=-1)
+    score: Array = 2.0 * _up(position, joints) @ up + np.sum(across * way("r_shoulder", "l_shoulder"), axis=-1)
     for side in "lr":
         thigh = way(f"{side}_hip", f"{side}_knee")
         arm = way(f"{side}_shoulder", f"{side}_elbow")

@@ -55,7 +55,7 @@ def by_shape(bvh: Bvh) -> Naming:
             field=bvh.names[0],
             hint="name the joints as Mixamo, MotionBuilder, VRM or H-Anim do, and send the whole body",
         )
-    joints = {}
+    joints: dict[str, int] = {}
     for side, leg, arm in zip("lr", legs, arms, strict=True):
         joints |= dict(zip((f"{side}_hip", f"{side}_knee", f"{side}_ankle"), leg.joints, strict=True))
         joints |= dict(zip((f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist"), arm.joints, strict=True))

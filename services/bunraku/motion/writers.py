@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINTS, PARENTS, TIPS, Motion
 
@@ -25,7 +24,8 @@ def euler_zxy(q: Array) -> Array:
     )
     about_x = np.arctan2(sine, np.hypot(2.0 * (w * y - x * z), 1.0 - 2.0 * (x * x + y * y)))
     about_y = np.where(locked, 0.0, np.arctan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (x * x + y * y)))
-    return np.degrees(np.stack([about_z, about_x, about_y], axis=-1))
+    angles: Array = np.degrees(np.stack([about_z, about_x, about_y], axis=-1))
+    return angles
 
 
 def write_bvh(motion: Motion) -> bytes:
