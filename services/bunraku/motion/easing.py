@@ -17,15 +17,6 @@ from bunraku.motion.rotation import Array
 Ease = Callable[[Array], Array]
 
 
-@dataclass(frozen=True, slots=True)
-class Move:
-    """A change by `delta` (k,) that begins at `begin` and takes `duration`, both in seconds; durations are above zero."""
-
-    begin: float
-    duration: float
-    delta: Array
-
-
 def minimum_jerk(u: Array) -> Array:
     """0 to 1 while `u` runs from 0 to 1, at rest at both ends (Flash and Hogan 1985); constant outside."""
     u = np.clip(u, 0.0, 1.0)
@@ -46,11 +37,21 @@ def falling(u: Array) -> Array:
     return eased
 
 
-def superpose(time: Array, start: Array, moves: Sequence[Move], ease: Ease) -> Array:
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A change by `delta` (k,) that begins at `begin` and takes `duration`, both in seconds; durations are above zero."""
+
+    begin: float
+    duration: float
+    delta: Array
+    ease: Ease = minimum_jerk
+
+
+def superpose(time: Array, start: Array, moves: Sequence[Move]) -> Array:
     """The track (n, k) over `time` (n,) seconds that begins at `start` (k,) and makes all `moves`."""
     track = np.tile(np.asarray(start, dtype=np.float64), (len(time), 1))
     for move in moves:
-        track += ease((time - move.begin) / move.duration)[:, None] * move.delta
+        track += move.ease((time - move.begin) / move.duration)[:, None] * move.delta
     return track
 
 

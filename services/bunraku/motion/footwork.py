@@ -61,7 +61,7 @@ def foot(score: Score, figure: Figure, side: Side, time: Array) -> Foot:
             clearance += footfall.lift * easing.bump(time, begin, peak, end)
             heel_up += np.radians(10.0) * easing.bump(time, begin, begin + 0.35 * (end - begin), begin + 0.8 * (end - begin))
             toe_up += np.radians(6.0) * easing.bump(time, begin + 0.45 * (end - begin), begin + 0.8 * (end - begin), end)
-    track = easing.superpose(time, start, moves, easing.minimum_jerk)
+    track = easing.superpose(time, start, moves)
     orientation = rotation.multiply(rotation.about_axis(1, track[:, 2]), rotation.about_axis(0, heel_up - toe_up))
     letter = side[0]
     ankle_height = sum(figure.offsets[INDEX[f"{letter}_{joint}"]][1] for joint in ("hip", "knee", "ankle")) + (
@@ -97,7 +97,7 @@ def facing(score: Score, time: Array) -> Array:
         duration = (footfall.beat - footfall.lifted) * beat + 0.3
         moves.append(Move(footfall.lifted * beat - 0.12, duration, np.radians([to - now])))
         now = to
-    return easing.superpose(time, np.radians([start]), moves, easing.minimum_jerk)[:, 0]
+    return easing.superpose(time, np.radians([start]), moves)[:, 0]
 
 
 def weight(score: Score, time: Array) -> Array:
@@ -120,13 +120,13 @@ def weight(score: Score, time: Array) -> Array:
             stands.append((_between(feet), end, end, 0.12))
         else:
             other: Side = "right" if footfall.foot == "left" else "left"
-            stands.append((_on(feet[other], feet[footfall.foot], footfall.to), begin, end, min(0.5 * (end - begin), 0.15)))
+            stands.append((_on(feet[other], feet[footfall.foot], footfall.to), begin, end, min(0.4 * (end - begin), 0.12)))
             feet[footfall.foot] = footfall.to
     stands.append((_between(feet), score.duration - 0.2, score.duration, 0.0))
     moves = []
     for (here, _, leave, early), (there, arrive, _, late) in zip(stands, stands[1:], strict=False):
         moves.append(Move(leave - early, arrive + late - leave + early, there - here))
-    return easing.superpose(time, stands[0][0], moves, easing.minimum_jerk)
+    return easing.superpose(time, stands[0][0], moves)
 
 
 def leap(score: Score, time: Array) -> Array:
@@ -171,5 +171,5 @@ def _on(standing: Place, left: Place, landing: Place) -> Array:
     """A point on the standing foot, a little to the side where the other foot comes from and goes to."""
     here = _vector(standing)[:2]
     away = 0.5 * (_vector(left)[:2] + _vector(landing)[:2]) - here
-    inwards: Array = here + 0.012 * away / max(float(np.linalg.norm(away)), 0.05)
+    inwards: Array = here + 0.018 * away / max(float(np.linalg.norm(away)), 0.05)
     return inwards

@@ -8,7 +8,7 @@ from bunraku.motion import easing, footwork, mass, rotation, skeleton, two_bone
 from bunraku.motion.easing import Move
 from bunraku.motion.footwork import Foot
 from bunraku.motion.rotation import Array
-from bunraku.motion.score import Arm, Key, Pose, Score, Side
+from bunraku.motion.score import Arm, Pose, Score, Side
 from bunraku.motion.skeleton import INDEX, JOINT_COUNT, Figure, Motion
 
 SHOULDER_LEAD, ELBOW_LAG, WRIST_LAG, HEAD_LEAD = 0.03, 0.03, 0.09, 0.06
@@ -37,9 +37,10 @@ def _track(score: Score, time: Array, values: dict[Pose, Array], lag: float = 0.
     moves = []
     before = score.rest
     for key in score.keys:
-        moves.append(Move((key.beat - key.over) * beat, key.over * beat, values[key.pose] - values[before]))
+        ease = easing.minimum_jerk if key.even else easing.crisp
+        moves.append(Move((key.beat - key.over) * beat, key.over * beat, values[key.pose] - values[before], ease))
         before = key.pose
-    return easing.superpose(time - lag, values[score.rest], moves, easing.crisp)
+    return easing.superpose(time - lag, values[score.rest], moves)
 
 
 def _poses(score: Score) -> set[Pose]:

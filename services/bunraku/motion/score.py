@@ -62,12 +62,14 @@ class Pose:
 class Key:
     """The body comes into `pose` at `beat`, having set out `over` beats earlier.
 
-    If it sets out before the key before is reached, it flows through that one.
+    If it sets out before the key before is reached, it flows through that one. It starts crisply, as a puppet does, or, where
+    it is `even`, as a slow sweep does.
     """
 
     beat: float
     pose: Pose
     over: float
+    even: bool = False
 
 
 @dataclass(frozen=True, slots=True)
