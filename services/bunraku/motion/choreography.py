@@ -7,10 +7,10 @@ stamps that mark the beat, the hops of a crow, and held poses (mie). The steps, 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
+from bunraku.motion import poses
 from bunraku.motion.performer import perform
-from bunraku.motion.score import Arm, Hop, Key, Place, Pose, Score, Side, Step
+from bunraku.motion.score import Hop, Key, Place, Score, Side, Step
 from bunraku.motion.skeleton import Motion, standard_figure
 
 TITLE = "Sanbasō, First Steps"
@@ -18,93 +18,51 @@ BEATS_PER_MINUTE = 96.0
 BEATS_PER_PHRASE = 8
 BEATS = 48
 
-# Arms: wrist (out, up, forward) from the shoulder in arm lengths, where the elbow points, turn of the palm, bend of the hand.
-ON_THIGH = Arm((0.10, -0.90, 0.30), (1.0, -0.2, -0.8), 10, 10)
-BOWING = Arm((0.02, -0.80, 0.50), (1.0, -0.1, -0.6), 0, 10)
-LOW_OPEN = Arm((0.62, -0.66, 0.28), (0.3, -0.3, -1.0), 50, -10)
-LEVEL = Arm((0.95, 0.02, 0.22), (0.0, -0.6, -1.0), 70, -15)
-HIGH = Arm((0.48, 0.82, 0.18), (0.9, -0.1, -0.5), 20, -15)
-BEFORE_CHEST = Arm((0.02, -0.22, 0.66), (0.9, -0.6, -0.2), -10, 0)
-CROSSED_OVER = Arm((-0.42, -0.02, 0.74), (0.9, -0.6, -0.1), -20, 5)
-CROSSED_UNDER = Arm((-0.40, -0.44, 0.52), (0.9, -0.5, -0.1), -20, 5)
-UPPER_FRONT = Arm((0.22, 0.10, 0.86), (0.8, -0.8, -0.1), 10, -10)
-LOWER_FRONT = Arm((0.20, -0.48, 0.66), (0.9, -0.4, -0.3), 10, -10)
-RAISED_FIST = Arm((0.60, 0.44, 0.16), (0.7, -0.7, -0.3), -30, 35)
-SLEEVE_SHOWN = Arm((0.90, -0.18, 0.34), (0.0, -1.0, -0.4), 20, -30)
-WING_UP = Arm((0.86, 0.46, 0.10), (0.1, -0.3, -1.0), 0, -30)
-WING_DOWN = Arm((0.74, -0.52, 0.06), (0.4, 0.3, -1.0), 0, 25)
-FAN_ABOVE = Arm((0.30, 0.90, 0.30), (1.0, 0.1, -0.3), 30, -25)
-FAN_ASIDE = Arm((0.90, 0.22, 0.30), (0.0, -0.8, -0.7), 80, -25)
-AT_HIP = Arm((0.34, -0.58, 0.10), (1.0, 0.0, -0.5), 0, 30)
-TRAILING = Arm((0.84, -0.42, 0.26), (0.2, -0.6, -1.0), 30, -30)
-
-STAND = Pose(ON_THIGH, ON_THIGH, depth=0.03)
-NOD_OF_GREETING = Pose(BOWING, BOWING, depth=0.035, bow=28, nod=14)
-DEEP_BOW = Pose(BOWING, BOWING, depth=0.05, bow=52, nod=18)
-OPENING = Pose(LOW_OPEN, LOW_OPEN, depth=0.07, bow=4, nod=-4)
-GATHERED = Pose(BEFORE_CHEST, BEFORE_CHEST, depth=0.08, bow=6, nod=6)
-SWEEP_LEFT = Pose(LEVEL, BEFORE_CHEST, depth=0.08, bow=4, lean=6, twist=18, look=42, tilt=-4)
-SWEEP_RIGHT = SWEEP_LEFT.mirrored()
-SLEEVES_WIDE = Pose(LEVEL, LEVEL, depth=0.06, bow=-3, nod=-5)
-KNEE_RAISED = Pose(HIGH, AT_HIP, depth=0.05, bow=2, twist=-8, look=-20)
-MIE_RIGHT = Pose(SLEEVE_SHOWN, RAISED_FIST, depth=0.20, bow=6, lean=6, twist=-14, look=-48, nod=-2, tilt=4)
-MIE_ROLL = replace(MIE_RIGHT, look=-6, nod=14, tilt=14)
-MIE_FRONT = replace(MIE_RIGHT, look=8, nod=-6, tilt=-5, depth=0.215)
-BEFORE_CROSSING = Pose(UPPER_FRONT, LOWER_FRONT, depth=0.12, bow=8, nod=4)
-CROSSED = Pose(CROSSED_OVER, CROSSED_UNDER, depth=0.10, bow=12, nod=12)
-FANS = Pose(HIGH, HIGH, depth=0.05, bow=-5, nod=-12)
-TURN_FAN = Pose(FAN_ASIDE, FAN_ABOVE, depth=0.07, lean=5, twist=10, look=12, tilt=4)
-TURN_LOW = Pose(FAN_ABOVE, FAN_ASIDE, depth=0.08, lean=-5, twist=8, look=10, nod=6)
-CROUCHED = Pose(WING_DOWN, WING_DOWN, depth=0.10, bow=12, nod=-4)
-WINGS = Pose(WING_UP, WING_UP, depth=0.07, bow=6, nod=-6)
-CIRCLING = Pose(SLEEVE_SHOWN, FAN_ABOVE, depth=0.08, bow=4, lean=-6, twist=-8, look=-12)
-CIRCLING_WIDE = Pose(LEVEL, FAN_ASIDE, depth=0.09, bow=5, lean=-4, twist=-10, look=-10, nod=4)
-LAST_KNEE = Pose(LEVEL, HIGH, depth=0.05, bow=2, twist=8, look=20)
-LAST_MIE = Pose(FAN_ABOVE, TRAILING, depth=0.20, bow=5, lean=-8, twist=12, look=48, nod=-2, tilt=-4)
-LAST_MIE_FRONT = replace(LAST_MIE, look=4, nod=-6, tilt=-8)
-
+QUICK = 0.28
+"""Beats in the air of a step that takes half a beat."""
 HOME_LEFT, HOME_RIGHT = Place(0.08, 0.0, 8), Place(-0.08, 0.0, -8)
 
 KEYS = (
     # 1 greeting, and the sleeves open
-    Key(2.0, NOD_OF_GREETING, 1.5, even=True),
-    Key(3.75, STAND, 1.5, even=True),
-    Key(5.5, OPENING, 1.75, even=True),
-    Key(6.75, SLEEVES_WIDE, 1.75),
-    Key(8.0, GATHERED, 1.0),
+    Key(2.0, poses.NOD_OF_GREETING, 1.5, even=True),
+    Key(3.75, poses.STAND, 1.5, even=True),
+    Key(5.5, poses.OPENING, 1.75, even=True),
+    Key(6.75, poses.SLEEVES_WIDE, 1.75),
+    Key(8.0, poses.GATHERED, 1.0),
     # 2 gliding left and right, the sleeves sweep
-    Key(10.75, SWEEP_LEFT, 2.5, even=True),
-    Key(13.0, GATHERED, 1.25),
-    Key(15.0, SWEEP_RIGHT, 2.0, even=True),
-    Key(16.25, GATHERED, 1.0),
+    Key(10.75, poses.SWEEP_LEFT, 2.5, even=True),
+    Key(12.1, poses.SWEEP_LEFT_NOD, 0.6),
+    Key(13.0, poses.GATHERED, 1.25),
+    Key(15.0, poses.SWEEP_RIGHT, 2.0, even=True),
+    Key(16.25, poses.GATHERED, 1.0),
     # 3 the first mie, hands crossed and fanned out
-    Key(17.5, KNEE_RAISED, 1.1),
-    Key(18.15, MIE_RIGHT, 0.7),
-    Key(19.0, MIE_ROLL, 0.7),
-    Key(19.7, MIE_FRONT, 0.5),
-    Key(21.0, BEFORE_CROSSING, 1.1),
-    Key(22.0, CROSSED, 1.0),
-    Key(24.0, FANS, 1.75),
+    Key(17.5, poses.KNEE_RAISED, 1.1),
+    Key(18.15, poses.MIE_RIGHT, 0.7),
+    Key(19.0, poses.MIE_ROLL, 0.7),
+    Key(19.7, poses.MIE_FRONT, 0.5),
+    Key(21.0, poses.BEFORE_CROSSING, 1.1),
+    Key(22.0, poses.CROSSED, 1.0),
+    Key(24.0, poses.FANS, 1.75),
     # 4 a slow turn under the fan
-    Key(26.0, TURN_FAN, 2.0, even=True),
-    Key(29.5, TURN_LOW, 3.0, even=True),
-    Key(32.0, CROUCHED, 2.0),
+    Key(26.0, poses.TURN_FAN, 2.0, even=True),
+    Key(29.5, poses.TURN_LOW, 3.0, even=True),
+    Key(32.0, poses.CROUCHED, 2.0),
     # 5 the crow's hops, and a circle round the stage
-    Key(32.8, WINGS, 0.7),
-    Key(33.3, CROUCHED, 0.7),
-    Key(33.8, WINGS, 0.7),
-    Key(34.3, CROUCHED, 0.7),
-    Key(34.8, WINGS, 0.7),
-    Key(35.3, CROUCHED, 0.7),
-    Key(37.0, CIRCLING, 1.75),
-    Key(40.0, CIRCLING_WIDE, 3.0, even=True),
+    Key(32.8, poses.WINGS, 0.7),
+    Key(33.3, poses.CROUCHED, 0.7),
+    Key(33.8, poses.WINGS, 0.7),
+    Key(34.3, poses.CROUCHED, 0.7),
+    Key(34.8, poses.WINGS, 0.7),
+    Key(35.3, poses.CROUCHED, 0.7),
+    Key(37.0, poses.CIRCLING, 1.75),
+    Key(40.0, poses.CIRCLING_WIDE, 3.0, even=True),
     # 6 the last mie, and the bow
-    Key(42.4, LAST_KNEE, 1.75),
-    Key(43.15, LAST_MIE, 0.75),
-    Key(44.0, LAST_MIE_FRONT, 0.5),
-    Key(45.5, STAND, 1.25, even=True),
-    Key(46.5, DEEP_BOW, 1.25),
-    Key(47.75, STAND, 1.2, even=True),
+    Key(42.4, poses.LAST_KNEE, 1.75),
+    Key(43.15, poses.LAST_MIE, 0.75),
+    Key(44.0, poses.LAST_MIE_FRONT, 0.5),
+    Key(45.5, poses.STAND, 1.25, even=True),
+    Key(46.5, poses.DEEP_BOW, 1.25),
+    Key(47.75, poses.STAND, 1.2, even=True),
 )
 
 
@@ -125,34 +83,28 @@ def raised(beat: float, foot: Side, x: float, z: float, turn: float = 0.0) -> St
 
 def standing(x: float, z: float, turn: float, apart: float = 0.08, open_by: float = 8.0) -> dict[Side, Place]:
     """Both feet about a point (x, z) of the stage, facing `turn`, each `apart` metres from it, toes out by `open_by`."""
-    out = math.radians(turn)
-    sides: dict[Side, Place] = {}
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        across = sign * apart
-        sides["left" if side == "left" else "right"] = Place(
-            x + across * math.cos(out), z - across * math.sin(out), turn + sign * open_by
-        )
-    return sides
+    across, down = apart * math.cos(math.radians(turn)), apart * math.sin(math.radians(turn))
+    return {"left": Place(x + across, z - down, turn + open_by), "right": Place(x - across, z + down, turn - open_by)}
 
 
 def turn_in_place() -> list[Step]:
-    """A whole turn to the left on the spot: the left foot opens, the right follows."""
-    steps = []
-    # the facing to which each step brings its foot
-    for beat, foot, turn in (
+    """A whole turn to the left on the spot: the left foot opens, the right follows; slow, and quick at the end."""
+    facings: tuple[tuple[float, Side, float], ...] = (
         (25.0, "left", 66.0),
         (26.0, "right", 88.0),
         (27.0, "left", 156.0),
         (28.0, "right", 178.0),
         (29.0, "left", 246.0),
         (30.0, "right", 268.0),
-        (31.0, "left", 334.0),
-        (31.5, "right", 360.0),
-        (32.0, "left", 360.0),
-    ):
-        side: Side = "left" if foot == "left" else "right"
-        steps.append(Step(beat, side, standing(0.0, 0.0, turn, 0.10 if beat < 31.5 else 0.08)[side], swing=0.5 if beat < 31.0 else 0.28))
-    return steps
+    )
+    steps = [Step(beat, foot, standing(0.0, 0.0, turn, apart=0.10)[foot]) for beat, foot, turn in facings]
+    home = standing(0.0, 0.0, 360.0)
+    return [
+        *steps,
+        Step(31.0, "left", standing(0.0, 0.0, 334.0, apart=0.10)["left"], swing=QUICK),
+        Step(31.5, "right", home["right"], swing=QUICK),
+        Step(32.0, "left", home["left"], swing=QUICK),
+    ]
 
 
 def circle() -> list[Step]:
@@ -163,15 +115,16 @@ def circle() -> list[Step]:
         heading = 360.0 - min(36.0 * (index + 1), 360.0)
         out = math.radians(heading)
         side: Side = "right" if index % 2 == 0 else "left"
-        place = standing(radius * (math.cos(out) - 1.0), -radius * math.sin(out), heading, open_by=8 if index > 8 else 4)
-        steps.append(Step(36.0 + 0.5 * index, side, place[side], swing=0.28))
+        place = standing(
+            radius * (math.cos(out) - 1.0), -radius * math.sin(out), heading, open_by=8 if index > 8 else 4
+        )
+        steps.append(Step(36.0 + 0.5 * index, side, place[side], swing=QUICK))
     return steps
 
 
 def hop(beat: float, x: float, z: float, turn: float) -> Hop:
-    """A hop of the crow (karasu-tobi) that lands with both feet about (x, z)."""
-    places = standing(x, z, turn)
-    return Hop(beat, places["left"], places["right"])
+    """A hop of the crow (karasu-tobi) that lands with both feet about (x, z), facing `turn`."""
+    return Hop(beat, **standing(x, z, turn))
 
 
 STEPS = (
@@ -198,7 +151,7 @@ STEPS = (
 )
 HOPS = (hop(33.0, -0.15, 0.02, 374.0), hop(34.0, 0.10, 0.04, 346.0), hop(35.0, 0.0, 0.0, 360.0))
 
-SCORE = Score(BEATS_PER_MINUTE, BEATS, STAND, HOME_LEFT, HOME_RIGHT, KEYS, STEPS, HOPS)
+SCORE = Score(BEATS_PER_MINUTE, BEATS, poses.STAND, HOME_LEFT, HOME_RIGHT, KEYS, STEPS, HOPS)
 
 
 def step_times() -> list[float]:

@@ -1,7 +1,7 @@
 """How a movement starts and stops: eases, and tracks made by adding movements up.
 
-A track is the sum of single movements from key to key, each with its own begin and end; where they overlap the body flows
-through a key instead of stopping there (superposition of submovements: Flash and Henis 1991, "Arm trajectory
+A track is the sum of single movements from key to key, each with its own begin and end; where they overlap the body
+flows through a key instead of stopping there (superposition of submovements: Flash and Henis 1991, "Arm trajectory
 modifications during reaching towards visual targets").
 """
 

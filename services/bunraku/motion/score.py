@@ -1,24 +1,26 @@
 """How a dance is written down: poses at beats, steps that land on beats, hops. A score holds no numbers per frame.
 
-Places on the stage are metres from its centre, x to the puppet's left when it faces the audience, z towards the audience.
-Angles are degrees. A beat is counted from 0 at the start of the dance.
+Places on the stage are metres from its centre, x to the puppet's left when it faces the audience, z towards the
+audience. Angles are degrees. A beat is counted from 0 at the start of the dance.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
 
 
 @dataclass(frozen=True, slots=True)
 class Arm:
     """Where one arm is, the same numbers for either side.
 
-    `wrist` is the wrist from the shoulder as (out, up, forward) of the chest, in lengths of the hanging arm; `elbow` the
-    direction (out, up, forward) in which the elbow points; `turn` degrees by which the palm, inwards at rest, is turned to
-    the front; `bend` degrees by which the hand is bent to its palm.
+    `wrist` is the wrist from the shoulder as (out, up, forward) of the chest, in lengths of the hanging arm; `elbow`
+    the direction (out, up, forward) in which the elbow points; `turn` degrees by which the palm, inwards at rest, is
+    turned to the front; `bend` degrees by which the hand is bent to its palm.
     """
 
     wrist: tuple[float, float, float]
@@ -31,8 +33,9 @@ class Arm:
 class Pose:
     """A shape of the body above the feet: both arms, and
 
-    `depth` metres by which the hips sink below standing; `bow` forward, `lean` and `twist` to the left, of the trunk over
-    the hips; `look`, `nod` and `tilt` of the head: to the left of the hips' facing, down, and over the left shoulder.
+    `depth` metres by which the hips sink below standing; `bow` forward, `lean` and `twist` to the left, of the trunk
+    over the hips; `look`, `nod` and `tilt` of the head: to the left of the hips' facing, down, and over the left
+    shoulder.
     """
 
     left: Arm
@@ -62,8 +65,8 @@ class Pose:
 class Key:
     """The body comes into `pose` at `beat`, having set out `over` beats earlier.
 
-    If it sets out before the key before is reached, it flows through that one. It starts crisply, as a puppet does, or, where
-    it is `even`, as a slow sweep does.
+    If it sets out before the key before is reached, it flows through that one. It starts crisply, as a puppet does,
+    or, where it is `even`, as a slow sweep does.
     """
 
     beat: float
@@ -81,17 +84,21 @@ class Place:
     turn: float = 0.0
 
 
+Feet = Mapping[Side, Place]
+"""Where both feet stand, or where one or both go."""
+
+
 @dataclass(frozen=True, slots=True)
 class Step:
     """A foot goes to a place and lands at `beat`.
 
-    It is `swing` beats in the air, `lift` metres high at most, and comes down within the last `fall` beats. A `stamp` comes
-    down hard and is heard.
+    It is `swing` beats in the air, its sole `lift` metres high at most, and comes down in the last `fall` beats. A
+    `stamp` comes down hard and is heard.
     """
 
     beat: float
     foot: Side
-    to: Place
+    place: Place
     swing: float = 0.5
     lift: float = 0.02
     fall: float = 0.25
@@ -102,28 +109,42 @@ class Step:
         """The beat at which the foot leaves the floor."""
         return self.beat - self.swing
 
+    @property
+    def to(self) -> Feet:
+        """Where the foot goes, by its side."""
+        return {self.foot: self.place}
+
 
 @dataclass(frozen=True, slots=True)
 class Hop:
-    """Both feet leave the floor together and land at `beat` in their places, `flight` beats later."""
+    """Both feet leave the floor together and land at `beat` in their places, after `flight` beats.
+
+    The soles rise `lift` times as high as the body flies: above 1, the legs are drawn up.
+    """
 
     beat: float
     left: Place
     right: Place
     flight: float = 0.42
+    lift: float = 1.3
 
     @property
     def lifted(self) -> float:
         """The beat at which the feet leave the floor."""
         return self.beat - self.flight
 
+    @property
+    def to(self) -> Feet:
+        """Where the feet go, by their sides."""
+        return {"left": self.left, "right": self.right}
+
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """A dance of `beats` beats that begins and ends in `rest`, its feet at `left` and `right`.
+    """A dance of `beats` beats that begins and ends in the pose `rest`, its feet at `left` and `right`.
 
-    Keys are in order of time, and so are steps and hops. ValueError says where a score does not close or has both feet in
-    the air but in a hop.
+    Keys and hops are in order of time. ValueError says at which beat a score does not close or lifts a foot when it
+    cannot.
     """
 
     beats_per_minute: float
@@ -133,23 +154,33 @@ class Score:
     right: Place
     keys: tuple[Key, ...]
     steps: tuple[Step, ...]
-    hops: tuple[Hop, ...] = field(default=())
+    hops: tuple[Hop, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.keys or self.keys[-1].pose != self.rest or self.keys[-1].beat > self.beats:
-            raise ValueError("the last key must bring the body back to the rest pose before the end, or a loop jumps")
-        keys = [key.beat for key in self.keys]
-        if keys != sorted(keys) or any(key.over <= 0 for key in self.keys):
-            raise ValueError("keys must be in order of beats, each taking more than 0 beats")
-        feet = {"left": self.left, "right": self.right}
-        free = 0.0
+            raise ValueError(
+                f"the last key must bring the body back to the rest pose by beat {self.beats}, or a loop jumps"
+            )
+        begun = 0.0
+        for key in self.keys:
+            if key.beat < begun or not 0 < key.over <= key.beat:
+                raise ValueError(f"the key at beat {key.beat} must follow beat {begun} and set out after beat 0")
+            begun = key.beat
+        feet, landed = dict(self.feet), 0.0
         for footfall in self.footfalls():
-            if footfall.lifted < free - 1e-9:
-                raise ValueError(f"the foot that lands at beat {footfall.beat} is lifted before beat {free}, when one is in the air")
-            free = footfall.beat
-            feet |= {footfall.foot: footfall.to} if isinstance(footfall, Step) else {"left": footfall.left, "right": footfall.right}
-        if feet != {"left": self.left, "right": self.right} or free > self.beats:
-            raise ValueError(f"the feet end at {feet}, not where they began, or a loop jumps")
+            if footfall.lifted < landed - 1e-9:
+                raise ValueError(
+                    f"the foot that lands at beat {footfall.beat} is lifted before the other lands at {landed}"
+                )
+            feet |= footfall.to
+            landed = footfall.beat
+        if feet != self.feet or landed > self.beats:
+            raise ValueError(f"at beat {landed} the feet are at {feet}, not where they began, so a loop jumps")
+
+    @property
+    def feet(self) -> Feet:
+        """Where the feet stand at the beginning."""
+        return {"left": self.left, "right": self.right}
 
     def footfalls(self) -> list[Step | Hop]:
         """Steps and hops in order of landing."""

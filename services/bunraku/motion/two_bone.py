@@ -1,7 +1,8 @@
 """Two bones and a hinge: the exact bend and turn that bring the end of an arm or leg to a point.
 
-The bones are rest offsets, `upper` from the first joint to the hinge and `lower` from the hinge to the end. They need not be
-in line at rest; the hinge turns about x of its own frame, a knee by a positive angle and an elbow by a negative one.
+The bones are rest offsets, `upper` from the first joint to the hinge and `lower` from the hinge to the end. They need
+not be in line at rest; the hinge turns about x of its own frame, a knee by a positive angle and an elbow by a
+negative one.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ def reach(upper: Array, lower: Array, bend: float = 0.0) -> float:
 def solve(upper: Array, lower: Array, target: Array, pole: Array, hinge: float) -> tuple[Array, Array]:
     """Orientation (n, 4) of the first joint and flexion (n,) in radians, never below 0, that bring the end to `target`.
 
-    `target` (n, 3) metres from the first joint and `pole` (n, 3), the direction in which the hinge points out, are in one
-    frame, that of the first joint's parent; the orientation is in it too. `hinge` is `KNEE` or `ELBOW`: the sign of flexion
-    about x. A target out of reach (further than the rest pose reaches, or nearer than 150 degrees of flexion) is met in
-    direction only. `pole` must not be along `target`.
+    `target` (n, 3) metres from the first joint and `pole` (n, 3), the direction in which the hinge points out, are in
+    one frame, that of the first joint's parent; the orientation is in it too. `hinge` is `KNEE` or `ELBOW`: the sign
+    of flexion about x. A target out of reach (further than the rest pose reaches, or nearer than 150 degrees of
+    flexion) is met in direction only. `pole` must not be along `target`.
     """
     target = np.asarray(target, dtype=np.float64)
     furthest = reach(upper, lower)
