@@ -37,7 +37,7 @@ KEYS = (
     Key(16.25, poses.GATHERED, 1.0),
     # 3 the first mie, hands crossed and fanned out
     Key(17.5, poses.KNEE_RAISED, 1.1),
-    Key(18.15, poses.MIE_RIGHT, 0.7),
+    Key(18.15, poses.MIE_RIGHT, 0.85),
     Key(19.0, poses.MIE_ROLL, 0.7),
     Key(19.7, poses.MIE_FRONT, 0.5),
     Key(21.0, poses.BEFORE_CROSSING, 1.1),
@@ -82,7 +82,7 @@ def raised(beat: float, foot: Side, x: float, z: float, turn: float = 0.0) -> St
 
 
 def standing(x: float, z: float, turn: float, apart: float = 0.08, open_by: float = 8.0) -> dict[Side, Place]:
-    """Both feet about a point (x, z) of the stage, facing `turn`, each `apart` metres from it, toes out by `open_by`."""
+    """Both feet about a point (x, z), facing `turn`, each `apart` metres from it, its toes out by `open_by` degrees."""
     across, down = apart * math.cos(math.radians(turn)), apart * math.sin(math.radians(turn))
     return {"left": Place(x + across, z - down, turn + open_by), "right": Place(x - across, z + down, turn - open_by)}
 
@@ -108,23 +108,23 @@ def turn_in_place() -> list[Step]:
 
 
 def circle() -> list[Step]:
-    """A whole turn to the right while walking round a small circle, two quick steps to the beat; the last one closes."""
+    """A whole turn to the right, walking round a small circle in two quick steps to the beat; the last one closes."""
     radius = 0.2
     steps = []
     for index in range(11):
         heading = 360.0 - min(36.0 * (index + 1), 360.0)
         out = math.radians(heading)
         side: Side = "right" if index % 2 == 0 else "left"
-        place = standing(
-            radius * (math.cos(out) - 1.0), -radius * math.sin(out), heading, open_by=8 if index > 8 else 4
-        )
+        x, z = radius * (math.cos(out) - 1.0), -radius * math.sin(out)
+        place = standing(x, z, heading, open_by=8 if index > 8 else 4)
         steps.append(Step(36.0 + 0.5 * index, side, place[side], swing=QUICK))
     return steps
 
 
 def hop(beat: float, x: float, z: float, turn: float) -> Hop:
     """A hop of the crow (karasu-tobi) that lands with both feet about (x, z), facing `turn`."""
-    return Hop(beat, **standing(x, z, turn))
+    feet = standing(x, z, turn)
+    return Hop(beat, feet["left"], feet["right"])
 
 
 STEPS = (

@@ -39,7 +39,7 @@ def falling(u: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A change by `delta` (k,) that begins at `begin` and takes `duration`, both in seconds; durations are above zero."""
+    """A change by `delta` (k,) that begins at `begin` and takes `duration`, above zero, both in seconds."""
 
     begin: float
     duration: float

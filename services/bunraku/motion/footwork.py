@@ -66,7 +66,7 @@ def _vector(place: Place) -> Array:
 
 
 def _sole(figure: Figure, side: Side, orientation: Array, toes: Array) -> tuple[Array, Array]:
-    """How high over the ankle the lowest point of the sole is (n,), and where from it the middle of the foot is (n, 3)."""
+    """Height above the ankle of the lowest of the sole (n,), and from it the way to the middle of the foot (n, 3)."""
     chain = ("humanoid_root", "sacroiliac", *(f"{side[0]}_{joint}" for joint in ("hip", "knee", "ankle")))
     down = FLOOR - sum(float(figure.offsets[INDEX[joint]][1]) for joint in chain)
     midtarsal = INDEX[f"{side[0]}_midtarsal"]

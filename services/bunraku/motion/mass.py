@@ -47,6 +47,6 @@ WEIGHTS: Array = _weights()
 
 
 def centre_of_mass(points: Array) -> Array:
-    """The centre of mass (..., 3) in metres of a body whose joints and tips are at `points` (..., 23, 3) (`skeleton.points`)."""
+    """Centre of mass (..., 3) in metres of a body whose `skeleton.points` are at `points` (..., 23, 3)."""
     centre: Array = np.einsum("k,...kj->...j", WEIGHTS, points)
     return centre

@@ -21,8 +21,8 @@ NECK = np.radians(40.0)
 BREATHS = 6
 """Breaths in one dance, a whole number so that it closes."""
 _SHOULDER_MIDDLE: Array = np.array([-0.8, 0.0, 0.8])
-"""Rotation vector of a left arm held forward and out, the middle of its range. Arms are blended as rotation vectors from
-here, so that none comes near the half turn where such a vector jumps."""
+"""Rotation vector of a left arm held forward and out, the middle of its range. Arms are blended as rotation vectors
+from here, so that none comes near the half turn where such a vector jumps."""
 _MIRROR: dict[Side, Array] = {"left": np.array([1.0, 1.0, 1.0]), "right": np.array([1.0, -1.0, -1.0])}
 
 
@@ -108,7 +108,7 @@ def _arm(score: Score, figure: Figure, time: Array, side: Side, rotations: Array
 
 
 def solve_arm(figure: Figure, arm: Arm) -> Array:
-    """Shoulder (a rotation vector from the middle of its range), bend of the elbow, and wrist of a left arm: (7,) radians."""
+    """A left arm (7,), radians: shoulder, a rotation vector from the middle of its range, bend of the elbow, wrist."""
     upper, lower = figure.offsets[INDEX["l_elbow"]], figure.offsets[INDEX["l_wrist"]]
     target = np.array([arm.wrist]) * two_bone.reach(upper, lower)
     turned, bend = two_bone.solve(upper, lower, target, np.array([arm.elbow]), two_bone.ELBOW)

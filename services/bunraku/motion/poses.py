@@ -29,7 +29,6 @@ FAN_ASIDE = Arm((0.90, 0.22, 0.30), (0.0, -0.8, -0.7), 80, -25)
 AT_HIP = Arm((0.34, -0.58, 0.10), (1.0, 0.0, -0.5), 0, 30)
 TRAILING = Arm((0.84, -0.42, 0.26), (0.2, -0.6, -1.0), 30, -30)
 
-
 STAND = Pose(ON_THIGH, ON_THIGH, depth=0.03)
 NOD_OF_GREETING = Pose(BOWING, BOWING, depth=0.035, bow=28, nod=14)
 DEEP_BOW = Pose(BOWING, BOWING, depth=0.05, bow=52, nod=18)

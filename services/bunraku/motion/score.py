@@ -31,11 +31,11 @@ class Arm:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A shape of the body above the feet: both arms, and
+    """A shape of the body above the feet.
 
-    `depth` metres by which the hips sink below standing; `bow` forward, `lean` and `twist` to the left, of the trunk
-    over the hips; `look`, `nod` and `tilt` of the head: to the left of the hips' facing, down, and over the left
-    shoulder.
+    `left` and `right` are its arms; `depth` metres by which the hips sink below standing; `bow` forward, `lean` and
+    `twist` to the left, of the trunk over the hips; `look`, `nod` and `tilt` of the head: to the left of the hips'
+    facing, down, and over the left shoulder.
     """
 
     left: Arm
@@ -77,7 +77,7 @@ class Key:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a foot stands: the middle of its sole (x, z) in metres, its toes `turn` degrees to the left of the audience."""
+    """Where a foot stands: the middle of its sole (x, z), metres, and its turn to the left of the audience, degrees."""
 
     x: float
     z: float
@@ -158,19 +158,17 @@ class Score:
 
     def __post_init__(self) -> None:
         if not self.keys or self.keys[-1].pose != self.rest or self.keys[-1].beat > self.beats:
-            raise ValueError(
-                f"the last key must bring the body back to the rest pose by beat {self.beats}, or a loop jumps"
-            )
-        begun = 0.0
+            raise ValueError(f"the last key must bring back the rest pose by beat {self.beats}, or a loop jumps")
+        reached = 0.0
         for key in self.keys:
-            if key.beat < begun or not 0 < key.over <= key.beat:
-                raise ValueError(f"the key at beat {key.beat} must follow beat {begun} and set out after beat 0")
-            begun = key.beat
+            if key.beat < reached or not 0 < key.over <= key.beat:
+                raise ValueError(f"the key at beat {key.beat} must follow beat {reached} and set out after beat 0")
+            reached = key.beat
         feet, landed = dict(self.feet), 0.0
         for footfall in self.footfalls():
             if footfall.lifted < landed - 1e-9:
                 raise ValueError(
-                    f"the foot that lands at beat {footfall.beat} is lifted before the other lands at {landed}"
+                    f"the step to beat {footfall.beat} begins before beat {landed}, when a foot is in the air"
                 )
             feet |= footfall.to
             landed = footfall.beat
