@@ -5,7 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
+
+# how long an example takes says more of the machine than of the code
+hypothesis.settings.register_profile("bunraku", deadline=None)
+hypothesis.settings.load_profile("bunraku")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
