@@ -1,4 +1,4 @@
-"""What a job does: a file's bytes to an encoded motion. Importing this loads all that a job uses, the compiled code too."""
+"""What a job does: a file to an encoded motion. Importing this loads all that a job uses, the compiled code too."""
 
 from __future__ import annotations
 
