@@ -116,7 +116,8 @@ def circle() -> list[Step]:
         out = math.radians(heading)
         side: Side = "right" if index % 2 == 0 else "left"
         x, z = radius * (math.cos(out) - 1.0), -radius * math.sin(out)
-        place = standing(x, z, heading, *((0.08, 8.0) if index > 8 else (0.066, 4.0)))
+        # narrow and straight while it turns, open again at home
+        place = standing(x, z, heading) if index > 8 else standing(x, z, heading, apart=0.066, open_by=4.0)
         steps.append(Step(36.0 + 0.5 * index, side, place[side], swing=QUICK))
     return steps
 
