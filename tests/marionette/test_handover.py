@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from math import acos, pi
+from math import acos, cos, pi, sin
 
 import numpy as np
 from hypothesis import given
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bunraku.marionette import handover, vector
 from bunraku.marionette.arm import Arm
-from bunraku.marionette.handover import Handover
+from bunraku.marionette.handover import HandMix, Handover
 from bunraku.marionette.table import table_of
 from bunraku.marionette.vector import IDENTITY, Vector
 from tests.marionette.arms import ARMS
@@ -61,11 +61,26 @@ def test_a_followed_hand_keeps_its_speed_and_arrives(hand: Vector, target: Vecto
 
 @given(hands, hands, st.floats(0.0, 1.0))
 def test_a_mixed_hand_never_passes_through_the_shoulder(dance: Vector, pulled: Vector, weight: float) -> None:
-    mixed = handover.mix_hand(dance, pulled, weight)
+    mixed, turn = HandMix().mix(dance, pulled, weight)
     near, far = sorted((vector.length(dance), vector.length(pulled)))
     assert near - 1e-9 <= vector.length(mixed) <= far + 1e-9
-    assert handover.mix_hand(dance, pulled, 0.0) is dance
-    assert handover.mix_hand(dance, pulled, 1.0) is pulled
+    assert HandMix().mix(dance, pulled, 0.0)[0] is dance
+    assert HandMix().mix(dance, pulled, 1.0)[0] is pulled
+    along = vector.rotate(turn, vector.unit(dance, mixed))
+    assert vector.length(vector.subtract(along, vector.unit(mixed, along))) < 1e-6
+
+
+@given(st.floats(-0.2, 0.2), st.floats(0.2, 0.8))
+def test_hands_that_pass_opposite_each_other_do_not_change_the_way_round(aside: float, weight: float) -> None:
+    """By the shortest way the mixed hand would jump by up to 2 pi times the smaller share as they pass."""
+    way, before = HandMix(), None
+    for i in range(61):
+        angle = 0.7 * pi + 0.01 * pi * i
+        dance = vector.unit((aside, -cos(angle), sin(angle)), (0.0, 0.0, 1.0))
+        mixed, _ = way.mix(dance, (0.0, -1.0, 0.0), weight)
+        if before is not None:
+            assert vector.length(vector.subtract(mixed, before)) < 0.04
+        before = mixed
 
 
 def test_a_thigh_follows_and_joints_mix_exactly_at_the_ends() -> None:

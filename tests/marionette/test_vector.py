@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -55,3 +56,10 @@ def test_across_is_square_and_unit(a: Vector) -> None:
     square = vector.across(a)
     assert abs(vector.dot(square, a)) < 1e-12
     assert abs(vector.length(square) - 1.0) < 1e-12
+
+
+@given(quaternions, st.floats(0.0, 1.0))
+def test_a_part_of_a_turn_goes_its_own_way_round(q: Quaternion, share: float) -> None:
+    rest = vector.multiply(vector.part_of(q, 1.0 - share), vector.part_of(q, share))
+    np.testing.assert_allclose(rest, q, atol=1e-9)
+    assert vector.part_of(q, 0.0) == pytest.approx(vector.IDENTITY)

@@ -24,12 +24,15 @@ class ArmBlend:
         self._rig = rig
         self._swivel: float | None = None
 
-    def joints(self, dance: Joints, bent: Joints, target: Vector, normal: Vector, weight: float) -> Joints:
+    def joints(
+        self, dance: Joints, bent: Joints, target: Vector, turn: Quaternion, normal: Vector, weight: float
+    ) -> Joints:
         """The joints at `weight`: 0 gives back the dance's, 1 the bent arm's in the plane of `normal`.
 
-        `dance` are the pose's joints, `bent` those of `ArmRig.bend` for the `target` (arm lengths, axes of vl5),
-        `normal` a unit vector square to it. Between, the elbow goes to the nearest place from which forearm and hand
-        reach the target; where the mixed wrist leaves none, the tip comes as near as it can.
+        `dance` are the pose's joints, `bent` those of `ArmRig.bend` for the `target` (arm lengths, axes of vl5); `turn`
+        brings the direction of the dance's own hand to the target's, and `normal` is a unit vector square to that.
+        Between, the elbow goes to the nearest place from which forearm and hand reach the target; where the mixed wrist
+        leaves none, the tip comes as near as it can.
         """
         rig = self._rig
         direction = rig.direction(target)
@@ -39,7 +42,7 @@ class ArmBlend:
             return (vector.normalise(shoulder), bent[1], bent[2])
         own = rig.direction(rig.target(dance))
         own_normal = vector.unit(vector.square_to(rig.bend_axis(dance), own), vector.across(own))
-        carried = vector.rotate(vector.between(own, direction), own_normal)
+        carried = vector.rotate(turn, own_normal)
         swivel = atan2(vector.dot(vector.cross(carried, normal), direction), vector.dot(carried, normal))
         if self._swivel is not None:
             swivel += 2.0 * pi * round((self._swivel - swivel) / (2.0 * pi))

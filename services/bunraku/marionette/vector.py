@@ -6,7 +6,7 @@ the stage's rate: there an array library costs some twenty times more than the a
 
 from __future__ import annotations
 
-from math import acos, cos, sin, sqrt
+from math import acos, atan2, cos, sin, sqrt
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -116,6 +116,13 @@ def from_columns(x: Vector, y: Vector, z: Vector) -> Quaternion:
     else:
         q = (x[1] - y[0], x[2] + z[0], y[2] + z[1], 1.0 + 2.0 * z[2] - trace)
     return normalise(q)
+
+
+def part_of(q: Quaternion, share: float) -> Quaternion:
+    """The turn about `q`'s axis by a share of its angle, which is up to 2 pi: `q` and -`q` go different ways."""
+    axis = (q[1], q[2], q[3])
+    half = atan2(length(axis), q[0])
+    return about(unit(axis, (1.0, 0.0, 0.0)), 2.0 * half * share)
 
 
 def slerp(a: Quaternion, b: Quaternion, t: float) -> Quaternion:
