@@ -1,15 +1,17 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bunraku.marionette.limbs import ArmRig, LegRig, Limb
 from bunraku.marionette.merge import Marionette, Overlay, apply
 from bunraku.marionette.ownership import Grant, Input
+from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import standard_figure
+from bunraku.motion.skeleton import Figure, standard_figure
 from tests.marionette.arms import dance
 
 FIGURE = standard_figure()
@@ -161,3 +163,22 @@ def test_the_same_inputs_give_the_same_dance_again() -> None:
         return np.array(out).tobytes()
 
     assert run() == run()
+
+
+def test_another_dancer_stays_in_the_hands_the_limbs_are_in() -> None:
+    pose = dance(1, seed=6)[0]
+    puppet = Marionette(FIGURE)
+    epoch = granted(puppet, 0, "ada", 0)
+    puppet.input("ada", Input(0, 1, epoch, 1, 0, (0.4, 0.2, 0.3)), 0)
+    puppet.overlay(pose, 0)
+    longer = Figure(FIGURE.offsets * 1.1, FIGURE.tips * 1.4)
+    puppet.set_figure(longer)
+    assert puppet.holders() == ("ada", None, None, None)
+    for i in range(1, 40):
+        puppet.alive("ada", [0], i * FRAME)
+        merged = apply(pose, puppet.overlay(pose, i * FRAME))
+    rig = ArmRig(longer, Limb.LEFT_HAND)
+    np.testing.assert_allclose(rig.target(rig.dance(merged.tolist())), (0.4, 0.2, 0.3), atol=1e-9)
+    with pytest.raises(ProportionsError):
+        puppet.set_figure(Figure(FIGURE.offsets, FIGURE.tips * 0.0))
+    assert puppet.overlay(pose, 40 * FRAME) is not None

@@ -100,13 +100,22 @@ class Marionette:
     """One puppet: who holds its limbs, and the overlay that follows from it."""
 
     def __init__(self, figure: Figure) -> None:
-        """Raises `ProportionsError` for a figure whose arms are too short to hang."""
+        """As `set_figure`."""
         self._ownership = Ownership()
-        self._limbs: dict[Limb, _PulledHand | _PulledLeg] = {
-            limb: _PulledHand(figure, limb) if limb.is_hand else _PulledLeg(figure, limb) for limb in Limb
-        }
         self._handovers = {limb: Handover() for limb in Limb}
         self._last: int | None = None
+        self.set_figure(figure)
+
+    def set_figure(self, figure: Figure) -> None:
+        """Another dancer on the stage, whose limbs stay in the hands they are in.
+
+        The first arm of its proportions takes a tenth of a second, to build its table. Raises `ProportionsError` for a
+        figure whose arms are too short to hang, and changes nothing.
+        """
+        limbs: dict[Limb, _PulledHand | _PulledLeg] = {
+            limb: _PulledHand(figure, limb) if limb.is_hand else _PulledLeg(figure, limb) for limb in Limb
+        }
+        self._limbs = limbs
 
     def holders(self) -> tuple[str | None, ...]:
         """The holder's id of each limb, or None."""
