@@ -1,4 +1,4 @@
-/** The leg (paper 4): the thigh is lifted by an angle from straight down, the shank hangs, the ankle is fixed. Radians. */
+/** The leg (paper 4): the thigh is lifted by an angle (radians) from straight down, the shank hangs, the ankle is fixed. */
 
 /** The farthest back a thigh is pulled. */
 export const THIGH_LEAST = -Math.PI / 4;

@@ -100,7 +100,7 @@ export class ArmRig {
     if (!unit(out, outAt, target, targetAt)) put(out, outAt, 0, -1, 0);
   }
 
-  /** The normal (3) of the vertical plane through a target; straight above or below the shoulder, of the one facing forwards. */
+  /** The normal (3) of the vertical plane through a target; on the axis of the one that faces forwards. */
   restingNormal(out: Numbers, outAt: number, target: Numbers, targetAt: number, up: Numbers, upAt: number): void {
     const { place } = this;
     this.direction(place, 0, target, targetAt);
@@ -180,7 +180,7 @@ export class LegRig {
     normalise(this.ankle, 0);
   }
 
-  /** The hips' world orientation into `hips`, and into `columns` the level direction they face, up, and their product. */
+  /** The hips' world orientation into `hips`; into `columns` the level direction they face, up, and their product. */
   private face(rotations: Numbers): void {
     const { hips, columns, place } = this;
     multiply(hips, 0, rotations, 0, rotations, 4 * SACROILIAC);

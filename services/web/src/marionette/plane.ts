@@ -1,7 +1,7 @@
 /**
  * The plane an arm hangs in, with memory: it is carried along with the hand by the shortest turn, and swings about the
  * line from shoulder to tip towards the vertical, the faster the farther the hand is from the vertical axis. So an elbow
- * does not pop across as the hand passes under or over the shoulder, and the tip stays in the plane. As `marionette/plane.py`.
+ * does not pop across as the hand passes under the shoulder, and the tip stays in the plane. As `marionette/plane.py`.
  */
 
 import { rotate, type Numbers } from "../motion/rotation";
@@ -14,7 +14,7 @@ const HALF_LIFE = 0.08;
 /** Radians per second that the plane swings at most. */
 const FASTEST = 2 * Math.PI;
 
-/** Normal (3) of the vertical plane through the unit `direction`; false, and nothing written, within 1e-9 of the axis. */
+/** Normal (3) of the vertical plane through the unit `direction`; false, nothing written, within 1e-9 of the axis. */
 export function verticalNormal(
   out: Numbers, outAt: number, direction: Numbers, directionAt: number, up: Numbers, upAt: number,
 ): boolean {

@@ -38,7 +38,7 @@ export function parseProportions(identity: string): Proportions {
   return { upper: parts[0] / 1000, fore: parts[1] / 1000, hand: parts[2] / 1000, identity };
 }
 
-/** The nearest to the shoulder that a hand tip is solved for: a quarter beyond what the joints' limits allow, at least 0.1. */
+/** The nearest to the shoulder that a tip is solved for: a quarter beyond what the joints allow, at least 0.1. */
 export function innerRadius({ upper, fore, hand }: Proportions): number {
   let nearest = 1;
   for (let degrees = 0; degrees <= 80; degrees++) {

@@ -80,7 +80,7 @@ export function between(out: Numbers, outAt: number, a: Numbers, aAt: number, b:
   normalise(out, outAt);
 }
 
-/** The rotation (4) that brings the axes to the right-handed unit vectors x, y, z, nine numbers at `at` (Shepperd 1978). */
+/** The rotation (4) that brings the axes to right-handed unit vectors, nine numbers at `at` (Shepperd 1978). */
 export function fromColumns(out: Numbers, outAt: number, c: Numbers, at: number): void {
   const xx = c[at], xy = c[at + 1], xz = c[at + 2];
   const yx = c[at + 3], yy = c[at + 4], yz = c[at + 5];

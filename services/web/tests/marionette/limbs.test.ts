@@ -25,7 +25,8 @@ function sameRotations(got: Float64Array, wanted: number[][]): void {
 
 test.each([0, 1] as const)("arm %i hangs as the golden vectors say, its tip on the target", (limb) => {
   const rig = new ArmRig(figure, limb, table);
-  const up = new Float64Array(3), normal = new Float64Array(3), own = new Float64Array(3), joints = new Float64Array(12);
+  const up = new Float64Array(3), normal = new Float64Array(3), own = new Float64Array(3);
+  const joints = new Float64Array(12);
   const cases = golden.limbs.cases.filter((one) => one.limb === limb);
   expect(cases.length).toBe(4);
   for (const one of cases) {

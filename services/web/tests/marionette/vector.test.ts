@@ -1,7 +1,9 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import { conjugate, multiply, rotate } from "../../src/motion/rotation";
-import { aboutAxis, across, between, cross, dot, fromColumns, length, normalise, squareTo, unit } from "../../src/marionette/vector";
+import {
+  aboutAxis, across, between, cross, dot, fromColumns, length, normalise, squareTo, unit,
+} from "../../src/marionette/vector";
 
 const part = fc.double({ min: -1, max: 1, noNaN: true });
 const direction = fc
