@@ -128,6 +128,11 @@ def make() -> dict[str, Any]:
     }
 
 
-if __name__ == "__main__":
+def write() -> None:
+    """Write the file anew."""
     FILE.parent.mkdir(parents=True, exist_ok=True)
     FILE.write_text(json.dumps(make(), indent=None, separators=(",", ":")).replace('{"', '\n{"') + "\n")
+
+
+if __name__ == "__main__":
+    write()

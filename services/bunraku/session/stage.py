@@ -80,7 +80,10 @@ class Puppeteer:
 class Stage:
     """A motion on a shared timeline, and those who pull at it."""
 
-    def __init__(self, session: str, motion: StoredMotion, bus: Bus, *, playing: bool, loop: bool) -> None:
+    def __init__(
+        self, session: str, motion: StoredMotion, marionette: Marionette, bus: Bus, *, playing: bool, loop: bool
+    ) -> None:
+        """`marionette` is of the motion's figure; the caller builds it, which takes a tenth of a second."""
         self.id = session
         self.created = clock()
         self._bus = bus
@@ -91,6 +94,7 @@ class Stage:
         self._engaged = asyncio.Event()
         self._sequence = 0
         self.seen = clock()
+        self._marionette = marionette
         self._set(motion)
         subject = f"session.{session}"
         self._subscriptions: list[Subscription] = [
@@ -129,15 +133,11 @@ class Stage:
         """Edit the timeline for everyone, `LEAD` from now."""
         return self._put(timeline.edit(self.timeline, clock() + LEAD, playing=playing, position=position, loop=loop))
 
-    def change(self, motion: StoredMotion) -> TimelineState:
-        """Another motion for everyone, from its start; limbs that are held go back to the dance."""
-        for limb, holder in enumerate(self._marionette.holders()):
-            if holder in self._puppeteers:
-                self._puppeteers[holder].tell(Refusal(limb, "lost").pack())
+    async def change(self, motion: StoredMotion) -> TimelineState:
+        """Another motion for everyone, from its start; limbs stay in the hands they are in."""
+        await asyncio.to_thread(self._marionette.set_figure, motion.track.figure)
         self._set(motion)
-        state = self._put(timeline.change(self.timeline, clock() + LEAD, motion.id, motion.track.duration_us))
-        self._announce()
-        return state
+        return self._put(timeline.change(self.timeline, clock() + LEAD, motion.id, motion.track.duration_us))
 
     def join(self, name: str) -> Puppeteer:
         """A puppeteer comes, with the first free colour; raises `Full`."""
@@ -180,7 +180,6 @@ class Stage:
     def _set(self, motion: StoredMotion) -> None:
         self._motion = motion
         self._dance = BlockStore(motion.track)
-        self._marionette = Marionette(motion.track.figure)
 
     def _put(self, state: TimelineState) -> TimelineState:
         self._timelines.put(state)
@@ -228,7 +227,7 @@ class Stage:
             self._announce()
         due = now + LEAD
         pose = self._pose(due)
-        pulled = self._marionette.overlay(pose[1], due) if pose is not None else None
+        pulled = self._marionette.overlay(pose[1], now) if pose is not None else None
         self._sequence += 1
         self._bus.publish(f"session.{self.id}.overlay", _packed(self._sequence, due, pulled).pack())
         return pulled is not None or any(self._marionette.holders())
