@@ -4,13 +4,12 @@ import { fromRotationVector, multiply } from "../motion/rotation";
 import { CHANNEL_COUNT, JOINT_COUNT, type Pose } from "../motion/skeleton";
 import { decodeCoefficients } from "./coefficients";
 import { DamagedBlock } from "./errors";
-import { type MotionTrack, REFERENCE_UNIT } from "./track";
+import { MOST_FRAMES, type MotionTrack, REFERENCE_UNIT } from "./track";
 import { basis } from "./transform";
 
 const FORMAT = 1;
 const HEADER = 7;
 const LARGEST_BLOCK = 65_536;
-const MOST_FRAMES = 1_000;
 
 const cosines = new Float64Array(MOST_FRAMES);
 const rotationVectors = new Float64Array(JOINT_COUNT * 3);

@@ -12,6 +12,20 @@ export const FIGURE_UNIT = 1e-4;
 /** Radians in one unit of an 8-bit rotation vector. */
 export const REFERENCE_UNIT = Math.PI / 127;
 
+/** Most frames a block may have. */
+export const MOST_FRAMES = 1_000;
+
+// a day of 1 s blocks; and as many rates as a Data Packet can number
+const MOST_BLOCKS = 86_400;
+const MOST_RATES = 16;
+
+/** One encoding of a motion: kbit/s of Data over the duration, and its mean and max error in mm over joints and tips. */
+export interface Rate {
+  kbps: number;
+  mean: number;
+  max: number;
+}
+
 /** The figure of 138 bytes: 18 offsets and 5 tips, each 3 x i16 little-endian in `FIGURE_UNIT`. */
 export function unpackFigure(data: Uint8Array): Figure {
   const numbers = 3 * (JOINT_COUNT + TIPS.length);
@@ -69,6 +83,7 @@ export class MotionTrack {
    * @param blockFrames frames of every block but perhaps the last
    * @param figure the dancer
    * @param reference the joints' reference rotations (72)
+   * @param rates what each rate costs and keeps, from the lowest to the highest
    */
   constructor(
     readonly fps: number,
@@ -76,9 +91,38 @@ export class MotionTrack {
     readonly blockFrames: number,
     readonly figure: Figure,
     readonly reference: Float64Array,
+    readonly rates: readonly Rate[] = [],
   ) {
     this.blocks = Math.ceil(frames / blockFrames);
     this.levers = levers(figure);
+  }
+
+  /**
+   * The track that a Description's map of type `motion` tells of.
+   *
+   * @throws DamagedBlock where it tells of none that can be played here
+   */
+  static fromDescription(map: Readonly<Record<string, unknown>>): MotionTrack {
+    const { codec, fps, frames, block_frames: blockFrames, figure, reference, rates } = map;
+    const whole = (value: unknown, most: number) => Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
+    if (codec !== CODEC) throw new DamagedBlock(`motion is of codec ${String(codec)}; this client reads ${CODEC}`);
+    if (!Number.isFinite(fps) || Number(fps) <= 0) throw new DamagedBlock("motion needs fps, a number above zero");
+    if (!whole(blockFrames, MOST_FRAMES)) throw new DamagedBlock(`motion needs block_frames, 1..${MOST_FRAMES}`);
+    if (!whole(frames, Number(blockFrames) * MOST_BLOCKS)) throw new DamagedBlock("motion needs frames, at least one");
+    if (!(figure instanceof Uint8Array && reference instanceof Uint8Array)) {
+      throw new DamagedBlock("motion needs figure and reference, bytes");
+    }
+    if (!Array.isArray(rates) || rates.length < 1 || rates.length > MOST_RATES) {
+      throw new DamagedBlock(`motion needs rates, 1..${MOST_RATES} of them`);
+    }
+    const known = rates.map((rate: Partial<Rate> | null, nth): Rate => {
+      const { kbps, mean, max } = rate ?? {};
+      if (![kbps, mean, max].every(Number.isFinite)) throw new DamagedBlock(`rate ${nth} needs kbps, mean and max, numbers`);
+      return { kbps: kbps!, mean: mean!, max: max! };
+    });
+    return new MotionTrack(
+      Number(fps), Number(frames), Number(blockFrames), unpackFigure(figure), unpackReference(reference), known,
+    );
   }
 
   /** Length in microseconds. */
