@@ -1,7 +1,6 @@
 /** A puppeteer: claims limbs of a session's puppet and says where they should be. */
 
-import type { Pose } from "../motion/skeleton";
-import { LIMBS } from "../motion/skeleton";
+import { LIMBS, type Pose } from "../motion/skeleton";
 import { type Grant, type Message, type Presence, type Refusal, TARGET, VELOCITY } from "../wire/messages";
 import { Connection } from "./connection";
 import { HAND_SPEED, LEG_SPEED, Pull, REACH, THIGH } from "./pull";
@@ -16,7 +15,7 @@ const ALIVE_EVERY = 100;
 const CROWDED = 512;
 
 /** One limb as the session knows it. */
-interface String {
+interface Hold {
   pull: Pull;
   wanted: boolean;
   /** Of the grant; null while not granted. */
@@ -25,7 +24,11 @@ interface String {
   /** What the session has not been told yet. */
   news: "none" | "target" | "velocity";
   speed: [number, number, number];
-  saidAt: number;
+  /** Whether the session has been told where the limb stands since the grant. */
+  anchored: boolean;
+  /** When the last input went out, and when the session last heard of the limb at all; local milliseconds. */
+  inputAt: number;
+  heardAt: number;
 }
 
 export interface PuppeteerOptions {
@@ -52,15 +55,15 @@ export class Puppeteer extends EventTarget {
   private readonly viewer: Viewer;
   private readonly now: () => number;
   private readonly connection: Connection;
-  private readonly strings: readonly String[];
+  private readonly holdings: readonly Hold[];
   private readonly speaking: ReturnType<typeof setInterval>;
 
   constructor(options: PuppeteerOptions) {
     super();
     this.viewer = options.viewer;
     this.now = options.now ?? (() => performance.now());
-    this.strings = LIMBS.map((_, limb) => ({
-      pull: new Pull(limb), wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], saidAt: 0,
+    this.holdings = LIMBS.map((_, limb) => ({
+      pull: new Pull(limb), wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], anchored: false, inputAt: 0, heardAt: 0,
     }));
     this.connection = new Connection({
       url: () => options.url,
@@ -74,56 +77,56 @@ export class Puppeteer extends EventTarget {
 
   /** Takes a limb: it is shown as held at once, and let go again if the session refuses it. */
   claim(limb: number): void {
-    const string = this.strings[limb];
-    if (string.wanted) return;
-    string.wanted = true;
-    string.news = "none";
-    string.pull.take(this.now());
+    const hold = this.holdings[limb];
+    if (hold.wanted) return;
+    hold.wanted = true;
+    hold.news = "none";
+    hold.pull.take(this.now());
     if (this.id !== null) this.connection.send({ name: "Claim", limb });
   }
 
   /** Lets a limb go. */
   release(limb: number): void {
-    const string = this.strings[limb];
-    if (!string.wanted) return;
-    if (string.epoch !== null) this.connection.send({ name: "Release", limb, epoch: string.epoch });
-    this.drop(string);
+    const hold = this.holdings[limb];
+    if (!hold.wanted) return;
+    if (hold.epoch !== null) this.connection.send({ name: "Release", limb, epoch: hold.epoch });
+    this.drop(hold);
   }
 
   /** Whether the session has granted the limb. */
   holds(limb: number): boolean {
-    return this.strings[limb].epoch !== null;
+    return this.holdings[limb].epoch !== null;
   }
 
   /** Asks for a place: of a hand, the tip in the shoulder's frame in arm lengths; of a leg, x is the thigh's angle in radians. */
   target(limb: number, x: number, y: number, z: number): void {
-    const string = this.strings[limb];
-    if (!string.wanted) return;
-    string.pull.target(finite(x), finite(y), finite(z), this.now());
-    string.speed = [0, 0, 0];
-    string.news = "target";
-    this.say(string, this.now());
+    const hold = this.holdings[limb];
+    if (!hold.wanted) return;
+    hold.pull.target(finite(x), finite(y), finite(z), this.now());
+    hold.speed = [0, 0, 0];
+    hold.news = "target";
+    this.say(hold, this.now());
   }
 
   /** Moves a limb at -1..1 of full speed along each axis, of a leg along the first; zero holds it still. */
   velocity(limb: number, x: number, y: number, z: number): void {
-    const string = this.strings[limb];
+    const hold = this.holdings[limb];
     const speed: [number, number, number] = [unit(x), unit(y), unit(z)];
-    if (!string.wanted || speed.every((part, axis) => part === string.speed[axis])) return;
-    string.pull.speed(...speed, this.now());
-    string.speed = speed;
-    string.news = "velocity";
-    this.say(string, this.now());
+    if (!hold.wanted || speed.every((part, axis) => part === hold.speed[axis])) return;
+    hold.pull.speed(...speed, this.now());
+    hold.speed = speed;
+    hold.news = "velocity";
+    this.say(hold, this.now());
   }
 
   /** Lays one's own limbs over `pose`; for the viewer. */
   lay(pose: Pose, nowMs: number, solver: Solver): void {
-    for (const { pull } of this.strings) pull.lay(pose, nowMs, solver);
+    for (const { pull } of this.holdings) pull.lay(pose, nowMs, solver);
   }
 
   /** Lets all go and ends it. */
   close(): void {
-    for (let limb = 0; limb < this.strings.length; limb++) this.release(limb);
+    for (let limb = 0; limb < this.holdings.length; limb++) this.release(limb);
     this.connection.close();
   }
 
@@ -133,8 +136,8 @@ export class Puppeteer extends EventTarget {
         this.id = message.id;
         this.colour = message.colour;
         // what was held when the line was lost is asked for again
-        this.strings.forEach((string, limb) => {
-          if (string.wanted) this.connection.send({ name: "Claim", limb });
+        this.holdings.forEach((hold, limb) => {
+          if (hold.wanted) this.connection.send({ name: "Claim", limb });
         });
         this.dispatchEvent(new Event("welcome"));
         break;
@@ -154,40 +157,43 @@ export class Puppeteer extends EventTarget {
   }
 
   private granted({ limb, epoch }: Grant): void {
-    const string = this.strings[limb];
-    if (!string.wanted) {
+    const hold = this.holdings[limb];
+    if (!hold.wanted) {
       // let go before the answer came
       this.connection.send({ name: "Release", limb, epoch });
       return;
     }
-    string.epoch = epoch;
-    string.sequence = 0;
+    hold.epoch = epoch;
+    hold.sequence = 0;
+    hold.anchored = false;
     // the session starts from where it has the limb: tell it where it is held here
-    if (string.pull.placed && string.news === "none") string.news = "target";
-    string.saidAt = -Infinity;
-    this.say(string, this.now());
+    if (hold.speed.some((part) => part !== 0)) hold.news = "velocity";
+    else if (hold.pull.placed) hold.news = "target";
+    hold.inputAt = -Infinity;
+    hold.heardAt = this.now();
+    this.say(hold, this.now());
     this.dispatchEvent(new CustomEvent("grant", { detail: { limb } }));
   }
 
   private refused({ limb, reason, holder }: Refusal): void {
-    this.drop(this.strings[limb]);
+    this.drop(this.holdings[limb]);
     this.dispatchEvent(new CustomEvent("refusal", { detail: { limb, reason, holder } }));
   }
 
-  private drop(string: String): void {
-    string.wanted = false;
-    string.epoch = null;
-    string.news = "none";
-    string.speed = [0, 0, 0];
-    string.pull.letGo(this.now());
+  private drop(hold: Hold): void {
+    hold.wanted = false;
+    hold.epoch = null;
+    hold.news = "none";
+    hold.speed = [0, 0, 0];
+    hold.pull.letGo(this.now());
   }
 
   private lost(reason: string, final: boolean): void {
     this.id = null;
     this.ended = final;
-    for (const string of this.strings) {
-      string.epoch = null;
-      if (final) this.drop(string);
+    for (const hold of this.holdings) {
+      hold.epoch = null;
+      if (final) this.drop(hold);
     }
     if (final) clearInterval(this.speaking);
     this.dispatchEvent(new CustomEvent("closed", { detail: reason }));
@@ -195,34 +201,37 @@ export class Puppeteer extends EventTarget {
 
   private speak(): void {
     const now = this.now();
-    for (const string of this.strings) this.say(string, now);
-    const quiet = this.strings.filter(({ epoch, saidAt }) => epoch !== null && now - saidAt >= ALIVE_EVERY);
+    for (const hold of this.holdings) this.say(hold, now);
+    const quiet = this.holdings.filter(({ epoch, heardAt }) => epoch !== null && now - heardAt >= ALIVE_EVERY);
     if (quiet.length === 0) return;
     const limbs = quiet.map(({ pull }) => pull.limb);
     if (!this.connection.send({ name: "Alive", limbs })) return;
-    for (const string of quiet) string.saidAt = now;
+    for (const hold of quiet) hold.heardAt = now;
   }
 
   /** Sends what is new of a limb, unless one went out just now or the line is crowded: then the next turn does. */
-  private say(string: String, now: number): void {
-    if (string.epoch === null || string.news === "none") return;
-    if (now - string.saidAt < INPUT_EVERY - 1 || this.connection.waiting > CROWDED) return;
+  private say(hold: Hold, now: number): void {
+    if (hold.epoch === null || hold.news === "none") return;
+    if (now - hold.inputAt < INPUT_EVERY - 1 || this.connection.waiting > CROWDED) return;
     const clock = this.viewer.clockTime(now);
     if (clock === null) return;
     const sampled = Math.round(clock);
-    const { pull, speed, epoch } = string;
+    const { pull, speed, epoch } = hold;
     pull.move(now);
     const input = (kind: number, values: [number, number, number]) =>
       this.connection.send({
-        name: "Input", limb: pull.limb, kind, epoch: epoch!, sequence: string.sequence++, sampled, values,
+        name: "Input", limb: pull.limb, kind, epoch: epoch!, sequence: hold.sequence++, sampled, values,
       });
     const [x, y, z] = pull.value;
-    // where it is goes before how it moves, and alone where it stands still: so both ends stay in one place
-    if (pull.placed) input(TARGET, [x, y, z]);
-    const moving = speed.some((part) => part !== 0);
-    if (string.news === "velocity" && (moving || !pull.placed)) input(VELOCITY, speed);
-    string.news = "none";
-    string.saidAt = now;
+    const moving = hold.news === "velocity" && speed.some((part) => part !== 0);
+    // said once after the grant, and wherever the limb comes to stand: so both ends have it in one place
+    if (pull.placed && !(moving && hold.anchored)) {
+      input(TARGET, [x, y, z]);
+      hold.anchored = true;
+    }
+    if (moving || !pull.placed) input(VELOCITY, speed);
+    hold.news = "none";
+    hold.inputAt = hold.heardAt = now;
   }
 }
 

@@ -24,7 +24,7 @@ export interface LineFigures {
   kbps: number;
   /** Seconds of motion ready ahead of the play position. */
   bufferSeconds: number;
-  /** Reference minus local, less the whole of it at the first answer: how far the two clocks have drifted. */
+  /** The reference clock minus this machine's own. */
   clockOffsetMs: number | null;
   /** How far the clock may be off at most. */
   clockErrorMs: number | null;
@@ -89,7 +89,6 @@ export class Viewer extends EventTarget {
   private missing = -1;
   private gaps = 0;
   private firstPoseMs: number | null = null;
-  private firstOffset: number | null = null;
   private latency: number | null = null;
   private decodeMs = 0;
   private frameMs = 0;
@@ -201,7 +200,7 @@ export class Viewer extends EventTarget {
       rate: this.rate,
       kbps: this.meter.kbps(now),
       bufferSeconds: ahead / 1e6,
-      clockOffsetMs: this.firstOffset === null ? null : (clock.offset - this.firstOffset) / 1000,
+      clockOffsetMs: known ? clock.offset / 1000 - performance.timeOrigin : null,
       clockErrorMs: known ? clock.error / 1000 : null,
       latencyMs: this.latency,
       firstPoseMs: this.firstPoseMs,
@@ -373,7 +372,6 @@ export class Viewer extends EventTarget {
 
   private pong(message: Pong, now: number): void {
     this.clock.pong(message.sent, message.received, message.answered, now * 1000);
-    if (Number.isFinite(this.clock.error)) this.firstOffset ??= this.clock.offset;
   }
 
   private tell(event: string): void {

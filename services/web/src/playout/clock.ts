@@ -14,6 +14,9 @@ const SLEW = 1e6;
 /** How much slower than real the clock may run. */
 const SLOWEST = 0.9;
 
+/** Further off than any greeting is late, microseconds. */
+const ANOTHER = 2e6;
+
 interface Sample {
   offset: number;
   trip: number;
@@ -44,11 +47,13 @@ export class ReferenceClock {
   }
 
   /**
-   * The server's greeting said it was `now` and came at local time `arrived`: late by its way here, which is good enough to
-   * start by until the first answer.
+   * The server's greeting said it was `now` and came at local time `arrived`. It is late by its way here, which is good enough
+   * to start by; after a new connection it counts only where it tells of quite another clock.
    */
   greeting(now: number, arrived: number): void {
-    if (this.best === null) this.aim(now - arrived, arrived);
+    const offset = now - arrived;
+    const another = this.goal === null || Math.abs(offset - this.goal) > ANOTHER;
+    if (this.best === null && another) this.aim(offset, arrived);
   }
 
   /**
