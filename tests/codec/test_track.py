@@ -6,9 +6,11 @@ import pytest
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.track import (
     FIGURE_UNIT,
+    describe_track,
     pack_figure,
     pack_reference,
     plan,
+    read_track,
     unpack_figure,
     unpack_reference,
 )
@@ -61,3 +63,28 @@ def test_very_high_frame_rates_keep_blocks_within_the_format() -> None:
     still = wandering_motion(0.01, 240.0, 1)
     track, _ = plan(Motion(still.figure, 5000.0, still.root, still.rotations))
     assert track.block_frames == 1000
+
+
+def test_a_track_survives_its_description() -> None:
+    track, _ = plan(wandering_motion(1.0, 29.97, 1))
+    again = read_track(describe_track(track, []))
+    assert (again.fps, again.frames, again.block_frames) == (track.fps, track.frames, track.block_frames)
+    np.testing.assert_allclose(again.levers, track.levers, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("codec", "other/2", "other/2"),
+        ("fps", "fast", "numbers"),
+        ("fps", 0, "above zero"),
+        ("block_frames", 5000, "1..1000"),
+        ("figure", "no", "figure"),
+        ("reference", b"", "51"),
+    ],
+)
+def test_a_wrong_description_is_refused(key: str, value: object, says: str) -> None:
+    described = describe_track(plan(wandering_motion(1.0, 30.0, 1))[0], [])
+    described[key] = value
+    with pytest.raises(DamagedBlock, match=says):
+        read_track(described)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from bunraku.codec import coefficients, transform
 from bunraku.codec.decode import FORMAT, HEADER, decode_block
-from bunraku.codec.track import REFERENCE_UNIT, MotionTrack, plan
+from bunraku.codec.track import REFERENCE_UNIT, MotionTrack, describe_track, plan
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion, points
@@ -39,6 +40,11 @@ class EncodedMotion:
 
     track: MotionTrack
     rates: list[Rate]
+
+    def describe(self) -> dict[str, Any]:
+        """What a Description says of this motion (SPEC.md, Track `motion`)."""
+        rates = [{"kbps": round(r.kbps, 3), "mean": round(r.mean, 3), "max": round(r.most, 3)} for r in self.rates]
+        return describe_track(self.track, rates)
 
 
 def encode_block(track: MotionTrack, root: Array, rotations: Array, step: int) -> bytes:

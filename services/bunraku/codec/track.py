@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -126,3 +127,33 @@ def unpack_reference(data: bytes) -> Array:
     if len(data) != 3 * (CHANNEL_COUNT - 2):
         raise DamagedBlock(f"references have {3 * (CHANNEL_COUNT - 2)} bytes, not {len(data)}")
     return np.frombuffer(data, "i1").reshape(-1, 3).astype(np.float64)
+
+
+def describe_track(track: MotionTrack, rates: list[dict[str, float]]) -> dict[str, Any]:
+    """The entry of a Description's `tracks` for this motion (SPEC.md, Track `motion`)."""
+    return {
+        "type": "motion",
+        "codec": CODEC,
+        "channels": CHANNEL_COUNT,
+        "fps": track.fps,
+        "frames": track.frames,
+        "block_frames": track.block_frames,
+        "rates": rates,
+        "figure": pack_figure(track.figure),
+        "reference": pack_reference(track.reference),
+    }
+
+
+def read_track(described: dict[str, Any]) -> MotionTrack:
+    """The track of `describe_track`; raises `DamagedBlock` where it is not one, or of another codec."""
+    if described.get("codec") != CODEC:
+        raise DamagedBlock(f"the motion is in {described.get('codec')!r}; this reads {CODEC!r}")
+    fps, frames, block_frames = (described.get(key) for key in ("fps", "frames", "block_frames"))
+    figure, reference = described.get("figure"), described.get("reference")
+    if not (isinstance(fps, float | int) and isinstance(frames, int) and isinstance(block_frames, int)):
+        raise DamagedBlock("a motion's track has numbers fps, frames and block_frames")
+    if not (fps > 0 and frames > 0 and 0 < block_frames <= 1000):
+        raise DamagedBlock("a motion's track has fps and frames above zero and blocks of 1..1000 frames")
+    if not (isinstance(figure, bytes) and isinstance(reference, bytes)):
+        raise DamagedBlock("a motion's track has a figure and a reference")
+    return MotionTrack(float(fps), frames, block_frames, unpack_figure(figure), unpack_reference(reference))
