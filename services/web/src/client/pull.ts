@@ -27,6 +27,32 @@ function minimumJerk(x: number): number {
   return x * x * x * (10 + x * (6 * x - 15));
 }
 
+/** Brings the hand at `from` on to `to` by `weight`, round the shoulder and not through it. */
+function goRound(from: Float64Array, to: Float64Array, weight: number): void {
+  const near = Math.hypot(from[0], from[1], from[2]), far = Math.hypot(to[0], to[1], to[2]);
+  // a hand at the shoulder itself is below it
+  const at = (v: Float64Array, length: number, axis: number) => (length > 1e-9 ? v[axis] / length : axis === 1 ? -1 : 0);
+  const x = at(from, near, 0), y = at(from, near, 1), z = at(from, near, 2);
+  const dot = x * at(to, far, 0) + y * at(to, far, 1) + z * at(to, far, 2);
+  let p = at(to, far, 0) - dot * x, q = at(to, far, 1) - dot * y, r = at(to, far, 2) - dot * z;
+  const square = Math.hypot(p, q, r), angle = Math.atan2(square, dot) * weight;
+  if (square > 1e-9) [p, q, r] = [p / square, q / square, r / square];
+  // straight across, any way round is as near: by the front, or the side for a hand before or behind
+  else if (Math.abs(z) < 0.9) [p, q, r] = unitSquare(0, 0, 1, x, y, z);
+  else [p, q, r] = unitSquare(1, 0, 0, x, y, z);
+  const length = near + weight * (far - near), c = length * Math.cos(angle), s = length * Math.sin(angle);
+  from[0] = c * x + s * p;
+  from[1] = c * y + s * q;
+  from[2] = c * z + s * r;
+}
+
+/** The unit vector nearest to (a, b, c) square to the unit (x, y, z). */
+function unitSquare(a: number, b: number, c: number, x: number, y: number, z: number): [number, number, number] {
+  const dot = a * x + b * y + c * z;
+  const length = Math.hypot(a - dot * x, b - dot * y, c - dot * z);
+  return [(a - dot * x) / length, (b - dot * y) / length, (c - dot * z) / length];
+}
+
 export class Pull {
   /** Whether the limb is, or is being, held. */
   held = false;
@@ -114,8 +140,9 @@ export class Pull {
     // the first moment of a hold is the dance's still: it is not solved, so that nothing jumps
     if (this.progress === 0) return false;
     const weight = minimumJerk(this.progress);
-    for (let axis = 0; axis < 3; axis++) dance[axis] += weight * (value[axis] - dance[axis]);
-    solver.solve(pose, this.limb, dance, nowMs);
+    if (this.isHand) goRound(dance, value, weight);
+    else dance[0] += weight * (value[0] - dance[0]);
+    solver.solve(pose, this.limb, dance, weight, nowMs);
     return true;
   }
 

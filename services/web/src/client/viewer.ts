@@ -43,8 +43,11 @@ export interface ViewerOptions {
   url: string;
   /** Local milliseconds, never running backwards. */
   now?: () => number;
-  /** Makes what a puppeteer's own limbs are solved with; without it they are seen as everyone sees them. */
-  solver?: SolverOf;
+  /**
+   * Makes what a puppeteer's own limbs are solved with: without it, and until it is there,
+   * they are seen as everyone sees them.
+   */
+  solver?: SolverOf | null;
 }
 
 const PING_BURST = 8;
@@ -71,7 +74,7 @@ export class Viewer extends EventTarget {
 
   private readonly url: URL;
   private readonly now: () => number;
-  private readonly solverOf: SolverOf | undefined;
+  private readonly solverOf: SolverOf | null;
   private readonly connection: Connection;
   private readonly started: number;
   private readonly timelines = new Timelines();
@@ -101,7 +104,7 @@ export class Viewer extends EventTarget {
     super();
     this.url = new URL(options.url);
     this.now = options.now ?? (() => performance.now());
-    this.solverOf = options.solver;
+    this.solverOf = options.solver ?? null;
     this.started = this.now();
     this.connection = new Connection({
       url: () => this.address(),
@@ -243,6 +246,7 @@ export class Viewer extends EventTarget {
     this.timelines.restart();
     this.pings = 0;
     this.ping();
+    this.prepareSolver();
     this.tell("open");
   }
 
@@ -326,18 +330,28 @@ export class Viewer extends EventTarget {
     this.shown = false;
     this.missing = -1;
     this.rate = -1;
-    this.prepareSolver(track.figure);
+    this.solver = null;
+    this.prepareSolver();
     this.tell("figure");
     this.tell("blocks");
   }
 
-  private prepareSolver(figure: Figure): void {
-    this.solver = null;
-    if (!this.solverOf) return;
-    void Promise.resolve(this.solverOf(figure)).then((solver) => {
-      // another motion may have come while it was made
-      if (this.figure === figure) this.solver = solver;
-    });
+  private prepareSolver(): void {
+    const { figure, solverOf } = this;
+    if (this.solver || !figure || !solverOf) return;
+    const origin = this.url.origin.replace(/^ws/, "http");
+    void Promise.resolve()
+      .then(() => solverOf(figure, origin))
+      .then(
+        (solver) => {
+          // another motion may have come while it was made
+          if (this.figure === figure) this.solver = solver;
+        },
+        (error: unknown) => {
+          // it is tried again with the next connection
+          console.warn("your own limbs follow with the session's delay: no arm tables.", error);
+        },
+      );
   }
 
   private retime(message: TimelineState): void {

@@ -39,6 +39,7 @@ beforeEach(async () => {
     { name: "TimelineState", epoch: 1, motion: "d", clock: UNIX, position: 0, playing: false, loop: true, duration: 2_600_000 },
     { name: "Data", track: 0, rate: 1, start: 0, block },
   );
+  // the solver is made in its own time
   await vi.advanceTimersByTimeAsync(0);
   puppeteer = new Puppeteer({ url: "ws://stage/v1/sessions/s/control", viewer, now: () => now });
   line = Line.last;

@@ -52,7 +52,7 @@ function data(start: number, rate: number, block: Uint8Array): Message {
 
 /** A viewer whose server has greeted it, described the dance, and started it now. */
 function watching(url = SESSION): Viewer {
-  viewer = new Viewer({ url, now: () => now });
+  viewer = new Viewer({ url, now: () => now, solver: null });
   Line.last.accept();
   Line.last.say(header(), description(), timeline());
   return viewer;
@@ -64,7 +64,7 @@ function expectNear(got: Float64Array, wanted: Float64Array): void {
 
 describe("the start", () => {
   test("nothing is known before the server speaks", () => {
-    viewer = new Viewer({ url: SESSION, now: () => now });
+    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
     expect(viewer.poseAt(0)).toBeNull();
     expect([viewer.figure, viewer.timeline, viewer.presence, viewer.motion]).toEqual([null, null, null, null]);
     expect([viewer.duration, viewer.blocks.length, viewer.rates.length]).toEqual([0, 0, 0]);
@@ -72,7 +72,7 @@ describe("the start", () => {
   });
 
   test("each thing is told as it comes, and the first block is drawn without waiting for a clock answer", () => {
-    viewer = new Viewer({ url: SESSION, now: () => now });
+    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
     const told: string[] = [];
     for (const event of ["open", "figure", "timeline", "blocks", "presence"]) {
       viewer.addEventListener(event, () => told.push(event));
@@ -257,7 +257,7 @@ describe("what cannot be played", () => {
     ["no rates", [{ ...goldenDescription(), rates: [] }], "motion needs rates"],
     ["a rate of nothing", [{ ...goldenDescription(), rates: [null] }], "rate 0 needs kbps"],
   ])("%s ends it and says why", (_, tracks, why) => {
-    viewer = new Viewer({ url: SESSION, now: () => now });
+    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
     Line.last.accept();
     Line.last.say(header(), { name: "Description", motion: "dance", tracks });
     expect(viewer.ended).toBe(true);
