@@ -8,8 +8,8 @@
 
 const SAMPLES = 8;
 
-/** Time constant of the slew, microseconds. */
-const SLEW = 1e6;
+/** Time constant of the slew, microseconds: a greeting 100 ms late is made good to a frame within half a second. */
+const SLEW = 250e3;
 
 /** How much slower than real the clock may run. */
 const SLOWEST = 0.9;
