@@ -210,7 +210,10 @@ class Stage:
         while True:
             await self._engaged.wait()
             due = loop.time()
-            while self._tick(clock()):
+            while True:
+                await self._prepare(clock() + LEAD)
+                if not self._tick(clock()):
+                    break
                 due = max(due + TICK, loop.time() - TICK)
                 await asyncio.sleep(max(due - loop.time(), 0))
             self._engaged.clear()
@@ -230,19 +233,21 @@ class Stage:
         self._bus.publish(f"session.{self.id}.overlay", _packed(self._sequence, due, pulled).pack())
         return pulled is not None or any(self._marionette.holders())
 
+    async def _prepare(self, due: int) -> None:
+        """Decode what `_pose` will need about `due`, in a thread: it takes milliseconds, the first time seconds."""
+        track, packets = self._motion.track, self._motion.packets[-1]
+        first = track.block_at(timeline.position_at(self.timeline, due))
+        for index in (first, (first + 1) % track.blocks):
+            if self._dance.rate(index) < 0:
+                dance, packet = self._dance, Data.unpack(packets[index])
+                dance.put(index, packet.rate, await asyncio.to_thread(decode_block, track, packet.block))
+
     def _pose(self, due: int) -> Pose | None:
-        """The dance at clock time `due`, at its best rate, decoded as it is needed."""
+        """The dance at clock time `due`, at its best rate."""
         state = self._timelines.at(due)
         if state is None or state.motion != self._motion.id:
             return None
-        position = timeline.position_at(state, due)
-        track, best = self._motion.track, len(self._motion.packets) - 1
-        first = track.block_at(position)
-        for index in (first, (first + 1) % track.blocks):
-            if self._dance.rate(index) < 0:
-                packet = Data.unpack(self._motion.packets[best][index])
-                self._dance.put(index, best, decode_block(track, packet.block))
-        return self._dance.pose_at(position, state.loop)
+        return self._dance.pose_at(timeline.position_at(state, due), state.loop)
 
 
 def _packed(sequence: int, due: int, pulled: merge.Overlay | None) -> Overlay:
