@@ -4,6 +4,7 @@
  * are local milliseconds and come in as arguments.
  */
 
+import { THIGH_GREATEST, THIGH_LEAST } from "../marionette/leg";
 import type { Pose } from "../motion/skeleton";
 import type { Solver } from "./solver";
 
@@ -18,7 +19,7 @@ export const LEG_SPEED = 2;
 /** How far a hand is pulled from its shoulder, arm lengths. */
 export const REACH = 1;
 /** The angles a thigh is pulled to, radians forwards from straight down. */
-export const THIGH: readonly [number, number] = [-Math.PI / 4, (2 * Math.PI) / 3];
+export const THIGH: readonly [number, number] = [THIGH_LEAST, THIGH_GREATEST];
 
 const between = (value: number, least: number, most: number) => Math.min(Math.max(value, least), most);
 

@@ -9,6 +9,7 @@ import { Overlays } from "../playout/overlay";
 import { positionAt, Timelines } from "../playout/timeline";
 import type { Data, Description, Edit, Message, Overlay, Pong, Presence, TimelineState } from "../wire/messages";
 import { Connection } from "./connection";
+import { fetchMarionette } from "./marionette";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
 import type { Solver, SolverOf } from "./solver";
@@ -44,8 +45,8 @@ export interface ViewerOptions {
   /** Local milliseconds, never running backwards. */
   now?: () => number;
   /**
-   * Makes what a puppeteer's own limbs are solved with: without it, and until it is there,
-   * they are seen as everyone sees them.
+   * Makes what a puppeteer's own limbs are solved with: the marionette, if nothing else is said. With null, and until it is
+   * there, they are seen as everyone sees them.
    */
   solver?: SolverOf | null;
 }
@@ -104,7 +105,7 @@ export class Viewer extends EventTarget {
     super();
     this.url = new URL(options.url);
     this.now = options.now ?? (() => performance.now());
-    this.solverOf = options.solver ?? null;
+    this.solverOf = options.solver === undefined ? fetchMarionette : options.solver;
     this.started = this.now();
     this.connection = new Connection({
       url: () => this.address(),
