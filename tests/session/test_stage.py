@@ -3,6 +3,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 
+import msgpack
 import numpy as np
 import pytest
 
@@ -121,9 +122,8 @@ async def test_a_stage_is_full_some_day(stage: Stage, monkeypatch: pytest.Monkey
         stage.join("c")
 
 
-async def test_presence_counts_viewers_of_all_replicas(stage: Stage, bus: MemoryBus) -> None:
-    import msgpack
-
+@pytest.mark.usefixtures("stage")
+async def test_presence_counts_viewers_of_all_replicas(bus: MemoryBus) -> None:
     audience = Audience(bus)
     for replica, count in (("a", 3), ("b", 4), ("a", 2), ("b", 0)):
         bus.publish("session.s.viewers", msgpack.packb([replica, count]))
