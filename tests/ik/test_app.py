@@ -137,7 +137,6 @@ def test_a_hundred_thousand_arms_fit_in_one_batch(client: TestClient) -> None:
 
 def test_the_service_documents_itself(client: TestClient) -> None:
     document = client.get("/openapi.json").json()
-    assert set(document["paths"]) == {"/v1/arms/{proportions}/table", "/v1/solve", "/v1/health"}
+    assert set(document["paths"]) == {"/v1/arms/{proportions}/table", "/v1/solve"}
     body = document["paths"]["/v1/solve"]["post"]["requestBody"]["content"]
     assert set(body) == {"application/json", MSGPACK}
-    assert client.get("/v1/health").json()["status"] == "ok"

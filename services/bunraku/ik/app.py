@@ -85,11 +85,6 @@ def create_app() -> FastAPI:
         answer = await asyncio.to_thread(batch.solve, asked, proportions, stored.data, accepted)
         return Response(answer, media_type=accepted)
 
-    @app.get("/v1/health")
-    async def health() -> dict[str, str]:
-        """The service runs."""
-        return {"status": "ok", "version": __version__}
-
     return app
 
 
