@@ -1,0 +1,173 @@
+/** The stage: puppet, disc, floor, lights, strings and the seat in the audience. Draws what it is given; keeps no time. */
+import { ACESFilmicToneMapping, Group, PCFShadowMap, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer, type IUniform } from "three";
+import type { Figure, Pose } from "../motion/skeleton";
+import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
+import { AudienceCamera, type Framing } from "./camera";
+import { createFloor } from "./floor";
+import { createLights, studio } from "./lights";
+import { LOOKS, type Look, type Theme } from "./look";
+import { asanohaTexture, faceTexture } from "./paint";
+import { Puppet } from "./puppet";
+import type { Paint } from "./shading";
+import { SOLE } from "./standard";
+import { Strings, type StringState } from "./strings";
+
+/** Pixel ratios above these cost more than they show. */
+const SHARPEST = { desktop: 2, phone: 1.75 };
+/** The rig follows once the dancer is this far from its middle, metres, and this quickly, 1/s. */
+const LEASH = 0.25;
+const FOLLOW = 2.5;
+/** A dancer further away than this was put there by a seek or a new motion: cut, do not travel. */
+const CUT = 1.2;
+/** Pixels at the top that belong to the header and a bar's name. */
+const HEADROOM = 120;
+
+const FREE: readonly StringState[] = [0, 1, 2, 3].map(() => ({ holder: null, lit: false, pull: null }));
+
+export class Stage {
+  readonly scene = new Scene();
+  /** Camera, lights, backdrop and floor: they follow a dancer who walks away, so joints stay where the dance puts them. */
+  readonly rig = new Group();
+  readonly strings = new Strings();
+  readonly audience = new AudienceCamera();
+  readonly renderer: WebGLRenderer;
+  puppet: Puppet | null = null;
+  readonly #backdrop = backdropUniforms();
+  readonly #floor = createFloor(this.#backdrop);
+  readonly #lights = createLights();
+  readonly #floorAt: IUniform<number> = { value: -SOLE };
+  readonly #caster = new Raycaster();
+  #paint: Paint | null = null;
+  #look: Look = LOOKS.night;
+  #themed: Theme | null = null;
+  #width = 1;
+  #height = 1;
+  #posed = false;
+  #still = false;
+
+  /** Throws where the browser has no WebGL 2. */
+  constructor(canvas: HTMLCanvasElement) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer.toneMapping = ACESFilmicToneMapping;
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    this.rig.name = "rig";
+    this.rig.add(this.audience.camera, this.#lights.group, createBackdrop(this.#backdrop), this.#floor.mesh);
+    this.scene.add(this.rig, this.strings.group);
+    this.#floor.mesh.position.y = this.#floorAt.value;
+  }
+
+  /** No easing, no swing: for people who asked for less motion. */
+  set still(on: boolean) {
+    this.#still = on;
+    this.audience.still = on;
+    this.strings.still = on;
+  }
+
+  setTheme(theme: Theme): void {
+    if (theme === this.#themed) return;
+    this.#themed = theme;
+    this.#look = LOOKS[theme];
+    dressBackdrop(this.#backdrop, this.#look);
+    this.#floor.dress(this.#look);
+    this.#lights.dress(this.#look);
+    this.scene.environment?.dispose();
+    this.scene.environment = studio(this.renderer, this.#look);
+    this.scene.environmentIntensity = this.#look.environment;
+    this.renderer.toneMappingExposure = this.#look.exposure;
+    if (this.puppet) this.puppet.reflected = this.#look.dark;
+  }
+
+  /** Carves the puppet for a dancer's limb lengths. */
+  setFigure(figure: Figure): void {
+    this.puppet?.dispose();
+    this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
+    this.puppet = new Puppet(figure, this.#paint, this.#floorAt);
+    this.puppet.reflected = this.#look.dark;
+    this.puppet.group.visible = false;
+    this.scene.add(this.puppet.group);
+    this.audience.scale = this.puppet.scale;
+    this.#floorAt.value = -SOLE * this.puppet.scale;
+    this.#floor.mesh.position.y = this.#floorAt.value;
+    this.#posed = false;
+  }
+
+  /** CSS pixels. */
+  resize(width: number, height: number, framing: Framing, pixelRatio: number): void {
+    const sharpest = framing === "desktop" ? SHARPEST.desktop : SHARPEST.phone;
+    this.#width = width;
+    this.#height = height;
+    this.renderer.setPixelRatio(Math.min(pixelRatio, sharpest));
+    this.renderer.setSize(width, height, false);
+    this.#backdrop.discRadius.value = framing === "desktop" ? 1.06 : 0.98;
+    this.#backdrop.discCentre.value.set(0, framing === "desktop" ? 1.3 : 1.36);
+    this.audience.frame(framing);
+    this.audience.resize(width / height);
+  }
+
+  /** Draws one frame: the pose (null: none yet), the strings, `seconds` since the frame before. */
+  draw(pose: Pose | null, states: readonly StringState[] = FREE, seconds = 0): void {
+    const { puppet } = this;
+    if (puppet && pose) {
+      puppet.group.visible = true;
+      puppet.apply(pose, this.#still ? 0 : seconds);
+      this.#follow(pose.root[0], pose.root[2], seconds);
+    }
+    this.rig.updateMatrixWorld(true);
+    this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0);
+    if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#ceiling(), this.right());
+    this.renderer.render(this.scene, this.audience.camera);
+  }
+
+  /** CSS pixels of a world place. */
+  toScreen(at: Vector3): { x: number; y: number } {
+    const clip = at.clone().project(this.audience.camera);
+    return { x: (clip.x * 0.5 + 0.5) * this.#width, y: (0.5 - clip.y * 0.5) * this.#height };
+  }
+
+  /** World place under a pixel, on the plane through `through` that faces the camera; null behind the camera. */
+  fromScreen(x: number, y: number, through: Vector3): Vector3 | null {
+    const { camera } = this.audience;
+    this.#caster.setFromCamera(new Vector2((x / this.#width) * 2 - 1, 1 - (y / this.#height) * 2), camera);
+    const facing = camera.getWorldDirection(new Vector3());
+    return this.#caster.ray.intersectPlane(new Plane().setFromNormalAndCoplanarPoint(facing, through), new Vector3());
+  }
+
+  /** The camera's right, up and backward directions in the world. */
+  right(): Vector3 {
+    return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 0);
+  }
+
+  up(): Vector3 {
+    return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 1);
+  }
+
+  back(): Vector3 {
+    return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 2);
+  }
+
+  #follow(x: number, z: number, seconds: number): void {
+    const { position } = this.rig;
+    const [dx, dz] = [x - position.x, z - position.z];
+    const away = Math.hypot(dx, dz);
+    if (!this.#posed || away > CUT) {
+      this.#posed = true;
+      position.set(x, 0, z);
+    } else if (away > LEASH) {
+      const share = ((away - LEASH) / away) * (1 - Math.exp(-FOLLOW * seconds));
+      position.x += dx * share;
+      position.z += dz * share;
+    }
+    this.#floor.travelled.set(position.x, position.z);
+  }
+
+  #reach(puppet: Puppet): number {
+    const at = new Vector3();
+    return Math.max(...[0, 1].map((limb) => Math.abs(puppet.handle(limb, at).project(this.audience.camera).x)));
+  }
+
+  #ceiling(): number {
+    const middle = this.rig.position.clone().setY(1);
+    return this.fromScreen(this.#width / 2, HEADROOM, middle)?.y ?? 2.2;
+  }
+}
