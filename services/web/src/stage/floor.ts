@@ -2,20 +2,21 @@
  * The stage floor. By night black lacquer: planks, and an analytic mirror of the backdrop (the view ray is mirrored and the
  * backdrop evaluated where it lands), so that no second render is needed. By day paper-pale wood that melts into the ground.
  */
-import { Mesh, MeshStandardMaterial, PlaneGeometry, Vector2, type IUniform } from "three";
+import { Matrix4, Mesh, MeshStandardMaterial, PlaneGeometry, type IUniform, type Object3D, type Vector2 } from "three";
 import { BACKDROP, BACKDROP_Z, type BackdropUniforms } from "./backdrop";
 import type { Look } from "./look";
 
 const SHADE = /* glsl */ `
 #include <opaque_fragment>
-vec3 eye = normalize(vPlace - cameraPosition);
-vec2 at = vPlace.xz - travelled;
+vec3 eye = normalize(mat3(intoRig) * (vPlace - cameraPosition));
+vec2 at = (intoRig * vec4(vPlace, 1.)).xz;
+vec2 board = at + travelled;
 vec3 bounce = vec3(eye.x, -eye.y, eye.z);
 float reach = (${BACKDROP_Z.toFixed(2)} - at.y) / min(bounce.z, -1e-3);
 vec2 landing = vec2(at.x, 0.) + bounce.xy * reach;
 float fresnel = .05 + .95 * pow(1. - abs(eye.y), 5.);
-float grain = .6 * noise2(vPlace.xz * vec2(2., 26.)) + .4 * noise2(vPlace.xz * vec2(6., 90.));
-float gap = smoothstep(.478, .497, abs(fract(vPlace.x * 1.55) - .5));
+float grain = .6 * noise2(board * vec2(2., 26.)) + .4 * noise2(board * vec2(6., 90.));
+float gap = smoothstep(.478, .497, abs(fract(board.x * 1.55) - .5));
 vec3 mirrored = backdrop(landing + vec2((grain - .5) * .03, 0.), .10 + .05 * reach);
 vec3 wood = gl_FragColor.rgb;
 float horizon;
@@ -39,22 +40,21 @@ if (dark < .5) gl_FragColor.rgb = mix(gl_FragColor.rgb, backdrop(vec2(at.x, -.2)
 
 export interface Floor {
   readonly mesh: Mesh;
-  /** How far the rig has followed the dancer, metres x and z: the planks stay where they are. */
-  readonly travelled: Vector2;
   dress(look: Look): void;
 }
 
-export function createFloor(backdrop: BackdropUniforms): Floor {
+/** `rig` is the frame the floor lies in; `travelled` how far that has gone, for the boards. */
+export function createFloor(backdrop: BackdropUniforms, rig: Object3D, travelled: Vector2): Floor {
   const material = new MeshStandardMaterial({ transparent: true });
-  const travelled: IUniform<Vector2> = { value: new Vector2() };
+  const intoRig: IUniform<Matrix4> = { value: new Matrix4() };
   const opacityNear: IUniform<number> = { value: 1 };
   material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, backdrop, { travelled, opacityNear });
+    Object.assign(shader.uniforms, backdrop, { travelled: { value: travelled }, intoRig, opacityNear });
     shader.vertexShader = shader.vertexShader
       .replace("#include <common>", "#include <common>\nvarying vec3 vPlace;")
       .replace("#include <fog_vertex>", "#include <fog_vertex>\nvPlace = (modelMatrix * vec4(transformed, 1.)).xyz;");
     shader.fragmentShader = shader.fragmentShader
-      .replace("#include <common>", `#include <common>\nvarying vec3 vPlace; uniform vec2 travelled; uniform float opacityNear;\n${BACKDROP}`)
+      .replace("#include <common>", `#include <common>\nvarying vec3 vPlace; uniform vec2 travelled; uniform mat4 intoRig; uniform float opacityNear;\n${BACKDROP}`)
       .replace("#include <opaque_fragment>", SHADE)
       .replace("#include <tonemapping_fragment>", MELT);
   };
@@ -64,9 +64,9 @@ export function createFloor(backdrop: BackdropUniforms): Floor {
   mesh.position.z = BACKDROP_Z + 4.5;
   mesh.receiveShadow = true;
   mesh.renderOrder = 2;
+  mesh.onBeforeRender = () => intoRig.value.copy(rig.matrixWorld).invert();
   return {
     mesh,
-    travelled: travelled.value,
     dress(look) {
       material.color.set(look.floor.colour);
       material.roughness = look.floor.roughness;

@@ -36,6 +36,8 @@ export class Puppet {
   readonly figure: Figure;
   /** Size against the standard figure of 1.75 m. */
   readonly scale: number;
+  /** How far the ankle stands above the ball of the foot at rest, metres. */
+  readonly ankleHeight: number;
   readonly #bones: Bone[];
   readonly #sleeves: SleeveBone[];
   readonly #geometry: BufferGeometry;
@@ -45,6 +47,7 @@ export class Puppet {
   constructor(figure: Figure, paint: Paint, floorAt: IUniform<number>) {
     this.figure = figure;
     this.scale = figureScale(figure);
+    this.ankleHeight = -figure.offsets[JOINTS.indexOf("l_midtarsal") * 3 + 1];
     this.group.name = "puppet";
     this.#bones = bonesOf(figure);
     this.group.add(this.#bone("humanoid_root"), this.#bone("l_sleeve"), this.#bone("r_sleeve"));

@@ -1,5 +1,5 @@
 /** The stage: puppet, disc, floor, lights, strings and the seat in the audience. Draws what it is given; keeps no time. */
-import { ACESFilmicToneMapping, Group, PCFShadowMap, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer, type IUniform } from "three";
+import { ACESFilmicToneMapping, PCFShadowMap, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer, type IUniform } from "three";
 import type { Figure, Pose } from "../motion/skeleton";
 import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
 import { AudienceCamera, type Framing } from "./camera";
@@ -8,17 +8,12 @@ import { createLights, studio } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
 import { Puppet } from "./puppet";
+import { Rig } from "./rig";
 import type { Paint } from "./shading";
-import { SOLE } from "./standard";
 import { Strings, type StringState } from "./strings";
 
 /** Pixel ratios above these cost more than they show. */
 const SHARPEST = { desktop: 2, phone: 1.75 };
-/** The rig follows once the dancer is this far from its middle, metres, and this quickly, 1/s. */
-const LEASH = 0.25;
-const FOLLOW = 2.5;
-/** A dancer further away than this was put there by a seek or a new motion: cut, do not travel. */
-const CUT = 1.2;
 /** Pixels at the top that belong to the header and a bar's name. */
 const HEADROOM = 120;
 
@@ -26,23 +21,21 @@ const FREE: readonly StringState[] = [0, 1, 2, 3].map(() => ({ holder: null, lit
 
 export class Stage {
   readonly scene = new Scene();
-  /** Camera, lights, backdrop and floor: they follow a dancer who walks away, so joints stay where the dance puts them. */
-  readonly rig = new Group();
+  readonly rig = new Rig();
   readonly strings = new Strings();
   readonly audience = new AudienceCamera();
   readonly renderer: WebGLRenderer;
   puppet: Puppet | null = null;
   readonly #backdrop = backdropUniforms();
-  readonly #floor = createFloor(this.#backdrop);
+  readonly #floor = createFloor(this.#backdrop, this.rig.group, this.rig.travelled);
   readonly #lights = createLights();
-  readonly #floorAt: IUniform<number> = { value: -SOLE };
+  readonly #floorAt: IUniform<number> = { value: 0 };
   readonly #caster = new Raycaster();
   #paint: Paint | null = null;
   #look: Look = LOOKS.night;
   #themed: Theme | null = null;
   #width = 1;
   #height = 1;
-  #posed = false;
   #still = false;
 
   /** Throws where the browser has no WebGL 2. */
@@ -51,10 +44,8 @@ export class Stage {
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
-    this.rig.name = "rig";
-    this.rig.add(this.audience.camera, this.#lights.group, createBackdrop(this.#backdrop), this.#floor.mesh);
-    this.scene.add(this.rig, this.strings.group);
-    this.#floor.mesh.position.y = this.#floorAt.value;
+    this.rig.group.add(this.audience.camera, this.#lights.group, createBackdrop(this.#backdrop), this.#floor.mesh);
+    this.scene.add(this.rig.group, this.strings.group);
   }
 
   /** No easing, no swing: for people who asked for less motion. */
@@ -87,9 +78,7 @@ export class Stage {
     this.puppet.group.visible = false;
     this.scene.add(this.puppet.group);
     this.audience.scale = this.puppet.scale;
-    this.#floorAt.value = -SOLE * this.puppet.scale;
-    this.#floor.mesh.position.y = this.#floorAt.value;
-    this.#posed = false;
+    this.rig.reset();
   }
 
   /** CSS pixels. */
@@ -111,9 +100,10 @@ export class Stage {
     if (puppet && pose) {
       puppet.group.visible = true;
       puppet.apply(pose, this.#still ? 0 : seconds);
-      this.#follow(pose.root[0], pose.root[2], seconds);
+      this.rig.follow(puppet, seconds);
+      this.#floorAt.value = this.rig.group.position.y;
     }
-    this.rig.updateMatrixWorld(true);
+    this.rig.group.updateMatrixWorld(true);
     this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0);
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#ceiling(), this.right());
     this.renderer.render(this.scene, this.audience.camera);
@@ -146,19 +136,13 @@ export class Stage {
     return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 2);
   }
 
-  #follow(x: number, z: number, seconds: number): void {
-    const { position } = this.rig;
-    const [dx, dz] = [x - position.x, z - position.z];
-    const away = Math.hypot(dx, dz);
-    if (!this.#posed || away > CUT) {
-      this.#posed = true;
-      position.set(x, 0, z);
-    } else if (away > LEASH) {
-      const share = ((away - LEASH) / away) * (1 - Math.exp(-FOLLOW * seconds));
-      position.x += dx * share;
-      position.z += dz * share;
-    }
-    this.#floor.travelled.set(position.x, position.z);
+  /** World place of the hand nearer to the audience. */
+  nearerHand(): Vector3 | null {
+    const { puppet } = this;
+    if (!puppet) return null;
+    const eye = this.audience.camera.getWorldPosition(new Vector3());
+    const [left, right] = [0, 1].map((limb) => puppet.handle(limb, new Vector3()));
+    return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
   #reach(puppet: Puppet): number {
@@ -167,7 +151,7 @@ export class Stage {
   }
 
   #ceiling(): number {
-    const middle = this.rig.position.clone().setY(1);
+    const middle = this.rig.group.localToWorld(new Vector3(0, 1, 0));
     return this.fromScreen(this.#width / 2, HEADROOM, middle)?.y ?? 2.2;
   }
 }
