@@ -86,3 +86,8 @@ bench-%: setup
 
 clean:
 	rm -rf .venv .tools .setup .bunraku services/web/node_modules services/bunraku/page
+
+locks: | .setup/python
+	$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate pyproject.toml -o requirements.lock
+	$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate pyproject.toml --group dev -o requirements-dev.lock
+	$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate --group node -o requirements-node.lock

@@ -1,0 +1,57 @@
+"""RFC 9457 problem documents: what HTTP answers when something is wrong."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+MEDIA_TYPE = "application/problem+json"
+
+
+class ProblemError(Exception):
+    """An answer with `status`, a `title` for the kind of problem, a `detail` for this one, and what helps (`field`,
+    `hint`, `line` ...)."""
+
+    def __init__(self, status: int, title: str, detail: str, **extra: Any) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.title = title
+        self.detail = detail
+        self.extra = extra
+
+
+def response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:
+    """The problem as HTTP says it; fields that are None are left out."""
+    extra = {name: value for name, value in problem.extra.items() if value is not None}
+    body = {"type": "about:blank", "title": problem.title, "status": problem.status, "detail": problem.detail, **extra}
+    return JSONResponse(body, problem.status, headers, MEDIA_TYPE)
+
+
+def install(app: FastAPI) -> None:
+    """Makes every error that `app` answers a problem document."""
+
+    @app.exception_handler(ProblemError)
+    async def told(_: Request, error: ProblemError) -> JSONResponse:
+        return response(error)
+
+    @app.exception_handler(RequestValidationError)
+    async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        return response(invalid_field(first["loc"][1:], first["msg"]))
+
+    @app.exception_handler(HTTPException)
+    async def refused(request: Request, error: HTTPException) -> JSONResponse:
+        title = HTTPStatus(error.status_code).phrase
+        detail = f"{request.method} {request.url.path}: {error.detail}"
+        return response(ProblemError(error.status_code, title, detail), dict(error.headers or {}))
+
+
+def invalid_field(location: tuple[int | str, ...], message: str) -> ProblemError:
+    """The problem of one field of a request, at `location` as pydantic gives it: `("targets", 3, 1)`."""
+    field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+    return ProblemError(422, "Invalid request", f"{field}: {message}" if field else message, field=field or None)

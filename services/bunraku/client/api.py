@@ -1,0 +1,114 @@
+"""Bunraku's HTTP interface from Python."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any, Self
+from urllib.parse import quote, urlsplit, urlunsplit
+
+import httpx2
+
+TIMEOUT = httpx2.Timeout(10.0, read=120.0)
+"""Seconds; an answer to an upload comes when it is encoded."""
+CHUNK = 1 << 16
+
+
+class ServerProblem(Exception):
+    """What the server answered in place of what was asked: an RFC 9457 problem, `body`, with its `status`."""
+
+    def __init__(self, status: int, body: dict[str, Any]) -> None:
+        line = f"line {body['line']}: " if body.get("line") else ""
+        hint = f" ({body['hint']})" if body.get("hint") else ""
+        super().__init__(f"{body.get('title', 'Problem')}: {line}{body.get('detail', '')}{hint}")
+        self.status = status
+        self.body = body
+
+
+class Client:
+    """A server of Bunraku at `url` (http or https). Use as an async context manager.
+
+    Methods raise `ServerProblem` where the server refuses, and `httpx2.TransportError` where there is none.
+    """
+
+    def __init__(self, url: str = "http://127.0.0.1:8000") -> None:
+        self.url = url.rstrip("/")
+        self._http = httpx2.AsyncClient(base_url=self.url, timeout=TIMEOUT)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._http.aclose()
+
+    async def upload(self, path: Path, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+        """Upload a motion file and wait until it can be watched; `progress` is told bytes sent and in all."""
+        size = await asyncio.to_thread(os.path.getsize, path)
+
+        async def chunks() -> AsyncIterator[bytes]:
+            sent = 0
+            with path.open("rb") as file:
+                while chunk := file.read(CHUNK):
+                    yield chunk
+                    sent += len(chunk)
+                    if progress is not None:
+                        progress(sent, size)
+
+        return await self._ask(
+            "POST",
+            "/v1/motions",
+            params={"filename": path.name},
+            content=chunks(),
+            headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
+        )
+
+    async def motions(self) -> list[dict[str, Any]]:
+        """All motions, newest first."""
+        items: list[dict[str, Any]] = []
+        params: dict[str, Any] = {"limit": 200}
+        while True:
+            page = await self._ask("GET", "/v1/motions", params=params)
+            items += page["items"]
+            if page["next"] is None:
+                return items
+            params["cursor"] = page["next"]
+
+    async def motion(self, motion: str) -> dict[str, Any]:
+        """One motion."""
+        return await self._ask("GET", f"/v1/motions/{quote(motion, safe='')}")
+
+    async def delete_motion(self, motion: str) -> None:
+        """Remove one motion."""
+        await self._ask("DELETE", f"/v1/motions/{quote(motion, safe='')}")
+
+    async def open_session(self, motion: str, *, playing: bool = True, loop: bool = True) -> dict[str, Any]:
+        """A new session over a motion."""
+        return await self._ask("POST", "/v1/sessions", json={"motion": motion, "playing": playing, "loop": loop})
+
+    async def session(self, session: str) -> dict[str, Any]:
+        """One session."""
+        return await self._ask("GET", f"/v1/sessions/{quote(session, safe='')}")
+
+    async def edit_session(self, session: str, **edit: Any) -> dict[str, Any]:
+        """Edit a session: any of `playing`, `position` (microseconds), `loop`, `motion`."""
+        return await self._ask("PATCH", f"/v1/sessions/{quote(session, safe='')}", json=edit)
+
+    def socket_url(self, path: str) -> str:
+        """The WebSocket address of a path of this server."""
+        parts = urlsplit(self.url)
+        scheme = {"http": "ws", "https": "wss"}.get(parts.scheme, parts.scheme)
+        return urlunsplit((scheme, parts.netloc, parts.path.rstrip("/") + path, "", ""))
+
+    async def _ask(self, method: str, path: str, **options: Any) -> dict[str, Any]:
+        response = await self._http.request(method, path, **options)
+        if response.status_code == 204:
+            return {}
+        try:
+            body = response.json()
+        except ValueError:
+            body = {"title": "Not Bunraku", "detail": f"{self.url} answered {response.status_code} without JSON"}
+        if not response.is_success or not isinstance(body, dict):
+            raise ServerProblem(response.status_code, body if isinstance(body, dict) else {})
+        return body

@@ -1,0 +1,74 @@
+"""The ingest service: uploads become motions; motions are listed, described and removed."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Query, Request, Response
+from fastapi.responses import JSONResponse
+
+from bunraku.backing import problems
+from bunraku.backing.backing import Backing
+from bunraku.backing.catalogue import BadCursor, Entry
+from bunraku.backing.problems import ProblemError
+from bunraku.ingest.uploads import Uploads
+
+
+def entry_json(entry: Entry) -> dict[str, Any]:
+    """A motion as the API shows it."""
+    created = datetime.fromtimestamp(entry.created / 1e6, UTC).isoformat(timespec="milliseconds")
+    return {"id": entry.id, "created": created.replace("+00:00", "Z"), **entry.description}
+
+
+def create_app(backing: Backing) -> FastAPI:
+    """The service upon `backing`."""
+    app = FastAPI(title="Bunraku ingest")
+    problems.install(app)
+    uploads = Uploads(backing)
+
+    @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BODY)
+    async def upload(request: Request, filename: Annotated[str, Query(min_length=1, max_length=255)]) -> Response:
+        """Make a motion of the file in the request's body. The same bytes again give the same motion, with 200."""
+        entry, new = await uploads.take(request, filename)
+        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+
+    @app.get("/v1/motions", tags=["motions"])
+    async def page(
+        limit: Annotated[int, Query(ge=1, le=200)] = 50, cursor: Annotated[str | None, Query(max_length=200)] = None
+    ) -> dict[str, Any]:
+        """Motions, newest first; `next` is the cursor of the next page."""
+        try:
+            entries, following = await backing.catalogue.page(limit, cursor)
+        except BadCursor as error:
+            raise ProblemError(422, "Bad cursor", str(error), field="cursor") from None
+        return {"items": [entry_json(entry) for entry in entries], "next": following}
+
+    @app.get("/v1/motions/{motion}", tags=["motions"])
+    async def describe(motion: str) -> dict[str, Any]:
+        """One motion."""
+        entry = await backing.catalogue.get(motion)
+        if entry is None:
+            raise _missing(motion)
+        return entry_json(entry)
+
+    @app.delete("/v1/motions/{motion}", status_code=204, tags=["motions"])
+    async def remove(motion: str) -> None:
+        """Remove one motion; sessions that play it go on with what they have."""
+        if not await backing.catalogue.remove(motion):
+            raise _missing(motion)
+        await backing.library.remove(motion)
+
+    return app
+
+
+def _missing(motion: str) -> ProblemError:
+    return ProblemError(404, "No such motion", f"there is no motion {motion[:40]!r}", hint="GET /v1/motions lists them")
+
+
+_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}

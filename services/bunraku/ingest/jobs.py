@@ -1,0 +1,131 @@
+"""An upload's bytes to an encoded motion, in a process of its own.
+
+Reading strangers' files and encoding them takes seconds of processor time and may go wrong in any way: a process apart
+keeps the service's loop free, and can be ended when it takes too long or too much.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import multiprocessing
+import resource
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from bunraku.backing.library import pack
+from bunraku.codec.encode import encode_motion
+from bunraku.motion.analysis import analyse
+from bunraku.motion.bvh import read
+from bunraku.motion.errors import UnreadableMotion
+
+MEMORY = 4 << 30
+"""Bytes of address space that a job may take."""
+
+_context = multiprocessing.get_context("forkserver")
+_context.set_forkserver_preload(["bunraku.ingest.jobs"])
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A motion ready to be stored: its library object, and what the API says of it."""
+
+    packed: bytes
+    described: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Why a file could not be made a motion of: the fields of `UnreadableMotion`."""
+
+    title: str
+    detail: str
+    line: int | None = None
+    field: str | None = None
+    hint: str | None = None
+
+
+def make(motion: str, path: Path) -> Made | Refused:
+    """Read, analyse and encode the file at `path` as the motion of this id."""
+    try:
+        analysis = analyse(read(path.read_bytes()))
+    except UnreadableMotion as error:
+        return Refused(error.title, error.detail, error.line, error.field, error.hint or None)
+    encoded = encode_motion(analysis.motion)
+    track = encoded.track
+    return Made(
+        pack(motion, encoded),
+        {
+            "duration": analysis.motion.duration,
+            "fps": analysis.motion.fps,
+            "frames": analysis.motion.frames,
+            "blocks": track.blocks,
+            "profile": analysis.profile,
+            "joints": analysis.mapped,
+            "rest_pose": analysis.rest,
+            "unit": analysis.unit,
+            "guessed": analysis.guessed,
+            "fit": {"mean_mm": round(analysis.fit_mean, 3), "max_mm": round(analysis.fit_max, 3)},
+            "rates": encoded.describe()["rates"],
+        },
+    )
+
+
+def _work(answer: Connection, motion: str, path: Path) -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    try:
+        answer.send(make(motion, path))
+    except MemoryError:
+        answer.send(
+            Refused(
+                "Too much motion", "reading this file takes more memory than one may", hint="cut it into shorter files"
+            )
+        )
+
+
+async def run(motion: str, path: Path, seconds: float) -> Made | Refused:
+    """`make` in a process of its own, ended after `seconds`."""
+    receiver, sender = _context.Pipe(duplex=False)
+    process = _context.Process(target=_work, args=(sender, motion, path), daemon=True)
+    await asyncio.to_thread(process.start)
+    sender.close()
+    try:
+        async with asyncio.timeout(seconds):
+            arrived = await _readable(receiver)
+        result = await asyncio.to_thread(receiver.recv) if arrived else None
+    except TimeoutError:
+        return Refused(
+            "Takes too long",
+            f"reading and encoding took more than {seconds:g} s",
+            hint="cut the file into shorter ones",
+        )
+    except EOFError:
+        result = None
+    finally:
+        process.kill()
+        await asyncio.to_thread(process.join)
+        process.close()
+        receiver.close()
+    if isinstance(result, Made | Refused):
+        return result
+    return Refused("Unreadable motion", "the reader broke off on this file", hint="please report it with the file")
+
+
+async def _readable(receiver: Connection) -> bool:
+    """Wait until something has come through the pipe, or it was closed."""
+    loop = asyncio.get_running_loop()
+    arrived: asyncio.Future[bool] = loop.create_future()
+    number = receiver.fileno()
+
+    def come() -> None:
+        if not arrived.done():
+            arrived.set_result(True)
+
+    loop.add_reader(number, come)
+    try:
+        return await arrived
+    finally:
+        with contextlib.suppress(ValueError, OSError):
+            loop.remove_reader(number)

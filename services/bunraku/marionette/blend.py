@@ -1,0 +1,73 @@
+"""An arm between the dance's way of reaching its hand tip and the marionette's.
+
+Both arms are seen in the frame of their chord, the line from shoulder to tip with the plane of the elbow about it.
+There they differ by little, and mixing their joints moves the tip by little; the arm is then closed on the target
+again, so that the tip is exact all the way.
+"""
+
+from __future__ import annotations
+
+from math import atan2, pi, sqrt
+
+from bunraku.marionette import vector
+from bunraku.marionette.limbs import ArmRig, Joints
+from bunraku.marionette.vector import Vector
+
+
+class ArmBlend:
+    """One arm on its way. It remembers which way round the elbow swings, so that it never changes its mind halfway."""
+
+    def __init__(self, rig: ArmRig) -> None:
+        self._rig = rig
+        self._swivel: float | None = None
+
+    def joints(self, dance: Joints, bent: Joints, target: Vector, normal: Vector, weight: float) -> Joints:
+        """The joints at `weight`: 0 gives back the dance's, 1 the bent arm's in the plane of `normal`.
+
+        `dance` are the pose's joints, `bent` those of `ArmRig.bend` for the `target` (arm lengths, axes of vl5),
+        `normal` a unit vector square to it. Between, the elbow goes to the nearest place from which forearm and hand reach the
+        target; where the mixed wrist leaves none, the tip comes as near as it can.
+        """
+        rig = self._rig
+        direction = rig.direction(target)
+        if weight >= 1.0:
+            self._swivel = None
+            shoulder = vector.multiply(rig.chord(direction, normal), bent[0])
+            return (vector.normalise(shoulder), bent[1], bent[2])
+        own = rig.direction(rig.target(dance))
+        own_normal = vector.unit(vector.square_to(rig.bend_axis(dance), own), vector.across(own))
+        carried = vector.rotate(vector.between(own, direction), own_normal)
+        swivel = atan2(vector.dot(vector.cross(carried, normal), direction), vector.dot(carried, normal))
+        if self._swivel is not None:
+            swivel += 2.0 * pi * round((self._swivel - swivel) / (2.0 * pi))
+        self._swivel = swivel
+        if weight <= 0.0:
+            return dance
+        plane = vector.rotate(vector.about(direction, swivel * weight), carried)
+        in_chord = vector.multiply(vector.conjugate(rig.chord(own, own_normal)), dance[0])
+        shoulder = vector.slerp(in_chord, bent[0], weight)
+        elbow, wrist = (vector.slerp(a, b, weight) for a, b in zip(dance[1:], bent[1:], strict=True))
+        shoulder, elbow = self._close(shoulder, elbow, wrist, vector.length(target))
+        return (vector.normalise(vector.multiply(rig.chord(direction, plane), shoulder)), elbow, wrist)
+
+    def _close(
+        self, shoulder: vector.Quaternion, elbow: vector.Quaternion, wrist: vector.Quaternion, reach: float
+    ) -> tuple[vector.Quaternion, vector.Quaternion]:
+        """Shoulder and elbow, turned by as little as brings the tip to `reach` arm lengths along the chord."""
+        upper, fore, hand = self._rig.links
+        rest = vector.add(fore, vector.rotate(wrist, hand))
+        near, far = vector.length(upper), vector.length(rest)
+        chord = max(reach * self._rig.scale, 1e-9)
+        along = min(max((near * near + chord * chord - far * far) / (2.0 * chord), -near), near)
+        off = sqrt(max(near * near - along * along, 0.0))
+        mixed = vector.rotate(shoulder, upper)
+        # straight arms leave the side open: the elbow of a bent one is below the chord
+        _, y, z = vector.unit((0.0, mixed[1] - 1e-6 * near, mixed[2]), (0.0, -1.0, 0.0))
+        place = (along, off * y, off * z)
+        before = vector.multiply(shoulder, elbow)
+        raised = vector.between(vector.scale(mixed, 1.0 / near), vector.scale(place, 1.0 / near))
+        shoulder = vector.multiply(raised, shoulder)
+        lower = vector.unit(vector.rotate(before, rest), (1.0, 0.0, 0.0))
+        wanted = vector.unit(vector.subtract((chord, 0.0, 0.0), place), (1.0, 0.0, 0.0))
+        turned = vector.multiply(vector.between(lower, wanted), before)
+        return shoulder, vector.normalise(vector.multiply(vector.conjugate(shoulder), turned))

@@ -1,0 +1,155 @@
+"""Who holds which limb: claims, epochs, inputs, and what happens when a puppeteer falls silent.
+
+A limb has at most one holder. Every grant has a new epoch, and inputs of another epoch move nothing, so that what a
+former holder sent late is harmless. Times are clock time in µs and come in as arguments.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from bunraku.marionette.limbs import Limb
+from bunraku.marionette.steering import Kind, Steering
+from bunraku.marionette.vector import Vector
+
+LOST_AFTER = 500_000
+"""Without a word from its holder for this many µs a limb returns to the dance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """`limb` is the claimant's; its inputs must carry `epoch`."""
+
+    limb: Limb
+    epoch: int
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """`limb` is not the puppeteer's: `holder` has it (`held`), there is no such limb (`unknown`), or it was the
+    puppeteer's and went back to the dance for want of a word (`lost`)."""
+
+    limb: int
+    holder: str | None
+    reason: Literal["held", "lost", "unknown"]
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One sample of a controller, as message 70 of the contract.
+
+    `values` of a hand: arm lengths on the axes of vl5 from the shoulder, or as velocity -1..1 of full speed; of a leg
+    the first is the thigh's angle in radians, or -1..1 of full speed. `sampled` is clock time in µs.
+    """
+
+    limb: int
+    kind: int
+    epoch: int
+    sequence: int
+    sampled: int
+    values: Vector
+
+
+@dataclass(slots=True)
+class _Hold:
+    holder: str | None = None
+    epoch: int = 0
+    sequence: int = -1
+    steering: Steering | None = None
+
+    def free(self, now: int) -> None:
+        self.holder = None
+        if self.steering is not None:
+            self.steering.stop(now)
+
+
+class Ownership:
+    """The four limbs of one puppet and their holders."""
+
+    def __init__(self) -> None:
+        self._holds = {limb: _Hold() for limb in Limb}
+
+    def holders(self) -> tuple[str | None, ...]:
+        """The holder's id of each limb, or None."""
+        return tuple(hold.holder for hold in self._holds.values())
+
+    def epoch(self, limb: Limb) -> int:
+        """The epoch of the limb's last grant; 0 before the first."""
+        return self._holds[limb].epoch
+
+    def steering(self, limb: Limb) -> Steering | None:
+        """What the holder asks of the limb; after a release the last that was asked; None before the first grant."""
+        return self._holds[limb].steering
+
+    def claim(self, limb: int, puppeteer: str, now: int) -> Grant | Refusal:
+        """Grants a free limb, or again the claimant's own with a new epoch."""
+        if limb not in Limb.__members__.values():
+            return Refusal(limb, None, "unknown")
+        hold = self._holds[Limb(limb)]
+        if hold.holder not in (None, puppeteer):
+            return Refusal(limb, hold.holder, "held")
+        # a limb still on its way back to the dance is taken where the last hand left it
+        left = hold.steering.value if hold.steering else None
+        hold.holder = puppeteer
+        hold.epoch += 1
+        hold.sequence = -1
+        hold.steering = Steering(Limb(limb), now, left)
+        return Grant(Limb(limb), hold.epoch)
+
+    def release(self, limb: int, puppeteer: str, epoch: int, now: int) -> bool:
+        """Frees a limb; False, and nothing changes, if it is not this puppeteer's at this epoch."""
+        hold = self._held(limb, puppeteer)
+        if hold is None or hold.epoch != epoch:
+            return False
+        hold.free(now)
+        return True
+
+    def leave(self, puppeteer: str, now: int) -> tuple[Limb, ...]:
+        """Frees all that a puppeteer holds; says which limbs."""
+        freed = tuple(limb for limb, hold in self._holds.items() if hold.holder == puppeteer)
+        for limb in freed:
+            self._holds[limb].free(now)
+        return freed
+
+    def alive(self, puppeteer: str, limbs: list[int], now: int) -> None:
+        """The puppeteer still holds `limbs`, without a new input; those it does not hold are passed over."""
+        for limb in limbs:
+            hold = self._held(limb, puppeteer)
+            if hold is not None and hold.steering is not None:
+                hold.steering.hear(now)
+
+    def input(self, puppeteer: str, given: Input, now: int) -> bool:
+        """Takes an input; False, and nothing moves, if the limb is not this puppeteer's at this epoch, or the sequence
+        is not above the last. Raises `ValueError` for numbers that are not finite or an unknown kind."""
+        kind = Kind(given.kind)
+        hold = self._held(given.limb, puppeteer)
+        if hold is None or hold.steering is None or hold.epoch != given.epoch or given.sequence <= hold.sequence:
+            return False
+        if kind is Kind.TARGET:
+            hold.steering.target(given.values, given.sampled, now)
+        else:
+            hold.steering.velocity(given.values, given.sampled, now)
+        hold.sequence = given.sequence
+        return True
+
+    def expire(self, now: int) -> list[tuple[Limb, str]]:
+        """Frees the limbs whose holders have been silent for `LOST_AFTER`; says which, and whose they were."""
+        lost: list[tuple[Limb, str]] = []
+        for limb, hold in self._holds.items():
+            if hold.holder is not None and hold.steering and now - hold.steering.heard >= LOST_AFTER:
+                lost.append((limb, hold.holder))
+                hold.free(now)
+        return lost
+
+    def forget(self, limb: Limb) -> None:
+        """The limb is wholly the dance's again: the next to hold it starts from there."""
+        hold = self._holds[limb]
+        if hold.holder is None:
+            hold.steering = None
+
+    def _held(self, limb: int, puppeteer: str) -> _Hold | None:
+        if limb not in Limb.__members__.values():
+            return None
+        hold = self._holds[Limb(limb)]
+        return hold if hold.holder == puppeteer else None

@@ -1,0 +1,122 @@
+"""The proportions of an arm: what its table of bends depends on, and by what name the table is known.
+
+Lengths are in arm lengths (upper arm + forearm + hand = 1) and masses in parts of their sum, so that one table fits
+every arm of the same shape, whatever its size.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import atan2, cos, hypot, radians, sin
+
+ELBOW_LIMIT = radians(150.0)
+"""The elbow bends from 0 to this."""
+WRIST_LIMIT = radians(80.0)
+"""The wrist bends from 0 to this."""
+OUTER_RADIUS = 1.0 - 1e-6
+"""The farthest a hand tip is solved for, in arm lengths: a fully straight arm has no bend left to choose."""
+
+WINTER = (0.028, 0.016, 0.006)
+"""Masses of upper arm, forearm and hand as parts of the body's (Winter, Biomechanics and Motor Control, table 4.1)."""
+
+_NAMES = ("L0", "L1", "L2", "M0", "M1", "M2")
+_LEAST = (100, 100, 20, 1, 1, 1)
+
+
+class ProportionsError(ValueError):
+    """Proportions that no arm has; `field` says which part, `hint` what to do."""
+
+    def __init__(self, message: str, field: str, hint: str) -> None:
+        super().__init__(message)
+        self.field = field
+        self.hint = hint
+
+
+@dataclass(frozen=True, slots=True)
+class Proportions:
+    """Link `lengths` (upper arm, forearm, hand; sum 1) and link `masses` (sum 1) of one arm."""
+
+    lengths: tuple[float, float, float]
+    masses: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, lengths: tuple[float, float, float], masses: tuple[float, float, float] = WINTER) -> Proportions:
+        """From lengths and masses in any unit. Raises `ProportionsError` where a link is too short for a table."""
+        whole, heavy = sum(lengths), sum(masses)
+        if not (whole > 0.0 and heavy > 0.0):
+            raise ProportionsError(
+                "an arm needs lengths and masses above zero", "L0", "give the arm's three links lengths"
+            )
+        a, b, c = (float(length / whole) for length in lengths)
+        d, e, f = (float(mass / heavy) for mass in masses)
+        made = cls((a, b, c), (d, e, f))
+        made.rounded()
+        return made
+
+    @classmethod
+    def parse(cls, identity: str) -> Proportions:
+        """From `L0-L1-L2-M0-M1-M2`, integers in thousandths. Raises `ProportionsError`."""
+        if not re.fullmatch(r"[0-9]{1,4}(-[0-9]{1,4}){5}", identity):
+            raise ProportionsError(
+                f"proportions {identity[:60]!r} are not six integers",
+                "proportions",
+                "write L0-L1-L2-M0-M1-M2, such as 393-351-256-560-320-120",
+            )
+        return _checked(tuple(int(part) for part in identity.split("-")))
+
+    @property
+    def thousandths(self) -> tuple[int, ...]:
+        """The six numbers rounded so that the lengths, and the masses, sum to 1000 (largest remainder)."""
+        return (*_apportion(self.lengths), *_apportion(self.masses))
+
+    @property
+    def identity(self) -> str:
+        """`L0-L1-L2-M0-M1-M2` in thousandths: the name of the arm's table."""
+        return "-".join(str(part) for part in self.thousandths)
+
+    def rounded(self) -> Proportions:
+        """These proportions as their identity has them. Raises `ProportionsError` as `parse` does."""
+        return _checked(self.thousandths)
+
+    @property
+    def inner_radius(self) -> float:
+        """The nearest to the shoulder that a hand tip is solved for, in arm lengths.
+
+        A quarter farther than the nearest point the limits of elbow and wrist allow (the wrist taken degree by
+        degree), and at least 0.1: nearer in, the shoulder would have to whirl.
+        """
+        upper, fore, hand = self.lengths
+        nearest = 1.0
+        for degrees in range(round(WRIST_LIMIT / radians(1.0)) + 1):
+            bend = radians(degrees)
+            x, y = fore + hand * cos(bend), hand * sin(bend)
+            elbow = min(ELBOW_LIMIT, radians(180.0) - atan2(y, x))
+            lower = hypot(x, y)
+            turn = elbow + atan2(y, x)
+            nearest = min(nearest, hypot(upper + lower * cos(turn), lower * sin(turn)))
+        return max(0.1, 1.25 * nearest)
+
+
+def _checked(parts: tuple[int, ...]) -> Proportions:
+    for name, part, least in zip(_NAMES, parts, _LEAST, strict=True):
+        if part < least:
+            raise ProportionsError(f"{name} is {part} thousandths", name, f"at least {least}: the link is too short")
+    for kind, numbers in (("L", parts[:3]), ("M", parts[3:])):
+        if sum(numbers) != 1000:
+            raise ProportionsError(
+                f"{kind}0 + {kind}1 + {kind}2 is {sum(numbers)}", f"{kind}0", "the three must sum to 1000 exactly"
+            )
+    a, b, c, d, e, f = (part / 1000.0 for part in parts)
+    return Proportions((a, b, c), (d, e, f))
+
+
+def _apportion(shares: tuple[float, float, float]) -> list[int]:
+    floors = [int(share * 1000.0) for share in shares]
+    remainders = [share * 1000.0 - floor for share, floor in zip(shares, floors, strict=True)]
+    # 1e-6 keeps 0.393 * 1000 = 392.99999999999994 from losing its thousandth to another
+    whole = [floor + (remainder > 1.0 - 1e-6) for floor, remainder in zip(floors, remainders, strict=True)]
+    order = sorted(range(3), key=lambda i: (-(remainders[i] % (1.0 - 1e-6)), i))
+    for i in order[: 1000 - sum(whole)]:
+        whole[i] += 1
+    return whole

@@ -1,0 +1,131 @@
+"""Vectors and unit quaternions of one limb, as plain tuples of floats.
+
+The same conventions as `motion.rotation` (w x y z, column vectors), for the path that solves one limb at a time at
+the stage's rate: there an array library costs some twenty times more than the arithmetic.
+"""
+
+from __future__ import annotations
+
+from math import acos, cos, sin, sqrt
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+
+def add(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def scale(a: Vector, factor: float) -> Vector:
+    """`a` times a number."""
+    return (a[0] * factor, a[1] * factor, a[2] * factor)
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product, right-handed."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def length(a: Vector) -> float:
+    """Euclidean length."""
+    return sqrt(dot(a, a))
+
+
+def unit(a: Vector, otherwise: Vector) -> Vector:
+    """`a` at unit length; `otherwise` where `a` is shorter than 1e-12."""
+    size = length(a)
+    return scale(a, 1.0 / size) if size > 1e-12 else otherwise
+
+
+def square_to(a: Vector, axis: Vector) -> Vector:
+    """The part of `a` square to the unit vector `axis`."""
+    return subtract(a, scale(axis, dot(a, axis)))
+
+
+def across(axis: Vector) -> Vector:
+    """Some unit vector square to the unit vector `axis`."""
+    seed = (1.0, 0.0, 0.0) if abs(axis[0]) < 0.9 else (0.0, 1.0, 0.0)
+    return unit(cross(axis, seed), seed)
+
+
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation `b` followed by `a`."""
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
+
+
+def conjugate(q: Quaternion) -> Quaternion:
+    """The opposite rotation."""
+    return (q[0], -q[1], -q[2], -q[3])
+
+
+def normalise(q: Quaternion) -> Quaternion:
+    """`q` at unit length; a zero becomes the identity."""
+    size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return (q[0] / size, q[1] / size, q[2] / size, q[3] / size) if size > 0.0 else IDENTITY
+
+
+def rotate(q: Quaternion, v: Vector) -> Vector:
+    """The vector `v` turned by `q`."""
+    u = (q[1], q[2], q[3])
+    t = scale(cross(u, v), 2.0)
+    return add(v, add(scale(t, q[0]), cross(u, t)))
+
+
+def about(axis: Vector, angle: float) -> Quaternion:
+    """A turn by `angle` radians about the unit vector `axis`."""
+    s = sin(0.5 * angle)
+    return (cos(0.5 * angle), axis[0] * s, axis[1] * s, axis[2] * s)
+
+
+def between(a: Vector, b: Vector) -> Quaternion:
+    """The shortest rotation from the unit vector `a` to the unit vector `b`; opposite ones turn about `across(a)`."""
+    w = 1.0 + dot(a, b)
+    if w < 1e-12:
+        return about(across(a), 3.141592653589793)
+    x, y, z = cross(a, b)
+    return normalise((w, x, y, z))
+
+
+def from_columns(x: Vector, y: Vector, z: Vector) -> Quaternion:
+    """The rotation that brings the axes to the right-handed unit vectors `x`, `y`, `z` (Shepperd 1978)."""
+    trace = x[0] + y[1] + z[2]
+    if trace >= max(x[0], y[1], z[2]):
+        q = (1.0 + trace, y[2] - z[1], z[0] - x[2], x[1] - y[0])
+    elif x[0] >= max(y[1], z[2]):
+        q = (y[2] - z[1], 1.0 + 2.0 * x[0] - trace, x[1] + y[0], x[2] + z[0])
+    elif y[1] >= z[2]:
+        q = (z[0] - x[2], x[1] + y[0], 1.0 + 2.0 * y[1] - trace, y[2] + z[1])
+    else:
+        q = (x[1] - y[0], x[2] + z[0], y[2] + z[1], 1.0 + 2.0 * z[2] - trace)
+    return normalise(q)
+
+
+def slerp(a: Quaternion, b: Quaternion, t: float) -> Quaternion:
+    """From `a` at t = 0 to `b` at t = 1 by the shorter way, at even angular speed."""
+    d = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    sign = -1.0 if d < 0.0 else 1.0
+    d = min(1.0, d * sign)
+    if d > 1.0 - 1e-9:
+        u, v = 1.0 - t, t * sign
+    else:
+        angle = acos(d)
+        u, v = sin((1.0 - t) * angle) / sin(angle), sin(t * angle) / sin(angle) * sign
+    return normalise((a[0] * u + b[0] * v, a[1] * u + b[1] * v, a[2] * u + b[2] * v, a[3] * u + b[3] * v))

@@ -1,0 +1,103 @@
+"""What the body must do to stand on its feet: where the hips face, where the weight is, and how hops carry them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from bunraku.motion import easing
+from bunraku.motion.easing import Move
+from bunraku.motion.footwork import GRAVITY
+from bunraku.motion.rotation import Array
+from bunraku.motion.score import Feet, Hop, Place, Score
+
+PUSH = 0.4
+"""Seconds in which the hips gather for a hop and recover from one."""
+LONG_STAND = 1.2
+"""Seconds on both feet after which the weight comes to rest between them."""
+
+
+def facing(score: Score, time: Array) -> Array:
+    """Where the hips face (n,) at `time` (n,) seconds, in radians to the left of the audience: between the two feet."""
+    feet = dict(score.feet)
+    start = now = _middle_turn(feet)
+    moves = []
+    for footfall in score.footfalls():
+        feet |= footfall.to
+        begin, end = footfall.lifted * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
+        # the hips begin a turn before the foot does and end it after
+        moves.append(Move(begin - 0.12, end - begin + 0.3, np.array([_middle_turn(feet) - now])))
+        now = _middle_turn(feet)
+    return easing.superpose(time, np.array([start]), moves)[:, 0]
+
+
+def weight(score: Score, time: Array) -> Array:
+    """Where the centre of mass is to be (n, 2), x and z in metres, at `time` (n,) seconds.
+
+    It is over the standing foot before the other is lifted and until it has landed, and between the feet in a long
+    stand.
+    """
+    feet = dict(score.feet)
+    # where the weight stands, from when to when, and how long before and after it may be on its way
+    stands: list[tuple[Array, float, float, float]] = [(_between(feet), 0.0, 0.0, 0.0)]
+    for footfall in score.footfalls():
+        begin, end = footfall.lifted * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
+        before = stands[-1][2]
+        if begin - before > LONG_STAND:
+            wait = begin - before
+            stands.append((_between(feet), before + 0.4 * wait, begin - 0.4 * wait, 0.1 * wait))
+        if isinstance(footfall, Hop):
+            stands.append((_between(feet), begin, begin, 0.12))
+            stands.append((_between(footfall.to), end, end, 0.12))
+        else:
+            stands.append((_on_one(feet, footfall.to), begin, end, min(0.4 * (end - begin), 0.12)))
+        feet |= footfall.to
+    stands.append((_between(feet), score.duration - 0.2, score.duration, 0.0))
+    moves = []
+    for (here, _, leave, early), (there, arrive, _, late) in pairwise(stands):
+        moves.append(Move(leave - early, arrive + late - (leave - early), there - here))
+    return easing.superpose(time, stands[0][0], moves)
+
+
+def leap(score: Score, time: Array) -> Array:
+    """Height in metres (n,) that hops add to the hips at `time` (n,) seconds.
+
+    They sink and push off, fly freely under gravity, and give way on landing: a cubic through the floor's height with
+    the speed of the flight at either end of it, which in the air is the parabola itself.
+    """
+    knots: list[tuple[float, float]] = []
+    for hop in score.hops:
+        begin, end = hop.lifted * score.seconds_per_beat, hop.beat * score.seconds_per_beat
+        if not knots or begin > knots[-1][0] + 2.0 * PUSH:
+            knots += [(knots[-1][0] + PUSH, 0.0)] if knots else []
+            knots.append((begin - PUSH, 0.0))
+        speed = 0.5 * GRAVITY * (end - begin)
+        knots += [(begin, speed), (end, -speed)]
+    if not knots:
+        return np.zeros_like(time)
+    knots.append((knots[-1][0] + PUSH, 0.0))
+    times, slopes = np.array(knots).T
+    return easing.hermite(time, times, np.zeros_like(times), slopes)
+
+
+def _middle_turn(feet: Feet) -> float:
+    return float(np.radians(0.5 * (feet["left"].turn + feet["right"].turn)))
+
+
+def _point(place: Place) -> Array:
+    return np.array([place.x, place.z])
+
+
+def _between(feet: Feet) -> Array:
+    middle: Array = 0.5 * (_point(feet["left"]) + _point(feet["right"]))
+    return middle
+
+
+def _on_one(feet: Feet, landing: Feet) -> Array:
+    """A point on the standing foot, 18 mm to the side where the other foot comes from and goes to."""
+    ((side, to),) = landing.items()
+    here = _point(feet["right" if side == "left" else "left"])
+    away = 0.5 * (_point(feet[side]) + _point(to)) - here
+    inwards: Array = here + 0.018 * away / max(float(np.linalg.norm(away)), 0.05)
+    return inwards

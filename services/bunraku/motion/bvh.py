@@ -1,0 +1,101 @@
+"""Reading BVH (Biovision Hierarchy): a tree of joints, then one row of channel values for every frame.
+
+There is no standard; the common ground is Meredith and Maddock, "Motion Capture File Formats Explained" (2001). This
+reader takes what real exporters write and says in `notes` where it had to choose; what it cannot read raises
+`UnreadableMotion` with the line. It runs in time and memory linear in the file, without recursion.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from bunraku.motion.bvh_frames import read_frames
+from bunraku.motion.bvh_hierarchy import EndSite, read_hierarchy
+from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.rotation import Array
+
+MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
+
+
+@dataclass(frozen=True, slots=True)
+class Bvh:
+    """A BVH file as it stands: units, axes and names are the file's own.
+
+    For J joints, parents before children: `names`, `parents` (-1 for the root), `offsets` (J, 3) from the parent,
+    `channels` (each a tuple of "Xposition" ... "Zrotation" in the file's order) and `lines`, where each is declared.
+    `ends` are the End Sites. `frames` (n, C) holds the channel values in the order of the joints, angles in degrees;
+    `frame_time` is in seconds. `notes` are sentences on what was not as it should be.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Array
+    channels: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+    ends: tuple[EndSite, ...]
+    frames: Array
+    frame_time: float
+    notes: tuple[str, ...]
+
+    @property
+    def fps(self) -> float:
+        """Frames per second: the whole number that `frame_time` was rounded from, where there is one."""
+        rate = 1.0 / self.frame_time
+        if abs(rate - round(rate)) < 1e-9 * rate:
+            return float(round(rate))
+        digits = len(np.format_float_positional(self.frame_time).partition(".")[2])
+        for whole in (round(rate), 24, 25, 30, 50, 60, 90, 100, 120, 240):
+            if whole > 0 and abs(rate - whole) < 0.02 * rate and round(1.0 / whole, digits) == self.frame_time:
+                return float(whole)
+        return rate
+
+
+def read(data: bytes) -> Bvh:
+    """The BVH file in `data`, in UTF-8, UTF-16 with a byte order mark or Latin-1.
+
+    Raises `UnreadableMotion` for what is not a BVH file or has no sound motion in it.
+    """
+    text = _plain(data)
+    if not text or text.isspace():
+        raise UnreadableMotion(
+            "Empty file", "there is nothing in it", hint="export the motion again and send that file"
+        )
+    hierarchy = read_hierarchy(text)
+    width = sum(len(channels) for channels in hierarchy.channels)
+    if width == 0:
+        raise UnreadableMotion(
+            "No channels", "no joint has a channel, so nothing can move", hint="export with rotations of the joints"
+        )
+    frames, frame_time, notes = read_frames(text, hierarchy.end, hierarchy.end_line, width)
+    return Bvh(
+        names=hierarchy.names,
+        parents=hierarchy.parents,
+        offsets=hierarchy.offsets,
+        channels=hierarchy.channels,
+        lines=hierarchy.lines,
+        ends=hierarchy.ends,
+        frames=frames,
+        frame_time=frame_time,
+        notes=(*hierarchy.notes, *notes),
+    )
+
+
+def _plain(data: bytes) -> bytes:
+    """`data` without byte order mark, in an encoding that keeps ASCII, lines ending in a line feed."""
+    for mark, encoding in MARKS:
+        if data.startswith(mark):
+            data = data[len(mark) :]
+            if encoding != "utf-8":
+                try:
+                    data = data.decode(encoding).encode()
+                except UnicodeError as error:
+                    raise UnreadableMotion(
+                        "Broken text", f"the file says it is {encoding.upper()}, but it is not", hint="save it as UTF-8"
+                    ) from error
+            break
+    if b"\r" in data:
+        data = re.sub(rb"\r\n?", b"\n", data)
+    return data

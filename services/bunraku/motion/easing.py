@@ -1,0 +1,77 @@
+"""How a movement starts and stops: eases, and tracks made by adding movements up.
+
+A track is the sum of single movements from key to key, each with its own begin and end; where they overlap the body
+flows through a key instead of stopping there (superposition of submovements: Flash and Henis 1991, "Arm trajectory
+modifications during reaching towards visual targets").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bunraku.motion.rotation import Array
+
+Ease = Callable[[Array], Array]
+
+
+def minimum_jerk(u: Array) -> Array:
+    """0 to 1 while `u` runs from 0 to 1, at rest at both ends (Flash and Hogan 1985); constant outside."""
+    u = np.clip(u, 0.0, 1.0)
+    eased: Array = u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    return eased
+
+
+def crisp(u: Array) -> Array:
+    """0 to 1 with a sharp start and a soft end, as a puppet moves: speed 20 u (1 - u)^3, at its most at u = 1/4."""
+    u = np.clip(u, 0.0, 1.0)
+    eased: Array = u * u * (10.0 + u * (-20.0 + u * (15.0 - 4.0 * u)))
+    return eased
+
+
+def falling(u: Array) -> Array:
+    """`crisp` backwards: a soft start and a sharp end, as a stamping foot comes down."""
+    eased: Array = 1.0 - crisp(1.0 - np.asarray(u))
+    return eased
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A change by `delta` (k,) that begins at `begin` and takes `duration`, above zero, both in seconds."""
+
+    begin: float
+    duration: float
+    delta: Array
+    ease: Ease = minimum_jerk
+
+
+def superpose(time: Array, start: Array, moves: Sequence[Move]) -> Array:
+    """The track (n, k) over `time` (n,) seconds that begins at `start` (k,) and makes all `moves`."""
+    track = np.tile(np.asarray(start, dtype=np.float64), (len(time), 1))
+    for move in moves:
+        track += move.ease((time - move.begin) / move.duration)[:, None] * move.delta
+    return track
+
+
+def bump(time: Array, begin: float, peak: float, end: float) -> Array:
+    """A swell (n,) from 0 at `begin` to 1 at `peak` and back to 0 at `end`, seconds, at rest at all three."""
+    return minimum_jerk((time - begin) / (peak - begin)) - minimum_jerk((time - peak) / (end - peak))
+
+
+def hermite(time: Array, knots: Array, values: Array, slopes: Array) -> Array:
+    """The cubic Hermite spline (n,) through `values` (m,) with `slopes` (m,) at rising `knots` (m,) seconds.
+
+    Outside the knots it keeps the first and the last value.
+    """
+    i = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
+    span = knots[i + 1] - knots[i]
+    u = np.clip((time - knots[i]) / span, 0.0, 1.0)
+    spline: Array = (
+        (1 + 2 * u) * (1 - u) ** 2 * values[i]
+        + u * (1 - u) ** 2 * span * slopes[i]
+        + u * u * (3 - 2 * u) * values[i + 1]
+        + u * u * (u - 1) * span * slopes[i + 1]
+    )
+    return spline

@@ -1,0 +1,102 @@
+"""A figure in the making: the source in its axes, and the joints placed so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bunraku.motion import procrustes, rotation
+from bunraku.motion.bvh import Bvh
+from bunraku.motion.kinematics import chain, pose
+from bunraku.motion.rest import Rest
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import INDEX, JOINT_COUNT, PARENTS
+
+
+@dataclass(slots=True)
+class Fit:
+    """The source in the figure's axes and metres, n frames, and the figure so far.
+
+    `joints` H-Anim index -> source index; `position` (n, J, 3) the source's joints and `turn` (n, J, 4) each one's
+    rotation from its rest; `rested` (J, 3) the source at rest, `axes` (J, 4) its joints' orientations there. Of the
+    figure: `offsets` and `tips` (18, 3), `placed` (n, 18, 3) and `oriented` (n, 18, 4) in the world.
+    """
+
+    bvh: Bvh
+    joints: dict[int, int]
+    scale: float
+    position: Array
+    turn: Array
+    rested: Array
+    axes: Array
+    offsets: Array = field(init=False)
+    tips: Array = field(init=False)
+    placed: Array = field(init=False)
+    oriented: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.position)
+        self.offsets, self.tips = np.zeros((JOINT_COUNT, 3)), np.zeros((JOINT_COUNT, 3))
+        self.placed, self.oriented = np.zeros((n, JOINT_COUNT, 3)), np.zeros((n, JOINT_COUNT, 4))
+
+    @classmethod
+    def begin(cls, bvh: Bvh, joints: dict[str, int], rest: Rest) -> Fit:
+        """The whole clip of `bvh` in the figure's axes, nothing placed yet."""
+        index = {INDEX[name]: source for name, source in joints.items()}
+        used = sorted({ancestor for source in index.values() for ancestor in chain(bvh, source)})
+        position, orientation = pose(bvh, used)
+        axes = rotation.multiply(rest.upright, rest.orientations)
+        turn = np.zeros_like(orientation)
+        turned = rotation.multiply(rest.world, orientation[:, used])
+        turn[:, used] = rotation.multiply(turned, rotation.conjugate(axes[used]))
+        return cls(
+            bvh=bvh,
+            joints=index,
+            scale=rest.scale,
+            position=rest.scale * rotation.rotate(rest.world, position),
+            turn=turn,
+            rested=rest.scale * rotation.rotate(rest.upright, rest.positions),
+            axes=axes,
+        )
+
+    def without_first(self) -> Fit:
+        """The same without its first frame."""
+        return replace(self, position=self.position[1:], turn=self.turn[1:])
+
+    def place(self, joint: int, offset: Array, orientation: Array) -> None:
+        """Place a joint of the figure: its `offset` (3,) in its parent, its world `orientation` (n, 4)."""
+        parent = PARENTS[joint]
+        self.offsets[joint] = offset
+        self.placed[:, joint] = self.placed[:, parent] + rotation.rotate(self.oriented[:, parent], offset)
+        self.oriented[:, joint] = orientation
+
+    def relative(self, joint: int, sources: list[int]) -> Array:
+        """Positions (n, m, 3) of `sources` from where the figure's `joint` is."""
+        found: Array = self.position[:, sources] - self.placed[:, [joint]]
+        return found
+
+    def mean_place(self, parent: int, source: int) -> Array:
+        """Where a source joint lies in the figure's joint `parent` on average (3,)."""
+        place: Array = procrustes.mean_places(self.oriented[:, parent], self.relative(parent, [source]))[0]
+        return place
+
+    def bone(self, joint: int) -> tuple[Array, float]:
+        """The source's bone from `joint` to the next, at rest (3,), and its mean length."""
+        start, end = self.joints[joint], self.joints[joint + 1]
+        length = np.linalg.norm(self.position[:, end] - self.position[:, start], axis=-1).mean()
+        return self.rested[end] - self.rested[start], float(length)
+
+    def beyond(self, source: int) -> Array | None:
+        """From a source joint to the farthest point that hangs from it at rest (3,); None where nothing does."""
+        below = [joint for joint in range(source, len(self.bvh.parents)) if source in chain(self.bvh, joint)]
+        found = [self.rested[joint] - self.rested[source] for joint in below[1:]]
+        found += [
+            self.rested[end.parent]
+            - self.rested[source]
+            + self.scale * rotation.rotate(self.axes[end.parent], end.offset)
+            for end in self.bvh.ends
+            if end.parent in below
+        ]
+        far = max(found, key=lambda v: float(np.linalg.norm(v)), default=None)
+        return far if far is not None and np.linalg.norm(far) > 1e-3 else None

@@ -1,0 +1,117 @@
+"""Where the feet are over time, from the steps of a score: flat and still where planted, in an arc where they swing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bunraku.motion import easing, rotation
+from bunraku.motion.easing import Move
+from bunraku.motion.rotation import Array
+from bunraku.motion.score import Hop, Place, Score, Side, Step
+from bunraku.motion.skeleton import INDEX, Figure
+
+FLOOR = -0.014
+"""Height of the floor and of a planted sole, metres (the standing figure's midtarsal is at .0001)."""
+GRAVITY = 9.81
+"""Metres a second squared."""
+MIDDLE = 0.06
+"""The middle of the sole, the place of a step, lies this far before the ankle, metres."""
+HEEL = 0.056
+"""The heel lies this far behind the ankle, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Foot:
+    """One foot over n frames.
+
+    World position of the ankle (n, 3) in metres, world orientation of the foot (n, 4), upward bend of the toes (n,) and
+    facing of the foot (n,) to the left of the audience, both in radians.
+    """
+
+    ankle: Array
+    orientation: Array
+    toes: Array
+    facing: Array
+
+
+def foot(score: Score, figure: Figure, side: Side, time: Array) -> Foot:
+    """The foot of `side` as `figure` dances `score`, over `time` (n,) seconds."""
+    place = score.feet[side]
+    start = _vector(place)
+    moves = []
+    clearance, heel_up, toes_up = np.zeros_like(time), np.zeros_like(time), np.zeros_like(time)
+    for footfall in score.footfalls():
+        if side not in footfall.to:
+            continue
+        begin, end = footfall.lifted * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
+        to = footfall.to[side]
+        # over its place a little before it is down, so that it comes down straight
+        moves.append(Move(begin, 0.95 * (end - begin), _vector(to) - _vector(place)))
+        place = to
+        swing = _hop if isinstance(footfall, Hop) else _stamp if footfall.stamp else _glide
+        for track, part in zip((clearance, heel_up, toes_up), swing(score, footfall, time), strict=True):
+            track += part
+    track = easing.superpose(time, start, moves)
+    orientation = rotation.multiply(rotation.about_axis(1, track[:, 2]), rotation.about_axis(0, heel_up - toes_up))
+    lowest, middle = _sole(figure, side, orientation, heel_up)
+    ankle = np.stack([track[:, 0], FLOOR + clearance - lowest, track[:, 1]], axis=-1)
+    ankle[:, [0, 2]] -= middle[:, [0, 2]]
+    return Foot(ankle, orientation, heel_up, track[:, 2])
+
+
+def _vector(place: Place) -> Array:
+    return np.array([place.x, place.z, np.radians(place.turn)])
+
+
+def _sole(figure: Figure, side: Side, orientation: Array, toes: Array) -> tuple[Array, Array]:
+    """Height above the ankle of the lowest of the sole (n,), and from it the way to the middle of the foot (n, 3)."""
+    chain = ("humanoid_root", "sacroiliac", *(f"{side[0]}_{joint}" for joint in ("hip", "knee", "ankle")))
+    down = FLOOR - sum(float(figure.offsets[INDEX[joint]][1]) for joint in chain)
+    midtarsal = INDEX[f"{side[0]}_midtarsal"]
+    heel = rotation.rotate(orientation, np.array([0.0, down, -HEEL]))
+    ball = rotation.rotate(orientation, np.array([0.0, down, figure.offsets[midtarsal][2]]))
+    bent = rotation.multiply(orientation, rotation.about_axis(0, -toes))
+    tip = ball + rotation.rotate(bent, figure.tips[midtarsal])
+    middle = rotation.rotate(orientation, np.array([0.0, 0.0, MIDDLE]))
+    return np.min([heel[:, 1], ball[:, 1], tip[:, 1]], axis=0), middle
+
+
+def _span(score: Score, footfall: Step | Hop) -> tuple[float, float, float]:
+    """Seconds of lifting, of beginning to come down (half way in a hop), and of landing."""
+    begin, end = footfall.lifted * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
+    if isinstance(footfall, Hop):
+        return begin, 0.5 * (begin + end), end
+    return begin, end - footfall.fall * score.seconds_per_beat, end
+
+
+def _glide(score: Score, step: Step | Hop, time: Array) -> tuple[Array, Array, Array]:
+    """Clearance of the sole (n,) in metres, rise of the heel and of the toes (n,) in radians, in a gliding step."""
+    begin, peak, end = _span(score, step)
+    early, late = begin + 0.35 * (end - begin), begin + 0.8 * (end - begin)
+    return (
+        step.lift * easing.bump(time, begin, peak, end),
+        np.radians(10.0) * easing.bump(time, begin, early, late),
+        np.radians(6.0) * easing.bump(time, begin + 0.45 * (end - begin), late, end),
+    )
+
+
+def _stamp(score: Score, step: Step | Hop, time: Array) -> tuple[Array, Array, Array]:
+    """As `_glide`, in a stamp: the foot rises within 0.9 beats, waits with its toes up, and falls."""
+    begin, fall, end = _span(score, step)
+    rise = min(fall, begin + 0.9 * score.seconds_per_beat)
+    up = easing.minimum_jerk((time - begin) / (rise - begin))
+    raised = up - easing.falling((time - fall) / (end - fall))
+    return step.lift * raised, np.zeros_like(time), np.radians(8.0) * raised
+
+
+def _hop(score: Score, hop: Step | Hop, time: Array) -> tuple[Array, Array, Array]:
+    """As `_glide`, in a hop: the legs stretch as they leave the floor and draw up under the body."""
+    begin, peak, end = _span(score, hop)
+    apex = GRAVITY * (end - begin) ** 2 / 8.0
+    return (
+        hop.lift * apex * easing.bump(time, begin, peak, end),
+        np.radians(24.0) * easing.bump(time, begin, 0.6 * begin + 0.4 * end, end),
+        np.zeros_like(time),
+    )

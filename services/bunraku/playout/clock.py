@@ -1,0 +1,78 @@
+"""The reference clock as seen from this end of a line (the clock filter of NTP, RFC 5905: who waited least knows best).
+
+Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last 8 the one with
+the smallest round trip says the offset. What is shown slews towards it and never steps, so the picture does not jump.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+SAMPLES = 8
+SLEW = 0.005
+"""How fast the shown offset may move: microseconds a microsecond."""
+STEP = 1_000_000
+"""Further off than this, at the start or after a pause of the machine, the clock is set anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One round trip: reference minus local `offset`, and the time on the way, `trip`; microseconds."""
+
+    offset: float
+    trip: int
+
+
+class ReferenceClock:
+    """Local time to reference time. All arguments and results are microseconds."""
+
+    def __init__(self) -> None:
+        self._samples: deque[Sample] = deque(maxlen=SAMPLES)
+        self._shown = 0.0
+        self._shown_at: int | None = None
+
+    def pong(self, sent: int, received: int, answered: int, arrived: int) -> None:
+        """Take in an answer: `sent` and `arrived` on the local clock, `received` and `answered` on the reference clock.
+
+        An answer that took less than no time is ignored.
+        """
+        trip = (arrived - sent) - (answered - received)
+        if trip < 0 or answered < received:
+            return
+        self._samples.append(Sample(((received - sent) + (answered - arrived)) / 2, trip))
+        if len(self._samples) == 1 or abs(self.offset - self._shown) > STEP:
+            self._shown, self._shown_at = self.offset, arrived
+
+    def guess(self, reference: int, local: int) -> None:
+        """A first idea of the time, from a message that said it: used until an answer says it well."""
+        if self._shown_at is None:
+            self._shown, self._shown_at = float(reference - local), local
+
+    @property
+    def ready(self) -> bool:
+        """Whether an answer has come yet."""
+        return bool(self._samples)
+
+    @property
+    def offset(self) -> float:
+        """Reference minus local, by the sample that waited least."""
+        return min(self._samples, key=lambda sample: sample.trip).offset if self._samples else 0.0
+
+    @property
+    def error(self) -> float:
+        """How far the offset may be off at most: half the smallest round trip."""
+        return min(sample.trip for sample in self._samples) / 2 if self._samples else float("inf")
+
+    @property
+    def shown_offset(self) -> float:
+        """The offset in use: on its way to `offset`."""
+        return self._shown
+
+    def at(self, local: int) -> int:
+        """The reference time at `local`; calls come in order of time."""
+        if self._shown_at is not None and local > self._shown_at:
+            most = SLEW * (local - self._shown_at)
+            self._shown += min(max(self.offset - self._shown, -most), most)
+            self._shown_at = local
+        return round(local + self._shown)

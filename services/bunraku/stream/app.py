@@ -1,0 +1,99 @@
+"""The stream service: blocks over sockets and over HTTP, and the live overlay of sessions. The only fan-out."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import FastAPI, Query, Response, WebSocket
+
+from bunraku.backing import problems, sockets
+from bunraku.backing.backing import Backing, clock
+from bunraku.backing.bus import NobodyAnswers
+from bunraku.backing.library import StoredMotion
+from bunraku.backing.problems import ProblemError
+from bunraku.backing.sockets import Refusal
+from bunraku.playout import timeline
+from bunraku.stream import viewers
+from bunraku.stream.sessions import WatchedSessions
+from bunraku.stream.viewers import Viewer
+
+IMMUTABLE = {"Cache-Control": "public, max-age=31536000, immutable"}
+TRACKS = ("motion", "audio", "camera", "light")
+
+RateQuery = Annotated[int | None, Query(ge=0, le=15)]
+TracksQuery = Annotated[str, Query(max_length=64)]
+
+
+def create_app(backing: Backing) -> FastAPI:
+    """The service upon `backing`."""
+    app = FastAPI(title="Bunraku stream")
+    problems.install(app)
+    sessions = WatchedSessions(backing.bus)
+
+    async def stored(motion: str) -> StoredMotion:
+        found = await backing.library.get(motion)
+        if found is None:
+            raise ProblemError(404, "No such motion", f"there is no motion {motion[:40]!r}")
+        return found
+
+    @app.get("/v1/motions/{motion}/description", tags=["blocks"], response_class=Response)
+    async def description(motion: str) -> Response:
+        """The motion's Description (message 2), for those who fetch blocks over HTTP."""
+        return Response((await stored(motion)).description, media_type=_BYTES, headers=IMMUTABLE)
+
+    @app.get("/v1/motions/{motion}/blocks/{rate}/{index}", tags=["blocks"], response_class=Response)
+    async def block(motion: str, rate: int, index: int) -> Response:
+        """One Data message (message 3): the same bytes as over a socket, to be kept for ever."""
+        packets = (await stored(motion)).packets
+        if not (0 <= rate < len(packets) and 0 <= index < len(packets[rate])):
+            raise ProblemError(
+                404, "No such block", f"rates are 0..{len(packets) - 1}, blocks 0..{len(packets[0]) - 1}"
+            )
+        return Response(packets[rate][index], media_type=_BYTES, headers=IMMUTABLE)
+
+    @app.websocket("/v1/motions/{motion}/stream")
+    async def watch_motion(
+        socket: WebSocket, motion: str, rate: RateQuery = None, tracks: TracksQuery = "", at: float = 0.0
+    ) -> None:
+        try:
+            await sockets.accept(socket)
+            viewer = Viewer(backing.library, rate, _wants_motion(tracks))
+            found = await backing.library.get(motion)
+            if found is None:
+                raise Refusal(sockets.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
+            # NaN and infinities start at the beginning
+            position = round(min(at, 1e6) * 1e6) if at > 0 else 0
+            viewer.timeline(timeline.start(motion, found.track.duration_us, clock(), position=position))
+            await viewers.serve(socket, viewer, private=True)
+        except Refusal as refusal:
+            await sockets.close(socket, refusal)
+
+    @app.websocket("/v1/sessions/{session}/stream")
+    async def watch_session(socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "") -> None:
+        try:
+            await sockets.accept(socket)
+            viewer = Viewer(backing.library, rate, _wants_motion(tracks))
+            try:
+                await sessions.join(session, viewer)
+            except NobodyAnswers:
+                raise Refusal(sockets.NOT_FOUND, "No such session", f"there is no session {session[:40]!r}") from None
+            try:
+                await viewers.serve(socket, viewer, private=False)
+            finally:
+                sessions.leave(session, viewer)
+        except Refusal as refusal:
+            await sockets.close(socket, refusal)
+
+    return app
+
+
+_BYTES = "application/octet-stream"
+
+
+def _wants_motion(tracks: str) -> bool:
+    """Whether `tracks` asks for motion; raises `Refusal` for a name that is no track."""
+    wanted = [name for name in tracks.split(",") if name]
+    unknown = [name for name in wanted if name not in TRACKS]
+    if unknown:
+        raise Refusal(sockets.BROKEN, "Unknown track", f"tracks are {', '.join(TRACKS)}, not {unknown[0]!r}")
+    return not wanted or "motion" in wanted

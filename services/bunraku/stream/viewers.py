@@ -1,0 +1,174 @@
+"""One viewer's socket: what it is sent, in which order, and what it says back (SPEC.md, Sockets).
+
+A viewer has a small queue for what must not be lost and one place for the newest overlay; blocks are picked when there
+is room to send. A viewer whose queue fills is dropped and told why.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from collections.abc import Awaitable, Callable
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from bunraku import __version__
+from bunraku.backing.backing import clock
+from bunraku.backing.library import Library, StoredMotion
+from bunraku.backing.sockets import BROKEN, NOT_FOUND, TOO_SLOW, Refusal, receive
+from bunraku.motion.skeleton import CHANNEL_COUNT
+from bunraku.playout import timeline
+from bunraku.playout.pacing import Pacer
+from bunraku.playout.rate import RateChoice
+from bunraku.wire.messages import (
+    ChannelHeader,
+    Edit,
+    MalformedMessage,
+    Ping,
+    Pong,
+    Report,
+    TimelineState,
+    unpack,
+)
+
+QUEUE = 64
+"""Messages that may wait for a viewer."""
+
+
+class Viewer:
+    """What one viewer has been sent and is still to be sent."""
+
+    def __init__(self, library: Library, pinned: int | None, motion_track: bool = True) -> None:
+        self._library = library
+        self._pinned = pinned
+        self._motion_track = motion_track
+        self._control: deque[bytes] = deque()
+        self._pings: deque[tuple[Ping, int]] = deque(maxlen=8)
+        self._overlay: bytes | None = None
+        self._timelines = timeline.Timelines()
+        self._motion: StoredMotion | None = None
+        self._pacer: Pacer | None = None
+        self._rate: RateChoice | None = None
+        self._wake = asyncio.Event()
+        self.overrun = False
+
+    def control(self, message: bytes) -> None:
+        """Queue a message that must arrive."""
+        if len(self._control) >= QUEUE:
+            self.overrun = True
+        else:
+            self._control.append(message)
+        self._wake.set()
+
+    def overlay(self, message: bytes) -> None:
+        """The newest overlay; one that was not sent yet is replaced."""
+        self._overlay = message
+        self._wake.set()
+
+    def timeline(self, state: TimelineState) -> None:
+        """A new timeline of the stage."""
+        self._timelines.put(state)
+        self._wake.set()
+
+    def edit(self, edited: Edit) -> None:
+        """Edit the viewer's own timeline."""
+        newest = self._timelines.newest
+        if newest is not None:
+            state = timeline.edit(newest, clock(), playing=edited.playing, position=edited.position, loop=edited.loop)
+            self.timeline(state)
+
+    def report(self, report: Report) -> None:
+        """How the viewer fares."""
+        if self._rate is not None:
+            self._rate.report(report, clock())
+            self._wake.set()
+
+    def ping(self, ping: Ping) -> None:
+        """Answer with the time, before all else."""
+        self._pings.append((ping, clock()))
+        self._wake.set()
+
+    async def send(self, put: Callable[[bytes], Awaitable[None]]) -> None:
+        """Send for ever; raises `Refusal`."""
+        shown: TimelineState | None = None
+        while True:
+            self._wake.clear()
+            if self.overrun:
+                raise Refusal(TOO_SLOW, "Too slow", f"{QUEUE} messages waited; come again")
+            while self._pings:
+                ping, received = self._pings.popleft()
+                await put(Pong(ping.sequence, ping.sent, received, clock()).pack())
+            if (state := self._timelines.newest) is not None and state is not shown:
+                await self._show(state, put)
+                shown = state
+            while self._control and not self._pings:
+                await put(self._control.popleft())
+            if self._overlay is not None:
+                overlay, self._overlay = self._overlay, None
+                await put(overlay)
+            if self._wake.is_set():
+                continue
+            if (packet := self._next_packet()) is not None:
+                await put(packet)
+                continue
+            await self._rest()
+
+    async def _show(self, state: TimelineState, put: Callable[[bytes], Awaitable[None]]) -> None:
+        if self._motion is None or self._motion.id != state.motion:
+            motion = await self._library.get(state.motion)
+            if motion is None:
+                raise Refusal(NOT_FOUND, "No such motion", f"there is no motion {state.motion[:40]!r}")
+            rates = len(motion.packets)
+            self._motion, self._pacer = motion, Pacer(motion.track, rates) if self._motion_track else None
+            self._rate = RateChoice(rates, self._pinned)
+            await put(ChannelHeader(motion.id, clock(), CHANNEL_COUNT, __version__).pack())
+            await put(motion.description)
+        await put(state.pack())
+
+    def _next_packet(self) -> bytes | None:
+        state = self._timelines.at(clock())
+        if state is None or self._pacer is None or self._motion is None or self._rate is None:
+            return None
+        due = self._pacer.next(state, clock(), self._rate.rate)
+        return None if due is None else self._motion.packets[due[1]][due[0]]
+
+    async def _rest(self) -> None:
+        """Until something is to be sent again."""
+        state = self._timelines.at(clock())
+        wait = self._pacer.wait(state, clock()) if state is not None and self._pacer is not None else None
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(None if wait is None else wait / 1e6):
+                await self._wake.wait()
+
+
+async def serve(socket: WebSocket, viewer: Viewer, private: bool) -> None:
+    """Send to and listen to a viewer until either ends; `private` viewers may edit their timeline."""
+    receiving = asyncio.create_task(_listen(socket, viewer, private))
+    sending = asyncio.create_task(viewer.send(socket.send_bytes))
+    try:
+        await asyncio.wait((receiving, sending), return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in (receiving, sending):
+            task.cancel()
+        ends = await asyncio.gather(receiving, sending, return_exceptions=True)
+    for end in ends:
+        if isinstance(end, Refusal):
+            raise end
+        if isinstance(end, BaseException) and not isinstance(end, asyncio.CancelledError | WebSocketDisconnect):
+            raise end
+
+
+async def _listen(socket: WebSocket, viewer: Viewer, private: bool) -> None:
+    while True:
+        data = await receive(socket)
+        try:
+            message = unpack(data)
+        except MalformedMessage as error:
+            raise Refusal(BROKEN, "Malformed message", str(error)) from None
+        if isinstance(message, Ping):
+            viewer.ping(message)
+        elif isinstance(message, Report):
+            viewer.report(message)
+        elif isinstance(message, Edit) and private:
+            viewer.edit(message)

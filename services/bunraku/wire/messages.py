@@ -1,0 +1,337 @@
+"""The messages of `bunraku.v1`: dataclasses to bytes and back (SPEC.md, Sockets).
+
+Names and units are SPEC.md's: times are integer microseconds on the clock or in the motion as each field says. A reader
+gets None for a type it does not know, and `MalformedMessage` for one it knows that is broken.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar
+
+import msgpack
+from pydantic import Field, TypeAdapter, ValidationError
+
+VERSION = 1
+SUBPROTOCOL = "bunraku.v1"
+CLOCK = "unix"
+LARGEST_FROM_CLIENT = 1_024
+LARGEST_FROM_SERVER = 1 << 20
+LIMBS: tuple[str, ...] = ("left_hand", "right_hand", "left_leg", "right_leg")
+
+Limb = Annotated[int, Field(strict=True, ge=0, lt=len(LIMBS))]
+Count = Annotated[int, Field(strict=True, ge=0, lt=1 << 53)]
+"""A count or a time: what JavaScript's numbers hold exactly."""
+
+
+class MalformedMessage(ValueError):
+    """A message of a known type that cannot be read; the text says what is wrong with it."""
+
+
+class _Packed:
+    """A message of one type byte and a MessagePack map of the fields that are not None."""
+
+    TYPE: ClassVar[int]
+    __slots__ = ()
+
+    def pack(self) -> bytes:
+        """The message as bytes."""
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__}  # type: ignore[attr-defined]
+        packed: bytes = msgpack.packb({k: v for k, v in values.items() if v is not None})
+        return bytes([self.TYPE]) + packed
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelHeader(_Packed):
+    """What will come, the first message of a stream (paper 3): `now` clock time, `channels` the total of all tracks."""
+
+    TYPE = 1
+    motion: str
+    now: Count
+    channels: Count
+    software: str
+    version: int = VERSION
+    clock: str = CLOCK
+
+
+@dataclass(frozen=True, slots=True)
+class Description(_Packed):
+    """The type of every track and what its blocks have in common (paper 3)."""
+
+    TYPE = 2
+    motion: str
+    tracks: list[dict[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class TimelineState(_Packed):
+    """Where the stage stands: at clock time `clock` at `position` of the motion. Times in microseconds."""
+
+    TYPE = 4
+    epoch: Count
+    motion: str
+    clock: Count
+    position: Count
+    playing: bool
+    loop: bool
+    duration: Count
+
+
+@dataclass(frozen=True, slots=True)
+class Presence(_Packed):
+    """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS`."""
+
+    TYPE = 6
+    viewers: Count
+    puppeteers: list[dict[str, Any]]
+    limbs: list[str | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem(_Packed):
+    """Why the socket is about to be closed."""
+
+    TYPE = 8
+    title: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Welcome(_Packed):
+    """A puppeteer's id, colour (0-4) and the lead of overlays over now, microseconds."""
+
+    TYPE = 9
+    id: str
+    colour: Count
+    lead: Count
+
+
+@dataclass(frozen=True, slots=True)
+class Grant(_Packed):
+    """The limb is yours; inputs carry `epoch`."""
+
+    TYPE = 10
+    limb: Limb
+    epoch: Count
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal(_Packed):
+    """The limb is not, or no longer, yours; `reason` is `held`, `lost` or `unknown`."""
+
+    TYPE = 11
+    limb: Limb
+    reason: str
+    holder: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Edit(_Packed):
+    """Edits of a viewer's private timeline; None leaves a thing as it is."""
+
+    TYPE = 65
+    playing: bool | None = None
+    position: Count | None = None
+    loop: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report(_Packed):
+    """How a viewer fares: microseconds ready ahead, to decode a block, to draw a frame; whether its tab is hidden."""
+
+    TYPE = 66
+    buffer: Count
+    decode: Count = 0
+    frame: Count = 0
+    hidden: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Claim(_Packed):
+    """Asks for a limb."""
+
+    TYPE = 67
+    limb: Limb
+
+
+@dataclass(frozen=True, slots=True)
+class Release(_Packed):
+    """Lets a limb go."""
+
+    TYPE = 68
+    limb: Limb
+    epoch: Count
+
+
+@dataclass(frozen=True, slots=True)
+class Alive(_Packed):
+    """Still holding `limbs` with nothing new to say."""
+
+    TYPE = 69
+    limbs: Annotated[list[Limb], Field(max_length=len(LIMBS))] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """One block of one track at one rate; `start` is the motion time of its first frame, microseconds."""
+
+    TYPE: ClassVar[int] = 3
+    track: int
+    rate: int
+    start: int
+    block: bytes
+
+    def pack(self) -> bytes:
+        """The message as bytes: 8 and the block."""
+        return bytes([self.TYPE, self.track << 4 | self.rate]) + self.start.to_bytes(6, "little") + self.block
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Data:
+        """The message of `pack`."""
+        if len(data) < 8:
+            raise MalformedMessage(f"Data has 8 bytes and a block, not {len(data)}")
+        return cls(data[1] >> 4, data[1] & 15, int.from_bytes(data[2:8], "little"), data[8:])
+
+
+@dataclass(frozen=True, slots=True)
+class Overlay:
+    """Pulled limbs at clock time `due`: limb -> three rotation vectors of its joints, in units of pi/32767."""
+
+    TYPE: ClassVar[int] = 5
+    sequence: int
+    due: int
+    limbs: dict[int, tuple[int, ...]]
+
+    def pack(self) -> bytes:
+        """The message as bytes: 12 and 18 a limb."""
+        limbs = sorted(self.limbs)
+        mask = sum(1 << limb for limb in limbs)
+        numbers = [n for limb in limbs for n in self.limbs[limb]]
+        return struct.pack(f"<BBHQ{len(numbers)}h", self.TYPE, mask, self.sequence & 0xFFFF, self.due, *numbers)
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Overlay:
+        """The message of `pack`."""
+        if len(data) < 12 or data[1] >= 1 << len(LIMBS):
+            raise MalformedMessage("Overlay has 12 bytes at least and a mask of 4 limbs")
+        limbs = [limb for limb in range(len(LIMBS)) if data[1] >> limb & 1]
+        if len(data) != 12 + 18 * len(limbs):
+            raise MalformedMessage(f"Overlay of {len(limbs)} limbs has {12 + 18 * len(limbs)} bytes, not {len(data)}")
+        _, _, sequence, due, *numbers = struct.unpack(f"<BBHQ{9 * len(limbs)}h", data)
+        return cls(sequence, due, {limb: tuple(numbers[9 * i : 9 * i + 9]) for i, limb in enumerate(limbs)})
+
+
+@dataclass(frozen=True, slots=True)
+class Ping:
+    """Asks for the time; `sent` is the sender's own clock. As long as its answer, so that both ways cost the same."""
+
+    TYPE: ClassVar[int] = 64
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<B3xIQ16x")
+    sequence: int
+    sent: int
+
+    def pack(self) -> bytes:
+        """The message as bytes: 32."""
+        return self.LAYOUT.pack(self.TYPE, self.sequence, self.sent)
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Ping:
+        """The message of `pack`."""
+        _, sequence, sent = _fixed(cls.LAYOUT, data, "Ping")
+        return cls(sequence, sent)
+
+
+@dataclass(frozen=True, slots=True)
+class Pong:
+    """The answer to a Ping: its `sequence` and `sent`, and the clock times when it came and when this left."""
+
+    TYPE: ClassVar[int] = 7
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<B3xIQQQ")
+    sequence: int
+    sent: int
+    received: int
+    answered: int
+
+    def pack(self) -> bytes:
+        """The message as bytes: 32."""
+        return self.LAYOUT.pack(self.TYPE, self.sequence, self.sent, self.received, self.answered)
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Pong:
+        """The message of `pack`."""
+        _, *values = _fixed(cls.LAYOUT, data, "Pong")
+        return cls(*values)
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One sample of the 14 inputs (paper 5): `kind` 0 a velocity of -1..1, 1 a target; `values` as SPEC.md says."""
+
+    TYPE: ClassVar[int] = 70
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<BBBxIIQ3f")
+    VELOCITY: ClassVar[int] = 0
+    TARGET: ClassVar[int] = 1
+    limb: int
+    kind: int
+    epoch: int
+    sequence: int
+    sampled: int
+    values: tuple[float, float, float]
+
+    def pack(self) -> bytes:
+        """The message as bytes: 32."""
+        head = (self.TYPE, self.limb, self.kind, self.epoch, self.sequence, self.sampled)
+        return self.LAYOUT.pack(*head, *self.values)
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Input:
+        """The message of `pack`; numbers that are not finite are malformed."""
+        _, limb, kind, epoch, sequence, sampled, *values = _fixed(cls.LAYOUT, data, "Input")
+        if limb >= len(LIMBS) or kind > cls.TARGET:
+            raise MalformedMessage(f"Input names limb {limb}, kind {kind}; there are 4 limbs and 2 kinds")
+        if not all(map(math.isfinite, values)):
+            raise MalformedMessage("Input holds a number that is not finite")
+        return cls(limb, kind, epoch, sequence, sampled, (values[0], values[1], values[2]))
+
+
+Message = (
+    ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
+    | Ping | Edit | Report | Claim | Release | Alive | Input
+)  # fmt: skip
+
+_FIXED = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)}
+_MAPS: dict[int, TypeAdapter[Any]] = {
+    kind.TYPE: TypeAdapter(kind)
+    for kind in (
+        ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Edit, Report, Claim,
+        Release, Alive,
+    )
+}  # fmt: skip
+
+
+def _fixed(layout: struct.Struct, data: bytes, name: str) -> tuple[Any, ...]:
+    if len(data) != layout.size:
+        raise MalformedMessage(f"{name} has {layout.size} bytes, not {len(data)}")
+    return layout.unpack(data)
+
+
+def unpack(data: bytes) -> Message | None:
+    """The message in `data`, None where the type is not known here; raises `MalformedMessage`."""
+    if not data:
+        raise MalformedMessage("an empty message has no type")
+    if data[0] in _FIXED:
+        return _FIXED[data[0]].unpack(data)
+    if data[0] not in _MAPS:
+        return None
+    try:
+        values = msgpack.unpackb(data[1:], strict_map_key=True)
+        message: Message = _MAPS[data[0]].validate_python(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "map"
+        raise MalformedMessage(f"type {data[0]}, {where}: {first['msg']}") from None
+    except (ValueError, TypeError, msgpack.UnpackException) as error:
+        raise MalformedMessage(f"type {data[0]} is not a MessagePack map: {error}") from None
+    return message

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.codec.decode import LARGEST_BLOCK, decode_block
+from bunraku.codec.encode import encode_block
+from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.track import plan
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import points
+from tests.vectors.blocks import wandering_motion
+
+TRACK, MOTION = plan(wandering_motion(2.0, 30.0, 11))
+BLOCK = encode_block(TRACK, MOTION.root[:30], MOTION.rotations[:30], 9)
+
+
+def truth(instants: Array) -> Array:
+    """The movement between frames, from the same tracks at a frame rate 8 times higher."""
+    fine = wandering_motion(2.0, 240.0, 11)
+    index = np.round(instants * 8).astype(int)
+    return points(TRACK.figure, fine.root[index], fine.rotations[index])
+
+
+def test_it_is_a_function_of_time() -> None:
+    instants = np.arange(16, 216) / 8.0
+    root, rotations = decode_block(TRACK, BLOCK).at(instants)
+    error = np.linalg.norm(points(TRACK.figure, root, rotations) - truth(instants), axis=-1)
+    assert error.mean() < 0.003
+    assert np.allclose(np.linalg.norm(rotations, axis=-1), 1)
+
+
+@given(st.binary(max_size=400))
+def test_any_bytes_decode_or_are_refused(data: bytes) -> None:
+    try:
+        block = decode_block(TRACK, data)
+    except DamagedBlock as error:
+        said = str(error)
+        assert said
+        return
+    assert 1 <= block.frames <= 1000
+
+
+@given(st.integers(0, len(BLOCK) * 8 - 1), st.integers(0, len(BLOCK)))
+def test_damage_is_survived(bit: int, cut: int) -> None:
+    damaged = bytearray(BLOCK)
+    damaged[bit // 8] ^= 1 << bit % 8
+    for data in (bytes(damaged), BLOCK[:cut]):
+        try:
+            block = decode_block(TRACK, data)
+        except DamagedBlock:
+            continue
+        root, rotations = block.at(0.0)
+        assert root.shape == (1, 3)
+        assert rotations.shape == (1, 18, 4)
+
+
+def test_oversized_blocks_are_refused() -> None:
+    with pytest.raises(DamagedBlock, match="bytes"):
+        decode_block(TRACK, BLOCK + bytes(LARGEST_BLOCK))

@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import numpy as np
+import scipy.fft
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.codec import transform
+from bunraku.motion.rotation import Array
+
+
+@given(st.integers(1, 90), st.integers(0, 99))
+def test_it_is_the_orthonormal_cosine_transform(frames: int, seed: int) -> None:
+    track = np.random.default_rng(seed).normal(size=(frames, 4, 3))
+    coefficients = transform.forward(track)
+    np.testing.assert_allclose(coefficients, np.moveaxis(scipy.fft.dct(track, norm="ortho", axis=0), 0, -1), atol=1e-9)
+    np.testing.assert_allclose(
+        transform.inverse(coefficients, frames, np.arange(frames, dtype=np.float64)), track, atol=1e-9
+    )
+
+
+def test_between_frames_it_follows_a_smooth_track() -> None:
+    t = np.arange(40, dtype=np.float64)
+
+    def swing(x: Array) -> Array:
+        track: Array = np.cos(2 * np.pi * x / 37.0)[:, None]
+        return track
+
+    halves = t[3:-3] + 0.5
+    back = transform.inverse(transform.forward(swing(t)), 40, halves)
+    np.testing.assert_allclose(back, swing(halves), atol=5e-3)
+
+
+def test_fewer_coefficients_are_a_smoother_track() -> None:
+    track = np.random.default_rng(0).normal(size=(30, 1))
+    cut = transform.inverse(transform.forward(track)[:, :8], 30, np.arange(30, dtype=np.float64))
+    assert np.abs(np.diff(cut, axis=0)).sum() < np.abs(np.diff(track, axis=0)).sum()

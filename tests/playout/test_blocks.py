@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bunraku.codec.decode import decode_block
+from bunraku.codec.encode import encode_motion
+from bunraku.motion import rotation
+from bunraku.motion.skeleton import points
+from bunraku.playout.blocks import BlockStore
+from tests.vectors.blocks import wandering_motion
+
+MOTION = wandering_motion(3.4, 30.0, 3)
+ENCODED = encode_motion(MOTION, steps=(20, 8))
+
+
+def store(*indices: int, rate: int = 1) -> BlockStore:
+    held = BlockStore(ENCODED.track)
+    for index in indices:
+        held.put(index, rate, decode_block(ENCODED.track, ENCODED.rates[rate].blocks[index]))
+    return held
+
+
+def test_it_shows_the_dance_at_every_frame() -> None:
+    held = store(0, 1, 2, 3)
+    for frame in (0, 17, 29, 30, 59, 60, 101):
+        pose = held.pose_at(round(frame * 1e6 / 30))
+        assert pose is not None
+        truth = points(MOTION.figure, MOTION.root[frame], MOTION.rotations[frame])
+        assert np.linalg.norm(points(ENCODED.track.figure, *pose) - truth, axis=-1).max() < 0.01
+
+
+def test_nothing_jumps_across_a_border() -> None:
+    held = store(0, 1, 2, 3)
+    times = np.arange(900_000, 1_100_000, 1_000)
+    shown = [points(ENCODED.track.figure, *pose) for t in times if (pose := held.pose_at(int(t)))]
+    assert len(shown) == len(times)
+    assert np.abs(np.diff(shown, axis=0)).max() < 0.02
+
+
+def test_a_missing_block_has_no_pose_and_a_better_one_stays() -> None:
+    held = store(0, 2)
+    assert held.pose_at(1_500_000) is None
+    assert held.pose_at(999_000) is not None
+    assert not held.put(0, 0, decode_block(ENCODED.track, ENCODED.rates[0].blocks[0]))
+    assert [held.rate(i) for i in range(4)] == [1, -1, 1, -1]
+
+
+def test_ahead_counts_what_is_here_without_a_gap() -> None:
+    held = store(0, 1, 3)
+    assert held.ahead(500_000, loop=True) == 1_500_000
+    assert held.ahead(2_500_000, loop=True) == 0
+    assert held.ahead(3_200_000, loop=True) == 200_000 + 2_000_000
+    assert held.ahead(3_200_000, loop=False) == 200_000
+    assert store(0, 1, 2, 3).ahead(1_000_000, loop=True) == ENCODED.track.start_us(1) + 3_400_000 - 1_000_000
+
+
+def test_the_end_of_a_loop_leads_into_its_beginning() -> None:
+    held = store(0, 1, 2, 3)
+    end = held.pose_at(ENCODED.track.duration_us - 1_000, loop=True)
+    begin = held.pose_at(0)
+    assert end is not None
+    assert begin is not None
+    np.testing.assert_allclose(end[0], begin[0], atol=0.05)
+    turn = rotation.to_rotation_vector(rotation.multiply(rotation.conjugate(end[1]), begin[1]))
+    assert np.linalg.norm(turn, axis=-1).max() < 0.2
+
+
+def test_blocks_of_another_motion_are_refused() -> None:
+    held = store()
+    with pytest.raises(ValueError, match="not of this motion"):
+        held.put(3, 0, decode_block(ENCODED.track, ENCODED.rates[0].blocks[0]))
+    with pytest.raises(ValueError, match="not of this motion"):
+        held.put(4, 0, decode_block(ENCODED.track, ENCODED.rates[0].blocks[0]))

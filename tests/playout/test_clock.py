@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.playout.clock import SLEW, ReferenceClock
+
+OFFSET = 3_600_000_000  # a client's clock an hour off
+
+
+def answer(clock: ReferenceClock, sent: int, out: int, back: int, offset: int = OFFSET) -> None:
+    received = sent + out + offset
+    clock.pong(sent, received, received + 50, sent + out + 50 + back)
+
+
+def test_the_smallest_round_trip_decides() -> None:
+    clock = ReferenceClock()
+    assert not clock.ready
+    for i, (out, back) in enumerate([(400_000, 20_000), (20_000, 20_000), (20_000, 900_000)]):
+        answer(clock, i * 1_000_000, out, back)
+    assert clock.offset == OFFSET
+    assert clock.error == 20_000
+
+
+@given(st.lists(st.tuples(st.integers(1_000, 500_000), st.integers(1_000, 500_000)), min_size=1, max_size=20))
+def test_the_error_it_states_is_never_exceeded(trips: list[tuple[int, int]]) -> None:
+    clock = ReferenceClock()
+    for i, (out, back) in enumerate(trips):
+        answer(clock, i * 2_000_000, out, back)
+        assert abs(clock.offset - OFFSET) <= clock.error
+
+
+@given(st.lists(st.tuples(st.integers(1_000, 500_000), st.integers(1_000, 500_000)), min_size=2, max_size=30))
+def test_shown_time_runs_on_and_slews(trips: list[tuple[int, int]]) -> None:
+    clock = ReferenceClock()
+    answer(clock, 0, *trips[0])
+    local = 2_000_000
+    before = clock.at(local)
+    for out, back in trips[1:]:
+        answer(clock, local, out, back)
+        for _ in range(20):
+            local += 100_000
+            now = clock.at(local)
+            assert abs((now - before) - 100_000) <= SLEW * 100_000 + 1
+            before = now
+
+
+def test_drift_of_200_ppm_is_followed() -> None:
+    clock = ReferenceClock()
+    local = 0
+    for second in range(0, 120, 2):
+        local = second * 1_000_000
+        answer(clock, local, 30_000, 30_000, OFFSET + second * 200)
+        clock.at(local + 60_050)
+    assert abs(clock.at(local + 100_000) - (local + 100_000 + OFFSET + 118 * 200)) < 5_000
+
+
+def test_impossible_answers_are_ignored() -> None:
+    clock = ReferenceClock()
+    clock.pong(1_000, 500_000, 400_000, 2_000)
+    clock.pong(1_000, 500_000, 502_000, 2_000)
+    assert not clock.ready
+    assert clock.at(7) == 7
+
+
+def test_a_guess_serves_until_an_answer_comes() -> None:
+    clock = ReferenceClock()
+    clock.guess(5_000_000, 1_000_000)
+    assert clock.at(1_500_000) == 5_500_000
+    assert not clock.ready
+    answer(clock, 2_000_000, 10_000, 10_000)
+    assert clock.at(2_020_050) == 2_020_050 + OFFSET
+    clock.guess(0, 0)
+    assert clock.at(2_020_060) == 2_020_060 + OFFSET

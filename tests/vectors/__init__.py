@@ -1,0 +1,1 @@
+"""Makes the golden vectors of `proto/vectors`, by which both languages are judged."""

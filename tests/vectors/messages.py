@@ -1,0 +1,100 @@
+"""Golden messages, valid and invalid."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import msgpack
+
+from bunraku.wire.messages import (
+    Alive,
+    ChannelHeader,
+    Claim,
+    Data,
+    Description,
+    Edit,
+    Grant,
+    Input,
+    Message,
+    Overlay,
+    Ping,
+    Pong,
+    Presence,
+    Problem,
+    Refusal,
+    Release,
+    Report,
+    TimelineState,
+    Welcome,
+)
+from tests.vectors.blocks import text
+
+NOW = 1_774_000_000_123_456
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return {"base64": text(value)}
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return value
+
+
+def make() -> dict[str, Any]:
+    """One of every message with its fields, and broken ones with the reason."""
+    examples: list[Message] = [
+        ChannelHeader(motion="k3v9q", now=NOW, channels=19, software="0.1.0"),
+        Description("k3v9q", [{"type": "motion", "fps": 60.0, "figure": bytes(range(138))}]),
+        Data(0, 3, 281_474_976_710_000, b"\x01block"),
+        TimelineState(7, "k3v9q", NOW, 1_500_000, True, False, 32_475_000),
+        Overlay(65_535, NOW, {0: (1, -2, 3, -32_767, 32_767, 0, 7, 8, 9), 3: (0, 0, 0, 1, 1, 1, -5, -6, -7)}),
+        Overlay(0, NOW, {}),
+        Presence(3, [{"id": "a1", "name": "Aiko あ", "colour": 0}], ["a1", None, None, None]),
+        Pong(4_000_000_000, 123_456_789_012, NOW, NOW + 31),
+        Problem("Too slow", "40 messages waited"),
+        Welcome("a1", 4, 120_000),
+        Grant(2, 9),
+        Refusal(1, "held", "a1"),
+        Refusal(1, "lost"),
+        Ping(4_000_000_000, 123_456_789_012),
+        Edit(playing=False),
+        Edit(position=0, loop=True),
+        Report(2_500_000, 300, 16_667, hidden=True),
+        Claim(3),
+        Release(0, 9),
+        Alive([0, 3]),
+        Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)),
+        Input(2, Input.VELOCITY, 9, 13, NOW, (-1.0, 0.0, 0.0)),
+    ]
+    target = examples[-2].pack()
+    invalid = {
+        "empty": b"",
+        "limb past the last": Claim(0).pack()[:-1] + b"\x04",
+        "limb is text": bytes([67]) + msgpack.packb({"limb": "left"}),
+        "no map": bytes([67]) + msgpack.packb([1]),
+        "not MessagePack": bytes([67, 0xC1]),
+        "input too short": target[:-1],
+        "input not a number": target[:20] + b"\x00\x00\xc0\x7f" + target[24:],
+        "input infinite": target[:20] + b"\x00\x00\x80\x7f" + target[24:],
+        "input of a fifth limb": target[:1] + b"\x04" + target[2:],
+        "overlay shorter than its mask": bytes([5, 1]) + bytes(10),
+        "overlay with a fifth limb": bytes([5, 16]) + bytes(10),
+        "data without a time": bytes([3, 0, 0]),
+        "pong too long": examples[7].pack() + b"\0",
+    }
+    return {
+        "valid": [
+            {
+                "name": type(message).__name__,
+                "type": message.TYPE,
+                "fields": _plain({f.name: getattr(message, f.name) for f in dataclasses.fields(message)}),
+                "bytes": text(message.pack()),
+            }
+            for message in examples
+        ],
+        "skipped": [text(b"\x3f later"), text(b"\xff")],
+        "invalid": [{"why": why, "bytes": text(data)} for why, data in invalid.items()],
+    }

@@ -1,0 +1,154 @@
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import msgpack
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.wire import messages
+from bunraku.wire.messages import (
+    Alive,
+    ChannelHeader,
+    Claim,
+    Data,
+    Description,
+    Edit,
+    Grant,
+    Input,
+    MalformedMessage,
+    Message,
+    Overlay,
+    Ping,
+    Pong,
+    Presence,
+    Problem,
+    Refusal,
+    Release,
+    Report,
+    TimelineState,
+    Welcome,
+    unpack,
+)
+
+TIME = st.integers(0, (1 << 53) - 1)
+U32 = st.integers(0, 0xFFFFFFFF)
+LIMB = st.integers(0, 3)
+TEXT = st.text(max_size=20)
+SINGLE = st.floats(allow_nan=False, allow_infinity=False, width=32)
+I16 = st.integers(-32768, 32767)
+
+MESSAGES: st.SearchStrategy[Any] = st.one_of(
+    st.builds(ChannelHeader, motion=TEXT, now=TIME, channels=TIME, software=TEXT),
+    st.builds(Description, motion=TEXT, tracks=st.lists(st.dictionaries(TEXT, st.binary(max_size=9)), max_size=2)),
+    st.builds(
+        Data, track=st.integers(0, 15), rate=st.integers(0, 15), start=st.integers(0, (1 << 48) - 1), block=st.binary()
+    ),
+    st.builds(
+        TimelineState,
+        epoch=TIME,
+        motion=TEXT,
+        clock=TIME,
+        position=TIME,
+        playing=st.booleans(),
+        loop=st.booleans(),
+        duration=TIME,
+    ),
+    st.builds(
+        Overlay,
+        sequence=st.integers(0, 0xFFFF),
+        due=TIME,
+        limbs=st.dictionaries(LIMB, st.tuples(*[I16] * 9)),
+    ),
+    st.builds(
+        Presence,
+        viewers=TIME,
+        puppeteers=st.lists(st.dictionaries(TEXT, TEXT), max_size=3),
+        limbs=st.lists(st.none() | TEXT, max_size=4),
+    ),
+    st.builds(Ping, sequence=U32, sent=TIME),
+    st.builds(Pong, sequence=U32, sent=TIME, received=TIME, answered=TIME),
+    st.builds(Problem, title=TEXT, detail=TEXT),
+    st.builds(Welcome, id=TEXT, colour=st.integers(0, 4), lead=TIME),
+    st.builds(Grant, limb=LIMB, epoch=U32),
+    st.builds(Refusal, limb=LIMB, reason=TEXT, holder=st.none() | TEXT),
+    st.builds(Edit, playing=st.none() | st.booleans(), position=st.none() | TIME, loop=st.none() | st.booleans()),
+    st.builds(Report, buffer=TIME, decode=TIME, frame=TIME, hidden=st.booleans()),
+    st.builds(Claim, limb=LIMB),
+    st.builds(Release, limb=LIMB, epoch=U32),
+    st.builds(Alive, limbs=st.lists(LIMB, max_size=4)),
+    st.builds(
+        Input,
+        limb=LIMB,
+        kind=st.integers(0, 1),
+        epoch=U32,
+        sequence=U32,
+        sampled=TIME,
+        values=st.tuples(SINGLE, SINGLE, SINGLE),
+    ),
+)
+
+
+@given(MESSAGES)
+def test_every_message_comes_back_as_it_went(message: Message) -> None:
+    assert unpack(message.pack()) == message
+
+
+@given(st.binary(max_size=80))
+def test_any_bytes_are_a_message_or_malformed_or_unknown(data: bytes) -> None:
+    try:
+        message = unpack(data)
+    except MalformedMessage:
+        return
+    assert message is None or dataclasses.is_dataclass(message)
+
+
+@given(MESSAGES, st.integers(0, 60), st.integers(0, 255))
+def test_damage_never_raises_anything_else(message: Message, at: int, byte: int) -> None:
+    data = bytearray(message.pack())
+    data[at % len(data)] = byte
+    for damaged in (bytes(data), bytes(data[: at % len(data)])):
+        try:
+            unpack(damaged)
+        except MalformedMessage:
+            continue
+
+
+def test_unknown_types_are_skipped_and_unknown_keys_too() -> None:
+    assert unpack(b"\x3fwhatever") is None
+    assert unpack(bytes([67]) + msgpack.packb({"limb": 2, "news": [1]})) == Claim(2)
+
+
+def test_sizes_are_those_of_the_contract() -> None:
+    assert len(Data(0, 3, 1_000_000, b"").pack()) == 8
+    assert len(Overlay(1, 2, {0: (0,) * 9, 3: (1,) * 9}).pack()) == 12 + 36
+    assert len(Ping(1, 2).pack()) == len(Pong(1, 2, 3, 4).pack()) == len(Input(0, 0, 1, 1, 1, (0, 0, 0)).pack()) == 32
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"", "no type"),
+        (bytes([67]) + msgpack.packb({"limb": 4}), "limb"),
+        (bytes([67]) + msgpack.packb({"limb": "left"}), "limb"),
+        (bytes([67]) + msgpack.packb([1]), "type 67"),
+        (bytes([67]) + b"\xc1", "MessagePack"),
+        (bytes([70]) + b"\0" * 30, "32 bytes"),
+        (Input(0, 1, 1, 1, 1, (float("nan"), 0, 0)).pack(), "finite"),
+        (Input(0, 1, 1, 1, 1, (float("inf"), 0, 0)).pack(), "finite"),
+        (bytes([5, 16]) + bytes(10), "mask"),
+        (bytes([5, 1]) + bytes(10), "30 bytes"),
+    ],
+)
+def test_a_malformed_message_says_what_is_wrong(data: bytes, says: str) -> None:
+    with pytest.raises(MalformedMessage, match=says):
+        unpack(data)
+
+
+def test_types_are_unique_and_client_types_start_at_64() -> None:
+    types = [kind.TYPE for kind in messages.Message.__args__]
+    assert len(set(types)) == len(types)
+    client = {Ping, Edit, Report, Claim, Release, Alive, Input}
+    assert {kind for kind in messages.Message.__args__ if kind.TYPE >= 64} == client
