@@ -2,10 +2,10 @@
 import "./style/page.css";
 import type { Vector3 } from "three";
 import { createSession, ProblemError, type Motion } from "./client/library";
-import { createGamepad, type GamepadInput } from "./input/gamepad";
-import { Hands, type Source } from "./input/hands";
-import { createKeyboard, type KeyboardInput } from "./input/keyboard";
-import { createPointer, type PointerInput } from "./input/pointer";
+import type { GamepadInput } from "./input/gamepad";
+import type { Hands, Source } from "./input/hands";
+import type { KeyboardInput } from "./input/keyboard";
+import type { PointerInput } from "./input/pointer";
 import { holders, LIMB_NAMES, type Holder } from "./page/model";
 import { ownName } from "./page/name";
 import { createPage } from "./page/page";
@@ -20,7 +20,6 @@ import type { StringState } from "./stage/strings";
 const INVITED = "bunraku.invited";
 const INVITATION = 6_000;
 const SAMPLE_EVERY = 500;
-const LONGEST_STEP = 0.1;
 
 const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvasElement;
 const query = new URLSearchParams(location.search);
@@ -218,7 +217,7 @@ function expose(): void {
 }
 
 async function openStage(): Promise<void> {
-  const { Stage } = await import("./stage/stage");
+  const { createGamepad, createKeyboard, createPointer, Hands, Stage } = await import("./theatre");
   try {
     stage = new Stage(canvas);
   } catch {
@@ -257,7 +256,7 @@ function frame(): void {
   requestAnimationFrame(frame);
   if (!stage || !hands) return;
   const now = performance.now();
-  const seconds = Math.min(LONGEST_STEP, (now - before) / 1000);
+  const seconds = (now - before) / 1000;
   before = now;
   const { viewer } = room ?? {};
   pointer?.update();

@@ -7,11 +7,14 @@ import type { Piece } from "./library";
 const MOST_PAGES = 5;
 
 export function asPiece(motion: Motion): Piece {
-  return { id: motion.id, name: motion.name || pieceName(motion.filename), detail: `${figureless(motion.fps)} Hz`, seconds: motion.duration };
+  return { id: motion.id, name: motion.name || pieceName(motion.filename), detail: kind(motion), seconds: motion.duration };
 }
 
-function figureless(fps: number): string {
-  return Number.isInteger(fps) ? String(fps) : figure(fps);
+/** "BVH, 120 Hz". */
+function kind({ filename, fps }: Motion): string {
+  const rate = `${Number.isInteger(fps) ? fps : figure(fps)} Hz`;
+  const ending = /\.([^.]+)$/.exec(filename)?.[1];
+  return ending ? `${ending.toUpperCase()}, ${rate}` : rate;
 }
 
 export class Pieces {

@@ -7,6 +7,7 @@ import type { Look } from "./look";
 
 export interface Lights {
   readonly group: Group;
+  shadows: boolean;
   dress(look: Look): void;
 }
 
@@ -33,6 +34,12 @@ export function createLights(): Lights {
   for (const light of [key, fill, warmRim, coolRim]) group.add(light, light.target);
   return {
     group,
+    get shadows() {
+      return key.castShadow;
+    },
+    set shadows(on) {
+      key.castShadow = on;
+    },
     dress(look) {
       for (const [light, [colour, intensity]] of [[key, look.key], [fill, look.fill], [warmRim, look.warmRim], [coolRim, look.coolRim]] as const) {
         light.color.set(colour);

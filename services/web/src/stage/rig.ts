@@ -11,10 +11,14 @@ const LEASH = 0.25;
 const FOLLOW = 2.5;
 /** A dancer further away than this was put there by a seek or a new motion: cut, do not travel. */
 const CUT = 1.2;
-/** Facing is averaged over this long, seconds, and followed only beyond this angle: a pirouette turns no stage. */
+/**
+ * Facing is averaged over so many seconds, and followed only beyond this angle and once watched for a while: a pirouette
+ * turns no stage, nor does a back that is turned as one comes in.
+ */
 const FACING_MEMORY = 8;
-const FACING_SLACK = Math.PI / 6;
-const TURN = 0.35;
+const FACING_SLACK = Math.PI / 3;
+const WATCHED = 2.5;
+const TURN = 0.8;
 /** The floor sinks to a foot below it quickly and rises to feet above it slowly, 1/s, and never to a jump. */
 const SINK = 8;
 const RISE = 0.15;
@@ -25,6 +29,7 @@ export class Rig {
   /** Local metres x and z that the rig has gone: floor boards stay while it moves. */
   readonly travelled = new Vector2();
   readonly #facing = new Vector2();
+  #watched = 0;
   #placed = false;
 
   constructor() {
@@ -46,17 +51,23 @@ export class Rig {
       if (!this.#placed) {
         position.y = ground;
         this.#facing.copy(facing);
-        rotation.y = Math.atan2(facing.x, facing.y);
+        this.#watched = 0;
+        rotation.y = 0;
       }
       this.#placed = true;
       position.set(root.x, position.y, root.z);
       return;
     }
-    this.#facing.lerp(facing, 1 - Math.exp(-seconds / FACING_MEMORY));
+    // A plain mean at first, then a fading one.
+    this.#watched += seconds;
+    this.#facing.lerp(facing, seconds / Math.min(Math.max(this.#watched, seconds, 1e-3), FACING_MEMORY));
     const turn = Math.atan2(this.#facing.x, this.#facing.y) - rotation.y;
     const off = Math.atan2(Math.sin(turn), Math.cos(turn));
-    const beyond = Math.sign(off) * Math.max(0, Math.abs(off) - FACING_SLACK);
-    rotation.y += beyond * (1 - Math.exp(-TURN * seconds));
+    // A dancer who turns about has no one front: the mean is then short, and the stage stays as it is.
+    if (this.#watched > WATCHED && this.#facing.length() > 0.5) {
+      const beyond = Math.sign(off) * Math.max(0, Math.abs(off) - FACING_SLACK);
+      rotation.y += beyond * (1 - Math.exp(-TURN * seconds));
+    }
 
     const lift = ground - position.y;
     if (lift < 0) position.y += lift * (1 - Math.exp(-SINK * seconds));

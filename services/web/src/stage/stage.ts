@@ -8,6 +8,7 @@ import { createLights, studio } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
 import { Puppet } from "./puppet";
+import { QualityChoice } from "./quality";
 import { Rig } from "./rig";
 import type { Paint } from "./shading";
 import { Strings, type StringState } from "./strings";
@@ -16,6 +17,9 @@ import { Strings, type StringState } from "./strings";
 const SHARPEST = { desktop: 2, phone: 1.75 };
 /** Pixels at the top that belong to the header and a bar's name. */
 const HEADROOM = 120;
+
+/** Movements of the stage's own take no longer step than this, seconds. */
+const LONGEST_STEP = 0.1;
 
 const FREE: readonly StringState[] = [0, 1, 2, 3].map(() => ({ holder: null, lit: false, pull: null }));
 
@@ -37,6 +41,8 @@ export class Stage {
   #width = 1;
   #height = 1;
   #still = false;
+  #sharpness = 1;
+  readonly #quality: QualityChoice;
 
   /** Throws where the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement) {
@@ -46,6 +52,8 @@ export class Stage {
     this.renderer.shadowMap.type = PCFShadowMap;
     this.rig.group.add(this.audience.camera, this.#lights.group, createBackdrop(this.#backdrop), this.#floor.mesh);
     this.scene.add(this.rig.group, this.strings.group);
+    this.#quality = new QualityChoice(driverName(this.renderer.getContext()));
+    this.#lights.shadows = this.#quality.quality.shadows;
   }
 
   /** No easing, no swing: for people who asked for less motion. */
@@ -66,7 +74,7 @@ export class Stage {
     this.scene.environment = studio(this.renderer, this.#look);
     this.scene.environmentIntensity = this.#look.environment;
     this.renderer.toneMappingExposure = this.#look.exposure;
-    if (this.puppet) this.puppet.reflected = this.#look.dark;
+    this.#reflect();
   }
 
   /** Carves the puppet for a dancer's limb lengths. */
@@ -74,7 +82,7 @@ export class Stage {
     this.puppet?.dispose();
     this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
     this.puppet = new Puppet(figure, this.#paint, this.#floorAt);
-    this.puppet.reflected = this.#look.dark;
+    this.#reflect();
     this.puppet.group.visible = false;
     this.scene.add(this.puppet.group);
     this.audience.scale = this.puppet.scale;
@@ -86,17 +94,18 @@ export class Stage {
     const sharpest = framing === "desktop" ? SHARPEST.desktop : SHARPEST.phone;
     this.#width = width;
     this.#height = height;
-    this.renderer.setPixelRatio(Math.min(pixelRatio, sharpest));
-    this.renderer.setSize(width, height, false);
+    this.#sharpness = Math.min(pixelRatio, sharpest);
+    this.#setSize();
     this.#backdrop.discRadius.value = framing === "desktop" ? 1.06 : 0.98;
     this.#backdrop.discCentre.value.set(0, framing === "desktop" ? 1.3 : 1.36);
     this.audience.frame(framing);
     this.audience.resize(width / height);
   }
 
-  /** Draws one frame: the pose (null: none yet), the strings, `seconds` since the frame before. */
-  draw(pose: Pose | null, states: readonly StringState[] = FREE, seconds = 0): void {
+  /** Draws one frame: the pose (null: none yet), the strings, and the seconds since the frame before. */
+  draw(pose: Pose | null, states: readonly StringState[] = FREE, interval = 0): void {
     const { puppet } = this;
+    const seconds = Math.min(interval, LONGEST_STEP);
     if (puppet && pose) {
       puppet.group.visible = true;
       puppet.apply(pose, this.#still ? 0 : seconds);
@@ -107,6 +116,11 @@ export class Stage {
     this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0);
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#ceiling(), this.right());
     this.renderer.render(this.scene, this.audience.camera);
+    if (puppet && pose && this.#quality.frame(interval)) {
+      this.#setSize();
+      this.#reflect();
+      this.#lights.shadows = this.#quality.quality.shadows;
+    }
   }
 
   /** CSS pixels of a world place. */
@@ -145,6 +159,16 @@ export class Stage {
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
+  #setSize(): void {
+    this.renderer.setPixelRatio(this.#sharpness * this.#quality.quality.sharpness);
+    this.renderer.setSize(this.#width, this.#height, false);
+  }
+
+  /** Only the lacquer of the night mirrors, and only where the machine is up to it. */
+  #reflect(): void {
+    if (this.puppet) this.puppet.reflected = this.#look.dark && this.#quality.quality.reflection;
+  }
+
   #reach(puppet: Puppet): number {
     const at = new Vector3();
     return Math.max(...[0, 1].map((limb) => Math.abs(puppet.handle(limb, at).project(this.audience.camera).x)));
@@ -154,4 +178,9 @@ export class Stage {
     const middle = this.rig.group.localToWorld(new Vector3(0, 1, 0));
     return this.fromScreen(this.#width / 2, HEADROOM, middle)?.y ?? 2.2;
   }
+}
+
+function driverName(context: WebGLRenderingContext | WebGL2RenderingContext): string {
+  const told = context.getExtension("WEBGL_debug_renderer_info");
+  return told ? String(context.getParameter(told.UNMASKED_RENDERER_WEBGL)) : "";
 }

@@ -26,9 +26,13 @@ export function signedPower(x: number, power: number): number {
   return Math.sign(x) * Math.abs(x) ** power;
 }
 
-/** Cubic Hermite curve through rows `[t, ...values]` with rising t; clamped to the ends. */
-export function curve(keys: readonly (readonly number[])[]): (t: number) => number[] {
+/**
+ * Cubic Hermite curve through rows `[t, ...values]` with rising t; clamped to the ends. The array returned is the same one
+ * every time: take the values out at once.
+ */
+export function curve(keys: readonly (readonly number[])[]): (t: number) => readonly number[] {
   const last = keys.length - 1;
+  const out: number[] = Array.from({ length: keys[0].length - 1 }, () => 0);
   return (at) => {
     const t = Math.min(keys[last][0], Math.max(keys[0][0], at));
     let i = 0;
@@ -36,17 +40,16 @@ export function curve(keys: readonly (readonly number[])[]): (t: number) => numb
     const [before, start, end, after] = [keys[Math.max(i - 1, 0)], keys[i], keys[i + 1], keys[Math.min(i + 2, last)]];
     const span = end[0] - start[0];
     const s = (t - start[0]) / span;
-    return start.slice(1).map((value, k) => {
-      const next = end[k + 1];
-      const slope = (next - value) / span;
-      const m0 = i === 0 ? slope : (next - before[k + 1]) / (end[0] - before[0]);
-      const m1 = i === last - 1 ? slope : (after[k + 1] - value) / (after[0] - start[0]);
-      const s2 = s * s;
-      const s3 = s2 * s;
-      return (
-        (2 * s3 - 3 * s2 + 1) * value + (s3 - 2 * s2 + s) * span * m0 + (3 * s2 - 2 * s3) * next + (s3 - s2) * span * m1
-      );
-    });
+    const rise = s * s * (3 - 2 * s);
+    const leave = s * (s - 1) * (s - 1) * span;
+    const arrive = s * s * (s - 1) * span;
+    for (let k = 1; k <= out.length; k++) {
+      const step = end[k] - start[k];
+      const m0 = i === 0 ? step / span : (end[k] - before[k]) / (end[0] - before[0]);
+      const m1 = i === last - 1 ? step / span : (after[k] - start[k]) / (after[0] - start[0]);
+      out[k - 1] = start[k] + rise * step + leave * m0 + arrive * m1;
+    }
+    return out;
   };
 }
 
