@@ -219,7 +219,7 @@ function expose(): void {
 async function openStage(): Promise<void> {
   const { createGamepad, createKeyboard, createPointer, Hands, Stage } = await import("./theatre");
   try {
-    stage = new Stage(canvas);
+    stage = new Stage(canvas, query.get("quality") === "best");
   } catch {
     page.notice("This browser cannot draw the stage", "It needs WebGL 2. Try another browser, or switch on hardware acceleration.");
     return;

@@ -1,5 +1,5 @@
 /** The puppet: bones named as H-Anim names the joints, one skinned mesh over them, and by night its reflection. */
-import { Bone, Group, Matrix4, Skeleton, SkinnedMesh, Vector3, type BufferGeometry, type IUniform } from "three";
+import { Bone, Group, Matrix4, Skeleton, SkinnedMesh, Vector3, type BufferGeometry, type IUniform, type Material } from "three";
 import { JOINTS, PARENTS, type Figure, type Pose } from "../motion/skeleton";
 import { Assembly } from "./assembly";
 import { figureScale, fitTo, restPositions } from "./fit";
@@ -9,7 +9,7 @@ import { addHakama } from "./parts/hakama";
 import { addHead } from "./parts/head";
 import { addLegs } from "./parts/legs";
 import { addSleeves } from "./parts/sleeves";
-import { figureMaterial, type Paint } from "./shading";
+import { figureMaterial, plainFigureMaterial, type Paint } from "./shading";
 import { SleeveBone } from "./sleeve-bone";
 import { SIDES } from "./standard";
 
@@ -41,8 +41,11 @@ export class Puppet {
   readonly #bones: Bone[];
   readonly #sleeves: SleeveBone[];
   readonly #geometry: BufferGeometry;
-  readonly #mesh: SkinnedMesh;
-  readonly #reflection: SkinnedMesh;
+  readonly #mesh: SkinnedMesh<BufferGeometry, Material>;
+  readonly #paint: Paint;
+  readonly #full: Material;
+  #plain: Material | null = null;
+  readonly #reflection: SkinnedMesh<BufferGeometry, Material>;
 
   constructor(figure: Figure, paint: Paint, floorAt: IUniform<number>) {
     this.figure = figure;
@@ -54,11 +57,13 @@ export class Puppet {
     this.group.updateMatrixWorld(true);
     const skeleton = new Skeleton(this.#bones);
     this.#geometry = puppetGeometry(figure);
-    this.#mesh = new SkinnedMesh(this.#geometry, figureMaterial(paint));
+    this.#paint = paint;
+    this.#full = figureMaterial(paint);
+    this.#mesh = new SkinnedMesh<BufferGeometry, Material>(this.#geometry, this.#full);
     this.#mesh.name = "figure";
     this.#mesh.castShadow = true;
     this.#mesh.receiveShadow = true;
-    this.#reflection = new SkinnedMesh(this.#geometry, figureMaterial(paint, floorAt));
+    this.#reflection = new SkinnedMesh<BufferGeometry, Material>(this.#geometry, figureMaterial(paint, floorAt));
     this.#reflection.renderOrder = -1;
     for (const mesh of [this.#mesh, this.#reflection]) {
       mesh.bind(skeleton, new Matrix4());
@@ -76,6 +81,12 @@ export class Puppet {
   /** Shows the reflection, which only the lacquer of the night has. */
   set reflected(on: boolean) {
     this.#reflection.visible = on;
+  }
+
+  /** Draws with the plain material, for machines without a graphics processor. */
+  set plain(on: boolean) {
+    const wanted = on ? (this.#plain ??= plainFigureMaterial(this.#paint)) : this.#full;
+    this.#mesh.material = wanted;
   }
 
   /** Takes a pose; `seconds` since the one before lets the sleeves swing, 0 sets them still. */
@@ -102,7 +113,7 @@ export class Puppet {
 
   dispose(): void {
     this.#geometry.dispose();
-    for (const mesh of [this.#mesh, this.#reflection]) (mesh.material as { dispose(): void }).dispose();
+    for (const material of [this.#full, this.#plain, this.#reflection.material]) material?.dispose();
     this.#mesh.skeleton.dispose();
     this.group.removeFromParent();
   }

@@ -5,14 +5,16 @@ export interface Quality {
   sharpness: number;
   reflection: boolean;
   shadows: boolean;
+  /** The figure without lacquer and grain. */
+  plain: boolean;
 }
 
 export const QUALITIES: readonly Quality[] = [
-  { sharpness: 1, reflection: true, shadows: true },
-  { sharpness: 0.75, reflection: true, shadows: true },
-  { sharpness: 0.6, reflection: false, shadows: true },
-  { sharpness: 0.42, reflection: false, shadows: false },
-  { sharpness: 0.28, reflection: false, shadows: false },
+  { sharpness: 1, reflection: true, shadows: true, plain: false },
+  { sharpness: 0.75, reflection: true, shadows: true, plain: false },
+  { sharpness: 0.6, reflection: false, shadows: true, plain: false },
+  { sharpness: 0.5, reflection: false, shadows: false, plain: true },
+  { sharpness: 0.35, reflection: false, shadows: false, plain: true },
 ];
 
 /** Frames slower than this, several together, step down. Seconds: 24 frames a second. */
@@ -32,9 +34,12 @@ export class QualityChoice {
   #toSkip = WARM_UP;
   readonly #times: number[] = [];
 
-  /** `renderer` is the graphics driver's name for itself. */
-  constructor(renderer = "") {
-    this.#level = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer) ? SOFTWARE_LEVEL : 0;
+  readonly #pinned: boolean;
+
+  /** `renderer` is the graphics driver's name for itself; `pinned` keeps the best quality, however slow. */
+  constructor(renderer: string, pinned: boolean) {
+    this.#pinned = pinned;
+    this.#level = !pinned && /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer) ? SOFTWARE_LEVEL : 0;
   }
 
   get quality(): Quality {
@@ -43,6 +48,7 @@ export class QualityChoice {
 
   /** Takes the seconds since the frame before; true when the quality has just been stepped down. Never steps up by itself. */
   frame(seconds: number): boolean {
+    if (this.#pinned) return false;
     if (seconds > PAUSE) {
       this.#times.length = 0;
       return false;

@@ -44,16 +44,16 @@ export class Stage {
   #sharpness = 1;
   readonly #quality: QualityChoice;
 
-  /** Throws where the browser has no WebGL 2. */
-  constructor(canvas: HTMLCanvasElement) {
+  /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
+  constructor(canvas: HTMLCanvasElement, pinned = false) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.rig.group.add(this.audience.camera, this.#lights.group, createBackdrop(this.#backdrop), this.#floor.mesh);
     this.scene.add(this.rig.group, this.strings.group);
-    this.#quality = new QualityChoice(driverName(this.renderer.getContext()));
-    this.#lights.shadows = this.#quality.quality.shadows;
+    this.#quality = new QualityChoice(driverName(this.renderer.getContext()), pinned);
+    this.#furnish();
   }
 
   /** No easing, no swing: for people who asked for less motion. */
@@ -74,7 +74,7 @@ export class Stage {
     this.scene.environment = studio(this.renderer, this.#look);
     this.scene.environmentIntensity = this.#look.environment;
     this.renderer.toneMappingExposure = this.#look.exposure;
-    this.#reflect();
+    this.#furnish();
   }
 
   /** Carves the puppet for a dancer's limb lengths. */
@@ -82,7 +82,7 @@ export class Stage {
     this.puppet?.dispose();
     this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
     this.puppet = new Puppet(figure, this.#paint, this.#floorAt);
-    this.#reflect();
+    this.#furnish();
     this.puppet.group.visible = false;
     this.scene.add(this.puppet.group);
     this.audience.scale = this.puppet.scale;
@@ -118,8 +118,7 @@ export class Stage {
     this.renderer.render(this.scene, this.audience.camera);
     if (puppet && pose && this.#quality.frame(interval)) {
       this.#setSize();
-      this.#reflect();
-      this.#lights.shadows = this.#quality.quality.shadows;
+      this.#furnish();
     }
   }
 
@@ -165,8 +164,12 @@ export class Stage {
   }
 
   /** Only the lacquer of the night mirrors, and only where the machine is up to it. */
-  #reflect(): void {
-    if (this.puppet) this.puppet.reflected = this.#look.dark && this.#quality.quality.reflection;
+  #furnish(): void {
+    const { reflection, shadows, plain } = this.#quality.quality;
+    this.#lights.shadows = shadows;
+    if (!this.puppet) return;
+    this.puppet.reflected = this.#look.dark && reflection;
+    this.puppet.plain = plain;
   }
 
   #reach(puppet: Puppet): number {
