@@ -46,13 +46,14 @@ export class Stage {
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement, pinned = false) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.#quality = new QualityChoice(driverName(), pinned);
+    const antialias = !this.#quality.quality.plain;
+    this.renderer = new WebGLRenderer({ canvas, antialias, powerPreference: "high-performance" });
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.rig.group.add(this.audience.camera, this.#lights.group, createBackdrop(this.#backdrop), this.#floor.mesh);
     this.scene.add(this.rig.group, this.strings.group);
-    this.#quality = new QualityChoice(driverName(this.renderer.getContext()), pinned);
     this.#furnish();
   }
 
@@ -183,7 +184,12 @@ export class Stage {
   }
 }
 
-function driverName(context: WebGLRenderingContext | WebGL2RenderingContext): string {
+/** What draws here, asked of a context of its own, since a canvas fixes its smoothing with its first one. */
+function driverName(): string {
+  const context = document.createElement("canvas").getContext("webgl2");
+  if (!context) throw new Error("this browser has no WebGL 2");
   const told = context.getExtension("WEBGL_debug_renderer_info");
-  return told ? String(context.getParameter(told.UNMASKED_RENDERER_WEBGL)) : "";
+  const name = told ? String(context.getParameter(told.UNMASKED_RENDERER_WEBGL)) : "";
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return name;
 }
