@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 import os
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
+
+from tests.servers import clip, running
+
+# how long an example takes says more of the machine than of the code
+hypothesis.settings.register_profile("bunraku", deadline=None)
+hypothesis.settings.load_profile("bunraku")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -19,3 +28,18 @@ def shared() -> Path:
             pytest.fail(f"in CI the real clips must be there: {folder}")
         pytest.skip(f"no real clips at {folder}; set BUNRAKU_SHARED to where they are")
     return folder
+
+
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a running server that all tests of this kind share."""
+    with running(tmp_path_factory.mktemp("server")) as url:
+        yield url
+
+
+@pytest.fixture
+def clip_file(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """A small motion file, another for every test."""
+    path = tmp_path / "clip.bvh"
+    path.write_bytes(clip(seed=zlib.crc32(request.node.nodeid.encode()) % 100_000))
+    return path

@@ -92,19 +92,20 @@ async def serve(settings: Settings, listening: socket.socket, *, demo: bool, rea
             await super().startup(sockets)
             ready()
 
-    async with compose(settings, demo=demo) as app:
-        config = uvicorn.Config(
-            app,
-            ws="websockets-sansio",
-            ws_max_size=LARGEST_FROM_CLIENT,
-            ws_per_message_deflate=False,
-            lifespan="off",
-            log_level="warning",
-            access_log=False,
-            server_header=False,
-            timeout_graceful_shutdown=2,
-        )
-        await Server(config).serve(sockets=[listening])
+    with listening:
+        async with compose(settings, demo=demo) as app:
+            config = uvicorn.Config(
+                app,
+                ws="websockets-sansio",
+                ws_max_size=LARGEST_FROM_CLIENT,
+                ws_per_message_deflate=False,
+                lifespan="off",
+                log_level="warning",
+                access_log=False,
+                server_header=False,
+                timeout_graceful_shutdown=2,
+            )
+            await Server(config).serve(sockets=[listening])
 
 
 def _page() -> ASGIApp:

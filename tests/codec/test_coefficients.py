@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec import coefficients
+from bunraku.codec.coefficients import Integers
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.rangecoder import Integers
 from bunraku.motion.skeleton import CHANNEL_COUNT
 
 

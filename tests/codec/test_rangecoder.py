@@ -13,7 +13,7 @@ def encode(bits: list[tuple[int, int]]) -> bytes:
     state, out = start_encoder(), np.zeros(4096, dtype=np.uint8)
     for bit, probability in bits:
         encode_bit(state, out, probability, bit)
-    return finish(state, out)
+    return out[1 : finish(state, out)].tobytes().rstrip(b"\0")
 
 
 @given(BITS)

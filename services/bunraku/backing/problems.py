@@ -37,7 +37,8 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(ProblemError)
     async def told(_: Request, error: ProblemError) -> JSONResponse:
-        return response(error)
+        # what else comes of a body that is too large is not wanted
+        return response(error, {"Connection": "close"} if error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE else None)
 
     @app.exception_handler(RequestValidationError)
     async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:

@@ -1,1 +1,31 @@
-"""The Python SDK: upload, list, watch, pull."""
+"""The Python SDK: `api.Client` uploads and lists, `viewer.Viewer` watches, `puppeteer.Puppeteer` pulls.
+
+Names are imported where they are first used: listing motions need not load a decoder.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bunraku.client.api import Client, ServerProblem
+    from bunraku.client.puppeteer import Puppeteer, Refused
+    from bunraku.client.viewer import Figures, StreamEnded, Viewer
+
+_HOMES = {
+    "Client": "api",
+    "ServerProblem": "api",
+    "Puppeteer": "puppeteer",
+    "Refused": "puppeteer",
+    "Figures": "viewer",
+    "StreamEnded": "viewer",
+    "Viewer": "viewer",
+}
+__all__ = ["Client", "Figures", "Puppeteer", "Refused", "ServerProblem", "StreamEnded", "Viewer"]
+
+
+def __getattr__(name: str) -> Any:
+    """The class of this name, from the module it lives in."""
+    from importlib import import_module
+
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

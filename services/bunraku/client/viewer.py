@@ -13,6 +13,7 @@ import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from bunraku.codec import coefficients
 from bunraku.codec.decode import decode_block
 from bunraku.codec.track import MotionTrack, read_track
 from bunraku.motion import rotation
@@ -89,6 +90,7 @@ class Viewer:
 
         Raises `StreamEnded` where the server closes the stream, OSError where there is none.
         """
+        await asyncio.to_thread(coefficients.warm)
         self._began = time.monotonic()
         async with connect(
             self.url,
@@ -201,7 +203,7 @@ class Viewer:
             elif self.figures.first_pose_ms is not None and not dark:
                 self.figures.gaps += 1
             dark = pose is None
-            due += FRAME
+            due = max(due + FRAME, loop.time())
             await asyncio.sleep(max(due - loop.time(), 0))
 
     def _settled(self) -> Figures:

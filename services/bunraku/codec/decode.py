@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.codec import coefficients, transform
+from bunraku.codec.coefficients import Integers
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.rangecoder import Integers
 from bunraku.codec.track import REFERENCE_UNIT, MotionTrack
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array

@@ -21,16 +21,18 @@ _TOP = 1 << 24
 _FULL = 0xFFFFFFFF
 
 
+@njit(cache=True)
 def start_encoder() -> Integers:
     """A fresh encoder state."""
     return np.array([0, _FULL, 0, 1, 0], dtype=np.int64)
 
 
+@njit(cache=True)
 def start_decoder(data: Bytes) -> Integers:
     """A decoder state at the start of `data`, whose first byte (always zero) was left out."""
     state = np.array([0, _FULL, 0, 0, 4], dtype=np.int64)
     for i in range(4):
-        state[_LOW] = (state[_LOW] << 8) | (int(data[i]) if i < len(data) else 0)
+        state[_LOW] = (state[_LOW] << 8) | (data[i] if i < len(data) else 0)
     return state
 
 
@@ -81,14 +83,16 @@ def decode_bit(state: Integers, data: Bytes, probability: int) -> int:
     return bit
 
 
-def finish(state: Integers, out: Bytes) -> bytes:
-    """End the stream: the number within the last interval with the most zero bytes, those at the end not sent."""
-    low, high = int(state[_LOW]), int(state[_LOW] + state[_RANGE] - 1)
+@njit(cache=True)
+def finish(state: Integers, out: Bytes) -> int:
+    """End the stream with the number within the last interval that has the most zero bytes at its end; the bytes
+    written. The first is always zero and, like zeros at the end, need not be sent."""
+    high = state[_LOW] + state[_RANGE] - 1
     for shift in (32, 24, 16, 8, 0):
-        rounded = (low + (1 << shift) - 1) >> shift << shift
+        rounded = (state[_LOW] + (1 << shift) - 1) >> shift << shift
         if rounded <= high:
             state[_LOW] = rounded
             break
     for _ in range(5):
         _shift_out(state, out)
-    return out[1 : state[_POSITION]].tobytes().rstrip(b"\0")
+    return int(state[_POSITION])

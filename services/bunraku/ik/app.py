@@ -73,7 +73,7 @@ def create_app() -> FastAPI:
             return Response(status_code=304, headers=headers)
         return Response(stored.data, headers=headers, media_type="application/octet-stream")
 
-    @app.post("/v1/solve", openapi_extra=batch.OPENAPI)
+    @app.post("/v1/solve", response_model=batch.SolveAnswer, openapi_extra=batch.OPENAPI)
     async def solve(request: Request) -> Response:
         """Arms for hand targets and legs for thigh angles, in a batch; JSON or MessagePack."""
         kind = batch.content_kind(request.headers.get("content-type"))

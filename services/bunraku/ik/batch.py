@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Annotated, Any
 
 import msgpack
 import numpy as np
 from fastapi import Request
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bunraku.backing.problems import ProblemError, invalid_field
 from bunraku.marionette import arm, leg, table
@@ -21,7 +21,8 @@ _NAMES = {JSON: JSON, MSGPACK: MSGPACK, "application/x-msgpack": MSGPACK, "appli
 MOST_TARGETS = 100_000
 LARGEST_BODY = 16 * 1024 * 1024
 
-Triple = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
+Triple = tuple[Number, Number, Number]
 
 
 class SolveRequest(BaseModel):
@@ -33,7 +34,7 @@ class SolveRequest(BaseModel):
     targets: list[Triple] = Field(
         default=[], max_length=MOST_TARGETS, description="hand tips from the shoulder, y up, in arm lengths"
     )
-    legs: list[FiniteFloat] = Field(
+    legs: list[Number] = Field(
         default=[], max_length=MOST_TARGETS, description="thighs' angles forwards from straight down, radians"
     )
 
@@ -70,16 +71,8 @@ OPENAPI: dict[str, Any] = {
         "required": True,
         "content": {kind: {"schema": SolveRequest.model_json_schema()} for kind in (JSON, MSGPACK)},
     },
-    "responses": {
-        "200": {
-            "description": "the angles and places, one entry for each that was asked",
-            "content": {
-                kind: {"schema": SolveAnswer.model_json_schema(ref_template="#/components/schemas/{model}")}
-                for kind in (JSON, MSGPACK)
-            },
-        }
-    },
 }
+"""The request's body for OpenAPI: it is read by hand, as its kind depends on Content-Type."""
 
 
 def content_kind(header: str | None) -> str:

@@ -1,7 +1,8 @@
 """An upload's bytes to an encoded motion, in a process of its own.
 
 Reading strangers' files and encoding them takes seconds of processor time and may go wrong in any way: a process apart
-keeps the service's loop free, and can be ended when it takes too long or too much.
+keeps the service's loop free, and can be ended when it takes too long or too much. What a job needs is loaded in the
+process that jobs are forked from, never in the service.
 """
 
 from __future__ import annotations
@@ -15,17 +16,11 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from bunraku.backing.library import pack
-from bunraku.codec.encode import encode_motion
-from bunraku.motion.analysis import analyse
-from bunraku.motion.bvh import read
-from bunraku.motion.errors import UnreadableMotion
-
 MEMORY = 4 << 30
 """Bytes of address space that a job may take."""
 
 _context = multiprocessing.get_context("forkserver")
-_context.set_forkserver_preload(["bunraku.ingest.jobs"])
+_context.set_forkserver_preload(["bunraku.ingest.making"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,33 +42,9 @@ class Refused:
     hint: str | None = None
 
 
-def make(motion: str, path: Path) -> Made | Refused:
-    """Read, analyse and encode the file at `path` as the motion of this id."""
-    try:
-        analysis = analyse(read(path.read_bytes()))
-    except UnreadableMotion as error:
-        return Refused(error.title, error.detail, error.line, error.field, error.hint or None)
-    encoded = encode_motion(analysis.motion)
-    track = encoded.track
-    return Made(
-        pack(motion, encoded),
-        {
-            "duration": analysis.motion.duration,
-            "fps": analysis.motion.fps,
-            "frames": analysis.motion.frames,
-            "blocks": track.blocks,
-            "profile": analysis.profile,
-            "joints": analysis.mapped,
-            "rest_pose": analysis.rest,
-            "unit": analysis.unit,
-            "guessed": analysis.guessed,
-            "fit": {"mean_mm": round(analysis.fit_mean, 3), "max_mm": round(analysis.fit_max, 3)},
-            "rates": encoded.describe()["rates"],
-        },
-    )
-
-
 def _work(answer: Connection, motion: str, path: Path) -> None:
+    from bunraku.ingest.making import make
+
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     try:
         answer.send(make(motion, path))
@@ -86,7 +57,7 @@ def _work(answer: Connection, motion: str, path: Path) -> None:
 
 
 async def run(motion: str, path: Path, seconds: float) -> Made | Refused:
-    """`make` in a process of its own, ended after `seconds`."""
+    """`making.make` in a process of its own, ended after `seconds`."""
     receiver, sender = _context.Pipe(duplex=False)
     process = _context.Process(target=_work, args=(sender, motion, path), daemon=True)
     await asyncio.to_thread(process.start)

@@ -66,9 +66,11 @@ def solve(proportions: Proportions, table: Table, targets: Array) -> Arms:
     at the shoulder itself counts as straight below. Straight above or below, the plane is the one that faces forwards.
     """
     x, y, z = (np.asarray(targets, dtype=np.float64)[..., i] for i in range(3))
-    azimuth = np.arctan2(x, z)
-    rho = np.hypot(x, z)
-    beta = np.arctan2(np.where((rho == 0.0) & (y == 0.0), -1.0, y), rho)
+    # nearer than 1e-12 there is no direction to keep
+    lost = np.hypot(np.hypot(x, z), y) < 1e-12
+    x, y, z = np.where(lost, 0.0, x), np.where(lost, -1e-12, y), np.where(lost, 0.0, z)
+    azimuth, rho = np.arctan2(x, z), np.hypot(x, z)
+    beta = np.arctan2(y, rho)
     inner = proportions.inner_radius
     r = np.clip(np.hypot(rho, y), inner, OUTER_RADIUS)
     u = (1.0 - np.sqrt((1.0 - r) / (1.0 - inner))) * (SIDE - 1)

@@ -11,7 +11,10 @@ from math import atan2, pi, sqrt
 
 from bunraku.marionette import vector
 from bunraku.marionette.limbs import ArmRig, Joints
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.vector import Quaternion, Vector
+
+BELOW = 0.5
+"""How far the elbow of a straight arm is drawn to the marionette's side, in parts of the upper arm at weight 1."""
 
 
 class ArmBlend:
@@ -21,12 +24,15 @@ class ArmBlend:
         self._rig = rig
         self._swivel: float | None = None
 
-    def joints(self, dance: Joints, bent: Joints, target: Vector, normal: Vector, weight: float) -> Joints:
+    def joints(
+        self, dance: Joints, bent: Joints, target: Vector, turn: Quaternion, normal: Vector, weight: float
+    ) -> Joints:
         """The joints at `weight`: 0 gives back the dance's, 1 the bent arm's in the plane of `normal`.
 
-        `dance` are the pose's joints, `bent` those of `ArmRig.bend` for the `target` (arm lengths, axes of vl5),
-        `normal` a unit vector square to it. Between, the elbow goes to the nearest place from which forearm and hand reach the
-        target; where the mixed wrist leaves none, the tip comes as near as it can.
+        `dance` are the pose's joints, `bent` those of `ArmRig.bend` for the `target` (arm lengths, axes of vl5); `turn`
+        brings the direction of the dance's own hand to the target's, and `normal` is a unit vector square to that.
+        Between, the elbow goes to the nearest place from which forearm and hand reach the target; where the mixed wrist
+        leaves none, the tip comes as near as it can.
         """
         rig = self._rig
         direction = rig.direction(target)
@@ -36,7 +42,7 @@ class ArmBlend:
             return (vector.normalise(shoulder), bent[1], bent[2])
         own = rig.direction(rig.target(dance))
         own_normal = vector.unit(vector.square_to(rig.bend_axis(dance), own), vector.across(own))
-        carried = vector.rotate(vector.between(own, direction), own_normal)
+        carried = vector.rotate(turn, own_normal)
         swivel = atan2(vector.dot(vector.cross(carried, normal), direction), vector.dot(carried, normal))
         if self._swivel is not None:
             swivel += 2.0 * pi * round((self._swivel - swivel) / (2.0 * pi))
@@ -47,12 +53,12 @@ class ArmBlend:
         in_chord = vector.multiply(vector.conjugate(rig.chord(own, own_normal)), dance[0])
         shoulder = vector.slerp(in_chord, bent[0], weight)
         elbow, wrist = (vector.slerp(a, b, weight) for a, b in zip(dance[1:], bent[1:], strict=True))
-        shoulder, elbow = self._close(shoulder, elbow, wrist, vector.length(target))
+        shoulder, elbow = self._close(shoulder, elbow, wrist, vector.length(target), weight)
         return (vector.normalise(vector.multiply(rig.chord(direction, plane), shoulder)), elbow, wrist)
 
     def _close(
-        self, shoulder: vector.Quaternion, elbow: vector.Quaternion, wrist: vector.Quaternion, reach: float
-    ) -> tuple[vector.Quaternion, vector.Quaternion]:
+        self, shoulder: Quaternion, elbow: Quaternion, wrist: Quaternion, reach: float, weight: float
+    ) -> tuple[Quaternion, Quaternion]:
         """Shoulder and elbow, turned by as little as brings the tip to `reach` arm lengths along the chord."""
         upper, fore, hand = self._rig.links
         rest = vector.add(fore, vector.rotate(wrist, hand))
@@ -61,8 +67,8 @@ class ArmBlend:
         along = min(max((near * near + chord * chord - far * far) / (2.0 * chord), -near), near)
         off = sqrt(max(near * near - along * along, 0.0))
         mixed = vector.rotate(shoulder, upper)
-        # straight arms leave the side open: the elbow of a bent one is below the chord
-        _, y, z = vector.unit((0.0, mixed[1] - 1e-6 * near, mixed[2]), (0.0, -1.0, 0.0))
+        # a straight arm leaves open to which side its elbow goes; that of the bent one is on the side of -y
+        _, y, z = vector.unit((0.0, mixed[1] - BELOW * weight * near, mixed[2]), (0.0, -1.0, 0.0))
         place = (along, off * y, off * z)
         before = vector.multiply(shoulder, elbow)
         raised = vector.between(vector.scale(mixed, 1.0 / near), vector.scale(place, 1.0 / near))

@@ -11,7 +11,7 @@ from math import acos, asin, cos, pi
 from bunraku.marionette import vector
 from bunraku.marionette.arm import Arm
 from bunraku.marionette.limbs import Joints
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.vector import Quaternion, Vector
 
 TAKE = 0.150
 """Seconds from the dance to a puppeteer's hand."""
@@ -65,14 +65,34 @@ def follow_thigh(theta: float, target: float, seconds: float) -> float:
     return theta + _limited(target - theta, THIGH_SPEED * seconds)
 
 
-def mix_hand(dance: Vector, pulled: Vector, weight: float) -> Vector:
-    """The target between two, on the way round the shoulder and not through it; exactly either at weight 0 and 1."""
-    if weight <= 0.0 or weight >= 1.0:
-        return pulled if weight >= 1.0 else dance
-    down = (0.0, -1.0, 0.0)
-    here, there = vector.unit(dance, down), vector.unit(pulled, down)
-    direction = _toward(here, there, _angle(here, there), weight)
-    return vector.scale(direction, (1.0 - weight) * vector.length(dance) + weight * vector.length(pulled))
+class HandMix:
+    """The target between the dance's hand and the pulled one, on a way round the shoulder and not through it.
+
+    The way is a turn that brings one direction to the other. It is carried on from call to call, so that two hands that
+    pass opposite each other do not make it change sides.
+    """
+
+    def __init__(self) -> None:
+        self._turn: Quaternion | None = None
+
+    def mix(self, dance: Vector, pulled: Vector, weight: float) -> tuple[Vector, Quaternion]:
+        """The target at `weight`, exactly either hand at 0 and 1, and the turn from the dance's direction to it."""
+        down = (0.0, -1.0, 0.0)
+        here, there = vector.unit(dance, down), vector.unit(pulled, down)
+        if self._turn is None:
+            turn = vector.between(here, there)
+        else:
+            turn = vector.multiply(vector.between(vector.rotate(self._turn, here), there), self._turn)
+        if weight >= 1.0:
+            # all the way there any turn will do: start afresh from the shortest
+            self._turn = None
+            return pulled, turn
+        self._turn = vector.normalise(turn)
+        part = vector.part_of(self._turn, max(weight, 0.0))
+        if weight <= 0.0:
+            return dance, part
+        reach = (1.0 - weight) * vector.length(dance) + weight * vector.length(pulled)
+        return vector.scale(vector.rotate(part, here), reach), part
 
 
 def mix_joints(dance: Joints, hung: Joints, weight: float) -> Joints:

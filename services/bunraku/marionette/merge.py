@@ -13,7 +13,7 @@ import numpy as np
 
 from bunraku.marionette import handover, vector
 from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.handover import Handover
+from bunraku.marionette.handover import HandMix, Handover
 from bunraku.marionette.limbs import ArmRig, Joints, LegRig, Limb, Pose
 from bunraku.marionette.ownership import Grant, Input, Ownership, Refusal
 from bunraku.marionette.plane import Plane
@@ -53,10 +53,12 @@ class _PulledHand:
         self.rig = ArmRig(figure, limb)
         self._hand: Vector | None = None
         self._plane: Plane | None = None
+        self._mix = HandMix()
         self._blend = ArmBlend(self.rig)
 
     def rest(self) -> None:
         self._hand = self._plane = None
+        self._mix = HandMix()
         self._blend = ArmBlend(self.rig)
 
     def pose(self, pose: Pose, steering: Steering, weight: float, now: int, seconds: float) -> Joints:
@@ -67,12 +69,12 @@ class _PulledHand:
         steering.advance(now)
         wanted = steering.value or own
         self._hand = handover.follow_hand(self._hand or own, wanted, rig.arm, seconds)
-        target = handover.mix_hand(own, self._hand, weight)
+        target, turn = self._mix.mix(own, self._hand, weight)
         direction, up = rig.direction(target), rig.up(pose)
         if self._plane is None:
             self._plane = Plane(rig.bend_axis(dance), direction)
         normal = self._plane.follow(direction, vector.length(target), up, seconds)
-        return self._blend.joints(dance, rig.bend(target, up), target, normal, weight)
+        return self._blend.joints(dance, rig.bend(target, up), target, turn, normal, weight)
 
 
 class _PulledLeg:
@@ -98,13 +100,22 @@ class Marionette:
     """One puppet: who holds its limbs, and the overlay that follows from it."""
 
     def __init__(self, figure: Figure) -> None:
-        """Raises `ProportionsError` for a figure whose arms are too short to hang."""
+        """As `set_figure`."""
         self._ownership = Ownership()
-        self._limbs: dict[Limb, _PulledHand | _PulledLeg] = {
-            limb: _PulledHand(figure, limb) if limb.is_hand else _PulledLeg(figure, limb) for limb in Limb
-        }
         self._handovers = {limb: Handover() for limb in Limb}
         self._last: int | None = None
+        self.set_figure(figure)
+
+    def set_figure(self, figure: Figure) -> None:
+        """Another dancer on the stage, whose limbs stay in the hands they are in.
+
+        The first arm of its proportions takes a tenth of a second, to build its table. Raises `ProportionsError` for a
+        figure whose arms are too short to hang, and changes nothing.
+        """
+        limbs: dict[Limb, _PulledHand | _PulledLeg] = {
+            limb: _PulledHand(figure, limb) if limb.is_hand else _PulledLeg(figure, limb) for limb in Limb
+        }
+        self._limbs = limbs
 
     def holders(self) -> tuple[str | None, ...]:
         """The holder's id of each limb, or None."""

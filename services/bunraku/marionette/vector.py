@@ -6,7 +6,7 @@ the stage's rate: there an array library costs some twenty times more than the a
 
 from __future__ import annotations
 
-from math import acos, cos, sin, sqrt
+from math import acos, atan2, cos, sin, sqrt
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -63,11 +63,13 @@ def across(axis: Vector) -> Vector:
 
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     """The rotation `b` followed by `a`."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
     return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
     )
 
 
@@ -84,9 +86,10 @@ def normalise(q: Quaternion) -> Quaternion:
 
 def rotate(q: Quaternion, v: Vector) -> Vector:
     """The vector `v` turned by `q`."""
-    u = (q[1], q[2], q[3])
-    t = scale(cross(u, v), 2.0)
-    return add(v, add(scale(t, q[0]), cross(u, t)))
+    w, x, y, z = q
+    a, b, c = v
+    p, r, s = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return (a + w * p + y * s - z * r, b + w * r + z * p - x * s, c + w * s + x * r - y * p)
 
 
 def about(axis: Vector, angle: float) -> Quaternion:
@@ -116,6 +119,13 @@ def from_columns(x: Vector, y: Vector, z: Vector) -> Quaternion:
     else:
         q = (x[1] - y[0], x[2] + z[0], y[2] + z[1], 1.0 + 2.0 * z[2] - trace)
     return normalise(q)
+
+
+def part_of(q: Quaternion, share: float) -> Quaternion:
+    """The turn about `q`'s axis by a share of its angle, which is up to 2 pi: `q` and -`q` go different ways."""
+    axis = (q[1], q[2], q[3])
+    half = atan2(length(axis), q[0])
+    return about(unit(axis, (1.0, 0.0, 0.0)), 2.0 * half * share)
 
 
 def slerp(a: Quaternion, b: Quaternion, t: float) -> Quaternion:

@@ -15,7 +15,9 @@ from bunraku.motion.score import Feet, Hop, Place, Score
 PUSH = 0.4
 """Seconds in which the hips gather for a hop and recover from one."""
 LONG_STAND = 1.2
-"""Seconds on both feet after which the weight comes to rest between them."""
+"""Seconds on both feet from which on the weight comes to rest between them."""
+SETTLE = 0.4
+"""Seconds in which it does so, so that a held pose is held."""
 
 
 def facing(score: Score, time: Array) -> Array:
@@ -45,13 +47,13 @@ def weight(score: Score, time: Array) -> Array:
         begin, end = footfall.lifted * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
         before = stands[-1][2]
         if begin - before > LONG_STAND:
-            wait = begin - before
-            stands.append((_between(feet), before + 0.4 * wait, begin - 0.4 * wait, 0.1 * wait))
+            settle = min(0.3 * (begin - before), SETTLE)
+            stands.append((_between(feet), before + settle, begin - settle, 0.0))
         if isinstance(footfall, Hop):
             stands.append((_between(feet), begin, begin, 0.12))
             stands.append((_between(footfall.to), end, end, 0.12))
         else:
-            stands.append((_on_one(feet, footfall.to), begin, end, min(0.4 * (end - begin), 0.12)))
+            stands.append((_on_one(feet, footfall.to), begin, end, min(0.5 * (end - begin), 0.12)))
         feet |= footfall.to
     stands.append((_between(feet), score.duration - 0.2, score.duration, 0.0))
     moves = []

@@ -18,7 +18,7 @@ BEATS_PER_MINUTE = 96.0
 BEATS_PER_PHRASE = 8
 BEATS = 48
 
-QUICK = 0.28
+QUICK = 0.26
 """Beats in the air of a step that takes half a beat."""
 HOME_LEFT, HOME_RIGHT = Place(0.08, 0.0, 8), Place(-0.08, 0.0, -8)
 
@@ -116,7 +116,8 @@ def circle() -> list[Step]:
         out = math.radians(heading)
         side: Side = "right" if index % 2 == 0 else "left"
         x, z = radius * (math.cos(out) - 1.0), -radius * math.sin(out)
-        place = standing(x, z, heading, open_by=8 if index > 8 else 4)
+        # narrow and straight while it turns, open again at home
+        place = standing(x, z, heading) if index > 8 else standing(x, z, heading, apart=0.066, open_by=4.0)
         steps.append(Step(36.0 + 0.5 * index, side, place[side], swing=QUICK))
     return steps
 
@@ -138,7 +139,7 @@ STEPS = (
     stamp(12.0, "right", 0.14, 0.06, 0),
     glide(13.0, "right", 0.0, 0.04, -14),
     glide(14.0, "left", 0.16, 0.02, -4),
-    glide(15.0, "right", -0.10, 0.04, -24),
+    glide(15.0, "right", -0.07, 0.04, -24),
     stamp(16.0, "left", 0.16, 0.02, 26),
     raised(18.0, "right", -0.30, 0.06, -44),
     glide(21.0, "right", -0.08, 0.0, -8),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-class UnreadableMotion(Exception):  # noqa: N818 (it names what the file is, and becomes a problem's title)
+class UnreadableMotion(Exception):
     """A file that cannot be read as motion, in words for the person who sent it.
 
     The fields are those of a problem document (RFC 9457) and the project's additions to it: `title` what is wrong in

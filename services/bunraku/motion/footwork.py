@@ -87,13 +87,18 @@ def _span(score: Score, footfall: Step | Hop) -> tuple[float, float, float]:
 
 
 def _glide(score: Score, step: Step | Hop, time: Array) -> tuple[Array, Array, Array]:
-    """Clearance of the sole (n,) in metres, rise of the heel and of the toes (n,) in radians, in a gliding step."""
+    """Clearance of the sole (n,) in metres, rise of the heel and of the toes (n,) in radians, in a gliding step.
+
+    The heel is down before the toes rise: where the lowest point of the sole changes, the foot is at rest on it.
+    """
     begin, peak, end = _span(score, step)
-    early, late = begin + 0.35 * (end - begin), begin + 0.8 * (end - begin)
+    quarter = 0.25 * (end - begin)
+    # a quick foot stays flatter
+    tilt = np.radians(10.0) * min(1.0, (end - begin) / 0.3)
     return (
         step.lift * easing.bump(time, begin, peak, end),
-        np.radians(10.0) * easing.bump(time, begin, early, late),
-        np.radians(6.0) * easing.bump(time, begin + 0.45 * (end - begin), late, end),
+        tilt * easing.bump(time, begin, begin + quarter, begin + 2.0 * quarter),
+        0.6 * tilt * easing.bump(time, begin + 2.0 * quarter, begin + 3.0 * quarter, end),
     )
 
 

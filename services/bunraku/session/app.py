@@ -18,6 +18,8 @@ from bunraku.backing import problems
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
+from bunraku.codec import coefficients
+from bunraku.marionette.merge import Marionette
 from bunraku.playout.timeline import position_at
 from bunraku.session import control
 from bunraku.session.stage import Stage
@@ -62,7 +64,8 @@ class Sessions:
             raise ProblemError(
                 503, "Too many sessions", f"{MOST} sessions are open", hint="end one, or try again later"
             )
-        stage = Stage(secrets.token_urlsafe(9), stored, self._backing.bus, playing=playing, loop=loop)
+        marionette = await asyncio.to_thread(Marionette, stored.track.figure)
+        stage = Stage(secrets.token_urlsafe(9), stored, marionette, self._backing.bus, playing=playing, loop=loop)
         self.stages[stage.id] = stage
         return stage
 
@@ -116,12 +119,13 @@ def create_app(backing: Backing) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         sweeping = asyncio.create_task(sessions.sweep(), name="sweep sessions")
+        # the first limb that is pulled should not wait for the decoder to load
+        warming = asyncio.create_task(asyncio.to_thread(coefficients.warm), name="load the decoder")
         try:
             yield
         finally:
             sweeping.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await sweeping
+            await asyncio.gather(sweeping, warming, return_exceptions=True)
             for session in tuple(sessions.stages):
                 await sessions.end(session)
 
@@ -157,7 +161,7 @@ def create_app(backing: Backing) -> FastAPI:
         """Play, pause, seek, loop, or change the motion, for everyone."""
         stage = sessions.get(session)
         if edit.motion is not None and edit.motion != stage.timeline.motion:
-            stage.change(await sessions.motion(edit.motion))
+            await stage.change(await sessions.motion(edit.motion))
         if (edit.playing, edit.position, edit.loop) != (None, None, None):
             stage.edit(playing=edit.playing, position=edit.position, loop=edit.loop)
         return session_json(stage)

@@ -80,7 +80,10 @@ class Puppeteer:
 class Stage:
     """A motion on a shared timeline, and those who pull at it."""
 
-    def __init__(self, session: str, motion: StoredMotion, bus: Bus, *, playing: bool, loop: bool) -> None:
+    def __init__(
+        self, session: str, motion: StoredMotion, marionette: Marionette, bus: Bus, *, playing: bool, loop: bool
+    ) -> None:
+        """`marionette` is of the motion's figure; the caller builds it, which takes a tenth of a second."""
         self.id = session
         self.created = clock()
         self._bus = bus
@@ -91,6 +94,7 @@ class Stage:
         self._engaged = asyncio.Event()
         self._sequence = 0
         self.seen = clock()
+        self._marionette = marionette
         self._set(motion)
         subject = f"session.{session}"
         self._subscriptions: list[Subscription] = [
@@ -129,15 +133,11 @@ class Stage:
         """Edit the timeline for everyone, `LEAD` from now."""
         return self._put(timeline.edit(self.timeline, clock() + LEAD, playing=playing, position=position, loop=loop))
 
-    def change(self, motion: StoredMotion) -> TimelineState:
-        """Another motion for everyone, from its start; limbs that are held go back to the dance."""
-        for limb, holder in enumerate(self._marionette.holders()):
-            if holder in self._puppeteers:
-                self._puppeteers[holder].tell(Refusal(limb, "lost").pack())
+    async def change(self, motion: StoredMotion) -> TimelineState:
+        """Another motion for everyone, from its start; limbs stay in the hands they are in."""
+        await asyncio.to_thread(self._marionette.set_figure, motion.track.figure)
         self._set(motion)
-        state = self._put(timeline.change(self.timeline, clock() + LEAD, motion.id, motion.track.duration_us))
-        self._announce()
-        return state
+        return self._put(timeline.change(self.timeline, clock() + LEAD, motion.id, motion.track.duration_us))
 
     def join(self, name: str) -> Puppeteer:
         """A puppeteer comes, with the first free colour; raises `Full`."""
@@ -180,7 +180,6 @@ class Stage:
     def _set(self, motion: StoredMotion) -> None:
         self._motion = motion
         self._dance = BlockStore(motion.track)
-        self._marionette = Marionette(motion.track.figure)
 
     def _put(self, state: TimelineState) -> TimelineState:
         self._timelines.put(state)
@@ -210,7 +209,10 @@ class Stage:
         while True:
             await self._engaged.wait()
             due = loop.time()
-            while self._tick(clock()):
+            while True:
+                await self._prepare(clock() + LEAD)
+                if not self._tick(clock()):
+                    break
                 due = max(due + TICK, loop.time() - TICK)
                 await asyncio.sleep(max(due - loop.time(), 0))
             self._engaged.clear()
@@ -225,24 +227,26 @@ class Stage:
             self._announce()
         due = now + LEAD
         pose = self._pose(due)
-        pulled = self._marionette.overlay(pose[1], due) if pose is not None else None
+        pulled = self._marionette.overlay(pose[1], now) if pose is not None else None
         self._sequence += 1
         self._bus.publish(f"session.{self.id}.overlay", _packed(self._sequence, due, pulled).pack())
         return pulled is not None or any(self._marionette.holders())
 
+    async def _prepare(self, due: int) -> None:
+        """Decode what `_pose` will need about `due`, in a thread: it takes milliseconds, the first time seconds."""
+        track, packets = self._motion.track, self._motion.packets[-1]
+        first = track.block_at(timeline.position_at(self.timeline, due))
+        for index in (first, (first + 1) % track.blocks):
+            if self._dance.rate(index) < 0:
+                dance, packet = self._dance, Data.unpack(packets[index])
+                dance.put(index, packet.rate, await asyncio.to_thread(decode_block, track, packet.block))
+
     def _pose(self, due: int) -> Pose | None:
-        """The dance at clock time `due`, at its best rate, decoded as it is needed."""
+        """The dance at clock time `due`, at its best rate."""
         state = self._timelines.at(due)
         if state is None or state.motion != self._motion.id:
             return None
-        position = timeline.position_at(state, due)
-        track, best = self._motion.track, len(self._motion.packets) - 1
-        first = track.block_at(position)
-        for index in (first, (first + 1) % track.blocks):
-            if self._dance.rate(index) < 0:
-                packet = Data.unpack(self._motion.packets[best][index])
-                self._dance.put(index, best, decode_block(track, packet.block))
-        return self._dance.pose_at(position, state.loop)
+        return self._dance.pose_at(timeline.position_at(state, due), state.loop)
 
 
 def _packed(sequence: int, due: int, pulled: merge.Overlay | None) -> Overlay:

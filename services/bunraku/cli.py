@@ -1,0 +1,198 @@
+"""The command `bunraku`."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+import webbrowser
+from pathlib import Path
+from typing import Annotated, Any
+from urllib.parse import urlsplit
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from bunraku import __version__
+
+app = typer.Typer(
+    help="A humanoid dances in the browser, and the people watching pull its strings.", no_args_is_help=True
+)
+out = Console()
+err = Console(stderr=True)
+
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Server = Annotated[str, typer.Option("--server", envvar="BUNRAKU_SERVER", help="Address of a running Bunraku.")]
+HERE = "http://127.0.0.1:8000"
+
+
+@app.command()
+def up(
+    host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen at; 0: any free one.", min=0, max=65535)] = 8000,
+    data: Annotated[Path | None, typer.Option(help="Folder for what is kept; default .bunraku.")] = None,
+    demo: Annotated[bool, typer.Option("--demo", help="Open a stage with Bunraku's own dance.")] = False,
+    open_page: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
+) -> None:
+    """Run everything in one process, until Ctrl-C."""
+    from bunraku.backing.settings import Settings
+    from bunraku.serve import serve
+
+    settings = Settings() if data is None else Settings(data=data)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        listening = socket.create_server((host, port), family=family, backlog=1024)
+    except OSError as error:
+        err.print(f"Cannot listen at {host}, port {port}: {error.strerror}. Another port: PORT={port + 1} make demo")
+        raise typer.Exit(1) from None
+    shown = f"[{host}]" if ":" in host else {"0.0.0.0": "127.0.0.1"}.get(host, host)
+    url = f"http://{shown}:{listening.getsockname()[1]}/"
+
+    def ready() -> None:
+        out.print(
+            f"Bunraku {__version__} is at [link={url}]{url}[/link]  (what it keeps: {settings.data}; Ctrl-C ends it)"
+        )
+        if open_page:
+            webbrowser.open(url)
+
+    out.print("Setting the stage ..." if demo else "Starting ...")
+    asyncio.run(serve(settings, listening, demo=demo, ready=ready))
+    out.print("The curtain falls.")
+
+
+@app.command()
+def upload(
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True)],
+    server: Server = HERE,
+    as_json: Json = False,
+) -> None:
+    """Upload a motion file, and say what was made of it."""
+    from bunraku.client.api import Client
+
+    async def run() -> dict[str, Any]:
+        columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=err, disable=as_json or not err.is_terminal, transient=True) as progress:
+            task = progress.add_task(file.name, total=file.stat().st_size)
+            async with Client(server) as client:
+                return await client.upload(file, lambda sent, _: progress.update(task, completed=sent))
+
+    motion = _ask(run, server)
+    if as_json:
+        out.print_json(data=motion)
+        return
+    table = Table(show_header=False, box=None)
+    table.add_row("id", motion["id"])
+    table.add_row("length", f"{motion['duration']:.2f} s, {motion['frames']} frames at {motion['fps']:g} fps")
+    table.add_row("joints", f"{len(motion['joints'])} of 18, names: {motion['profile']}")
+    table.add_row("fit", f"{motion['fit']['mean_mm']:.1f} mm mean, {motion['fit']['max_mm']:.1f} mm at most")
+    table.add_row("rates", ", ".join(f"{rate['kbps']:.1f} kbit/s" for rate in motion["rates"]))
+    for guess in motion["guessed"]:
+        table.add_row("guessed", guess)
+    out.print(table)
+
+
+@app.command(name="list")
+def list_motions(server: Server = HERE, as_json: Json = False) -> None:
+    """List the motions of a server."""
+    from bunraku.client.api import Client
+
+    async def run() -> list[dict[str, Any]]:
+        async with Client(server) as client:
+            return await client.motions()
+
+    motions = _ask(run, server)
+    if as_json:
+        out.print_json(data=motions)
+        return
+    table = Table("id", "name", "length", "fps", "rates, kbit/s", box=None, header_style="bold")
+    for motion in motions:
+        rates = " ".join(f"{rate['kbps']:.1f}" for rate in motion["rates"])
+        table.add_row(motion["id"], motion["name"], f"{motion['duration']:.1f} s", f"{motion['fps']:g}", rates)
+    out.print(table)
+
+
+@app.command()
+def watch(
+    url: Annotated[str, typer.Argument(help="A motion or session: its id, its page, or its API address.")],
+    seconds: Annotated[float, typer.Option(help="How long.", min=0.1, max=86400)] = 10.0,
+    server: Server = HERE,
+    as_json: Json = False,
+) -> None:
+    """Watch without a screen, and print how it went."""
+    from bunraku.client import Client, StreamEnded, Viewer
+
+    async def run() -> dict[str, Any]:
+        async with Client(server) as client:
+            viewer = Viewer(await _stream_url(client, url))
+        return (await viewer.watch(seconds)).as_json()
+
+    try:
+        figures = _ask(run, server)
+    except StreamEnded as error:
+        err.print(f"The stream ended: {error}")
+        raise typer.Exit(1) from None
+    if as_json:
+        out.print_json(data=figures)
+        return
+    table = Table(show_header=False, box=None)
+    for key, value in figures.items():
+        table.add_row(key.replace("_", " "), str(value))
+    out.print(table)
+
+
+@app.command()
+def version(as_json: Json = False) -> None:
+    """Print the version."""
+    out.print_json(data={"version": __version__}) if as_json else out.print(__version__)
+
+
+@app.command()
+def warm() -> None:
+    """Compile the codec once, so that no upload waits for it (done by `make setup`)."""
+    from bunraku.codec import coefficients
+
+    coefficients.warm()
+
+
+async def _stream_url(client: Any, address: str) -> str:
+    """The socket of a motion or session, given by its address, its page or its id."""
+    from bunraku.client.api import Client, ServerProblem
+
+    parts = urlsplit(address)
+    if parts.scheme in ("ws", "wss"):
+        return address
+    if parts.scheme in ("http", "https"):
+        base = Client(f"{parts.scheme}://{parts.netloc}")
+        query = dict(pair.partition("=")[::2] for pair in parts.query.split("&"))
+        path = f"/v1/sessions/{query['session']}" if "session" in query else parts.path.rstrip("/")
+        return base.socket_url(path if path.endswith("/stream") else f"{path}/stream")
+    try:
+        await client.session(address)
+        kind = "sessions"
+    except ServerProblem:
+        await client.motion(address)
+        kind = "motions"
+    socket_url: str = client.socket_url(f"/v1/{kind}/{address}/stream")
+    return socket_url
+
+
+def _ask(run: Any, server: str) -> Any:
+    """The result of `run`, its failures said in words."""
+    import httpx2
+    from websockets.exceptions import WebSocketException
+
+    from bunraku.client.api import ServerProblem
+
+    try:
+        return asyncio.run(run())
+    except ServerProblem as problem:
+        err.print(str(problem))
+    except (httpx2.TransportError, OSError, WebSocketException) as error:
+        err.print(f"No Bunraku answers at {server}: {error}. Is `bunraku up` running?")
+    raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    sys.exit(app())

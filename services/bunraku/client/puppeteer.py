@@ -1,0 +1,157 @@
+"""A puppeteer from Python: takes limbs of a session and moves them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from typing import Self
+from urllib.parse import quote
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from bunraku.client.api import Client
+from bunraku.wire.messages import (
+    LARGEST_FROM_SERVER,
+    LIMBS,
+    SUBPROTOCOL,
+    Alive,
+    Claim,
+    Grant,
+    Input,
+    Presence,
+    Problem,
+    Refusal,
+    Release,
+    Welcome,
+    unpack,
+)
+
+ALIVE_EVERY = 0.1
+ANSWER = 5.0
+"""Seconds to wait for the server's word."""
+
+
+class Refused(Exception):
+    """A limb that is another's, or a stage that is closed; the text says which."""
+
+
+class Puppeteer:
+    """One puppeteer of a session. Use as an async context manager; limbs are named as in `LIMBS`.
+
+    While a limb is held the server is told 10 times a second that it still is.
+    """
+
+    def __init__(self, client: Client, session: str, name: str = "Someone") -> None:
+        self._url = client.socket_url(f"/v1/sessions/{quote(session, safe='')}/control") + f"?name={quote(name)}"
+        self.id: str | None = None
+        self.presence: Presence | None = None
+        self._epochs: dict[int, int] = {}
+        self._sequence = 0
+        self._answers: asyncio.Queue[Grant | Refusal] = asyncio.Queue(64)
+        self._welcome = asyncio.Event()
+        self._connection: ClientConnection | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+        self._ended = "the stage is not open"
+
+    async def __aenter__(self) -> Self:
+        self._connection = await connect(
+            self._url,
+            subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
+            compression=None,
+            max_size=LARGEST_FROM_SERVER,
+            open_timeout=ANSWER,
+            close_timeout=1,
+        )
+        self._tasks = [asyncio.create_task(self._listen()), asyncio.create_task(self._keep_alive())]
+        try:
+            async with asyncio.timeout(ANSWER):
+                await self._welcome.wait()
+        except TimeoutError:
+            await self.__aexit__()
+            raise Refused(self._ended) from None
+        if self.id is None:
+            await self.__aexit__()
+            raise Refused(self._ended)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._connection is not None:
+            await self._connection.close()
+
+    async def claim(self, limb: str) -> None:
+        """Take a limb; raises `Refused` where another holds it."""
+        number = LIMBS.index(limb)
+        await self._send(Claim(number).pack())
+        try:
+            async with asyncio.timeout(ANSWER):
+                while (answer := await self._answers.get()).limb != number:
+                    continue
+        except TimeoutError:
+            raise Refused(f"no answer for {limb}: {self._ended}") from None
+        if isinstance(answer, Refusal):
+            raise Refused(
+                f"{limb} is {answer.reason} by {answer.holder}" if answer.holder else f"{limb}: {answer.reason}"
+            )
+
+    async def release(self, limb: str) -> None:
+        """Let a limb go."""
+        number = LIMBS.index(limb)
+        if number in self._epochs:
+            await self._send(Release(number, self._epochs.pop(number)).pack())
+
+    async def target(self, limb: str, x: float, y: float = 0.0, z: float = 0.0) -> None:
+        """Pull a held hand's tip to a place in the shoulder's frame, arm lengths; a leg's thigh to the angle `x`."""
+        await self._input(limb, Input.TARGET, (x, y, z))
+
+    async def velocity(self, limb: str, x: float, y: float = 0.0, z: float = 0.0) -> None:
+        """Move a held limb at -1..1 of full speed along each axis until told otherwise."""
+        await self._input(limb, Input.VELOCITY, (x, y, z))
+
+    async def _input(self, limb: str, kind: int, values: tuple[float, float, float]) -> None:
+        number = LIMBS.index(limb)
+        if number not in self._epochs:
+            raise Refused(f"{limb} is not held")
+        self._sequence += 1
+        sampled = time.time_ns() // 1000
+        await self._send(Input(number, kind, self._epochs[number], self._sequence, sampled, values).pack())
+
+    async def _send(self, data: bytes) -> None:
+        if self._connection is None:
+            raise Refused(self._ended)
+        try:
+            await self._connection.send(data)
+        except ConnectionClosed:
+            raise Refused(self._ended) from None
+
+    async def _listen(self) -> None:
+        assert self._connection is not None
+        with contextlib.suppress(ConnectionClosed):
+            async for data in self._connection:
+                message = unpack(data) if isinstance(data, bytes) else None
+                if isinstance(message, Welcome):
+                    self.id = message.id
+                    self._welcome.set()
+                elif isinstance(message, Grant):
+                    self._epochs[message.limb] = message.epoch
+                    self._answers.put_nowait(message)
+                elif isinstance(message, Refusal):
+                    self._epochs.pop(message.limb, None)
+                    if message.reason != "lost":
+                        self._answers.put_nowait(message)
+                elif isinstance(message, Presence):
+                    self.presence = message
+                elif isinstance(message, Problem):
+                    self._ended = f"{message.title}: {message.detail}"
+        self._welcome.set()
+
+    async def _keep_alive(self) -> None:
+        while True:
+            await asyncio.sleep(ALIVE_EVERY)
+            if self._epochs:
+                with contextlib.suppress(Refused):
+                    await self._send(Alive(list(self._epochs)).pack())

@@ -1,0 +1,47 @@
+"""What a job does: a file to an encoded motion. Importing this loads all that a job uses, the compiled code too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bunraku.backing.library import pack
+from bunraku.codec import coefficients
+from bunraku.codec.encode import encode_motion
+from bunraku.ingest.jobs import Made, Refused
+from bunraku.marionette.limbs import ArmRig, Limb
+from bunraku.marionette.proportions import ProportionsError
+from bunraku.motion.analysis import analyse
+from bunraku.motion.bvh import read
+from bunraku.motion.errors import UnreadableMotion
+
+coefficients.warm()
+
+
+def make(motion: str, path: Path) -> Made | Refused:
+    """Read, analyse and encode the file at `path` as the motion of this id."""
+    try:
+        analysis = analyse(read(path.read_bytes()))
+        for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
+            ArmRig(analysis.motion.figure, limb)
+    except UnreadableMotion as error:
+        return Refused(error.title, error.detail, error.line, error.field, error.hint or None)
+    except ProportionsError as error:
+        return Refused("No puppet's arms", f"its arms cannot be pulled: {error}", field=error.field, hint=error.hint)
+    encoded = encode_motion(analysis.motion)
+    track = encoded.track
+    return Made(
+        pack(motion, encoded),
+        {
+            "duration": analysis.motion.duration,
+            "fps": analysis.motion.fps,
+            "frames": analysis.motion.frames,
+            "blocks": track.blocks,
+            "profile": analysis.profile,
+            "joints": analysis.mapped,
+            "rest_pose": analysis.rest,
+            "unit": analysis.unit,
+            "guessed": analysis.guessed,
+            "fit": {"mean_mm": round(analysis.fit_mean, 3), "max_mm": round(analysis.fit_max, 3)},
+            "rates": encoded.describe()["rates"],
+        },
+    )

@@ -1,0 +1,154 @@
+/** Motions and sessions over HTTP (`proto/SPEC.md`, HTTP). */
+
+/** A motion as the server describes it; what more it says is kept. */
+export interface Motion {
+  id: string;
+  name: string;
+  filename: string;
+  created: string;
+  /** Seconds. */
+  duration: number;
+  fps: number;
+  [key: string]: unknown;
+}
+
+/** A session; `position` and `duration` in microseconds, `limbs` the holder's id or null for each. */
+export interface Session {
+  id: string;
+  motion: string;
+  playing: boolean;
+  loop: boolean;
+  position: number;
+  duration: number;
+  epoch: number;
+  viewers: number;
+  puppeteers: { id: string; name: string; colour: number }[];
+  limbs: (string | null)[];
+}
+
+/** Edits of a session's timeline; `position` in microseconds. */
+export interface SessionEdit {
+  playing?: boolean;
+  position?: number;
+  loop?: boolean;
+  motion?: string;
+}
+
+/** One page of a list, and the cursor of the next. */
+export interface Page<T> {
+  items: T[];
+  next: string | null;
+}
+
+/** What went wrong, in words for the person who gets it (RFC 9457). `status` is 0 where no server answered. */
+export class ProblemError extends Error {
+  override readonly name = "ProblemError";
+
+  constructor(
+    readonly status: number,
+    readonly title: string,
+    readonly detail: string,
+    readonly hint: string | null = null,
+    readonly line: number | null = null,
+    readonly field: string | null = null,
+  ) {
+    super(`${title}: ${detail}`);
+  }
+
+  /** The problem in the body of an answer of `status`, of whatever form. */
+  static from(status: number, body: string): ProblemError {
+    let said: Record<string, unknown> = {};
+    try {
+      const parsed: unknown = JSON.parse(body);
+      if (typeof parsed === "object" && parsed !== null) said = parsed as Record<string, unknown>;
+    } catch {
+      // a proxy's page, or nothing: the status has to do
+    }
+    const text = (value: unknown) => (typeof value === "string" ? value : null);
+    return new ProblemError(
+      status, text(said.title) ?? "The server refused", text(said.detail) ?? `it answered ${status}`, text(said.hint),
+      typeof said.line === "number" ? said.line : null, text(said.field),
+    );
+  }
+
+  static unreachable(): ProblemError {
+    return new ProblemError(0, "No answer", "the server cannot be reached", "look at the line, then try again");
+  }
+}
+
+/** Motions, newest first. */
+export function listMotions(cursor?: string): Promise<Page<Motion>> {
+  return ask("GET", `/v1/motions${page(cursor)}`) as Promise<Page<Motion>>;
+}
+
+/** Removes a motion. */
+export async function deleteMotion(id: string): Promise<void> {
+  await ask("DELETE", `/v1/motions/${encodeURIComponent(id)}`);
+}
+
+/** A new session over a motion. */
+export function createSession(motion: string): Promise<Session> {
+  return ask("POST", "/v1/sessions", { motion }) as Promise<Session>;
+}
+
+/** Sessions. */
+export function listSessions(cursor?: string): Promise<Page<Session>> {
+  return ask("GET", `/v1/sessions${page(cursor)}`) as Promise<Page<Session>>;
+}
+
+/** One session. */
+export function getSession(id: string): Promise<Session> {
+  return ask("GET", `/v1/sessions/${encodeURIComponent(id)}`) as Promise<Session>;
+}
+
+/** Plays, pauses, seeks, loops, or changes the motion, for everyone. */
+export function editSession(id: string, edit: SessionEdit): Promise<Session> {
+  return ask("PATCH", `/v1/sessions/${encodeURIComponent(id)}`, edit) as Promise<Session>;
+}
+
+/**
+ * Uploads a motion capture file. `onProgress` is told the share sent, 0..1; fetch cannot say that, so this is an
+ * XMLHttpRequest. Cancelled by `signal`, it rejects with the signal's reason.
+ *
+ * @throws ProblemError
+ */
+export function uploadMotion(file: File, onProgress?: (share: number) => void, signal?: AbortSignal): Promise<Motion> {
+  return new Promise((resolve, reject) => {
+    signal?.throwIfAborted();
+    const request = new XMLHttpRequest();
+    const cancel = () => request.abort();
+    signal?.addEventListener("abort", cancel, { once: true });
+    request.upload.addEventListener("progress", ({ loaded, total }) => onProgress?.(total > 0 ? loaded / total : 0));
+    request.addEventListener("loadend", () => signal?.removeEventListener("abort", cancel));
+    request.addEventListener("abort", () => reject(signal?.reason as Error));
+    request.addEventListener("error", () => reject(ProblemError.unreachable()));
+    request.addEventListener("load", () => {
+      if (request.status >= 300) reject(ProblemError.from(request.status, request.responseText));
+      else resolve(JSON.parse(request.responseText) as Motion);
+    });
+    request.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}`);
+    request.setRequestHeader("Content-Type", "application/octet-stream");
+    request.send(file);
+  });
+}
+
+function page(cursor: string | undefined): string {
+  return cursor === undefined ? "" : `?cursor=${encodeURIComponent(cursor)}`;
+}
+
+async function ask(method: string, path: string, body?: unknown): Promise<unknown> {
+  const options: RequestInit = { method };
+  if (body !== undefined) {
+    options.body = JSON.stringify(body);
+    options.headers = { "Content-Type": "application/json" };
+  }
+  let answer: Response;
+  try {
+    answer = await fetch(path, options);
+  } catch {
+    throw ProblemError.unreachable();
+  }
+  const said = await answer.text();
+  if (!answer.ok) throw ProblemError.from(answer.status, said);
+  return said === "" ? null : JSON.parse(said);
+}

@@ -1,0 +1,244 @@
+/** A puppeteer: claims limbs of a session's puppet and says where they should be. */
+
+import { LIMBS, type Pose } from "../motion/skeleton";
+import { type Grant, type Message, type Presence, type Refusal, TARGET, VELOCITY } from "../wire/messages";
+import { Connection } from "./connection";
+import { HAND_SPEED, LEG_SPEED, Pull, REACH, THIGH } from "./pull";
+import type { Solver } from "./solver";
+import type { Viewer } from "./viewer";
+
+/** An input of a limb goes out so often at most, milliseconds: the newest wins. */
+const INPUT_EVERY = 33;
+/** Said so often that a limb is held still, milliseconds. */
+const ALIVE_EVERY = 100;
+/** With more bytes than these waiting for the line, inputs wait too, and the newest goes when it is free. */
+const CROWDED = 512;
+
+/** One limb as the session knows it. */
+interface Hold {
+  pull: Pull;
+  wanted: boolean;
+  /** Of the grant; null while not granted. */
+  epoch: number | null;
+  sequence: number;
+  /** What the session has not been told yet. */
+  news: "none" | "target" | "velocity";
+  speed: [number, number, number];
+  /** Whether the session has been told where the limb stands since the grant. */
+  anchored: boolean;
+  /** When the last input went out, and when the session last heard of the limb at all; local milliseconds. */
+  inputAt: number;
+  heardAt: number;
+}
+
+export interface PuppeteerOptions {
+  /** `ws(s)://.../control` of a session. */
+  url: string;
+  /** The viewer of the same session: it has the clock, and shows one's own limbs at once. */
+  viewer: Viewer;
+  /** Local milliseconds, the viewer's. */
+  now?: () => number;
+}
+
+/**
+ * Events: "welcome"; "grant" (detail: `{limb}`), "refusal" (detail: `{limb, reason, holder}`), "presence", "closed" (detail: the reason).
+ */
+export class Puppeteer extends EventTarget {
+  id: string | null = null;
+  colour: number | null = null;
+  presence: Presence | null = null;
+  /** Whether the line is closed for good. */
+  ended = false;
+  /** What targets are brought within: arm lengths from the shoulder, radians of a thigh; and full speeds, a second. */
+  readonly limits = { reach: REACH, thigh: THIGH, handSpeed: HAND_SPEED, legSpeed: LEG_SPEED } as const;
+
+  private readonly viewer: Viewer;
+  private readonly now: () => number;
+  private readonly connection: Connection;
+  private readonly holdings: readonly Hold[];
+  private readonly speaking: ReturnType<typeof setInterval>;
+
+  constructor(options: PuppeteerOptions) {
+    super();
+    this.viewer = options.viewer;
+    this.now = options.now ?? (() => performance.now());
+    this.holdings = LIMBS.map((_, limb) => ({
+      pull: new Pull(limb), wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], anchored: false, inputAt: 0, heardAt: 0,
+    }));
+    this.connection = new Connection({
+      url: () => options.url,
+      onOpen: () => undefined,
+      onMessage: (message) => this.receive(message),
+      onMalformed: () => undefined,
+      onClosed: (reason, final) => this.lost(reason, final),
+    });
+    this.speaking = setInterval(() => this.speak(), INPUT_EVERY);
+  }
+
+  /** Takes a limb: it is shown as held at once, and let go again if the session refuses it. */
+  claim(limb: number): void {
+    const hold = this.holdings[limb];
+    if (hold.wanted) return;
+    hold.wanted = true;
+    hold.news = "none";
+    hold.pull.take(this.now());
+    if (this.id !== null) this.connection.send({ name: "Claim", limb });
+  }
+
+  /** Lets a limb go. */
+  release(limb: number): void {
+    const hold = this.holdings[limb];
+    if (!hold.wanted) return;
+    if (hold.epoch !== null) this.connection.send({ name: "Release", limb, epoch: hold.epoch });
+    this.drop(hold);
+  }
+
+  /** Whether the session has granted the limb. */
+  holds(limb: number): boolean {
+    return this.holdings[limb].epoch !== null;
+  }
+
+  /** Asks for a place: of a hand, the tip in the shoulder's frame in arm lengths; of a leg, x is the thigh's angle in radians. */
+  target(limb: number, x: number, y: number, z: number): void {
+    const hold = this.holdings[limb];
+    if (!hold.wanted) return;
+    hold.pull.target(finite(x), finite(y), finite(z), this.now());
+    hold.speed = [0, 0, 0];
+    hold.news = "target";
+    this.say(hold, this.now());
+  }
+
+  /** Moves a limb at -1..1 of full speed along each axis, of a leg along the first; zero holds it still. */
+  velocity(limb: number, x: number, y: number, z: number): void {
+    const hold = this.holdings[limb];
+    const speed: [number, number, number] = [unit(x), unit(y), unit(z)];
+    if (!hold.wanted || speed.every((part, axis) => part === hold.speed[axis])) return;
+    hold.pull.speed(...speed, this.now());
+    hold.speed = speed;
+    hold.news = "velocity";
+    this.say(hold, this.now());
+  }
+
+  /** Lays one's own limbs over `pose`; for the viewer. */
+  lay(pose: Pose, nowMs: number, solver: Solver): void {
+    for (const { pull } of this.holdings) pull.lay(pose, nowMs, solver);
+  }
+
+  /** Lets all go and ends it. */
+  close(): void {
+    for (let limb = 0; limb < this.holdings.length; limb++) this.release(limb);
+    this.connection.close();
+  }
+
+  private receive(message: Message): void {
+    switch (message.name) {
+      case "Welcome":
+        this.id = message.id;
+        this.colour = message.colour;
+        // what was held when the line was lost is asked for again
+        this.holdings.forEach((hold, limb) => {
+          if (hold.wanted) this.connection.send({ name: "Claim", limb });
+        });
+        this.dispatchEvent(new Event("welcome"));
+        break;
+      case "Presence":
+        this.presence = message;
+        this.dispatchEvent(new Event("presence"));
+        break;
+      case "Grant":
+        this.granted(message);
+        break;
+      case "Refusal":
+        this.refused(message);
+        break;
+      default:
+        break;
+    }
+  }
+
+  private granted({ limb, epoch }: Grant): void {
+    const hold = this.holdings[limb];
+    if (!hold.wanted) {
+      // let go before the answer came
+      this.connection.send({ name: "Release", limb, epoch });
+      return;
+    }
+    hold.epoch = epoch;
+    hold.sequence = 0;
+    hold.anchored = false;
+    // the session starts from where it has the limb: tell it where it is held here
+    if (hold.speed.some((part) => part !== 0)) hold.news = "velocity";
+    else if (hold.pull.placed) hold.news = "target";
+    hold.inputAt = -Infinity;
+    hold.heardAt = this.now();
+    this.say(hold, this.now());
+    this.dispatchEvent(new CustomEvent("grant", { detail: { limb } }));
+  }
+
+  private refused({ limb, reason, holder }: Refusal): void {
+    this.drop(this.holdings[limb]);
+    this.dispatchEvent(new CustomEvent("refusal", { detail: { limb, reason, holder } }));
+  }
+
+  private drop(hold: Hold): void {
+    hold.wanted = false;
+    hold.epoch = null;
+    hold.news = "none";
+    hold.speed = [0, 0, 0];
+    hold.pull.letGo(this.now());
+  }
+
+  private lost(reason: string, final: boolean): void {
+    this.id = null;
+    this.ended = final;
+    for (const hold of this.holdings) {
+      hold.epoch = null;
+      if (final) this.drop(hold);
+    }
+    if (final) clearInterval(this.speaking);
+    this.dispatchEvent(new CustomEvent("closed", { detail: reason }));
+  }
+
+  private speak(): void {
+    const now = this.now();
+    for (const hold of this.holdings) this.say(hold, now);
+    const quiet = this.holdings.filter(({ epoch, heardAt }) => epoch !== null && now - heardAt >= ALIVE_EVERY);
+    if (quiet.length === 0) return;
+    const limbs = quiet.map(({ pull }) => pull.limb);
+    if (!this.connection.send({ name: "Alive", limbs })) return;
+    for (const hold of quiet) hold.heardAt = now;
+  }
+
+  /** Sends what is new of a limb, unless one went out just now or the line is crowded: then the next turn does. */
+  private say(hold: Hold, now: number): void {
+    if (hold.epoch === null || hold.news === "none") return;
+    if (now - hold.inputAt < INPUT_EVERY - 1 || this.connection.waiting > CROWDED) return;
+    const clock = this.viewer.clockTime(now);
+    if (clock === null) return;
+    const sampled = Math.round(clock);
+    const { pull, speed, epoch } = hold;
+    pull.move(now);
+    const input = (kind: number, values: [number, number, number]) =>
+      this.connection.send({
+        name: "Input", limb: pull.limb, kind, epoch: epoch!, sequence: hold.sequence++, sampled, values,
+      });
+    const [x, y, z] = pull.value;
+    const moving = hold.news === "velocity" && speed.some((part) => part !== 0);
+    // said once after the grant, and wherever the limb comes to stand: so both ends have it in one place
+    if (pull.placed && !(moving && hold.anchored)) {
+      input(TARGET, [x, y, z]);
+      hold.anchored = true;
+    }
+    if (moving || !pull.placed) input(VELOCITY, speed);
+    hold.news = "none";
+    hold.inputAt = hold.heardAt = now;
+  }
+}
+
+function finite(value: number): number {
+  return Number.isFinite(value) ? value : 0;
+}
+
+function unit(value: number): number {
+  return Math.min(Math.max(finite(value), -1), 1);
+}

@@ -1,0 +1,395 @@
+/** A viewer of a motion or a session: what comes over the line, and the pose to draw at any instant. */
+
+import { DamagedBlock } from "../codec/errors";
+import { MotionTrack, type Rate } from "../codec/track";
+import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
+import { BlockStore } from "../playout/blocks";
+import { ReferenceClock } from "../playout/clock";
+import { Overlays } from "../playout/overlay";
+import { positionAt, Timelines } from "../playout/timeline";
+import type { Data, Description, Edit, Message, Overlay, Pong, Presence, TimelineState } from "../wire/messages";
+import { Connection } from "./connection";
+import { fetchMarionette } from "./marionette";
+import { Meter } from "./meter";
+import type { Puppeteer } from "./puppeteer";
+import type { Solver, SolverOf } from "./solver";
+
+export type Timeline = TimelineState;
+export type { Presence };
+
+/** How the line fares. Numbers that nothing is known of yet are null. */
+export interface LineFigures {
+  /** Index of the rate shown, -1 before the first block. */
+  rate: number;
+  /** Kilobits a second that come, all messages counted. */
+  kbps: number;
+  /** Seconds of motion ready ahead of the play position. */
+  bufferSeconds: number;
+  /** The reference clock minus this machine's own. */
+  clockOffsetMs: number | null;
+  /** How far the clock may be off at most. */
+  clockErrorMs: number | null;
+  /** How late overlays come after they are due; below zero, how early. */
+  latencyMs: number | null;
+  /** From the making of this viewer to its first pose. */
+  firstPoseMs: number | null;
+  /** How often the block needed was missing while playing. */
+  gaps: number;
+  /** Why it is as it is, in plain words. */
+  reason: string;
+}
+
+export interface ViewerOptions {
+  /** `ws(s)://.../stream` of a motion or a session. */
+  url: string;
+  /** Local milliseconds, never running backwards. */
+  now?: () => number;
+  /**
+   * Makes what a puppeteer's own limbs are solved with: the marionette, if nothing else is said. With null, and until it is
+   * there, they are seen as everyone sees them.
+   */
+  solver?: SolverOf | null;
+}
+
+const PING_BURST = 8;
+const PING_BURST_EVERY = 60;
+const PING_EVERY = 2_000;
+const REPORT_EVERY = 1_000;
+
+/** Weight of the newest in running means. */
+const NEWEST = 1 / 8;
+
+const NO_BLOCKS = new Int8Array(0);
+
+/** Events: "figure", "timeline", "presence", "blocks", "open", and "closed" (a CustomEvent whose detail is the reason). */
+export class Viewer extends EventTarget {
+  /** The reference clock, in microseconds of local time. */
+  readonly clock = new ReferenceClock();
+  /** Messages and blocks that could not be read. */
+  damaged = 0;
+  /** Whether the line is closed for good. */
+  ended = false;
+  presence: Presence | null = null;
+  motion: string | null = null;
+  puppeteer: Puppeteer | null = null;
+
+  private readonly url: URL;
+  private readonly now: () => number;
+  private readonly solverOf: SolverOf | null;
+  private readonly connection: Connection;
+  private readonly started: number;
+  private readonly timelines = new Timelines();
+  private readonly overlays = new Overlays();
+  private readonly meter = new Meter();
+  private readonly reporting: ReturnType<typeof setInterval>;
+  private pinging: ReturnType<typeof setTimeout> | undefined;
+  private pings = 0;
+  private store: BlockStore | null = null;
+  private trackIndex = 0;
+  private solver: Solver | null = null;
+  private readonly dance = restPose();
+  private readonly merged = restPose();
+  private shown = false;
+  private missing = -1;
+  private gaps = 0;
+  private firstPoseMs: number | null = null;
+  private latency: number | null = null;
+  private decodeMs = 0;
+  private frameMs = 0;
+  private rate = -1;
+  private closedReason: string | null = null;
+  /** The private timeline to go on with when the line comes back. */
+  private resume: TimelineState | null = null;
+
+  constructor(options: ViewerOptions) {
+    super();
+    this.url = new URL(options.url);
+    this.now = options.now ?? (() => performance.now());
+    this.solverOf = options.solver === undefined ? fetchMarionette : options.solver;
+    this.started = this.now();
+    this.connection = new Connection({
+      url: () => this.address(),
+      onOpen: () => this.opened(),
+      onMessage: (message, bytes) => this.receive(message, bytes),
+      onMalformed: () => void this.damaged++,
+      onClosed: (reason, final) => this.lost(reason, final),
+    });
+    this.reporting = setInterval(() => this.report(), REPORT_EVERY);
+  }
+
+  /** The dancer's lengths, null before the first Description. */
+  get figure(): Figure | null {
+    return this.store?.track.figure ?? null;
+  }
+
+  /** The newest timeline. */
+  get timeline(): Timeline | null {
+    return this.timelines.newest;
+  }
+
+  /** Length of the motion in seconds, 0 before it is known. */
+  get duration(): number {
+    return (this.store?.track.durationUs ?? 0) / 1e6;
+  }
+
+  /** Per block: -1 missing, else the best rate held. It is the live array. */
+  get blocks(): Int8Array {
+    return this.store?.rates ?? NO_BLOCKS;
+  }
+
+  /** What each rate costs and keeps, from the lowest to the highest. */
+  get rates(): readonly Rate[] {
+    return this.store?.track.rates ?? [];
+  }
+
+  /** The reference time at local `nowMs`, microseconds; null before the server has told the time. */
+  clockTime(nowMs: number): number | null {
+    return this.clock.ready ? this.clock.at(nowMs * 1000) : null;
+  }
+
+  /** Seconds in the motion at local `nowMs`. */
+  positionAt(nowMs: number): number {
+    const clock = this.clock.at(nowMs * 1000);
+    const timeline = this.timelines.at(clock);
+    return timeline ? positionAt(timeline, clock) / 1e6 : 0;
+  }
+
+  /**
+   * The pose to draw at local `nowMs`: the dance, with what is pulled laid over it, and one's own limbs as one pulls them. Null
+   * before there is any; where the block needed is missing the dance holds still. The storage is used again by the next call.
+   */
+  poseAt(nowMs: number): Pose | null {
+    const { store, dance, merged } = this;
+    const clock = this.clock.at(nowMs * 1000);
+    const timeline = this.timelines.at(clock);
+    if (!store || !timeline || timeline.motion !== this.motion) return null;
+    const position = positionAt(timeline, clock);
+    const index = store.track.blockAt(position);
+    if (store.poseAt(position, timeline.loop, dance)) {
+      if (!this.shown) this.firstPoseMs ??= nowMs - this.started;
+      this.shown = true;
+      this.missing = -1;
+      this.rate = store.rates[index];
+    } else if (timeline.playing && this.shown && this.missing !== index) {
+      this.missing = index;
+      this.gaps++;
+    }
+    if (!this.shown) return null;
+    copyPose(dance, merged);
+    this.overlays.lay(clock, merged);
+    if (this.solver) this.puppeteer?.lay(merged, nowMs, this.solver);
+    return merged;
+  }
+
+  /** Shows `puppeteer`'s own limbs at once. */
+  attach(puppeteer: Puppeteer): void {
+    this.puppeteer = puppeteer;
+  }
+
+  /** Plays, pauses, seeks (`position`, seconds) or loops the private timeline of a motion's stream; false without a line. */
+  edit(change: { playing?: boolean; position?: number; loop?: boolean }): boolean {
+    const { playing = null, position, loop = null } = change;
+    const at = position === undefined ? null : Math.max(0, Math.round(position * 1e6));
+    return this.connection.send({ name: "Edit", playing, position: at, loop } satisfies Edit);
+  }
+
+  /** How the line fares now. */
+  line(): LineFigures {
+    const { clock, store } = this;
+    const now = this.now();
+    const timeline = this.timelines.newest;
+    const ahead = store && timeline ? store.ahead(this.positionAt(now) * 1e6, timeline.loop) : 0;
+    const known = Number.isFinite(clock.error);
+    return {
+      rate: this.rate,
+      kbps: this.meter.kbps(now),
+      bufferSeconds: ahead / 1e6,
+      clockOffsetMs: known ? clock.offset / 1000 - performance.timeOrigin : null,
+      clockErrorMs: known ? clock.error / 1000 : null,
+      latencyMs: this.latency,
+      firstPoseMs: this.firstPoseMs,
+      gaps: this.gaps,
+      reason: this.reason(),
+    };
+  }
+
+  /** A frame was drawn and took `frameMs`: the server heeds it when it chooses a rate. */
+  drawn(frameMs: number): void {
+    this.frameMs += NEWEST * (frameMs - this.frameMs);
+  }
+
+  /** Ends it for good. */
+  close(): void {
+    this.connection.close();
+  }
+
+  private address(): string {
+    const url = new URL(this.url);
+    if (!this.connectsToSession && this.resume) url.searchParams.set("at", String(this.positionAt(this.now())));
+    return url.href;
+  }
+
+  private get connectsToSession(): boolean {
+    return this.url.pathname.includes("/sessions/");
+  }
+
+  private reason(): string {
+    if (this.closedReason !== null) return this.closedReason;
+    if (this.damaged > 0) return `${this.damaged} messages could not be read`;
+    if (!this.shown) return "waiting for the first block";
+    if (this.missing >= 0) return "waiting for a block";
+    return this.url.searchParams.has("rate") ? "pinned by the address" : "chosen by the server";
+  }
+
+  private opened(): void {
+    this.closedReason = null;
+    this.clock.restart();
+    this.timelines.restart();
+    this.pings = 0;
+    this.ping();
+    this.prepareSolver();
+    this.tell("open");
+  }
+
+  private lost(reason: string, final: boolean): void {
+    this.closedReason = reason;
+    this.ended = final;
+    this.resume = this.timelines.newest;
+    clearTimeout(this.pinging);
+    if (final) clearInterval(this.reporting);
+    this.dispatchEvent(new CustomEvent("closed", { detail: reason }));
+  }
+
+  private ping(): void {
+    const sent = Math.round(this.now() * 1000);
+    if (!this.connection.send({ name: "Ping", sequence: this.pings, sent })) return;
+    this.pings++;
+    this.pinging = setTimeout(() => this.ping(), this.pings < PING_BURST ? PING_BURST_EVERY : PING_EVERY);
+  }
+
+  private report(): void {
+    this.connection.send({
+      name: "Report",
+      buffer: Math.round(this.line().bufferSeconds * 1e6),
+      decode: Math.round(this.decodeMs * 1000),
+      frame: Math.round(this.frameMs * 1000),
+      hidden: typeof document !== "undefined" && document.hidden,
+    });
+  }
+
+  private receive(message: Message, bytes: number): void {
+    const now = this.now();
+    this.meter.add(now, bytes);
+    switch (message.name) {
+      case "ChannelHeader":
+        this.clock.greeting(message.now, now * 1000);
+        break;
+      case "Description":
+        this.describe(message);
+        break;
+      case "TimelineState":
+        this.retime(message);
+        break;
+      case "Data":
+        this.keep(message, now);
+        break;
+      case "Overlay":
+        this.overlay(message, now);
+        break;
+      case "Presence":
+        this.presence = message;
+        this.tell("presence");
+        break;
+      case "Pong":
+        this.pong(message, now);
+        break;
+      default:
+        break;
+    }
+  }
+
+  private describe(message: Description): void {
+    // what an id names never changes, so the blocks of the same motion are good still
+    if (message.motion === this.motion && this.store) return;
+    const index = message.tracks.findIndex((track) => track.type === "motion");
+    if (index < 0) {
+      this.connection.close("the stream has no motion in it");
+      return;
+    }
+    let track: MotionTrack;
+    try {
+      track = MotionTrack.fromDescription(message.tracks[index]);
+    } catch (error) {
+      if (!(error instanceof DamagedBlock)) throw error;
+      this.connection.close(error.message);
+      return;
+    }
+    this.trackIndex = index;
+    this.motion = message.motion;
+    this.store = new BlockStore(track);
+    this.overlays.clear();
+    this.shown = false;
+    this.missing = -1;
+    this.rate = -1;
+    this.solver = null;
+    this.prepareSolver();
+    this.tell("figure");
+    this.tell("blocks");
+  }
+
+  private prepareSolver(): void {
+    const { figure, solverOf } = this;
+    if (this.solver || !figure || !solverOf) return;
+    const origin = this.url.origin.replace(/^ws/, "http");
+    void Promise.resolve()
+      .then(() => solverOf(figure, origin))
+      .then(
+        (solver) => {
+          // another motion may have come while it was made
+          if (this.figure === figure) this.solver = solver;
+        },
+        (error: unknown) => {
+          // it is tried again with the next connection
+          console.warn("your own limbs follow with the session's delay: no arm tables.", error);
+        },
+      );
+  }
+
+  private retime(message: TimelineState): void {
+    if (!this.timelines.put(message)) return;
+    const { resume } = this;
+    this.resume = null;
+    if (resume && !this.connectsToSession && (resume.playing !== message.playing || resume.loop !== message.loop)) {
+      this.edit({ playing: resume.playing, loop: resume.loop });
+    }
+    this.tell("timeline");
+  }
+
+  private keep(message: Data, now: number): void {
+    if (!this.store || message.track !== this.trackIndex) return;
+    try {
+      if (!this.store.put(message.start, message.rate, message.block)) return;
+    } catch (error) {
+      if (!(error instanceof DamagedBlock)) throw error;
+      this.damaged++;
+      return;
+    }
+    const took = this.now() - now;
+    this.decodeMs += (this.decodeMs === 0 ? 1 : NEWEST) * (took - this.decodeMs);
+    this.tell("blocks");
+  }
+
+  private overlay(message: Overlay, now: number): void {
+    this.overlays.put(message);
+    const late = (this.clock.at(now * 1000) - message.due) / 1000;
+    this.latency = this.latency === null ? late : this.latency + NEWEST * (late - this.latency);
+  }
+
+  private pong(message: Pong, now: number): void {
+    this.clock.pong(message.sent, message.received, message.answered, now * 1000);
+  }
+
+  private tell(event: string): void {
+    this.dispatchEvent(new Event(event));
+  }
+}

@@ -1,0 +1,61 @@
+/** The proportions of an arm, in arm lengths and parts of its mass, and the name by which its table is known. */
+
+/** The elbow bends from 0 to this, radians. */
+export const ELBOW_LIMIT = (150 * Math.PI) / 180;
+/** The wrist bends from 0 to this, radians. */
+export const WRIST_LIMIT = (80 * Math.PI) / 180;
+/** The farthest a hand tip is solved for, in arm lengths. */
+export const OUTER_RADIUS = 1 - 1e-6;
+
+/** Masses of upper arm, forearm and hand as parts of the body's (Winter). */
+const WINTER = [0.028, 0.016, 0.006];
+
+/** Lengths of upper arm, forearm and hand with sum 1, and the identity `L0-L1-L2-M0-M1-M2` of their table. */
+export interface Proportions {
+  readonly upper: number;
+  readonly fore: number;
+  readonly hand: number;
+  readonly identity: string;
+}
+
+/** From link lengths in any unit. Throws `RangeError` for an arm without length. */
+export function proportionsOf(upper: number, fore: number, hand: number): Proportions {
+  const whole = upper + fore + hand;
+  if (!(upper > 0 && fore > 0 && hand > 0)) throw new RangeError("an arm's three links need lengths above zero");
+  const lengths = [upper / whole, fore / whole, hand / whole];
+  const heavy = WINTER[0] + WINTER[1] + WINTER[2];
+  const masses = WINTER.map((mass) => mass / heavy);
+  const identity = [...apportion(lengths), ...apportion(masses)].join("-");
+  return { upper: lengths[0], fore: lengths[1], hand: lengths[2], identity };
+}
+
+/** From an identity, as the service knows it. Throws `RangeError` for text that is not one. */
+export function parseProportions(identity: string): Proportions {
+  const parts = /^\d{1,4}(-\d{1,4}){5}$/.test(identity) ? identity.split("-").map(Number) : [];
+  if (parts.length !== 6 || parts[0] + parts[1] + parts[2] !== 1000) {
+    throw new RangeError(`proportions ${identity} are not L0-L1-L2-M0-M1-M2 in thousandths`);
+  }
+  return { upper: parts[0] / 1000, fore: parts[1] / 1000, hand: parts[2] / 1000, identity };
+}
+
+/** The nearest to the shoulder that a tip is solved for: a quarter beyond what the joints allow, at least 0.1. */
+export function innerRadius({ upper, fore, hand }: Proportions): number {
+  let nearest = 1;
+  for (let degrees = 0; degrees <= 80; degrees++) {
+    const bend = (degrees * Math.PI) / 180;
+    const x = fore + hand * Math.cos(bend), y = hand * Math.sin(bend);
+    const lower = Math.hypot(x, y), lean = Math.atan2(y, x);
+    const turn = Math.min(ELBOW_LIMIT, Math.PI - lean) + lean;
+    nearest = Math.min(nearest, Math.hypot(upper + lower * Math.cos(turn), lower * Math.sin(turn)));
+  }
+  return Math.max(0.1, 1.25 * nearest);
+}
+
+/** Thousandths that sum to 1000, by the largest remainder. */
+function apportion(shares: readonly number[]): number[] {
+  const whole = shares.map((share) => Math.floor(share * 1000 + 1e-6));
+  const order = [0, 1, 2].sort((i, j) => shares[j] * 1000 - whole[j] - (shares[i] * 1000 - whole[i]) || i - j);
+  const left = 1000 - whole[0] - whole[1] - whole[2];
+  for (let k = 0; k < left; k++) whole[order[k]] += 1;
+  return whole;
+}

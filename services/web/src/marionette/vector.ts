@@ -1,0 +1,103 @@
+/**
+ * What the limbs need beside `motion/rotation`: directions and frames, in flat arrays (`out` at `outAt`), without
+ * allocation. Input and output may be the same array.
+ */
+
+import type { Numbers } from "../motion/rotation";
+
+/** Scalar product of two vectors (3). */
+export function dot(a: Numbers, aAt: number, b: Numbers, bAt: number): number {
+  return a[aAt] * b[bAt] + a[aAt + 1] * b[bAt + 1] + a[aAt + 2] * b[bAt + 2];
+}
+
+/** Euclidean length of a vector (3). */
+export function length(a: Numbers, aAt: number): number {
+  return Math.sqrt(dot(a, aAt, a, aAt));
+}
+
+/** A vector from its parts. */
+export function put(out: Numbers, outAt: number, x: number, y: number, z: number): void {
+  out[outAt] = x;
+  out[outAt + 1] = y;
+  out[outAt + 2] = z;
+}
+
+/** Vector product, right-handed. */
+export function cross(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
+  const ax = a[aAt], ay = a[aAt + 1], az = a[aAt + 2];
+  const bx = b[bAt], by = b[bAt + 1], bz = b[bAt + 2];
+  put(out, outAt, ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
+}
+
+/** `a` at unit length; false, and nothing written, where it is shorter than `least`. */
+export function unit(out: Numbers, outAt: number, a: Numbers, aAt: number, least = 1e-12): boolean {
+  const size = length(a, aAt);
+  if (size <= least) return false;
+  put(out, outAt, a[aAt] / size, a[aAt + 1] / size, a[aAt + 2] / size);
+  return true;
+}
+
+/** The part of `a` square to the unit vector `axis`. */
+export function squareTo(out: Numbers, outAt: number, a: Numbers, aAt: number, axis: Numbers, axisAt: number): void {
+  const along = dot(a, aAt, axis, axisAt);
+  put(
+    out, outAt,
+    a[aAt] - axis[axisAt] * along, a[aAt + 1] - axis[axisAt + 1] * along, a[aAt + 2] - axis[axisAt + 2] * along,
+  );
+}
+
+/** Some unit vector square to the unit vector `axis`: its product with x, or with y where it lies along x. */
+export function across(out: Numbers, outAt: number, axis: Numbers, axisAt: number): void {
+  const x = axis[axisAt], y = axis[axisAt + 1], z = axis[axisAt + 2];
+  if (Math.abs(x) < 0.9) put(out, outAt, 0, z, -y);
+  else put(out, outAt, -z, 0, x);
+  unit(out, outAt, out, outAt);
+}
+
+/** A quaternion (4) at unit length. */
+export function normalise(q: Numbers, at: number): void {
+  const size = Math.sqrt(q[at] ** 2 + q[at + 1] ** 2 + q[at + 2] ** 2 + q[at + 3] ** 2);
+  for (let i = 0; i < 4; i++) q[at + i] /= size;
+}
+
+/** A turn by `angle` radians about an axis of the frame: 0, 1, 2 for x, y, z. */
+export function aboutAxis(out: Numbers, outAt: number, axis: 0 | 1 | 2, angle: number): void {
+  out[outAt] = Math.cos(0.5 * angle);
+  put(out, outAt + 1, 0, 0, 0);
+  out[outAt + 1 + axis] = Math.sin(0.5 * angle);
+}
+
+/** The shortest rotation (4) from the unit vector `a` to the unit vector `b`; opposite ones turn about `across(a)`. */
+export function between(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
+  const w = 1 + dot(a, aAt, b, bAt);
+  if (w < 1e-12) {
+    across(out, outAt + 1, a, aAt);
+    out[outAt] = 0;
+    return;
+  }
+  cross(out, outAt + 1, a, aAt, b, bAt);
+  out[outAt] = w;
+  normalise(out, outAt);
+}
+
+/** The rotation (4) that brings the axes to right-handed unit vectors, nine numbers at `at` (Shepperd 1978). */
+export function fromColumns(out: Numbers, outAt: number, c: Numbers, at: number): void {
+  const xx = c[at], xy = c[at + 1], xz = c[at + 2];
+  const yx = c[at + 3], yy = c[at + 4], yz = c[at + 5];
+  const zx = c[at + 6], zy = c[at + 7], zz = c[at + 8];
+  const trace = xx + yy + zz;
+  if (trace >= Math.max(xx, yy, zz)) {
+    out[outAt] = 1 + trace;
+    put(out, outAt + 1, yz - zy, zx - xz, xy - yx);
+  } else if (xx >= Math.max(yy, zz)) {
+    out[outAt] = yz - zy;
+    put(out, outAt + 1, 1 + 2 * xx - trace, xy + yx, xz + zx);
+  } else if (yy >= zz) {
+    out[outAt] = zx - xz;
+    put(out, outAt + 1, xy + yx, 1 + 2 * yy - trace, yz + zy);
+  } else {
+    out[outAt] = xy - yx;
+    put(out, outAt + 1, xz + zx, yz + zy, 1 + 2 * zz - trace);
+  }
+  normalise(out, outAt);
+}

@@ -1,0 +1,77 @@
+/**
+ * The H-Anim LOA-1 figure: a root and 17 joints (`proto/SPEC.md`, Conventions). Right-handed, metres, y up, z the way the
+ * figure faces, x to its left; at rest every local rotation is the identity and the arms hang down.
+ */
+
+import { multiply, rotate } from "./rotation";
+
+/** Joint names in the order of the contract; channel c >= 2 is joint c - 1. */
+export const JOINTS: readonly string[] = [
+  "humanoid_root", "sacroiliac", "l_hip", "l_knee", "l_ankle", "l_midtarsal", "r_hip", "r_knee", "r_ankle",
+  "r_midtarsal", "vl5", "skullbase", "l_shoulder", "l_elbow", "l_wrist", "r_shoulder", "r_elbow", "r_wrist",
+];
+
+/** Each joint's parent; -1 for the root. */
+export const PARENTS: readonly number[] = [-1, 0, 1, 2, 3, 4, 1, 6, 7, 8, 0, 10, 10, 12, 13, 10, 15, 16];
+
+/** The joints that carry a tip: crown, left hand, right hand, left toes, right toes. */
+export const TIPS: readonly number[] = [11, 14, 17, 5, 9];
+
+export const JOINT_COUNT = 18;
+export const CHANNEL_COUNT = 19;
+
+/** The limbs people can hold, in the order of the contract. */
+export const LIMBS: readonly string[] = ["left_hand", "right_hand", "left_leg", "right_leg"];
+
+/** First of the three joints of each limb; the others follow it: shoulder elbow wrist, or hip knee ankle. */
+export const LIMB_JOINTS: readonly number[] = [12, 15, 2, 6];
+
+/** Lengths of one dancer, metres in the rest pose: each joint from its parent (54), each tip from its joint (54, zero where none). */
+export interface Figure {
+  offsets: Float64Array;
+  tips: Float64Array;
+}
+
+/** One pose: the root's position (3) in metres, and a local rotation w x y z for each joint (72). */
+export interface Pose {
+  root: Float64Array;
+  rotations: Float64Array;
+}
+
+/** World positions (54) in metres and orientations (72) of all joints. */
+export interface World {
+  positions: Float64Array;
+  orientations: Float64Array;
+}
+
+/** A pose at the origin, at rest. */
+export function restPose(): Pose {
+  const rotations = new Float64Array(JOINT_COUNT * 4);
+  for (let joint = 0; joint < JOINT_COUNT; joint++) rotations[joint * 4] = 1;
+  return { root: new Float64Array(3), rotations };
+}
+
+/** `from` written into `to`. */
+export function copyPose(from: Pose, to: Pose): void {
+  to.root.set(from.root);
+  to.rotations.set(from.rotations);
+}
+
+/** Storage for `world`. */
+export function emptyWorld(): World {
+  return { positions: new Float64Array(JOINT_COUNT * 3), orientations: new Float64Array(JOINT_COUNT * 4) };
+}
+
+/** World positions and orientations of `pose` on `figure`, written into `out` and returned. */
+export function world(figure: Figure, pose: Pose, out: World): World {
+  const { positions, orientations } = out;
+  for (let i = 0; i < 3; i++) positions[i] = pose.root[i];
+  for (let i = 0; i < 4; i++) orientations[i] = pose.rotations[i];
+  for (let joint = 1; joint < JOINT_COUNT; joint++) {
+    const parent = PARENTS[joint];
+    rotate(positions, joint * 3, orientations, parent * 4, figure.offsets, joint * 3);
+    for (let i = 0; i < 3; i++) positions[joint * 3 + i] += positions[parent * 3 + i];
+    multiply(orientations, joint * 4, orientations, parent * 4, pose.rotations, joint * 4);
+  }
+  return out;
+}

@@ -1,0 +1,82 @@
+/** The blocks a viewer holds, and the dance's pose at any instant (`proto/SPEC.md`, Motion block). */
+
+import { decodeBlock, type MotionBlock } from "../codec/decode";
+import { DamagedBlock } from "../codec/errors";
+import type { MotionTrack } from "../codec/track";
+import { slerp } from "../motion/rotation";
+import { JOINT_COUNT, type Pose, restPose } from "../motion/skeleton";
+
+/** Decoded blocks of one motion, of each the best rate that came. */
+export class BlockStore {
+  /** Per block: -1 missing, else the best rate held. */
+  readonly rates: Int8Array;
+  private readonly blocks: (MotionBlock | null)[];
+  private readonly next = restPose();
+
+  constructor(readonly track: MotionTrack) {
+    this.rates = new Int8Array(track.blocks).fill(-1);
+    this.blocks = new Array<MotionBlock | null>(track.blocks).fill(null);
+  }
+
+  /**
+   * Decodes the block whose first frame stands at motion time `startUs` and keeps it, unless as good a one is here already;
+   * whether it was kept.
+   *
+   * @throws DamagedBlock where it cannot be decoded or is not of this motion
+   */
+  put(startUs: number, rate: number, data: Uint8Array): boolean {
+    const { track } = this;
+    const index = track.blockAt(startUs);
+    // a frame's time is rounded to the microsecond
+    if (Math.abs(track.startUs(index) - startUs) > 1) {
+      throw new DamagedBlock(`no block of this motion begins at ${startUs} µs`);
+    }
+    if (this.rates[index] >= rate) return false;
+    const block = decodeBlock(track, data);
+    if (block.frames !== track.framesIn(index)) {
+      throw new DamagedBlock(`block ${index} has ${track.framesIn(index)} frames, not ${block.frames}`);
+    }
+    this.blocks[index] = block;
+    this.rates[index] = rate;
+    return true;
+  }
+
+  /** Microseconds of motion that are here from `position` on without a gap, once around at most. */
+  ahead(position: number, loop: boolean): number {
+    const { track } = this;
+    const first = track.blockAt(position);
+    const most = loop ? track.blocks : track.blocks - first;
+    let count = 0;
+    while (count < most && this.rates[(first + count) % track.blocks] >= 0) count++;
+    if (count === 0) return 0;
+    if (count === most) return loop ? track.durationUs : Math.max(track.durationUs - position, 0);
+    const end = first + count;
+    return track.startUs(end % track.blocks) + (end >= track.blocks ? track.durationUs : 0) - position;
+  }
+
+  /**
+   * The pose at motion time `position` in microseconds, written into `out`; false, and `out` untouched, where its block is
+   * missing. Between the last frame of a block and the first of the next it is the mix of the two where the next is here, at
+   * the end of a loop too.
+   */
+  poseAt(position: number, loop: boolean, out: Pose): boolean {
+    const { track } = this;
+    const index = track.blockAt(position);
+    const block = this.blocks[index];
+    if (!block) return false;
+    const instant = (position * track.fps) / 1e6 - index * track.blockFrames;
+    const past = instant - (block.frames - 1);
+    const following = index + 1 < track.blocks ? this.blocks[index + 1] : loop ? this.blocks[0] : null;
+    if (past <= 0 || !following) {
+      block.at(Math.min(Math.max(instant, -0.5), block.frames - 0.5), out);
+      return true;
+    }
+    const { next } = this;
+    const mix = Math.min(past, 1);
+    block.at(block.frames - 1, out);
+    following.at(0, next);
+    for (let axis = 0; axis < 3; axis++) out.root[axis] += mix * (next.root[axis] - out.root[axis]);
+    for (let at = 0; at < JOINT_COUNT * 4; at += 4) slerp(out.rotations, at, out.rotations, at, next.rotations, at, mix);
+    return true;
+  }
+}

@@ -1,0 +1,102 @@
+/**
+ * The reference clock as seen from this end of a line (after NTP, RFC 5905, clock filter: the sample that waited least).
+ *
+ * Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last 8 the one with the
+ * smallest round trip says the offset. The offset in use slews towards it and never steps: it closes on it exponentially, and
+ * time never runs slower than a tenth of its speed, so what is shown neither jumps nor runs backwards.
+ */
+
+const SAMPLES = 8;
+
+/** Time constant of the slew, microseconds: a greeting 100 ms late is made good to a frame within half a second. */
+const SLEW = 250e3;
+
+/** How much slower than real the clock may run. */
+const SLOWEST = 0.9;
+
+/** Further off than any greeting is late, microseconds. */
+const ANOTHER = 2e6;
+
+interface Sample {
+  offset: number;
+  trip: number;
+}
+
+/** Local time to reference time; all arguments and results are microseconds. */
+export class ReferenceClock {
+  private readonly samples: Sample[] = [];
+  private best: Sample | null = null;
+  // the offset in use was `from` at local time `since`, and goes to `goal`
+  private from = 0;
+  private since = 0;
+  private goal: number | null = null;
+
+  /** Whether anything has told the time yet. */
+  get ready(): boolean {
+    return this.goal !== null;
+  }
+
+  /** Reference minus local, by the sample that waited least; until there is one, by the greeting. */
+  get offset(): number {
+    return this.goal ?? 0;
+  }
+
+  /** How far the offset may be off at most: half the smallest round trip. Infinite before the first answer. */
+  get error(): number {
+    return this.best ? this.best.trip / 2 : Infinity;
+  }
+
+  /**
+   * The server's greeting said it was `now` and came at local time `arrived`. It is late by its way here, which is good enough
+   * to start by; after a new connection it counts only where it tells of quite another clock.
+   */
+  greeting(now: number, arrived: number): void {
+    const offset = now - arrived;
+    const another = this.goal === null || Math.abs(offset - this.goal) > ANOTHER;
+    if (this.best === null && another) this.aim(offset, arrived);
+  }
+
+  /**
+   * Takes in an answer: `sent` and `arrived` on the local clock, `received` and `answered` on the reference clock. One that
+   * took less than no time is ignored.
+   */
+  pong(sent: number, received: number, answered: number, arrived: number): void {
+    const trip = arrived - sent - (answered - received);
+    if (trip < 0 || answered < received) return;
+    this.samples.push({ offset: (received - sent + (answered - arrived)) / 2, trip });
+    if (this.samples.length > SAMPLES) this.samples.shift();
+    this.best = this.samples.reduce((least, sample) => (sample.trip < least.trip ? sample : least));
+    this.aim(this.best.offset, arrived);
+  }
+
+  /** A new connection, perhaps to another machine: older answers say nothing about it. The offset in use stays. */
+  restart(): void {
+    this.samples.length = 0;
+    this.best = null;
+  }
+
+  /** The offset in use at `local`: on its way to `offset`. */
+  shownOffset(local: number): number {
+    if (this.goal === null) return 0;
+    let away = this.from - this.goal;
+    let elapsed = Math.max(local - this.since, 0);
+    if (away > SLOWEST * SLEW) {
+      // far ahead: the exponential would run backwards, so go at the slowest speed until it no longer does
+      const until = Math.min((away - SLOWEST * SLEW) / SLOWEST, elapsed);
+      away -= SLOWEST * until;
+      elapsed -= until;
+    }
+    return this.goal + away * Math.exp(-elapsed / SLEW);
+  }
+
+  /** The reference time at `local`. */
+  at(local: number): number {
+    return local + this.shownOffset(local);
+  }
+
+  private aim(goal: number, local: number): void {
+    this.from = this.goal === null ? goal : this.shownOffset(local);
+    this.since = local;
+    this.goal = goal;
+  }
+}

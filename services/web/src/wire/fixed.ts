@@ -1,0 +1,136 @@
+/** Messages of fixed layout, little-endian (`proto/SPEC.md`, Fixed messages): what is hot, to bytes and back. */
+
+import { LIMBS } from "../motion/skeleton";
+import { MalformedMessage } from "./errors";
+import { type Data, type Input, type Overlay, type Ping, type Pong, TARGET, TYPES } from "./messages";
+
+const DATA_HEADER = 8;
+const OVERLAY_HEADER = 12;
+const LIMB_NUMBERS = 9;
+const SHORT = 32;
+const WORD = 2 ** 32;
+
+function viewOf(bytes: Uint8Array): DataView {
+  return new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+}
+
+function empty(name: keyof typeof TYPES, size: number): [Uint8Array<ArrayBuffer>, DataView] {
+  const bytes = new Uint8Array(size);
+  bytes[0] = TYPES[name];
+  return [bytes, viewOf(bytes)];
+}
+
+function setU64(view: DataView, at: number, value: number): void {
+  view.setUint32(at, value % WORD, true);
+  view.setUint32(at + 4, Math.floor(value / WORD), true);
+}
+
+function getU64(view: DataView, at: number, what: string): number {
+  const value = view.getUint32(at + 4, true) * WORD + view.getUint32(at, true);
+  if (!Number.isSafeInteger(value)) throw new MalformedMessage(`${what} is past 2^53`);
+  return value;
+}
+
+function short(bytes: Uint8Array, name: string): DataView {
+  if (bytes.length !== SHORT) throw new MalformedMessage(`${name} has ${SHORT} bytes, not ${bytes.length}`);
+  return viewOf(bytes);
+}
+
+export function packData(message: Data): Uint8Array<ArrayBuffer> {
+  const [bytes, view] = empty("Data", DATA_HEADER + message.block.length);
+  bytes[1] = (message.track << 4) | message.rate;
+  view.setUint32(2, message.start % WORD, true);
+  view.setUint16(6, Math.floor(message.start / WORD), true);
+  bytes.set(message.block, DATA_HEADER);
+  return bytes;
+}
+
+export function unpackData(bytes: Uint8Array): Data {
+  if (bytes.length < DATA_HEADER) throw new MalformedMessage(`Data has 8 bytes and a block, not ${bytes.length}`);
+  const view = viewOf(bytes);
+  const start = view.getUint16(6, true) * WORD + view.getUint32(2, true);
+  return { name: "Data", track: bytes[1] >> 4, rate: bytes[1] & 15, start, block: bytes.subarray(DATA_HEADER) };
+}
+
+export function packOverlay(message: Overlay): Uint8Array<ArrayBuffer> {
+  const limbs = [...message.limbs].sort(([a], [b]) => a - b);
+  const [bytes, view] = empty("Overlay", OVERLAY_HEADER + limbs.length * LIMB_NUMBERS * 2);
+  bytes[1] = limbs.reduce((mask, [limb]) => mask | (1 << limb), 0);
+  view.setUint16(2, message.sequence, true);
+  setU64(view, 4, message.due);
+  const numbers = limbs.flatMap(([, values]) => [...values]);
+  numbers.forEach((number, i) => view.setInt16(OVERLAY_HEADER + 2 * i, number, true));
+  return bytes;
+}
+
+export function unpackOverlay(bytes: Uint8Array): Overlay {
+  if (bytes.length < OVERLAY_HEADER || bytes[1] >= 1 << LIMBS.length) {
+    throw new MalformedMessage("Overlay has 12 bytes at least and a mask of 4 limbs");
+  }
+  const held = LIMBS.map((_, limb) => limb).filter((limb) => (bytes[1] >> limb) & 1);
+  const size = OVERLAY_HEADER + held.length * LIMB_NUMBERS * 2;
+  if (bytes.length !== size) {
+    throw new MalformedMessage(`Overlay of ${held.length} limbs has ${size} bytes, not ${bytes.length}`);
+  }
+  const view = viewOf(bytes);
+  const limbs = new Map<number, Int16Array>();
+  held.forEach((limb, nth) => {
+    const at = OVERLAY_HEADER + nth * LIMB_NUMBERS * 2;
+    limbs.set(limb, Int16Array.from({ length: LIMB_NUMBERS }, (_, i) => view.getInt16(at + 2 * i, true)));
+  });
+  return { name: "Overlay", sequence: view.getUint16(2, true), due: getU64(view, 4, "Overlay's due time"), limbs };
+}
+
+export function packPing(message: Ping): Uint8Array<ArrayBuffer> {
+  const [bytes, view] = empty("Ping", SHORT);
+  view.setUint32(4, message.sequence, true);
+  setU64(view, 8, message.sent);
+  return bytes;
+}
+
+export function unpackPing(bytes: Uint8Array): Ping {
+  const view = short(bytes, "Ping");
+  return { name: "Ping", sequence: view.getUint32(4, true), sent: getU64(view, 8, "Ping's time") };
+}
+
+export function packPong(message: Pong): Uint8Array<ArrayBuffer> {
+  const [bytes, view] = empty("Pong", SHORT);
+  view.setUint32(4, message.sequence, true);
+  setU64(view, 8, message.sent);
+  setU64(view, 16, message.received);
+  setU64(view, 24, message.answered);
+  return bytes;
+}
+
+export function unpackPong(bytes: Uint8Array): Pong {
+  const view = short(bytes, "Pong");
+  const [sent, received, answered] = [8, 16, 24].map((at) => getU64(view, at, "Pong's time"));
+  return { name: "Pong", sequence: view.getUint32(4, true), sent, received, answered };
+}
+
+export function packInput(message: Input): Uint8Array<ArrayBuffer> {
+  const [bytes, view] = empty("Input", SHORT);
+  bytes[1] = message.limb;
+  bytes[2] = message.kind;
+  view.setUint32(4, message.epoch, true);
+  view.setUint32(8, message.sequence, true);
+  setU64(view, 12, message.sampled);
+  message.values.forEach((value, axis) => view.setFloat32(20 + 4 * axis, value, true));
+  return bytes;
+}
+
+export function unpackInput(bytes: Uint8Array): Input {
+  const view = short(bytes, "Input");
+  const [, limb, kind] = bytes;
+  if (limb >= LIMBS.length || kind > TARGET) {
+    throw new MalformedMessage(`Input names limb ${limb}, kind ${kind}; there are 4 limbs and 2 kinds`);
+  }
+  const values: [number, number, number] = [
+    view.getFloat32(20, true), view.getFloat32(24, true), view.getFloat32(28, true),
+  ];
+  if (!values.every(Number.isFinite)) throw new MalformedMessage("Input holds a number that is not finite");
+  return {
+    name: "Input", limb, kind, epoch: view.getUint32(4, true), sequence: view.getUint32(8, true),
+    sampled: getU64(view, 12, "Input's time"), values,
+  };
+}

@@ -1,0 +1,100 @@
+/** Messages of one MessagePack map (`proto/SPEC.md`, MessagePack messages): their fields, checked, to bytes and back. */
+
+import { decode, encode } from "@msgpack/msgpack";
+import { LIMBS } from "../motion/skeleton";
+import { MalformedMessage } from "./errors";
+import { type Message, type PuppeteerPresence, type Track, TYPES } from "./messages";
+
+/** Reads a field's value, or throws what it should have been. */
+type Field = (value: unknown) => unknown;
+
+/** The messages of fixed layout are read elsewhere (`fixed.ts`). */
+type MapName = Exclude<Message["name"], "Data" | "Overlay" | "Ping" | "Pong" | "Input">;
+
+/** More than any real message has, and little enough to read at once. */
+const MOST_ENTRIES = 100_000;
+
+function expect(holds: boolean, what: string): void {
+  if (!holds) throw new MalformedMessage(`must be ${what}`);
+}
+
+const text: Field = (value) => (expect(typeof value === "string", "text"), value);
+const flag: Field = (value) => (expect(typeof value === "boolean", "true or false"), value);
+const count: Field = (value) =>
+  (expect(Number.isSafeInteger(value) && (value as number) >= 0, "a whole number of 0..2^53"), value);
+const limb: Field = (value) => (count(value), expect((value as number) < LIMBS.length, "a limb, 0..3"), value);
+const list = (item: Field): Field => (value) => {
+  expect(Array.isArray(value), "a list");
+  return (value as unknown[]).map(item);
+};
+const isMap = (value: unknown): value is Record<string, unknown> =>
+  typeof value === "object" && value !== null && !Array.isArray(value) && !ArrayBuffer.isView(value);
+const map = <T>(read: (map: Record<string, unknown>) => T) => (value: unknown): T => {
+  expect(isMap(value), "a map");
+  return read(value as Record<string, unknown>);
+};
+/** A field that may be nil or left out; it reads as null. */
+const optional = (field: Field): Field => (value) => (value === undefined || value === null ? null : field(value));
+
+const track = map((value): Track => ({ ...value, type: text(value.type) as string }));
+const puppeteer = map((value): PuppeteerPresence => ({
+  id: text(value.id) as string, name: text(value.name) as string, colour: count(value.colour) as number,
+}));
+
+const FIELDS: { [name in MapName]: Readonly<Record<string, Field>> } = {
+  ChannelHeader: { motion: text, now: count, channels: count, software: text, version: count, clock: text },
+  Description: { motion: text, tracks: list(track) },
+  TimelineState: {
+    epoch: count, motion: text, clock: count, position: count, playing: flag, loop: flag, duration: count,
+  },
+  Presence: { viewers: count, puppeteers: list(puppeteer), limbs: list(optional(text)) },
+  Problem: { title: text, detail: text },
+  Welcome: { id: text, colour: count, lead: count },
+  Grant: { limb, epoch: count },
+  Refusal: { limb, reason: text, holder: optional(text) },
+  Edit: { playing: optional(flag), position: optional(count), loop: optional(flag) },
+  Report: { buffer: count, decode: count, frame: count, hidden: flag },
+  Claim: { limb },
+  Release: { limb, epoch: count },
+  Alive: { limbs: list(limb) },
+};
+
+const NAMES = new Map(Object.keys(FIELDS).map((name) => [TYPES[name as MapName], name as MapName]));
+
+/** Whether messages of type byte `type` are one map. */
+export function isMapType(type: number): boolean {
+  return NAMES.has(type);
+}
+
+/** The message as bytes: the type, and the map of the fields that are not null. */
+export function packMap(message: Extract<Message, { name: MapName }>): Uint8Array<ArrayBuffer> {
+  const fields = Object.entries(message).filter(([key, value]) => key !== "name" && value !== null);
+  const packed = encode(Object.fromEntries(fields));
+  const bytes = new Uint8Array(1 + packed.length);
+  bytes[0] = TYPES[message.name];
+  bytes.set(packed, 1);
+  return bytes;
+}
+
+/** The message in `bytes`, of a type for which `isMapType` holds. */
+export function unpackMap(bytes: Uint8Array): Message {
+  const name = NAMES.get(bytes[0])!;
+  let values: unknown;
+  try {
+    values = decode(bytes.subarray(1), {
+      maxStrLength: bytes.length, maxBinLength: bytes.length, maxArrayLength: MOST_ENTRIES, maxMapLength: MOST_ENTRIES,
+    });
+  } catch (error) {
+    throw new MalformedMessage(`${name} is not MessagePack: ${(error as Error).message}`);
+  }
+  if (!isMap(values)) throw new MalformedMessage(`${name} is not a MessagePack map`);
+  const message: Record<string, unknown> = { name };
+  for (const [key, field] of Object.entries(FIELDS[name])) {
+    try {
+      message[key] = field(values[key]);
+    } catch (error) {
+      throw new MalformedMessage(`${name}, ${key}: ${(error as Error).message}`);
+    }
+  }
+  return message as unknown as Message;
+}

@@ -1,0 +1,127 @@
+import { afterEach, describe, expect, test, vi } from "vitest";
+import * as library from "../../src/client/library";
+
+afterEach(() => vi.unstubAllGlobals());
+
+/** Answers every request with `status` and `body`; the requests made. */
+function answering(status: number, body: string): [string, RequestInit][] {
+  const made: [string, RequestInit][] = [];
+  vi.stubGlobal("fetch", (path: string, options: RequestInit) => {
+    made.push([path, options]);
+    return Promise.resolve(new Response(status === 204 ? null : body, { status }));
+  });
+  return made;
+}
+
+test("lists are asked for page by page", async () => {
+  const made = answering(200, '{"items": [{"id": "a"}], "next": "b/c"}');
+  const { items, next } = await library.listMotions();
+  expect(items[0].id).toBe("a");
+  await library.listMotions(next!);
+  await library.listSessions();
+  expect(made.map(([path]) => path)).toEqual(["/v1/motions", "/v1/motions?cursor=b%2Fc", "/v1/sessions"]);
+});
+
+test("sessions are made and edited with JSON", async () => {
+  const made = answering(200, '{"id": "s"}');
+  await library.createSession("m");
+  await library.editSession("s/..", { position: 5, playing: false });
+  await library.getSession("s");
+  expect(made.map(([path, { method, body }]) => [method, path, body])).toEqual([
+    ["POST", "/v1/sessions", '{"motion":"m"}'],
+    ["PATCH", "/v1/sessions/s%2F..", '{"position":5,"playing":false}'],
+    ["GET", "/v1/sessions/s", undefined],
+  ]);
+  expect(made[0][1].headers).toEqual({ "Content-Type": "application/json" });
+});
+
+test("a motion is removed", async () => {
+  const made = answering(204, "");
+  await library.deleteMotion("m");
+  expect(made.map(([path, { method }]) => [method, path])).toEqual([["DELETE", "/v1/motions/m"]]);
+});
+
+describe("problems", () => {
+  test("are told with their hint, line and field", async () => {
+    answering(422, '{"title": "Not a motion", "detail": "two roots", "hint": "keep one", "line": 12, "field": "body"}');
+    await expect(library.createSession("m")).rejects.toMatchObject({
+      name: "ProblemError", status: 422, title: "Not a motion", detail: "two roots", hint: "keep one", line: 12, field: "body",
+    });
+  });
+
+  test.each(["", "<html>502</html>", "null", "[1]", '{"title": 5}'])("from a proxy that says %j have the status", (body) => {
+    const problem = library.ProblemError.from(502, body);
+    expect([problem.status, problem.title, problem.detail]).toEqual([502, "The server refused", "it answered 502"]);
+    expect([problem.hint, problem.line]).toEqual([null, null]);
+  });
+
+  test("where nobody answers", async () => {
+    vi.stubGlobal("fetch", () => Promise.reject(new TypeError("fetch failed")));
+    await expect(library.listMotions()).rejects.toMatchObject({ name: "ProblemError", status: 0, title: "No answer" });
+  });
+});
+
+describe("uploads", () => {
+  /** The browser's request as the test plays it. */
+  class Request extends EventTarget {
+    static last: Request;
+    readonly upload = new EventTarget();
+    readonly headers: Record<string, string> = {};
+    status = 0;
+    responseText = "";
+    asked: unknown[] = [];
+    constructor() {
+      super();
+      Request.last = this;
+    }
+    open(...asked: unknown[]): void {
+      this.asked = asked;
+    }
+    setRequestHeader(name: string, value: string): void {
+      this.headers[name] = value;
+    }
+    send(body: unknown): void {
+      this.asked.push(body);
+    }
+    abort(): void {
+      this.dispatchEvent(new Event("abort"));
+      this.dispatchEvent(new Event("loadend"));
+    }
+    answer(status: number, text: string): void {
+      this.status = status;
+      this.responseText = text;
+      this.dispatchEvent(new Event("load"));
+      this.dispatchEvent(new Event("loadend"));
+    }
+  }
+
+  const file = new File(["HIERARCHY"], "my dance.bvh");
+
+  test("send the file as it is, tell their progress, and give the motion", async () => {
+    vi.stubGlobal("XMLHttpRequest", Request);
+    const shares: number[] = [];
+    const motion = library.uploadMotion(file, (share) => shares.push(share));
+    expect(Request.last.asked).toEqual(["POST", "/v1/motions?filename=my%20dance.bvh", file]);
+    expect(Request.last.headers).toEqual({ "Content-Type": "application/octet-stream" });
+    Request.last.upload.dispatchEvent(Object.assign(new Event("progress"), { loaded: 3, total: 9 }));
+    Request.last.answer(201, '{"id": "abc"}');
+    expect((await motion).id).toBe("abc");
+    expect(shares).toEqual([1 / 3]);
+  });
+
+  test("are refused with the server's words", async () => {
+    vi.stubGlobal("XMLHttpRequest", Request);
+    const motion = library.uploadMotion(file);
+    Request.last.answer(422, '{"title": "Not a motion", "detail": "NaN", "line": 7}');
+    await expect(motion).rejects.toMatchObject({ title: "Not a motion", line: 7 });
+  });
+
+  test("are cancelled", async () => {
+    vi.stubGlobal("XMLHttpRequest", Request);
+    const cancel = new AbortController();
+    const motion = library.uploadMotion(file, undefined, cancel.signal);
+    cancel.abort();
+    await expect(motion).rejects.toMatchObject({ name: "AbortError" });
+    await expect(library.uploadMotion(file, undefined, cancel.signal)).rejects.toMatchObject({ name: "AbortError" });
+  });
+});

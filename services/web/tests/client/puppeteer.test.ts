@@ -1,0 +1,246 @@
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { Puppeteer } from "../../src/client/puppeteer";
+import type { Solver } from "../../src/client/solver";
+import { Viewer } from "../../src/client/viewer";
+import { LIMB_JOINTS, type Pose } from "../../src/motion/skeleton";
+import { type BlockVectors, goldenDescription } from "../golden";
+import { bytes, vectors } from "../vectors";
+import { Line } from "./line";
+
+const UNIX = 1_774_000_000_000_000;
+const [block] = vectors<BlockVectors>("blocks").valid.map((vector) => bytes(vector.block));
+
+/** A solver whose target is the x, y, z of the limb's first joint: what was solved can be read in the pose. */
+const plain: Solver = {
+  target: (pose: Pose, limb: number, out: Float64Array) => {
+    for (let axis = 0; axis < 3; axis++) out[axis] = pose.rotations[LIMB_JOINTS[limb] * 4 + 1 + axis];
+  },
+  solve: (pose: Pose, limb: number, target: Float64Array) => {
+    for (let axis = 0; axis < 3; axis++) pose.rotations[LIMB_JOINTS[limb] * 4 + 1 + axis] = target[axis];
+  },
+  rest: () => undefined,
+};
+
+let now = 0;
+let viewer: Viewer;
+let stream: Line;
+let puppeteer: Puppeteer;
+let line: Line;
+
+beforeEach(async () => {
+  Line.install();
+  now = 0;
+  viewer = new Viewer({ url: "ws://stage/v1/sessions/s/stream", now: () => now, solver: () => plain });
+  stream = Line.last;
+  stream.accept();
+  stream.say(
+    { name: "ChannelHeader", motion: "d", now: UNIX, channels: 19, software: "0", version: 1, clock: "unix" },
+    { name: "Description", motion: "d", tracks: [goldenDescription()] },
+    { name: "TimelineState", epoch: 1, motion: "d", clock: UNIX, position: 0, playing: false, loop: true, duration: 2_600_000 },
+    { name: "Data", track: 0, rate: 1, start: 0, block },
+  );
+  // the solver is made in its own time
+  await vi.advanceTimersByTimeAsync(0);
+  puppeteer = new Puppeteer({ url: "ws://stage/v1/sessions/s/control", viewer, now: () => now });
+  line = Line.last;
+  viewer.attach(puppeteer);
+  line.accept();
+  line.say({ name: "Welcome", id: "a1", colour: 2, lead: 100_000 });
+});
+
+afterEach(() => {
+  puppeteer.close();
+  viewer.close();
+  Line.remove();
+});
+
+function pass(ms: number): void {
+  now += ms;
+  vi.advanceTimersByTime(ms);
+}
+
+/** The x of a limb's first joint as drawn now. */
+function drawn(limb: number): number {
+  return viewer.poseAt(now)!.rotations[LIMB_JOINTS[limb] * 4 + 1];
+}
+
+test("is welcomed", () => {
+  expect([puppeteer.id, puppeteer.colour]).toEqual(["a1", 2]);
+  expect(puppeteer.limits).toMatchObject({ reach: 1, handSpeed: 1, legSpeed: 2 });
+});
+
+describe("a limb", () => {
+  test("is claimed, granted and let go with its epoch", () => {
+    const granted: unknown[] = [];
+    puppeteer.addEventListener("grant", (event) => granted.push((event as CustomEvent).detail));
+    puppeteer.claim(1);
+    puppeteer.claim(1);
+    expect(line.of("Claim")).toEqual([{ name: "Claim", limb: 1 }]);
+    expect(puppeteer.holds(1)).toBe(false);
+    line.say({ name: "Grant", limb: 1, epoch: 7 });
+    expect(granted).toEqual([{ limb: 1 }]);
+    expect(puppeteer.holds(1)).toBe(true);
+    puppeteer.release(1);
+    expect(line.of("Release")).toEqual([{ name: "Release", limb: 1, epoch: 7 }]);
+    expect(puppeteer.holds(1)).toBe(false);
+  });
+
+  test("let go before the answer came is let go when it comes", () => {
+    puppeteer.claim(0);
+    puppeteer.release(0);
+    expect(line.of("Release")).toEqual([]);
+    line.say({ name: "Grant", limb: 0, epoch: 3 });
+    expect(line.of("Release")).toEqual([{ name: "Release", limb: 0, epoch: 3 }]);
+    expect(puppeteer.holds(0)).toBe(false);
+  });
+
+  test("refused or lost goes back, and says why", () => {
+    const refused: unknown[] = [];
+    puppeteer.addEventListener("refusal", (event) => refused.push((event as CustomEvent).detail));
+    puppeteer.claim(0);
+    line.say({ name: "Refusal", limb: 0, reason: "held", holder: "b2" });
+    puppeteer.target(0, 1, 0, 0);
+    pass(100);
+    expect(refused).toEqual([{ limb: 0, reason: "held", holder: "b2" }]);
+    expect(line.of("Input")).toEqual([]);
+  });
+
+  test("is asked for again when the line comes back", () => {
+    puppeteer.claim(0);
+    line.say({ name: "Grant", limb: 0, epoch: 3 });
+    line.end(1006);
+    expect(puppeteer.holds(0)).toBe(false);
+    pass(250);
+    line = Line.last;
+    line.accept();
+    line.say({ name: "Welcome", id: "a9", colour: 0, lead: 100_000 });
+    expect(line.of("Claim")).toEqual([{ name: "Claim", limb: 0 }]);
+  });
+});
+
+describe("inputs", () => {
+  beforeEach(() => {
+    puppeteer.claim(0);
+    line.say({ name: "Grant", limb: 0, epoch: 5 });
+  });
+
+  test("carry epoch, rising sequence and the clock time of the sample", () => {
+    pass(40);
+    puppeteer.target(0, 0.5, -0.25, 0.125);
+    pass(40);
+    puppeteer.target(0, 0.25, -0.25, 0.125);
+    const inputs = line.of("Input");
+    expect(inputs).toHaveLength(2);
+    expect(inputs[0]).toEqual({
+      name: "Input", limb: 0, kind: 1, epoch: 5, sequence: 0, sampled: UNIX + 40_000, values: [0.5, -0.25, 0.125],
+    });
+    expect([inputs[1].sequence, inputs[1].sampled]).toEqual([1, UNIX + 80_000]);
+  });
+
+  test("of a mouse that moves a thousand times a second are thinned, and the last always goes", () => {
+    for (let moved = 0; moved < 500; moved++) {
+      pass(1);
+      puppeteer.target(0, moved / 1000, 0, 0);
+    }
+    pass(100);
+    const inputs = line.of("Input");
+    expect(inputs.length).toBeGreaterThan(10);
+    expect(inputs.length).toBeLessThan(20);
+    expect(inputs[inputs.length - 1].values[0]).toBeCloseTo(0.499, 6);
+  });
+
+  test("wait while the line is crowded, and then the newest goes", () => {
+    line.bufferedAmount = 5_000;
+    pass(40);
+    puppeteer.target(0, 0.1, 0, 0);
+    pass(200);
+    puppeteer.target(0, 0.9, 0, 0);
+    pass(200);
+    expect(line.of("Input")).toEqual([]);
+    line.bufferedAmount = 0;
+    pass(40);
+    expect(line.of("Input").map((input) => input.values[0])).toEqual([Math.fround(0.9)]);
+  });
+
+  test("of a speed say where it starts, how it goes, and where it stops", () => {
+    viewer.poseAt(now);
+    puppeteer.target(0, 0, 0, 0);
+    pass(100);
+    puppeteer.velocity(0, 1, 0, 0);
+    puppeteer.velocity(0, 1, 0, 0);
+    pass(200);
+    puppeteer.velocity(0, 0, 0, 0);
+    pass(100);
+    const said = line.of("Input").map(({ kind, values }) => [kind, values[0]]);
+    expect(said).toEqual([[1, 0], [0, 1], [1, Math.fround(0.2)]]);
+  });
+
+  test("of a limb never placed start from where the session has it", () => {
+    pass(40);
+    puppeteer.velocity(0, 0.5, 0, 0);
+    expect(line.of("Input").map(({ kind, values }) => [kind, ...values])).toEqual([[0, 0.5, 0, 0]]);
+  });
+
+  test("are finite and within -1..1 whatever the controller says", () => {
+    pass(40);
+    puppeteer.velocity(0, NaN, 7, -Infinity);
+    pass(40);
+    puppeteer.target(0, NaN, Infinity, 0.5);
+    expect(line.of("Input").map(({ values }) => values)).toEqual([[0, 1, 0], [0, 0, 0.5]]);
+  });
+
+  test("of limbs that are not claimed go nowhere", () => {
+    puppeteer.target(3, 1, 0, 0);
+    puppeteer.velocity(3, 1, 0, 0);
+    pass(100);
+    expect(line.of("Input")).toEqual([]);
+  });
+});
+
+test("a limb held still is kept alive at 10 Hz, one that moves is not mentioned", () => {
+  puppeteer.claim(0);
+  puppeteer.claim(2);
+  line.say({ name: "Grant", limb: 0, epoch: 1 }, { name: "Grant", limb: 2, epoch: 1 });
+  for (let moved = 0; moved < 50; moved++) {
+    pass(20);
+    puppeteer.target(0, moved / 100, 0, 0);
+  }
+  const alive = line.of("Alive");
+  expect(alive.length).toBeGreaterThanOrEqual(7);
+  expect(alive.length).toBeLessThanOrEqual(11);
+  for (const { limbs } of alive.slice(1)) expect(limbs).toEqual([2]);
+});
+
+describe("one's own limb", () => {
+  test("is shown at once, before the session has answered", () => {
+    const before = drawn(0);
+    puppeteer.claim(0);
+    puppeteer.target(0, 0.75, 0, 0);
+    expect(drawn(0)).toBeCloseTo(before, 9);
+    pass(75);
+    expect(drawn(0)).not.toBeCloseTo(before, 2);
+    pass(75);
+    expect(drawn(0)).toBeCloseTo(0.75, 9);
+  });
+
+  test("goes back to the dance when it is refused", () => {
+    const before = drawn(0);
+    puppeteer.claim(0);
+    puppeteer.target(0, 0.75, 0, 0);
+    pass(200);
+    drawn(0);
+    line.say({ name: "Refusal", limb: 0, reason: "held", holder: "b2" });
+    pass(300);
+    expect(drawn(0)).toBe(before);
+  });
+});
+
+test("leaving lets all go", () => {
+  puppeteer.claim(0);
+  line.say({ name: "Grant", limb: 0, epoch: 2 });
+  const reasons: string[] = [];
+  puppeteer.addEventListener("closed", (event) => reasons.push((event as CustomEvent<string>).detail));
+  puppeteer.close();
+  expect(line.of("Release")).toHaveLength(1);
+  expect(reasons).toEqual(["closed here"]);
+});

@@ -1,0 +1,276 @@
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { type LineFigures, Viewer } from "../../src/client/viewer";
+import { decodeBlock } from "../../src/codec/decode";
+import { restPose } from "../../src/motion/skeleton";
+import type { Message, Overlay, TimelineState } from "../../src/wire/messages";
+import { type BlockVectors, goldenDescription, goldenTrack } from "../golden";
+import { bytes, vectors } from "../vectors";
+import { Line } from "./line";
+
+const UNIX = 1_774_000_000_000_000;
+const SESSION = "ws://stage/v1/sessions/s1/stream";
+const MOTION = "ws://stage/v1/motions/dance/stream?rate=1";
+const golden = vectors<BlockVectors>("blocks").valid;
+const [best, lowest, , last] = golden.map((vector) => bytes(vector.block));
+
+let now = 0;
+let viewer: Viewer;
+
+beforeEach(() => {
+  Line.install();
+  now = 0;
+});
+afterEach(() => {
+  viewer.close();
+  Line.remove();
+});
+
+/** `ms` pass on both clocks of this end. */
+function pass(ms: number): void {
+  now += ms;
+  vi.advanceTimersByTime(ms);
+}
+
+function header(motion = "dance"): Message {
+  return { name: "ChannelHeader", motion, now: UNIX + now * 1000, channels: 19, software: "0", version: 1, clock: "unix" };
+}
+
+function description(motion = "dance"): Message {
+  return { name: "Description", motion, tracks: [{ type: "audio" }, goldenDescription()] };
+}
+
+function timeline(change: Partial<TimelineState> = {}): Message {
+  return {
+    name: "TimelineState", epoch: 1, motion: "dance", clock: UNIX, position: 0, playing: true, loop: true,
+    duration: 2_600_000, ...change,
+  };
+}
+
+function data(start: number, rate: number, block: Uint8Array): Message {
+  return { name: "Data", track: 1, rate, start, block };
+}
+
+/** A viewer whose server has greeted it, described the dance, and started it now. */
+function watching(url = SESSION): Viewer {
+  viewer = new Viewer({ url, now: () => now, solver: null });
+  Line.last.accept();
+  Line.last.say(header(), description(), timeline());
+  return viewer;
+}
+
+function expectNear(got: Float64Array, wanted: Float64Array): void {
+  wanted.forEach((value, i) => expect(Math.abs(got[i] - value)).toBeLessThan(1e-9));
+}
+
+describe("the start", () => {
+  test("nothing is known before the server speaks", () => {
+    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
+    expect(viewer.poseAt(0)).toBeNull();
+    expect([viewer.figure, viewer.timeline, viewer.presence, viewer.motion]).toEqual([null, null, null, null]);
+    expect([viewer.duration, viewer.blocks.length, viewer.rates.length]).toEqual([0, 0, 0]);
+    expect(viewer.line().reason).toBe("waiting for the first block");
+  });
+
+  test("each thing is told as it comes, and the first block is drawn without waiting for a clock answer", () => {
+    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
+    const told: string[] = [];
+    for (const event of ["open", "figure", "timeline", "blocks", "presence"]) {
+      viewer.addEventListener(event, () => told.push(event));
+    }
+    pass(80);
+    Line.last.accept();
+    Line.last.say(header(), description(), timeline({ clock: UNIX + 80_000 }));
+    Line.last.say({ name: "Presence", viewers: 1, puppeteers: [], limbs: [null, null, null, null] });
+    expect(viewer.poseAt(now)).toBeNull();
+    Line.last.say(data(0, 0, lowest));
+    expect(told).toEqual(["open", "figure", "blocks", "timeline", "presence", "blocks"]);
+    const wanted = restPose();
+    decodeBlock(goldenTrack(), lowest).at(0, wanted);
+    const pose = viewer.poseAt(now)!;
+    expectNear(pose.root, wanted.root);
+    expectNear(pose.rotations, wanted.rotations);
+    expect(viewer.line().firstPoseMs).toBe(80);
+    expect(viewer.duration).toBe(2.6);
+    expect([...viewer.blocks]).toEqual([0, -1, -1]);
+    expect(viewer.rates[1]).toEqual({ kbps: 5, mean: 1, max: 4 });
+  });
+});
+
+test("the pose goes on with time, and a better block takes over", () => {
+  watching();
+  Line.last.say(data(0, 0, lowest));
+  pass(500);
+  const wanted = restPose();
+  decodeBlock(goldenTrack(), lowest).at(15, wanted);
+  expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);
+  expect(viewer.positionAt(now)).toBeCloseTo(0.5, 9);
+  expect(viewer.line().rate).toBe(0);
+  Line.last.say(data(0, 1, best));
+  decodeBlock(goldenTrack(), best).at(15, wanted);
+  expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);
+  expect(viewer.line().rate).toBe(1);
+});
+
+test("where the block needed is missing the pose holds still, and that is one gap", () => {
+  watching();
+  Line.last.say(data(0, 1, best));
+  pass(990);
+  const held = structuredClone(viewer.poseAt(now)!);
+  pass(50);
+  expect(viewer.poseAt(now)).toEqual(held);
+  pass(50);
+  viewer.poseAt(now);
+  let line: LineFigures = viewer.line();
+  expect([line.gaps, line.bufferSeconds, line.reason]).toEqual([1, 0, "waiting for a block"]);
+  Line.last.say(data(1_000_000, 0, lowest));
+  expect(viewer.poseAt(now)).not.toEqual(held);
+  line = viewer.line();
+  expect([line.gaps, line.reason]).toEqual([1, "chosen by the server"]);
+  expect(line.bufferSeconds).toBeCloseTo(0.91, 9);
+});
+
+test("overlays lie over the dance on clock time, and their lateness is measured", () => {
+  watching();
+  Line.last.say(data(0, 1, best));
+  const overlay = (due: number, x: number): Overlay => ({
+    name: "Overlay", sequence: 0, due: UNIX + due, limbs: new Map([[0, Int16Array.of(x, 0, 0, 0, 0, 0, 0, 0, 0)]]),
+  });
+  Line.last.say(overlay(100_000, 0), overlay(200_000, 16384));
+  expect(viewer.line().latencyMs).toBeLessThan(-100);
+  pass(150);
+  const pose = viewer.poseAt(now)!;
+  expect(2 * Math.atan2(pose.rotations[49], pose.rotations[48])).toBeCloseTo(Math.PI / 4, 4);
+  const wanted = restPose();
+  decodeBlock(goldenTrack(), best).at(4.5, wanted);
+  expectNear(pose.rotations.subarray(60), wanted.rotations.subarray(60));
+  pass(400);
+  decodeBlock(goldenTrack(), best).at(16.5, wanted);
+  expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);
+});
+
+test("pings in a burst, then every two seconds, and takes the smallest round trip", () => {
+  watching();
+  pass(60 * 7);
+  expect(Line.last.of("Ping")).toHaveLength(8);
+  pass(1_999);
+  expect(Line.last.of("Ping")).toHaveLength(8);
+  pass(1);
+  const pings = Line.last.of("Ping");
+  expect(pings).toHaveLength(9);
+  expect(new Set(pings.map((ping) => ping.sequence)).size).toBe(9);
+  const { sequence, sent } = pings[8];
+  pass(40);
+  const at = UNIX + sent + 20_000;
+  Line.last.say({ name: "Pong", sequence, sent, received: at, answered: at });
+  expect(viewer.line().clockErrorMs).toBe(20);
+  expect(viewer.clockTime(now)).toBeCloseTo(UNIX + now * 1000, -1);
+});
+
+test("reports once a second what is ready and how long drawing takes", () => {
+  watching();
+  Line.last.say(data(0, 1, best), data(1_000_000, 0, lowest));
+  for (let frame = 0; frame < 200; frame++) viewer.drawn(8);
+  pass(1_000);
+  const [report] = Line.last.of("Report");
+  expect(report.buffer).toBe(1_000_000);
+  expect(report.frame).toBeCloseTo(8_000, -1);
+  expect(report.hidden).toBe(false);
+  pass(2_000);
+  expect(Line.last.of("Report")).toHaveLength(3);
+});
+
+describe("when the line is lost", () => {
+  test("it comes back, keeps its blocks and the dance goes on meanwhile", () => {
+    watching();
+    const reasons: string[] = [];
+    viewer.addEventListener("closed", (event) => reasons.push((event as CustomEvent<string>).detail));
+    Line.last.say(data(0, 1, best));
+    Line.last.end(1006);
+    expect(viewer.line().reason).toBe("the line was lost");
+    pass(250);
+    expect(viewer.positionAt(now)).toBeCloseTo(0.25, 9);
+    expect(viewer.poseAt(now)).not.toBeNull();
+    Line.last.accept();
+    Line.last.say(header(), description(), timeline({ epoch: 1, position: 100_000 }));
+    expect([...viewer.blocks]).toEqual([1, -1, -1]);
+    expect(viewer.positionAt(now)).toBeCloseTo(0.35, 9);
+    expect(reasons).toEqual(["the line was lost"]);
+    expect(viewer.ended).toBe(false);
+  });
+
+  test("another motion drops the blocks", () => {
+    watching();
+    Line.last.say(data(0, 1, best));
+    Line.last.say(header("other"), description("other"));
+    expect(viewer.poseAt(now)).toBeNull();
+    expect([...viewer.blocks]).toEqual([-1, -1, -1]);
+    Line.last.say(timeline({ epoch: 2, motion: "other" }), data(0, 0, lowest));
+    expect(viewer.poseAt(now)).not.toBeNull();
+    expect(viewer.motion).toBe("other");
+  });
+
+  test("a private timeline goes on from where it stood", () => {
+    watching(MOTION);
+    Line.last.say(data(0, 1, best));
+    pass(400);
+    Line.last.say(timeline({ epoch: 2, clock: UNIX, position: 700_000, playing: false, loop: false }));
+    Line.last.end(1006);
+    pass(250);
+    expect(Line.last.url).toBe("ws://stage/v1/motions/dance/stream?rate=1&at=0.7");
+    Line.last.accept();
+    Line.last.say(header(), description(), timeline({ position: 700_000 }));
+    expect(Line.last.of("Edit")).toEqual([{ name: "Edit", playing: false, position: null, loop: false }]);
+  });
+
+  test("a missing session is the end", () => {
+    watching();
+    Line.last.end(4404);
+    pass(60_000);
+    expect(Line.opened).toHaveLength(1);
+    expect(viewer.ended).toBe(true);
+    expect(viewer.line().reason).toBe("there is no such motion or session");
+  });
+});
+
+describe("what cannot be played", () => {
+  test("a damaged block is passed over and counted", () => {
+    watching();
+    Line.last.say(data(0, 1, best.subarray(0, 4)), data(0, 1, last), data(123, 0, best));
+    Line.last.raw(Uint8Array.of(4, 0xc1));
+    expect(viewer.damaged).toBe(4);
+    expect([...viewer.blocks]).toEqual([-1, -1, -1]);
+    Line.last.say(data(0, 0, lowest));
+    expect(viewer.poseAt(now)).not.toBeNull();
+  });
+
+  test("other tracks' data is skipped", () => {
+    watching();
+    Line.last.say({ name: "Data", track: 0, rate: 1, start: 0, block: best });
+    expect([viewer.damaged, ...viewer.blocks]).toEqual([0, -1, -1, -1]);
+  });
+
+  test.each([
+    ["no motion", [{ type: "audio" }], "the stream has no motion in it"],
+    ["another codec", [{ ...goldenDescription(), codec: "bunraku.motion/9" }], "motion is of codec bunraku.motion/9"],
+    ["no frames", [{ ...goldenDescription(), frames: 0 }], "motion needs frames"],
+    ["a figure cut short", [{ ...goldenDescription(), figure: new Uint8Array(9) }], "a figure has 138 bytes, not 9"],
+    ["no rates", [{ ...goldenDescription(), rates: [] }], "motion needs rates"],
+    ["a rate of nothing", [{ ...goldenDescription(), rates: [null] }], "rate 0 needs kbps"],
+  ])("%s ends it and says why", (_, tracks, why) => {
+    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
+    Line.last.accept();
+    Line.last.say(header(), { name: "Description", motion: "dance", tracks });
+    expect(viewer.ended).toBe(true);
+    expect(viewer.line().reason).toContain(why);
+  });
+});
+
+test("a private timeline is edited in seconds", () => {
+  watching(MOTION);
+  expect(viewer.edit({ position: 1.25, playing: false })).toBe(true);
+  expect(Line.last.of("Edit")).toEqual([{ name: "Edit", playing: false, position: 1_250_000, loop: null }]);
+  expect(viewer.line().reason).toBe("waiting for the first block");
+  Line.last.say(data(0, 1, best));
+  viewer.poseAt(now);
+  expect(viewer.line().reason).toBe("pinned by the address");
+});

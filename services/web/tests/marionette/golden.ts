@@ -1,0 +1,28 @@
+/** The shape of `proto/vectors/arm.json`. */
+
+import { vectors } from "../vectors";
+
+export interface GoldenArm {
+  proportions: string;
+  inner_radius: number;
+  sha256: string;
+  table: string;
+  solves: { target: number[]; azimuth: number; angles: number[]; elbow: number[]; wrist: number[]; tip: number[] }[];
+}
+
+export interface GoldenLimb {
+  limb: 0 | 1 | 2 | 3;
+  rotations: number[][];
+  target?: number[];
+  angle?: number;
+  own: number | number[];
+  joints: number[][];
+}
+
+export interface Golden {
+  arms: GoldenArm[];
+  plane: { start: number[]; up: number[]; seconds: number; steps: { target: number[]; normal: number[] }[] };
+  limbs: { offsets: number[][]; tips: number[][]; cases: GoldenLimb[] };
+}
+
+export const golden = vectors<Golden>("arm");

@@ -1,0 +1,47 @@
+import { expect, test } from "vitest";
+import { fromRotationVector } from "../../src/motion/rotation";
+import {
+  copyPose, emptyWorld, JOINT_COUNT, JOINTS, LIMB_JOINTS, LIMBS, PARENTS, restPose, TIPS, world,
+} from "../../src/motion/skeleton";
+
+/** Every joint one metre below its parent. */
+const figure = { offsets: new Float64Array(JOINT_COUNT * 3), tips: new Float64Array(JOINT_COUNT * 3) };
+for (let joint = 0; joint < JOINT_COUNT; joint++) figure.offsets[joint * 3 + 1] = -1;
+
+test("parents come before their children, and limbs and tips are the contract's", () => {
+  expect(JOINTS).toHaveLength(18);
+  PARENTS.forEach((parent, joint) => expect(parent).toBeLessThan(joint));
+  expect(LIMBS.map((_, limb) => [0, 1, 2].map((nth) => JOINTS[LIMB_JOINTS[limb] + nth]))).toEqual([
+    ["l_shoulder", "l_elbow", "l_wrist"], ["r_shoulder", "r_elbow", "r_wrist"],
+    ["l_hip", "l_knee", "l_ankle"], ["r_hip", "r_knee", "r_ankle"],
+  ]);
+  expect(TIPS.map((joint) => JOINTS[joint])).toEqual(["skullbase", "l_wrist", "r_wrist", "l_midtarsal", "r_midtarsal"]);
+});
+
+test("at rest all hangs below the root", () => {
+  const pose = restPose();
+  pose.root.set([1, 10, 2]);
+  const { positions, orientations } = world(figure, pose, emptyWorld());
+  expect([...positions.subarray(42, 45)]).toEqual([1, 6, 2]);
+  expect([...orientations.subarray(56, 60)]).toEqual([1, 0, 0, 0]);
+});
+
+test("a joint turns what hangs from it, and nothing else", () => {
+  const pose = restPose();
+  const elbow = JOINTS.indexOf("l_elbow");
+  // lifts the forearm forwards
+  fromRotationVector(pose.rotations, elbow * 4, -Math.PI / 2, 0, 0);
+  const at = (joint: string) => [...world(figure, pose, emptyWorld()).positions.subarray(JOINTS.indexOf(joint) * 3)].slice(0, 3);
+  [0, -3, 1].forEach((value, axis) => expect(at("l_wrist")[axis]).toBeCloseTo(value, 12));
+  expect(at("l_elbow")).toEqual([0, -3, 0]);
+  expect(at("r_wrist")).toEqual([0, -4, 0]);
+});
+
+test("a pose is copied whole", () => {
+  const from = restPose(), to = restPose();
+  from.root[1] = 3;
+  from.rotations[7] = 0.5;
+  copyPose(from, to);
+  expect(to).toEqual(from);
+  expect(to.root).not.toBe(from.root);
+});

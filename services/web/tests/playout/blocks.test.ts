@@ -1,0 +1,120 @@
+import { describe, expect, test } from "vitest";
+import { decodeBlock } from "../../src/codec/decode";
+import { DamagedBlock } from "../../src/codec/errors";
+import { MotionTrack } from "../../src/codec/track";
+import { restPose } from "../../src/motion/skeleton";
+import { BlockStore } from "../../src/playout/blocks";
+import { type BlockVectors, goldenTrack } from "../golden";
+import { bytes, vectors } from "../vectors";
+
+const golden = vectors<BlockVectors>("blocks").valid;
+// three blocks: the golden ones of 30, 30 and 18 frames at 30 fps
+const track = goldenTrack();
+const [best, lowest, middle, last] = golden.map((vector) => bytes(vector.block));
+
+function filled(): BlockStore {
+  const store = new BlockStore(track);
+  store.put(0, 1, best);
+  store.put(1_000_000, 0, lowest);
+  store.put(2_000_000, 0, last);
+  return store;
+}
+
+test("the golden track has three blocks", () => {
+  expect([track.blocks, track.framesIn(0), track.framesIn(2), track.durationUs]).toEqual([3, 30, 18, 2_600_000]);
+});
+
+describe("what is kept", () => {
+  test("the best rate of each block", () => {
+    const store = new BlockStore(track);
+    expect([...store.rates]).toEqual([-1, -1, -1]);
+    expect(store.put(1_000_000, 1, middle)).toBe(true);
+    expect(store.put(1_000_000, 0, lowest)).toBe(false);
+    expect(store.put(1_000_000, 3, best)).toBe(true);
+    expect([...store.rates]).toEqual([-1, 3, -1]);
+    const kept = restPose(), wanted = restPose();
+    store.poseAt(1_000_000, false, kept);
+    decodeBlock(track, best).at(0, wanted);
+    expect(kept).toEqual(wanted);
+  });
+
+  test("nothing that is damaged or of another motion", () => {
+    const store = new BlockStore(track);
+    expect(() => store.put(500_000, 0, best)).toThrow(DamagedBlock);
+    expect(() => store.put(3_000_000, 0, last)).toThrow(DamagedBlock);
+    expect(() => store.put(0, 0, last)).toThrow("block 0 has 30 frames, not 18");
+    expect(() => store.put(0, 0, best.subarray(0, 5))).toThrow(DamagedBlock);
+    expect([...store.rates]).toEqual([-1, -1, -1]);
+  });
+
+  test("timestamps rounded to the microsecond", () => {
+    const odd = new MotionTrack(29.97, 95, 30, track.figure, track.reference);
+    const store = new BlockStore(odd);
+    for (const index of [0, 1, 2]) expect(store.put(odd.startUs(index), 0, best)).toBe(true);
+    expect([...store.rates]).toEqual([0, 0, 0, -1]);
+  });
+});
+
+describe("how much is ahead", () => {
+  test("up to the first gap", () => {
+    const store = new BlockStore(track);
+    expect(store.ahead(0, true)).toBe(0);
+    store.put(0, 0, best);
+    expect(store.ahead(250_000, true)).toBe(750_000);
+    store.put(2_000_000, 0, last);
+    expect(store.ahead(250_000, true)).toBe(750_000);
+    expect(store.ahead(2_100_000, false)).toBe(500_000);
+    expect(store.ahead(2_100_000, true)).toBe(1_500_000);
+  });
+
+  test("once around at most", () => {
+    expect(filled().ahead(700_000, true)).toBe(2_600_000);
+    expect(filled().ahead(700_000, false)).toBe(1_900_000);
+  });
+});
+
+describe("the pose", () => {
+  test("is missing with its block, and leaves what was there", () => {
+    const store = new BlockStore(track);
+    const pose = restPose();
+    expect(store.poseAt(0, true, pose)).toBe(false);
+    expect(pose).toEqual(restPose());
+  });
+
+  test("is the block's at a frame", () => {
+    const pose = restPose(), wanted = restPose();
+    filled().poseAt(9.5e6 / 30, true, pose);
+    decodeBlock(track, best).at(9.5, wanted);
+    pose.rotations.forEach((value, i) => expect(value).toBeCloseTo(wanted.rotations[i], 12));
+  });
+
+  test("between two blocks lies between their poses, and passes to each without a step", () => {
+    const store = filled();
+    const poses = [0, 1e-6, 0.5, 1 - 1e-6, 1].map((mix) => {
+      const pose = restPose();
+      store.poseAt(((29 + mix) * 1e6) / 30, true, pose);
+      return pose;
+    });
+    const near = (a: Float64Array, b: Float64Array) =>
+      a.forEach((value, i) => expect(Math.abs(value - b[i])).toBeLessThan(1e-5));
+    near(poses[0].root, poses[1].root);
+    near(poses[3].root, poses[4].root);
+    const middleOfRoot = poses[0].root.map((value, i) => (value + poses[4].root[i]) / 2);
+    near(poses[2].root, middleOfRoot);
+    for (let at = 0; at < 72; at += 4) {
+      expect(Math.hypot(...poses[2].rotations.subarray(at, at + 4))).toBeCloseTo(1, 9);
+    }
+  });
+
+  test("at the end of a loop goes over into the start, and without a loop stays", () => {
+    const store = filled();
+    const first = restPose(), looped = restPose(), stayed = restPose();
+    store.poseAt(0, true, first);
+    store.poseAt(2_600_000 - 0.01, true, looped);
+    looped.root.forEach((value, i) => expect(Math.abs(value - first.root[i])).toBeLessThan(1e-5));
+    store.poseAt(2_600_000, false, stayed);
+    const wanted = restPose();
+    decodeBlock(track, last).at(17.5, wanted);
+    expect(stayed).toEqual(wanted);
+  });
+});

@@ -1,0 +1,99 @@
+import * as fc from "fast-check";
+import { describe, expect, test } from "vitest";
+import { ReferenceClock } from "../../src/playout/clock";
+
+const UNIX = 1_774_000_000_000_000;
+
+/** A round trip started at local `sent`: `out` and `back` microseconds on the way, the server being `ahead`. */
+function trip(clock: ReferenceClock, sent: number, out: number, back: number, ahead: number): number {
+  const received = sent + out + ahead;
+  clock.pong(sent, received, received + 50, sent + out + 50 + back);
+  return sent + out + 50 + back;
+}
+
+test("before anything came it is not ready", () => {
+  const clock = new ReferenceClock();
+  expect(clock.ready).toBe(false);
+  expect(clock.error).toBe(Infinity);
+});
+
+test("the greeting says the time, late by its way, until an answer says it better", () => {
+  const clock = new ReferenceClock();
+  clock.greeting(UNIX, 75_000);
+  expect(clock.at(75_000)).toBe(UNIX);
+  trip(clock, 80_000, 75_000, 75_000, UNIX);
+  expect(clock.offset).toBe(UNIX);
+  clock.greeting(UNIX - 5_000_000, 300_000);
+  expect(clock.offset).toBe(UNIX);
+});
+
+test("an even line gives the offset exactly, and half the trip as the error", () => {
+  const clock = new ReferenceClock();
+  const now = trip(clock, 1_000, 30_000, 30_000, UNIX);
+  expect(clock.at(now)).toBe(now + UNIX);
+  expect(clock.error).toBe(30_000);
+});
+
+test("the smallest round trip of the last eight counts, and older ones are forgotten", () => {
+  const clock = new ReferenceClock();
+  trip(clock, 0, 10_000, 10_000, UNIX);
+  for (let i = 1; i < 8; i++) trip(clock, i * 1e6, 200_000, 40_000, UNIX);
+  expect(clock.offset).toBe(UNIX);
+  trip(clock, 9e6, 60_000, 40_000, UNIX);
+  expect(clock.offset).toBe(UNIX + 10_000);
+});
+
+test("answers that took less than no time are ignored", () => {
+  const clock = new ReferenceClock();
+  clock.pong(1000, UNIX, UNIX + 500, 1400);
+  clock.pong(1000, UNIX, UNIX - 1, 1400);
+  expect(clock.ready).toBe(false);
+});
+
+test("a new connection forgets the answers and keeps the time", () => {
+  const clock = new ReferenceClock();
+  const now = trip(clock, 0, 1_000, 1_000, UNIX);
+  clock.restart();
+  expect(clock.error).toBe(Infinity);
+  expect(clock.at(now)).toBe(now + UNIX);
+  clock.greeting(now + UNIX + 40_000, now);
+  expect(clock.at(now)).toBe(now + UNIX);
+});
+
+describe("the slew", () => {
+  const error = fc.integer({ min: -30_000_000, max: 30_000_000 });
+
+  test("never steps and never runs backwards", () => {
+    fc.assert(
+      fc.property(fc.array(fc.tuple(error, fc.integer({ min: 16_000, max: 3_000_000 })), { maxLength: 6 }), (changes) => {
+        const clock = new ReferenceClock();
+        trip(clock, 0, 1_000, 1_000, 0);
+        let now = 10_000;
+        let shown = clock.at(now);
+        for (const [ahead, wait] of changes) {
+          clock.restart();
+          const step = clock.shownOffset(now);
+          clock.pong(now, now + ahead, now + ahead, now);
+          expect(Math.abs(clock.shownOffset(now) - step)).toBeLessThan(1e-3);
+          for (let passed = 0; passed < wait; passed += 8_000) {
+            now += 8_000;
+            expect(clock.at(now)).toBeGreaterThan(shown);
+            shown = clock.at(now);
+          }
+        }
+      }),
+    );
+  });
+
+  test("closes on the offset", () => {
+    fc.assert(
+      fc.property(error, (ahead) => {
+        const clock = new ReferenceClock();
+        trip(clock, 0, 0, 0, 0);
+        clock.restart();
+        clock.pong(100, 100 + ahead, 100 + ahead, 100);
+        expect(Math.abs(clock.shownOffset(60e6) - ahead)).toBeLessThan(1);
+      }),
+    );
+  });
+});

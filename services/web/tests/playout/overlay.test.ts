@@ -1,0 +1,97 @@
+import * as fc from "fast-check";
+import { describe, expect, test } from "vitest";
+import { restPose } from "../../src/motion/skeleton";
+import { Overlays, SILENCE } from "../../src/playout/overlay";
+import type { Overlay } from "../../src/wire/messages";
+
+const QUARTER = Math.round(32767 / 4);
+
+/** An overlay that turns the first joint of each of `limbs` about x by `units`. */
+function overlay(due: number, units: number, ...limbs: number[]): Overlay {
+  const numbers = () => Int16Array.of(units, 0, 0, 0, 0, 0, 0, 0, 0);
+  return { name: "Overlay", sequence: 0, due, limbs: new Map(limbs.map((limb) => [limb, numbers()])) };
+}
+
+/** The angle about x of `joint` at `clock`. */
+function angle(overlays: Overlays, clock: number, joint = 12): number {
+  const pose = restPose();
+  overlays.lay(clock, pose);
+  return 2 * Math.atan2(pose.rotations[joint * 4 + 1], pose.rotations[joint * 4]);
+}
+
+describe("a pulled limb", () => {
+  test("goes evenly from each overlay to the next", () => {
+    const overlays = new Overlays();
+    overlays.put(overlay(1_000_000, 0, 0));
+    overlays.put(overlay(1_100_000, QUARTER, 0));
+    expect(angle(overlays, 1_000_000)).toBeCloseTo(0, 9);
+    expect(angle(overlays, 1_025_000)).toBeCloseTo(Math.PI / 16, 3);
+    expect(angle(overlays, 1_100_000)).toBeCloseTo(Math.PI / 4, 3);
+  });
+
+  test("starts from the dance where the overlay before left it to the dance", () => {
+    const overlays = new Overlays();
+    overlays.put(overlay(1_000_000, QUARTER, 1));
+    overlays.put(overlay(1_100_000, QUARTER, 0, 1));
+    expect(angle(overlays, 1_050_000)).toBeCloseTo(Math.PI / 8, 3);
+    expect(angle(overlays, 1_050_000, 15)).toBeCloseTo(Math.PI / 4, 3);
+  });
+
+  test("is the dance's again after the last overlay, an empty one or silence", () => {
+    const overlays = new Overlays();
+    overlays.put(overlay(1_000_000, QUARTER, 0));
+    expect(overlays.lay(1_000_000 + SILENCE - 1, restPose())).toBe(1);
+    expect(overlays.lay(1_000_000 + SILENCE, restPose())).toBe(0);
+    overlays.put(overlay(1_050_000, 0));
+    expect(overlays.lay(1_050_000, restPose())).toBe(0);
+  });
+
+  test("is not laid before the first overlay is due", () => {
+    const overlays = new Overlays();
+    overlays.put(overlay(1_000_000, QUARTER, 0));
+    overlays.put(overlay(1_000_000 + 2 * SILENCE, QUARTER, 0));
+    expect(overlays.lay(999_999, restPose())).toBe(0);
+    expect(overlays.lay(1_000_000 + 2 * SILENCE - 1, restPose())).toBe(0);
+    expect(overlays.lay(1_000_000 + 2 * SILENCE, restPose())).toBe(1);
+  });
+});
+
+test("late and doubled overlays are put in their places", () => {
+  const overlays = new Overlays();
+  overlays.put(overlay(1_200_000, 0, 0));
+  overlays.put(overlay(1_000_000, 0, 0));
+  overlays.put(overlay(1_100_000, 0, 0));
+  overlays.put(overlay(1_100_000, QUARTER, 0));
+  expect(angle(overlays, 1_100_000)).toBeCloseTo(Math.PI / 4, 3);
+  expect(angle(overlays, 1_150_000)).toBeCloseTo(Math.PI / 8, 3);
+});
+
+test("only the pulled limbs change, and rotations stay of unit length", () => {
+  const number = fc.integer({ min: -32767, max: 32767 });
+  const limbs = fc.uniqueArray(fc.nat(3));
+  const one = fc.tuple(fc.integer({ min: 0, max: 600_000 }), limbs, fc.array(number, { minLength: 9, maxLength: 9 }));
+  fc.assert(
+    fc.property(fc.array(one, { maxLength: 12 }), fc.integer({ min: 0, max: 700_000 }), (all, clock) => {
+      const overlays = new Overlays();
+      for (const [due, which, numbers] of all) {
+        const held = new Map(which.map((limb) => [limb, Int16Array.from(numbers)]));
+        overlays.put({ name: "Overlay", sequence: 0, due, limbs: held });
+      }
+      const pose = restPose(), rest = restPose();
+      const mask = overlays.lay(clock, pose);
+      for (let joint = 0; joint < 18; joint++) {
+        const limb = [12, 15, 2, 6].findIndex((first) => joint >= first && joint < first + 3);
+        const turned = pose.rotations.subarray(joint * 4, joint * 4 + 4);
+        expect(Math.hypot(...turned)).toBeCloseTo(1, 9);
+        if (limb < 0 || !((mask >> limb) & 1)) expect(turned).toEqual(rest.rotations.subarray(joint * 4, joint * 4 + 4));
+      }
+    }),
+  );
+});
+
+test("another motion starts without the old overlays", () => {
+  const overlays = new Overlays();
+  overlays.put(overlay(1_000_000, QUARTER, 0));
+  overlays.clear();
+  expect(overlays.lay(1_000_000, restPose())).toBe(0);
+});

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+from fastapi import FastAPI
+from fastapi.testclient import TestClient
+
+from bunraku.backing import problems
+from bunraku.backing.problems import ProblemError
+
+
+def client() -> TestClient:
+    app = FastAPI()
+    problems.install(app)
+
+    @app.get("/told")
+    async def told() -> None:
+        raise ProblemError(422, "Not a dance", "line 7 is not a number", line=7, field=None, hint="look there")
+
+    @app.get("/number/{number}")
+    async def number(number: int) -> int:
+        return number
+
+    return TestClient(app)
+
+
+def test_what_was_told_is_answered_with_what_helps() -> None:
+    answer = client().get("/told")
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json() == {
+        "type": "about:blank",
+        "title": "Not a dance",
+        "status": 422,
+        "detail": "line 7 is not a number",
+        "line": 7,
+        "hint": "look there",
+    }
+
+
+def test_the_frameworks_own_errors_are_problems_too() -> None:
+    invalid = client().get("/number/seven")
+    assert invalid.status_code == 422
+    assert invalid.headers["content-type"] == "application/problem+json"
+    assert invalid.json()["field"] == "number"
+    missing = client().get("/nowhere")
+    assert missing.json()["status"] == missing.status_code == 404
+    assert missing.headers["content-type"] == "application/problem+json"
+    wrong = client().post("/told")
+    assert wrong.status_code == 405
+    assert wrong.headers["allow"] == "GET"
+    assert "POST /told" in wrong.json()["detail"]
+
+
+def test_a_field_deep_inside_is_named_as_one_would_write_it() -> None:
+    problem = problems.invalid_field(("targets", 3, 1), "not a number")
+    assert problem.extra["field"] == "targets[3][1]"
+    assert problem.detail == "targets[3][1]: not a number"
+    assert problems.invalid_field((), "not an object").extra["field"] is None

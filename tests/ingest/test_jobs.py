@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from bunraku.ingest import jobs
+from tests.servers import clip
+
+
+async def test_a_job_makes_a_motion_in_another_process(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(clip(0.5))
+    made = await jobs.run("m1", source, 60)
+    assert isinstance(made, jobs.Made)
+    assert made.described["frames"] == 15
+
+
+async def test_a_reader_that_breaks_off_is_a_refusal(tmp_path: Path) -> None:
+    made = await jobs.run("m1", tmp_path / "missing", 60)
+    assert isinstance(made, jobs.Refused)
+    assert made.hint
+
+
+async def test_a_job_is_ended_in_time(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(clip(20.0))
+    refused = await jobs.run("m1", source, 0.001)
+    assert isinstance(refused, jobs.Refused)
+    assert "long" in refused.title

@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.marionette.proportions import Proportions, ProportionsError
+
+links = st.floats(0.15, 0.6)
+masses = st.floats(0.002, 0.1)
+
+
+@given(st.tuples(links, links, links), st.tuples(masses, masses, masses), st.floats(0.01, 100.0))
+def test_identity_is_the_shape_whatever_the_size(
+    lengths: tuple[float, float, float], heavy: tuple[float, float, float], size: float
+) -> None:
+    arm = Proportions.of(lengths, heavy)
+    assert sum(arm.thousandths[:3]) == sum(arm.thousandths[3:]) == 1000
+    for exact, rounded in zip((*arm.lengths, *arm.masses), arm.thousandths, strict=True):
+        assert abs(exact * 1000.0 - rounded) <= 1.0
+    a, b, c = (length * size for length in lengths)
+    assert max(abs(x - y) for x, y in zip(Proportions.of((a, b, c), heavy).lengths, arm.lengths, strict=True)) < 1e-12
+
+
+@given(st.integers(100, 780), st.data())
+def test_parse_and_identity_are_inverse(upper: int, data: st.DataObject) -> None:
+    fore = data.draw(st.integers(100, 980 - upper))
+    first = data.draw(st.integers(1, 998))
+    second = data.draw(st.integers(1, 999 - first))
+    identity = f"{upper}-{fore}-{1000 - upper - fore}-{first}-{second}-{1000 - first - second}"
+    arm = Proportions.parse(identity)
+    assert arm.identity == identity
+    assert arm.rounded() == arm
+    assert 0.1 <= arm.inner_radius < 1.0
+
+
+@pytest.mark.parametrize(
+    ("identity", "field"),
+    [
+        ("", "proportions"),
+        ("393-351-256-560-320", "proportions"),
+        ("0.4-0.4-0.2-1-1-1", "proportions"),
+        ("393-351-256-560-320-٣٣", "proportions"),
+        ("393-351-255-560-320-120", "L0"),
+        ("393-351-256-560-320-121", "M0"),
+        ("990-5-5-560-320-120", "L1"),
+        ("393-351-256-1000-0-0", "M1"),
+    ],
+)
+def test_refusals_name_the_field(identity: str, field: str) -> None:
+    with pytest.raises(ProportionsError) as refused:
+        Proportions.parse(identity)
+    assert refused.value.field == field
+    assert refused.value.hint
+
+
+def test_an_arm_without_a_hand_is_refused() -> None:
+    with pytest.raises(ProportionsError, match="L2"):
+        Proportions.of((0.3, 0.3, 0.0))
+    with pytest.raises(ProportionsError, match="above zero"):
+        Proportions.of((0.0, 0.0, 0.0))

@@ -1,0 +1,62 @@
+"""Real servers for tests: the composed app on a free port of its own, keeping its things in a folder of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bunraku.backing.settings import Settings
+from bunraku.motion.skeleton import Motion
+from bunraku.motion.writers import write_bvh
+from bunraku.serve import serve
+from tests.vectors.blocks import wandering_motion
+
+
+@contextmanager
+def running(data: Path, *, demo: bool = False, **settings: object) -> Iterator[str]:
+    """The address of a server that runs in a thread until the block ends."""
+    listening = socket.create_server(("127.0.0.1", 0))
+    url = f"http://127.0.0.1:{listening.getsockname()[1]}"
+    started, ended = threading.Event(), threading.Event()
+    failures: list[BaseException] = []
+
+    def run() -> None:
+        async def until_ended() -> None:
+            given = Settings(data=data, **settings)  # type: ignore[arg-type]
+            serving = asyncio.create_task(serve(given, listening, demo=demo, ready=started.set))
+            ending = asyncio.create_task(asyncio.to_thread(ended.wait))
+            await asyncio.wait((serving, ending), return_when=asyncio.FIRST_COMPLETED)
+            ended.set()
+            serving.cancel()
+            await asyncio.gather(serving, ending, return_exceptions=True)
+            if not serving.cancelled() and (error := serving.exception()) is not None:
+                raise error
+
+        try:
+            asyncio.run(until_ended())
+        except BaseException as error:
+            failures.append(error)
+        finally:
+            started.set()
+
+    thread = threading.Thread(target=run, name=f"server {url}")
+    thread.start()
+    try:
+        assert started.wait(60), "the server did not start"
+        assert not failures, failures
+        yield url
+    finally:
+        ended.set()
+        thread.join(20)
+        assert not thread.is_alive(), "the server did not end"
+        assert not failures, failures
+
+
+def clip(seconds: float = 3.4, seed: int = 3, fps: float = 30.0) -> bytes:
+    """A small BVH file of arbitrary smooth movement."""
+    motion = wandering_motion(seconds, fps, seed)
+    return write_bvh(Motion(motion.figure, fps, motion.root * 0.1 + [0, 0.85, 0], motion.rotations))

@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx2
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from bunraku.client import Client
+from bunraku.wire.messages import (
+    SUBPROTOCOL,
+    ChannelHeader,
+    Claim,
+    Data,
+    Description,
+    Edit,
+    Message,
+    Ping,
+    Pong,
+    Problem,
+    TimelineState,
+    unpack,
+)
+
+
+def socket(server: str, path: str, protocol: str = SUBPROTOCOL) -> connect:
+    return connect(f"ws://{urlsplit(server).netloc}{path}", subprotocols=[protocol], compression=None)  # type: ignore[list-item]
+
+
+async def message(connection: ClientConnection) -> Message | None:
+    data = await asyncio.wait_for(connection.recv(), 10)
+    assert isinstance(data, bytes)
+    return unpack(data)
+
+
+async def until(connection: ClientConnection, kind: type) -> Message:
+    while not isinstance(found := await message(connection), kind):
+        assert not isinstance(found, Problem), found
+    assert found is not None
+    return found
+
+
+@pytest.fixture
+async def motion(server: str, clip_file: Path) -> str:
+    async with Client(server) as client:
+        return str((await client.upload(clip_file))["id"])
+
+
+async def test_the_server_speaks_first_in_the_papers_order(server: str, motion: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream") as connection:
+        assert connection.subprotocol == SUBPROTOCOL
+        kinds = [await message(connection) for _ in range(7)]
+    header, description, timeline, *data = kinds
+    assert isinstance(header, ChannelHeader)
+    assert (header.motion, header.channels, header.clock) == (motion, 19, "unix")
+    assert isinstance(description, Description)
+    assert isinstance(timeline, TimelineState)
+    assert abs(timeline.clock - header.now) < 1_000_000
+    assert [(d.start, d.rate) for d in data if isinstance(d, Data)] == [
+        (0, 0),
+        (1_000_000, 3),
+        (2_000_000, 3),
+        (3_000_000, 3),
+    ]
+
+
+async def test_a_pinned_rate_is_kept_after_the_first_block(server: str, motion: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream?rate=1") as connection:
+        rates = [data.rate for _ in range(7) if isinstance(data := await message(connection), Data)]
+    assert rates == [0, 1, 1, 1]
+
+
+async def test_without_the_motion_track_no_block_comes(server: str, motion: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream?tracks=camera,light") as connection:
+        await until(connection, TimelineState)
+        await connection.send(Ping(1, 2).pack())
+        assert isinstance(await message(connection), Pong)
+
+
+async def test_blocks_over_http_are_the_same_bytes_and_may_be_kept_for_ever(server: str, motion: str) -> None:
+    async with httpx2.AsyncClient(base_url=server) as http:
+        block = await http.get(f"/v1/motions/{motion}/blocks/3/1")
+        description = await http.get(f"/v1/motions/{motion}/description")
+        assert (await http.get(f"/v1/motions/{motion}/blocks/9/0")).status_code == 404
+        assert (await http.get(f"/v1/motions/{motion}/blocks/0/x")).status_code == 422
+        assert (await http.get("/v1/motions/none/description")).status_code == 404
+    assert "immutable" in block.headers["cache-control"]
+    async with socket(server, f"/v1/motions/{motion}/stream") as connection:
+        received = [await connection.recv() for _ in range(5)]
+    assert description.content == received[1]
+    assert block.content == received[4]
+
+
+async def test_pings_are_answered_with_the_time(server: str, motion: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream") as connection:
+        await connection.send(Ping(7, 123).pack())
+        pong = await until(connection, Pong)
+        assert isinstance(pong, Pong)
+        assert (pong.sequence, pong.sent) == (7, 123)
+        assert pong.received <= pong.answered
+
+
+async def test_a_viewers_own_timeline_is_edited_by_its_messages(server: str, motion: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream?at=1.5") as connection:
+        first = await until(connection, TimelineState)
+        assert isinstance(first, TimelineState)
+        assert first.position == 1_500_000
+        await connection.send(Edit(playing=False, position=200_000).pack())
+        second = await until(connection, TimelineState)
+        assert isinstance(second, TimelineState)
+        assert (second.epoch, second.playing, second.position) == (first.epoch + 1, False, 200_000)
+        assert isinstance(await until(connection, Data), Data)
+
+
+async def test_unknown_messages_are_skipped(server: str, motion: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream") as connection:
+        await connection.send(b"\x7fnews")
+        await connection.send(Claim(1).pack())
+        await connection.send(Ping(1, 1).pack())
+        assert isinstance(await until(connection, Pong), Pong)
+
+
+@pytest.mark.parametrize(
+    ("path", "protocol", "sends", "code"),
+    [
+        ("/v1/motions/nothing/stream", SUBPROTOCOL, None, 4404),
+        ("/v1/sessions/nothing/stream", SUBPROTOCOL, None, 4404),
+        ("/v1/motions/{}/stream", "bunraku.v9", None, 4406),
+        ("/v1/motions/{}/stream?tracks=smell", SUBPROTOCOL, None, 1008),
+        ("/v1/motions/{}/stream", SUBPROTOCOL, bytes([64, 0]), 1008),
+        ("/v1/motions/{}/stream", SUBPROTOCOL, "text", 1008),
+        ("/v1/motions/{}/stream", SUBPROTOCOL, bytes([64]) + bytes(1024), 1009),
+    ],
+)
+async def test_what_is_wrong_is_said_and_the_socket_closed(
+    server: str, motion: str, path: str, protocol: str, sends: bytes | str | None, code: int
+) -> None:
+    problem = None
+    with pytest.raises(ConnectionClosed) as closed:  # noqa: PT012
+        async with socket(server, path.format(motion), protocol) as connection:
+            if sends is not None:
+                await connection.send(sends)
+            while True:
+                found = await message(connection)
+                problem = found if isinstance(found, Problem) else problem
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == code
+    if problem is not None:
+        assert problem.title
+        assert problem.detail
+
+
+@pytest.mark.parametrize("query", ["rate=99", "rate=-1", "rate=x", "at=x"])
+async def test_wrong_queries_do_not_open_a_socket(server: str, motion: str, query: str) -> None:
+    with pytest.raises(Exception, match=r"HTTP 4\d\d"):
+        async with socket(server, f"/v1/motions/{motion}/stream?{query}") as connection:
+            await connection.recv()

@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from bunraku.backing.backing import clock
+from bunraku.backing.library import Library, pack
+from bunraku.backing.sockets import TOO_SLOW, Refusal
+from bunraku.codec.encode import encode_motion
+from bunraku.playout import timeline
+from bunraku.stream.viewers import QUEUE, Viewer
+from bunraku.wire.messages import ChannelHeader, Data, Overlay, Ping, Pong, Presence, Report, TimelineState, unpack
+from tests.vectors.blocks import wandering_motion
+
+
+@pytest.fixture
+async def library() -> Library:
+    shelf = Library.open("memory:///")
+    for name, seconds in (("one", 9.2), ("two", 2.0)):
+        encoded = encode_motion(wandering_motion(seconds, 30.0, 9), steps=(28, 14))
+        await shelf.put(name, pack(name, encoded))
+    return shelf
+
+
+class Line:
+    """A line that takes messages, and can be stopped."""
+
+    def __init__(self) -> None:
+        self.sent: list[bytes] = []
+        self.open = asyncio.Event()
+        self.open.set()
+        self._more = asyncio.Condition()
+
+    async def put(self, message: bytes) -> None:
+        await self.open.wait()
+        async with self._more:
+            self.sent.append(message)
+            self._more.notify_all()
+
+    async def count(self, kind: type, number: int) -> list[object]:
+        def found() -> list[object]:
+            return [m for m in map(unpack, self.sent) if isinstance(m, kind)]
+
+        async with asyncio.timeout(10), self._more:
+            await self._more.wait_for(lambda: len(found()) >= number)
+        return found()
+
+
+async def test_another_motion_is_announced_before_its_blocks(library: Library) -> None:
+    viewer, line = Viewer(library, None), Line()
+    state = timeline.start("one", 9_200_000, clock())
+    viewer.timeline(state)
+    sending = asyncio.create_task(viewer.send(line.put))
+    await line.count(Data, 3)
+    viewer.timeline(timeline.change(state, clock(), "two", 2_000_000))
+    await line.count(ChannelHeader, 2)
+    await line.count(TimelineState, 2)
+    sending.cancel()
+    kinds = [message[0] for message in line.sent]
+    second = len(kinds) - 1 - kinds[::-1].index(1)
+    assert kinds[second : second + 3] == [1, 2, 4]
+
+
+async def test_only_the_newest_overlay_waits(library: Library) -> None:
+    viewer, line = Viewer(library, None), Line()
+    viewer.timeline(timeline.start("one", 9_200_000, clock()))
+    line.open.clear()
+    sending = asyncio.create_task(viewer.send(line.put))
+    await asyncio.sleep(0)
+    for number in range(100):
+        viewer.overlay(Overlay(number, 5, {}).pack())
+    line.open.set()
+    overlays = await line.count(Overlay, 1)
+    await line.count(Data, 5)
+    sending.cancel()
+    assert [o.sequence for o in overlays if isinstance(o, Overlay)] == [99]
+
+
+async def test_one_who_does_not_keep_up_is_told_so(library: Library) -> None:
+    viewer, line = Viewer(library, None), Line()
+    viewer.timeline(timeline.start("one", 9_200_000, clock()))
+    for _ in range(QUEUE + 1):
+        viewer.control(Presence(1, [], [None] * 4).pack())
+    with pytest.raises(Refusal) as refused:
+        await viewer.send(line.put)
+    assert refused.value.code == TOO_SLOW
+
+
+async def test_pings_are_answered_before_blocks(library: Library) -> None:
+    viewer, line = Viewer(library, None), Line()
+    viewer.timeline(timeline.start("one", 9_200_000, clock()))
+    viewer.ping(Ping(1, 2))
+    sending = asyncio.create_task(viewer.send(line.put))
+    await line.count(Data, 1)
+    sending.cancel()
+    assert isinstance(unpack(line.sent[0]), Pong)
+
+
+async def test_reports_change_the_rate(library: Library) -> None:
+    viewer, line = Viewer(library, None), Line()
+    viewer.timeline(timeline.start("one", 9_200_000, clock()))
+    sending = asyncio.create_task(viewer.send(line.put))
+    await line.count(Data, 5)
+    viewer.report(Report(buffer=3_000_000, hidden=True))
+    viewer.timeline(timeline.edit(timeline.start("one", 9_200_000, clock()), clock(), position=6_000_000))
+    data = await line.count(Data, 8)
+    sending.cancel()
+    assert [d.rate for d in data if isinstance(d, Data)][-2:] == [0, 0]
