@@ -16,10 +16,10 @@ from websockets.exceptions import ConnectionClosed
 from bunraku.codec import coefficients
 from bunraku.codec.decode import decode_block
 from bunraku.codec.track import MotionTrack, read_track
-from bunraku.motion import rotation
 from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore, Pose
 from bunraku.playout.clock import ReferenceClock
+from bunraku.playout.overlays import Overlays
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
     SUBPROTOCOL,
@@ -38,8 +38,6 @@ from bunraku.wire.messages import (
 
 FRAME = 1 / 60
 BURST = 8
-OVERLAY_LASTS = 250_000
-"""An overlay with none after it holds for so long, microseconds."""
 
 
 class StreamEnded(Exception):
@@ -80,7 +78,7 @@ class Viewer:
         self.presence: Presence | None = None
         self.motion: str | None = None
         self._blocks: BlockStore | None = None
-        self._overlays: list[Overlay] = []
+        self._overlays = Overlays()
         self._early: list[float] = []
         self._decode = 0.0
         self._began = 0.0
@@ -121,21 +119,7 @@ class Viewer:
         pose = self._blocks.pose_at(timeline.position_at(state, reference), state.loop)
         if pose is None:
             return None
-        return pose[0], self._overlaid(pose[1], reference)
-
-    def _overlaid(self, rotations: rotation.Array, reference: int) -> rotation.Array:
-        earlier = [o for o in self._overlays if o.due <= reference]
-        later = [o for o in self._overlays if o.due > reference]
-        if not earlier or (not later and reference - earlier[-1].due > OVERLAY_LASTS):
-            return rotations
-        before, merged = earlier[-1], rotations.copy()
-        for limb, numbers in before.limbs.items():
-            turned = _rotations(numbers)
-            if later and limb in later[0].limbs:
-                share = (reference - before.due) / (later[0].due - before.due)
-                turned = rotation.slerp(turned, _rotations(later[0].limbs[limb]), np.full(3, share))
-            merged[list(JOINTS_OF_LIMB[limb])] = turned
-        return merged
+        return pose[0], self._overlays.lay(pose[1], reference)
 
     async def _receive(self, connection: ClientConnection) -> None:
         try:
@@ -161,7 +145,7 @@ class Viewer:
             now = self.clock.at(_local())
             if self.clock.ready:
                 self._early.append((message.due - now) / 1e3)
-            self._overlays = [*(o for o in self._overlays if o.due > now - OVERLAY_LASTS), message][-64:]
+            self._overlays.put(message)
         elif isinstance(message, Pong):
             self.clock.pong(message.sent, message.received, message.answered, _local())
         elif isinstance(message, TimelineState):
@@ -214,13 +198,6 @@ class Viewer:
         figures.clock_error_ms = self.clock.error / 1e3 if self.clock.ready else None
         figures.overlay_early_ms = float(np.median(self._early)) if self._early else None
         return figures
-
-
-JOINTS_OF_LIMB = ((12, 13, 14), (15, 16, 17), (2, 3, 4), (6, 7, 8))
-
-
-def _rotations(numbers: tuple[int, ...]) -> rotation.Array:
-    return rotation.from_rotation_vector(np.reshape(numbers, (3, 3)) * (np.pi / 32767))
 
 
 def _local() -> int:

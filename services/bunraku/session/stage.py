@@ -14,19 +14,17 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import msgpack
-import numpy as np
 
 from bunraku.backing.backing import clock
 from bunraku.backing.bus import Bus, Subscription
 from bunraku.backing.library import StoredMotion
 from bunraku.codec.decode import decode_block
-from bunraku.marionette import merge
 from bunraku.marionette.merge import Marionette
 from bunraku.marionette.ownership import Grant as Granted
 from bunraku.marionette.ownership import Input as Given
-from bunraku.motion import rotation
 from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore, Pose
+from bunraku.playout.overlays import pack_joints
 from bunraku.wire import messages
 from bunraku.wire.messages import (
     Alive,
@@ -50,7 +48,6 @@ QUEUE = 64
 COLOURS = 5
 PUPPETEERS = 32
 """Puppeteers of one session."""
-OVERLAY_UNIT = np.pi / 32767
 
 
 class Full(Exception):
@@ -93,6 +90,7 @@ class Stage:
         self._viewers: dict[str, int] = {}
         self._engaged = asyncio.Event()
         self._sequence = 0
+        self._overlay: bytes | None = None
         self.seen = clock()
         self._marionette = marionette
         self._set(motion)
@@ -194,7 +192,7 @@ class Stage:
             puppeteer.tell(packed)
 
     async def _state(self, _: bytes) -> bytes:
-        packed: bytes = msgpack.packb([self.timeline.pack(), self.presence.pack()])
+        packed: bytes = msgpack.packb([self.timeline.pack(), self.presence.pack(), self._overlay])
         return packed
 
     def _on_viewers(self, message: bytes) -> None:
@@ -229,7 +227,9 @@ class Stage:
         pose = self._pose(due)
         pulled = self._marionette.overlay(pose[1], now) if pose is not None else None
         self._sequence += 1
-        self._bus.publish(f"session.{self.id}.overlay", _packed(self._sequence, due, pulled).pack())
+        limbs = dict(zip(map(int, pulled.limbs), map(pack_joints, pulled.rotations), strict=True)) if pulled else {}
+        self._overlay = Overlay(self._sequence, due, limbs).pack() if limbs else None
+        self._bus.publish(f"session.{self.id}.overlay", self._overlay or Overlay(self._sequence, due, {}).pack())
         return pulled is not None or any(self._marionette.holders())
 
     async def _prepare(self, due: int) -> None:
@@ -247,13 +247,3 @@ class Stage:
         if state is None or state.motion != self._motion.id:
             return None
         return self._dance.pose_at(timeline.position_at(state, due), state.loop)
-
-
-def _packed(sequence: int, due: int, pulled: merge.Overlay | None) -> Overlay:
-    if pulled is None:
-        return Overlay(sequence, due, {})
-    vectors = rotation.to_rotation_vector(pulled.rotations) / OVERLAY_UNIT
-    numbers = np.clip(np.round(vectors), -32767, 32767).astype(int).reshape(len(pulled.limbs), 9)
-    return Overlay(
-        sequence, due, {int(limb): tuple(map(int, row)) for limb, row in zip(pulled.limbs, numbers, strict=True)}
-    )

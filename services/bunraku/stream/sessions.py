@@ -19,9 +19,10 @@ class WatchedSession:
         self._subject = f"session.{session}"
         self._replica = replica
         self._viewers: set[Viewer] = set()
-        timeline, presence = msgpack.unpackb(state)
+        timeline, presence, overlay = msgpack.unpackb(state)
         self._timeline = timeline
         self._presence = presence
+        self._overlay: bytes | None = overlay
         self._subscriptions: list[Subscription] = [
             bus.subscribe(f"{self._subject}.timeline", self._on_timeline),
             bus.subscribe(f"{self._subject}.presence", self._on_presence),
@@ -33,6 +34,8 @@ class WatchedSession:
         self._viewers.add(viewer)
         viewer.timeline(_timeline(self._timeline))
         viewer.control(self._presence)
+        if self._overlay is not None:
+            viewer.overlay(self._overlay)
         self._count()
 
     def leave(self, viewer: Viewer) -> bool:
@@ -63,6 +66,8 @@ class WatchedSession:
             viewer.control(message)
 
     def _on_overlay(self, message: bytes) -> None:
+        # who joins while a limb is pulled starts from here; an empty mask says that none is
+        self._overlay = message if message[1] else None
         for viewer in self._viewers:
             viewer.overlay(message)
 

@@ -1,0 +1,52 @@
+/** Real servers for browser tests: `bunraku up` on a free port, keeping its things in a folder of its own. */
+import { spawn } from "node:child_process";
+import { existsSync, mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+
+const REPOSITORY = resolve(import.meta.dirname, "../../../..");
+
+export interface RunningServer {
+  url: string;
+  stop(): Promise<void>;
+}
+
+/** Start a server, with our own dance on its stage if `demo`; resolves once it answers. */
+export async function startServer({ demo = true } = {}): Promise<RunningServer> {
+  const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
+  const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
+  const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
+    stdio: ["ignore", "pipe", "inherit"],
+    env: { ...process.env, COLUMNS: "200", NO_COLOR: "1" },
+  });
+  const ended = new Promise<void>((done) => server.once("exit", () => done()));
+  const url = await new Promise<string>((found, failed) => {
+    let said = "";
+    server.stdout.on("data", (chunk: Buffer) => {
+      said += chunk.toString();
+      const address = /is at (http:\S+?)\/?\s/.exec(said);
+      if (address?.[1]) found(address[1]);
+    });
+    void ended.then(() => failed(new Error(`the server ended before it served: ${said}`)));
+  });
+  return {
+    url,
+    async stop() {
+      server.kill("SIGINT");
+      await ended;
+      rmSync(data, { recursive: true, force: true });
+    },
+  };
+}
+
+/** The folder of real clips beside the project, if it is there. */
+export function sharedFolder(): string | null {
+  const folder = process.env["BUNRAKU_SHARED"] ?? resolve(REPOSITORY, "../shared");
+  return existsSync(join(folder, "mocap/bvh")) ? folder : null;
+}
+
+/** The Chromium of this machine, if it has one. */
+export function chromium(): string | null {
+  const places = [process.env["CHROMIUM"], "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+  return places.find((place): place is string => place !== undefined && existsSync(place)) ?? null;
+}

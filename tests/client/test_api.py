@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from bunraku.client import Client, ServerProblem
+
+
+async def test_upload_tells_how_far_it_is_and_what_was_made(server: str, clip_file: Path) -> None:
+    told: list[tuple[int, int]] = []
+    async with Client(server) as client:
+        motion = await client.upload(clip_file, lambda sent, size: told.append((sent, size)))
+        assert await client.motion(motion["id"]) == motion
+        assert motion["id"] in [m["id"] for m in await client.motions()]
+        await client.delete_motion(motion["id"])
+        with pytest.raises(ServerProblem) as gone:
+            await client.motion(motion["id"])
+    assert gone.value.status == 404
+    assert told[-1] == (motion["bytes"],) * 2
+    assert told == sorted(told)
+
+
+async def test_a_refusal_says_line_and_hint(server: str, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.bvh"
+    bad.write_text("HIERARCHY\nROOT hips\n{\nOFFSET 0 0 zero\n")
+    async with Client(server) as client:
+        with pytest.raises(ServerProblem, match=r"line 4.*\("):
+            await client.upload(bad)
+
+
+async def test_where_nobody_answers_it_says_so() -> None:
+    async with Client("http://127.0.0.1:9") as client:
+        with pytest.raises(httpx2.TransportError):
+            await client.motions()
+
+
+def test_socket_addresses_follow_the_servers() -> None:
+    assert Client("https://stage.example/here/").socket_url("/v1/x") == "wss://stage.example/here/v1/x"

@@ -1,0 +1,45 @@
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bunraku.client import Client, Puppeteer, Refused, Viewer
+from bunraku.motion import rotation
+from bunraku.motion.skeleton import INDEX, world
+from bunraku.playout.blocks import Pose
+
+
+async def test_a_pulled_hand_is_seen_where_it_was_pulled_by_others(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+        viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream?rate=3"))
+        shown: dict[int, Pose] = {}
+        watching = asyncio.create_task(viewer.watch(2.5, shown.__setitem__))
+        async with Puppeteer(client, session, "Aiko") as puppeteer:
+            await puppeteer.claim("left_hand")
+            await puppeteer.target("left_hand", 0.3, 0.5, 0.4)
+            figures = await watching
+            await puppeteer.release("left_hand")
+    assert figures.overlays > 10
+    assert viewer.track is not None
+    figure = viewer.track.figure
+    root, rotations = shown[max(shown)]
+    position, orientation = world(figure, root, rotations)
+    shoulder, wrist, chest = INDEX["l_shoulder"], INDEX["l_wrist"], INDEX["vl5"]
+    tip = position[wrist] + rotation.rotate(orientation[wrist], figure.tips[wrist])
+    length = sum(np.linalg.norm(figure.offsets[INDEX[j]]) for j in ("l_elbow", "l_wrist")) + np.linalg.norm(
+        figure.tips[wrist]
+    )
+    seen = rotation.rotate(rotation.conjugate(orientation[chest]), tip - position[shoulder]) / length
+    np.testing.assert_allclose(seen, [0.3, 0.5, 0.4], atol=0.01)
+
+
+async def test_pulling_what_one_does_not_hold_is_refused(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+        async with Puppeteer(client, session) as puppeteer:
+            with pytest.raises(Refused, match="not held"):
+                await puppeteer.velocity("right_hand", 1)

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from bunraku.client import Client
+from tests.servers import clip, running
+
+
+async def test_a_session_is_opened_edited_listed_and_ended(tmp_path: Path) -> None:
+    source, other = tmp_path / "one.bvh", tmp_path / "two.bvh"
+    source.write_bytes(clip(2.0, 1))
+    other.write_bytes(clip(1.0, 2))
+    with running(tmp_path / "data") as url:
+        async with Client(url) as client, httpx2.AsyncClient(base_url=url) as http:
+            one, two = (await client.upload(source))["id"], (await client.upload(other))["id"]
+            answer = await http.post("/v1/sessions", json={"motion": one, "playing": False})
+            assert answer.status_code == 201
+            session = answer.json()
+            assert answer.headers["location"] == f"/v1/sessions/{session['id']}"
+            assert (session["motion"], session["playing"], session["loop"], session["position"]) == (
+                one,
+                False,
+                True,
+                0,
+            )
+            assert session["limbs"] == [None] * 4
+            edited = await client.edit_session(session["id"], position=700_000, loop=False)
+            assert (edited["position"], edited["loop"], edited["epoch"]) == (700_000, False, 2)
+            changed = await client.edit_session(session["id"], motion=two)
+            assert (changed["motion"], changed["duration"], changed["epoch"]) == (two, 1_000_000, 3)
+            more = [(await client.open_session(one))["id"] for _ in range(2)]
+            page = (await http.get("/v1/sessions?limit=2")).json()
+            rest = (await http.get(f"/v1/sessions?limit=2&cursor={page['next']}")).json()
+            assert [s["id"] for s in page["items"] + rest["items"]] == [session["id"], *more]
+            assert (await http.delete(f"/v1/sessions/{more[0]}")).status_code == 204
+            assert (await http.get(f"/v1/sessions/{more[0]}")).status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "field"),
+    [
+        ({"motion": "none"}, 404, "motion"),
+        ({}, 422, "motion"),
+        ({"motion": "m", "colour": "red"}, 422, "colour"),
+        ({"motion": 5}, 422, "motion"),
+        ([], 422, None),
+    ],
+)
+async def test_a_wrong_session_is_refused_in_words(server: str, body: object, status: int, field: str | None) -> None:
+    async with httpx2.AsyncClient(base_url=server) as http:
+        answer = await http.post("/v1/sessions", json=body)
+    assert answer.status_code == status
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.json().get("field") == field
+
+
+async def test_a_wrong_edit_changes_nothing(server: str, clip_file: Path) -> None:
+    async with Client(server) as client, httpx2.AsyncClient(base_url=server) as http:
+        session = await client.open_session((await client.upload(clip_file))["id"], playing=False)
+        path = f"/v1/sessions/{session['id']}"
+        for body in ({"position": -1}, {"position": 1 << 60}, {"motion": "none"}, {"speed": 2}):
+            assert (await http.patch(path, json=body)).status_code in (404, 422)
+        assert (await http.get(path)).json() == session
+        assert (await http.patch("/v1/sessions/none", json={"playing": True})).status_code == 404

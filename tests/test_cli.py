@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from bunraku import __version__
+from bunraku.cli import app
+
+RUN = CliRunner()
+
+
+def test_upload_list_watch_and_version_speak_json(server: str, clip_file: Path) -> None:
+    uploaded = RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"])
+    assert uploaded.exit_code == 0, uploaded.output
+    motion = json.loads(uploaded.stdout)["id"]
+    listed = json.loads(RUN.invoke(app, ["list", "--server", server, "--json"]).stdout)
+    assert motion in [m["id"] for m in listed]
+    for address in (motion, f"{server}/v1/motions/{motion}", f"{server}/v1/motions/{motion}/stream"):
+        watched = RUN.invoke(app, ["watch", address, "--server", server, "--seconds", "0.4", "--json"])
+        assert watched.exit_code == 0, watched.output
+        figures = json.loads(watched.stdout)
+        assert figures["frames"] > 0
+        assert figures["first_pose_ms"] > 0
+    assert json.loads(RUN.invoke(app, ["version", "--json"]).stdout) == {"version": __version__}
+
+
+def test_for_people_there_are_tables(server: str, clip_file: Path) -> None:
+    shown = RUN.invoke(app, ["upload", str(clip_file), "--server", server])
+    assert "18 of 18" in shown.stdout
+    assert "kbit/s" in shown.stdout
+    assert clip_file.stem in RUN.invoke(app, ["list", "--server", server]).stdout
+
+
+def test_failures_are_said_in_words(server: str, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.bvh"
+    bad.write_text("nothing")
+    for arguments in (
+        ["upload", str(bad), "--server", server],
+        ["watch", "none", "--server", server],
+        ["watch", f"{server}/v1/motions/none", "--seconds", "1"],
+        ["list", "--server", "http://127.0.0.1:9"],
+        ["upload", str(tmp_path / "missing.bvh"), "--server", server],
+    ):
+        result = RUN.invoke(app, arguments)
+        assert result.exit_code != 0
+        assert "Traceback" not in result.output
+        assert not isinstance(result.exception, Exception) or isinstance(result.exception, SystemExit)
