@@ -1,1 +1,325 @@
-document.title = "Bunraku";
+/** The only wiring: page, stage, inputs and the session they are about. */
+import "./style/page.css";
+import type { Vector3 } from "three";
+import { createSession, ProblemError, type Motion } from "./client/library";
+import type { GamepadInput } from "./input/gamepad";
+import type { Hands, Source } from "./input/hands";
+import type { KeyboardInput } from "./input/keyboard";
+import type { PointerInput } from "./input/pointer";
+import { holders, LIMB_NAMES, type Holder } from "./page/model";
+import { ownName } from "./page/name";
+import { createPage } from "./page/page";
+import { PHONE } from "./page/panels";
+import { Pieces } from "./page/pieces";
+import { createTheme, type ThemeChoice } from "./page/theme";
+import { tell, uploadAll } from "./page/uploads";
+import { findSession, Room } from "./room";
+import type { Stage } from "./stage/stage";
+import type { StringState } from "./stage/strings";
+
+const INVITED = "bunraku.invited";
+const INVITATION = 6_000;
+const SAMPLE_EVERY = 500;
+
+const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvasElement;
+const query = new URLSearchParams(location.search);
+const calm = matchMedia("(prefers-reduced-motion: reduce)");
+const pieces = new Pieces();
+
+let stage: Stage | null = null;
+let hands: Hands | null = null;
+let pointer: PointerInput | null = null;
+let keyboard: KeyboardInput | null = null;
+let pad: GamepadInput | null = null;
+let room: Room | null = null;
+let connected = false;
+let focused: number | null = null;
+let invitedAt: number | null = null;
+let theme: ThemeChoice | null = null;
+
+const page = createPage(document.body, {
+  share: () => void share(),
+  theme: () => theme?.toggle(),
+  play,
+  loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
+  seek: (seconds) => room?.seek(seconds, performance.now()),
+  files: (files) => {
+    page.panels.open("library");
+    void uploadAll(files, page.library, uploaded);
+  },
+  choose: (id) => void choose(id),
+  remove: (piece) => {
+    if (confirm(`Remove "${piece.name}" from the library?`)) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
+  },
+  toggle: (limb) => (hands?.source(limb) ? hands.letGo(limb) : take(limb, "keys")),
+  focus: (limb) => (focused = limb),
+  reframe: resize,
+});
+theme = createTheme((now) => {
+  page.header.theme(now);
+  stage?.setTheme(now);
+});
+
+function play(): void {
+  if (room?.viewer.timeline) room.edit({ playing: !room.viewer.timeline.playing });
+}
+
+function step(blocks: number): void {
+  if (!room || room.viewer.blocks.length === 0) return;
+  const block = room.viewer.duration / room.viewer.blocks.length;
+  const now = performance.now();
+  room.seek(Math.min(room.viewer.duration, Math.max(0, room.position(now) + blocks * block)), now);
+}
+
+async function share(): Promise<void> {
+  const url = new URL(location.href);
+  url.search = room ? `?session=${encodeURIComponent(room.id)}` : "";
+  try {
+    await navigator.clipboard.writeText(url.href);
+    page.toast("Link copied");
+  } catch {
+    page.toast(`Copy this link: ${url.href}`);
+  }
+}
+
+async function uploaded(motion: Motion): Promise<void> {
+  await pieces.refresh();
+  renderPieces();
+  await choose(motion.id);
+}
+
+/** Puts a dance on the stage: for everyone in the session, or in a session of its own where there is none. */
+async function choose(id: string): Promise<void> {
+  try {
+    if (room) {
+      room.edit({ motion: id, position: 0 });
+    } else {
+      const session = await createSession(id);
+      const entered = enter(session.id);
+      if (calm.matches) entered.edit({ playing: false });
+    }
+    if (PHONE.matches) page.panels.close("library");
+  } catch (error) {
+    tell(page.library, pieces.find(id)?.name ?? "This dance", error);
+  }
+}
+
+function renderPieces(): void {
+  page.library.pieces(pieces.all, room?.viewer.motion ?? null);
+  page.header.piece(pieces.find(room?.viewer.motion ?? null)?.name ?? "");
+}
+
+/** Holders as the session says, and one's own limbs at once, before it has answered. */
+function held(): (Holder | null)[] {
+  const { puppeteer, viewer } = room ?? {};
+  const told = holders(viewer?.presence ?? null, puppeteer?.id ?? null);
+  return told.map((holder, limb) => {
+    if (hands?.source(limb)) return { id: puppeteer?.id ?? "", name: "You", colour: puppeteer?.colour ?? 0, mine: true };
+    return holder?.mine ? null : holder;
+  });
+}
+
+function renderStrings(): void {
+  page.strings.render(held(), connected && room !== null);
+}
+
+function take(limb: number, source: Source): boolean {
+  const holder = held()[limb];
+  if (holder && !holder.mine) {
+    refused(limb);
+    return false;
+  }
+  endInvitation();
+  return hands?.take(limb, source) ?? false;
+}
+
+function refused(limb: number): void {
+  stage?.strings.refuse(limb);
+  const holder = held()[limb];
+  page.toast(holder ? `${holder.name} holds the ${LIMB_NAMES[limb].toLowerCase()}` : `The ${LIMB_NAMES[limb].toLowerCase()} was let go`);
+}
+
+function endInvitation(): void {
+  invitedAt = -Infinity;
+  page.tags.invite(null);
+  try {
+    localStorage.setItem(INVITED, "yes");
+  } catch {
+    // Storage may be forbidden; then the invitation comes again.
+  }
+}
+
+function wasInvited(): boolean {
+  try {
+    return localStorage.getItem(INVITED) !== null;
+  } catch {
+    return false;
+  }
+}
+
+/** Watches a session, leaving the one before. */
+function enter(id: string): Room {
+  room?.close();
+  room = new Room(id, ownName(query, Math.random()), (error) => {
+    page.toast(error instanceof ProblemError ? `${error.title}: ${error.detail}` : String(error));
+  });
+  const { viewer, puppeteer } = room;
+  if (hands) hands.puppeteer = puppeteer;
+  const url = new URL(location.href);
+  url.search = `?session=${encodeURIComponent(id)}`;
+  history.replaceState(null, "", url);
+  page.notice(null);
+  viewer.addEventListener("figure", () => {
+    if (viewer.figure) stage?.setFigure(viewer.figure);
+    if (!pieces.find(viewer.motion)) void pieces.refresh().then(renderPieces, () => undefined);
+    renderPieces();
+  });
+  const renderTimeline = () => page.transport.timeline(viewer.timeline?.playing ?? false, viewer.timeline?.loop ?? false, viewer.timeline !== null);
+  viewer.addEventListener("timeline", renderTimeline);
+  viewer.addEventListener("blocks", () => page.transport.blocks(viewer.blocks, viewer.rates.length));
+  const renderPeople = () => {
+    page.header.people(viewer.presence, puppeteer.id);
+    renderStrings();
+  };
+  viewer.addEventListener("presence", renderPeople);
+  puppeteer.addEventListener("welcome", renderPeople);
+  puppeteer.addEventListener("refusal", (event) => {
+    const { limb } = (event as CustomEvent<{ limb: number }>).detail;
+    hands?.refused(limb);
+    refused(limb);
+  });
+  viewer.addEventListener("open", () => {
+    connected = true;
+    page.notice(null);
+    renderStrings();
+  });
+  viewer.addEventListener("closed", (event) => {
+    connected = false;
+    renderStrings();
+    const reason = String((event as CustomEvent<string>).detail);
+    if (viewer.ended) page.notice("The session has ended", reason);
+    else page.toast(`The line was lost: ${reason}`);
+  });
+  renderTimeline();
+  renderPieces();
+  expose();
+  return room;
+}
+
+function resize(): void {
+  const framing = PHONE.matches ? (page.panels.sheet ? "sheet" : "phone") : "desktop";
+  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio);
+}
+
+/** `window.bunraku`: the parts of the running page, for tests and for people who like to look inside. */
+function expose(): void {
+  Object.assign(window, { bunraku: { stage, viewer: room?.viewer ?? null, puppeteer: room?.puppeteer ?? null, hands } });
+}
+
+async function openStage(): Promise<void> {
+  const { createGamepad, createKeyboard, createPointer, Hands, Stage } = await import("./theatre");
+  try {
+    stage = new Stage(canvas, query.get("quality") === "best");
+  } catch {
+    page.notice("This browser cannot draw the stage", "It needs WebGL 2. Try another browser, or switch on hardware acceleration.");
+    return;
+  }
+  stage.still = calm.matches;
+  calm.addEventListener("change", () => stage && (stage.still = calm.matches));
+  if (theme) stage.setTheme(theme.theme);
+  hands = new Hands(stage);
+  hands.changed = renderStrings;
+  pointer = createPointer(canvas, stage, hands, (limb) => !held()[limb], refused);
+  keyboard = createKeyboard(window, hands, {
+    take: (limb) => take(limb, "keys"),
+    play,
+    step,
+    panel: (name) => page.panels.toggle(name),
+    keys: () => page.keys.show(),
+    escape: () => page.panels.closeLast(),
+  });
+  pad = createGamepad(hands, { take: (limb) => take(limb, "pad"), play, step }, () => navigator.getGamepads());
+  if (room) {
+    hands.puppeteer = room.puppeteer;
+    if (room.viewer.figure) stage.setFigure(room.viewer.figure);
+  }
+  expose();
+  resize();
+  addEventListener("resize", resize);
+  requestAnimationFrame(frame);
+}
+
+let before = 0;
+let sampled = 0;
+
+function frame(): void {
+  requestAnimationFrame(frame);
+  if (!stage || !hands) return;
+  const now = performance.now();
+  const seconds = (now - before) / 1000;
+  before = now;
+  const { viewer } = room ?? {};
+  pointer?.update();
+  keyboard?.update();
+  pad?.update(now);
+  if (page.keys.open) page.keys.pad(pad?.pad ?? null);
+  const pose = viewer?.poseAt(now) ?? null;
+  const all = held();
+  const states = all.map((holder, limb): StringState => ({
+    holder: holder?.colour ?? null,
+    lit: pointer?.near === limb || focused === limb || keyboard?.limb === limb,
+    pull: hands?.pull(limb) ?? null,
+  }));
+  stage.draw(pose, states, seconds);
+  page.tags.render(all, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
+  if (pose) invite(now);
+  if (room && viewer) page.transport.position(room.position(now), viewer.duration);
+  if (viewer && now - sampled >= SAMPLE_EVERY) {
+    sampled = now;
+    const line = viewer.line();
+    page.line.sample(line, viewer.rates.length);
+    page.transport.health(page.line.health(line, connected));
+  }
+  viewer?.drawn(performance.now() - now);
+}
+
+function screenPlace(at: Vector3 | null): { x: number; y: number } | null {
+  return at && stage ? stage.toScreen(at) : null;
+}
+
+/** On a first visit, six seconds of invitation by the hand nearer to the audience. */
+function invite(now: number): void {
+  if (invitedAt === null) invitedAt = wasInvited() ? -Infinity : now;
+  if (invitedAt === -Infinity || !stage?.puppet) return;
+  if (now - invitedAt > INVITATION) {
+    endInvitation();
+    return;
+  }
+  page.tags.invite(screenPlace(stage.nearerHand()));
+}
+
+async function start(): Promise<void> {
+  try {
+    const asked = query.get("session");
+    // The session of the address needs no list: go on stage at once, and read the library meanwhile.
+    if (asked) enter(asked);
+    await pieces.refresh();
+    renderPieces();
+    const session = room ? null : await findSession(null, pieces.all[0]?.id ?? null);
+    if (session) {
+      const entered = enter(session.id);
+      if (calm.matches && session.viewers === 0) entered.edit({ playing: false });
+    } else if (!room) {
+      page.notice("The stage is empty", "Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it.");
+      page.panels.open("library");
+    }
+  } catch (error) {
+    if (!(error instanceof ProblemError)) throw error;
+    page.notice(error.title, `${error.detail}. ${error.hint ?? ""}`);
+  }
+}
+
+renderStrings();
+page.transport.health("none");
+void openStage();
+void start();

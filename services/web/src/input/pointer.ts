@@ -1,0 +1,106 @@
+/** Mouse and touch on the stage: a ring or hand is dragged, anything else turns the view. */
+import { Vector3 } from "three";
+import type { Stage } from "../stage/stage";
+import type { Hands } from "./hands";
+
+/** How near a handle a pointer takes hold, CSS pixels, whatever size the ring is drawn. */
+export const GRAB = 44;
+const ORBIT = 0.005;
+
+export interface PointerInput {
+  /** The limb under the pointer, lit; null for none. */
+  readonly near: number | null;
+  /** Pulls again what is held: the dance moves under a resting pointer. Once a frame. */
+  update(): void;
+}
+
+interface Drag {
+  limb: number;
+  x: number;
+  y: number;
+  /** From the pointer to the handle when it was taken, pixels. */
+  dx: number;
+  dy: number;
+}
+
+/** `may(limb)` says whether a limb is free to take; `refused` is told when it is not. */
+export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Hands, may: (limb: number) => boolean, refused: (limb: number) => void): PointerInput {
+  const drags = new Map<number, Drag>();
+  let near: number | null = null;
+  let orbiting: { id: number; x: number; y: number } | null = null;
+  const handle = new Vector3();
+
+  const nearest = (x: number, y: number): number | null => {
+    if (!stage.puppet) return null;
+    let best: number | null = null;
+    let least = GRAB;
+    for (let limb = 0; limb < 4; limb++) {
+      const at = stage.toScreen(stage.puppet.handle(limb, handle));
+      const away = Math.hypot(at.x - x, at.y - y);
+      if (away < least) [best, least] = [limb, away];
+    }
+    return best;
+  };
+  const light = (limb: number | null) => {
+    near = limb;
+    if (limb === null) delete canvas.dataset.near;
+    else canvas.dataset.near = "";
+  };
+  const pull = ({ limb, x, y, dx, dy }: Drag) => {
+    if (!stage.puppet) return;
+    const place = stage.fromScreen(x + dx, y + dy, stage.puppet.handle(limb, handle));
+    if (place) hands.pullTo(limb, place);
+  };
+
+  canvas.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    const { clientX: x, clientY: y, pointerId } = event;
+    const limb = nearest(x, y);
+    canvas.setPointerCapture(pointerId);
+    if (limb === null) {
+      orbiting ??= { id: pointerId, x, y };
+      return;
+    }
+    if (!may(limb)) {
+      refused(limb);
+      return;
+    }
+    if (!stage.puppet || !hands.take(limb, "pointer")) return;
+    const at = stage.toScreen(stage.puppet.handle(limb, handle));
+    drags.set(pointerId, { limb, x, y, dx: at.x - x, dy: at.y - y });
+    canvas.dataset.pulling = "";
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const drag = drags.get(event.pointerId);
+    if (drag) {
+      [drag.x, drag.y] = [event.clientX, event.clientY];
+      pull(drag);
+    } else if (orbiting?.id === event.pointerId) {
+      stage.audience.orbit((orbiting.x - event.clientX) * ORBIT, (event.clientY - orbiting.y) * ORBIT);
+      orbiting = { id: event.pointerId, x: event.clientX, y: event.clientY };
+    } else if (event.pointerType !== "touch") {
+      light(nearest(event.clientX, event.clientY));
+    }
+  });
+  const end = (event: PointerEvent) => {
+    const drag = drags.get(event.pointerId);
+    drags.delete(event.pointerId);
+    if (drag && hands.source(drag.limb) === "pointer") hands.letGo(drag.limb);
+    if (orbiting?.id === event.pointerId) orbiting = null;
+    if (drags.size === 0) delete canvas.dataset.pulling;
+  };
+  canvas.addEventListener("pointerup", end);
+  canvas.addEventListener("pointercancel", end);
+  canvas.addEventListener("pointerleave", () => light(null));
+  return {
+    get near() {
+      return near;
+    },
+    update() {
+      for (const [id, drag] of drags) {
+        if (hands.source(drag.limb) === "pointer") pull(drag);
+        else drags.delete(id);
+      }
+    },
+  };
+}

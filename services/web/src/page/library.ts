@@ -1,0 +1,108 @@
+/** The library drawer: drop zone, uploads with true progress, problems in plain words, and the list of dances. */
+import { element, setAttribute, setText } from "./dom";
+import { clockTime, uploadProgress } from "./format";
+import { icon, motionGlyph } from "./icons";
+import { createPanel, type Panel } from "./panels";
+
+export interface Piece {
+  id: string;
+  name: string;
+  /** What kind of recording: "40 Hz, 1.2 mm". */
+  detail: string;
+  seconds: number;
+}
+
+export interface UploadRow {
+  progress(loaded: number, total: number, seconds: number): void;
+  remove(): void;
+}
+
+export interface Library {
+  readonly panel: Panel;
+  pieces(pieces: readonly Piece[], current: string | null): void;
+  upload(name: string, cancel: () => void): UploadRow;
+  problem(name: string, title: string, detail: string, hint: string | null): void;
+}
+
+export const ACCEPTED = ".bvh";
+
+export function createLibrary(root: HTMLElement, on: { files(files: readonly File[]): void; choose(id: string): void; remove(piece: Piece): void; close(): void }): Library {
+  const panel = createPanel(root, "library", "Library", on.close);
+  const picker = element("input", { type: "file", accept: ACCEPTED, multiple: true, hidden: true });
+  picker.addEventListener("change", () => {
+    on.files([...(picker.files ?? [])]);
+    picker.value = ""; // The same file may be chosen again.
+  });
+  const drop = element("button", { class: "drop", type: "button", onClick: () => picker.click() }, icon("upload"), element("b", {}, "Drop a dance here"));
+  drop.append(element("span", {}, "motion .bvh, up to 64 MB, or press to choose"));
+  const doing = element("div", { role: "group", "aria-label": "Uploads" });
+  const said = element("div", { role: "alert" });
+  const list = element("ul", { class: "motions" });
+  const empty = element("p", { class: "empty", hidden: true }, "No dances yet. Drop a motion capture file anywhere on this page and the puppet dances it.");
+  panel.body.append(drop, picker, doing, said, list, empty);
+  return {
+    panel,
+    pieces(pieces, current) {
+      empty.hidden = pieces.length > 0;
+      list.replaceChildren(
+        ...pieces.map((piece) => {
+          const choose = element("button", { class: "motion", type: "button", onClick: () => on.choose(piece.id) });
+          setAttribute(choose, "aria-current", piece.id === current ? "true" : null);
+          const glyph = element("span", { class: "motion-glyph" });
+          glyph.append(motionGlyph(piece.id));
+          const text = element("span", { class: "motion-text" }, element("b", {}, piece.name), element("small", {}, piece.detail));
+          choose.append(glyph, text, element("span", { class: "motion-length" }, clockTime(piece.seconds)));
+          const remove = element("button", { class: "round-button motion-remove", type: "button", "aria-label": `Remove ${piece.name}`, onClick: () => on.remove(piece) }, icon("bin"));
+          return element("li", {}, choose, remove);
+        }),
+      );
+    },
+    upload(name, cancel) {
+      const share = element("span", {}, "0 %");
+      const fill = element("i", { style: "width: 0" });
+      const bar = element("div", { class: "progress", role: "progressbar", "aria-label": `Upload of ${name}`, "aria-valuemin": 0, "aria-valuemax": 100 }, fill);
+      const state = element("span", {}, "waiting");
+      const stop = element("button", { class: "text-button", type: "button", "aria-label": `Cancel the upload of ${name}`, onClick: cancel }, "Cancel");
+      const row = element("div", { class: "upload" }, element("div", { class: "upload-row" }, element("span", { class: "upload-name" }, name), share), bar);
+      row.append(element("div", { class: "upload-row" }, state, stop));
+      doing.append(row);
+      return {
+        progress(loaded, total, seconds) {
+          const percent = total > 0 ? Math.floor((loaded / total) * 100) : 0;
+          setText(share, `${percent} %`);
+          setText(state, uploadProgress(loaded, total, seconds));
+          fill.style.width = `${percent}%`;
+          bar.setAttribute("aria-valuenow", String(percent));
+        },
+        remove: () => row.remove(),
+      };
+    },
+    problem(name, title, detail, hint) {
+      const box = element("div", { class: "problem" }, element("b", {}, `${name}: ${title}`), element("p", {}, detail));
+      if (hint) box.append(element("p", { class: "muted" }, hint));
+      box.append(element("button", { class: "text-button", type: "button", onClick: () => box.remove() }, "Dismiss"));
+      said.replaceChildren(box);
+    },
+  };
+}
+
+/** Files dropped anywhere on the page; a gold frame shows that they may be. */
+export function acceptDrops(root: HTMLElement, on: (files: readonly File[]) => void): void {
+  const frame = element("div", { class: "drop-frame", hidden: true }, element("span", {}, "Drop to add this dance"));
+  root.append(frame);
+  const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
+  addEventListener("dragover", (event) => {
+    if (!carriesFiles(event)) return;
+    event.preventDefault();
+    frame.hidden = false;
+  });
+  addEventListener("dragleave", (event) => {
+    if (event.relatedTarget === null) frame.hidden = true;
+  });
+  addEventListener("drop", (event) => {
+    if (!carriesFiles(event)) return;
+    event.preventDefault();
+    frame.hidden = true;
+    on([...(event.dataTransfer?.files ?? [])]);
+  });
+}

@@ -1,0 +1,35 @@
+/** What the page shows of a session, in the words of the contract. */
+import type { Viewer } from "../client/viewer";
+
+export type Presence = NonNullable<Viewer["presence"]>;
+export type Timeline = NonNullable<Viewer["timeline"]>;
+export type LineFigures = ReturnType<Viewer["line"]>;
+
+/** Limbs as people read them: the puppet's right first, in the order of keys 1 to 4. */
+export const LIMB_ORDER: readonly number[] = [1, 0, 3, 2];
+export const LIMB_NAMES: readonly string[] = ["Left hand", "Right hand", "Left leg", "Right leg"];
+
+/** The key (1 to 4) that takes a limb. */
+export function limbKey(limb: number): number {
+  return LIMB_ORDER.indexOf(limb) + 1;
+}
+
+/** Who holds a limb, as the page tells it. */
+export interface Holder {
+  id: string;
+  /** "You" for oneself. */
+  name: string;
+  colour: number;
+  mine: boolean;
+}
+
+/** Holders of the four limbs, null where free. */
+export function holders(presence: Presence | null, self: string | null): (Holder | null)[] {
+  return [0, 1, 2, 3].map((limb) => {
+    const id = presence?.limbs[limb];
+    if (!id) return null;
+    const person = presence?.puppeteers.find((one) => one.id === id);
+    const mine = id === self;
+    return { id, mine, name: mine ? "You" : person?.name || "Someone", colour: person?.colour ?? 0 };
+  });
+}

@@ -1,0 +1,70 @@
+/** Opens and shuts the library, strings and line panels; on a phone one at a time, as a sheet. */
+import { element } from "./dom";
+import { icon } from "./icons";
+import type { PanelName } from "./transport";
+
+export const PHONE = matchMedia("(max-width: 720px)");
+
+export interface Panel {
+  readonly element: HTMLElement;
+  readonly body: HTMLElement;
+}
+
+/** A panel with its title and close button. */
+export function createPanel(root: HTMLElement, kind: string, title: string, close: () => void): Panel {
+  const body = element("div");
+  const shut = element("button", { class: "round-button", type: "button", "aria-label": `Close ${title.toLowerCase()}`, onClick: close }, icon("close"));
+  const panel = element("aside", { class: `panel ${kind}`, "aria-label": title, hidden: true }, element("div", { class: "panel-head" }, element("h2", {}, title), shut), body);
+  root.append(panel);
+  return { element: panel, body };
+}
+
+export interface Panels {
+  isOpen(name: PanelName): boolean;
+  toggle(name: PanelName): void;
+  open(name: PanelName): void;
+  close(name: PanelName): void;
+  /** Shuts the panel opened last; false when none is open. */
+  closeLast(): boolean;
+  /** Some panel covers the lower part of a phone. */
+  readonly sheet: boolean;
+}
+
+/** `changed` is told of every panel that opens or shuts. The button that opened a panel gets the focus back. */
+export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, changed: (name: PanelName, open: boolean) => void): Panels {
+  const order: PanelName[] = [];
+  const returns = new Map<PanelName, HTMLElement>();
+  const set = (name: PanelName, open: boolean) => {
+    const panel = panels.get(name);
+    if (!panel || panel.hidden !== open) return;
+    const before = document.activeElement;
+    const within = panel.contains(before);
+    panel.hidden = !open;
+    order.splice(0, order.length, ...order.filter((one) => one !== name));
+    if (open) {
+      if (PHONE.matches) for (const other of [...order]) set(other, false);
+      order.push(name);
+      if (before instanceof HTMLElement && before !== document.body) returns.set(name, before);
+    } else if (within) {
+      returns.get(name)?.focus();
+    }
+    document.body.classList.toggle("sheet-open", PHONE.matches && order.length > 0);
+    changed(name, open);
+  };
+  return {
+    isOpen: (name) => order.includes(name),
+    toggle(name) {
+      set(name, !order.includes(name));
+    },
+    open: (name) => set(name, true),
+    close: (name) => set(name, false),
+    closeLast() {
+      const last = order.at(-1);
+      if (last) set(last, false);
+      return last !== undefined;
+    },
+    get sheet() {
+      return PHONE.matches && order.length > 0;
+    },
+  };
+}

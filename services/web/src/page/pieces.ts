@@ -1,0 +1,44 @@
+/** The library's motions as the page names them. */
+import { deleteMotion, listMotions, type Motion } from "../client/library";
+import { figure, pieceName } from "./format";
+import type { Piece } from "./library";
+
+/** Pages of the list that are read; beyond them the newest are enough to choose from. */
+const MOST_PAGES = 5;
+
+export function asPiece(motion: Motion): Piece {
+  return { id: motion.id, name: motion.name || pieceName(motion.filename), detail: kind(motion), seconds: motion.duration };
+}
+
+/** "BVH, 120 Hz". */
+function kind({ filename, fps }: Motion): string {
+  const rate = `${Number.isInteger(fps) ? fps : figure(fps)} Hz`;
+  const ending = /\.([^.]+)$/.exec(filename)?.[1];
+  return ending ? `${ending.toUpperCase()}, ${rate}` : rate;
+}
+
+export class Pieces {
+  all: Piece[] = [];
+
+  /** Reads the list again. Throws ProblemError. */
+  async refresh(): Promise<void> {
+    const found: Piece[] = [];
+    let cursor: string | undefined;
+    for (let page = 0; page < MOST_PAGES; page++) {
+      const { items, next } = await listMotions(cursor);
+      found.push(...items.map(asPiece));
+      if (next === null) break;
+      cursor = next;
+    }
+    this.all = found;
+  }
+
+  async remove(id: string): Promise<void> {
+    await deleteMotion(id);
+    this.all = this.all.filter((piece) => piece.id !== id);
+  }
+
+  find(id: string | null): Piece | null {
+    return this.all.find((piece) => piece.id === id) ?? null;
+  }
+}

@@ -1,0 +1,70 @@
+/** The session being watched: its viewer and puppeteer, and the edits of its timeline. */
+import { createSession, editSession, getSession, listSessions, type Session, type SessionEdit } from "./client/library";
+import { Puppeteer } from "./client/puppeteer";
+import { Viewer } from "./client/viewer";
+
+/** After a seek the bar stands where it was put until the line has followed, at most this long. Milliseconds. */
+const SEEK_GRACE = 1200;
+
+/** The session of the address, else the first there is, else a new one over `newest`; null when there is nothing to dance. */
+export async function findSession(asked: string | null, newest: string | null): Promise<Session | null> {
+  if (asked) return getSession(asked);
+  const { items } = await listSessions();
+  if (items.length > 0) return items[0];
+  return newest ? createSession(newest) : null;
+}
+
+export class Room {
+  readonly viewer: Viewer;
+  readonly puppeteer: Puppeteer;
+  #sending = false;
+  #waiting: SessionEdit | null = null;
+  #sought: { seconds: number; at: number; epoch: number } | null = null;
+
+  /** `failed` is told when an edit of the timeline was refused. */
+  constructor(readonly id: string, name: string, private readonly failed: (error: unknown) => void) {
+    const base = `${location.origin.replace(/^http/, "ws")}/v1/sessions/${encodeURIComponent(id)}`;
+    this.viewer = new Viewer({ url: `${base}/stream` });
+    this.puppeteer = new Puppeteer({ url: `${base}/control?name=${encodeURIComponent(name)}`, viewer: this.viewer });
+    this.viewer.attach(this.puppeteer);
+  }
+
+  /** Seconds in the motion, or where a seek under way will land. */
+  position(now: number): number {
+    const { timeline } = this.viewer;
+    if (this.#sought && (now - this.#sought.at > SEEK_GRACE || (timeline !== null && timeline.epoch > this.#sought.epoch && !this.#sending))) {
+      this.#sought = null;
+    }
+    return this.#sought?.seconds ?? this.viewer.positionAt(now);
+  }
+
+  seek(seconds: number, now: number): void {
+    this.#sought = { seconds, at: now, epoch: this.viewer.timeline?.epoch ?? 0 };
+    this.edit({ position: Math.round(seconds * 1e6) });
+  }
+
+  /** Edits the timeline for everyone. One edit is under way at a time; those made meanwhile are sent as one. */
+  edit(change: SessionEdit): void {
+    this.#waiting = { ...this.#waiting, ...change };
+    if (!this.#sending) void this.#send();
+  }
+
+  close(): void {
+    this.puppeteer.close();
+    this.viewer.close();
+  }
+
+  async #send(): Promise<void> {
+    this.#sending = true;
+    while (this.#waiting) {
+      const edit = this.#waiting;
+      this.#waiting = null;
+      try {
+        await editSession(this.id, edit);
+      } catch (error) {
+        this.failed(error);
+      }
+    }
+    this.#sending = false;
+  }
+}

@@ -1,0 +1,139 @@
+/** The puppet: bones named as H-Anim names the joints, one skinned mesh over them, and by night its reflection. */
+import { Bone, Group, Matrix4, Skeleton, SkinnedMesh, Vector3, type BufferGeometry, type IUniform, type Material } from "three";
+import { JOINTS, PARENTS, type Figure, type Pose } from "../motion/skeleton";
+import { Assembly } from "./assembly";
+import { figureScale, fitTo, restPositions } from "./fit";
+import { addArms } from "./parts/arms";
+import { addBodice } from "./parts/bodice";
+import { addHakama } from "./parts/hakama";
+import { addHead } from "./parts/head";
+import { addLegs } from "./parts/legs";
+import { addSleeves } from "./parts/sleeves";
+import { figureMaterial, plainFigureMaterial, type Paint } from "./shading";
+import { SleeveBone } from "./sleeve-bone";
+import { SIDES } from "./standard";
+
+/** Bones in the order of the geometry's skin indices: the joints of the contract, then the two sleeves. */
+export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
+
+/** Places people hold, in the order of the limbs of the contract: bone, and place in its frame on the standard figure. */
+const HANDLES: readonly (readonly [bone: string, at: readonly [number, number, number]])[] = [
+  ["l_wrist", [0.004, -0.075, 0.004]],
+  ["r_wrist", [-0.004, -0.075, 0.004]],
+  ["l_knee", [0, 0, 0.008]],
+  ["r_knee", [0, 0, 0.008]],
+];
+
+/** All parts on one dancer's figure, in its rest pose. Pure: takes no graphics context. */
+export function puppetGeometry(figure: Figure): BufferGeometry {
+  const assembly = new Assembly(BONES, fitTo(figure));
+  for (const add of [addLegs, addArms, addHead, addBodice, addHakama, addSleeves]) add(assembly);
+  return assembly.geometry();
+}
+
+export class Puppet {
+  readonly group = new Group();
+  readonly figure: Figure;
+  /** Size against the standard figure of 1.75 m. */
+  readonly scale: number;
+  /** How far the ankle stands above the ball of the foot at rest, metres. */
+  readonly ankleHeight: number;
+  readonly #bones: Bone[];
+  readonly #sleeves: SleeveBone[];
+  readonly #geometry: BufferGeometry;
+  readonly #mesh: SkinnedMesh<BufferGeometry, Material>;
+  readonly #paint: Paint;
+  readonly #full: Material;
+  #plain: Material | null = null;
+  readonly #reflection: SkinnedMesh<BufferGeometry, Material>;
+
+  constructor(figure: Figure, paint: Paint, floorAt: IUniform<number>) {
+    this.figure = figure;
+    this.scale = figureScale(figure);
+    this.ankleHeight = -figure.offsets[JOINTS.indexOf("l_midtarsal") * 3 + 1];
+    this.group.name = "puppet";
+    this.#bones = bonesOf(figure);
+    this.group.add(this.#bone("humanoid_root"), this.#bone("l_sleeve"), this.#bone("r_sleeve"));
+    this.group.updateMatrixWorld(true);
+    const skeleton = new Skeleton(this.#bones);
+    this.#geometry = puppetGeometry(figure);
+    this.#paint = paint;
+    this.#full = figureMaterial(paint);
+    this.#mesh = new SkinnedMesh<BufferGeometry, Material>(this.#geometry, this.#full);
+    this.#mesh.name = "figure";
+    this.#mesh.castShadow = true;
+    this.#mesh.receiveShadow = true;
+    this.#reflection = new SkinnedMesh<BufferGeometry, Material>(this.#geometry, figureMaterial(paint, floorAt));
+    this.#reflection.renderOrder = -1;
+    for (const mesh of [this.#mesh, this.#reflection]) {
+      mesh.bind(skeleton, new Matrix4());
+      mesh.frustumCulled = false;
+      this.group.add(mesh);
+    }
+    const rest = restPositions(figure);
+    this.#sleeves = SIDES.map(({ side }) => {
+      const along = (rest.get(`${side}_elbow`) as Vector3).clone().sub(rest.get(`${side}_shoulder`) as Vector3);
+      const joints = { shoulder: this.#bone(`${side}_shoulder`), elbow: this.#bone(`${side}_elbow`), chest: this.#bone("vl5") };
+      return new SleeveBone(this.#bone(`${side}_sleeve`), side, joints, along);
+    });
+  }
+
+  /** Shows the reflection, which only the lacquer of the night has. */
+  set reflected(on: boolean) {
+    this.#reflection.visible = on;
+  }
+
+  /** Draws with the plain material, for machines without a graphics processor. */
+  set plain(on: boolean) {
+    const wanted = on ? (this.#plain ??= plainFigureMaterial(this.#paint)) : this.#full;
+    this.#mesh.material = wanted;
+  }
+
+  /** Takes a pose; `seconds` since the one before lets the sleeves swing, 0 sets them still. */
+  apply(pose: Pose, seconds: number): void {
+    this.#bones[0].position.fromArray(pose.root);
+    for (let k = 0; k < JOINTS.length; k++) {
+      const q = pose.rotations;
+      this.#bones[k].quaternion.set(q[k * 4 + 1], q[k * 4 + 2], q[k * 4 + 3], q[k * 4]);
+    }
+    this.#bones[0].updateWorldMatrix(true, true);
+    for (const sleeve of this.#sleeves) sleeve.update(seconds);
+  }
+
+  /** World place of a limb's handle (0 left hand, 1 right hand, 2 left knee, 3 right knee), written into `out`. */
+  handle(limb: number, out: Vector3): Vector3 {
+    const [bone, at] = HANDLES[limb];
+    return out.set(...at).multiplyScalar(this.scale).applyMatrix4(this.#bone(bone).matrixWorld);
+  }
+
+  /** World matrix of a joint. */
+  joint(name: string): Matrix4 {
+    return this.#bone(name).matrixWorld;
+  }
+
+  dispose(): void {
+    this.#geometry.dispose();
+    for (const material of [this.#full, this.#plain, this.#reflection.material]) material?.dispose();
+    this.#mesh.skeleton.dispose();
+    this.group.removeFromParent();
+  }
+
+  #bone(name: string): Bone {
+    return this.#bones[BONES.indexOf(name)];
+  }
+}
+
+function bonesOf(figure: Figure): Bone[] {
+  const bones = BONES.map((name) => {
+    const bone = new Bone();
+    bone.name = name;
+    return bone;
+  });
+  JOINTS.forEach((_, k) => {
+    bones[k].position.fromArray(figure.offsets, k * 3);
+    if (PARENTS[k] >= 0) bones[PARENTS[k]].add(bones[k]);
+  });
+  const rest = restPositions(figure);
+  for (const { side } of SIDES) bones[BONES.indexOf(`${side}_sleeve`)].position.copy(rest.get(`${side}_shoulder`) as Vector3);
+  return bones;
+}

@@ -1,0 +1,69 @@
+/** The four rings people take hold of: one instanced billboard, drawn over everything (section 5). */
+import { Color, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, PlaneGeometry, ShaderMaterial, Vector3 } from "three";
+
+const RINGS = 4;
+
+export interface Ring {
+  colour: string;
+  alpha: number;
+  /** Radius in metres, and the line's share of it. */
+  radius: number;
+  line: number;
+  glow: number;
+}
+
+export class Rings {
+  readonly mesh: Mesh<InstancedBufferGeometry, ShaderMaterial>;
+  readonly #place = new InstancedBufferAttribute(new Float32Array(RINGS * 3), 3);
+  readonly #tint = new InstancedBufferAttribute(new Float32Array(RINGS * 4), 4);
+  readonly #shape = new InstancedBufferAttribute(new Float32Array(RINGS * 3), 3);
+  readonly #colour = new Color();
+
+  constructor() {
+    const square = new PlaneGeometry(2, 2);
+    const geometry = new InstancedBufferGeometry();
+    geometry.index = square.index;
+    geometry.setAttribute("position", square.getAttribute("position"));
+    geometry.setAttribute("place", this.#place);
+    geometry.setAttribute("tint", this.#tint);
+    geometry.setAttribute("shape", this.#shape);
+    geometry.instanceCount = RINGS;
+    const material = new ShaderMaterial({
+      transparent: true,
+      depthWrite: false,
+      depthTest: false,
+      vertexShader: /* glsl */ `
+        attribute vec3 place, shape; attribute vec4 tint;
+        varying vec2 vAt; varying vec4 vTint; varying vec3 vShape;
+        void main() {
+          vAt = position.xy * 1.6; vTint = tint; vShape = shape;
+          vec4 at = viewMatrix * vec4(place, 1.);
+          at.xy += vAt * shape.x;
+          gl_Position = projectionMatrix * at;
+        }`,
+      fragmentShader: /* glsl */ `
+        varying vec2 vAt; varying vec4 vTint; varying vec3 vShape;
+        void main() {
+          float r = length(vAt), soft = .9 * fwidth(r) + .004;
+          float line = 1. - smoothstep(vShape.y, vShape.y + soft, abs(r - .92));
+          float dot = 1. - smoothstep(.085, .085 + soft, r);
+          float glow = exp(-pow((r - .92) / .22, 2.)) * vShape.z;
+          float fill = .06 * (1. - smoothstep(.86, .92, r));
+          gl_FragColor = vec4(vTint.rgb, clamp(max(line, .9 * dot) + .3 * glow + fill, 0., 1.) * vTint.a);
+          #include <colorspace_fragment>
+        }`,
+    });
+    this.mesh = new Mesh(geometry, material);
+    this.mesh.name = "rings";
+    this.mesh.frustumCulled = false;
+    this.mesh.renderOrder = 8;
+  }
+
+  set(index: number, at: Vector3, ring: Ring): void {
+    const { r, g, b } = this.#colour.set(ring.colour);
+    this.#place.setXYZ(index, at.x, at.y, at.z);
+    this.#tint.setXYZW(index, r, g, b, ring.alpha);
+    this.#shape.setXYZ(index, ring.radius, ring.line, ring.glow);
+    for (const attribute of [this.#place, this.#tint, this.#shape]) attribute.needsUpdate = true;
+  }
+}

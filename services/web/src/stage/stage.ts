@@ -1,0 +1,195 @@
+/** The stage: puppet, disc, floor, lights, strings and the seat in the audience. Draws what it is given; keeps no time. */
+import { ACESFilmicToneMapping, PCFShadowMap, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer, type IUniform } from "three";
+import type { Figure, Pose } from "../motion/skeleton";
+import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
+import { AudienceCamera, type Framing } from "./camera";
+import { createFloor } from "./floor";
+import { createLights, studio } from "./lights";
+import { LOOKS, type Look, type Theme } from "./look";
+import { asanohaTexture, faceTexture } from "./paint";
+import { Puppet } from "./puppet";
+import { QualityChoice } from "./quality";
+import { Rig } from "./rig";
+import type { Paint } from "./shading";
+import { Strings, type StringState } from "./strings";
+
+/** Pixel ratios above these cost more than they show. */
+const SHARPEST = { desktop: 2, phone: 1.75 };
+/** Pixels at the top that belong to the header and a bar's name. */
+const HEADROOM = 120;
+
+/** Movements of the stage's own take no longer step than this, seconds. */
+const LONGEST_STEP = 0.1;
+
+const FREE: readonly StringState[] = [0, 1, 2, 3].map(() => ({ holder: null, lit: false, pull: null }));
+
+export class Stage {
+  readonly scene = new Scene();
+  readonly rig = new Rig();
+  readonly strings = new Strings();
+  readonly audience = new AudienceCamera();
+  readonly renderer: WebGLRenderer;
+  puppet: Puppet | null = null;
+  readonly #backdrop = backdropUniforms();
+  readonly #floor = createFloor(this.#backdrop, this.rig.group, this.rig.travelled);
+  readonly #lights = createLights();
+  readonly #floorAt: IUniform<number> = { value: 0 };
+  readonly #caster = new Raycaster();
+  #paint: Paint | null = null;
+  #look: Look = LOOKS.night;
+  #themed: Theme | null = null;
+  #width = 1;
+  #height = 1;
+  #still = false;
+  #sharpness = 1;
+  readonly #quality: QualityChoice;
+
+  /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
+  constructor(canvas: HTMLCanvasElement, pinned = false) {
+    this.#quality = new QualityChoice(driverName(), pinned);
+    const antialias = !this.#quality.quality.plain;
+    this.renderer = new WebGLRenderer({ canvas, antialias, powerPreference: "high-performance" });
+    this.renderer.toneMapping = ACESFilmicToneMapping;
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    this.rig.group.add(this.audience.camera, this.#lights.group, createBackdrop(this.#backdrop), this.#floor.mesh);
+    this.scene.add(this.rig.group, this.strings.group);
+    this.#furnish();
+  }
+
+  /** No easing, no swing: for people who asked for less motion. */
+  set still(on: boolean) {
+    this.#still = on;
+    this.audience.still = on;
+    this.strings.still = on;
+  }
+
+  setTheme(theme: Theme): void {
+    if (theme === this.#themed) return;
+    this.#themed = theme;
+    this.#look = LOOKS[theme];
+    dressBackdrop(this.#backdrop, this.#look);
+    this.#floor.dress(this.#look);
+    this.#lights.dress(this.#look);
+    this.scene.environment?.dispose();
+    this.scene.environment = studio(this.renderer, this.#look);
+    this.scene.environmentIntensity = this.#look.environment;
+    this.renderer.toneMappingExposure = this.#look.exposure;
+    this.#furnish();
+  }
+
+  /** Carves the puppet for a dancer's limb lengths. */
+  setFigure(figure: Figure): void {
+    this.puppet?.dispose();
+    this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
+    this.puppet = new Puppet(figure, this.#paint, this.#floorAt);
+    this.#furnish();
+    this.puppet.group.visible = false;
+    this.scene.add(this.puppet.group);
+    this.audience.scale = this.puppet.scale;
+    this.rig.reset();
+  }
+
+  /** CSS pixels. */
+  resize(width: number, height: number, framing: Framing, pixelRatio: number): void {
+    const sharpest = framing === "desktop" ? SHARPEST.desktop : SHARPEST.phone;
+    this.#width = width;
+    this.#height = height;
+    this.#sharpness = Math.min(pixelRatio, sharpest);
+    this.#setSize();
+    this.#backdrop.discRadius.value = framing === "desktop" ? 1.06 : 0.98;
+    this.#backdrop.discCentre.value.set(0, framing === "desktop" ? 1.3 : 1.36);
+    this.audience.frame(framing);
+    this.audience.resize(width / height);
+  }
+
+  /** Draws one frame: the pose (null: none yet), the strings, and the seconds since the frame before. */
+  draw(pose: Pose | null, states: readonly StringState[] = FREE, interval = 0): void {
+    const { puppet } = this;
+    const seconds = Math.min(interval, LONGEST_STEP);
+    if (puppet && pose) {
+      puppet.group.visible = true;
+      puppet.apply(pose, this.#still ? 0 : seconds);
+      this.rig.follow(puppet, seconds);
+      this.#floorAt.value = this.rig.group.position.y;
+    }
+    this.rig.group.updateMatrixWorld(true);
+    this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0);
+    if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#ceiling(), this.right());
+    this.renderer.render(this.scene, this.audience.camera);
+    if (puppet && pose && this.#quality.frame(interval)) {
+      this.#setSize();
+      this.#furnish();
+    }
+  }
+
+  /** CSS pixels of a world place. */
+  toScreen(at: Vector3): { x: number; y: number } {
+    const clip = at.clone().project(this.audience.camera);
+    return { x: (clip.x * 0.5 + 0.5) * this.#width, y: (0.5 - clip.y * 0.5) * this.#height };
+  }
+
+  /** World place under a pixel, on the plane through `through` that faces the camera; null behind the camera. */
+  fromScreen(x: number, y: number, through: Vector3): Vector3 | null {
+    const { camera } = this.audience;
+    this.#caster.setFromCamera(new Vector2((x / this.#width) * 2 - 1, 1 - (y / this.#height) * 2), camera);
+    const facing = camera.getWorldDirection(new Vector3());
+    return this.#caster.ray.intersectPlane(new Plane().setFromNormalAndCoplanarPoint(facing, through), new Vector3());
+  }
+
+  /** The camera's right, up and backward directions in the world. */
+  right(): Vector3 {
+    return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 0);
+  }
+
+  up(): Vector3 {
+    return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 1);
+  }
+
+  back(): Vector3 {
+    return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 2);
+  }
+
+  /** World place of the hand nearer to the audience. */
+  nearerHand(): Vector3 | null {
+    const { puppet } = this;
+    if (!puppet) return null;
+    const eye = this.audience.camera.getWorldPosition(new Vector3());
+    const [left, right] = [0, 1].map((limb) => puppet.handle(limb, new Vector3()));
+    return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
+  }
+
+  #setSize(): void {
+    this.renderer.setPixelRatio(this.#sharpness * this.#quality.quality.sharpness);
+    this.renderer.setSize(this.#width, this.#height, false);
+  }
+
+  /** Only the lacquer of the night mirrors, and only where the machine is up to it. */
+  #furnish(): void {
+    const { reflection, shadows, plain } = this.#quality.quality;
+    this.#lights.shadows = shadows;
+    if (!this.puppet) return;
+    this.puppet.reflected = this.#look.dark && reflection;
+    this.puppet.plain = plain;
+  }
+
+  #reach(puppet: Puppet): number {
+    const at = new Vector3();
+    return Math.max(...[0, 1].map((limb) => Math.abs(puppet.handle(limb, at).project(this.audience.camera).x)));
+  }
+
+  #ceiling(): number {
+    const middle = this.rig.group.localToWorld(new Vector3(0, 1, 0));
+    return this.fromScreen(this.#width / 2, HEADROOM, middle)?.y ?? 2.2;
+  }
+}
+
+/** What draws here, asked of a context of its own, since a canvas fixes its smoothing with its first one. */
+function driverName(): string {
+  const context = document.createElement("canvas").getContext("webgl2");
+  if (!context) throw new Error("this browser has no WebGL 2");
+  const told = context.getExtension("WEBGL_debug_renderer_info");
+  const name = told ? String(context.getParameter(told.UNMASKED_RENDERER_WEBGL)) : "";
+  context.getExtension("WEBGL_lose_context")?.loseContext();
+  return name;
+}

@@ -1,0 +1,25 @@
+import { describe, expect, test } from "vitest";
+import { byteCount, clockTime, figure, initial, pieceName, uploadProgress } from "../../src/page/format";
+
+describe("figures for people", () => {
+  test("times", () => {
+    expect([0, 9.99, 87, 204, 3671].map(clockTime)).toEqual(["0:00", "0:09", "1:27", "3:24", "1:01:11"]);
+    expect([-1, Number.NaN, Infinity].map(clockTime)).toEqual(["0:00", "0:00", "0:00"]);
+  });
+
+  test("bytes", () => {
+    expect([950, 12_345, 999_999, 8_100_000].map(byteCount)).toEqual(["0.9 kB", "12 kB", "1000 kB", "8.1 MB"]);
+  });
+
+  test("an upload says how far it is and how long it will take", () => {
+    expect(uploadProgress(8_100_000, 13_000_000, 6.6)).toBe("8.1 MB of 13.0 MB, 4 s left");
+    expect(uploadProgress(0, 13_000_000, 2)).toBe("0.0 kB of 13.0 MB");
+    expect(uploadProgress(13_000_000, 13_000_000, 9)).toBe("13.0 MB of 13.0 MB, reading the dance");
+  });
+
+  test("digits, initials and names", () => {
+    expect([3.4567, 12.34, 184.2, Number.NaN].map(figure)).toEqual(["3.46", "12.3", "184", "-"]);
+    expect([" aiko", "", "élan"].map(initial)).toEqual(["A", "?", "É"]);
+    expect(["perfume_A.bvh", ".bvh", "a.b.csv"].map(pieceName)).toEqual(["perfume A", ".bvh", "a.b"]);
+  });
+});
