@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bunraku.ingest import jobs
+from bunraku.ingest.results import Made, Refused
 from tests.servers import clip
 
 
@@ -10,13 +11,13 @@ async def test_a_job_makes_a_motion_in_another_process(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(clip(0.5))
     made = await jobs.run("m1", source, 60)
-    assert isinstance(made, jobs.Made)
+    assert isinstance(made, Made)
     assert made.described["frames"] == 15
 
 
 async def test_a_reader_that_breaks_off_is_a_refusal(tmp_path: Path) -> None:
     made = await jobs.run("m1", tmp_path / "missing", 60)
-    assert isinstance(made, jobs.Refused)
+    assert isinstance(made, Refused)
     assert made.hint
 
 
@@ -24,5 +25,5 @@ async def test_a_job_is_ended_in_time(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(clip(20.0))
     refused = await jobs.run("m1", source, 0.001)
-    assert isinstance(refused, jobs.Refused)
+    assert isinstance(refused, Refused)
     assert "long" in refused.title

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import msgpack
 
-from bunraku.ingest.jobs import Made, Refused
 from bunraku.ingest.making import make
+from bunraku.ingest.results import Made, Refused
 from tests.servers import clip
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+from collections.abc import Coroutine
+from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -29,6 +32,20 @@ async def accept(socket: WebSocket) -> None:
         await socket.accept()
         raise Refusal(NOT_SPOKEN, "Subprotocol", f"offer the WebSocket subprotocol {SUBPROTOCOL}")
     await socket.accept(SUBPROTOCOL)
+
+
+async def converse(*ways: Coroutine[Any, Any, None]) -> None:
+    """Run both ways of a socket until one ends; what ended it is raised, but for the client's going away."""
+    tasks = [asyncio.create_task(way) for way in ways]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        ends = await asyncio.gather(*tasks, return_exceptions=True)
+    for end in ends:
+        if isinstance(end, BaseException) and not isinstance(end, asyncio.CancelledError | WebSocketDisconnect):
+            raise end
 
 
 async def close(socket: WebSocket, refusal: Refusal) -> None:

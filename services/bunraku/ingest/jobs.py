@@ -11,35 +11,16 @@ import asyncio
 import contextlib
 import multiprocessing
 import resource
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+
+from bunraku.ingest.results import Made, Refused
 
 MEMORY = 4 << 30
 """Bytes of address space that a job may take."""
 
 _context = multiprocessing.get_context("forkserver")
 _context.set_forkserver_preload(["bunraku.ingest.making"])
-
-
-@dataclass(frozen=True, slots=True)
-class Made:
-    """A motion ready to be stored: its library object, and what the API says of it."""
-
-    packed: bytes
-    described: dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Refused:
-    """Why a file could not be made a motion of: the fields of `UnreadableMotion`."""
-
-    title: str
-    detail: str
-    line: int | None = None
-    field: str | None = None
-    hint: str | None = None
 
 
 def _work(answer: Connection, motion: str, path: Path) -> None:

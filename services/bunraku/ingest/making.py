@@ -7,7 +7,7 @@ from pathlib import Path
 from bunraku.backing.library import pack
 from bunraku.codec import coefficients
 from bunraku.codec.encode import encode_motion
-from bunraku.ingest.jobs import Made, Refused
+from bunraku.ingest.results import Made, Refused
 from bunraku.marionette.limbs import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.analysis import analyse

@@ -15,6 +15,7 @@ from bunraku.backing.backing import Backing, clock
 from bunraku.backing.catalogue import Entry
 from bunraku.backing.problems import ProblemError
 from bunraku.ingest import jobs
+from bunraku.ingest.results import Made, Refused
 
 AT_ONCE = 2
 """Uploads that are encoded at the same time; the rest wait."""
@@ -80,8 +81,8 @@ class Uploads:
             file.write(pending)
         return motion_id(digest.digest())
 
-    async def _store(self, motion: str, made: jobs.Made | jobs.Refused, filename: str, size: int) -> tuple[Entry, bool]:
-        if isinstance(made, jobs.Refused):
+    async def _store(self, motion: str, made: Made | Refused, filename: str, size: int) -> tuple[Entry, bool]:
+        if isinstance(made, Refused):
             raise ProblemError(
                 422, made.title, made.detail, line=made.line, field=made.field, hint=made.hint, filename=filename
             )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
-
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from bunraku.backing import sockets
 from bunraku.backing.backing import clock
@@ -27,25 +25,11 @@ async def serve(socket: WebSocket, stage: Stage | None, name: str) -> None:
         except Full as error:
             raise Refusal(sockets.TOO_SLOW, "Full", str(error)) from None
         try:
-            await _converse(socket, stage, puppeteer)
+            await sockets.converse(_listen(socket, stage, puppeteer), _tell(socket, puppeteer))
         finally:
             stage.leave(puppeteer)
     except Refusal as refusal:
         await sockets.close(socket, refusal)
-
-
-async def _converse(socket: WebSocket, stage: Stage, puppeteer: Puppeteer) -> None:
-    listening = asyncio.create_task(_listen(socket, stage, puppeteer))
-    telling = asyncio.create_task(_tell(socket, puppeteer))
-    try:
-        await asyncio.wait((listening, telling), return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in (listening, telling):
-            task.cancel()
-        ends = await asyncio.gather(listening, telling, return_exceptions=True)
-    for end in ends:
-        if isinstance(end, BaseException) and not isinstance(end, asyncio.CancelledError | WebSocketDisconnect):
-            raise end
 
 
 async def _listen(socket: WebSocket, stage: Stage, puppeteer: Puppeteer) -> None:

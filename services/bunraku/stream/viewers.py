@@ -11,12 +11,12 @@ import contextlib
 from collections import deque
 from collections.abc import Awaitable, Callable
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from bunraku import __version__
 from bunraku.backing.backing import clock
 from bunraku.backing.library import Library, StoredMotion
-from bunraku.backing.sockets import BROKEN, NOT_FOUND, TOO_SLOW, Refusal, receive
+from bunraku.backing.sockets import BROKEN, NOT_FOUND, TOO_SLOW, Refusal, converse, receive
 from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.playout import timeline
 from bunraku.playout.pacing import Pacer
@@ -144,19 +144,7 @@ class Viewer:
 
 async def serve(socket: WebSocket, viewer: Viewer, private: bool) -> None:
     """Send to and listen to a viewer until either ends; `private` viewers may edit their timeline."""
-    receiving = asyncio.create_task(_listen(socket, viewer, private))
-    sending = asyncio.create_task(viewer.send(socket.send_bytes))
-    try:
-        await asyncio.wait((receiving, sending), return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in (receiving, sending):
-            task.cancel()
-        ends = await asyncio.gather(receiving, sending, return_exceptions=True)
-    for end in ends:
-        if isinstance(end, Refusal):
-            raise end
-        if isinstance(end, BaseException) and not isinstance(end, asyncio.CancelledError | WebSocketDisconnect):
-            raise end
+    await converse(_listen(socket, viewer, private), viewer.send(socket.send_bytes))
 
 
 async def _listen(socket: WebSocket, viewer: Viewer, private: bool) -> None:
