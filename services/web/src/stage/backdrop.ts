@@ -19,26 +19,27 @@ uniform float leafStrength, dark, discRadius;
 uniform vec2 discCentre;
 ${NOISE}
 vec3 backdrop(vec2 at, float blur) {
-  float sharp = blur > .05 ? 0. : 1.;
   float height = clamp((at.y + .2) / 4.2, 0., 1.);
   vec3 ground = mix(mix(groundLow, groundMiddle, smoothstep(0., .35, height)), groundTop, smoothstep(.35, 1., height));
   float paper = .6 * noise2(at * vec2(3., 4.)) + .4 * noise2(at * vec2(13., 17.));
   ground *= 1. + (paper - .5) * mix(.05, .09, dark) * (blur > .2 ? .3 : 1.);
 
   vec2 fromCentre = at - discCentre;
-  float ragged = .003 * (noise2(at * 9.) - .5) + .0025 * (noise2(at * 41.) - .5);
-  float away = length(fromCentre) + sharp * ragged;
+  float away = length(fromCentre);
+  // Fine detail is for the disc itself; its blurred image in the floor has none.
+  if (blur < .05) away += .003 * (noise2(at * 9.) - .5) + .0025 * (noise2(at * 41.) - .5);
   float inside = 1. - smoothstep(discRadius - .004 - blur, discRadius + .004 + blur, away);
+  vec3 halo = leafDeep * exp(-2.2 * max(away - discRadius, 0.)) * (1. - inside) * .055 * dark;
+  if (inside <= 0.) return ground + halo;
 
   vec2 square = at * 3.3 + vec2(.3, .1) + .05 * (noise2(at * 6.) - .5);
   vec2 edge = abs(fract(square) - .5);
   float seam = smoothstep(.47, .497, max(edge.x, edge.y));
   float tone = .34 * hash2(floor(square) + 7.) - .17;
   float cloud = .7 * noise2(at * 2.1 + 3.) + .3 * noise2(at * 9.);
-  vec3 leaf = mix(leafDeep, leafBright, clamp(.15 + .7 * cloud + tone, 0., 1.)) * (1. + .07 * seam * sharp * dark);
+  vec3 leaf = mix(leafDeep, leafBright, clamp(.15 + .7 * cloud + tone, 0., 1.)) * (1. + (blur < .05 ? .07 * seam * dark : 0.));
   leaf *= mix(1., smoothstep(1.9, .1, length(fromCentre - vec2(-.35, .45))), .75 * dark);
   leaf *= mix(1., smoothstep(-.2, 1.1, at.y), .55 * dark);
-  vec3 halo = leafDeep * exp(-2.2 * max(away - discRadius, 0.)) * (1. - inside) * .055 * dark;
   return mix(ground, leaf, inside * leafStrength) + halo;
 }
 `;

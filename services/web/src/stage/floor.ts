@@ -2,7 +2,7 @@
  * The stage floor. By night black lacquer: planks, and an analytic mirror of the backdrop (the view ray is mirrored and the
  * backdrop evaluated where it lands), so that no second render is needed. By day paper-pale wood that melts into the ground.
  */
-import { Matrix4, Mesh, MeshStandardMaterial, PlaneGeometry, type IUniform, type Object3D, type Vector2 } from "three";
+import { Matrix4, Mesh, MeshLambertMaterial, MeshStandardMaterial, PlaneGeometry, type IUniform, type Object3D, type Vector2 } from "three";
 import { BACKDROP, BACKDROP_Z, type BackdropUniforms } from "./backdrop";
 import type { Look } from "./look";
 
@@ -24,7 +24,7 @@ if (dark > .5) {
   wood *= (1. + .55 * (grain - .5)) * (1. - .6 * gap) * mix(.35, 1., exp(-.28 * dot(at, at)));
   wood += mirrored * (.9 * fresnel + .13) * (1. - .4 * gap) * .95;
   horizon = smoothstep(1.3, ${(0.2 - BACKDROP_Z).toFixed(2)}, -at.y + .22 * abs(at.x));
-  wood = mix(wood, backdrop(vec2(at.x, .02), .05), horizon);
+  if (horizon > 0.) wood = mix(wood, backdrop(vec2(at.x, .02), .06), horizon);
 } else {
   wood *= (1. + .05 * (grain - .5)) * (1. - .10 * gap);
   wood = mix(wood, mirrored, .35 * fresnel);
@@ -43,9 +43,9 @@ export interface Floor {
   dress(look: Look): void;
 }
 
-/** `rig` is the frame the floor lies in; `travelled` how far that has gone, for the boards. */
-export function createFloor(backdrop: BackdropUniforms, rig: Object3D, travelled: Vector2): Floor {
-  const material = new MeshStandardMaterial({ transparent: true });
+/** `plain` leaves out gloss, for machines that draw in software; `rig` is the frame the floor lies in; `travelled` how far that has gone, for the boards. */
+export function createFloor(backdrop: BackdropUniforms, rig: Object3D, travelled: Vector2, plain: boolean): Floor {
+  const material = plain ? new MeshLambertMaterial({ transparent: true }) : new MeshStandardMaterial({ transparent: true });
   const intoRig: IUniform<Matrix4> = { value: new Matrix4() };
   const opacityNear: IUniform<number> = { value: 1 };
   material.onBeforeCompile = (shader) => {
@@ -69,8 +69,10 @@ export function createFloor(backdrop: BackdropUniforms, rig: Object3D, travelled
     mesh,
     dress(look) {
       material.color.set(look.floor.colour);
-      material.roughness = look.floor.roughness;
-      material.envMapIntensity = look.floor.environment;
+      if (material instanceof MeshStandardMaterial) {
+        material.roughness = look.floor.roughness;
+        material.envMapIntensity = look.floor.environment;
+      }
       opacityNear.value = look.floor.opacity;
     },
   };

@@ -19,10 +19,13 @@ const FACING_MEMORY = 8;
 const FACING_SLACK = Math.PI / 3;
 const WATCHED = 2.5;
 const TURN = 0.8;
-/** The floor sinks to a foot below it quickly and rises to feet above it slowly, 1/s, and never to a jump. */
-const SINK = 8;
-const RISE = 0.15;
-const JUMP = 0.12;
+/**
+ * The floor sinks to a foot below it and rises to feet above it, 1/s: slowly enough that a foot that dips for a moment at a
+ * low rate takes it nowhere, and never to a jump, metres.
+ */
+const SINK = 2.5;
+const RISE = 0.6;
+const JUMP = 0.15;
 
 export class Rig {
   readonly group = new Group();

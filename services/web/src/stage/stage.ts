@@ -3,7 +3,7 @@ import { ACESFilmicToneMapping, PCFShadowMap, Plane, Raycaster, Scene, Vector2, 
 import type { Figure, Pose } from "../motion/skeleton";
 import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
 import { AudienceCamera, type Framing } from "./camera";
-import { createFloor } from "./floor";
+import { createFloor, type Floor } from "./floor";
 import { createLights, studio } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
@@ -31,7 +31,7 @@ export class Stage {
   readonly renderer: WebGLRenderer;
   puppet: Puppet | null = null;
   readonly #backdrop = backdropUniforms();
-  readonly #floor = createFloor(this.#backdrop, this.rig.group, this.rig.travelled);
+  readonly #floor: Floor;
   readonly #lights = createLights();
   readonly #floorAt: IUniform<number> = { value: 0 };
   readonly #caster = new Raycaster();
@@ -47,8 +47,9 @@ export class Stage {
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement, pinned = false) {
     this.#quality = new QualityChoice(driverName(), pinned);
-    const antialias = !this.#quality.quality.plain;
-    this.renderer = new WebGLRenderer({ canvas, antialias, powerPreference: "high-performance" });
+    const { plain } = this.#quality.quality;
+    this.#floor = createFloor(this.#backdrop, this.rig.group, this.rig.travelled, plain);
+    this.renderer = new WebGLRenderer({ canvas, antialias: !plain, powerPreference: "high-performance" });
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
@@ -72,7 +73,7 @@ export class Stage {
     this.#floor.dress(this.#look);
     this.#lights.dress(this.#look);
     this.scene.environment?.dispose();
-    this.scene.environment = studio(this.renderer, this.#look);
+    this.scene.environment = this.#quality.quality.plain ? null : studio(this.renderer, this.#look);
     this.scene.environmentIntensity = this.#look.environment;
     this.renderer.toneMappingExposure = this.#look.exposure;
     this.#furnish();
@@ -115,7 +116,7 @@ export class Stage {
     }
     this.rig.group.updateMatrixWorld(true);
     this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0);
-    if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#ceiling(), this.right());
+    if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());
     this.renderer.render(this.scene, this.audience.camera);
     if (puppet && pose && this.#quality.frame(interval)) {
       this.#setSize();

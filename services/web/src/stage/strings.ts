@@ -17,6 +17,8 @@ export interface StringState {
 
 /** Pull error that draws a thread fully taut, metres. */
 const TAUT = 0.25;
+/** Heights over the floor that bars keep at least: of hands, of legs. Metres for the standard figure. */
+const OVERHEAD = [2.14, 1.98];
 const LEAN = (12 * Math.PI) / 180;
 
 interface Motion {
@@ -55,8 +57,8 @@ export class Strings {
     return this.#motions[limb].held > 0.5 ? this.#motions[limb].bar : null;
   }
 
-  /** Draws the four strings. `ceiling` is the height bars stay under, `right` the camera's right, world. */
-  update(puppet: Puppet, states: readonly StringState[], look: Look, seconds: number, ceiling: number, right: Vector3): void {
+  /** Draws the four strings. `ground` is the floor's height, `ceiling` what bars stay under, `right` the camera's right, world. */
+  update(puppet: Puppet, states: readonly StringState[], look: Look, seconds: number, ground: number, ceiling: number, right: Vector3): void {
     this.group.visible = true;
     this.#threads.dark = look.dark;
     const bars: Bar[] = [];
@@ -74,7 +76,7 @@ export class Strings {
       const shake = motion.shake > 0 ? Math.sin(motion.shake * 4 * Math.PI) * 0.01 * puppet.scale : 0;
       const shown = handle.clone().addScaledVector(right, shake);
       const tension = state.pull ? Math.min(1, 0.35 + state.pull.distanceTo(handle) / TAUT) : held ? 0.75 : 0;
-      if (motion.held > 0.01) bars.push(this.#bar(motion, state, handle, limb, held, ceiling, seconds, puppet.scale));
+      if (motion.held > 0.01) bars.push(this.#bar(motion, state, handle, limb, held, ground, ceiling, seconds, puppet.scale));
       this.#ring(limb, shown, motion, state, look, puppet.scale);
       if (held) {
         const hook = motion.bar.clone().setY(motion.bar.y - HOOK);
@@ -88,11 +90,12 @@ export class Strings {
     this.#bars.set(bars);
   }
 
-  #bar(motion: Motion, state: StringState, handle: Vector3, limb: number, held: boolean, ceiling: number, seconds: number, scale: number): Bar {
+  #bar(motion: Motion, state: StringState, handle: Vector3, limb: number, held: boolean, ground: number, ceiling: number, seconds: number, scale: number): Bar {
     const aside = (limb % 2 === 0 ? 1 : -1) * (limb < 2 ? 0.08 : 0.16) * scale;
     const goal = handle.clone();
     goal.x += aside;
-    const clear = handle.y + (limb < 2 ? 0.42 : 1.15) * scale;
+    // Above the head, so that neither bar nor name stands before the face.
+    const clear = Math.max(handle.y + (limb < 2 ? 0.32 : 0.5) * scale, ground + OVERHEAD[limb < 2 ? 0 : 1] * scale);
     goal.y = Math.min(Math.max(clear, state.pull ? state.pull.y : -Infinity), ceiling);
     // A bar never meets the hand; where the picture ends too soon it slips above the edge instead.
     goal.y = Math.max(goal.y, handle.y + 0.12 * scale);

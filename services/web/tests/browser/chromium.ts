@@ -1,17 +1,9 @@
-/** Debian's Chromium, drawing in software. */
-import { existsSync } from "node:fs";
+/** Chromium drawing in software, so that it runs where there is no graphics processor. */
 import { chromium, type Browser } from "playwright-core";
 
-const PLACES = [process.env.BUNRAKU_CHROMIUM ?? "", "/usr/bin/chromium", "/usr/bin/chromium-browser"];
-
-/** Where Chromium is, or null. */
-export function chromiumPath(): string | null {
-  return PLACES.find((place) => place !== "" && existsSync(place)) ?? null;
-}
-
-export function launch(): Promise<Browser> {
+export function launch(executablePath: string): Promise<Browser> {
   return chromium.launch({
-    executablePath: chromiumPath() ?? "",
+    executablePath,
     args: [
       "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
       "--disable-background-networking", "--disable-component-update", "--disable-sync",

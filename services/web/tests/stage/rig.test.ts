@@ -1,0 +1,63 @@
+import { Matrix4, Quaternion, Vector3 } from "three";
+import { describe, expect, test } from "vitest";
+import type { Puppet } from "../../src/stage/puppet";
+import { Rig } from "../../src/stage/rig";
+import { SOLE } from "../../src/stage/standard";
+
+/** What the rig reads of a puppet: a dancer who stands at x, z on a floor at y, turned by `yaw`. */
+function dancer(x: number, y: number, z: number, yaw = 0): Puppet {
+  const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), yaw);
+  const at = (height: number) => new Matrix4().compose(new Vector3(x, y + height, z), turn, new Vector3(1, 1, 1));
+  const heights: Record<string, number> = { humanoid_root: 0.85, l_midtarsal: SOLE, r_midtarsal: SOLE, l_ankle: SOLE + 0.07, r_ankle: SOLE + 0.07 };
+  return { scale: 1, ankleHeight: 0.07, joint: (name: string) => at(heights[name]) } as unknown as Puppet;
+}
+
+function follow(rig: Rig, puppet: Puppet, seconds: number): void {
+  for (let t = 0; t < seconds; t += 1 / 60) rig.follow(puppet, 1 / 60);
+}
+
+describe("the rig", () => {
+  test("meets a dancer where they stand", () => {
+    const rig = new Rig();
+    rig.follow(dancer(3, 0.2, -2), 0);
+    expect(rig.group.position.distanceTo(new Vector3(3, 0.2, -2))).toBeLessThan(1e-9);
+  });
+
+  test("leaves small steps alone, follows a walk, and tells the boards how far it went", () => {
+    const rig = new Rig();
+    follow(rig, dancer(0, 0, 0), 0.1);
+    follow(rig, dancer(0.2, 0, 0), 2);
+    expect(rig.group.position.x).toBe(0);
+    follow(rig, dancer(1, 0, 0), 10);
+    expect(rig.group.position.x).toBeCloseTo(0.75, 2);
+    expect(rig.travelled.x).toBeCloseTo(0.75, 2);
+  });
+
+  test("cuts to a dancer put elsewhere, and the boards do not slide", () => {
+    const rig = new Rig();
+    follow(rig, dancer(0, 0, 0), 0.1);
+    rig.follow(dancer(5, 0, 5), 1 / 60);
+    expect(rig.group.position.x).toBe(5);
+    expect(rig.travelled.length()).toBe(0);
+  });
+
+  test("keeps the floor under the feet, but a jump leaves it", () => {
+    const rig = new Rig();
+    follow(rig, dancer(0, 0, 0), 0.1);
+    follow(rig, dancer(0, 0.08, 0), 12);
+    expect(rig.group.position.y).toBeCloseTo(0.08, 2);
+    follow(rig, dancer(0, 0.6, 0), 0.5);
+    expect(rig.group.position.y).toBeCloseTo(0.08, 2);
+    follow(rig, dancer(0, -0.3, 0), 4);
+    expect(rig.group.position.y).toBeCloseTo(-0.3, 2);
+  });
+
+  test("turns to one who dances to another side, not with a pirouette", () => {
+    const steady = new Rig();
+    follow(steady, dancer(0, 0, 0, Math.PI / 2), 20);
+    expect(steady.group.rotation.y).toBeGreaterThan(0.3);
+    const turning = new Rig();
+    for (let t = 0; t < 20; t += 1 / 60) turning.follow(dancer(0, 0, 0, 4 * t), 1 / 60);
+    expect(Math.abs(turning.group.rotation.y)).toBeLessThan(0.3);
+  });
+});
