@@ -12,8 +12,6 @@ from urllib.parse import urlsplit
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from bunraku import __version__
 
@@ -69,6 +67,9 @@ def upload(
     as_json: Json = False,
 ) -> None:
     """Upload a motion file, and say what was made of it."""
+    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.table import Table
+
     from bunraku.client.api import Client
 
     async def run() -> dict[str, Any]:
@@ -96,6 +97,8 @@ def upload(
 @app.command(name="list")
 def list_motions(server: Server = HERE, as_json: Json = False) -> None:
     """List the motions of a server."""
+    from rich.table import Table
+
     from bunraku.client.api import Client
 
     async def run() -> list[dict[str, Any]]:
@@ -121,6 +124,8 @@ def watch(
     as_json: Json = False,
 ) -> None:
     """Watch without a screen, and print how it went."""
+    from rich.table import Table
+
     from bunraku.client import Client, StreamEnded, Viewer
 
     async def run() -> dict[str, Any]:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import socket
-import tempfile
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
@@ -13,7 +11,6 @@ from pathlib import Path
 from signal import SIGINT, SIGTERM
 from typing import Any
 
-import anyio.to_thread
 import uvicorn
 from fastapi import FastAPI
 from starlette.middleware.gzip import GZipMiddleware
@@ -27,14 +24,15 @@ import bunraku.session.app
 import bunraku.stream.app
 from bunraku import __version__
 from bunraku.backing import problems
-from bunraku.backing.backing import open_backing
+from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.settings import Settings
-from bunraku.ingest.uploads import Uploads, motion_id
-from bunraku.motion import choreography
-from bunraku.motion.writers import write_bvh
+from bunraku.codec import coefficients
+from bunraku.demo import add_demo
 from bunraku.wire.messages import LARGEST_FROM_CLIENT
 
 PAGE = Path(__file__).parent / "page"
+LOAD_AFTER = 1.5
+"""Seconds in which the first page has the process to itself."""
 
 
 class Page(StaticFiles):
@@ -71,20 +69,11 @@ async def compose(settings: Settings, *, demo: bool = False) -> AsyncIterator[Fa
             return {"status": "ok", "version": __version__}
 
         app.mount("/", _page())
+        loading = asyncio.create_task(_load(backing), name="load what is needed later")
+        stack.push_async_callback(_ended, loading)
         if demo:
-            motion = await add_demo(Uploads(backing))
-            await sessions.state.sessions.open(motion)
+            await sessions.state.sessions.open(await add_demo(backing))
         yield app
-
-
-async def add_demo(uploads: Uploads) -> str:
-    """The id of the demo's own dance, taken in like any upload the first time."""
-    data = await anyio.to_thread.run_sync(lambda: write_bvh(choreography.dance()))
-    with tempfile.TemporaryDirectory(prefix="bunraku-demo-") as folder:
-        path = Path(folder) / "source"
-        path.write_bytes(data)
-        entry, _ = await uploads.add(motion_id(hashlib.sha256(data).digest()), path, f"{choreography.TITLE}.bvh")
-    return entry.id
 
 
 async def serve(settings: Settings, listening: socket.socket, *, demo: bool, ready: Callable[[], None]) -> None:
@@ -122,6 +111,18 @@ async def serve(settings: Settings, listening: socket.socket, *, demo: bool, rea
                 timeout_graceful_shutdown=2,
             )
             await Server(config).serve(sockets=[listening])
+
+
+async def _load(backing: Backing) -> None:
+    """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
+    await asyncio.sleep(LOAD_AFTER)
+    await backing.catalogue.open()
+    await asyncio.to_thread(coefficients.warm)
+
+
+async def _ended(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    await asyncio.wait((task,))
 
 
 def _page() -> ASGIApp:

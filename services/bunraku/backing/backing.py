@@ -36,7 +36,7 @@ async def open_backing(settings: Settings) -> AsyncIterator[Backing]:
     if settings.bus != "memory:":
         raise ValueError(f"a bus is at memory:, not {settings.bus!r}")
     settings.data.mkdir(parents=True, exist_ok=True)
-    catalogue = await Catalogue.open(settings.catalogue_url())
+    catalogue = Catalogue(settings.catalogue_url())
     bus = MemoryBus()
     try:
         yield Backing(settings, catalogue, Library.open(settings.library_url()), bus)

@@ -1,29 +1,15 @@
-"""What motions there are: one row each, in SQL.
-
-SQLite by default, PostgreSQL by URL; the same statements on both.
-"""
+"""What motions there are: one row each."""
 
 from __future__ import annotations
 
-import base64
-import binascii
-import json
+import asyncio
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import BigInteger, Column, MetaData, Row, String, Table, Text, delete, select, tuple_
-from sqlalchemy.exc import IntegrityError
-from sqlalchemy.ext.asyncio import AsyncEngine, create_async_engine
+if TYPE_CHECKING:
+    from bunraku.backing.catalogue_sql import SqlCatalogue
 
-METADATA = MetaData()
-MOTIONS = Table(
-    "motions",
-    METADATA,
-    Column("id", String(32), primary_key=True),
-    Column("created", BigInteger, nullable=False, index=True),
-    Column("description", Text, nullable=False),
-)
-_DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg"}
+SCHEMES = ("sqlite", "postgresql")
 
 
 class BadCursor(ValueError):
@@ -40,67 +26,51 @@ class Entry:
 
 
 class Catalogue:
-    """The table of motions."""
+    """The catalogue at `sqlite:///path` or `postgresql://...`.
 
-    def __init__(self, engine: AsyncEngine) -> None:
-        self._engine = engine
+    It is opened at its first use, or by `open`: loading SQLAlchemy takes seconds on a small machine, and a stage can
+    be seen without it. Raises ValueError for another address.
+    """
 
-    @classmethod
-    async def open(cls, url: str) -> Catalogue:
-        """The catalogue at `sqlite:///path` or `postgresql://...`, its table made where it is missing."""
-        scheme, rest = url.split(":", 1)
-        if scheme not in _DRIVERS:
+    def __init__(self, url: str) -> None:
+        if url.split(":", 1)[0] not in SCHEMES:
             raise ValueError(f"a catalogue is at sqlite:///path or postgresql://host/name, not {url!r}")
-        engine = create_async_engine(f"{_DRIVERS[scheme]}:{rest}", pool_pre_ping=scheme != "sqlite")
-        async with engine.begin() as connection:
-            await connection.run_sync(METADATA.create_all)
-        return cls(engine)
+        self._url = url
+        self._opening: asyncio.Task[SqlCatalogue] | None = None
+
+    async def open(self) -> SqlCatalogue:
+        """The catalogue itself; who comes second waits for the first. After a failure the next call tries again."""
+        if self._opening is None or (self._opening.done() and self._opening.exception() is not None):
+            self._opening = asyncio.create_task(self._open(), name="open the catalogue")
+        return await asyncio.shield(self._opening)
 
     async def close(self) -> None:
         """Close every connection."""
-        await self._engine.dispose()
+        if self._opening is not None:
+            await asyncio.wait((self._opening,))
+            if self._opening.exception() is None:
+                await self._opening.result().close()
 
     async def add(self, entry: Entry) -> bool:
         """Add a motion; whether it was new."""
-        row = {"id": entry.id, "created": entry.created, "description": json.dumps(entry.description)}
-        try:
-            async with self._engine.begin() as connection:
-                await connection.execute(MOTIONS.insert().values(row))
-        except IntegrityError:
-            return False
-        return True
+        return await (await self.open()).add(entry)
 
     async def get(self, motion: str) -> Entry | None:
         """The motion of this id."""
-        async with self._engine.connect() as connection:
-            row = (await connection.execute(select(MOTIONS).where(MOTIONS.c.id == motion))).first()
-        return _entry(row) if row is not None else None
+        return await (await self.open()).get(motion)
 
     async def page(self, limit: int, cursor: str | None = None) -> tuple[list[Entry], str | None]:
         """At most `limit` motions, newest first, and the cursor of the next page; raises `BadCursor`."""
-        statement = select(MOTIONS).order_by(MOTIONS.c.created.desc(), MOTIONS.c.id.desc()).limit(limit + 1)
-        if cursor is not None:
-            statement = statement.where(tuple_(MOTIONS.c.created, MOTIONS.c.id) < tuple_(*_read_cursor(cursor)))
-        async with self._engine.connect() as connection:
-            entries = [_entry(row) for row in (await connection.execute(statement)).all()]
-        if len(entries) <= limit:
-            return entries, None
-        last = entries[limit - 1]
-        return entries[:limit], base64.urlsafe_b64encode(f"{last.created}:{last.id}".encode()).decode()
+        return await (await self.open()).page(limit, cursor)
 
     async def remove(self, motion: str) -> bool:
         """Remove a motion; whether it was there."""
-        async with self._engine.begin() as connection:
-            return (await connection.execute(delete(MOTIONS).where(MOTIONS.c.id == motion))).rowcount > 0
+        return await (await self.open()).remove(motion)
 
+    async def _open(self) -> SqlCatalogue:
+        def load() -> type[SqlCatalogue]:
+            from bunraku.backing.catalogue_sql import SqlCatalogue
 
-def _entry(row: Row[Any]) -> Entry:
-    return Entry(row.id, row.created, json.loads(row.description))
+            return SqlCatalogue
 
-
-def _read_cursor(cursor: str) -> tuple[int, str]:
-    try:
-        created, motion = base64.urlsafe_b64decode(cursor.encode()).decode().split(":", 1)
-        return min(int(created), (1 << 63) - 1), motion
-    except (ValueError, binascii.Error):
-        raise BadCursor("the cursor is not one of this list; leave it out to start anew") from None
+        return await (await asyncio.to_thread(load)).open(self._url)

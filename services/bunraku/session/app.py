@@ -18,7 +18,6 @@ from bunraku.backing import problems
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
-from bunraku.codec import coefficients
 from bunraku.marionette.merge import Marionette
 from bunraku.playout.timeline import position_at
 from bunraku.session import control
@@ -119,13 +118,12 @@ def create_app(backing: Backing) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         sweeping = asyncio.create_task(sessions.sweep(), name="sweep sessions")
-        # the first limb that is pulled should not wait for the decoder to load
-        warming = asyncio.create_task(asyncio.to_thread(coefficients.warm), name="load the decoder")
         try:
             yield
         finally:
             sweeping.cancel()
-            await asyncio.gather(sweeping, warming, return_exceptions=True)
+            with contextlib.suppress(asyncio.CancelledError):
+                await sweeping
             for session in tuple(sessions.stages):
                 await sessions.end(session)
 

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from bunraku.backing.catalogue import BadCursor, Entry
+from bunraku.backing.catalogue_sql import SqlCatalogue
+
+
+@pytest.fixture
+async def catalogue(tmp_path: Path) -> AsyncIterator[SqlCatalogue]:
+    opened = await SqlCatalogue.open(f"sqlite:///{tmp_path}/catalogue.sqlite")
+    yield opened
+    await opened.close()
+
+
+async def test_what_was_added_is_there_once(catalogue: SqlCatalogue) -> None:
+    entry = Entry("m1", 5, {"name": "あ", "fps": 29.97, "guessed": ["cm"]})
+    assert await catalogue.add(entry)
+    assert not await catalogue.add(Entry("m1", 6, {}))
+    assert await catalogue.get("m1") == entry
+    assert await catalogue.get("m2") is None
+    assert await catalogue.remove("m1")
+    assert not await catalogue.remove("m1")
+
+
+async def test_pages_go_through_all_newest_first_even_where_times_are_equal(catalogue: SqlCatalogue) -> None:
+    for number in range(7):
+        await catalogue.add(Entry(f"m{number}", number // 2, {}))
+    seen: list[str] = []
+    cursor = None
+    while True:
+        page, cursor = await catalogue.page(3, cursor)
+        seen += [entry.id for entry in page]
+        if cursor is None:
+            break
+    assert seen == ["m6", "m5", "m4", "m3", "m2", "m1", "m0"]
+
+
+@pytest.mark.parametrize("cursor", ["", "x", "bm8=", "é", "Og=="])
+async def test_a_strange_cursor_is_refused(catalogue: SqlCatalogue, cursor: str) -> None:
+    with pytest.raises(BadCursor):
+        await catalogue.page(3, cursor)
+
+
+async def test_it_is_there_after_opening_again(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/c.sqlite"
+    first = await SqlCatalogue.open(url)
+    await first.add(Entry("m1", 5, {"a": 1}))
+    await first.close()
+    again = await SqlCatalogue.open(url)
+    assert await again.get("m1") == Entry("m1", 5, {"a": 1})
+    await again.close()

@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bunraku import demo
+from bunraku.backing.backing import open_backing
+from bunraku.backing.settings import Settings
+from bunraku.motion import choreography
+
+
+async def test_the_dance_is_taken_in_once_and_again_when_it_was_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    danced = 0
+    dance = choreography.dance
+
+    def counted(fps: float = 60.0) -> object:
+        nonlocal danced
+        danced += 1
+        return dance(fps)
+
+    monkeypatch.setattr(choreography, "dance", counted)
+    async with open_backing(Settings(data=tmp_path)) as backing:
+        motion = await demo.add_demo(backing)
+        entry = await backing.catalogue.get(motion)
+        assert entry is not None
+        assert entry.description["name"] == choreography.TITLE
+        assert entry.description["duration"] >= 20
+        assert await demo.add_demo(backing) == motion
+        assert danced == 1
+        await backing.catalogue.remove(motion)
+        await backing.library.remove(motion)
+        (tmp_path / "demo.json").write_text("[]")
+        assert await demo.add_demo(backing) == motion
+        assert danced == 2
+        assert await backing.library.get(motion) is not None
