@@ -42,6 +42,7 @@ export class Stage {
   #height = 1;
   #still = false;
   #sharpness = 1;
+  #framing: Framing = "desktop";
   readonly #quality: QualityChoice;
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
@@ -88,6 +89,7 @@ export class Stage {
     this.puppet.group.visible = false;
     this.scene.add(this.puppet.group);
     this.audience.scale = this.puppet.scale;
+    this.#placeDisc();
     this.rig.reset();
   }
 
@@ -98,9 +100,9 @@ export class Stage {
     this.#height = height;
     this.#sharpness = Math.min(pixelRatio, sharpest);
     this.#setSize();
-    this.#backdrop.discRadius.value = framing === "desktop" ? 1.06 : 0.98;
-    this.#backdrop.discCentre.value.set(0, framing === "desktop" ? 1.3 : 1.36);
-    this.audience.frame(framing);
+    this.#framing = framing;
+    this.#placeDisc();
+    this.audience.frame(framing, height);
     this.audience.resize(width / height);
   }
 
@@ -158,6 +160,13 @@ export class Stage {
     const eye = this.audience.camera.getWorldPosition(new Vector3());
     const [left, right] = [0, 1].map((limb) => puppet.handle(limb, new Vector3()));
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
+  }
+
+  /** The disc keeps its proportion to the dancer. */
+  #placeDisc(): void {
+    const [radius, height] = this.#framing === "desktop" ? [1.06, 1.3] : [0.98, 1.36];
+    this.#backdrop.discRadius.value = radius * this.audience.scale;
+    this.#backdrop.discCentre.value.set(0, height * this.audience.scale);
   }
 
   #setSize(): void {
