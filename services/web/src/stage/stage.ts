@@ -4,6 +4,7 @@ import type { Figure, Pose } from "../motion/skeleton";
 import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
 import { AudienceCamera, type Framing } from "./camera";
 import { createFloor, type Floor } from "./floor";
+import { FrameGate } from "./frame-gate";
 import { createLights, studio } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
@@ -44,6 +45,8 @@ export class Stage {
   #sharpness = 1;
   #framing: Framing = "desktop";
   readonly #quality: QualityChoice;
+  readonly #gate: FrameGate;
+  #sinceDrawn = 0;
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement, pinned = false) {
@@ -51,6 +54,7 @@ export class Stage {
     const { plain } = this.#quality.quality;
     this.#floor = createFloor(this.#backdrop, this.rig.group, this.rig.travelled, plain);
     this.renderer = new WebGLRenderer({ canvas, antialias: !plain, powerPreference: "high-performance" });
+    this.#gate = new FrameGate(this.renderer.getContext() as WebGL2RenderingContext);
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
@@ -106,7 +110,10 @@ export class Stage {
     this.audience.resize(width / height);
   }
 
-  /** Draws one frame: the pose (null: none yet), the strings, and the seconds since the frame before. */
+  /**
+   * Moves everything on to a pose (null: none yet) and its strings, and draws it if the graphics are done with the frame
+   * before; `interval` is the seconds since the last call.
+   */
   draw(pose: Pose | null, states: readonly StringState[] = FREE, interval = 0): void {
     const { puppet } = this;
     const seconds = Math.min(interval, LONGEST_STEP);
@@ -119,8 +126,13 @@ export class Stage {
     this.rig.group.updateMatrixWorld(true);
     this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0);
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());
+    this.#sinceDrawn += interval;
+    if (!this.#gate.open) return;
     this.renderer.render(this.scene, this.audience.camera);
-    if (puppet && pose && this.#quality.frame(interval)) {
+    this.#gate.close();
+    const slow = puppet && pose && this.#quality.frame(this.#sinceDrawn);
+    this.#sinceDrawn = 0;
+    if (slow) {
       this.#setSize();
       this.#furnish();
     }
