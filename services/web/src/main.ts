@@ -166,7 +166,7 @@ function enter(id: string): Room {
   const { viewer, puppeteer } = room;
   if (hands) hands.puppeteer = puppeteer;
   const url = new URL(location.href);
-  url.search = `?session=${encodeURIComponent(id)}`;
+  url.searchParams.set("session", id);
   history.replaceState(null, "", url);
   page.notice(null);
   viewer.addEventListener("figure", () => {
@@ -194,11 +194,12 @@ function enter(id: string): Room {
     renderStrings();
   });
   viewer.addEventListener("closed", (event) => {
+    const wasConnected = connected;
     connected = false;
     renderStrings();
     const reason = String((event as CustomEvent<string>).detail);
     if (viewer.ended) page.notice("The session has ended", reason);
-    else page.toast(`The line was lost: ${reason}`);
+    else if (wasConnected) page.toast(`The line was lost: ${reason}`);
   });
   renderTimeline();
   renderPieces();

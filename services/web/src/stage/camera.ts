@@ -9,6 +9,9 @@ const FRAMINGS: Readonly<Record<Framing, readonly [visible: number, look: number
   phone: [3.95, 0.81],
   sheet: [4.7, 0.26],
 };
+/** Pixels from the bottom that the transport takes, and the window height the desktop framing was drawn for. */
+const TRANSPORT = 110;
+const DRAWN_FOR = 900;
 const HALF_FIELD = (13 * Math.PI) / 180;
 const EYE = 0.08;
 const YAW = (25 * Math.PI) / 180;
@@ -21,7 +24,7 @@ export class AudienceCamera {
   readonly camera = new PerspectiveCamera(26, 1, 0.1, 40);
   still = false;
   scale = 1;
-  #framing: Framing = "desktop";
+  #goal: readonly [visible: number, look: number] = FRAMINGS.desktop;
   #visible = FRAMINGS.desktop[0];
   #look = FRAMINGS.desktop[1];
   #yaw = 0;
@@ -29,9 +32,11 @@ export class AudienceCamera {
   #back = 0;
   #untouched = REST;
 
-  /** Changes the framing, eased over 0.6 s. */
-  frame(framing: Framing): void {
-    this.#framing = framing;
+  /** Changes the framing, eased over 0.6 s. In a window of few pixels the transport takes a larger share: the puppet makes room. */
+  frame(framing: Framing, height: number): void {
+    const [visible, look] = FRAMINGS[framing];
+    const lost = framing === "desktop" ? Math.max(0, TRANSPORT / height - TRANSPORT / DRAWN_FOR) : 0;
+    this.#goal = [visible / (1 - lost), look - (visible / (1 - lost)) * (lost / 2)];
   }
 
   resize(aspect: number): void {
@@ -48,7 +53,7 @@ export class AudienceCamera {
 
   /** Moves on by `seconds`. `reach` is how far out the hands are, 0 the middle to 1 the edge of the picture. */
   update(seconds: number, reach: number): void {
-    const [visible, look] = FRAMINGS[this.#framing];
+    const [visible, look] = this.#goal;
     const share = this.still ? 1 : 1 - Math.exp((-4 / EASE) * seconds);
     this.#visible += (visible - this.#visible) * share;
     this.#look += (look - this.#look) * share;

@@ -4,6 +4,7 @@ import type { Figure, Pose } from "../motion/skeleton";
 import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
 import { AudienceCamera, type Framing } from "./camera";
 import { createFloor, type Floor } from "./floor";
+import { FrameGate } from "./frame-gate";
 import { createLights, studio } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
@@ -42,7 +43,10 @@ export class Stage {
   #height = 1;
   #still = false;
   #sharpness = 1;
+  #framing: Framing = "desktop";
   readonly #quality: QualityChoice;
+  readonly #gate: FrameGate;
+  #sinceDrawn = 0;
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement, pinned = false) {
@@ -50,6 +54,7 @@ export class Stage {
     const { plain } = this.#quality.quality;
     this.#floor = createFloor(this.#backdrop, this.rig.group, this.rig.travelled, plain);
     this.renderer = new WebGLRenderer({ canvas, antialias: !plain, powerPreference: "high-performance" });
+    this.#gate = new FrameGate(this.renderer.getContext() as WebGL2RenderingContext);
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
@@ -88,6 +93,7 @@ export class Stage {
     this.puppet.group.visible = false;
     this.scene.add(this.puppet.group);
     this.audience.scale = this.puppet.scale;
+    this.#placeDisc();
     this.rig.reset();
   }
 
@@ -98,13 +104,16 @@ export class Stage {
     this.#height = height;
     this.#sharpness = Math.min(pixelRatio, sharpest);
     this.#setSize();
-    this.#backdrop.discRadius.value = framing === "desktop" ? 1.06 : 0.98;
-    this.#backdrop.discCentre.value.set(0, framing === "desktop" ? 1.3 : 1.36);
-    this.audience.frame(framing);
+    this.#framing = framing;
+    this.#placeDisc();
+    this.audience.frame(framing, height);
     this.audience.resize(width / height);
   }
 
-  /** Draws one frame: the pose (null: none yet), the strings, and the seconds since the frame before. */
+  /**
+   * Moves everything on to a pose (null: none yet) and its strings, and draws it if the graphics are done with the frame
+   * before; `interval` is the seconds since the last call.
+   */
   draw(pose: Pose | null, states: readonly StringState[] = FREE, interval = 0): void {
     const { puppet } = this;
     const seconds = Math.min(interval, LONGEST_STEP);
@@ -117,8 +126,13 @@ export class Stage {
     this.rig.group.updateMatrixWorld(true);
     this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0);
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());
+    this.#sinceDrawn += interval;
+    if (!this.#gate.open) return;
     this.renderer.render(this.scene, this.audience.camera);
-    if (puppet && pose && this.#quality.frame(interval)) {
+    this.#gate.close();
+    const slow = puppet && pose && this.#quality.frame(this.#sinceDrawn);
+    this.#sinceDrawn = 0;
+    if (slow) {
       this.#setSize();
       this.#furnish();
     }
@@ -158,6 +172,13 @@ export class Stage {
     const eye = this.audience.camera.getWorldPosition(new Vector3());
     const [left, right] = [0, 1].map((limb) => puppet.handle(limb, new Vector3()));
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
+  }
+
+  /** The disc keeps its proportion to the dancer. */
+  #placeDisc(): void {
+    const [radius, height] = this.#framing === "desktop" ? [1.06, 1.3] : [0.98, 1.36];
+    this.#backdrop.discRadius.value = radius * this.audience.scale;
+    this.#backdrop.discCentre.value.set(0, height * this.audience.scale);
   }
 
   #setSize(): void {

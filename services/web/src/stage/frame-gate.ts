@@ -1,0 +1,30 @@
+/**
+ * Lets a frame be drawn only when the one before is done. A browser queues frames and then stands still until the graphics
+ * catch up; on a slow machine that would stop the network's timers too, and a held limb would be taken for lost.
+ */
+export class FrameGate {
+  readonly #context: WebGL2RenderingContext;
+  #fence: WebGLSync | null = null;
+
+  constructor(context: WebGL2RenderingContext) {
+    this.#context = context;
+  }
+
+  /** Whether the frame before has been drawn. */
+  get open(): boolean {
+    const gl = this.#context;
+    if (!this.#fence) return true;
+    if (gl.isContextLost()) this.#fence = null;
+    else if (gl.getSyncParameter(this.#fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    if (this.#fence) gl.deleteSync(this.#fence);
+    this.#fence = null;
+    return true;
+  }
+
+  /** Call right after drawing. */
+  close(): void {
+    const gl = this.#context;
+    this.#fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+  }
+}
