@@ -71,7 +71,7 @@ class ReferenceClock:
 
     def at(self, local: int) -> int:
         """The reference time at `local`; calls come in order of time."""
-        if self._shown_at is not None and local > self._shown_at:
+        if self._samples and self._shown_at is not None and local > self._shown_at:
             most = SLEW * (local - self._shown_at)
             self._shown += min(max(self.offset - self._shown, -most), most)
             self._shown_at = local

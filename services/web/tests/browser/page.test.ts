@@ -19,6 +19,7 @@ const shared = sharedFolder();
 const inCi = Boolean(process.env["CI"]);
 if (!path && inCi) throw new Error("the browser tests must run in CI: install Chromium");
 if (!path) console.warn("browser tests skipped: Chromium is not installed");
+if (!shared && inCi) throw new Error("the browser test of a real clip must run in CI: set BUNRAKU_SHARED");
 if (!shared) console.warn("browser test of a real clip skipped: no clips beside the project (BUNRAKU_SHARED)");
 
 describe.skipIf(!path)("the page", { timeout: 2 * PATIENCE }, () => {
