@@ -36,3 +36,16 @@ async def test_the_dance_is_taken_in_once_and_again_when_it_was_removed(
         assert await demo.add_demo(backing) == motion
         assert danced == 2
         assert await backing.library.get(motion) is not None
+
+
+async def test_a_dance_made_by_other_code_makes_room_for_the_new_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with open_backing(Settings(data=tmp_path)) as backing:
+        monkeypatch.setattr(choreography, "TITLE", "Older")
+        await demo.add_demo(backing)
+        monkeypatch.setattr(choreography, "TITLE", "Newer")
+        monkeypatch.setattr(demo, "_fingerprint", lambda: "other code")
+        await demo.add_demo(backing)
+        entries, _ = await backing.catalogue.page(10)
+        assert [entry.description["name"] for entry in entries] == ["Newer"]
