@@ -12,6 +12,7 @@ from bunraku.motion.skeleton import (
     Figure,
     Motion,
     channels,
+    front,
     points,
     standard_figure,
     world,
@@ -58,3 +59,12 @@ def test_wrong_shapes_are_refused() -> None:
         Motion(standard_figure(), 0.0, np.zeros((1, 3)), np.zeros((1, JOINT_COUNT, 4)))
     with pytest.raises(ValueError, match="rotations"):
         Motion(standard_figure(), 30.0, np.zeros((2, 3)), np.zeros((1, JOINT_COUNT, 4)))
+
+
+def test_the_front_is_the_mean_facing_and_none_for_one_who_turns() -> None:
+    motion = still(60)
+    assert front(motion) == 0
+    motion.rotations[:, 0] = rotation.about_axis(1, np.linspace(2.0, 2.6, 60))
+    assert front(motion) == pytest.approx(2.3, abs=0.01)
+    motion.rotations[:, 0] = rotation.about_axis(1, np.linspace(0, 2 * np.pi, 60))
+    assert front(motion) == 0

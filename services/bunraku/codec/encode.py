@@ -12,7 +12,7 @@ from bunraku.codec.decode import FORMAT, HEADER, decode_block
 from bunraku.codec.track import REFERENCE_UNIT, MotionTrack, describe_track, plan
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import Motion, points
+from bunraku.motion.skeleton import Motion, front, points
 
 STEPS: tuple[int, ...] = (30, 24, 17, 9)
 """Step index of each rate, from the lowest rate to the highest."""
@@ -36,15 +36,16 @@ class Rate:
 
 @dataclass(frozen=True, slots=True)
 class EncodedMotion:
-    """A motion at every rate, lowest first, upon one track."""
+    """A motion at every rate, lowest first, upon one track; `front` is where it faces (`skeleton.front`)."""
 
     track: MotionTrack
     rates: list[Rate]
+    front: float
 
     def describe(self) -> dict[str, Any]:
         """What a Description says of this motion (SPEC.md, Track `motion`)."""
         rates = [{"kbps": round(r.kbps, 3), "mean": round(r.mean, 3), "max": round(r.most, 3)} for r in self.rates]
-        return describe_track(self.track, rates)
+        return describe_track(self.track, rates) | {"front": round(self.front, 3)}
 
 
 def encode_block(track: MotionTrack, root: Array, rotations: Array, step: int) -> bytes:
@@ -84,4 +85,4 @@ def encode_motion(motion: Motion, block_seconds: float = 1.0, steps: tuple[int, 
         )
         kbps = sum(map(len, blocks)) * 8e-3 / motion.duration
         rates.append(Rate(blocks, kbps, float(error.mean()) * 1e3, float(error.max()) * 1e3))
-    return EncodedMotion(track, rates)
+    return EncodedMotion(track, rates, front(motion))

@@ -151,3 +151,12 @@ def channels(motion: Motion) -> list[Array]:
     """The paper's 19 channels: root position (n, 3) in metres, then root and 17 joints as axis and angle (n, 4)."""
     turned = rotation.to_axis_angle(motion.rotations)
     return [motion.root, *(turned[:, k] for k in range(JOINT_COUNT))]
+
+
+def front(motion: Motion) -> float:
+    """Where the dance faces over its length: radians about y from z towards x; 0 where it has no one front.
+
+    The mean of the pelvis's forward direction on the floor; a dance that turns about has a short mean, and no front.
+    """
+    forward = rotation.rotate(motion.rotations[:, 0], np.array([0.0, 0.0, 1.0])).mean(axis=0)
+    return float(np.arctan2(forward[0], forward[2])) if np.hypot(forward[0], forward[2]) > 0.5 else 0.0

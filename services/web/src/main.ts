@@ -170,7 +170,7 @@ function enter(id: string): Room {
   history.replaceState(null, "", url);
   page.notice(null);
   viewer.addEventListener("figure", () => {
-    if (viewer.figure) stage?.setFigure(viewer.figure);
+    if (viewer.figure) stage?.setFigure(viewer.figure, viewer.front);
     if (!pieces.find(viewer.motion)) void pieces.refresh().then(renderPieces, () => undefined);
     renderPieces();
   });
@@ -242,7 +242,7 @@ async function openStage(): Promise<void> {
   pad = createGamepad(hands, { take: (limb) => take(limb, "pad"), play, step }, () => navigator.getGamepads());
   if (room) {
     hands.puppeteer = room.puppeteer;
-    if (room.viewer.figure) stage.setFigure(room.viewer.figure);
+    if (room.viewer.figure) stage.setFigure(room.viewer.figure, room.viewer.front);
   }
   expose();
   resize();

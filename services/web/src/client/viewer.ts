@@ -122,6 +122,11 @@ export class Viewer extends EventTarget {
     return this.store?.track.figure ?? null;
   }
 
+  /** Where the dance faces over its length, radians about y from z towards x. */
+  get front(): number {
+    return this.store?.track.front ?? 0;
+  }
+
   /** The newest timeline. */
   get timeline(): Timeline | null {
     return this.timelines.newest;

@@ -84,6 +84,7 @@ export class MotionTrack {
    * @param figure the dancer
    * @param reference the joints' reference rotations (72)
    * @param rates what each rate costs and keeps, from the lowest to the highest
+   * @param front where the dance faces over its length, radians about y from z towards x
    */
   constructor(
     readonly fps: number,
@@ -92,6 +93,7 @@ export class MotionTrack {
     readonly figure: Figure,
     readonly reference: Float64Array,
     readonly rates: readonly Rate[] = [],
+    readonly front = 0,
   ) {
     this.blocks = Math.ceil(frames / blockFrames);
     this.levers = levers(figure);
@@ -103,7 +105,7 @@ export class MotionTrack {
    * @throws DamagedBlock where it tells of none that can be played here
    */
   static fromDescription(map: Readonly<Record<string, unknown>>): MotionTrack {
-    const { codec, fps, frames, block_frames: blockFrames, figure, reference, rates } = map;
+    const { codec, fps, frames, block_frames: blockFrames, figure, reference, rates, front } = map;
     const whole = (value: unknown, most: number) => Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
     if (codec !== CODEC) throw new DamagedBlock(`motion is of codec ${String(codec)}; this client reads ${CODEC}`);
     if (!Number.isFinite(fps) || Number(fps) <= 0) throw new DamagedBlock("motion needs fps, a number above zero");
@@ -122,6 +124,7 @@ export class MotionTrack {
     });
     return new MotionTrack(
       Number(fps), Number(frames), Number(blockFrames), unpackFigure(figure), unpackReference(reference), known,
+      Number.isFinite(front) ? Number(front) : 0,
     );
   }
 

@@ -13,7 +13,7 @@ const FOLLOW = 2.5;
 const CUT = 1.2;
 /**
  * Facing is averaged over so many seconds, and followed only beyond this angle and once watched for a while: a pirouette
- * turns no stage, nor does a back that is turned as one comes in.
+ * turns no stage, nor does a back that is turned as one comes in: the dance itself says where its front is.
  */
 const FACING_MEMORY = 8;
 const FACING_SLACK = Math.PI / 3;
@@ -32,6 +32,7 @@ export class Rig {
   /** Local metres x and z that the rig has gone: floor boards stay while it moves. */
   readonly travelled = new Vector2();
   readonly #facing = new Vector2();
+  #front = 0;
   #watched = 0;
   #placed = false;
 
@@ -39,9 +40,10 @@ export class Rig {
     this.group.name = "rig";
   }
 
-  /** The next dancer is met with a cut. */
-  reset(): void {
+  /** The next dancer is met with a cut, from where the dance faces over its length (radians about y from z towards x). */
+  reset(front = 0): void {
     this.#placed = false;
+    this.#front = front;
   }
 
   follow(puppet: Puppet, seconds: number): void {
@@ -53,9 +55,9 @@ export class Rig {
     if (!this.#placed || away > CUT) {
       if (!this.#placed) {
         position.y = ground;
-        this.#facing.copy(facing);
-        this.#watched = 0;
-        rotation.y = 0;
+        this.#facing.set(Math.sin(this.#front), Math.cos(this.#front));
+        this.#watched = WATCHED;
+        rotation.y = this.#front;
       }
       this.#placed = true;
       position.set(root.x, position.y, root.z);

@@ -84,8 +84,8 @@ export class Stage {
     this.#furnish();
   }
 
-  /** Carves the puppet for a dancer's limb lengths. */
-  setFigure(figure: Figure): void {
+  /** Carves the puppet for a dancer's limb lengths, and turns to where the dance faces (radians about y from z towards x). */
+  setFigure(figure: Figure, front = 0): void {
     this.puppet?.dispose();
     this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
     this.puppet = new Puppet(figure, this.#paint, this.#floorAt);
@@ -94,7 +94,7 @@ export class Stage {
     this.scene.add(this.puppet.group);
     this.audience.scale = this.puppet.scale;
     this.#placeDisc();
-    this.rig.reset();
+    this.rig.reset(front);
   }
 
   /** CSS pixels. */

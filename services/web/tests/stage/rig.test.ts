@@ -23,6 +23,15 @@ describe("the rig", () => {
     expect(rig.group.position.distanceTo(new Vector3(3, 0.2, -2))).toBeLessThan(1e-9);
   });
 
+  test("meets a dance from its front, wherever the dancer looks just then", () => {
+    const rig = new Rig();
+    rig.reset(2.8);
+    rig.follow(dancer(0, 0, 0, 0.4), 1 / 60);
+    expect(rig.group.rotation.y).toBeCloseTo(2.8, 6);
+    follow(rig, dancer(0, 0, 0, 2.5), 5);
+    expect(rig.group.rotation.y).toBeCloseTo(2.8, 1);
+  });
+
   test("leaves small steps alone, follows a walk, and tells the boards how far it went", () => {
     const rig = new Rig();
     follow(rig, dancer(0, 0, 0), 0.1);
