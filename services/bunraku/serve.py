@@ -41,7 +41,7 @@ class Page(StaticFiles):
     async def get_response(self, path: str, scope: Scope) -> Response:
         """As `StaticFiles`, with caching."""
         response = await super().get_response(path, scope)
-        lasting = path.startswith("assets/") and response.status_code < 300
+        lasting = path.startswith("assets/")
         response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if lasting else "no-cache"
         return response
 

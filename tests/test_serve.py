@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from bunraku import __version__, serve
+from bunraku.backing.settings import Settings
+from tests.servers import running
+
+
+async def test_everything_is_at_one_address_and_described(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server) as http:
+        assert (await http.get("/v1/health")).json() == {"status": "ok", "version": __version__}
+        described = (await http.get("/v1/openapi.json")).json()
+        assert (await http.get("/v1/docs")).status_code == 200
+    routes = {(path, method) for path, methods in described["paths"].items() for method in methods}
+    assert routes >= {
+        ("/v1/motions", "post"),
+        ("/v1/motions", "get"),
+        ("/v1/motions/{motion}", "get"),
+        ("/v1/motions/{motion}", "delete"),
+        ("/v1/motions/{motion}/description", "get"),
+        ("/v1/motions/{motion}/blocks/{rate}/{index}", "get"),
+        ("/v1/sessions", "post"),
+        ("/v1/sessions/{session}", "patch"),
+        ("/v1/arms/{proportions}/table", "get"),
+        ("/v1/solve", "post"),
+        ("/v1/health", "get"),
+    }
+
+
+@pytest.mark.parametrize("path", ["/v1/nothing", "/v1/motions/none", "/v1/sessions/none"])
+async def test_what_is_not_there_is_a_problem_document(server: str, path: str) -> None:
+    async with httpx2.AsyncClient(base_url=server) as http:
+        answer = await http.get(path)
+    assert answer.status_code == 404
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+async def test_the_page_is_asked_for_anew_and_its_parts_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "page"
+    (page / "assets").mkdir(parents=True)
+    (page / "index.html").write_text("<!doctype html><title>Bunraku</title>" + " " * 2000)
+    (page / "assets" / "index-abc.js").write_text("export {};" * 500)
+    monkeypatch.setattr(serve, "PAGE", page)
+    with running(tmp_path / "data") as url:
+        async with httpx2.AsyncClient(base_url=url) as http:
+            index = await http.get("/")
+            script = await http.get("/assets/index-abc.js")
+            missing = await http.get("/assets/other.js")
+    assert index.headers["cache-control"] == "no-cache"
+    assert index.headers["content-encoding"] == "gzip"
+    assert "immutable" in script.headers["cache-control"]
+    assert missing.status_code == 404
+
+
+async def test_without_a_built_page_it_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serve, "PAGE", tmp_path / "nowhere")
+    async with serve.compose(Settings(data=tmp_path / "data")) as app:
+        transport = httpx2.ASGITransport(app)
+        async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
+            answer = await http.get("/")
+    assert answer.status_code == 503
+    assert "make setup" in answer.text
