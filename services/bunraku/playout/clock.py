@@ -6,12 +6,15 @@ the smallest round trip says the offset. What is shown slews towards it and neve
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
 SAMPLES = 8
-SLEW = 0.005
-"""How fast the shown offset may move: microseconds a microsecond."""
+CLOSING = 250_000
+"""The shown offset closes on the best one with this time constant, microseconds."""
+SLEW = 0.9
+"""It moves by this at most, microseconds a microsecond: shown time never stands or runs back."""
 STEP = 1_000_000
 """Further off than this, at the start or after a pause of the machine, the clock is set anew."""
 
@@ -72,7 +75,8 @@ class ReferenceClock:
     def at(self, local: int) -> int:
         """The reference time at `local`; calls come in order of time."""
         if self._samples and self._shown_at is not None and local > self._shown_at:
-            most = SLEW * (local - self._shown_at)
-            self._shown += min(max(self.offset - self._shown, -most), most)
+            passed = local - self._shown_at
+            closed = (self.offset - self._shown) * -math.expm1(-passed / CLOSING)
+            self._shown += min(max(closed, -SLEW * passed), SLEW * passed)
             self._shown_at = local
         return round(local + self._shown)
