@@ -24,7 +24,7 @@ help:
 .tools/bin/uv:
 	@echo "setup: uv"
 	@$(PYTHON) -c 'import sys; sys.exit("Bunraku needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else None'
-	@$(PYTHON) -m pip install --quiet --target .tools "uv>=0.9"
+	@PIP_ROOT_USER_ACTION=ignore $(PYTHON) -m pip install --quiet --target .tools "uv>=0.9"
 
 .setup/python: requirements-dev.lock requirements.lock pyproject.toml | $(filter .tools/bin/uv,$(UV))
 	@echo "setup: Python packages in .venv"

@@ -49,9 +49,8 @@ def up(
     url = f"http://{shown}:{listening.getsockname()[1]}/"
 
     def ready() -> None:
-        out.print(
-            f"Bunraku {__version__} is at [link={url}]{url}[/link]  (what it keeps: {settings.data}; Ctrl-C ends it)"
-        )
+        out.print(f"Bunraku {__version__} is at [link={url}]{url}[/link]", soft_wrap=True)
+        out.print(f"It keeps its motions in {settings.data}. Ctrl-C ends it.", soft_wrap=True)
         if open_page:
             webbrowser.open(url)
 

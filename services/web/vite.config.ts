@@ -6,6 +6,8 @@ export default defineConfig({
     emptyOutDir: true,
     target: "es2023",
     assetsInlineLimit: 0,
+    // three.js is one chunk, loaded while the page is already there
+    chunkSizeWarningLimit: 700,
   },
   server: { proxy: { "/v1": { target: "http://127.0.0.1:8000", ws: true } } },
   test: { include: ["tests/**/*.test.ts"], environment: "node" },
