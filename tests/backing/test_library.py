@@ -56,3 +56,10 @@ async def test_memory_is_bounded_and_what_fell_out_is_read_again(monkeypatch: py
 
 def test_an_object_is_one_map() -> None:
     assert set(msgpack.unpackb(pack("m", ENCODED))) == {"description", "packets"}
+
+
+@pytest.mark.parametrize("motion", ["", "../m1", "a/b", "a//b", "m1\0", "é", ".", "motions/m1"])
+async def test_what_could_not_be_an_id_is_no_motion(tmp_path: Path, motion: str) -> None:
+    shelf = Library.open(f"file://{tmp_path}")
+    await shelf.put("m1", pack("m1", ENCODED))
+    assert await shelf.get(motion) is None

@@ -43,6 +43,8 @@ async def test_a_session_is_opened_edited_listed_and_ended(tmp_path: Path) -> No
     ("body", "status", "field"),
     [
         ({"motion": "none"}, 404, "motion"),
+        ({"motion": "../../etc/passwd"}, 404, "motion"),
+        ({"motion": "\0"}, 404, "motion"),
         ({}, 422, "motion"),
         ({"motion": "m", "colour": "red"}, 422, "colour"),
         ({"motion": 5}, 422, "motion"),

@@ -66,7 +66,9 @@ class Library:
         await obstore.put_async(self._store, _path(motion), packed)
 
     async def get(self, motion: str) -> StoredMotion | None:
-        """The motion of this id."""
+        """The motion of this id; what could not be an id is no motion, and never a path."""
+        if not (motion.isascii() and motion.isalnum()):
+            return None
         if motion in self._cache:
             self._cache.move_to_end(motion)
             return self._cache[motion]
