@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import base64
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -43,6 +44,15 @@ async def test_pages_go_through_all_newest_first_even_where_times_are_equal(cata
 async def test_a_strange_cursor_is_refused(catalogue: SqlCatalogue, cursor: str) -> None:
     with pytest.raises(BadCursor):
         await catalogue.page(3, cursor)
+
+
+@pytest.mark.parametrize("created", [-(10**30), 10**30])
+async def test_a_cursor_out_of_this_world_is_an_empty_or_whole_list(catalogue: SqlCatalogue, created: int) -> None:
+    await catalogue.add(Entry("m1", 5, {}))
+    cursor = base64.urlsafe_b64encode(f"{created}:x".encode()).decode()
+    entries, following = await catalogue.page(3, cursor)
+    assert [entry.id for entry in entries] == (["m1"] if created > 0 else [])
+    assert following is None
 
 
 async def test_it_is_there_after_opening_again(tmp_path: Path) -> None:

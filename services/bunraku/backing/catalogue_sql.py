@@ -84,6 +84,6 @@ def _entry(row: Row[Any]) -> Entry:
 def _read_cursor(cursor: str) -> tuple[int, str]:
     try:
         created, motion = base64.urlsafe_b64decode(cursor.encode()).decode().split(":", 1)
-        return min(int(created), (1 << 63) - 1), motion
+        return min(max(int(created), 0), (1 << 63) - 1), motion
     except (ValueError, binascii.Error):
         raise BadCursor("the cursor is not one of this list; leave it out to start anew") from None
