@@ -7,7 +7,6 @@ reader takes what real exporters write and says in `notes` where it had to choos
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,6 +95,4 @@ def _plain(data: bytes) -> bytes:
                         "Broken text", f"the file says it is {encoding.upper()}, but it is not", hint="save it as UTF-8"
                     ) from error
             break
-    if b"\r" in data:
-        data = re.sub(rb"\r\n?", b"\n", data)
-    return data
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")

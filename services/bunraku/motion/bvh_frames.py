@@ -7,14 +7,18 @@ import re
 
 import numpy as np
 
-from bunraku.motion.bvh_numbers import DECIMAL_COMMA, NO_COMMA, SEPARATING_COMMA, parse, words_per_line
+from bunraku.motion.bvh_numbers import DECIMAL_COMMA, NO_COMMA, SEPARATING_COMMA, Lines, count, parse
 from bunraku.motion.errors import UnreadableMotion, shown
 from bunraku.motion.rotation import Array
 
 FRAME_TIME = 1.0 / 30.0
 """Seconds a frame, where the file does not say."""
+SHORTEST, LONGEST = 0.001, 10.0
+"""Seconds a frame: what lies outside is no motion capture."""
 
-_COMMENT = re.compile(rb"(?:#|//)[^\n]*")
+# not the # of 1.#QNAN, which is a number gone wrong
+_COMMENT = re.compile(rb"(?<!\S)(?:#|//)[^\n]*")
+_DECIMAL = re.compile(rb"(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?")
 _SETTING = re.compile(rb"\s*(frames|frame[ \t]*time)[ \t]*:?[ \t]*([^\s]*)", re.IGNORECASE)
 
 
@@ -29,24 +33,25 @@ def read_frames(text: bytes, start: int, line: int, width: int) -> tuple[Array, 
     declared: int | None = None
     frame_time: float | None = None
     position = start
-    while setting := _SETTING.match(text, position):
+    seen: set[bool] = set()
+    while (setting := _SETTING.match(text, position)) and (counts := setting[1].lower() == b"frames") not in seen:
+        seen.add(counts)
+        line += text.count(b"\n", position, setting.end())
         position = setting.end()
-        at = line + text.count(b"\n", start, setting.start(2))
-        if setting.group(1).lower() == b"frames":
-            declared = _frame_count(setting.group(2), notes)
+        if counts:
+            declared = _frame_count(setting[2], notes)
         else:
-            frame_time = _frame_time(setting.group(2), at)
-    line += text.count(b"\n", start, position)
+            frame_time = _frame_time(setting[2], line)
     if frame_time is None or frame_time <= 0.0:
         notes.append(f"The frame time is {'missing' if frame_time is None else 'not above zero'}; 30 frames/s assumed.")
         frame_time = FRAME_TIME
     data = np.frombuffer(text, dtype=np.uint8)[position:]
     comma = _meaning_of_comma(text, position)
-    per_line = words_per_line(data, comma)
-    values, bad = parse(data, int(per_line.sum()), comma)
+    lines = count(data, comma, width)
+    values, bad = parse(data, lines.words, comma)
     if bad >= 0:
         raise _bad_value(text, position + bad, line + text.count(b"\n", position, position + bad))
-    whole = _whole_frames(values, declared, width, per_line, line, notes)
+    whole = _whole_frames(lines, declared, width, line, notes)
     return values[: whole * width].reshape(whole, width), frame_time, notes
 
 
@@ -61,9 +66,17 @@ def _frame_time(word: bytes, line: int) -> float | None:
     if not word:
         return None
     try:
-        seconds = float(word.replace(b",", b"."))
+        seconds = float(word.replace(b",", b".")) if b"_" not in word else math.nan
     except ValueError:
         seconds = math.nan
+    if 0.0 < seconds < math.inf and not SHORTEST <= seconds <= LONGEST:
+        raise UnreadableMotion(
+            "Frame time out of range",
+            f"{shown(word)} is not between {SHORTEST} and {LONGEST} seconds",
+            line=line,
+            field="Frame Time",
+            hint="write the seconds of one frame, such as 0.0333333",
+        )
     if not math.isfinite(seconds):
         raise UnreadableMotion(
             "Not a number",
@@ -90,6 +103,8 @@ def _bad_value(text: bytes, position: int, line: int) -> UnreadableMotion:
     lower = word.lower().lstrip(b"+-")
     if lower.startswith((b"nan", b"inf", b"1.#", b"-1.#")):
         title, hint = "Not a finite number", "the export went wrong in this frame; cut it out or export again"
+    elif _DECIMAL.fullmatch(lower):
+        title, hint = "Not a finite number", "it is larger than a number can be; export again"
     elif lower in (b"hierarchy", b"root", b"motion"):
         title, hint = "Two motions in one file", "send one motion a file"
     else:
@@ -97,51 +112,52 @@ def _bad_value(text: bytes, position: int, line: int) -> UnreadableMotion:
     return UnreadableMotion(title, f"{shown(word)} stands where a channel value should", line=line, hint=hint)
 
 
-def _whole_frames(
-    values: Array, declared: int | None, width: int, per_line: np.ndarray, line: int, notes: list[str]
-) -> int:
-    """The number of frames in `values`, or a refusal where they cannot be frames of `width` values.
+def _whole_frames(lines: Lines, declared: int | None, width: int, line: int, notes: list[str]) -> int:
+    """The number of whole frames on `lines`, the first of them line `line` of the file, or a refusal where they cannot
+    be frames of `width` values.
 
     One frame a line is usual, and then each line is checked. Frames that share lines or run over several are only
     checked in sum.
     """
-    total = len(values)
-    rows = np.flatnonzero(per_line)
-    counts = per_line[rows]
-    if total < width:
+    if lines.words < width:
         raise UnreadableMotion(
             "No whole frame",
-            f"the channels take {width} values a frame, and there are {total} in all",
+            f"the channels take {width} values a frame, and there are {lines.words} in all",
             line=line,
             hint="the file may be cut short; export it again",
         )
-    right = counts == width
-    if not right.any():
-        odd = 0 if len(rows) == declared and (declared > 1 or total % width) and np.ptp(counts) == 0 else None
-    elif right.sum() > 0.5 * len(rows) and not right[:-1].all() and (total % width or total // width != declared):
-        odd = int(np.argmin(right))
-    else:
-        odd = len(rows) - 1 if counts[-1] > width and right[:-1].all() and total % width else None
-    if odd is not None:
+    whole, rest = divmod(lines.words, width)
+    if odd := _odd_line(lines, declared, width):
         raise UnreadableMotion(
             "Wrong number of values",
-            f"this line has {counts[odd]} values, the channels take {width}",
-            line=line + int(rows[odd]),
+            f"this line has {odd[1]} values, the channels take {width}",
+            line=line + odd[0],
             hint="every frame needs one value for each channel; check the CHANNELS lines against the export",
         )
-    whole, rest = divmod(total, width)
+    if rest and (lines.odd >= 0 or lines.rows == 1) and (declared is None or whole >= declared):
+        raise UnreadableMotion(
+            "Wrong number of values",
+            f"{lines.words:,} values do not divide by the {width} channels",
+            line=line + (lines.odd if lines.odd >= 0 else lines.last),
+            hint="every frame needs one value for each channel; check the CHANNELS lines against the export",
+        )
     if rest:
-        one_a_line = bool(right[:-1].all())
-        if not one_a_line and (declared is None or whole > declared):
-            raise UnreadableMotion(
-                "Wrong number of values",
-                f"{total:,} values do not divide by the {width} channels",
-                line=line,
-                hint="every frame needs one value for each channel; check the CHANNELS lines against the export",
-            )
         notes.append(f"The last frame has {rest} of {width} values; it was dropped.")
     if declared is None:
         notes.append(f"The number of frames is missing; {whole} are there and were used.")
     elif declared != whole:
         notes.append(f"The file says {declared} frames, but {whole} are there and were used.")
     return whole
+
+
+def _odd_line(lines: Lines, declared: int | None, width: int) -> tuple[int, int] | None:
+    """The line that shows that the values are not frames of `width`, and how many it has."""
+    rest = lines.words % width
+    first_odd = (lines.odd, lines.odd_words) if lines.odd >= 0 else (lines.last, lines.last_words)
+    if lines.right == 0:
+        even = lines.rows > 1 and lines.fewest == lines.most
+        return first_odd if even and (lines.rows == declared or (rest and width % lines.most)) else None
+    if lines.odd >= 0:
+        mostly = 2 * lines.right >= lines.rows
+        return first_odd if mostly and (rest or lines.words // width != declared) else None
+    return first_odd if rest and lines.last_words > width else None

@@ -16,11 +16,11 @@ JOINT_LIMIT = 1_000
 DEPTH_LIMIT = 256
 NAME_LIMIT = 200
 AXES = "xyz"
+ORIGIN = (0.0, 0.0, 0.0)
 CHANNEL_NAMES = {f"{axis}{kind}": f"{axis.upper()}{kind}" for kind in ("position", "rotation") for axis in AXES}
 
-_GAP = re.compile(rb"[^\S\n]+")
+_BETWEEN = re.compile(rb"(?:\s++|(?:#|//)[^\n]*+)*+")
 _WORD = re.compile(rb"[{}]|[^\s{}]+")
-_LINE = re.compile(rb"[^\n]*")
 _NAME = re.compile(rb"[^\n{}]*")
 _DECIMAL_COMMA = re.compile(rb"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 
@@ -58,18 +58,9 @@ class _Words:
 
     def skip(self) -> None:
         """Go on to the next word, over space, blank lines and comments (# or //)."""
-        text = self.text
-        while self.position < len(text):
-            if gap := _GAP.match(text, self.position):
-                self.position = gap.end()
-            elif text.startswith(b"\n", self.position):
-                self.position += 1
-                self.line += 1
-            elif text.startswith((b"#", b"//"), self.position):
-                comment = _LINE.match(text, self.position)
-                self.position = comment.end() if comment else len(text)
-            else:
-                return
+        if between := _BETWEEN.match(self.text, self.position):
+            self.line += self.text.count(b"\n", self.position, between.end())
+            self.position = between.end()
 
     def peek(self) -> bytes:
         """The next word, not taken; empty at the end of the file."""
@@ -86,24 +77,31 @@ class _Words:
     def name(self) -> bytes:
         """The rest of the line up to a brace, without the space around it: names may hold spaces."""
         rest = _NAME.match(self.text, self.position)
-        if rest is None or rest.end() - self.position > 10 * NAME_LIMIT:
+        name = rest.group().strip() if rest else b""
+        if len(name) > NAME_LIMIT:
             raise UnreadableMotion(
-                "Name too long", f"a joint's name has over {NAME_LIMIT} characters", line=self.line, hint="shorten it"
+                "Name too long",
+                f"the name {shown(name)} has over {NAME_LIMIT} bytes",
+                line=self.line,
+                hint="shorten it, or begin a new line after it",
             )
-        self.position = rest.end()
-        return rest.group().strip()
+        self.position = rest.end() if rest else self.position
+        return name
 
 
 @dataclass(slots=True)
 class _Tree:
-    """What has been read so far; `stack` is the way from the root to the open brace, None for an End Site."""
+    """What has been read so far; `stack` is the way from the root to the open brace, None for an End Site.
+
+    `offsets`, `channels` and the offsets of `ends` are None until the file gives them.
+    """
 
     names: list[bytes] = field(default_factory=list)
     parents: list[int] = field(default_factory=list)
-    offsets: list[tuple[float, float, float]] = field(default_factory=list)
-    channels: list[tuple[str, ...]] = field(default_factory=list)
+    offsets: list[tuple[float, float, float] | None] = field(default_factory=list)
+    channels: list[tuple[str, ...] | None] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
-    ends: list[EndSite] = field(default_factory=list)
+    ends: list[tuple[int, tuple[float, float, float] | None]] = field(default_factory=list)
     stack: list[int | None] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -130,7 +128,7 @@ def read_hierarchy(text: bytes) -> Hierarchy:
                 _root(tree, words)
             case b"joint":
                 _joint(tree, words)
-            case b"end":
+            case b"end" | b"endsite":
                 _end_site(tree, words)
             case b"offset":
                 _offset(tree, words)
@@ -173,10 +171,10 @@ def read_hierarchy(text: bytes) -> Hierarchy:
     return Hierarchy(
         names=names,
         parents=tuple(tree.parents),
-        offsets=np.array(tree.offsets, dtype=np.float64),
-        channels=tuple(tree.channels),
+        offsets=np.array([offset or ORIGIN for offset in tree.offsets]),
+        channels=tuple(channels or () for channels in tree.channels),
         lines=tuple(tree.lines),
-        ends=tuple(tree.ends),
+        ends=tuple(EndSite(parent, np.array(offset or ORIGIN)) for parent, offset in tree.ends),
         notes=tuple(tree.notes),
         end=words.position,
         end_line=words.line,
@@ -189,7 +187,7 @@ def _root(tree: _Tree, words: _Words) -> None:
             "Two roots",
             "a second ROOT begins here",
             line=words.line,
-            field=shown(words.name()),
+            field=_decoded([words.name()])[0],
             hint="send one figure a file",
         )
     _add(tree, words, -1)
@@ -203,7 +201,7 @@ def _joint(tree: _Tree, words: _Words) -> None:
             "Joint in the wrong place",
             f"this joint is inside {inside}",
             line=line,
-            field=shown(words.name()),
+            field=_decoded([words.name()])[0],
             hint="every JOINT belongs between the braces of its parent; check the braces above",
         )
     _add(tree, words, tree.stack[-1])
@@ -228,7 +226,7 @@ def _add(tree: _Tree, words: _Words, parent: int) -> None:
                 "Cycle of joints",
                 f"{shown(name)} lies inside itself (see line {tree.lines[ancestor]})",
                 line=line,
-                field=shown(name),
+                field=_decoded([name])[0],
                 hint="a joint cannot be its own ancestor; rename it or check the braces",
             )
         ancestor = tree.parents[ancestor]
@@ -236,29 +234,35 @@ def _add(tree: _Tree, words: _Words, parent: int) -> None:
     tree.stack.append(len(tree.names))
     tree.names.append(name)
     tree.parents.append(parent)
-    tree.offsets.append((0.0, 0.0, 0.0))
-    tree.channels.append(())
+    tree.offsets.append(None)
+    tree.channels.append(None)
     tree.lines.append(line)
 
 
 def _end_site(tree: _Tree, words: _Words) -> None:
+    line = words.line
     name = words.name()
     if not tree.stack or tree.stack[-1] is None:
         raise UnreadableMotion(
             "End Site in the wrong place",
             "this End Site belongs to no joint",
-            line=words.line,
+            line=line,
             hint="an End Site stands inside the last joint of a chain; check the braces above",
         )
+    if len(tree.ends) >= JOINT_LIMIT:
+        raise UnreadableMotion(
+            "Too many End Sites", f"over {JOINT_LIMIT:,} of them", line=line, hint="export the body's joints only"
+        )
     _brace(words, name)
-    tree.ends.append(EndSite(tree.stack[-1], np.zeros(3)))
+    tree.ends.append((tree.stack[-1], None))
     tree.stack.append(None)
 
 
 def _brace(words: _Words, name: bytes) -> None:
+    line = words.line
     if words.take() != b"{":
         raise UnreadableMotion(
-            "Missing brace", f"no {{ after {shown(name)}", line=words.line, field=shown(name), hint="add the {"
+            "Missing brace", f"no {{ after {shown(name)}", line=line, field=_decoded([name])[0], hint="add the {"
         )
 
 
@@ -267,16 +271,29 @@ def _offset(tree: _Tree, words: _Words) -> None:
         raise UnreadableMotion(
             "OFFSET in the wrong place", "it belongs to no joint", line=words.line, hint="check the braces above"
         )
-    x, y, z = (_number(words) for _ in range(3))
+    line = words.line
     joint = tree.stack[-1]
+    if (tree.ends[-1][1] if joint is None else tree.offsets[joint]) is not None:
+        raise _twice("OFFSET", line)
+    offset = (_number(words, line), _number(words, line), _number(words, line))
     if joint is None:
-        tree.ends[-1] = EndSite(tree.ends[-1].parent, np.array([x, y, z]))
+        tree.ends[-1] = (tree.ends[-1][0], offset)
     else:
-        tree.offsets[joint] = (x, y, z)
+        tree.offsets[joint] = offset
 
 
-def _number(words: _Words) -> float:
-    """The next word as a finite number; a decimal comma is as good as a point."""
+def _twice(keyword: str, line: int) -> UnreadableMotion:
+    return UnreadableMotion(
+        f"{keyword} twice",
+        f"this joint has {keyword} already",
+        line=line,
+        field=keyword,
+        hint="leave one; a JOINT line or a } may be missing above",
+    )
+
+
+def _number(words: _Words, line: int) -> float:
+    """The next word, of the OFFSET on `line`, as a finite number; a decimal comma is as good as a point."""
     word = words.take()
     plain = word.replace(b",", b".") if _DECIMAL_COMMA.fullmatch(word) else word.rstrip(b",")
     try:
@@ -287,7 +304,7 @@ def _number(words: _Words) -> float:
         raise UnreadableMotion(
             "Not a number",
             f"OFFSET needs three finite numbers, not {shown(word)}",
-            line=words.line,
+            line=line,
             field="OFFSET",
             hint="write the three lengths as plain decimal numbers",
         )
@@ -301,18 +318,20 @@ def _channels(tree: _Tree, words: _Words) -> None:
         raise UnreadableMotion(
             "CHANNELS in the wrong place", "they belong to no joint", line=line, hint="only joints have channels"
         )
+    if tree.channels[joint] is not None:
+        raise _twice("CHANNELS", line)
     word = words.take()
     if not word.isdigit() or len(word) > 3:
         raise UnreadableMotion(
             "Not a number",
             f"CHANNELS needs a count, not {shown(word)}",
-            line=words.line,
+            line=line,
             field="CHANNELS",
             hint="write how many channels follow",
         )
     count = int(word)
     found: list[str] = []
-    while (name := CHANNEL_NAMES.get(words.peek().decode("latin-1").lower()[:9])) and len(words.peek()) == 9:
+    while name := CHANNEL_NAMES.get(words.peek()[:10].decode("latin-1").lower()):
         words.take()
         found.append(name)
     if len(found) != count:

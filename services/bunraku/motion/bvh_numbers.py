@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -89,21 +90,59 @@ def _parse(data: Bytes, comma: int, powers: Array, out: Array) -> int:
         word += 1
 
 
-def _per_line(data: Bytes, comma: int, out: npt.NDArray[np.int64]) -> None:
-    """Add to `out` the number of words of each line."""
-    line = 0
+class Lines(NamedTuple):
+    """How words lie on the lines that have any: lines are counted from 0 where the data begins, -1 is none."""
+
+    words: int
+    """Words in all."""
+    rows: int
+    """Lines that have any word."""
+    right: int
+    """Lines that have as many words as a frame has values."""
+    fewest: int
+    most: int
+    odd: int
+    """The first line, the last one apart, that has another number of words than a frame has values."""
+    odd_words: int
+    last: int
+    last_words: int
+
+
+def _count(data: Bytes, comma: int, width: int) -> tuple[int, int, int, int, int, int, int, int, int]:
+    """The fields of `Lines`, for frames of `width` values."""
+    words = rows = right = fewest = most = 0
+    odd, odd_words, last, last_words = -1, 0, -1, 0
+    line = here = 0
     between = True
     for c in data:
         space = c <= 32 or (comma == 2 and c == 44)
         if between and not space:
-            out[line] += 1
+            if here == 0:
+                if odd < 0 and last_words > 0 and last_words != width:
+                    odd, odd_words = last, last_words
+                fewest = last_words if rows == 1 else min(fewest, last_words)
+                rows += 1
+            here += 1
         between = space
         if c == 10:
+            if here > 0:
+                words += here
+                right += here == width
+                most = max(most, here)
+                last, last_words = line, here
+            here = 0
             line += 1
+    if here > 0:
+        words += here
+        right += here == width
+        most = max(most, here)
+        last, last_words = line, here
+    fewest = last_words if rows <= 1 else min(fewest, last_words)
+    return words, rows, right, fewest, most, odd, odd_words, last, last_words
 
 
 _parse_compiled: Callable[..., int] = numba.njit(cache=True, nogil=True)(_parse)
-_per_line_compiled: Callable[..., None] = numba.njit(cache=True, nogil=True)(_per_line)
+_count_compiled: Callable[..., tuple[int, ...]] = numba.njit(cache=True, nogil=True)(_count)
 
 
 def parse(data: Bytes, count: int, comma: int) -> tuple[Array, int]:
@@ -116,8 +155,6 @@ def parse(data: Bytes, count: int, comma: int) -> tuple[Array, int]:
     return out, bad
 
 
-def words_per_line(data: Bytes, comma: int) -> npt.NDArray[np.int64]:
-    """How many words stand on each line of `data` (lines end in a line feed)."""
-    out = np.zeros(int(np.count_nonzero(data == 10)) + 1, dtype=np.int64)
-    _per_line_compiled(data, comma, out)
-    return out
+def count(data: Bytes, comma: int, width: int) -> Lines:
+    """How words lie on the lines of `data` (lines end in a line feed), for frames of `width` values."""
+    return Lines(*_count_compiled(data, comma, width))

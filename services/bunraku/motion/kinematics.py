@@ -73,7 +73,9 @@ def _local(bvh: Bvh, joint: int, values: Array, column: int) -> tuple[Array, Arr
             moved[:, axis] = track
     given = ["XYZ".index(c[0]) for c in bvh.channels[joint] if c.endswith("position")]
     if given and bvh.parents[joint] >= 0:
-        mean = moved[:, given].mean(axis=0)
+        # over the whole clip, so that all choices of frames are read alike
+        columns = [column + index for index, c in enumerate(bvh.channels[joint]) if c.endswith("position")]
+        mean = bvh.frames[:, columns].mean(axis=0)
         if np.linalg.norm(mean) < np.linalg.norm(mean - offset[given]):
             moved[:, given] += offset[given]
     return turned, moved

@@ -1,0 +1,100 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bunraku.motion.bvh import Bvh, read
+from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.kinematics import pose
+from bunraku.motion.rotation import from_rotation_vector
+from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, Motion, standard_figure, world
+from bunraku.motion.writers import write_bvh
+from tests.motion.bvh_sources import HEAD, PLAIN, ROWS, VALUES, motion
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(PLAIN, id="plain"),
+        pytest.param(PLAIN.replace(b"\n", b"\r\n"), id="CRLF"),
+        pytest.param(PLAIN.replace(b"\n", b"\r"), id="lone CR"),
+        pytest.param(b"\xef\xbb\xbf" + PLAIN, id="BOM"),
+        pytest.param(b"\xff\xfe" + PLAIN.decode().encode("utf-16-le"), id="UTF-16 little"),
+        pytest.param(b"\xfe\xff" + PLAIN.decode().encode("utf-16-be"), id="UTF-16 big"),
+        pytest.param(PLAIN.replace(b" ", b"\t").replace(b"End\tSite", b"End Site"), id="tabs"),
+        pytest.param(PLAIN.replace(b"\n", b"\n\n \t\n"), id="blank lines"),
+        pytest.param(PLAIN.replace(b"\n  {", b" {").replace(b"Hips\n{", b"Hips {"), id="brace on the line"),
+        pytest.param(PLAIN.lower().replace(b"hips", b"Hips").replace(b"spine", b"Spine"), id="lower case"),
+        pytest.param(PLAIN.replace(b"OFFSET", b"# a comment\nOFFSET"), id="comments"),
+        pytest.param(HEAD + motion(b" ".join(ROWS)), id="all on one line"),
+        pytest.param(HEAD + motion(*b" ".join(ROWS).split()), id="a value a line"),
+        pytest.param(HEAD + motion(b"1e0 .2E1 30e-1 4. +5 6 7 8 9.50", ROWS[1]), id="E-notation"),
+        pytest.param(PLAIN.replace(b".", b","), id="decimal commas"),
+        pytest.param(HEAD + motion(*(row.replace(b" ", b", ") for row in ROWS)), id="separating commas"),
+    ],
+)
+def test_every_dialect_reads_as_the_plain_file(data: bytes) -> None:
+    bvh = read(data)
+    assert bvh.names == ("Hips", "Spine")
+    assert bvh.parents == (-1, 0)
+    assert bvh.offsets.tolist() == [[0.0, 90.0, 0.0], [0.0, 10.5, 0.0]]
+    assert [end.offset.tolist() for end in bvh.ends] == [[0.0, 20.0, 0.0]]
+    assert bvh.frames.tolist() == VALUES
+    assert (bvh.frame_time, bvh.fps, bvh.notes) == (0.04, 25.0, ())
+
+
+@pytest.mark.parametrize("data", [b"", b" \r\n\t", b"\xef\xbb\xbf"])
+def test_an_empty_file_is_refused(data: bytes) -> None:
+    with pytest.raises(UnreadableMotion, match="Empty file") as caught:
+        read(data)
+    assert caught.value.hint
+
+
+def test_broken_utf16_and_no_channels_are_refused() -> None:
+    with pytest.raises(UnreadableMotion, match="Broken text"):
+        read(b"\xff\xfeH\x00I")
+    with pytest.raises(UnreadableMotion, match="No channels"):
+        read(b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n1\n")
+
+
+@pytest.mark.parametrize(
+    ("time", "fps"),
+    [(b".0083333", 120.0), (b"0.0333333", 30.0), (b"0.033367", pytest.approx(29.97, abs=1e-3)), (b"0.025000", 40.0)],
+)
+def test_a_rounded_frame_time_is_the_rate_it_was_rounded_from(time: bytes, fps: float) -> None:
+    assert read(HEAD + motion(time=b"Frame Time: " + time)).fps == fps
+
+
+def test_all_real_clips_read(shared: Path) -> None:
+    clips = sorted((shared / "mocap" / "bvh").glob("*.bvh"))
+    assert clips
+    for clip in clips:
+        bvh = read(clip.read_bytes())
+        assert bvh.frames.shape == (len(bvh.frames), sum(map(len, bvh.channels)))
+        assert len(bvh.frames) > 100
+        assert bvh.fps in (40.0, 120.0)
+        last = [float(word) for word in clip.read_bytes().rstrip().splitlines()[-1].split()]
+        assert bvh.frames[-1] == pytest.approx(last, rel=1e-14, abs=0.0)
+
+
+@st.composite
+def motions(draw: st.DrawFn) -> Motion:
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n = draw(st.integers(1, 5))
+    turned = from_rotation_vector(random.uniform(-3.0, 3.0, (n, JOINT_COUNT, 3)))
+    return Motion(
+        standard_figure(), draw(st.sampled_from([24.0, 30.0, 60.0, 120.0])), random.normal(0, 2, (n, 3)), turned
+    )
+
+
+@settings(max_examples=25)
+@given(motions())
+def test_what_is_written_reads_as_the_same_motion(motion: Motion) -> None:
+    bvh: Bvh = read(write_bvh(motion))
+    assert (bvh.names, bvh.notes, bvh.fps) == (JOINTS, (), motion.fps)
+    position, orientation = pose(bvh, list(range(JOINT_COUNT)))
+    true_position, true_orientation = world(motion.figure, motion.root, motion.rotations)
+    assert np.abs(position / 100.0 - true_position).max() < 1e-6
+    assert np.abs(np.sum(orientation * true_orientation, axis=-1)).min() > 1.0 - 1e-9

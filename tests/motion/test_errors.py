@@ -1,0 +1,19 @@
+from bunraku.motion.errors import UnreadableMotion, shown
+
+
+def test_the_message_says_what_where_and_what_to_do() -> None:
+    error = UnreadableMotion("Two roots", "a second ROOT", line=7, field="b", hint="send one")
+    assert str(error) == "Two roots: line 7: a second ROOT (send one)"
+    assert (error.title, error.detail, error.line, error.field, error.hint) == (
+        "Two roots",
+        "a second ROOT",
+        7,
+        "b",
+        "send one",
+    )
+    assert str(UnreadableMotion("Empty file", "nothing")) == "Empty file: nothing"
+
+
+def test_shown_text_is_short_and_printable() -> None:
+    assert shown(b"a\x00b\xff") == "'a\\x00b�'"
+    assert shown("x" * 50) == "'" + "x" * 40 + "…'"
