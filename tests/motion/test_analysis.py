@@ -123,7 +123,7 @@ def test_elbows_bend_about_minus_x_and_knees_about_x() -> None:
 
 def test_a_dance_high_above_the_floor_is_moved_onto_it() -> None:
     motion = dance()
-    high = replace(motion, root=motion.root + [0.0, 3.0, 0.0])
+    high = replace(motion, root=motion.root + np.array([0.0, 3.0, 0.0]))
     analysis = analyse(bvh.read(told(high)))
     assert any("floor" in sentence for sentence in analysis.guessed)
     placed, _ = world(analysis.motion.figure, analysis.motion.root, analysis.motion.rotations)
