@@ -8,7 +8,6 @@ from bunraku.motion.fitting import Fit
 from bunraku.motion.kinematics import pose
 from bunraku.motion.rest import find_rest, sample
 from bunraku.motion.skeleton import INDEX, world
-from bunraku.motion.trunk import place_trunk
 from tests.motion.sources import dance, pose_with_arms, told
 
 MOTION = dance(frames=40)
@@ -41,12 +40,3 @@ def test_bones_and_what_lies_beyond(fit: Fit) -> None:
     hand = fit.beyond(INDEX["l_wrist"])
     assert hand is not None
     np.testing.assert_allclose(hand, [0.18, 0.0, 0.0], atol=1e-6)
-
-
-def test_the_trunk_lies_on_a_source_that_has_it(fit: Fit) -> None:
-    place_trunk(fit)
-    placed, _ = world(MOTION.figure, MOTION.root, MOTION.rotations)
-    trunk = [INDEX[name] for name in ("humanoid_root", "sacroiliac", "vl5", "skullbase")]
-    np.testing.assert_allclose(fit.placed[:, trunk], placed[:, trunk], atol=1e-5)
-    carried = [INDEX[name] for name in ("l_hip", "r_hip", "l_shoulder", "r_shoulder")]
-    np.testing.assert_allclose(fit.offsets[carried], MOTION.figure.offsets[carried], atol=1e-5)
