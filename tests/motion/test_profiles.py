@@ -8,7 +8,17 @@ from bunraku.motion.naming import bare
 from bunraku.motion.profiles import LIMB_JOINTS, PROFILES, Profile
 from bunraku.motion.skeleton import JOINTS
 
-NAMED = ("H-Anim 1", "H-Anim 2", "CMU (cgspeed)", "MotionBuilder", "Mixamo", "Blender", "Rokoko", "LAFAN", "Xsens")
+NAMED: tuple[str, ...] = (
+    "H-Anim 1",
+    "H-Anim 2",
+    "CMU (cgspeed)",
+    "MotionBuilder",
+    "Mixamo",
+    "Blender",
+    "Rokoko",
+    "LAFAN",
+    "Xsens",
+)
 NAMED += ("Perception Neuron", "3ds Max Biped", "VRM")
 
 
