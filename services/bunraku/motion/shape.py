@@ -22,6 +22,8 @@ ALIKE = 0.15
 """Bones of left and right may differ by this part of the longer."""
 SHORTEST_LIMB = 0.15
 """A limb is at least this part of the longest way from the root to a joint."""
+COLLAR = 0.8
+"""Collar bone and upper arm are taken for an arm only where upper arm and forearm are under this part of them."""
 HEAD_HEIGHT = 0.12
 """The head reaches at least this part of a leg's length above its joint."""
 
@@ -55,6 +57,7 @@ def by_shape(bvh: Bvh) -> Naming:
             field=bvh.names[0],
             hint="name the joints as Mixamo, MotionBuilder, VRM or H-Anim do, and send the whole body",
         )
+    arms = _past_collar(arms, pairs)
     joints: dict[str, int] = {}
     for side, leg, arm in zip("lr", legs, arms, strict=True):
         joints |= dict(zip((f"{side}_hip", f"{side}_knee", f"{side}_ankle"), leg.joints, strict=True))
@@ -103,6 +106,15 @@ def _pairs(bvh: Bvh, lengths: Array) -> list[tuple[_Limb, _Limb]]:
         and _apart(a, b, bvh.parents)
     ]
     return sorted(found, key=lambda pair: -min(pair[0].length, pair[1].length))
+
+
+def _past_collar(arms: tuple[_Limb, _Limb], pairs: list[tuple[_Limb, _Limb]]) -> tuple[_Limb, _Limb]:
+    """The arms one bone further down where they began with the collar bone; a hand is too short to follow as one."""
+    for pair in pairs:
+        further = {arm.joints[:2] for arm in pair} == {arm.joints[1:] for arm in arms}
+        if further and sum(arm.length for arm in pair) >= COLLAR * sum(arm.length for arm in arms):
+            return pair
+    return arms
 
 
 def _limbs(bvh: Bvh, lengths: Array) -> list[_Limb]:
