@@ -1,0 +1,105 @@
+import { Vector3 } from "three";
+import { describe, expect, test } from "vitest";
+import { AudienceCamera, type Framing } from "../../src/stage/camera";
+
+/** The seat once it has come to rest in a window of so many pixels. */
+function seat(framing: Framing, width: number, height: number, scale = 1): AudienceCamera {
+  const audience = new AudienceCamera();
+  audience.still = true;
+  audience.scale = scale;
+  audience.frame(framing, height);
+  audience.resize(width / height);
+  audience.update(0, 0);
+  return audience;
+}
+
+/** Pixels from the bottom of the picture. */
+function above(audience: AudienceCamera, y: number, height: number): number {
+  return (new Vector3(0, y, 0).project(audience.camera).y * 0.5 + 0.5) * height;
+}
+
+function yaw({ camera }: AudienceCamera): number {
+  return Math.atan2(camera.position.x, camera.position.z);
+}
+
+function run(audience: AudienceCamera, seconds: number, reach = 0): void {
+  for (let t = 0; t < seconds; t += 1 / 60) audience.update(1 / 60, reach);
+}
+
+describe("the framing", () => {
+  test.each([300, 400, 600, 900, 1400])("shows head and feet between header and transport, %d pixels high", (height) => {
+    const audience = seat("desktop", 1.6 * height, height);
+    expect(above(audience, 0, height)).toBeGreaterThan(110);
+    expect(above(audience, 1.75, height)).toBeLessThan(height * 0.85);
+  });
+
+  test("makes the puppet smaller on a phone, and lifts it over an open sheet", () => {
+    const size = (framing: Framing) => above(seat(framing, 400, 800), 1.75, 800) - above(seat(framing, 400, 800), 0, 800);
+    expect(size("phone")).toBeLessThan(size("desktop"));
+    expect(above(seat("sheet", 400, 800), 0, 800)).toBeGreaterThan(above(seat("phone", 400, 800), 0, 800) + 50);
+  });
+
+  test("shows a dancer twice the size in the same picture", () => {
+    for (const y of [0, 0.9, 1.75]) {
+      expect(above(seat("desktop", 800, 600, 2), 2 * y, 600)).toBeCloseTo(above(seat("desktop", 800, 600), y, 600), 6);
+    }
+  });
+
+  test("changes calmly, or at once where less motion is asked for", () => {
+    const [calm, eased] = [seat("desktop", 800, 900), seat("desktop", 800, 900)];
+    const before = eased.camera.position.z;
+    eased.still = false;
+    for (const audience of [calm, eased]) {
+      audience.frame("phone", 900);
+      audience.update(1 / 60, 0);
+    }
+    expect(eased.camera.position.z).toBeGreaterThan(before);
+    expect(eased.camera.position.z).toBeLessThan(before + 0.2 * (calm.camera.position.z - before));
+    run(eased, 3);
+    expect(eased.camera.position.z).toBeCloseTo(calm.camera.position.z, 3);
+  });
+});
+
+describe("turning the view", () => {
+  test("goes a little to each side and no further, and keeps the dancer in the middle", () => {
+    const audience = seat("desktop", 800, 900);
+    audience.still = false;
+    audience.orbit(0.2, 0);
+    audience.update(0, 0);
+    expect(yaw(audience)).toBeCloseTo(0.2, 6);
+    audience.orbit(9, 9);
+    audience.update(0, 0);
+    expect(yaw(audience)).toBeCloseTo((25 * Math.PI) / 180, 6);
+    expect(new Vector3(0, 1.005, 0).project(audience.camera).x).toBeCloseTo(0, 6);
+    expect(new Vector3(0, 1.005, 0).project(audience.camera).y).toBeCloseTo(0, 6);
+    audience.orbit(-9, -9);
+    audience.update(0, 0);
+    expect(yaw(audience)).toBeCloseTo((-25 * Math.PI) / 180, 6);
+    expect(audience.camera.position.y).toBeGreaterThan(0.2);
+  });
+
+  test("stays while it is touched, and springs back when left for four seconds", () => {
+    const audience = seat("desktop", 800, 900);
+    audience.still = false;
+    audience.orbit(0.3, 0.1);
+    run(audience, 3.9);
+    expect(yaw(audience)).toBeCloseTo(0.3, 6);
+    audience.orbit(0, 0);
+    run(audience, 3.9);
+    expect(yaw(audience)).toBeCloseTo(0.3, 6);
+    run(audience, 4);
+    expect(Math.abs(yaw(audience))).toBeLessThan(0.01);
+  });
+});
+
+test("the seat steps back from hands that reach out of the picture, by an eighth at most, and comes forward again", () => {
+  const audience = seat("desktop", 800, 900);
+  audience.still = false;
+  const near = audience.camera.position.z;
+  run(audience, 5, 0.8);
+  expect(audience.camera.position.z).toBeCloseTo(near, 6);
+  run(audience, 5, 3);
+  expect(audience.camera.position.z / near).toBeCloseTo(1.12, 3);
+  run(audience, 12, 0.2);
+  expect(audience.camera.position.z / near).toBeCloseTo(1, 3);
+});
