@@ -54,8 +54,8 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python services/bunraku/codec/*.py
-	@echo "setup: compiling the codec"
+.setup/warm: .setup/python services/bunraku/codec/*.py services/bunraku/motion/bvh_numbers.py
+	@echo "setup: compiling reader and codec"
 	@$(BIN)/bunraku warm
 	@touch $@
 

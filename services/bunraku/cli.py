@@ -154,10 +154,8 @@ def version(as_json: Json = False) -> None:
 
 @app.command()
 def warm() -> None:
-    """Compile the codec once, so that no upload waits for it (done by `make setup`)."""
-    from bunraku.codec import coefficients
-
-    coefficients.warm()
+    """Compile reader and codec once, so that no upload waits for it (done by `make setup`)."""
+    from bunraku.ingest import making  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
 
 
 async def _stream_url(client: Any, address: str) -> str:

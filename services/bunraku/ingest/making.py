@@ -14,7 +14,10 @@ from bunraku.motion.analysis import analyse
 from bunraku.motion.bvh import read
 from bunraku.motion.errors import UnreadableMotion
 
+_SMALLEST = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xrotation } MOTION Frames: 1 Frame Time: 0.1 0"
+
 coefficients.warm()
+read(_SMALLEST)
 
 
 def make(motion: str, path: Path) -> Made | Refused:
