@@ -10,5 +10,6 @@ export default defineConfig({
     chunkSizeWarningLimit: 700,
   },
   server: { proxy: { "/v1": { target: "http://127.0.0.1:8000", ws: true } } },
-  test: { include: ["tests/**/*.test.ts"], environment: "node" },
+  // one file at a time: browsers that draw in software starve each other
+  test: { include: ["tests/**/*.test.ts"], environment: "node", fileParallelism: false },
 });

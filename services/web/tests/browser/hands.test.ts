@@ -1,12 +1,13 @@
 /** What fingers do to the page in a real browser: a file is dropped on it, a ring is dragged by touch. */
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import type { Puppeteer } from "../../src/client/puppeteer";
 import type { Hands } from "../../src/input/hands";
 import type { Stage } from "../../src/stage/stage";
 import { launch } from "./chromium";
 import { chromium, startServer, type RunningServer } from "./server";
 
-type Inside = { bunraku: { stage: Stage; hands: Hands } };
+type Inside = { bunraku: { stage: Stage; hands: Hands; puppeteer: Puppeteer | null } };
 
 const LEFT_HAND = 0;
 const PATIENCE = 90_000;
@@ -39,6 +40,7 @@ describe.skipIf(!path)("hands on the page", { timeout: 2 * PATIENCE }, () => {
   test("a finger on a ring pulls the hand, and lifted gives it back", async () => {
     // Paused on entering, as less motion is asked for: only the finger moves the hand.
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
+    await page.waitForFunction(() => (window as unknown as Inside).bunraku.puppeteer?.id != null);
     const ring = await ringOf(page);
     const touch = await page.context().newCDPSession(page);
     const finger = (type: "touchStart" | "touchMove", x: number, y: number) =>
@@ -81,13 +83,20 @@ function drag({ type, name, text }: { type: string; name: string; text: string }
   if (!event.defaultPrevented) throw new Error(`the browser would have opened the file: ${type} was not taken`);
 }
 
-/** Where the left hand's ring is on the screen, pixels. */
-function ringOf(page: Page): Promise<{ x: number; y: number }> {
-  return page.evaluate((limb) => {
-    const { stage } = (window as unknown as Inside).bunraku;
-    if (!stage.puppet) throw new Error("no puppet on the stage");
-    return stage.toScreen(stage.puppet.handle(limb, stage.rig.group.position.clone()));
-  }, LEFT_HAND);
+/** Where the left hand's ring is on the screen once the pause has taken effect and nothing moves any more, pixels. */
+async function ringOf(page: Page): Promise<{ x: number; y: number }> {
+  let last = { x: Infinity, y: Infinity };
+  for (let same = 0; same < 5; ) {
+    const now = await page.evaluate(async (limb) => {
+      await new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
+      const { stage } = (window as unknown as Inside).bunraku;
+      if (!stage.puppet) throw new Error("no puppet on the stage");
+      return stage.toScreen(stage.puppet.handle(limb, stage.rig.group.position.clone()));
+    }, LEFT_HAND);
+    same = Math.hypot(now.x - last.x, now.y - last.y) < 0.5 ? same + 1 : 0;
+    last = now;
+  }
+  return last;
 }
 
 /** Two seconds of a figure that bows, centimetres and degrees. */
