@@ -176,7 +176,14 @@ export class Puppeteer extends EventTarget {
   }
 
   private refused({ limb, reason, holder }: Refusal): void {
-    this.drop(this.holdings[limb]);
+    const hold = this.holdings[limb];
+    if (reason === "lost") {
+      // The line, or this page, stood still too long: what is still held here is asked for again, as after a cut.
+      hold.epoch = null;
+      if (hold.wanted) this.connection.send({ name: "Claim", limb });
+      return;
+    }
+    this.drop(hold);
     this.dispatchEvent(new CustomEvent("refusal", { detail: { limb, reason, holder } }));
   }
 

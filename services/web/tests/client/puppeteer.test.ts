@@ -94,7 +94,7 @@ describe("a limb", () => {
     expect(puppeteer.holds(0)).toBe(false);
   });
 
-  test("refused or lost goes back, and says why", () => {
+  test("refused goes back, and says why", () => {
     const refused: unknown[] = [];
     puppeteer.addEventListener("refusal", (event) => refused.push((event as CustomEvent).detail));
     puppeteer.claim(0);
@@ -103,6 +103,31 @@ describe("a limb", () => {
     pass(100);
     expect(refused).toEqual([{ limb: 0, reason: "held", holder: "b2" }]);
     expect(line.of("Input")).toEqual([]);
+  });
+
+  test("lost for want of a word while it is still held is asked for again, unless another took it meanwhile", () => {
+    const refused: unknown[] = [];
+    puppeteer.addEventListener("refusal", (event) => refused.push((event as CustomEvent).detail));
+    puppeteer.claim(0);
+    line.say({ name: "Grant", limb: 0, epoch: 3 });
+    puppeteer.target(0, 0.5, 0, 0);
+    line.say({ name: "Refusal", limb: 0, reason: "lost", holder: null });
+    expect(line.of("Claim")).toHaveLength(2);
+    expect([puppeteer.holds(0), refused]).toEqual([false, []]);
+    line.say({ name: "Grant", limb: 0, epoch: 4 });
+    expect(puppeteer.holds(0)).toBe(true);
+    // The session is told anew where the hand is.
+    expect(line.of("Input").at(-1)).toMatchObject({ epoch: 4, values: [0.5, 0, 0] });
+    line.say({ name: "Refusal", limb: 0, reason: "lost", holder: null }, { name: "Refusal", limb: 0, reason: "held", holder: "b2" });
+    expect(refused).toEqual([{ limb: 0, reason: "held", holder: "b2" }]);
+  });
+
+  test("lost after it was let go is not asked for", () => {
+    puppeteer.claim(0);
+    line.say({ name: "Grant", limb: 0, epoch: 3 });
+    puppeteer.release(0);
+    line.say({ name: "Refusal", limb: 0, reason: "lost", holder: null });
+    expect(line.of("Claim")).toHaveLength(1);
   });
 
   test("is asked for again when the line comes back", () => {
