@@ -1,6 +1,20 @@
+import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 
+/** The stage's chunk is fetched beside the page's script, and not only once that runs. */
+const preloadTheatre: Plugin = {
+  name: "preload-theatre",
+  transformIndexHtml: {
+    order: "post",
+    handler: (_, { bundle }) =>
+      Object.values(bundle ?? {})
+        .filter((file) => file.type === "chunk" && file.name === "theatre")
+        .map(({ fileName }) => ({ tag: "link", attrs: { rel: "modulepreload", crossorigin: true, href: `/${fileName}` }, injectTo: "head" })),
+  },
+};
+
 export default defineConfig({
+  plugins: [preloadTheatre],
   build: {
     outDir: "../bunraku/page",
     emptyOutDir: true,

@@ -301,16 +301,17 @@ function invite(now: number): void {
 
 async function start(): Promise<void> {
   try {
+    // The stage waits for no list: the library is read meanwhile.
+    const library = pieces.refresh().then(renderPieces);
     const asked = query.get("session");
-    // The session of the address needs no list: go on stage at once, and read the library meanwhile.
     if (asked) enter(asked);
-    await pieces.refresh();
-    renderPieces();
-    const session = room ? null : await findSession(null, pieces.all[0]?.id ?? null);
+    const session = asked ? null : await findSession(library.then(() => pieces.all[0]?.id ?? null));
     if (session) {
       const entered = enter(session.id);
       if (calm.matches && session.viewers === 0) entered.edit({ playing: false });
-    } else if (!room) {
+    }
+    await library;
+    if (!room) {
       page.notice("The stage is empty", "Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it.");
       page.panels.open("library");
     }

@@ -1,17 +1,17 @@
 /** The session being watched: its viewer and puppeteer, and the edits of its timeline. */
-import { createSession, editSession, getSession, listSessions, type Session, type SessionEdit } from "./client/library";
+import { createSession, editSession, listSessions, type Session, type SessionEdit } from "./client/library";
 import { Puppeteer } from "./client/puppeteer";
 import { Viewer } from "./client/viewer";
 
 /** After a seek the bar stands where it was put until the line has followed, at most this long. Milliseconds. */
 const SEEK_GRACE = 1200;
 
-/** The session of the address, else the first there is, else a new one over `newest`; null when there is nothing to dance. */
-export async function findSession(asked: string | null, newest: string | null): Promise<Session | null> {
-  if (asked) return getSession(asked);
+/** The first session there is, else a new one over the `newest` motion; null when there is nothing to dance. */
+export async function findSession(newest: Promise<string | null>): Promise<Session | null> {
   const { items } = await listSessions();
   if (items.length > 0) return items[0];
-  return newest ? createSession(newest) : null;
+  const motion = await newest;
+  return motion ? createSession(motion) : null;
 }
 
 export class Room {

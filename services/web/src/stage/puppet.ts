@@ -68,8 +68,8 @@ export class Puppet {
     for (const mesh of [this.#mesh, this.#reflection]) {
       mesh.bind(skeleton, new Matrix4());
       mesh.frustumCulled = false;
-      this.group.add(mesh);
     }
+    this.group.add(this.#mesh);
     const rest = restPositions(figure);
     this.#sleeves = SIDES.map(({ side }) => {
       const along = (rest.get(`${side}_elbow`) as Vector3).clone().sub(rest.get(`${side}_shoulder`) as Vector3);
@@ -80,7 +80,9 @@ export class Puppet {
 
   /** Shows the reflection, which only the lacquer of the night has. */
   set reflected(on: boolean) {
-    this.#reflection.visible = on;
+    // Taken away, not hidden: what is hidden has its shader compiled all the same.
+    if (on) this.group.add(this.#reflection);
+    else this.#reflection.removeFromParent();
   }
 
   /** Draws with the plain material, for machines without a graphics processor. */

@@ -95,6 +95,8 @@ export class Stage {
     this.audience.scale = this.puppet.scale;
     this.#placeDisc();
     this.rig.reset(front);
+    // Every shader there will be, side by side: one after the other as they come into sight takes longer, and stutters.
+    this.renderer.compile(this.scene, this.audience.camera);
   }
 
   /** CSS pixels. */
