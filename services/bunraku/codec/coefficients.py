@@ -1,17 +1,29 @@
-"""Quantised coefficients of one block to bytes and back (SPEC.md, Motion block: Order, Symbol, Exp-Golomb, Model)."""
+"""Heads and quantised coefficients of blocks to bytes and back (SPEC.md, Motion block)."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 
 import numpy as np
-import numpy.typing as npt
 
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.prior import LEVELS, Integers, Prior
 from bunraku.motion.skeleton import CHANNEL_COUNT
 
-Integers = npt.NDArray[np.int64]
+LARGEST_BLOCK = 65_536
+MOST_FRAMES = 1_000
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What stands before the coefficients: `frames`, the `step` index (0..255), and `turn`, the whole tenths of a radian
+    (-32..31) of the rotation vector that the root's rotations are relative to."""
+
+    frames: int
+    step: int
+    turn: tuple[int, int, int]
 
 
 @cache
@@ -21,31 +33,42 @@ def _kernels() -> ModuleType:
     return kernels
 
 
-def warm() -> None:
-    """Load the compiled code, or compile it where that was never done: seconds that no one should wait for later."""
-    decode(encode(np.ones((CHANNEL_COUNT, 3, 2), dtype=np.int64)), 2)
+def length_level(frames: int, fps: float) -> int:
+    """Level of a block's duration in sixteenths of a second: a feature of its contexts."""
+    return int(LEVELS[min(int(16 * frames / fps + 0.5), 4095)])
 
 
-def encode(q: Integers) -> bytes:
-    """Bytes of the coefficients `q` (19, 3, K), K < 1024, |q| < 2^23; zero frequencies at the end cost nothing.
+def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> bytes:
+    """Bytes of a block of `fps` frames a second with coefficients `q` (19, 3, K), K <= frames; zero frequencies at the end
+    cost nothing, nor does the number of frames where it is `usual`.
 
-    Raises ValueError for a larger coefficient.
+    Raises ValueError for a coefficient or block that is too large.
     """
     used = np.flatnonzero(q.any(axis=(0, 1)))
-    q = np.ascontiguousarray(q[:, :, : int(used[-1]) + 1 if len(used) else 0], dtype=np.int64)
-    out = np.zeros(64 + q.size * 8, dtype=np.uint8)
-    length = _kernels().encode(q, out)
-    if length < 0:
+    count = int(used[-1]) + 1 if len(used) else 0
+    q = np.ascontiguousarray(q[:, :, :count], dtype=np.int64)
+    kernels = _kernels()
+    out = kernels.room(q)
+    numbers = np.array([head.frames, head.step, *head.turn, count], dtype=np.int64)
+    length = kernels.encode(prior, q, numbers, usual, length_level(head.frames, fps), out)
+    if not 0 <= length <= LARGEST_BLOCK:
         raise ValueError("a coefficient is too large to be coded: the step is too fine for this motion")
     return out[1:length].tobytes().rstrip(b"\0")
 
 
-def decode(data: bytes, frames: int) -> Integers:
-    """The coefficients (19, 3, K) of a block of `frames` frames; raises `DamagedBlock`."""
-    q = np.zeros((CHANNEL_COUNT, 3, frames), dtype=np.int64)
-    count = _kernels().decode(np.array(bytearray(data), dtype=np.uint8), q)
-    if count < 0:
-        raise DamagedBlock("block holds a number longer than 24 bits")
-    if count > frames:
-        raise DamagedBlock(f"block says {count} frequencies for {frames} frames")
-    return q[:, :, :count]
+def decode(prior: Prior, data: bytes, usual: int, fps: float) -> tuple[Head, Integers]:
+    """Head and coefficients (19, 3, K) of a block; raises `DamagedBlock`."""
+    if len(data) > LARGEST_BLOCK:
+        raise DamagedBlock(f"a block has at most {LARGEST_BLOCK} bytes, not {len(data)}")
+    kernels = _kernels()
+    numbers = np.zeros(6, dtype=np.int64)
+    octets = np.array(bytearray(data), dtype=np.uint8)
+    if not kernels.decode_head(octets, usual, numbers):
+        raise DamagedBlock(
+            f"block says {numbers[0]} frames and {numbers[5]} frequencies; 1..{MOST_FRAMES} and no more are allowed"
+        )
+    frames, step, x, y, z, count = map(int, numbers)
+    q = np.zeros((CHANNEL_COUNT, 3, count), dtype=np.int64)
+    if not kernels.decode(prior, octets, q, numbers, usual, length_level(frames, fps)):
+        raise DamagedBlock(f"block holds a number longer than {kernels.ESCAPE} bits")
+    return Head(frames, step, (x, y, z)), q

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 
 import numpy as np
 
 from bunraku.codec import coefficients, transform
 from bunraku.codec.coefficients import Integers
-from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.track import REFERENCE_UNIT, MotionTrack
+from bunraku.codec.prior import Prior, shipped
+from bunraku.codec.track import TURN_UNIT, MotionTrack, step_size
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-
-FORMAT = 1
-HEADER = struct.Struct("<BBH3b")
-LARGEST_BLOCK = 65_536
-MOST_FRAMES = 1_000
 
 
 @dataclass(frozen=True, slots=True)
 class MotionBlock:
-    """A decoded block: `frames` frames, quantised `q` (19, 3, K), their values, and the rotations they are relative to
-    (18, 4)."""
+    """A decoded block: `frames` frames, quantised `q` (19, 3, K), their values (19, 3, K) in metres and radians, and the
+    rotations they are relative to (18, 4)."""
 
     frames: int
     q: Integers
@@ -38,16 +32,25 @@ class MotionBlock:
         return tracks[:, 0], rotation.multiply(np.broadcast_to(self.reference, turned.shape), turned)
 
 
-def decode_block(track: MotionTrack, data: bytes) -> MotionBlock:
-    """Decode one block of `track`; raises `DamagedBlock` on anything that is not one."""
-    if not HEADER.size <= len(data) <= LARGEST_BLOCK:
-        raise DamagedBlock(f"a block has {HEADER.size}..{LARGEST_BLOCK} bytes, not {len(data)}")
-    block_format, step, frames, x, y, z = HEADER.unpack_from(data)
-    if block_format != FORMAT:
-        raise DamagedBlock(f"block is of format {block_format}; this decoder reads {FORMAT}")
-    if not 1 <= frames <= MOST_FRAMES:
-        raise DamagedBlock(f"block says {frames} frames; 1..{MOST_FRAMES} are allowed")
-    q = coefficients.decode(data[HEADER.size :], frames)
-    root = rotation.from_rotation_vector(np.array([[x, y, z]]) * REFERENCE_UNIT)
-    reference = np.concatenate([root, track.reference_rotations])
-    return MotionBlock(frames, q, q * track.steps(step, frames)[:, None, None], reference)
+def reconstruct(q: Integers) -> Array:
+    """Values of quantised coefficients, in steps: a little below the middle, where values are denser (SPEC.md)."""
+    size = np.abs(q)
+    values: Array = np.sign(q) * (size - np.where(size == 1, 0.06, 0.03))
+    return values
+
+
+def root_reference(turn: tuple[int, int, int]) -> Array:
+    """The rotation (1, 4) that a block's root is relative to."""
+    return rotation.from_rotation_vector(np.array([turn]) * TURN_UNIT)
+
+
+def decode_block(track: MotionTrack, data: bytes, prior: Prior | None = None) -> MotionBlock:
+    """Decode one block of `track`; raises `DamagedBlock` on what cannot be one.
+
+    `prior` is the package's own unless another is given; nothing but the same prior decodes a block.
+    """
+    head, q = coefficients.decode(prior or shipped(), data, track.block_frames, track.fps)
+    size = step_size(head.step, head.frames)
+    values = np.linalg.inv(track.weights) @ (reconstruct(q) * size)
+    reference = np.concatenate([root_reference(head.turn), track.reference_rotations])
+    return MotionBlock(head.frames, q, values, reference)

@@ -1,37 +1,40 @@
-"""Frames of a motion to blocks at several rates (SPEC.md, Motion block)."""
+"""Frames of a motion to blocks at several rates, each within its error (SPEC.md, Motion block)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from bunraku.codec import coefficients, transform
-from bunraku.codec.decode import FORMAT, HEADER, decode_block
-from bunraku.codec.track import REFERENCE_UNIT, MotionTrack, describe_track, plan
-from bunraku.motion import rotation
+from bunraku.codec.decode import decode_block
+from bunraku.codec.prior import Prior, shipped
+from bunraku.codec.search import BlockEncoder, Coded
+from bunraku.codec.track import MotionTrack, describe_track, plan
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion, front, points
 
-STEPS: tuple[int, ...] = (30, 24, 17, 9)
-"""Step index of each rate, from the lowest rate to the highest."""
+LADDER: tuple[float, ...] = (60.0, 20.0, 8.0, 3.0, 0.5)
+"""Largest error of each rate at any point and frame, mm, from the lowest rate to the highest: about 1 kbit/s to what
+cannot be told from the source."""
 
-_ROUNDING = np.array([0.5, 0.5, 0.42])
-"""Where rounding up begins is past the middle for the joints: a zero more costs less than the error it makes."""
+Grade = Literal["live", "best"]
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
     """One encoding of a whole motion: its blocks, and what they cost and keep.
 
-    `kbps` counts the blocks' bytes over the duration; `mean` and `most` are errors in mm over 18 joints and 5 tips.
+    `kbps` counts the blocks' bytes over the duration; `mean` and `most` are errors in mm over 18 joints and 5 tips as
+    decoded; `bound` is what no point of any block exceeds.
     """
 
     blocks: list[bytes]
     kbps: float
     mean: float
     most: float
+    bound: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,45 +47,60 @@ class EncodedMotion:
 
     def describe(self) -> dict[str, Any]:
         """What a Description says of this motion (SPEC.md, Track `motion`)."""
-        rates = [{"kbps": round(r.kbps, 3), "mean": round(r.mean, 3), "max": round(r.most, 3)} for r in self.rates]
+        rates = [{"kbps": round(r.kbps, 3), "mean": round(r.mean, 3), "max": r.bound} for r in self.rates]
         return describe_track(self.track, rates) | {"front": round(self.front, 3)}
 
 
-def encode_block(track: MotionTrack, root: Array, rotations: Array, step: int) -> bytes:
-    """One block of the frames `root` (n, 3) and `rotations` (n, 18, 4), n <= 1,000, at step index `step`."""
-    frames = len(root)
-    middle = rotation.to_rotation_vector(rotations[frames // 2, 0])
-    centre = np.clip(np.round(middle / REFERENCE_UNIT), -127, 127)
-    reference = np.concatenate(
-        [rotation.from_rotation_vector(centre * REFERENCE_UNIT)[None], track.reference_rotations]
-    )
-    relative = rotation.multiply(np.broadcast_to(rotation.conjugate(reference), rotations.shape), rotations)
-    vectors = rotation.continuous(rotation.to_rotation_vector(relative))
-    values = transform.forward(np.concatenate([root[:, None], vectors], axis=1))
-    scaled = values / track.steps(step, frames)[:, None, None]
-    rounding = _ROUNDING[np.minimum(np.arange(len(scaled)), 2)][:, None, None]
-    q = (np.sign(scaled) * np.floor(np.abs(scaled) + rounding)).astype(np.int64)
-    return HEADER.pack(FORMAT, step, frames, *(int(c) for c in centre)) + coefficients.encode(q)
+def encode_motion(
+    motion: Motion,
+    block_seconds: float = 1.0,
+    ladder: tuple[float, ...] = LADDER,
+    grade: Grade = "best",
+    first_seconds: float | None = None,
+    prior: Prior | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> EncodedMotion:
+    """Encode `motion` in independent blocks at every largest error of `ladder` (mm), and check each by decoding it.
 
-
-def encode_motion(motion: Motion, block_seconds: float = 1.0, steps: tuple[int, ...] = STEPS) -> EncodedMotion:
-    """Encode `motion` at every step of `steps` in independent blocks, and measure each rate by decoding it."""
-    track, motion = plan(motion, block_seconds)
-    truth = points(motion.figure, motion.root, motion.rotations)
-    bounds = [(i * track.block_frames, i * track.block_frames + track.frames_in(i)) for i in range(track.blocks)]
+    `progress` is told the share done, 0..1. Raises ValueError for a motion that no step can hold to its error.
+    """
+    track, motion = plan(motion, block_seconds, first_seconds)
+    encoder = BlockEncoder(track, motion, prior or shipped())
     rates = []
-    for step in steps:
-        blocks = [encode_block(track, motion.root[a:b], motion.rotations[a:b], step) for a, b in bounds]
-        error = np.concatenate(
-            [
-                np.linalg.norm(
-                    points(track.figure, *decode_block(track, block).at(np.arange(b - a, dtype=np.float64)))
-                    - truth[a:b],
-                    axis=-1,
-                )
-                for block, (a, b) in zip(blocks, bounds, strict=True)
-            ]
-        )
-        kbps = sum(map(len, blocks)) * 8e-3 / motion.duration
-        rates.append(Rate(blocks, kbps, float(error.mean()) * 1e3, float(error.max()) * 1e3))
+    for number, bound in enumerate(ladder):
+        coded: list[Coded] = []
+        for index in range(track.blocks):
+            coded.append(encoder.bounded(index, bound, grade, coded[-1].step if coded else None))
+            progress((number + (index + 1) / track.blocks) / len(ladder))
+        rates.append(measure(track, motion, [block.data for block in coded], bound, prior))
     return EncodedMotion(track, rates, front(motion))
+
+
+def encode_mean(
+    motion: Motion, mean: float, block_seconds: float = 1.0, prior: Prior | None = None
+) -> tuple[MotionTrack, Rate]:
+    """Encode `motion` at one step, or two neighbours, so that its mean error comes up to `mean` mm and not above."""
+    track, motion = plan(motion, block_seconds)
+    encoder = BlockEncoder(track, motion, prior or shipped())
+    blocks = encoder.averaged(mean)
+    return track, measure(track, motion, [block.data for block in blocks], np.inf, prior)
+
+
+def measure(track: MotionTrack, motion: Motion, blocks: list[bytes], bound: float, prior: Prior | None = None) -> Rate:
+    """The rate that `blocks` make, by decoding them; raises ValueError where an error is above `bound` mm."""
+    errors = [_errors(track, motion, index, block, prior) for index, block in enumerate(blocks)]
+    error = np.concatenate(errors)
+    if error.max() > bound:
+        raise ValueError(f"a block is {error.max():.3f} mm off where {bound} mm is the most")
+    kbps = sum(map(len, blocks)) * 8e-3 / motion.duration
+    return Rate(blocks, kbps, float(error.mean()), float(error.max()), float(bound))
+
+
+def _errors(track: MotionTrack, motion: Motion, index: int, block: bytes, prior: Prior | None) -> Array:
+    """How far each point (n, 23) of a block is off when decoded, mm."""
+    start, frames = track.first_frame(index), track.frames_in(index)
+    part = slice(start, start + frames)
+    truth = points(motion.figure, motion.root[part], motion.rotations[part])
+    decoded = points(track.figure, *decode_block(track, block, prior).at(np.arange(frames, dtype=np.float64)))
+    error: Array = np.linalg.norm(decoded - truth, axis=-1) * 1e3
+    return error

@@ -1,7 +1,7 @@
-"""The compiled inside of the codec: coefficients through adaptive contexts into the range coder and back.
+"""The compiled inside of the codec: coefficients through contexts and prior into the range coder and back.
 
 A module of its own because importing numba takes seconds: `coefficients` loads it at its first use, so that programs
-which only pass blocks on start at once. Coefficients are int64 (19, 3, K): channel, axis, frequency.
+which only pass blocks on start at once.
 """
 
 from __future__ import annotations
@@ -9,138 +9,165 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from bunraku.codec.rangecoder import (
-    EVEN,
-    Bytes,
-    Integers,
-    decode_bit,
-    encode_bit,
-    finish,
-    start_decoder,
-    start_encoder,
+from bunraku.codec.contexts import (
+    nothing_seen,
+    scale,
+    see,
+    see_channel,
+    see_frequency,
+    share,
+    sign_context,
 )
+from bunraku.codec.prior import CLASS_OF, ROWS, UNARY, Integers, Prior
+from bunraku.codec.rangecoder import EVEN, Bytes, decode_bit, encode_bit, finish, start_decoder, start_encoder
 
-FREQUENCY_BITS = 10
-UNARY = 14
-ESCAPE = 24
+ESCAPE = 20
+"""Bits of an escape's length, at most."""
+_FRAMES_AS_USUAL = 32440
+_MOST_FRAMES_BITS = 10
 
-# models lie in one array: unary [class 3][position 4][neighbourhood 6][14], then Exp-Golomb [class 3][2][24];
-# row 0 is the probability, row 1 how many bits the model has seen
-_UNARY_MODELS = 3 * 4 * 6 * UNARY
-_MODELS = _UNARY_MODELS + 3 * 2 * ESCAPE
-_NEIGHBOURHOOD_START = np.array([4274, 10923, 16384, 21845, 26214, 29789], dtype=np.int64)
-_ESCAPE_START = 26214
-
-
-@njit(cache=True)
-def _fresh_models() -> Integers:
-    models = np.zeros((2, _MODELS), dtype=np.int64)
-    for which in range(_UNARY_MODELS):
-        models[0, which] = _NEIGHBOURHOOD_START[which // UNARY % 6]
-    models[0, _UNARY_MODELS:] = _ESCAPE_START
-    return models
+FRAMES, STEP, TURN_X, TURN_Y, TURN_Z, COUNT = range(6)
+"""Places in a block's head: frames, step index, the root's turn on three axes (-32..31), frequencies."""
 
 
 @njit(cache=True)
-def _adaptive(decoding: bool, state: Integers, data: Bytes, models: Integers, which: int, bit: int) -> int:
-    probability = models[0, which]
+def _bit(decoding: bool, state: Integers, data: Bytes, probability: int, bit: int) -> int:
     if decoding:
-        bit = decode_bit(state, data, probability)
-    else:
-        encode_bit(state, data, probability, bit)
-    goal = 32768 if bit else 0
-    probability += (goal - probability) >> min(2 + (models[1, which] >> 1), 5)
-    models[0, which] = min(max(probability, 64), 32704)
-    models[1, which] += 1
+        return decode_bit(state, data, probability)
+    encode_bit(state, data, probability, bit)
     return bit
 
 
 @njit(cache=True)
-def _even(decoding: bool, state: Integers, data: Bytes, bit: int) -> int:
-    if decoding:
-        return decode_bit(state, data, EVEN)
-    encode_bit(state, data, EVEN, bit)
-    return bit
+def _number(decoding: bool, state: Integers, data: Bytes, bits: int, value: int) -> int:
+    result = 0
+    for i in range(bits - 1, -1, -1):
+        result = result << 1 | _bit(decoding, state, data, EVEN, (value >> i) & 1)
+    return result
 
 
 @njit(cache=True)
-def _exp_golomb(decoding: bool, state: Integers, data: Bytes, models: Integers, first: int, rest: int) -> int:
-    """The value, or -1 where the escape is longer than it may be."""
+def bit_length(value: int) -> int:
+    """Bits of a positive number."""
     bits = 0
-    if not decoding:
-        while (rest + 1) >> (bits + 1) > 0:
-            bits += 1
-    length = 0
-    while length < ESCAPE and _adaptive(decoding, state, data, models, first + length, 1 if bits > length else 0):
-        length += 1
-    if length == ESCAPE:
-        return -1
-    value = 1
-    for i in range(length - 1, -1, -1):
-        value = (value << 1) | _even(decoding, state, data, ((rest + 1) >> i) & 1)
-    return value - 1
+    while value >> bits > 0:
+        bits += 1
+    return bits
 
 
 @njit(cache=True)
-def _code(decoding: bool, state: Integers, data: Bytes, models: Integers, q: Integers) -> bool:
-    """Encode `q` or decode into it; False where the data cannot be a block."""
-    for channel in range(q.shape[0]):
-        group = min(channel, 2)
-        golomb = _UNARY_MODELS + group * 2 * ESCAPE
-        for axis in range(3):
-            for k in range(q.shape[2]):
-                size = abs(q[channel, axis, k])
-                if k == 0:
-                    value = _exp_golomb(decoding, state, data, models, golomb, size)
-                    if value < 0:
-                        return False
-                else:
-                    near = 2 * abs(q[channel, axis, k - 1])
-                    if k > 1:
-                        near += abs(q[channel, axis, k - 2])
-                    if axis > 0:
-                        near += abs(q[channel, axis - 1, k])
-                    neighbourhood = 0
-                    while neighbourhood < 5 and near > (1 << neighbourhood) - (neighbourhood == 0):
-                        neighbourhood += 1
-                    position = 0 if k == 1 else 1 if k < 4 else 2 if k < 8 else 3
-                    first = ((group * 4 + position) * 6 + neighbourhood) * UNARY
-                    value = 0
-                    while value < UNARY and _adaptive(
-                        decoding, state, data, models, first + value, 1 if size > value else 0
-                    ):
-                        value += 1
-                    if value == UNARY:
-                        rest = _exp_golomb(decoding, state, data, models, golomb + ESCAPE, size - UNARY)
-                        if rest < 0:
-                            return False
-                        value += rest
-                if value > 0:
-                    negative = _even(decoding, state, data, 1 if q[channel, axis, k] < 0 else 0)
-                    if decoding:
-                        q[channel, axis, k] = -value if negative else value
+def _head(decoding: bool, state: Integers, data: Bytes, usual: int, head: Integers) -> bool:
+    """A block's head; False where it cannot be one."""
+    if _bit(decoding, state, data, _FRAMES_AS_USUAL, 1 if head[FRAMES] == usual else 0):
+        head[FRAMES] = usual
+    else:
+        head[FRAMES] = _number(decoding, state, data, _MOST_FRAMES_BITS, head[FRAMES])
+    if not 1 <= head[FRAMES] <= 1000:
+        return False
+    head[STEP] = _number(decoding, state, data, 8, head[STEP])
+    for i in range(TURN_X, TURN_Z + 1):
+        head[i] = _number(decoding, state, data, 6, head[i] + 32) - 32
+    head[COUNT] = _number(decoding, state, data, bit_length(head[FRAMES]), head[COUNT])
+    return head[COUNT] <= head[FRAMES]  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def _size(decoding: bool, state: Integers, data: Bytes, hazard: Integers, scaled: int, size: int) -> int:
+    """A coefficient's size where about 2^(scaled / 256) is expected; -1 where it cannot be one."""
+    shift = (scaled >> 8) - 3 if scaled >= 1024 else 0
+    place = (scaled - shift * 256 + 7 * 256) * 4
+    row, weight = place >> 8, place & 255
+    if row > ROWS - 2:
+        row, weight = ROWS - 2, 256
+    high, value = size >> shift, 0
+    while value < UNARY:
+        probability = (hazard[row, value] * (256 - weight) + hazard[row + 1, value] * weight) >> 8
+        if not _bit(decoding, state, data, probability, 1 if high > value else 0):
+            break
+        value += 1
+    if value == UNARY:
+        rest = high - UNARY + 1
+        bits, length = bit_length(rest) - 1 if not decoding else 0, 0
+        while length < ESCAPE and _bit(decoding, state, data, EVEN, 1 if bits > length else 0):
+            length += 1
+        if length == ESCAPE:
+            return -1
+        value += (1 << length | _number(decoding, state, data, length, rest)) - 1
+    return value << shift | _number(decoding, state, data, shift, size)
+
+
+@njit(cache=True)
+def _body(
+    decoding: bool, state: Integers, data: Bytes, prior: Prior, q: Integers, head: Integers, length: int
+) -> bool:
+    count, step = head[COUNT], head[STEP]
+    seen = nothing_seen(count)
+    for channel in range(19):
+        for k in range(count):
+            share(prior, seen, channel, k, count, step, length)
+            for axis in range(3):
+                scaled = scale(prior, seen, channel, axis, k)
+                size = _size(decoding, state, data, prior.hazard, scaled, abs(q[channel, axis, k]))
+                if size < 0:
+                    return False
+                if size > 0:
+                    odds = prior.sign[CLASS_OF[k], sign_context(q, channel, axis, k)]
+                    negative = _bit(decoding, state, data, odds, 1 if q[channel, axis, k] < 0 else 0)
+                    q[channel, axis, k] = -size if negative else size
+                see(seen, channel, axis, k, size)
+            see_frequency(seen, channel, k)
+        see_channel(seen, channel, count)
     return True
 
 
 @njit(cache=True)
-def encode(q: Integers, out: Bytes) -> int:
-    """Write `q` into `out`; the length, its first byte being of no use, or -1 where a coefficient is too large."""
+def encode(prior: Prior, q: Integers, head: Integers, usual: int, length: int, out: Bytes) -> int:
+    """Write a block into `out`; the length, its first byte being of no use, or -1 where a coefficient is too large."""
     state = start_encoder()
-    for i in range(FREQUENCY_BITS - 1, -1, -1):
-        encode_bit(state, out, EVEN, (q.shape[2] >> i) & 1)
-    if not _code(False, state, out, _fresh_models(), q):
+    if not _head(False, state, out, usual, head) or not _body(False, state, out, prior, q, head, length):
         return -1
     return finish(state, out)
 
 
 @njit(cache=True)
-def decode(data: Bytes, q: Integers) -> int:
-    """Read `data` into `q`, which is zero; how many frequencies it has, -1 where it cannot be a block. Where there are
-    more than `q` has room for nothing is read."""
+def decode_head(data: Bytes, usual: int, head: Integers) -> bool:
+    """Read the head alone; False where it cannot be one."""
+    return _head(True, start_decoder(data), data, usual, head)  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def decode(prior: Prior, data: Bytes, q: Integers, head: Integers, usual: int, length: int) -> bool:
+    """Read a block into `q`, zeros of (19, 3, count); False where it cannot be one."""
     state = start_decoder(data)
-    count = 0
-    for _ in range(FREQUENCY_BITS):
-        count = count << 1 | decode_bit(state, data, EVEN)
-    if count <= q.shape[2] and not _code(True, state, data, _fresh_models(), q[:, :, :count]):
-        return -1
-    return count
+    return _head(True, state, data, usual, head) and _body(True, state, data, prior, q, head, length)  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def examples(
+    prior: Prior, q: Integers, head: Integers, length: int, features: Integers, where: Integers, first: int
+) -> int:
+    """For training: the `features` of every coefficient from row `first`, and in `where` its class, axis, size and sign
+    (0 none, 1 plus, 2 minus) with its context; the row after the last."""
+    count, row = head[COUNT], first
+    seen = nothing_seen(count)
+    for channel in range(19):
+        for k in range(count):
+            share(prior, seen, channel, k, count, head[STEP], length)
+            for axis in range(3):
+                scale(prior, seen, channel, axis, k)
+                features[row] = seen.features
+                value = q[channel, axis, k]
+                where[row, 0], where[row, 1], where[row, 2] = CLASS_OF[k], 3 * channel + axis, abs(value)
+                where[row, 3] = 0 if value == 0 else 1 if value > 0 else 2
+                where[row, 4] = sign_context(q, channel, axis, k)
+                row += 1
+                see(seen, channel, axis, k, abs(value))
+            see_frequency(seen, channel, k)
+        see_channel(seen, channel, count)
+    return row
+
+
+@njit(cache=True)
+def room(q: Integers) -> Bytes:
+    """Bytes enough for any block of these coefficients."""
+    return np.zeros(64 + q.size * 10, dtype=np.uint8)

@@ -10,13 +10,25 @@ import numpy as np
 from bunraku.codec.errors import DamagedBlock
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import CHANNEL_COUNT, JOINT_COUNT, PARENTS, TIPS, Figure, Motion
+from bunraku.motion.skeleton import CHANNEL_COUNT, INDEX, JOINT_COUNT, PARENTS, TIPS, Figure, Motion
 
-CODEC = "bunraku.motion/1"
+CODEC = "bunraku.motion/2"
 FIGURE_UNIT = 1e-4
 """Metres in one unit of the figure's 16-bit offsets."""
-REFERENCE_UNIT = np.pi / 127
-"""Radians in one unit of an 8-bit rotation vector."""
+TURN_UNIT = 0.1
+"""Radians in one unit of a block's turn of the root."""
+STEP_UNIT = 2.0**-16
+"""Quantiser step of index 0 for a block of 30 frames, metres; sixteen indices make it twice as large."""
+STILL = 4, 14
+"""Bits after the point of references in radians: of a motion, and of one that stands still."""
+
+_LEVER = 0.45
+_TWIST = 0.06**2
+# how much finer than its lever says a channel is coded: root position and rotation, sacroiliac, wrists, head, toes
+_CARE = np.ones(CHANNEL_COUNT)
+_CARE[[0, 1, 2]] = 1.15, 0.88, 0.88
+_CARE[[INDEX[name] + 1 for name in ("l_midtarsal", "r_midtarsal")]] = 0.87
+_CARE[[INDEX[name] + 1 for name in ("skullbase", "l_wrist", "r_wrist")]] = 0.9
 
 _FIGURE_NUMBERS = 3 * (JOINT_COUNT + len(TIPS))
 
@@ -25,65 +37,97 @@ _FIGURE_NUMBERS = 3 * (JOINT_COUNT + len(TIPS))
 class MotionTrack:
     """Constants of a motion's blocks.
 
-    `fps` and `frames` as in `Motion`; every block but perhaps the last has `block_frames` frames; `figure` is the
-    dancer, on the grid of `FIGURE_UNIT`; `reference` (17, 3) int8 is each joint's typical rotation, a rotation vector
-    in `REFERENCE_UNIT`.
+    `fps` and `frames` as in `Motion`; the first block has `first_frames` frames, every other but perhaps the last
+    `block_frames`; `figure` is the dancer, on the grid of `FIGURE_UNIT`; `reference` (17, 3) whole numbers are each
+    joint's typical rotation, a rotation vector in 2^-`reference_bits` radians.
     """
 
     fps: float
     frames: int
     block_frames: int
+    first_frames: int
     figure: Figure
     reference: Array
+    reference_bits: int
 
     @property
     def blocks(self) -> int:
         """Number of blocks."""
-        return -(-self.frames // self.block_frames)
+        return 1 - (-(self.frames - self.first_frames) // self.block_frames)
 
     @property
     def duration_us(self) -> int:
         """Length in microseconds."""
         return round(self.frames * 1e6 / self.fps)
 
+    def first_frame(self, index: int) -> int:
+        """Frame of the motion with which block `index` starts."""
+        return self.first_frames + (index - 1) * self.block_frames if index > 0 else 0
+
     def frames_in(self, index: int) -> int:
         """Frames of block `index`."""
-        return min(self.block_frames, self.frames - index * self.block_frames)
+        if index == 0:
+            return self.first_frames
+        return min(self.block_frames, self.frames - self.first_frame(index))
 
     def start_us(self, index: int) -> int:
         """Motion time of the first frame of block `index`, microseconds: the timestamp of its Data Packet."""
-        return round(index * self.block_frames * 1e6 / self.fps)
+        return round(self.first_frame(index) * 1e6 / self.fps)
 
     def block_at(self, position_us: float) -> int:
         """Index of the block that holds the instant `position_us`, kept within the motion."""
-        index = int(position_us * self.fps / 1e6 / self.block_frames + 1e-6)
+        frame = position_us * self.fps / 1e6 + 1e-6
+        index = int((frame - self.first_frames) // self.block_frames) + 1 if frame >= self.first_frames else 0
         return min(max(index, 0), self.blocks - 1)
 
     @property
     def reference_rotations(self) -> Array:
         """`reference` as quaternions (17, 4)."""
-        return rotation.from_rotation_vector(self.reference * REFERENCE_UNIT)
+        return rotation.from_rotation_vector(self.reference * 2.0**-self.reference_bits)
 
     @property
-    def levers(self) -> Array:
-        """How far a turn of each channel moves the body (19,): SPEC.md, Quantiser."""
-        figure = self.figure
-        points = np.ones(JOINT_COUNT)
-        squares = 0.06**2 + np.sum(figure.tips**2, axis=1)
-        points[list(TIPS)] += 1
-        for joint in range(JOINT_COUNT - 1, 0, -1):
-            squares[PARENTS[joint]] += points[joint] ** 0.45 * np.sum(figure.offsets[joint] ** 2)
+    def weights(self) -> Array:
+        """What a channel's values are multiplied with before they are quantised (19, 3, 3): SPEC.md, Weights."""
+        return _weights(self.figure)
+
+
+def step_size(index: int, frames: int) -> float:
+    """Quantiser step at step index `index` of the weighted coefficients of a block of `frames` frames, metres."""
+    return float(STEP_UNIT * 2.0 ** (index / 16) * np.sqrt(frames / 30.0))
+
+
+def _weights(figure: Figure) -> Array:
+    points = np.ones(JOINT_COUNT)
+    points[list(TIPS)] += 1
+    squares = np.zeros((JOINT_COUNT, 3, 3))
+
+    def add(joint: int, arm: Array, count: float) -> None:
+        squares[joint] += count**_LEVER * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+
+    for joint in range(JOINT_COUNT - 1, -1, -1):
+        squares[joint] += _TWIST * np.eye(3)
+        if joint in TIPS:
+            add(joint, figure.tips[joint], 1)
+        if joint > 0:
+            add(PARENTS[joint], figure.offsets[joint], points[joint])
             points[PARENTS[joint]] += points[joint]
-        return np.concatenate([[2.6], np.sqrt(squares)])
+    weights = np.empty((CHANNEL_COUNT, 3, 3))
+    weights[0] = points[0] ** (_LEVER / 2) * np.eye(3)
+    weights[1:] = [_root(square) for square in squares]
+    weighted: Array = weights * _CARE[:, None, None]
+    return weighted
 
-    def steps(self, index: int, frames: int) -> Array:
-        """Quantiser steps (19,) of the coefficients at step index `index` in a block of `frames` frames."""
-        steps: Array = 1e-4 * 2.0 ** (index / 4) * np.sqrt(frames / 30.0) / self.levers
-        return steps
+
+def _root(square: Array) -> Array:
+    """The symmetric square root of a positive matrix (3, 3)."""
+    values, vectors = np.linalg.eigh(square)
+    root: Array = (vectors * np.sqrt(values)) @ vectors.T
+    return root
 
 
-def plan(motion: Motion, block_seconds: float = 1.0) -> tuple[MotionTrack, Motion]:
-    """The track of `motion` in blocks of about `block_seconds`, and the motion upon the track's figure.
+def plan(motion: Motion, block_seconds: float = 1.0, first_seconds: float | None = None) -> tuple[MotionTrack, Motion]:
+    """The track of `motion` in even blocks of about `block_seconds`, the first of `first_seconds` where that is given, and
+    the motion upon the track's figure.
 
     The figure goes to the track's grid (0.05 mm) before anything is encoded, so that limb lengths are exact ever after.
     """
@@ -95,9 +139,16 @@ def plan(motion: Motion, block_seconds: float = 1.0) -> tuple[MotionTrack, Motio
     # the mean direction of the quaternions, taken on one hemisphere
     aligned = joints * np.sign(np.sum(joints * joints[:1], axis=-1, keepdims=True) + 1e-12)
     mean = rotation.to_rotation_vector(rotation.normalise(aligned.mean(axis=0)))
-    reference = np.clip(np.round(mean / REFERENCE_UNIT), -127, 127)
-    block_frames = min(max(1, round(block_seconds * motion.fps)), 1000)
-    track = MotionTrack(motion.fps, motion.frames, block_frames, figure, reference)
+    still = np.allclose(motion.rotations, motion.rotations[:1], atol=2.0 ** -STILL[1])
+    reference_bits = STILL[still]
+    reference = np.round(mean * 2.0**reference_bits)
+    frames = motion.frames
+    first = 0 if first_seconds is None else min(max(1, round(first_seconds * motion.fps)), frames, 1000)
+    pieces = max(1, round((frames - first) / (block_seconds * motion.fps)))
+    block_frames = min(max(1, -(-(frames - first) // pieces)), 1000)
+    track = MotionTrack(
+        motion.fps, frames, block_frames, first or min(block_frames, frames), figure, reference, reference_bits
+    )
     return track, Motion(figure, motion.fps, motion.root, motion.rotations)
 
 
@@ -117,16 +168,18 @@ def unpack_figure(data: bytes) -> Figure:
     return Figure(numbers[:JOINT_COUNT], tips)
 
 
-def pack_reference(reference: Array) -> bytes:
-    """51 bytes: the rotation vectors (17, 3) in `REFERENCE_UNIT` as i8."""
-    return np.asarray(reference).astype("i1").tobytes()
+def pack_reference(reference: Array, bits: int) -> bytes:
+    """103 bytes: `bits`, then the rotation vectors (17, 3) in 2^-`bits` radians as i16."""
+    return bytes([bits]) + np.asarray(reference).astype("<i2").tobytes()
 
 
-def unpack_reference(data: bytes) -> Array:
-    """The reference of `pack_reference`; raises `DamagedBlock`."""
-    if len(data) != 3 * (CHANNEL_COUNT - 2):
-        raise DamagedBlock(f"references have {3 * (CHANNEL_COUNT - 2)} bytes, not {len(data)}")
-    return np.frombuffer(data, "i1").reshape(-1, 3).astype(np.float64)
+def unpack_reference(data: bytes) -> tuple[Array, int]:
+    """The reference of `pack_reference` and its bits; raises `DamagedBlock`."""
+    if len(data) != 1 + 6 * (CHANNEL_COUNT - 2):
+        raise DamagedBlock(f"references have {1 + 6 * (CHANNEL_COUNT - 2)} bytes, not {len(data)}")
+    if data[0] > STILL[1]:
+        raise DamagedBlock(f"references are in 2^-{data[0]} radians; {STILL[1]} is the most")
+    return np.frombuffer(data[1:], "<i2").reshape(-1, 3).astype(np.float64), data[0]
 
 
 def describe_track(track: MotionTrack, rates: list[dict[str, float]]) -> dict[str, Any]:
@@ -138,9 +191,10 @@ def describe_track(track: MotionTrack, rates: list[dict[str, float]]) -> dict[st
         "fps": track.fps,
         "frames": track.frames,
         "block_frames": track.block_frames,
+        "first_frames": track.first_frames,
         "rates": rates,
         "figure": pack_figure(track.figure),
-        "reference": pack_reference(track.reference),
+        "reference": pack_reference(track.reference, track.reference_bits),
     }
 
 
@@ -148,12 +202,19 @@ def read_track(described: dict[str, Any]) -> MotionTrack:
     """The track of `describe_track`; raises `DamagedBlock` where it is not one, or of another codec."""
     if described.get("codec") != CODEC:
         raise DamagedBlock(f"the motion is in {described.get('codec')!r}; this reads {CODEC!r}")
-    fps, frames, block_frames = (described.get(key) for key in ("fps", "frames", "block_frames"))
+    fps = described.get("fps")
+    frames, block_frames, first_frames = (described.get(key) for key in ("frames", "block_frames", "first_frames"))
     figure, reference = described.get("figure"), described.get("reference")
-    if not (isinstance(fps, float | int) and isinstance(frames, int) and isinstance(block_frames, int)):
-        raise DamagedBlock("a motion's track has numbers fps, frames and block_frames")
-    if not (fps > 0 and frames > 0 and 0 < block_frames <= 1000):
+    if not (
+        isinstance(fps, float | int)
+        and isinstance(frames, int)
+        and isinstance(block_frames, int)
+        and isinstance(first_frames, int)
+    ):
+        raise DamagedBlock("a motion's track has numbers fps, frames, block_frames and first_frames")
+    if not (fps > 0 and 0 < first_frames <= min(frames, 1000) and 0 < block_frames <= 1000):
         raise DamagedBlock("a motion's track has fps and frames above zero and blocks of 1..1000 frames")
     if not (isinstance(figure, bytes) and isinstance(reference, bytes)):
         raise DamagedBlock("a motion's track has a figure and a reference")
-    return MotionTrack(float(fps), frames, block_frames, unpack_figure(figure), unpack_reference(reference))
+    vectors, bits = unpack_reference(reference)
+    return MotionTrack(float(fps), frames, block_frames, first_frames, unpack_figure(figure), vectors, bits)

@@ -1,0 +1,145 @@
+"""From what is coded already to the scale of the next coefficient, compiled (SPEC.md, Contexts).
+
+Coefficients are int64 (19, 3, K): channel, axis, frequency; they are coded channel by channel, frequency by frequency,
+axis by axis. Everything is integers, so that both languages reach the same bits.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from bunraku.codec.prior import CLASS_OF, HIDDEN, LEVELS, RELATIVES, SHARED, Integers, Prior
+
+LOW = -7 * 256
+HIGH = 14 * 256
+"""Scales are kept within these, in 1/256 octave."""
+_PAD = 3
+
+
+class Seen(NamedTuple):
+    """Levels of what is coded: `axis` (19, 3, K + 8) of each coefficient and `mean` (19, K + 8) over its axes, shifted by
+    three so that there are zeros on both sides; `total` (K + 8) of the means over the channels done; `run` (K + 1) of
+    the means of this channel up to each frequency; and room for the sums: `shared` (1 + HIDDEN), `features` (32)."""
+
+    axis: Integers
+    mean: Integers
+    total: Integers
+    run: Integers
+    shared: Integers
+    features: Integers
+
+
+@njit(cache=True)
+def nothing_seen(count: int) -> Seen:
+    """`Seen` of a block of `count` frequencies at its start."""
+    return Seen(
+        np.zeros((19, 3, count + 8), np.int64),
+        np.zeros((19, count + 8), np.int64),
+        np.zeros(count + 8, np.int64),
+        np.zeros(count + 1, np.int64),
+        np.zeros(1 + HIDDEN, np.int64),
+        np.zeros(32, np.int64),
+    )
+
+
+@njit(cache=True)
+def level(size: int) -> int:
+    """16 log2(1 + size), rounded."""
+    return LEVELS[min(size, 4095)]  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def share(prior: Prior, seen: Seen, channel: int, k: int, count: int, step: int, length: int) -> None:
+    """Sum up what the three axes of frequency `k` of `count` share; `step` is the step index, `length` the level of the
+    block's duration."""
+    f, mean, total, kk = seen.features, seen.mean, seen.total, k + _PAD
+    f[0], f[1], f[2] = mean[channel, kk - 1], mean[channel, kk - 2], mean[channel, kk - 3]
+    for which in range(2):
+        relative = RELATIVES[which, channel]
+        at = 3 + 4 * which
+        if relative >= 0:
+            m = mean[relative]
+            f[at], f[at + 1], f[at + 2] = m[kk], m[kk - 1], m[kk + 1]
+            f[at + 3] = (m[kk + 2] + m[kk + 3] + m[kk + 4]) // 3
+        else:
+            f[at], f[at + 1], f[at + 2], f[at + 3] = 0, 0, 0, 0
+    grandparent = RELATIVES[2, channel]
+    if grandparent >= 0:
+        f[11] = mean[grandparent, kk]
+        f[12] = (mean[grandparent, kk + 1] + mean[grandparent, kk + 2]) >> 1
+    else:
+        f[11], f[12] = 0, 0
+    done = max(channel, 1)
+    f[13], f[14], f[15] = total[kk] // done, total[kk - 1] // done, total[kk + 1] // done
+    f[16] = (total[kk + 2] + total[kk + 3] + total[kk + 4]) // (3 * done)
+    f[17] = seen.run[k] // (k + 1)
+    f[18] = mean[channel - 1, kk] if channel > 0 else 0
+    f[19] = mean[channel - 2, kk] if channel > 1 else 0
+    f[20], f[21], f[22], f[23] = min(count - k, 63), level(k), step, length
+    group = CLASS_OF[k]
+    sums = seen.shared
+    sums[0] = 0
+    for i in range(SHARED):
+        sums[0] += f[i] * prior.linear[group, i]
+    for j in range(HIDDEN):
+        total_j = prior.hidden_class[j, group]
+        for i in range(SHARED):
+            total_j += f[i] * prior.hidden[j, i]
+        sums[1 + j] = total_j
+
+
+@njit(cache=True)
+def scale(prior: Prior, seen: Seen, channel: int, axis: int, k: int) -> int:
+    """The expected size of one coefficient: log2 in 1/256, after `share` of its frequency."""
+    f, kk = seen.features, k + _PAD
+    own, parent, mirror = seen.axis[channel, axis], RELATIVES[0, channel], RELATIVES[1, channel]
+    f[24], f[25], f[26] = own[kk - 1], own[kk - 2], own[kk - 3]
+    f[27] = seen.axis[channel, 0, kk] if axis > 0 else 0
+    f[28] = seen.axis[channel, 1, kk] if axis > 1 else 0
+    f[29] = seen.axis[parent, axis, kk] if parent >= 0 else 0
+    f[30] = seen.axis[mirror, axis, kk] if mirror >= 0 else 0
+    f[31] = seen.axis[mirror, axis, kk + 1] if mirror >= 0 else 0
+    group, which = CLASS_OF[k], 3 * channel + axis
+    linear = seen.shared[0] + prior.bias[group, which]
+    for i in range(SHARED, 32):
+        linear += f[i] * prior.linear[group, i]
+    result = linear >> 8
+    for j in range(HIDDEN):
+        x = seen.shared[1 + j] + prior.hidden_bias[j, which]
+        for i in range(SHARED, 32):
+            x += f[i] * prior.hidden[j, i]
+        if x > 0:
+            result += (min(x >> 8, 32767) * prior.out[j, group]) >> 12
+    return min(max(result, LOW), HIGH)
+
+
+@njit(cache=True)
+def see(seen: Seen, channel: int, axis: int, k: int, size: int) -> None:
+    """Note the size of a coefficient just coded."""
+    seen.axis[channel, axis, k + _PAD] = level(size)
+
+
+@njit(cache=True)
+def see_frequency(seen: Seen, channel: int, k: int) -> None:
+    """Note that the three axes of a frequency are coded."""
+    kk, axis = k + _PAD, seen.axis[channel]
+    seen.mean[channel, kk] = (axis[0, kk] + axis[1, kk] + axis[2, kk]) // 3
+    seen.run[k + 1] = seen.run[k] + seen.mean[channel, kk]
+
+
+@njit(cache=True)
+def see_channel(seen: Seen, channel: int, count: int) -> None:
+    """Note that a channel is coded."""
+    for kk in range(_PAD, count + _PAD):
+        seen.total[kk] += seen.mean[channel, kk]
+
+
+@njit(cache=True)
+def sign_context(q: Integers, channel: int, axis: int, k: int) -> int:
+    """Context of a sign: a movement that a block cuts off leaves every second frequency with one sign."""
+    near = min(max(q[channel, axis, k - 2], -2), 2) if k > 2 else 0
+    far = min(max(q[channel, axis, k - 4], -1), 1) if k > 4 else 0
+    return 3 * (near + 2) + far + 1  # type: ignore[no-any-return]

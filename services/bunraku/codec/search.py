@@ -1,0 +1,164 @@
+"""The encoder's choices for one block: which step, which passes, until the error is as asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from types import ModuleType
+from typing import Any, Literal
+
+import numpy as np
+
+from bunraku.codec import coefficients, transform
+from bunraku.codec.coefficients import Head, Integers
+from bunraku.codec.decode import root_reference
+from bunraku.codec.prior import Prior
+from bunraku.codec.track import TURN_UNIT, MotionTrack, step_size
+from bunraku.motion import rotation
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import PARENTS, Motion, points
+
+FINEST, COARSEST = 0, 255
+_SWEEPS = 3
+_PRICE_OF_MEAN = 0.35
+_PRICE_OF_MOST = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Coded:
+    """A block's bytes, its `step` index, and the error in mm at each point and frame (23, n)."""
+
+    data: bytes
+    step: int
+    error: Array
+
+
+@cache
+def _compiled() -> tuple[ModuleType, ModuleType, ModuleType, ModuleType]:
+    """The passes load compiled code; programs that encode nothing never wait for it."""
+    from bunraku.codec import bodies, costs, feedback, refine
+
+    return bodies, costs, feedback, refine
+
+
+class BlockEncoder:
+    """Encodes the blocks of one motion upon its track."""
+
+    def __init__(self, track: MotionTrack, motion: Motion, prior: Prior) -> None:
+        self._track = track
+        self._prior = prior
+        self._root = motion.rotations[:, 0]
+        orientation = np.empty((len(PARENTS), motion.frames, 4))
+        orientation[0] = motion.rotations[:, 0]
+        for joint, parent in enumerate(PARENTS[1:], 1):
+            orientation[joint] = rotation.multiply(orientation[parent], motion.rotations[:, joint])
+        self._orientation = orientation
+        self._points = np.ascontiguousarray(points(motion.figure, motion.root, motion.rotations).transpose(1, 0, 2))
+
+    @cached_property
+    def _costs(self) -> Array:
+        table: Array = _compiled()[1].cost_table(self._prior)
+        return table
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        weight = self._track.weights
+        return weight, np.ascontiguousarray(np.linalg.inv(weight))
+
+    def _body(self, turn: tuple[int, int, int]) -> Any:
+        figure = self._track.figure
+        reference = np.concatenate([root_reference(turn), self._track.reference_rotations])
+        return _compiled()[0].Body(figure.offsets, figure.tips, *self._weights, reference)
+
+    def block(self, index: int, step: int, goal: Literal["first", "mean", "most"]) -> Coded:
+        """Block `index` at one step: by the first pass alone, or refined for its mean or its largest error."""
+        _, _, feedback, refine = _compiled()
+        track = self._track
+        start, frames = track.first_frame(index), track.frames_in(index)
+        part = slice(start, start + frames)
+        middle = rotation.to_rotation_vector(self._root[start + frames // 2])
+        x, y, z = (int(i) for i in np.clip(np.round(middle / TURN_UNIT), -32, 31))
+        body = self._body((x, y, z))
+        basis = np.ascontiguousarray(transform.basis(frames, frames, np.arange(frames, dtype=np.float64)).T)
+        size, length = step_size(step, frames), coefficients.length_level(frames, track.fps)
+        truth = np.ascontiguousarray(self._orientation[:, part]), np.ascontiguousarray(self._points[:, part])
+        q: Integers = np.zeros((19, 3, frames), dtype=np.int64)
+        given = (self._prior, self._costs, body, *truth, basis, size, step, length, q)
+        decoded = feedback.first_pass(*given)
+        if goal == "first":
+            # the points of tips are placed with the last of their joints
+            pass
+        elif goal == "mean":
+            decoded = refine.refine(*given, _SWEEPS, _PRICE_OF_MEAN, False)
+        else:
+            decoded = refine.refine(*given, _SWEEPS, _PRICE_OF_MOST, True)
+        data = coefficients.encode(self._prior, Head(frames, step, (x, y, z)), q, track.block_frames, track.fps)
+        return Coded(data, step, np.linalg.norm(decoded - truth[1], axis=-1) * 1e3)
+
+    def bounded(self, index: int, bound: float, grade: str, near: int | None = None) -> Coded:
+        """Block `index` with no point more than `bound` mm off, at the cheapest step found; the search starts at step
+        `near`. Raises ValueError where no step is fine enough."""
+        goal: Literal["first", "most"] = "first" if grade == "live" else "most"
+        tried: dict[int, Coded] = {}
+
+        def holds(step: int) -> bool:
+            if step not in tried:
+                tried[step] = self.block(index, step, goal)
+            return bool(tried[step].error.max() <= bound * (1 - 1e-6))
+
+        step = near if near is not None else int(np.clip(16 * np.log2(bound * 2e-4 / 2.0**-16), FINEST, COARSEST))
+        good = step if holds(step) else None
+        for _ in range(6 if grade == "best" else 1):
+            most = max(float(tried[step].error.max()), 1e-9)
+            move = int(np.clip(np.round(16 * np.log2(bound * 0.97 / most)), -48, 48))
+            if good is not None and abs(move) <= 1:
+                break
+            step = int(np.clip(step + (move or (-1 if good is None else 1)), FINEST, COARSEST))
+            if step in tried:
+                break
+            if holds(step):
+                good = step if good is None else max(good, step)
+        step = min(tried)
+        while good is None:
+            if step == FINEST:
+                raise ValueError(f"block {index} cannot be held to {bound} mm at the finest step")
+            step = max(step - 4, FINEST)
+            good = step if holds(step) else None
+        if grade == "best":
+            for more in (1, 2, 3, 4, 6):
+                if good + more <= COARSEST:
+                    holds(good + more)
+        return min((coded for step, coded in tried.items() if holds(step)), key=lambda coded: len(coded.data))
+
+    def averaged(self, mean: float) -> list[Coded]:
+        """All blocks with a mean error over the motion of at most `mean` mm and near it: at the coarsest step that is fine
+        enough, as many blocks one step coarser as the mean allows."""
+        blocks, frames = self._track.blocks, self._track.frames
+        tried: dict[int, list[Coded]] = {}
+
+        def at(step: int) -> float:
+            if step not in tried:
+                tried[step] = [self.block(index, step, "mean") for index in range(blocks)]
+            return sum(float(block.error.sum()) for block in tried[step]) / (23 * frames)
+
+        low, high = FINEST, COARSEST
+        step = int(np.clip(16 * np.log2(mean * 2e-3 / 2.0**-16), FINEST + 1, COARSEST - 1))
+        while high - low > 1:
+            error = at(step)
+            if error <= mean:
+                low = step
+            else:
+                high = step
+            guess = step + int(np.clip(np.round(19 * np.log2(mean / max(error, 1e-9))), -64, 64))
+            step = min(max(guess, low + 1), high - 1)
+        if low not in tried and at(low) > mean:
+            raise ValueError(f"the motion cannot be held to a mean error of {mean} mm")
+        at(high)
+        chosen, room = list(tried[low]), mean * 23 * frames - sum(float(block.error.sum()) for block in tried[low])
+        gains = [(len(a.data) - len(b.data), i) for i, (a, b) in enumerate(zip(tried[low], tried[high], strict=True))]
+        for gain, index in sorted(gains, reverse=True):
+            worse = float(tried[high][index].error.sum() - tried[low][index].error.sum())
+            if gain > 0 and worse <= room:
+                chosen[index] = tried[high][index]
+                room -= worse
+        return chosen

@@ -1,0 +1,171 @@
+"""The prior as numbers that can be learned, its loss and gradients, compiled.
+
+In octaves, as the coder's integers will say in 1/4096: a scale from linear weights and a small hidden layer, then the
+odds of "larger than this?" between two rows of a table (SPEC.md, Prior).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from bunraku.codec.prior import AXES, CLASSES, FEATURES, HIDDEN, ROWS, SIGNS, UNARY, Prior
+
+Array = npt.NDArray[np.float64]
+_LN2 = float(np.log(2))
+_RATES = (0.3, 1.0, 0.5, 0.5, 0.5, 0.3, 1.0)
+_DECAY = (1e-6, 1e-5, 1e-6, 1e-5, 0.0, 0.0, 0.0)
+
+
+def start(seed: int = 0) -> list[Array]:
+    """Untrained parameters: linear, bias, hidden, hidden bias, hidden class, out, hazards (logits)."""
+    random = np.random.default_rng(seed)
+    linear, bias = np.zeros((CLASSES, FEATURES)), np.full((CLASSES, AXES), -0.8)
+    linear[:, [24, 0, 3, 13, 27]] = 0.25, 0.25, 0.1, 0.2, 0.1
+    linear[0, 22], bias[0] = -1.0, 9.0
+    width = 2.0 ** (-7 + np.arange(ROWS) / 4)
+    odds = np.repeat(np.exp(-1 / (width + 0.15))[:, None], UNARY, axis=1)
+    return [
+        linear,
+        bias,
+        random.normal(0, 0.15, (HIDDEN, FEATURES)),
+        np.zeros((HIDDEN, AXES)),
+        random.normal(0, 0.1, (HIDDEN, CLASSES)),
+        random.normal(0, 0.02, (HIDDEN, CLASSES)),
+        np.log(odds / (1 - odds)),
+    ]
+
+
+@njit(cache=True, fastmath=True)
+def _loss(
+    features: npt.NDArray[np.int16],
+    where: npt.NDArray[np.int32],
+    rows: npt.NDArray[np.int64],
+    linear: Array,
+    bias: Array,
+    hidden: Array,
+    hidden_bias: Array,
+    hidden_class: Array,
+    out: Array,
+    hazard: Array,
+    d_linear: Array,
+    d_bias: Array,
+    d_hidden: Array,
+    d_hidden_bias: Array,
+    d_hidden_class: Array,
+    d_out: Array,
+    d_hazard: Array,
+) -> float:
+    """Nats of the sizes of all `rows`; adds the gradients."""
+    odds = 1 / (1 + np.exp(-hazard))
+    d_odds = np.zeros_like(odds)
+    inner, f, loss = np.zeros(HIDDEN), np.zeros(FEATURES), 0.0
+    for example in range(len(rows)):
+        row = rows[example]
+        group, axis, size = where[row, 0], where[row, 1], where[row, 2]
+        scale = bias[group, axis]
+        for i in range(FEATURES):
+            f[i] = features[row, i] * 0.0625
+            scale += linear[group, i] * f[i]
+        for j in range(HIDDEN):
+            x = hidden_bias[j, axis] + hidden_class[j, group]
+            for i in range(FEATURES):
+                x += hidden[j, i] * f[i]
+            inner[j] = x
+            if x > 0:
+                scale += out[j, group] * x
+        inside = -6.99 < scale < 13.99
+        scale = min(max(scale, -6.99), 13.99)
+        shift = int(np.floor(scale)) - 3 if scale >= 4 else 0
+        place = (scale - shift + 7) * 4
+        at = min(int(place), ROWS - 2)
+        weight = min(place - at, 1.0)
+        high, slope = size >> shift, 0.0
+        loss += shift * _LN2
+        for value in range(UNARY):
+            low_odds, high_odds = odds[at, value], odds[at + 1, value]
+            p = low_odds * (1 - weight) + high_odds * weight
+            if high > value:
+                loss -= np.log(p)
+                by = -1 / p
+            else:
+                loss -= np.log(1 - p)
+                by = 1 / (1 - p)
+            d_odds[at, value] += by * (1 - weight)
+            d_odds[at + 1, value] += by * weight
+            slope += by * (high_odds - low_odds)
+            if high <= value:
+                break
+        if inside:
+            slope *= 4
+            d_bias[group, axis] += slope
+            for i in range(FEATURES):
+                d_linear[group, i] += slope * f[i]
+            for j in range(HIDDEN):
+                if inner[j] > 0:
+                    d_out[j, group] += slope * inner[j]
+                    x = slope * out[j, group]
+                    d_hidden_bias[j, axis] += x
+                    d_hidden_class[j, group] += x
+                    for i in range(FEATURES):
+                        d_hidden[j, i] += x * f[i]
+    d_hazard += d_odds * odds * (1 - odds)
+    return loss
+
+
+def train(
+    features: npt.NDArray[np.int16],
+    where: npt.NDArray[np.int32],
+    parameters: list[Array],
+    steps: int,
+    say: Callable[[str], None],
+    seed: int = 0,
+    batch: int = 1 << 16,
+) -> list[Array]:
+    """Adam over random batches of the examples, the rate warmed up and let down by a cosine."""
+    random, parameters = np.random.default_rng(seed), [p.copy() for p in parameters]
+    first, second = [np.zeros_like(p) for p in parameters], [np.zeros_like(p) for p in parameters]
+    spent, began = 0.0, time.monotonic()
+    for step in range(1, steps + 1):
+        gradients = [np.zeros_like(p) for p in parameters]
+        rows = random.integers(0, len(where), batch)
+        spent += _loss(features, where, rows, *parameters, *gradients) / batch / _LN2
+        rate = 0.03 * min(1.0, step / 30) * 0.5 * (1 + np.cos(np.pi * step / steps)) + 1e-4
+        for p, g, m, v, share, decay in zip(parameters, gradients, first, second, _RATES, _DECAY, strict=True):
+            g = g / batch + decay * (p - p.mean(axis=1, keepdims=True) if decay == 1e-5 else p)
+            m += 0.1 * (g - m)
+            v += 0.01 * (g * g - v)
+            p -= rate * share * (m / (1 - 0.9**step)) / (np.sqrt(v / (1 - 0.99**step)) + 1e-9)
+        if step % 300 == 0:
+            say(f"  step {step}: {spent / 300:.4f} bits, {time.monotonic() - began:.0f} s")
+            spent = 0.0
+    return parameters
+
+
+def quantised(parameters: list[Array], where: npt.NDArray[np.int32]) -> Prior:
+    """The integers of the coder; the signs' odds are counted in the examples."""
+    linear, bias, hidden, hidden_bias, hidden_class, out, hazard = parameters
+    counts = np.full((CLASSES, SIGNS, 2), 20.0)
+    signed = where[where[:, 3] > 0]
+    np.add.at(counts, (signed[:, 0], signed[:, 4], signed[:, 3] - 1), 1)
+
+    def whole(array: Array, scale: float, most: int) -> npt.NDArray[np.int64]:
+        return np.clip(np.round(array * scale), -most, most).astype(np.int64)
+
+    def odds(p: Array) -> npt.NDArray[np.int64]:
+        return np.clip(np.round(p * 32768), 24, 32768 - 24).astype(np.int64)
+
+    return Prior(
+        whole(linear, 4096, 32767),
+        whole(bias, 4096 * 16, 1 << 22),
+        whole(hidden, 4096, 32767),
+        whole(hidden_bias, 4096 * 16, 1 << 22),
+        whole(hidden_class, 4096 * 16, 1 << 22),
+        whole(out, 4096, 32767),
+        odds(1 / (1 + np.exp(-hazard))),
+        odds(counts[:, :, 1] / counts.sum(axis=2)),
+    )
