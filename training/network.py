@@ -17,8 +17,10 @@ from bunraku.codec.prior import AXES, CLASSES, FEATURES, HIDDEN, ROWS, SIGNS, UN
 
 Array = npt.NDArray[np.float64]
 _LN2 = float(np.log(2))
-_RATES = (0.3, 1.0, 0.5, 0.5, 0.5, 0.3, 1.0)
-_DECAY = (1e-6, 1e-5, 1e-6, 1e-5, 0.0, 0.0, 0.0)
+_RATES = (1.2, 4.0, 2.0, 2.0, 2.0, 1.2, 4.0)
+_DECAY = (3e-3, 1e-3, 3e-3, 1e-3, 0.0, 1e-3, 0.0)
+# biases are drawn to their mean, the others to nothing
+_TO_MEAN = (False, True, False, True, False, False, False)
 
 
 def start(seed: int = 0) -> list[Array]:
@@ -78,7 +80,7 @@ def _loss(
             inner[j] = x
             if x > 0:
                 scale += out[j, group] * x
-        inside = -6.99 < scale < 13.99
+        below, above = scale < -6.99, scale > 13.99
         scale = min(max(scale, -6.99), 13.99)
         shift = int(np.floor(scale)) - 3 if scale >= 4 else 0
         place = (scale - shift + 7) * 4
@@ -100,7 +102,8 @@ def _loss(
             slope += by * (high_odds - low_odds)
             if high <= value:
                 break
-        if inside:
+        # at the end of the table only a way back is followed
+        if not (below and slope > 0) and not (above and slope < 0):
             slope *= 4
             d_bias[group, axis] += slope
             for i in range(FEATURES):
@@ -135,8 +138,9 @@ def train(
         rows = random.integers(0, len(where), batch)
         spent += _loss(features, where, rows, *parameters, *gradients) / batch / _LN2
         rate = 0.03 * min(1.0, step / 30) * 0.5 * (1 + np.cos(np.pi * step / steps)) + 1e-4
-        for p, g, m, v, share, decay in zip(parameters, gradients, first, second, _RATES, _DECAY, strict=True):
-            g = g / batch + decay * (p - p.mean(axis=1, keepdims=True) if decay == 1e-5 else p)
+        for i, p in enumerate(parameters):
+            m, v, share = first[i], second[i], _RATES[i]
+            g = gradients[i] / batch + _DECAY[i] * (p - p.mean(axis=1, keepdims=True) if _TO_MEAN[i] else p)
             m += 0.1 * (g - m)
             v += 0.01 * (g * g - v)
             p -= rate * share * (m / (1 - 0.9**step)) / (np.sqrt(v / (1 - 0.99**step)) + 1e-9)

@@ -22,7 +22,7 @@ from training import corpus, network
 
 SHIPPED = Path(prior.__file__).with_name("prior.json")
 HELD_OUT = Path("tests/bench/priors")
-STEPS = range(64, 200, 8)
+STEPS = range(64, 204, 10)
 LENGTHS = (0.5, 1.0, 1.0, 2.0)
 LONG = 36.0
 """Seconds of a clip that are learned from at each step, so that long ones do not outweigh the others."""
@@ -60,7 +60,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="training.prior", description=__doc__)
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--rounds", type=int, default=2)
-    parser.add_argument("--steps", type=int, default=1500)
+    parser.add_argument("--steps", type=int, default=1000)
     asked = parser.parse_args()
     allowed = corpus.licensed(asked.corpus)
     names = [name for name in corpus.names(asked.corpus) if name in allowed]

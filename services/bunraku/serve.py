@@ -26,7 +26,7 @@ from bunraku import __version__
 from bunraku.backing import problems
 from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.settings import Settings
-from bunraku.codec import coefficients
+from bunraku.codec import decode
 from bunraku.demo import add_demo
 from bunraku.wire.messages import LARGEST_FROM_CLIENT
 
@@ -117,7 +117,7 @@ async def _load(backing: Backing) -> None:
     """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
     await asyncio.sleep(LOAD_AFTER)
     await backing.catalogue.open()
-    await asyncio.to_thread(coefficients.warm)
+    await asyncio.to_thread(decode.warm)
 
 
 async def _ended(task: asyncio.Task[None]) -> None:

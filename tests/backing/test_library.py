@@ -12,7 +12,7 @@ from bunraku.codec.encode import encode_motion
 from bunraku.wire.messages import Data, Description, unpack
 from tests.vectors.blocks import wandering_motion
 
-ENCODED = encode_motion(wandering_motion(2.5, 30.0, 8), steps=(28, 14))
+ENCODED = encode_motion(wandering_motion(2.5, 30.0, 8), ladder=(30.0, 5.0), grade="live")
 
 
 async def test_a_motion_comes_back_ready_to_be_sent(tmp_path: Path) -> None:

@@ -5,10 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.codec import coefficients
-from bunraku.codec.coefficients import Integers
+from bunraku.codec import coefficients, prior
+from bunraku.codec.coefficients import LARGEST_BLOCK, Head, Integers
 from bunraku.codec.errors import DamagedBlock
 from bunraku.motion.skeleton import CHANNEL_COUNT
+
+PRIOR = prior.shipped()
+FPS = 30.0
 
 
 def spectrum(seed: int, count: int, size: float) -> Integers:
@@ -17,36 +20,52 @@ def spectrum(seed: int, count: int, size: float) -> Integers:
     return np.round(random.laplace(0, 1, (CHANNEL_COUNT, 3, count)) * fall).astype(np.int64)
 
 
-@given(st.integers(0, 1000), st.integers(1, 60), st.floats(0, 20_000))
-def test_coefficients_come_back_bit_for_bit(seed: int, count: int, size: float) -> None:
+@given(
+    st.integers(0, 1000),
+    st.integers(1, 60),
+    st.floats(0, 20_000),
+    st.builds(Head, st.integers(60, 1000), st.integers(0, 255), st.tuples(*3 * [st.integers(-32, 31)])),
+    st.sampled_from([60, 30]),
+)
+def test_heads_and_coefficients_come_back_bit_for_bit(
+    seed: int, count: int, size: float, head: Head, usual: int
+) -> None:
     q = spectrum(seed, count, size)
-    back = coefficients.decode(coefficients.encode(q), count)
+    again, back = coefficients.decode(PRIOR, coefficients.encode(PRIOR, head, q, usual, FPS), usual, FPS)
+    assert again == head
     used = back.shape[2]
     np.testing.assert_array_equal(back, q[:, :, :used])
     assert not q[:, :, used:].any()
 
 
 def test_the_largest_numbers_come_back_and_larger_ones_are_refused() -> None:
+    head = Head(30, 0, (0, 0, 0))
     q = np.zeros((CHANNEL_COUNT, 3, 2), dtype=np.int64)
-    q[0, 0], q[18, 2] = ((1 << 23) - 2, -(1 << 20)), (-5, 1 << 22)
-    np.testing.assert_array_equal(coefficients.decode(coefficients.encode(q), 2), q)
-    q[0, 0, 0] = 1 << 25
+    q[0, 0], q[18, 2] = ((1 << 19) - 2, -(1 << 18)), (-5, 1 << 17)
+    np.testing.assert_array_equal(
+        coefficients.decode(PRIOR, coefficients.encode(PRIOR, head, q, 30, FPS), 30, FPS)[1], q
+    )
+    q[18, 2, 1] = 1 << 40
     with pytest.raises(ValueError, match="too large"):
-        coefficients.encode(q)
+        coefficients.encode(PRIOR, head, q, 30, FPS)
 
 
-def test_a_still_block_costs_next_to_nothing() -> None:
+def test_head_and_end_cost_few_bytes() -> None:
     q = np.zeros((CHANNEL_COUNT, 3, 30), dtype=np.int64)
-    assert len(coefficients.encode(q)) <= 2
-    q[0, :, 0] = (812, -40, 3000)
-    assert len(coefficients.encode(q)) <= 24
+    assert len(coefficients.encode(PRIOR, Head(30, 200, (31, -32, 7)), q, 30, FPS)) <= 6
+    assert len(coefficients.encode(PRIOR, Head(999, 200, (31, -32, 7)), q, 30, FPS)) <= 9
 
 
 @given(st.binary(max_size=300), st.integers(1, 120))
-def test_any_bytes_decode_or_are_refused(data: bytes, frames: int) -> None:
+def test_any_bytes_decode_or_are_refused(data: bytes, usual: int) -> None:
     try:
-        q = coefficients.decode(data, frames)
+        head, q = coefficients.decode(PRIOR, data, usual, FPS)
     except DamagedBlock:
         return
-    assert q.shape[2] <= frames
-    assert abs(q).max(initial=0) < 1 << 25
+    assert q.shape[2] <= head.frames <= 1000
+    assert abs(q).max(initial=0) < 1 << 36
+
+
+def test_too_many_bytes_are_refused() -> None:
+    with pytest.raises(DamagedBlock, match="bytes"):
+        coefficients.decode(PRIOR, bytes(LARGEST_BLOCK + 1), 30, FPS)

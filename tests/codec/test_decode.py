@@ -1,20 +1,20 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.codec.decode import LARGEST_BLOCK, decode_block
-from bunraku.codec.encode import encode_block
+from bunraku.codec import prior
+from bunraku.codec.decode import decode_block, reconstruct
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.search import BlockEncoder
 from bunraku.codec.track import plan
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import points
 from tests.vectors.blocks import wandering_motion
 
 TRACK, MOTION = plan(wandering_motion(2.0, 30.0, 11))
-BLOCK = encode_block(TRACK, MOTION.root[:30], MOTION.rotations[:30], 9)
+BLOCK = BlockEncoder(TRACK, MOTION, prior.shipped()).block(0, 96, "mean").data
 
 
 def truth(instants: Array) -> Array:
@@ -32,13 +32,16 @@ def test_it_is_a_function_of_time() -> None:
     assert np.allclose(np.linalg.norm(rotations, axis=-1), 1)
 
 
+def test_values_are_a_little_nearer_to_zero_than_their_middle() -> None:
+    np.testing.assert_allclose(reconstruct(np.array([-5, -1, 0, 1, 2])), [-4.97, -0.94, 0, 0.94, 1.97])
+
+
 @given(st.binary(max_size=400))
 def test_any_bytes_decode_or_are_refused(data: bytes) -> None:
     try:
         block = decode_block(TRACK, data)
     except DamagedBlock as error:
-        said = str(error)
-        assert said
+        assert str(error)
         return
     assert 1 <= block.frames <= 1000
 
@@ -55,8 +58,3 @@ def test_damage_is_survived(bit: int, cut: int) -> None:
         root, rotations = block.at(0.0)
         assert root.shape == (1, 3)
         assert rotations.shape == (1, 18, 4)
-
-
-def test_oversized_blocks_are_refused() -> None:
-    with pytest.raises(DamagedBlock, match="bytes"):
-        decode_block(TRACK, BLOCK + bytes(LARGEST_BLOCK))

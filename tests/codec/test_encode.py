@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bunraku.codec.decode import decode_block
-from bunraku.codec.encode import STEPS, encode_motion
+from bunraku.codec.encode import LADDER, EncodedMotion, encode_mean, encode_motion, measure
 from bunraku.motion.skeleton import Figure, Motion, points
 from tests.vectors.blocks import wandering_motion
 
@@ -17,40 +17,84 @@ def real(shared: Path, name: str) -> Motion:
     return Motion(Figure(parts["off"], parts["tip"]), float(clip["fps"]), parts["root"], parts["Q"])
 
 
-def test_finer_rates_cost_more_and_err_less() -> None:
-    rates = encode_motion(wandering_motion(3.2, 30.0, 5)).rates
-    assert len(rates) == len(STEPS) >= 3
-    assert [r.kbps for r in rates] == sorted(r.kbps for r in rates)
-    assert [r.mean for r in rates] == sorted((r.mean for r in rates), reverse=True)
+def decoded(encoded: EncodedMotion, rate: int) -> np.ndarray:
+    """World points of all frames as a viewer has them."""
+    blocks = [decode_block(encoded.track, data) for data in encoded.rates[rate].blocks]
+    poses = [block.at(np.arange(block.frames, dtype=np.float64)) for block in blocks]
+    return points(encoded.track.figure, *(np.concatenate(part) for part in zip(*poses, strict=True)))
+
+
+@pytest.mark.parametrize("grade", ["live", "best"])
+def test_the_ladder_rises_and_every_rate_keeps_its_bound(grade: str) -> None:
+    motion = wandering_motion(3.2, 30.0, 5)
+    encoded = encode_motion(motion, grade=grade)  # type: ignore[arg-type]
+    assert len(encoded.rates) == len(LADDER) >= 5
+    assert [rate.kbps for rate in encoded.rates] == sorted(rate.kbps for rate in encoded.rates)
+    truth = points(motion.figure, motion.root, motion.rotations)
+    for number, (rate, bound) in enumerate(zip(encoded.rates, LADDER, strict=True)):
+        error = np.linalg.norm(decoded(encoded, number) - truth, axis=-1) * 1e3
+        assert error.max() <= bound == rate.bound
+        assert rate.most == pytest.approx(error.max())
+        assert rate.mean == pytest.approx(error.mean())
 
 
 @pytest.mark.parametrize("fps", [24.0, 29.97, 120.0])
-@pytest.mark.parametrize("block_seconds", [0.25, 1.0, 2.0])
-def test_stated_errors_are_those_of_the_decoded_motion(fps: float, block_seconds: float) -> None:
+@pytest.mark.parametrize("block_seconds", [0.25, 0.5, 1.0, 2.0])
+def test_blocks_of_any_length_keep_the_bound(fps: float, block_seconds: float) -> None:
     motion = wandering_motion(2.3, fps, 6)
-    encoded = encode_motion(motion, block_seconds, steps=(12,))
-    blocks = [decode_block(encoded.track, data) for data in encoded.rates[0].blocks]
-    poses = [block.at(np.arange(block.frames, dtype=np.float64)) for block in blocks]
-    root = np.concatenate([pose[0] for pose in poses])
-    rotations = np.concatenate([pose[1] for pose in poses])
-    truth = points(encoded.track.figure, motion.root, motion.rotations)
-    error = np.linalg.norm(points(encoded.track.figure, root, rotations) - truth, axis=-1) * 1e3
-    assert encoded.rates[0].mean == pytest.approx(error.mean())
-    assert encoded.rates[0].most == pytest.approx(error.max())
-    assert error.mean() < 2.0
+    encoded = encode_motion(motion, block_seconds, ladder=(4.0,), grade="live", first_seconds=0.2)
+    assert encoded.track.first_frames == round(0.2 * fps)
+    truth = points(motion.figure, motion.root, motion.rotations)
+    assert np.linalg.norm(decoded(encoded, 0) - truth, axis=-1).max() <= 4e-3
 
 
-def test_a_single_frame_and_a_still_figure_are_cheap() -> None:
+def test_across_borders_nothing_jumps_by_more_than_the_errors() -> None:
+    """Two frames on either side of a border are each at most the bound off, so their step and the change of their steps
+    differ from the truth's by at most two and four bounds."""
+    motion, bound = wandering_motion(3.0, 60.0, 12), 5e-3
+    encoded = encode_motion(motion, 0.5, ladder=(bound * 1e3,))
+    truth, seen = points(motion.figure, motion.root, motion.rotations), decoded(encoded, 0)
+    for index in range(1, encoded.track.blocks):
+        border = encoded.track.first_frame(index)
+        for order in (1, 2):
+            part = slice(border - 2, border + 2)
+            off = np.diff(seen[part], order, axis=0) - np.diff(truth[part], order, axis=0)
+            assert np.linalg.norm(off, axis=-1).max() <= 2**order * bound
+
+
+def test_the_mean_is_met_and_not_passed() -> None:
+    _, rate = encode_mean(wandering_motion(3.2, 30.0, 5), 2.0)
+    assert 1.8 < rate.mean <= 2.0
+
+
+def test_a_still_puppet_costs_thirty_bytes_a_block_at_most() -> None:
     motion = wandering_motion(4.0, 30.0, 5)
     still = Motion(motion.figure, 30.0, np.tile(motion.root[:1], (90, 1)), np.tile(motion.rotations[:1], (90, 1, 1)))
+    for rate in encode_motion(still).rates:
+        assert max(map(len, rate.blocks)) <= 30
+
+
+def test_a_single_frame_is_a_motion() -> None:
+    motion = wandering_motion(4.0, 30.0, 5)
     assert encode_motion(Motion(motion.figure, 30.0, motion.root[:1], motion.rotations[:1])).track.blocks == 1
-    lowest = encode_motion(still).rates[0]
-    assert max(map(len, lowest.blocks)) < 90
+
+
+def test_progress_rises_to_one() -> None:
+    told: list[float] = []
+    encode_motion(wandering_motion(2.0, 30.0, 5), grade="live", progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+def test_a_block_beyond_its_bound_is_never_let_through() -> None:
+    motion = wandering_motion(1.0, 30.0, 5)
+    encoded = encode_motion(motion, ladder=(20.0,))
+    with pytest.raises(ValueError, match="0.001"):
+        measure(encoded.track, motion, encoded.rates[0].blocks, 0.001)
 
 
 def test_real_dance_is_small_and_near(shared: Path) -> None:
     rates = encode_motion(real(shared, "perfume_A")).rates
-    assert rates[0].kbps < 1.6
-    assert rates[2].kbps < 6.0
-    assert rates[2].mean < 2.0
-    assert rates[3].mean < 0.7
+    assert rates[0].kbps < 0.8
+    assert rates[2].kbps < 2.5
+    assert rates[4].kbps < 8.0

@@ -2,24 +2,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from bunraku.codec import kernels
+from bunraku.codec import kernels, prior
+from bunraku.codec.prior import FEATURES
+
+PRIOR = prior.shipped()
 
 
-def test_a_block_with_more_frequencies_than_room_is_not_read() -> None:
-    q = np.ones((19, 3, 6), dtype=np.int64)
-    out = np.zeros(4096, dtype=np.uint8)
-    length = kernels.encode(q, out)
-    room = np.zeros((19, 3, 5), dtype=np.int64)
-    assert kernels.decode(out[1:length], room) == 6
-    assert not room.any()
-    room = np.zeros((19, 3, 9), dtype=np.int64)
-    assert kernels.decode(out[1:length], room) == 6
-    np.testing.assert_array_equal(room[:, :, :6], q)
+def test_bit_length() -> None:
+    assert [kernels.bit_length(value) for value in (0, 1, 2, 3, 4, 1000)] == [0, 1, 2, 2, 3, 10]
 
 
-def test_models_learn_within_a_block() -> None:
-    q = np.zeros((19, 3, 30), dtype=np.int64)
-    q[:, 0] = 3
-    out = np.zeros(1 << 16, dtype=np.uint8)
-    # 570 equal numbers cost little more than their signs
-    assert kernels.encode(q, out) < 570 / 8 * 2.6
+def test_examples_have_every_coefficient_in_the_coder_s_order() -> None:
+    random = np.random.default_rng(3)
+    q = random.integers(-3, 4, (19, 3, 6))
+    head = np.array([30, 120, 0, 0, 0, 6], dtype=np.int64)
+    features, where = np.zeros((q.size, FEATURES), np.int64), np.zeros((q.size, 5), np.int64)
+    assert kernels.examples(PRIOR, q, head, 64, features, where, 0) == q.size
+    np.testing.assert_array_equal(where[:, 2], abs(q).transpose(0, 2, 1).ravel())
+    np.testing.assert_array_equal(where[:, 3], np.select([q > 0, q < 0], [1, 2]).transpose(0, 2, 1).ravel())
+    assert (features[:, 22] == 120).all()
+
+
+def test_what_cannot_be_a_head_is_said() -> None:
+    head = np.zeros(6, dtype=np.int64)
+    # the first bit says "not as usual", then 0 frames
+    assert not kernels.decode_head(np.array([255, 0, 0, 0, 0], dtype=np.uint8), 30, head)

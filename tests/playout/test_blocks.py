@@ -11,7 +11,7 @@ from bunraku.playout.blocks import BlockStore
 from tests.vectors.blocks import wandering_motion
 
 MOTION = wandering_motion(3.4, 30.0, 3)
-ENCODED = encode_motion(MOTION, steps=(20, 8))
+ENCODED = encode_motion(MOTION, ladder=(20.0, 2.0), grade="live")
 
 
 def store(*indices: int, rate: int = 1) -> BlockStore:

@@ -41,7 +41,7 @@ class Audience:
 
 async def stored(name: str, seed: int) -> StoredMotion:
     library = Library.open("memory:///")
-    await library.put(name, pack(name, encode_motion(wandering_motion(2.3, 30.0, seed), steps=(28, 12))))
+    await library.put(name, pack(name, encode_motion(wandering_motion(2.3, 30.0, seed), ladder=(30.0, 5.0), grade="live")))
     motion = await library.get(name)
     assert motion is not None
     return motion

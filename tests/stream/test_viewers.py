@@ -18,7 +18,7 @@ from tests.vectors.blocks import wandering_motion
 async def library() -> Library:
     shelf = Library.open("memory:///")
     for name, seconds in (("one", 9.2), ("two", 2.0)):
-        encoded = encode_motion(wandering_motion(seconds, 30.0, 9), steps=(28, 14))
+        encoded = encode_motion(wandering_motion(seconds, 30.0, 9), ladder=(30.0, 5.0), grade="live")
         await shelf.put(name, pack(name, encoded))
     return shelf
 

@@ -13,7 +13,7 @@ import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from bunraku.codec import coefficients
+from bunraku.codec import decode
 from bunraku.codec.decode import decode_block
 from bunraku.codec.track import MotionTrack, read_track
 from bunraku.playout import timeline
@@ -88,7 +88,7 @@ class Viewer:
 
         Raises `StreamEnded` where the server closes the stream, OSError where there is none.
         """
-        await asyncio.to_thread(coefficients.warm)
+        await asyncio.to_thread(decode.warm)
         self._began = time.monotonic()
         async with connect(
             self.url,

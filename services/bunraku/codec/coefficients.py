@@ -33,6 +33,12 @@ def _kernels() -> ModuleType:
     return kernels
 
 
+def warm(prior: Prior) -> None:
+    """Load the compiled code, or compile it where that was never done: seconds that no one should wait for later."""
+    ones = np.ones((CHANNEL_COUNT, 3, 2), dtype=np.int64)
+    decode(prior, encode(prior, Head(2, 100, (0, 0, 0)), ones, 2, 30.0), 2, 30.0)
+
+
 def length_level(frames: int, fps: float) -> int:
     """Level of a block's duration in sixteenths of a second: a feature of its contexts."""
     return int(LEVELS[min(int(16 * frames / fps + 0.5), 4095)])
@@ -72,3 +78,21 @@ def decode(prior: Prior, data: bytes, usual: int, fps: float) -> tuple[Head, Int
     if not kernels.decode(prior, octets, q, numbers, usual, length_level(frames, fps)):
         raise DamagedBlock(f"block holds a number longer than {kernels.ESCAPE} bits")
     return Head(frames, step, (x, y, z)), q
+
+
+def encode_numbers(values: Integers, groups: Integers) -> bytes:
+    """Bytes of some whole numbers, each of a group with models of its own; raises ValueError for one above 2^16."""
+    out = np.zeros(64 + 8 * len(values), dtype=np.uint8)
+    length = _kernels().numbers(False, out, np.array(values, dtype=np.int64), groups)
+    if length < 0:
+        raise ValueError("a number is too large to be coded")
+    return out[1:length].tobytes().rstrip(b"\0")
+
+
+def decode_numbers(data: bytes, groups: Integers) -> Integers:
+    """The numbers of `encode_numbers`; raises `DamagedBlock`."""
+    kernels = _kernels()
+    values = np.zeros(len(groups), dtype=np.int64)
+    if kernels.numbers(True, np.array(bytearray(data), dtype=np.uint8), values, groups) < 0:
+        raise DamagedBlock(f"a number is longer than {kernels.NUMBER_BITS} bits")
+    return values

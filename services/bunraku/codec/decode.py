@@ -54,3 +54,8 @@ def decode_block(track: MotionTrack, data: bytes, prior: Prior | None = None) ->
     values = np.linalg.inv(track.weights) @ (reconstruct(q) * size)
     reference = np.concatenate([root_reference(head.turn), track.reference_rotations])
     return MotionBlock(head.frames, q, values, reference)
+
+
+def warm() -> None:
+    """Load or compile what decoding needs."""
+    coefficients.warm(shipped())

@@ -12,8 +12,9 @@ from bunraku.codec.decode import decode_block
 from bunraku.codec.prior import Prior, shipped
 from bunraku.codec.search import BlockEncoder, Coded
 from bunraku.codec.track import MotionTrack, describe_track, plan
+from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import Motion, front, points
+from bunraku.motion.skeleton import JOINT_COUNT, Motion, front, points, standard_figure
 
 LADDER: tuple[float, ...] = (60.0, 20.0, 8.0, 3.0, 0.5)
 """Largest error of each rate at any point and frame, mm, from the lowest rate to the highest: about 1 kbit/s to what
@@ -84,6 +85,13 @@ def encode_mean(
     encoder = BlockEncoder(track, motion, prior or shipped())
     blocks = encoder.averaged(mean)
     return track, measure(track, motion, [block.data for block in blocks], np.inf, prior)
+
+
+def warm() -> None:
+    """Load or compile what encoding needs, and decoding."""
+    figure = standard_figure()
+    still = Motion(figure, 30.0, np.zeros((2, 3)), np.tile(rotation.IDENTITY, (2, JOINT_COUNT, 1)))
+    encode_motion(still, ladder=(10.0,))
 
 
 def measure(track: MotionTrack, motion: Motion, blocks: list[bytes], bound: float, prior: Prior | None = None) -> Rate:

@@ -23,6 +23,8 @@ from bunraku.codec.rangecoder import EVEN, Bytes, decode_bit, encode_bit, finish
 
 ESCAPE = 20
 """Bits of an escape's length, at most."""
+NUMBER_BITS = 17
+"""Bits of a dancer's number, less one, are fewer."""
 _FRAMES_AS_USUAL = 32440
 _MOST_FRAMES_BITS = 10
 
@@ -140,6 +142,30 @@ def decode(prior: Prior, data: Bytes, q: Integers, head: Integers, usual: int, l
     """Read a block into `q`, zeros of (19, 3, count); False where it cannot be one."""
     state = start_decoder(data)
     return _head(True, state, data, usual, head) and _body(True, state, data, prior, q, head, length)  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def numbers(decoding: bool, data: Bytes, values: Integers, groups: Integers) -> int:
+    """Write `values` into `data`, or read them from it: each number's bits less one in unary by the models of its group,
+    which learn, the low bits and the sign equiprobable. The length, its first byte being of no use; -1 where it cannot be."""
+    models = np.full((groups.max() + 1, NUMBER_BITS), EVEN)
+    state = start_decoder(data) if decoding else start_encoder()
+    for i in range(len(values)):
+        model, size = models[groups[i]], abs(values[i]) + 1
+        bits, length = 0 if decoding else bit_length(size) - 1, 0
+        while length < NUMBER_BITS:
+            more = _bit(decoding, state, data, model[length], 1 if bits > length else 0)
+            moved = model[length] + (((32768 if more else 0) - model[length]) >> 3)
+            model[length] = min(max(moved, 1024), 31744)
+            if not more:
+                break
+            length += 1
+        if length == NUMBER_BITS:
+            return -1
+        size = (1 << length | _number(decoding, state, data, length, size)) - 1
+        if size > 0:
+            values[i] = -size if _bit(decoding, state, data, EVEN, 1 if values[i] < 0 else 0) else size
+    return 0 if decoding else finish(state, data)
 
 
 @njit(cache=True)

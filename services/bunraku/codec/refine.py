@@ -24,7 +24,7 @@ from bunraku.codec.bodies import (
 )
 from bunraku.codec.contexts import Seen, nothing_seen, scale, see, see_channel, see_frequency, share
 from bunraku.codec.costs import bits
-from bunraku.codec.prior import Integers, Prior
+from bunraku.codec.prior import HIDDEN, Integers, Prior
 
 _TWIST = 0.03**2
 """Weight of an orientation's error, radians squared against metres squared: what no point shows must stay right too."""
@@ -32,7 +32,7 @@ _MORE = 3
 """Frequencies above a channel's last that a sweep may use."""
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=True)
 def _axes(body: Body, joint: int, axis: int, vectors: Array, orientation: Array, out: Array) -> None:
     """`out` (n, 3): the world's axis and speed of the joint's turning as one of its weighted values grows."""
     unit = body.unweight[joint + 1][:, axis]
@@ -59,7 +59,7 @@ def _axes(body: Body, joint: int, axis: int, vectors: Array, orientation: Array,
             rotate(body.reference[joint], v, out[t])
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=True)
 def _slopes(
     joint: int, axes: Array, points: Array, off: Array, turned: Array, weight: Array, slope: Array, bend: Array
 ) -> None:
@@ -84,7 +84,7 @@ def _slopes(
             bend[t] += weight[point, t] * (x * x + y * y + z * z)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=True)
 def _move(joint: int, axes: Array, change: Array, points: Array, off: Array, turned: Array) -> None:
     """Carry a change (n) of the joint's value into the errors."""
     for i in range(BELOW_COUNT[joint]):
@@ -104,7 +104,7 @@ def _move(joint: int, axes: Array, change: Array, points: Array, off: Array, tur
             off[point, t, 2] += d0 * b - d1 * a
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=True)
 def _descend(
     prior: Prior,
     costs: Array,
@@ -112,9 +112,7 @@ def _descend(
     q: Integers,
     channel: int,
     axis: int,
-    used: int,
-    step: int,
-    length: int,
+    sums: Integers,
     basis: Array,
     slope: Array,
     bend: Array,
@@ -122,8 +120,9 @@ def _descend(
     price: float,
     change: Array,
 ) -> bool:
-    """One sweep over the frequencies of one axis; `change` (n) gets how its values move. Whether any did."""
-    count, frames = basis.shape
+    """One sweep over the frequencies of one axis, of which those of `sums`, their shared context, are used; `change` (n)
+    gets how its values move. Whether any did."""
+    used, frames = len(sums), basis.shape[1]
     reach = 0
     for x in range(3):
         for k in range(used):
@@ -152,7 +151,7 @@ def _descend(
             if worse > price * 14:
                 continue
             if fresh:
-                share(prior, seen, channel, k, used, step, length)
+                seen.shared[:] = sums[k]
                 expected = scale(prior, seen, channel, axis, k)
                 before = bits(costs, expected, abs(now))
                 fresh = False
@@ -189,7 +188,7 @@ def _errors(
     return points - true_points
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=True)
 def _weigh(off: Array, weight: Array) -> None:
     """Weights (23, n) that grow with each point's error, so that the largest comes down."""
     mean = 0.0
@@ -226,7 +225,7 @@ def refine(
     vectors, orientation, points = np.zeros((18, frames, 3)), np.zeros((18, frames, 4)), np.zeros((23, frames, 3))
     turned, weight = np.zeros((18, frames, 3)), np.ones((23, frames))
     slope, bend, change = np.zeros(frames), np.zeros(frames), np.zeros(frames)
-    axes = np.zeros((frames, 3))
+    axes, sums = np.zeros((frames, 3)), np.zeros((count, 1 + HIDDEN), np.int64)
     for _ in range(sweeps):
         pose(body, q, size, basis, vectors, orientation, points)
         off = _errors(body, true_orientation, true_points, orientation, points, turned)
@@ -247,6 +246,9 @@ def refine(
         for channel in range(19):
             for k in range(used):
                 see_frequency(seen, channel, k)
+            for k in range(used):
+                share(prior, seen, channel, k, used, step, length)
+                sums[k] = seen.shared
             for axis in range(3):
                 if channel == 0:
                     per = body.unweight[0][axis, axis]
@@ -259,7 +261,7 @@ def refine(
                     _axes(body, channel - 1, axis, vectors[channel - 1], orientation, axes)
                     _slopes(channel - 1, axes, points, off, turned, weight, slope, bend)
                 if not _descend(
-                    prior, costs, seen, q, channel, axis, used, step, length, basis, slope, bend, size, price, change
+                    prior, costs, seen, q, channel, axis, sums[:used], basis, slope, bend, size, price, change
                 ):
                     continue
                 if channel == 0:

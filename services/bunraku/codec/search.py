@@ -85,12 +85,9 @@ class BlockEncoder:
         q: Integers = np.zeros((19, 3, frames), dtype=np.int64)
         given = (self._prior, self._costs, body, *truth, basis, size, step, length, q)
         decoded = feedback.first_pass(*given)
-        if goal == "first":
-            # the points of tips are placed with the last of their joints
-            pass
-        elif goal == "mean":
+        if goal == "mean":
             decoded = refine.refine(*given, _SWEEPS, _PRICE_OF_MEAN, False)
-        else:
+        elif goal == "most":
             decoded = refine.refine(*given, _SWEEPS, _PRICE_OF_MOST, True)
         data = coefficients.encode(self._prior, Head(frames, step, (x, y, z)), q, track.block_frames, track.fps)
         return Coded(data, step, np.linalg.norm(decoded - truth[1], axis=-1) * 1e3)

@@ -7,19 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from bunraku.codec.dancer import FIGURE_UNIT, on_grid, pack_dancer, unpack_dancer
 from bunraku.codec.errors import DamagedBlock
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import CHANNEL_COUNT, INDEX, JOINT_COUNT, PARENTS, TIPS, Figure, Motion
 
 CODEC = "bunraku.motion/2"
-FIGURE_UNIT = 1e-4
-"""Metres in one unit of the figure's 16-bit offsets."""
 TURN_UNIT = 0.1
 """Radians in one unit of a block's turn of the root."""
 STEP_UNIT = 2.0**-16
 """Quantiser step of index 0 for a block of 30 frames, metres; sixteen indices make it twice as large."""
-STILL = 4, 14
+_BITS = 3, 14
 """Bits after the point of references in radians: of a motion, and of one that stands still."""
 
 _LEVER = 0.45
@@ -29,8 +28,6 @@ _CARE = np.ones(CHANNEL_COUNT)
 _CARE[[0, 1, 2]] = 1.15, 0.88, 0.88
 _CARE[[INDEX[name] + 1 for name in ("l_midtarsal", "r_midtarsal")]] = 0.87
 _CARE[[INDEX[name] + 1 for name in ("skullbase", "l_wrist", "r_wrist")]] = 0.9
-
-_FIGURE_NUMBERS = 3 * (JOINT_COUNT + len(TIPS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,16 +128,13 @@ def plan(motion: Motion, block_seconds: float = 1.0, first_seconds: float | None
 
     The figure goes to the track's grid (0.05 mm) before anything is encoded, so that limb lengths are exact ever after.
     """
-    figure = Figure(
-        np.round(motion.figure.offsets / FIGURE_UNIT) * FIGURE_UNIT,
-        np.round(motion.figure.tips / FIGURE_UNIT) * FIGURE_UNIT,
-    )
+    figure = on_grid(motion.figure)
     joints = motion.rotations[:, 1:]
     # the mean direction of the quaternions, taken on one hemisphere
     aligned = joints * np.sign(np.sum(joints * joints[:1], axis=-1, keepdims=True) + 1e-12)
     mean = rotation.to_rotation_vector(rotation.normalise(aligned.mean(axis=0)))
-    still = np.allclose(motion.rotations, motion.rotations[:1], atol=2.0 ** -STILL[1])
-    reference_bits = STILL[still]
+    still = np.allclose(motion.rotations, motion.rotations[:1], atol=2.0 ** -_BITS[1])
+    reference_bits = _BITS[still]
     reference = np.round(mean * 2.0**reference_bits)
     frames = motion.frames
     first = 0 if first_seconds is None else min(max(1, round(first_seconds * motion.fps)), frames, 1000)
@@ -150,36 +144,6 @@ def plan(motion: Motion, block_seconds: float = 1.0, first_seconds: float | None
         motion.fps, frames, block_frames, first or min(block_frames, frames), figure, reference, reference_bits
     )
     return track, Motion(figure, motion.fps, motion.root, motion.rotations)
-
-
-def pack_figure(figure: Figure) -> bytes:
-    """138 bytes: 18 offsets and 5 tips, each 3 x i16 in `FIGURE_UNIT`; a limb may be 3.27 m long."""
-    numbers = np.concatenate([figure.offsets, figure.tips[list(TIPS)]]) / FIGURE_UNIT
-    return np.clip(np.round(numbers), -32767, 32767).astype("<i2").tobytes()
-
-
-def unpack_figure(data: bytes) -> Figure:
-    """The figure of `pack_figure`; raises `DamagedBlock`."""
-    if len(data) != 2 * _FIGURE_NUMBERS:
-        raise DamagedBlock(f"a figure has {2 * _FIGURE_NUMBERS} bytes, not {len(data)}")
-    numbers = np.frombuffer(data, "<i2").reshape(-1, 3) * FIGURE_UNIT
-    tips = np.zeros((JOINT_COUNT, 3))
-    tips[list(TIPS)] = numbers[JOINT_COUNT:]
-    return Figure(numbers[:JOINT_COUNT], tips)
-
-
-def pack_reference(reference: Array, bits: int) -> bytes:
-    """103 bytes: `bits`, then the rotation vectors (17, 3) in 2^-`bits` radians as i16."""
-    return bytes([bits]) + np.asarray(reference).astype("<i2").tobytes()
-
-
-def unpack_reference(data: bytes) -> tuple[Array, int]:
-    """The reference of `pack_reference` and its bits; raises `DamagedBlock`."""
-    if len(data) != 1 + 6 * (CHANNEL_COUNT - 2):
-        raise DamagedBlock(f"references have {1 + 6 * (CHANNEL_COUNT - 2)} bytes, not {len(data)}")
-    if data[0] > STILL[1]:
-        raise DamagedBlock(f"references are in 2^-{data[0]} radians; {STILL[1]} is the most")
-    return np.frombuffer(data[1:], "<i2").reshape(-1, 3).astype(np.float64), data[0]
 
 
 def describe_track(track: MotionTrack, rates: list[dict[str, float]]) -> dict[str, Any]:
@@ -193,8 +157,7 @@ def describe_track(track: MotionTrack, rates: list[dict[str, float]]) -> dict[st
         "block_frames": track.block_frames,
         "first_frames": track.first_frames,
         "rates": rates,
-        "figure": pack_figure(track.figure),
-        "reference": pack_reference(track.reference, track.reference_bits),
+        "dancer": pack_dancer(track.figure, track.reference, track.reference_bits),
     }
 
 
@@ -204,7 +167,7 @@ def read_track(described: dict[str, Any]) -> MotionTrack:
         raise DamagedBlock(f"the motion is in {described.get('codec')!r}; this reads {CODEC!r}")
     fps = described.get("fps")
     frames, block_frames, first_frames = (described.get(key) for key in ("frames", "block_frames", "first_frames"))
-    figure, reference = described.get("figure"), described.get("reference")
+    dancer = described.get("dancer")
     if not (
         isinstance(fps, float | int)
         and isinstance(frames, int)
@@ -214,7 +177,6 @@ def read_track(described: dict[str, Any]) -> MotionTrack:
         raise DamagedBlock("a motion's track has numbers fps, frames, block_frames and first_frames")
     if not (fps > 0 and 0 < first_frames <= min(frames, 1000) and 0 < block_frames <= 1000):
         raise DamagedBlock("a motion's track has fps and frames above zero and blocks of 1..1000 frames")
-    if not (isinstance(figure, bytes) and isinstance(reference, bytes)):
-        raise DamagedBlock("a motion's track has a figure and a reference")
-    vectors, bits = unpack_reference(reference)
-    return MotionTrack(float(fps), frames, block_frames, first_frames, unpack_figure(figure), vectors, bits)
+    if not isinstance(dancer, bytes):
+        raise DamagedBlock("a motion's track has a dancer, bytes")
+    return MotionTrack(float(fps), frames, block_frames, first_frames, *unpack_dancer(dancer))

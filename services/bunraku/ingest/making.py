@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bunraku.backing.library import pack
-from bunraku.codec import coefficients
+from bunraku.codec import encode
 from bunraku.codec.encode import encode_motion
 from bunraku.ingest.results import Made, Refused
 from bunraku.marionette.limbs import ArmRig, Limb
@@ -16,7 +16,7 @@ from bunraku.motion.errors import UnreadableMotion
 
 _SMALLEST = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xrotation } MOTION Frames: 1 Frame Time: 0.1 0"
 
-coefficients.warm()
+encode.warm()
 read(_SMALLEST)
 
 

@@ -56,7 +56,7 @@ class BlockStore:
         if index not in self._blocks:
             return None
         block = self._blocks[index][1]
-        instant = position * track.fps / 1e6 - index * track.block_frames
+        instant = position * track.fps / 1e6 - track.first_frame(index)
         past = instant - (block.frames - 1)
         following = index + 1 if index + 1 < track.blocks else 0 if loop else -1
         if past <= 0 or following not in self._blocks:

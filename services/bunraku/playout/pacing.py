@@ -51,6 +51,7 @@ class Pacer:
         """Microseconds until the next block comes within reach, None while nothing moves."""
         if not state.playing:
             return None
-        position = position_at(state, clock)
-        block = round(self._track.block_frames * 1e6 / self._track.fps)
-        return block - (position + AHEAD) % block + 1_000
+        track = self._track
+        reach = (position_at(state, clock) + AHEAD) % track.duration_us
+        following = track.block_at(reach) + 1
+        return (track.start_us(following) if following < track.blocks else track.duration_us) - reach + 1_000

@@ -1,0 +1,145 @@
+"""How small motion is: `make bench-codec CORPUS=../shared/mocap`. The last line printed is one JSON object.
+
+Every clip is encoded with a prior that saw none of its family, when asked for a mean or a largest error. Its kbit/s count
+all that a viewer receives of the motion over the clip: blocks, Data heads, WebSocket frames, and the dancer (limb
+lengths and references) from the Description. `--quick` takes every third clip.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+
+from bunraku.codec.decode import decode_block
+from bunraku.codec.encode import LADDER, encode_mean, encode_motion
+from bunraku.codec.prior import Prior, parse, shipped
+from bunraku.codec.dancer import pack_dancer
+from bunraku.codec.track import MotionTrack
+from bunraku.motion.skeleton import Motion
+from bunraku.wire.messages import Data
+from tests.bench import peers
+from training import corpus as clips
+
+GOALS = (("mean", 1.0), ("mean", 5.0), ("max", 10.0), ("max", 2.0))
+PEERS = {"acl": "acl", "meshopt": "meshopt_brotli"}
+PRIORS = Path(__file__).with_name("priors")
+
+
+def prior_for(name: str) -> Prior:
+    """The prior that has not seen the clip's family."""
+    path = PRIORS / f"{clips.family(name)}.json"
+    return parse(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else shipped()
+
+
+def received(track: MotionTrack, blocks: list[bytes]) -> int:
+    """Bytes of a motion on its way to a viewer."""
+    packets = [len(Data(0, 0, track.start_us(index), block).pack()) for index, block in enumerate(blocks)]
+    framed = sum(size + (2 if size < 126 else 4) for size in packets)
+    return framed + len(pack_dancer(track.figure, track.reference, track.reference_bits))
+
+
+def ours(motion: Motion, goal: tuple[str, float], prior: Prior, block_seconds: float) -> float:
+    """Our kbit/s for a goal."""
+    kind, error = goal
+    if kind == "mean":
+        track, rate = encode_mean(motion, error, block_seconds, prior)
+    else:
+        encoded = encode_motion(motion, block_seconds, (error,), prior=prior)
+        track, rate = encoded.track, encoded.rates[0]
+    return received(track, rate.blocks) * 8e-3 / motion.duration
+
+
+def geometric(values: list[float]) -> float:
+    return float(np.exp(np.mean(np.log(values))))
+
+
+def speeds(motions: dict[str, Motion]) -> dict[str, float]:
+    """Times real time of the whole ladder in both grades over clips of 30 to 60 frames a second, and milliseconds to
+    decode a block."""
+    usual = [motion for motion in motions.values() if 30 <= motion.fps <= 60]
+    figures = {}
+    seconds = sum(motion.duration for motion in usual)
+    for key, grade in (("encode_times_real_time", "live"), ("encode_best_times_real_time", "best")):
+        began = time.perf_counter()
+        for motion in usual:
+            encode_motion(motion, grade=grade)  # type: ignore[arg-type]
+        figures[key] = seconds / (time.perf_counter() - began)
+    spent = []
+    for motion in motions.values():
+        track, rate = encode_mean(motion, 1.0)
+        for block in rate.blocks:
+            began = time.perf_counter()
+            decode_block(track, block)
+            spent.append(time.perf_counter() - began)
+    figures["decode_ms_python"] = float(np.median(spent)) * 1e3
+    return figures
+
+
+def decode_ms_typescript(motions: dict[str, Motion]) -> float | None:
+    """Median milliseconds in Node of a block at 1 mm, None where there is no Node."""
+    web = Path(__file__).resolve().parents[2] / "services/web"
+    coded = []
+    for motion in motions.values():
+        track, rate = encode_mean(motion, 1.0)
+        described = {
+            "fps": track.fps,
+            "frames": track.frames,
+            "blockFrames": track.block_frames,
+            "firstFrames": track.first_frames,
+            "dancer": pack_dancer(track.figure, track.reference, track.reference_bits).hex(),
+        }
+        coded.append({"track": described, "blocks": [block.hex() for block in rate.blocks]})
+    try:
+        done = subprocess.run(
+            ["npx", "vite-node", "tests/bench/decode.ts"],
+            cwd=web,
+            input=json.dumps(coded),
+            capture_output=True,
+            text=True,
+            timeout=300,
+            check=True,
+        )
+    except (FileNotFoundError, subprocess.SubprocessError):
+        return None
+    return float(json.loads(done.stdout.splitlines()[-1])["median_ms"])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="bench-codec", description=__doc__)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--block-seconds", type=float, default=1.0)
+    asked = parser.parse_args()
+    folder = Path(os.environ.get("CORPUS") or os.environ.get("BUNRAKU_SHARED", "../shared") + "/mocap")
+    measured = peers.read(folder)
+    names = [name for name in clips.names(folder) if name in measured][:: 3 if asked.quick else 1]
+    motions = {name: clips.load(folder, name) for name in names}
+    ratios: dict[str, list[float]] = {}
+    rates: dict[str, list[float]] = {}
+    print(f"{'clip':<16}" + "".join(f"{kind} {error:g} mm".rjust(12) + f"{'acl':>8}{'meshopt':>9}" for kind, error in GOALS))
+    for name, motion in motions.items():
+        row = f"{name:<16}"
+        for kind, error in GOALS:
+            key = f"{kind}_{error:g}mm"
+            kbps = ours(motion, (kind, error), prior_for(name), asked.block_seconds)
+            rates.setdefault(f"kbps_{key}", []).append(kbps)
+            row += f"{kbps:12.2f}"
+            for peer, column in PEERS.items():
+                theirs = peers.kbps(measured[name][column], peers.MEAN if kind == "mean" else peers.MOST, error)
+                ratios.setdefault(f"{peer}_{key}", []).append(theirs / kbps)
+                row += f"{theirs / kbps:8.2f}" if peer == "acl" else f"{theirs / kbps:9.2f}"
+        print(row, flush=True)
+    figures = {key: round(geometric(values), 3) for key, values in (ratios | rates).items()}
+    figures |= {key: round(value, 3) for key, value in speeds(motions).items()}
+    typescript = decode_ms_typescript(motions)
+    figures["decode_ms_typescript"] = round(typescript, 3) if typescript is not None else -1.0
+    print(json.dumps(figures | {"clips": len(names), "ladder_mm": list(LADDER), "block_seconds": asked.block_seconds}))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import numpy as np
+
+from bunraku.codec import contexts, prior
+from bunraku.codec.contexts import HIGH, LOW
+
+PRIOR = prior.shipped()
+
+
+def scales(size: int) -> list[int]:
+    """The scales of the third channel's frequencies where everything before has one size."""
+    seen = contexts.nothing_seen(12)
+    found = []
+    for channel in range(3):
+        for k in range(12):
+            contexts.share(PRIOR, seen, channel, k, 12, 120, 64)
+            for axis in range(3):
+                found.append(contexts.scale(PRIOR, seen, channel, axis, k))
+                contexts.see(seen, channel, axis, k, size)
+            contexts.see_frequency(seen, channel, k)
+        contexts.see_channel(seen, channel, 12)
+    return found[2 * 36 :]
+
+
+def test_large_neighbours_make_large_sizes_expected() -> None:
+    nothing, some, much = (np.array(scales(size)) for size in (0, 4, 200))
+    assert (nothing < some).all()
+    assert (some < much).all()
+
+
+def test_scales_stay_within_their_bounds() -> None:
+    for size in (0, 4095, 1 << 19):
+        assert LOW <= min(scales(size)) <= max(scales(size)) <= HIGH
+
+
+def test_the_hidden_layer_of_a_prior_is_heard() -> None:
+    loud = PRIOR._replace(
+        hidden_class=np.full_like(PRIOR.hidden_class, 1 << 20), out=np.full_like(PRIOR.out, 4096), hidden=0 * PRIOR.hidden
+    )
+    seen = contexts.nothing_seen(3)
+    contexts.share(loud, seen, 0, 0, 3, 120, 64)
+    assert contexts.scale(loud, seen, 0, 0, 0) == HIGH
+
+
+def test_signs_look_two_and_four_frequencies_back() -> None:
+    q = np.zeros((19, 3, 9), dtype=np.int64)
+    assert contexts.sign_context(q, 4, 1, 6) == 7
+    q[4, 1, 4], q[4, 1, 2] = -9, 3
+    assert contexts.sign_context(q, 4, 1, 6) == 2
+    # the mean of a movement says nothing of how it moves
+    q[4, 1, 0] = 5
+    assert contexts.sign_context(q, 4, 1, 2) == 7
