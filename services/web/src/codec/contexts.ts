@@ -31,6 +31,8 @@ export const RELATIVES = {
 } as const;
 const { parent: PARENT_OF, mirror: MIRROR_OF, grandparent: GRANDPARENT_OF } = RELATIVES;
 
+const NOTHING = new Float64Array(SUMS);
+
 // zeros on both sides of the frequencies
 const BEFORE = 3;
 const BESIDE = 8;
@@ -49,9 +51,9 @@ export class Contexts {
   private readonly totals: Int32Array;
   /** Sum of the means of this channel up to the frequency. */
   private run = 0;
-  private readonly features = new Int32Array(FEATURES);
-  private readonly shared = new Int32Array(SUMS);
-  private readonly sums = new Int32Array(SUMS);
+  private readonly features = new Float64Array(FEATURES);
+  private readonly shared = new Float64Array(SUMS);
+  private readonly sums = new Float64Array(SUMS);
   private readonly levels = levels();
 
   /**
@@ -105,8 +107,7 @@ export class Contexts {
     f[21] = this.levels[k];
     f[22] = this.step;
     f[23] = this.length;
-    shared.fill(0);
-    weigh(shared, f, 0, SHARED, this.prior.weights, CLASS_OF[k] * FEATURES * SUMS);
+    weigh(shared, NOTHING, NOTHING, 0, f, 0, SHARED, this.prior.weights, CLASS_OF[k] * FEATURES * SUMS);
   }
 
   /** The expected size of one coefficient, log2 in 1/256, after `share` of its frequency. */
@@ -129,8 +130,7 @@ export class Contexts {
     f[31] = axes[mirror + 1];
     const z = CLASS_OF[k];
     const bias = (z * AXES + channel * 3 + axis) * SUMS;
-    for (let sum = 0; sum < SUMS; sum++) sums[sum] = shared[sum] + biases[bias + sum];
-    weigh(sums, f, SHARED, FEATURES, weights, z * FEATURES * SUMS);
+    weigh(sums, shared, biases, bias, f, SHARED, FEATURES, weights, z * FEATURES * SUMS);
     let result = sums[0] >> 8;
     for (let unit = 0; unit < HIDDEN; unit++) {
       const x = sums[1 + unit] >> 8;
@@ -161,34 +161,44 @@ export class Contexts {
 }
 
 /**
- * Adds features `from` .. `to` - 1, weighted with [feature][sum] from `base`, to the nine `sums`. They are named one by one
- * because they are to stay in registers: nearly all the time of a decoder is spent here.
+ * The nine sums, into `out`: `start`, the biases from `bias` on, and features `from` .. `to` - 1 weighted with [feature][sum] from
+ * `base` on. They are named one by one because they are to stay in registers: most of a decoder's time is spent here. They
+ * are whole numbers in doubles, which multiply and add at least as fast, and there are more registers for them.
  */
-function weigh(sums: Int32Array, features: Int32Array, from: number, to: number, weights: Int32Array, base: number): void {
-  let a = sums[0], b = sums[1], c = sums[2], d = sums[3], e = sums[4], f = sums[5], g = sums[6], h = sums[7], i = sums[8];
+function weigh(
+  out: Float64Array, start: Float64Array, biases: Float64Array, bias: number,
+  features: Float64Array, from: number, to: number, weights: Float64Array, base: number,
+): void {
+  let a = start[0] + biases[bias];
+  let b = start[1] + biases[bias + 1];
+  let c = start[2] + biases[bias + 2];
+  let d = start[3] + biases[bias + 3];
+  let e = start[4] + biases[bias + 4];
+  let f = start[5] + biases[bias + 5];
+  let g = start[6] + biases[bias + 6];
+  let h = start[7] + biases[bias + 7];
+  let i = start[8] + biases[bias + 8];
   for (let feature = from; feature < to; feature++) {
-    const value = features[feature];
-    if (value === 0) continue;
-    const at = base + feature * SUMS;
-    a = (a + Math.imul(value, weights[at])) | 0;
-    b = (b + Math.imul(value, weights[at + 1])) | 0;
-    c = (c + Math.imul(value, weights[at + 2])) | 0;
-    d = (d + Math.imul(value, weights[at + 3])) | 0;
-    e = (e + Math.imul(value, weights[at + 4])) | 0;
-    f = (f + Math.imul(value, weights[at + 5])) | 0;
-    g = (g + Math.imul(value, weights[at + 6])) | 0;
-    h = (h + Math.imul(value, weights[at + 7])) | 0;
-    i = (i + Math.imul(value, weights[at + 8])) | 0;
+    const value = features[feature], at = base + feature * SUMS;
+    a += value * weights[at];
+    b += value * weights[at + 1];
+    c += value * weights[at + 2];
+    d += value * weights[at + 3];
+    e += value * weights[at + 4];
+    f += value * weights[at + 5];
+    g += value * weights[at + 6];
+    h += value * weights[at + 7];
+    i += value * weights[at + 8];
   }
-  sums[0] = a;
-  sums[1] = b;
-  sums[2] = c;
-  sums[3] = d;
-  sums[4] = e;
-  sums[5] = f;
-  sums[6] = g;
-  sums[7] = h;
-  sums[8] = i;
+  out[0] = a;
+  out[1] = b;
+  out[2] = c;
+  out[3] = d;
+  out[4] = e;
+  out[5] = f;
+  out[6] = g;
+  out[7] = h;
+  out[8] = i;
 }
 
 /**

@@ -24,9 +24,9 @@ export const AXES = 3 * CHANNEL_COUNT;
 /** The network from features to a scale, the hazards of each scale and the signs' odds: probabilities of a 1 in 1/32768. */
 export interface Prior {
   /** What a feature adds to each sum: [class][feature][sum]. */
-  readonly weights: Int32Array;
+  readonly weights: Float64Array;
   /** What each sum starts at: [class][axis of a channel][sum]. */
-  readonly biases: Int32Array;
+  readonly biases: Float64Array;
   /** [class][hidden unit] */
   readonly out: Int32Array;
   /** [row][decision] */
@@ -52,16 +52,21 @@ export function readPrior(values: PriorValues): Prior {
     }
   }
   const { linear, bias, hidden, hidden_bias: hiddenBias, hidden_class: hiddenClass, out, hazard, sign } = values;
-  const units = hidden.map((_, unit) => unit);
-  return {
-    weights: Int32Array.from(linear.flatMap((row) => row.flatMap((weight, i) => [weight, ...units.map((unit) => hidden[unit][i])]))),
-    biases: Int32Array.from(
-      bias.flatMap((row, z) => row.flatMap((first, i) => [first, ...units.map((unit) => hiddenBias[unit][i] + hiddenClass[unit][z])])),
-    ),
-    out: Int32Array.from(linear.flatMap((_, z) => units.map((unit) => out[unit][z]))),
-    hazard: Int32Array.from(hazard.flat()),
-    sign: Int32Array.from(sign.flat()),
-  };
+  const weights = new Float64Array(CLASSES * FEATURES * SUMS);
+  const biases = new Float64Array(CLASSES * AXES * SUMS);
+  const outs = new Int32Array(CLASSES * HIDDEN);
+  for (let z = 0, weight = 0, start = 0; z < CLASSES; z++) {
+    for (let i = 0; i < FEATURES; i++) {
+      weights[weight++] = linear[z][i];
+      for (let unit = 0; unit < HIDDEN; unit++) weights[weight++] = hidden[unit][i];
+    }
+    for (let i = 0; i < AXES; i++) {
+      biases[start++] = bias[z][i];
+      for (let unit = 0; unit < HIDDEN; unit++) biases[start++] = hiddenBias[unit][i] + hiddenClass[unit][z];
+    }
+    for (let unit = 0; unit < HIDDEN; unit++) outs[z * HIDDEN + unit] = out[unit][z];
+  }
+  return { weights, biases, out: outs, hazard: Int32Array.from(hazard.flat()), sign: Int32Array.from(sign.flat()) };
 }
 
 let known: Prior | null = null;
