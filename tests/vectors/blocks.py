@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import base64
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 
 from bunraku.codec import coefficients
-from bunraku.codec.decode import FORMAT, HEADER, decode_block
-from bunraku.codec.encode import encode_block
-from bunraku.codec.track import pack_figure, pack_reference, plan
+from bunraku.codec.coefficients import Head
+from bunraku.codec.decode import decode_block
+from bunraku.codec.prior import Integers, shipped
+from bunraku.codec.search import BlockEncoder
+from bunraku.codec.track import MotionTrack, pack_figure, pack_reference, plan
 from bunraku.motion import rotation
-from bunraku.motion.skeleton import JOINT_COUNT, Motion, standard_figure
+from bunraku.motion.skeleton import CHANNEL_COUNT, JOINT_COUNT, Motion, standard_figure
 
 
 def text(data: bytes) -> str:
@@ -35,50 +38,109 @@ def wandering_motion(seconds: float, fps: float, seed: int) -> Motion:
     return Motion(standard_figure(), fps, root, rotation.from_rotation_vector(tracks[:, 1:]))
 
 
+def wild(random: np.random.Generator, count: int, most: int) -> Integers:
+    """Sparse coefficients (19, 3, `count`) of every size from one to `most`."""
+    size = np.floor(2.0 ** random.uniform(0, np.log2(most + 1), (CHANNEL_COUNT, 3, count))).astype(np.int64)
+    here = random.random(size.shape) < random.choice([0.05, 0.5, 0.95], (CHANNEL_COUNT, 1, 1))
+    quantised: Integers = size * here * random.choice([-1, 1], size.shape)
+    return quantised
+
+
+def head(numbers: list[tuple[int, int]], usual: bool = False) -> bytes:
+    """The head of a block that says any `numbers` (value, bits), by the definition of the range coder in whole numbers
+    of any size. It is the lowest number of its interval, so zeros behind it read as ones for ever."""
+    low, span, size = 0, 0xFFFFFFFF, 4
+    bits = [(32440, usual)] + [(16384, bool(value >> i & 1)) for value, n in numbers for i in range(n - 1, -1, -1)]
+    for probability, bit in bits:
+        bound = (span >> 15) * probability
+        if bit:
+            span = bound
+        else:
+            low, span = low + bound, span - bound
+        while span < 1 << 24:
+            low, span, size = low << 8, span << 8, size + 1
+    return low.to_bytes(size, "big")
+
+
+def vector(track: MotionTrack, number: int, data: bytes) -> dict[str, Any]:
+    """A valid block of track `number` and what it decodes to."""
+    start, q = coefficients.decode(shipped(), data, track.block_frames, track.fps)
+    block, poses = decode_block(track, data), []
+    for instant in (0.0, start.frames / 3 - 0.5, start.frames - 1.0, start.frames - 0.5):
+        root, rotations = block.at(instant)
+        poses.append({"instant": instant, "root": root[0].tolist(), "rotations": rotations[0].ravel().tolist()})
+    return {
+        "track": number,
+        "block": text(data),
+        "frames": start.frames,
+        "step": start.step,
+        "turn": list(start.turn),
+        "q": q.ravel().tolist(),
+        "poses": poses,
+    }
+
+
+def describe(track: MotionTrack) -> dict[str, Any]:
+    """A track's fields as a Description has them, and its weights."""
+    return {
+        "fps": track.fps,
+        "frames": track.frames,
+        "block_frames": track.block_frames,
+        "first_frames": track.first_frames,
+        "figure": text(pack_figure(track.figure)),
+        "reference": text(pack_reference(track.reference, track.reference_bits)),
+        "weights": track.weights.tolist(),
+    }
+
+
 def make() -> dict[str, Any]:
-    """Blocks of several lengths and steps with their coefficients and poses, and broken ones with the reason."""
-    motion = wandering_motion(2.6, 30.0, 7)
-    track, motion = plan(motion)
+    """Tracks; blocks of several lengths and steps with coefficients and poses; and broken ones with the reason."""
+    even, motion = plan(wandering_motion(2.6, 30.0, 7))
+    even = replace(even, block_frames=30, first_frames=30)
+    quick, swift = plan(wandering_motion(1.1, 59.94, 8), 0.5, 0.1)
+    stood = np.repeat(motion.rotations[3:4], 20, axis=0)
+    still, statue = plan(Motion(standard_figure(), 24.0, motion.root[:20] * 0, stood))
+    tracks = [even, quick, still]
     valid = []
-    for start, frames, step in (
-        (0, 30, 9),
-        (0, 30, 30),
-        (30, 30, 17),
-        (60, 18, 24),
-        (5, 1, 12),
-        (3, 2, 0),
-        (0, 78, 40),
+    goals: tuple[tuple[int, Motion, int, int, Literal["first", "mean"]], ...] = (
+        (0, motion, 0, 90, "mean"),
+        (0, motion, 0, 190, "mean"),
+        (0, motion, 1, 130, "first"),
+        (0, motion, 2, 160, "mean"),
+        (1, swift, 0, 60, "first"),
+        (1, swift, 1, 150, "mean"),
+        (1, swift, 2, 110, "mean"),
+        (2, statue, 0, 120, "mean"),
+    )
+    for number, of, index, step, goal in goals:
+        coded = BlockEncoder(tracks[number], of, shipped()).block(index, step, goal)
+        valid.append(vector(tracks[number], number, coded.data))
+    random = np.random.default_rng(9)
+    for number, frames, step, turn, count, most in (
+        (0, 30, 0, (0, 0, 0), 0, 1),
+        (0, 1, 0, (-32, 31, 0), 1, 12),
+        (1, 2, 255, (31, 0, -32), 2, 3),
+        (0, 31, 7, (1, -2, 3), 31, 1 << 12),
+        (0, 30, 0, (-3, 2, -1), 24, 1 << 20),
+        (1, 240, 77, (0, 16, 0), 70, 60),
+        (2, 1000, 100, (0, -1, 0), 40, 1 << 8),
     ):
-        data = encode_block(track, motion.root[start : start + frames], motion.rotations[start : start + frames], step)
-        block = decode_block(track, data)
-        poses = []
-        for instant in (0.0, frames / 3 - 0.5, frames - 1.0, frames - 0.5):
-            root, rotations = block.at(instant)
-            poses.append({"instant": instant, "root": root[0].tolist(), "rotations": rotations[0].ravel().tolist()})
-        valid.append(
-            {"block": text(data), "frames": frames, "step": step, "q": block.q.ravel().tolist(), "poses": poses}
-        )
-    good = base64.b64decode(str(valid[0]["block"]))
-    many = HEADER.pack(FORMAT, 9, 4, 0, 0, 0) + coefficients.encode(np.ones((19, 3, 5), dtype=np.int64))
+        track = tracks[number]
+        q = wild(random, count, most)
+        data = coefficients.encode(shipped(), Head(frames, step, turn), q, track.block_frames, track.fps)
+        valid.append(vector(track, number, data))
+    rest = [(9, 8), (32, 6), (32, 6), (32, 6)]
     invalid = {
-        "empty": b"",
-        "shorter than its header": good[:6],
-        "another format": b"\x02" + good[1:],
-        "no frames": HEADER.pack(FORMAT, 9, 0, 0, 0, 0) + good[7:],
-        "too many frames": HEADER.pack(FORMAT, 9, 1001, 0, 0, 0) + good[7:],
-        "more frequencies than frames": many,
-        "an escape too long": HEADER.pack(FORMAT, 9, 30, 0, 0, 0) + bytes([0, 63]) + bytes(30),
-        "too large": good + bytes(65_536),
+        "empty: more frequencies than frames": b"",
+        "no frames": head([(0, 10), *rest]),
+        "too many frames": head([(1001, 10), *rest, (4, 10)]),
+        "more frequencies than frames": head([(4, 10), *rest, (5, 3)]),
+        "more frequencies than the usual frames": head([*rest, (31, 5)], usual=True),
+        "an escape too long": head([*rest, (1, 5)], usual=True) + bytes(30),
+        "too large": base64.b64decode(valid[0]["block"]) + bytes(65_536),
     }
     return {
-        "track": {
-            "fps": track.fps,
-            "frames": track.frames,
-            "block_frames": track.block_frames,
-            "figure": text(pack_figure(track.figure)),
-            "reference": text(pack_reference(track.reference)),
-            "levers": track.levers.tolist(),
-        },
+        "tracks": [describe(track) for track in tracks],
         "valid": valid,
         "invalid": [{"why": why, "block": text(data)} for why, data in invalid.items()],
     }

@@ -10,7 +10,7 @@ import pytest
 
 from bunraku.codec.decode import decode_block
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.track import MotionTrack, unpack_figure, unpack_reference
+from bunraku.codec.track import CODEC, read_track
 from bunraku.wire.messages import MalformedMessage, unpack
 from tests.vectors import golden
 
@@ -36,14 +36,9 @@ def test_golden_files_are_what_the_code_makes(name: str) -> None:
 
 def test_broken_blocks_are_refused() -> None:
     vectors = json.loads((golden.FOLDER / "blocks.json").read_text(encoding="utf-8"))
-    head = vectors["track"]
-    track = MotionTrack(
-        head["fps"],
-        head["frames"],
-        head["block_frames"],
-        unpack_figure(base64.b64decode(head["figure"])),
-        unpack_reference(base64.b64decode(head["reference"])),
-    )
+    head = vectors["tracks"][0]
+    described = head | {key: base64.b64decode(head[key]) for key in ("figure", "reference")}
+    track = read_track({"codec": CODEC, **described})
     for broken in vectors["invalid"]:
         with pytest.raises(DamagedBlock):
             decode_block(track, base64.b64decode(broken["block"]))

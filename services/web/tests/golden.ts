@@ -1,30 +1,43 @@
-/** The golden blocks of `proto/vectors/blocks.json` and their track. */
+/** The golden blocks of `proto/vectors/blocks.json` and their tracks. */
 
 import { MotionTrack } from "../src/codec/track";
 import { bytes, vectors } from "./vectors";
 
 export interface BlockVectors {
-  track: { fps: number; frames: number; block_frames: number; figure: string; reference: string; levers: number[] };
+  /** The first has three blocks of 30, 30 and 18 frames: the first four valid blocks are 0 at two rates, 1 and 2. */
+  tracks: {
+    fps: number;
+    frames: number;
+    block_frames: number;
+    first_frames: number;
+    figure: string;
+    reference: string;
+    /** [channel 19][3][3] */
+    weights: number[][][];
+  }[];
   valid: {
+    track: number;
     block: string;
     frames: number;
     step: number;
+    turn: number[];
     q: number[];
     poses: { instant: number; root: number[]; rotations: number[] }[];
   }[];
+  /** Of the first track. */
   invalid: { why: string; block: string }[];
 }
 
-/** The golden track as a Description's map has it. */
-export function goldenDescription(): { type: string } & Record<string, unknown> {
-  const { track } = vectors<BlockVectors>("blocks");
+/** A golden track as a Description's map has it. */
+export function goldenDescription(which = 0): { type: string } & Record<string, unknown> {
+  const { weights: _, ...track } = vectors<BlockVectors>("blocks").tracks[which];
   return {
-    ...track, type: "motion", codec: "bunraku.motion/1", channels: 19, figure: bytes(track.figure),
+    ...track, type: "motion", codec: "bunraku.motion/2", channels: 19, figure: bytes(track.figure),
     reference: bytes(track.reference), rates: [{ kbps: 1.5, mean: 5, max: 20 }, { kbps: 5, mean: 1, max: 4 }],
   };
 }
 
-/** The track of the golden blocks. */
-export function goldenTrack(): MotionTrack {
-  return MotionTrack.fromDescription(goldenDescription());
+/** A track of the golden blocks. */
+export function goldenTrack(which = 0): MotionTrack {
+  return MotionTrack.fromDescription(goldenDescription(which));
 }

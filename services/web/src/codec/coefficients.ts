@@ -1,102 +1,101 @@
 /**
- * Bytes to the quantised coefficients of one block: contexts, adaptive models, range decoder (`proto/SPEC.md`, Motion block: Order,
- * Symbol, Exp-Golomb, Model).
+ * Bytes to the head and the quantised coefficients of one block (`proto/SPEC.md`, Motion block: Head, Order, Size, Sign), to
+ * the same bits as the Python room `codec/kernels.py`.
  */
 
 import { CHANNEL_COUNT } from "../motion/skeleton";
+import { CLASS_OF, Contexts, signContext } from "./contexts";
 import { DamagedBlock } from "./errors";
+import { level } from "./levels";
+import { type Prior, ROWS, SIGNS, UNARY } from "./prior";
 import { EVEN, RangeDecoder } from "./rangecoder";
 
-const FREQUENCY_BITS = 10;
-const UNARY = 14;
-const ESCAPE = 24;
+/** Most bytes of a block. */
+export const LARGEST_BLOCK = 65_536;
 
-// all models lie in one array: unary [class 3][position 4][neighbourhood 6][14], then Exp-Golomb [class 3][2][24]
-const UNARY_MODELS = 3 * 4 * 6 * UNARY;
-const MODELS = UNARY_MODELS + 3 * 2 * ESCAPE;
-const ESCAPE_START = 26214;
-const FRESH = Uint16Array.from({ length: MODELS }, (_, i) =>
-  i < UNARY_MODELS ? [4274, 10923, 16384, 21845, 26214, 29789][Math.floor(i / UNARY) % 6] : ESCAPE_START,
-);
+/** Most frames of a block. */
+export const MOST_FRAMES = 1_000;
 
-/** A bit's shift depends on how many its model has seen, up to this many. */
-const SEEN = 6;
+const FRAMES_AS_USUAL = 32440;
+const ESCAPE = 20;
 
-class Models {
-  private readonly probability = FRESH.slice();
-  private readonly seen = new Uint8Array(MODELS);
-
-  constructor(private readonly decoder: RangeDecoder) {}
-
-  /** The next bit by model `which`, which learns from it. */
-  bit(which: number): 0 | 1 {
-    const probability = this.probability[which];
-    const bit = this.decoder.bit(probability);
-    const seen = this.seen[which];
-    const moved = probability + (((bit ? 32768 : 0) - probability) >> (2 + (seen >> 1)));
-    this.probability[which] = moved < 64 ? 64 : moved > 32704 ? 32704 : moved;
-    if (seen < SEEN) this.seen[which] = seen + 1;
-    return bit;
-  }
-
-  /** Exp-Golomb with the models from `first`. */
-  golomb(first: number): number {
-    let length = 0;
-    while (length < ESCAPE && this.bit(first + length)) length++;
-    if (length === ESCAPE) throw new DamagedBlock("block holds a number longer than 24 bits");
-    let value = 1;
-    for (let i = 0; i < length; i++) value = (value << 1) | this.decoder.bit(EVEN);
-    return value - 1;
-  }
-
-  /** The size of a coefficient by the unary models from `first`, and the Exp-Golomb models from `escape` where it is large. */
-  size(first: number, escape: number): number {
-    let value = 0;
-    while (value < UNARY && this.bit(first + value)) value++;
-    return value === UNARY ? UNARY + this.golomb(escape) : value;
-  }
+/** A block as it stands in its bytes. */
+export interface Coefficients {
+  frames: number;
+  /** Step index, 0..255. */
+  step: number;
+  /** Rotation vector that the root's rotations are relative to, whole tenths of a radian. */
+  turn: readonly [x: number, y: number, z: number];
+  /** Frequencies of each track. */
+  count: number;
+  /** Whole numbers [channel 19][axis 3][`count`]; the largest there can be is a little above 2^31. */
+  q: Float64Array;
 }
 
-/** Quantised coefficients: `q` is [channel 19][axis 3][frequency `count`]. */
-export interface Coefficients {
-  count: number;
-  q: Int32Array;
+/** Level of a block's duration in sixteenths of a second: a feature of its contexts. */
+export function lengthLevel(frames: number, fps: number): number {
+  return level(Math.floor((16 * frames) / fps + 0.5));
 }
 
 /**
- * The coefficients of a block of `frames` frames, range-coded from byte `start` of `data` on. The work is bounded by 57 x
- * `frames` coefficients of at most 62 bits.
+ * Head and coefficients of a block of a motion with `fps` frames a second whose blocks have `usual` frames. The work is bounded
+ * by 57,000 coefficients of at most 70 bits.
  *
  * @throws DamagedBlock
  */
-export function decodeCoefficients(data: Uint8Array, start: number, frames: number): Coefficients {
-  const decoder = new RangeDecoder(data, start);
-  let count = 0;
-  for (let i = 0; i < FREQUENCY_BITS; i++) count = (count << 1) | decoder.bit(EVEN);
-  if (count > frames) throw new DamagedBlock(`block says ${count} frequencies for ${frames} frames`);
-  const q = new Int32Array(CHANNEL_COUNT * 3 * count);
-  const models = new Models(decoder);
-  // sizes of this axis and of the one before, in the same channel
-  let sizes = new Float64Array(count);
-  let before = new Float64Array(count);
-  for (let track = 0, at = 0; track < CHANNEL_COUNT * 3; track++) {
-    const channelClass = Math.min(Math.floor(track / 3), 2);
-    const golomb = UNARY_MODELS + channelClass * 2 * ESCAPE;
-    const firstAxis = track % 3 === 0;
-    for (let k = 0; k < count; k++, at++) {
-      let value: number;
-      if (k === 0) {
-        value = models.golomb(golomb);
-      } else {
-        const near = 2 * sizes[k - 1] + (k > 1 ? sizes[k - 2] : 0) + (firstAxis ? 0 : before[k]);
-        const neighbourhood = near < 1 ? 0 : near < 3 ? 1 : near < 5 ? 2 : near < 9 ? 3 : near < 17 ? 4 : 5;
-        const position = k === 1 ? 0 : k < 4 ? 1 : k < 8 ? 2 : 3;
-        value = models.size(((channelClass * 4 + position) * 6 + neighbourhood) * UNARY, golomb + ESCAPE);
-      }
-      sizes[k] = value;
-      q[at] = value > 0 && decoder.bit(EVEN) ? -value : value;
-    }
-    [sizes, before] = [before, sizes];
+export function decodeCoefficients(prior: Prior, data: Uint8Array, usual: number, fps: number): Coefficients {
+  if (data.length > LARGEST_BLOCK) {
+    throw new DamagedBlock(`a block has at most ${LARGEST_BLOCK} bytes, not ${data.length}`);
   }
-  return { count, q };
+  const decoder = new RangeDecoder(data);
+  const frames = decoder.bit(FRAMES_AS_USUAL) ? usual : decoder.number(10);
+  if (frames < 1 || frames > MOST_FRAMES) {
+    throw new DamagedBlock(`block says ${frames} frames; 1..${MOST_FRAMES} are allowed`);
+  }
+  const step = decoder.number(8);
+  const turn = [decoder.number(6) - 32, decoder.number(6) - 32, decoder.number(6) - 32] as const;
+  const count = decoder.number(32 - Math.clz32(frames));
+  if (count > frames) throw new DamagedBlock(`block says ${count} frequencies for ${frames} frames`);
+  const q = new Float64Array(CHANNEL_COUNT * 3 * count);
+  const contexts = new Contexts(prior, count, step, lengthLevel(frames, fps));
+  for (let channel = 0; channel < CHANNEL_COUNT; channel++) {
+    for (let k = 0; k < count; k++) {
+      contexts.share(channel, k);
+      for (let axis = 0; axis < 3; axis++) {
+        const size = decodeSize(decoder, prior.hazard, contexts.scale(channel, axis, k));
+        if (size > 0) {
+          const at = (channel * 3 + axis) * count + k;
+          const odds = prior.sign[CLASS_OF[k] * SIGNS + signContext(q, at, k)];
+          q[at] = decoder.bit(odds) ? -size : size;
+        }
+        contexts.see(channel, axis, k, size);
+      }
+      contexts.seeFrequency(channel, k);
+    }
+    contexts.seeChannel(channel);
+  }
+  return { frames, step, turn, count, q };
+}
+
+/** A coefficient's size where about 2^(`scale` / 256) is expected. */
+function decodeSize(decoder: RangeDecoder, hazard: Int32Array, scale: number): number {
+  const shift = scale >= 1024 ? (scale >> 8) - 3 : 0;
+  const place = (scale - shift * 256 + 7 * 256) * 4;
+  let row = place >> 8, weight = place & 255;
+  if (row > ROWS - 2) {
+    row = ROWS - 2;
+    weight = 256;
+  }
+  let value = 0;
+  for (let at = row * UNARY; value < UNARY; value++, at++) {
+    if (!decoder.bit((hazard[at] * (256 - weight) + hazard[at + UNARY] * weight) >> 8)) break;
+  }
+  if (value === UNARY) {
+    let length = 0;
+    while (length < ESCAPE && decoder.bit(EVEN)) length++;
+    if (length === ESCAPE) throw new DamagedBlock(`block holds a number longer than ${ESCAPE} bits`);
+    value += ((1 << length) | decoder.number(length)) - 1;
+  }
+  // no shift of bits: the largest sizes need 32
+  return shift > 0 ? value * (1 << shift) + decoder.number(shift) : value;
 }

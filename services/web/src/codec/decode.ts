@@ -1,46 +1,42 @@
-/** A motion block to the pose at any instant (`proto/SPEC.md`, Motion block, format 1). */
+/** A motion block to the pose at any instant (`proto/SPEC.md`, Motion block, format 2). */
 
 import { fromRotationVector, multiply } from "../motion/rotation";
 import { CHANNEL_COUNT, JOINT_COUNT, type Pose } from "../motion/skeleton";
-import { decodeCoefficients } from "./coefficients";
-import { DamagedBlock } from "./errors";
-import { MOST_FRAMES, type MotionTrack, REFERENCE_UNIT } from "./track";
+import { decodeCoefficients, MOST_FRAMES } from "./coefficients";
+import { type Prior, shippedPrior } from "./prior";
+import { type MotionTrack, TURN_UNIT } from "./track";
 import { basis } from "./transform";
 
-const FORMAT = 1;
-const HEADER = 7;
-const LARGEST_BLOCK = 65_536;
+/** Quantiser step of index 0 for a block of 30 frames, metres; sixteen indices make it twice as large. */
+const STEP_UNIT = 2 ** -16;
 
 const cosines = new Float64Array(MOST_FRAMES);
 const rotationVectors = new Float64Array(JOINT_COUNT * 3);
 
-/** A decoded block. Coefficients stay integers: they take half the memory, and are scaled once per channel when drawn. */
+/** A decoded block. */
 export class MotionBlock {
   /**
    * @param frames frames of the block
    * @param count frequencies of each track
-   * @param q quantised coefficients [channel 19][axis 3][count]
-   * @param steps quantiser step of each channel (19): metres, then radians
+   * @param values coefficients [channel 19][axis 3][count], metres, then radians
    * @param reference rotations (72) that the rotation vectors are relative to
    */
   constructor(
     readonly frames: number,
     readonly count: number,
-    readonly q: Int32Array,
-    readonly steps: Float64Array,
+    readonly values: Float64Array,
     readonly reference: Float64Array,
   ) {}
 
   /** The pose at `t`, in frames from the block's first, any real in [-1/2, frames - 1/2], written into `out`. */
   at(t: number, out: Pose): void {
-    const { count, q, steps, reference } = this;
+    const { count, values, reference } = this;
     basis(cosines, this.frames, count, t);
     for (let track = 0, at = 0; track < CHANNEL_COUNT * 3; track++) {
       let sum = 0;
-      for (let k = 0; k < count; k++) sum += q[at++] * cosines[k];
-      const value = sum * steps[(track / 3) | 0];
-      if (track < 3) out.root[track] = value;
-      else rotationVectors[track - 3] = value;
+      for (let k = 0; k < count; k++) sum += values[at++] * cosines[k];
+      if (track < 3) out.root[track] = sum;
+      else rotationVectors[track - 3] = sum;
     }
     const v = rotationVectors;
     for (let joint = 0; joint < JOINT_COUNT; joint++) {
@@ -50,26 +46,42 @@ export class MotionBlock {
   }
 }
 
+/** Quantiser step at step index `index` of the weighted coefficients of a block of `frames` frames, metres. */
+export function stepSize(index: number, frames: number): number {
+  return STEP_UNIT * 2 ** (index / 16) * Math.sqrt(frames / 30);
+}
+
+/** The value of a quantised coefficient, in steps: a little below the middle, where values are denser. */
+export function reconstruct(q: number): number {
+  if (q === 0) return 0;
+  const less = q === 1 || q === -1 ? 0.06 : 0.03;
+  return q > 0 ? q - less : q + less;
+}
+
 /**
- * Decodes one block of `track`.
+ * Decodes one block of `track`, with the shipped prior unless another is given: nothing but the prior that it was encoded with
+ * decodes a block.
  *
- * @throws DamagedBlock on anything that is not one
+ * @throws DamagedBlock on what cannot be one
  */
-export function decodeBlock(track: MotionTrack, data: Uint8Array): MotionBlock {
-  if (data.length < HEADER || data.length > LARGEST_BLOCK) {
-    throw new DamagedBlock(`a block has ${HEADER}..${LARGEST_BLOCK} bytes, not ${data.length}`);
+export function decodeBlock(track: MotionTrack, data: Uint8Array, prior: Prior = shippedPrior()): MotionBlock {
+  const { frames, step, turn, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps);
+  const size = stepSize(step, frames);
+  const { inverses } = track.weights;
+  // in place: of each frequency the three axes are read before they are written
+  for (let channel = 0; channel < CHANNEL_COUNT; channel++) {
+    const w = channel * 9;
+    for (let k = 0; k < count; k++) {
+      const at = channel * 3 * count + k;
+      const x = reconstruct(q[at]) * size;
+      const y = reconstruct(q[at + count]) * size;
+      const z = reconstruct(q[at + 2 * count]) * size;
+      q[at] = inverses[w] * x + inverses[w + 1] * y + inverses[w + 2] * z;
+      q[at + count] = inverses[w + 3] * x + inverses[w + 4] * y + inverses[w + 5] * z;
+      q[at + 2 * count] = inverses[w + 6] * x + inverses[w + 7] * y + inverses[w + 8] * z;
+    }
   }
-  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
-  const format = view.getUint8(0);
-  if (format !== FORMAT) throw new DamagedBlock(`block is of format ${format}; this decoder reads ${FORMAT}`);
-  const frames = view.getUint16(2, true);
-  if (frames < 1 || frames > MOST_FRAMES) {
-    throw new DamagedBlock(`block says ${frames} frames; 1..${MOST_FRAMES} are allowed`);
-  }
-  const { count, q } = decodeCoefficients(data, HEADER, frames);
-  const step = 1e-4 * 2 ** (view.getUint8(1) / 4) * Math.sqrt(frames / 30);
   const reference = track.reference.slice();
-  const [x, y, z] = [4, 5, 6].map((byte) => view.getInt8(byte) * REFERENCE_UNIT);
-  fromRotationVector(reference, 0, x, y, z);
-  return new MotionBlock(frames, count, q, track.levers.map((lever) => step / lever), reference);
+  fromRotationVector(reference, 0, turn[0] * TURN_UNIT, turn[1] * TURN_UNIT, turn[2] * TURN_UNIT);
+  return new MotionBlock(frames, count, q, reference);
 }

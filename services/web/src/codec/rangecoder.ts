@@ -10,14 +10,13 @@ export const EVEN = 16384;
 
 export class RangeDecoder {
   private readonly data: Uint8Array;
-  private position: number;
+  private position = 0;
   private low = 0;
   private range = 0xffffffff;
 
-  /** Starts at byte `start` of `data`; the coder's first byte, always zero, was not sent. Past the end come zeros. */
-  constructor(data: Uint8Array, start: number) {
+  /** Starts at the first byte of `data`; the coder's own first byte, always zero, was not sent. Past the end come zeros. */
+  constructor(data: Uint8Array) {
     this.data = data;
-    this.position = start;
     for (let i = 0; i < 4; i++) this.low = ((this.low << 8) | this.next()) >>> 0;
   }
 
@@ -37,6 +36,13 @@ export class RangeDecoder {
       this.range = (this.range << 8) >>> 0;
     }
     return one ? 1 : 0;
+  }
+
+  /** The next `bits` equiprobable bits, high first: a number below 2^31. */
+  number(bits: number): number {
+    let value = 0;
+    for (let i = 0; i < bits; i++) value = (value << 1) | this.bit(EVEN);
+    return value;
   }
 
   private next(): number {

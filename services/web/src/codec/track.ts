@@ -1,19 +1,21 @@
 /** What the blocks of one motion have in common: sent once, in the Description (`proto/SPEC.md`, Track `motion`). */
 
 import { fromRotationVector } from "../motion/rotation";
-import { CHANNEL_COUNT, type Figure, JOINT_COUNT, PARENTS, TIPS } from "../motion/skeleton";
+import { CHANNEL_COUNT, type Figure, JOINT_COUNT, TIPS } from "../motion/skeleton";
+import { MOST_FRAMES } from "./coefficients";
 import { DamagedBlock } from "./errors";
+import { channelWeights, type Weights } from "./weights";
 
-export const CODEC = "bunraku.motion/1";
+export const CODEC = "bunraku.motion/2";
 
 /** Metres in one unit of the figure's 16-bit offsets. */
 export const FIGURE_UNIT = 1e-4;
 
-/** Radians in one unit of an 8-bit rotation vector. */
-export const REFERENCE_UNIT = Math.PI / 127;
+/** Radians in one unit of a block's turn of the root. */
+export const TURN_UNIT = 0.1;
 
-/** Most frames a block may have. */
-export const MOST_FRAMES = 1_000;
+// bits after the point of a reference in radians
+const MOST_REFERENCE_BITS = 14;
 
 // a day of 1 s blocks; and as many rates as a Data Packet can number
 const MOST_BLOCKS = 86_400;
@@ -41,46 +43,39 @@ export function unpackFigure(data: Uint8Array): Figure {
   return figure;
 }
 
-/** The rotations (72, w x y z; the root's the identity) that each joint's channel is relative to, of 51 bytes. */
+/**
+ * The rotations (72, w x y z; the root's the identity) that each joint's channel is relative to, of 103 bytes: a byte b, then
+ * joints 1-17, each a rotation vector of 3 x i16 little-endian in 2^-b radians.
+ */
 export function unpackReference(data: Uint8Array): Float64Array {
-  const numbers = 3 * (CHANNEL_COUNT - 2);
-  if (data.length !== numbers) throw new DamagedBlock(`references have ${numbers} bytes, not ${data.length}`);
-  const view = new Int8Array(data.buffer, data.byteOffset, data.byteLength);
+  const size = 1 + 6 * (CHANNEL_COUNT - 2);
+  if (data.length !== size) throw new DamagedBlock(`references have ${size} bytes, not ${data.length}`);
+  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
+  const bits = view.getUint8(0);
+  if (bits > MOST_REFERENCE_BITS) {
+    throw new DamagedBlock(`references are in 2^-${bits} radians; ${MOST_REFERENCE_BITS} is the most`);
+  }
   const reference = new Float64Array(JOINT_COUNT * 4);
   reference[0] = 1;
   for (let joint = 1; joint < JOINT_COUNT; joint++) {
-    const at = (joint - 1) * 3;
-    const [x, y, z] = [view[at], view[at + 1], view[at + 2]].map((unit) => unit * REFERENCE_UNIT);
+    const at = 1 + (joint - 1) * 6;
+    const [x, y, z] = [0, 2, 4].map((axis) => view.getInt16(at + axis, true) * 2 ** -bits);
     fromRotationVector(reference, joint * 4, x, y, z);
   }
   return reference;
 }
 
-/** How far a turn of each channel moves the body (19): SPEC, Quantiser. */
-export function levers(figure: Figure): Float64Array {
-  const square = (v: Float64Array, joint: number) =>
-    v[joint * 3] ** 2 + v[joint * 3 + 1] ** 2 + v[joint * 3 + 2] ** 2;
-  const points = JOINTS_AND_TIPS.slice();
-  const squares = Float64Array.from(points, (_, joint) => 0.06 ** 2 + square(figure.tips, joint));
-  for (let joint = JOINT_COUNT - 1; joint > 0; joint--) {
-    squares[PARENTS[joint]] += points[joint] ** 0.45 * square(figure.offsets, joint);
-    points[PARENTS[joint]] += points[joint];
-  }
-  return Float64Array.of(2.6, ...squares.map(Math.sqrt));
-}
-
-const JOINTS_AND_TIPS = Array.from({ length: JOINT_COUNT }, (_, joint) => (TIPS.includes(joint) ? 2 : 1));
-
 /** Constants of a motion's blocks, as in the Description. */
 export class MotionTrack {
   /** Number of blocks. */
   readonly blocks: number;
-  readonly levers: Float64Array;
+  readonly weights: Weights;
 
   /**
    * @param fps frames per second
    * @param frames frames of the whole motion
-   * @param blockFrames frames of every block but perhaps the last
+   * @param blockFrames frames of every block but the first and perhaps the last
+   * @param firstFrames frames of the first block
    * @param figure the dancer
    * @param reference the joints' reference rotations (72)
    * @param rates what each rate costs and keeps, from the lowest to the highest
@@ -90,13 +85,14 @@ export class MotionTrack {
     readonly fps: number,
     readonly frames: number,
     readonly blockFrames: number,
+    readonly firstFrames: number,
     readonly figure: Figure,
     readonly reference: Float64Array,
     readonly rates: readonly Rate[] = [],
     readonly front = 0,
   ) {
-    this.blocks = Math.ceil(frames / blockFrames);
-    this.levers = levers(figure);
+    this.blocks = 1 + Math.ceil((frames - firstFrames) / blockFrames);
+    this.weights = channelWeights(figure);
   }
 
   /**
@@ -105,12 +101,15 @@ export class MotionTrack {
    * @throws DamagedBlock where it tells of none that can be played here
    */
   static fromDescription(map: Readonly<Record<string, unknown>>): MotionTrack {
-    const { codec, fps, frames, block_frames: blockFrames, figure, reference, rates, front } = map;
+    const { codec, fps, frames, block_frames: blockFrames, first_frames: firstFrames, figure, reference, rates, front } = map;
     const whole = (value: unknown, most: number) => Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
     if (codec !== CODEC) throw new DamagedBlock(`motion is of codec ${String(codec)}; this client reads ${CODEC}`);
     if (!Number.isFinite(fps) || Number(fps) <= 0) throw new DamagedBlock("motion needs fps, a number above zero");
     if (!whole(blockFrames, MOST_FRAMES)) throw new DamagedBlock(`motion needs block_frames, 1..${MOST_FRAMES}`);
     if (!whole(frames, Number(blockFrames) * MOST_BLOCKS)) throw new DamagedBlock("motion needs frames, at least one");
+    if (!whole(firstFrames, Math.min(Number(frames), MOST_FRAMES))) {
+      throw new DamagedBlock(`motion needs first_frames, 1..${MOST_FRAMES} and no more than its frames`);
+    }
     if (!(figure instanceof Uint8Array && reference instanceof Uint8Array)) {
       throw new DamagedBlock("motion needs figure and reference, bytes");
     }
@@ -123,8 +122,8 @@ export class MotionTrack {
       return { kbps: kbps!, mean: mean!, max: max! };
     });
     return new MotionTrack(
-      Number(fps), Number(frames), Number(blockFrames), unpackFigure(figure), unpackReference(reference), known,
-      Number.isFinite(front) ? Number(front) : 0,
+      Number(fps), Number(frames), Number(blockFrames), Number(firstFrames), unpackFigure(figure), unpackReference(reference),
+      known, Number.isFinite(front) ? Number(front) : 0,
     );
   }
 
@@ -133,19 +132,26 @@ export class MotionTrack {
     return Math.round((this.frames * 1e6) / this.fps);
   }
 
+  /** Frame of the motion with which block `index` starts. */
+  firstFrame(index: number): number {
+    return index > 0 ? this.firstFrames + (index - 1) * this.blockFrames : 0;
+  }
+
   /** Frames of block `index`. */
   framesIn(index: number): number {
-    return Math.min(this.blockFrames, this.frames - index * this.blockFrames);
+    return index > 0 ? Math.min(this.blockFrames, this.frames - this.firstFrame(index)) : this.firstFrames;
   }
 
   /** Motion time of the first frame of block `index`, microseconds. */
   startUs(index: number): number {
-    return Math.round((index * this.blockFrames * 1e6) / this.fps);
+    return Math.round((this.firstFrame(index) * 1e6) / this.fps);
   }
 
   /** Index of the block that holds the instant `positionUs`, kept within the motion. */
   blockAt(positionUs: number): number {
-    const index = Math.floor((positionUs * this.fps) / 1e6 / this.blockFrames + 1e-6);
-    return Math.min(Math.max(index, 0), this.blocks - 1);
+    // a block's start is rounded to the microsecond
+    const frame = ((positionUs + 1) * this.fps) / 1e6;
+    const index = frame >= this.firstFrames ? Math.floor((frame - this.firstFrames) / this.blockFrames) + 1 : 0;
+    return Math.min(index, this.blocks - 1);
   }
 }

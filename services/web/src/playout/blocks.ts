@@ -64,7 +64,7 @@ export class BlockStore {
     const index = track.blockAt(position);
     const block = this.blocks[index];
     if (!block) return false;
-    const instant = (position * track.fps) / 1e6 - index * track.blockFrames;
+    const instant = (position * track.fps) / 1e6 - track.firstFrame(index);
     const past = instant - (block.frames - 1);
     const following = index + 1 < track.blocks ? this.blocks[index + 1] : loop ? this.blocks[0] : null;
     if (past <= 0 || !following) {

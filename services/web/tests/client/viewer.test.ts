@@ -235,7 +235,7 @@ describe("when the line is lost", () => {
 describe("what cannot be played", () => {
   test("a damaged block is passed over and counted", () => {
     watching();
-    Line.last.say(data(0, 1, best.subarray(0, 4)), data(0, 1, last), data(123, 0, best));
+    Line.last.say(data(0, 1, best.subarray(0, 0)), data(0, 1, last), data(123, 0, best));
     Line.last.raw(Uint8Array.of(4, 0xc1));
     expect(viewer.damaged).toBe(4);
     expect([...viewer.blocks]).toEqual([-1, -1, -1]);

@@ -1,26 +1,64 @@
 import { expect, test } from "vitest";
-import { decodeCoefficients } from "../../src/codec/coefficients";
+import { decodeCoefficients, lengthLevel } from "../../src/codec/coefficients";
 import { DamagedBlock } from "../../src/codec/errors";
+import { AXES, CLASSES, FEATURES, HIDDEN, readPrior, ROWS, SIGNS, shippedPrior, UNARY } from "../../src/codec/prior";
 import { type BlockVectors } from "../golden";
 import { bytes, vectors } from "../vectors";
+import { encode } from "./encoder";
 
-const golden = vectors<BlockVectors>("blocks").valid;
+const { tracks, valid } = vectors<BlockVectors>("blocks");
 
-test("the golden coefficients, and how many frequencies they have", () => {
-  for (const vector of golden) {
-    const { count, q } = decodeCoefficients(bytes(vector.block), 7, vector.frames);
-    expect(count * 57).toBe(vector.q.length);
-    expect([...q]).toEqual(vector.q);
-  }
+test.each(valid)("golden head and coefficients: $frames frames at step $step", (vector) => {
+  const { block_frames: usual, fps } = tracks[vector.track];
+  const { frames, step, turn, count, q } = decodeCoefficients(shippedPrior(), bytes(vector.block), usual, fps);
+  expect([frames, step, [...turn]]).toEqual([vector.frames, vector.step, vector.turn]);
+  expect(count * 57).toBe(vector.q.length);
+  expect([...q]).toEqual(vector.q);
 });
 
-test("no bytes say the most frequencies there are, which fits no block", () => {
-  expect(() => decodeCoefficients(new Uint8Array(0), 0, 1000)).toThrow("1023 frequencies for 1000 frames");
+test("the golden blocks reach escapes, sizes with low bits, every axis and blocks without any", () => {
+  const sizes = valid.map(({ q }) => q.reduce((most, value) => Math.max(most, Math.abs(value)), 0));
+  expect(Math.max(...sizes)).toBeGreaterThan(2 ** 19);
+  expect(sizes).toContain(0);
 });
 
-test("more frequencies than frames, and an escape without end, are refused", () => {
-  const { block, q } = golden[0];
-  expect(() => decodeCoefficients(bytes(block), 7, q.length / 57 - 1)).toThrow(DamagedBlock);
-  // frequencies: one; then the lowest number of every interval: ones only
-  expect(() => decodeCoefficients(Uint8Array.of(255, 128), 0, 1000)).toThrow("longer than 24 bits");
+test("a block's duration in sixteenths of a second", () => {
+  expect([lengthLevel(30, 30), lengthLevel(1, 1000), lengthLevel(1000, 1e-3), lengthLevel(40, 59.94)]).toEqual([65, 0, 192, 57]);
+});
+
+/** A prior whose every scale is `scale` and every hazard and sign `probability`. */
+function level(scale: number, probability: number) {
+  const rows = (count: number, length: number, value: number) => Array.from({ length: count }, () => new Array<number>(length).fill(value));
+  return readPrior({
+    linear: rows(CLASSES, FEATURES, 0), bias: rows(CLASSES, AXES, scale << 8), hidden: rows(HIDDEN, FEATURES, 0),
+    hidden_bias: rows(HIDDEN, AXES, 0), hidden_class: rows(HIDDEN, CLASSES, 0), out: rows(HIDDEN, CLASSES, 0),
+    hazard: rows(ROWS, UNARY, probability), sign: rows(CLASSES, SIGNS, probability),
+  });
+}
+
+const number = (value: number, bits: number) =>
+  Array.from({ length: bits }, (_, i) => ({ bit: (value >> (bits - 1 - i)) & 1, probability: 16384 }));
+const head = [{ bit: 1, probability: 32440 }, ...number(90, 8), ...number(32, 6), ...number(31, 6), ...number(33, 6), ...number(1, 5)];
+const ones = (count: number, probability: number) => new Array(count).fill({ bit: 1, probability });
+
+test("the largest size there can be is above 2^31, and right", () => {
+  const bits = [
+    ...head, ...ones(UNARY, 9000), ...ones(19, 16384), { bit: 0, probability: 16384 }, ...number(2 ** 19 - 1, 19),
+    ...number(2 ** 11 - 1, 11), { bit: 1, probability: 9000 },
+    ...new Array(56).fill([{ bit: 0, probability: 9000 }, ...number(0, 11)]).flat(),
+  ];
+  const { q, turn } = decodeCoefficients(level(3584, 9000), encode(bits), 30, 30);
+  expect(turn).toEqual([0, -1, 1]);
+  expect([...q]).toEqual([-((2 ** 20 - 1 + UNARY - 1) * 2 ** 11 + 2 ** 11 - 1), ...new Array(56).fill(0)]);
+});
+
+test("an escape of twenty ones is refused", () => {
+  const bits = [...head, ...ones(UNARY, 9000), ...ones(20, 16384)];
+  expect(() => decodeCoefficients(level(0, 9000), encode(bits), 30, 30)).toThrow("longer than 20 bits");
+});
+
+test("no bytes say every frequency that bits can, which are more than 30 frames have", () => {
+  const none = new Uint8Array(0);
+  expect(() => decodeCoefficients(shippedPrior(), none, 30, 30)).toThrow("31 frequencies for 30 frames");
+  expect(() => decodeCoefficients(shippedPrior(), none, 31, 30)).toThrow(DamagedBlock);
 });

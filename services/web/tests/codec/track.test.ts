@@ -1,15 +1,7 @@
 import { describe, expect, test } from "vitest";
 import { DamagedBlock } from "../../src/codec/errors";
 import { MotionTrack, unpackFigure, unpackReference } from "../../src/codec/track";
-import { type BlockVectors, goldenDescription, goldenTrack } from "../golden";
-import { vectors } from "../vectors";
-
-const golden = vectors<BlockVectors>("blocks").track;
-
-test("the golden track's levers to 1e-12", () => {
-  const { levers } = goldenTrack();
-  golden.levers.forEach((lever, channel) => expect(levers[channel]).toBeCloseTo(lever, 12));
-});
+import { goldenDescription, goldenTrack } from "../golden";
 
 test("figure and reference are read in their units", () => {
   const data = new Uint8Array(138);
@@ -18,36 +10,59 @@ test("figure and reference are read in their units", () => {
   const figure = unpackFigure(data);
   expect(figure.offsets[1]).toBeCloseTo(-0.824, 12);
   expect(figure.tips[14 * 3]).toBeCloseTo(0.1234, 12);
-  const turned = new Uint8Array(51);
-  new Int8Array(turned.buffer)[0] = -127;
+  const turned = new Uint8Array(103);
+  turned[0] = 14;
+  new DataView(turned.buffer).setInt16(1, -(2 ** 14), true);
   const reference = unpackReference(turned);
-  expect(reference[5]).toBeCloseTo(-1, 12);
-  expect([...reference.subarray(0, 4), ...reference.subarray(8, 12)]).toEqual([1, 0, 0, 0, 1, 0, 0, 0]);
+  const wanted = [1, 0, 0, 0, Math.cos(0.5), -Math.sin(0.5), 0, 0, 1, 0, 0, 0];
+  wanted.forEach((value, i) => expect(reference[i]).toBeCloseTo(value, 12));
+  turned[0] = 4;
+  expect(unpackReference(turned)[4]).toBeCloseTo(Math.cos(512), 12);
 });
 
-test("blocks are found by time, whatever the rounding", () => {
+test("blocks are found by time, whatever the rounding and the length of the first", () => {
+  const { figure, reference } = goldenTrack();
   for (const fps of [24, 29.97, 30, 59.94, 60, 119.88, 120]) {
-    const track = new MotionTrack(fps, Math.round(fps * 9.5), Math.round(fps), goldenTrack().figure, goldenTrack().reference);
-    for (let index = 0; index < track.blocks; index++) expect(track.blockAt(track.startUs(index))).toBe(index);
-    expect(track.blockAt(-5)).toBe(0);
-    expect(track.blockAt(1e12)).toBe(track.blocks - 1);
-    const frames = Array.from({ length: track.blocks }, (_, index) => track.framesIn(index));
-    expect(frames.reduce((sum, each) => sum + each)).toBe(track.frames);
+    for (const first of [1, 6, Math.round(fps), Math.round(fps * 3), Math.round(fps * 9.5)]) {
+      const track = new MotionTrack(fps, Math.round(fps * 9.5), Math.round(fps), first, figure, reference);
+      for (let index = 0; index < track.blocks; index++) {
+        expect(track.blockAt(track.startUs(index))).toBe(index);
+        if (index > 0) expect(track.blockAt(track.startUs(index) - 1e3)).toBe(index - 1);
+        expect(track.firstFrame(index)).toBe(index > 0 ? track.firstFrame(index - 1) + track.framesIn(index - 1) : 0);
+      }
+      expect(track.blockAt(-5)).toBe(0);
+      expect(track.blockAt(1e12)).toBe(track.blocks - 1);
+      const frames = Array.from({ length: track.blocks }, (_, index) => track.framesIn(index));
+      expect(Math.min(...frames)).toBeGreaterThan(0);
+      expect(frames.reduce((sum, each) => sum + each)).toBe(track.frames);
+    }
   }
+});
+
+test("the golden tracks' blocks", () => {
+  const lengths = [0, 1, 2].map((which) => {
+    const track = goldenTrack(which);
+    return Array.from({ length: track.blocks }, (_, index) => track.framesIn(index));
+  });
+  expect(lengths).toEqual([[30, 30, 18], [6, 30, 30], [20]]);
 });
 
 describe("a description that cannot be played is refused with what it lacks", () => {
   test.each([
-    [{ codec: "bunraku.motion/2" }, "codec bunraku.motion/2"],
+    [{ codec: "bunraku.motion/1" }, "codec bunraku.motion/1"],
     [{ fps: 0 }, "fps"],
     [{ fps: NaN }, "fps"],
     [{ fps: "60" }, "fps"],
     [{ block_frames: 0 }, "block_frames"],
     [{ block_frames: 1001 }, "block_frames"],
+    [{ first_frames: 0 }, "first_frames"],
+    [{ first_frames: 79 }, "first_frames"],
+    [{ first_frames: undefined }, "first_frames"],
     [{ frames: 1e12 }, "frames"],
     [{ frames: 2.5 }, "frames"],
     [{ figure: "text" }, "figure"],
-    [{ reference: new Uint8Array(50) }, "51 bytes"],
+    [{ reference: new Uint8Array(51) }, "103 bytes"],
+    [{ reference: new Uint8Array(103).fill(15) }, "2^-15 radians"],
     [{ rates: Array(17).fill({ kbps: 1, mean: 1, max: 1 }) }, "rates"],
     [{ rates: [{ kbps: 1, mean: 1 }] }, "rate 0"],
   ])("%o", (change, what) => {

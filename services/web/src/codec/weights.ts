@@ -1,0 +1,93 @@
+/**
+ * What a channel's values are multiplied with before they are quantised: how far a turn about each direction moves the body
+ * (`proto/SPEC.md`, Weights).
+ */
+
+import { CHANNEL_COUNT, type Figure, JOINT_COUNT, JOINTS, PARENTS, TIPS } from "../motion/skeleton";
+
+const LEVER = 0.45;
+const TWIST = 0.06 ** 2;
+
+/** How much finer than its lever says a channel is coded (19). */
+const CARE = new Float64Array(CHANNEL_COUNT).fill(1);
+CARE.set([1.15, 0.88, 0.88]);
+for (const name of ["l_midtarsal", "r_midtarsal"]) CARE[JOINTS.indexOf(name) + 1] = 0.87;
+for (const name of ["skullbase", "l_wrist", "r_wrist"]) CARE[JOINTS.indexOf(name) + 1] = 0.9;
+
+/** The weight of each channel and its inverse: symmetric matrices [channel 19][3][3]. */
+export interface Weights {
+  readonly weights: Float64Array;
+  readonly inverses: Float64Array;
+}
+
+/** The weights of the channels of a dancer. */
+export function channelWeights(figure: Figure): Weights {
+  const squares = Array.from({ length: JOINT_COUNT }, () => Float64Array.of(TWIST, 0, 0, 0, TWIST, 0, 0, 0, TWIST));
+  const points = Array.from({ length: JOINT_COUNT }, (_, joint) => (TIPS.includes(joint) ? 2 : 1));
+  for (let joint = JOINT_COUNT - 1; joint >= 0; joint--) {
+    if (TIPS.includes(joint)) addArm(squares[joint], figure.tips, joint, 1);
+    if (joint > 0) {
+      const parent = PARENTS[joint];
+      addArm(squares[parent], figure.offsets, joint, points[joint]);
+      points[parent] += points[joint];
+    }
+  }
+  const weights = new Float64Array(CHANNEL_COUNT * 9), inverses = new Float64Array(CHANNEL_COUNT * 9);
+  for (let axis = 0; axis < 3; axis++) {
+    const weight = points[0] ** (LEVER / 2) * CARE[0];
+    weights[axis * 4] = weight;
+    inverses[axis * 4] = 1 / weight;
+  }
+  squares.forEach((square, joint) => {
+    const care = CARE[joint + 1];
+    const { values, vectors } = eigen(square);
+    for (let i = 0; i < 9; i++) {
+      const row = Math.floor(i / 3) * 3, column = (i % 3) * 3;
+      for (let j = 0; j < 3; j++) {
+        const product = vectors[row + j] * vectors[column + j], root = Math.sqrt(values[j]) * care;
+        weights[(joint + 1) * 9 + i] += product * root;
+        inverses[(joint + 1) * 9 + i] += product / root;
+      }
+    }
+  });
+  return { weights, inverses };
+}
+
+/** Adds count^0.45 (|a|^2 I - a a^T) of the arm a of a joint to `square`. */
+function addArm(square: Float64Array, arms: Float64Array, joint: number, count: number): void {
+  const arm = arms.subarray(joint * 3, joint * 3 + 3);
+  const length = arm[0] ** 2 + arm[1] ** 2 + arm[2] ** 2;
+  for (let i = 0; i < 9; i++) {
+    square[i] += count ** LEVER * ((i % 4 === 0 ? length : 0) - arm[Math.floor(i / 3)] * arm[i % 3]);
+  }
+}
+
+/**
+ * Eigenvalues (3) and eigenvectors (columns of [3][3]) of a symmetric matrix [3][3], by Jacobi's rotations (Golub and Van Loan,
+ * Matrix Computations, 8.5).
+ */
+function eigen(symmetric: Float64Array): { values: Float64Array; vectors: Float64Array } {
+  const a = symmetric.slice(), vectors = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1);
+  // each sweep squares what is left beside the diagonal: six are more than doubles can show
+  for (let sweep = 0; sweep < 12; sweep++) {
+    for (const [p, q] of [[0, 1], [0, 2], [1, 2]]) {
+      if (a[p * 3 + q] === 0) continue;
+      const tau = (a[q * 4] - a[p * 4]) / (2 * a[p * 3 + q]);
+      const tangent = (tau < 0 ? -1 : 1) / (Math.abs(tau) + Math.sqrt(1 + tau * tau));
+      const cosine = 1 / Math.sqrt(1 + tangent * tangent), sine = tangent * cosine;
+      turn(a, p, q, 3, 1, cosine, sine);
+      turn(a, p, q, 1, 3, cosine, sine);
+      turn(vectors, p, q, 1, 3, cosine, sine);
+    }
+  }
+  return { values: Float64Array.of(a[0], a[4], a[8]), vectors };
+}
+
+/** Turns lines `p` and `q` of a matrix: rows with a `stride` of 3 and numbers 1 apart, columns the other way. */
+function turn(m: Float64Array, p: number, q: number, stride: number, apart: number, cosine: number, sine: number): void {
+  for (let i = 0; i < 3; i++) {
+    const x = m[p * stride + i * apart], y = m[q * stride + i * apart];
+    m[p * stride + i * apart] = cosine * x - sine * y;
+    m[q * stride + i * apart] = sine * x + cosine * y;
+  }
+}
