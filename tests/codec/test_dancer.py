@@ -36,7 +36,7 @@ def test_the_figure_moves_by_half_a_grid_step_at_most() -> None:
 
 def test_giants_are_refused() -> None:
     figure = standard_figure()
-    with pytest.raises(ValueError, match="9.0 m long"):
+    with pytest.raises(ValueError, match="9.1 m long; 3.3"):
         on_grid(Figure(figure.offsets + np.eye(JOINT_COUNT, 3) * 9.0, figure.tips))
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from bunraku.codec import coefficients
 from bunraku.codec.coefficients import Head
+from bunraku.codec.dancer import pack_dancer
 from bunraku.codec.decode import decode_block
 from bunraku.codec.prior import Integers, shipped
 from bunraku.codec.search import BlockEncoder
-from bunraku.codec.track import MotionTrack, pack_figure, pack_reference, plan
+from bunraku.codec.track import MotionTrack, plan
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import CHANNEL_COUNT, JOINT_COUNT, Motion, standard_figure
 
@@ -46,11 +47,13 @@ def wild(random: np.random.Generator, count: int, most: int) -> Integers:
     return quantised
 
 
-def head(numbers: list[tuple[int, int]], usual: bool = False) -> bytes:
-    """The head of a block that says any `numbers` (value, bits), by the definition of the range coder in whole numbers
+def head(numbers: list[tuple[int, int]], frames: int | None = None) -> bytes:
+    """The head of a block of `frames` frames (None: as usual) that says any `numbers` (value, bits) after them, by the definition of the range coder in whole numbers
     of any size. It is the lowest number of its interval, so zeros behind it read as ones for ever."""
     low, span, size = 0, 0xFFFFFFFF, 4
-    bits = [(32440, usual)] + [(16384, bool(value >> i & 1)) for value, n in numbers for i in range(n - 1, -1, -1)]
+    unusual = [] if frames is None else [(16384, bool(frames >> i & 1)) for i in range(9, -1, -1)]
+    bits = [(32440, frames is None), *unusual, (512, False)]
+    bits += [(16384, bool(value >> i & 1)) for value, n in numbers for i in range(n - 1, -1, -1)]
     for probability, bit in bits:
         bound = (span >> 15) * probability
         if bit:
@@ -87,8 +90,10 @@ def describe(track: MotionTrack) -> dict[str, Any]:
         "frames": track.frames,
         "block_frames": track.block_frames,
         "first_frames": track.first_frames,
-        "figure": text(pack_figure(track.figure)),
-        "reference": text(pack_reference(track.reference, track.reference_bits)),
+        "dancer": text(pack_dancer(track.figure, track.reference, track.reference_bits)),
+        "offsets": track.figure.offsets.ravel().tolist(),
+        "tips": track.figure.tips.ravel().tolist(),
+        "reference": np.concatenate([rotation.IDENTITY, track.reference_rotations.ravel()]).tolist(),
         "weights": track.weights.tolist(),
     }
 
@@ -132,12 +137,12 @@ def make() -> dict[str, Any]:
     rest = [(9, 8), (32, 6), (32, 6), (32, 6)]
     invalid = {
         "empty: more frequencies than frames": b"",
-        "no frames": head([(0, 10), *rest]),
-        "too many frames": head([(1001, 10), *rest, (4, 10)]),
-        "more frequencies than frames": head([(4, 10), *rest, (5, 3)]),
-        "more frequencies than the usual frames": head([*rest, (31, 5)], usual=True),
-        "an escape too long": head([*rest, (1, 5)], usual=True) + bytes(30),
-        "too large": base64.b64decode(valid[0]["block"]) + bytes(65_536),
+        "no frames": head(rest, 0),
+        "too many frames": head([*rest, (4, 10)], 1001),
+        "more frequencies than frames": head([*rest, (5, 3)], 4),
+        "more frequencies than the usual frames": head([*rest, (31, 5)]),
+        "an escape too long": head([*rest, (1, 5)]) + bytes(30),
+        "too large": base64.b64decode(valid[-1]["block"]) + bytes(65_536),
     }
     return {
         "tracks": [describe(track) for track in tracks],

@@ -55,7 +55,8 @@ def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> byt
     q = np.ascontiguousarray(q[:, :, :count], dtype=np.int64)
     kernels = _kernels()
     out = kernels.room(q)
-    numbers = np.array([head.frames, head.step, *head.turn, count], dtype=np.int64)
+    channels = CHANNEL_COUNT if q[2:].any() else 2
+    numbers = np.array([head.frames, head.step, *head.turn, count, channels], dtype=np.int64)
     length = kernels.encode(prior, q, numbers, usual, length_level(head.frames, fps), out)
     if not 0 <= length <= LARGEST_BLOCK:
         raise ValueError("a coefficient is too large to be coded: the step is too fine for this motion")
@@ -67,13 +68,13 @@ def decode(prior: Prior, data: bytes, usual: int, fps: float) -> tuple[Head, Int
     if len(data) > LARGEST_BLOCK:
         raise DamagedBlock(f"a block has at most {LARGEST_BLOCK} bytes, not {len(data)}")
     kernels = _kernels()
-    numbers = np.zeros(6, dtype=np.int64)
+    numbers = np.zeros(7, dtype=np.int64)
     octets = np.array(bytearray(data), dtype=np.uint8)
     if not kernels.decode_head(octets, usual, numbers):
         raise DamagedBlock(
             f"block says {numbers[0]} frames and {numbers[5]} frequencies; 1..{MOST_FRAMES} and no more are allowed"
         )
-    frames, step, x, y, z, count = map(int, numbers)
+    frames, step, x, y, z, count = map(int, numbers[:6])
     q = np.zeros((CHANNEL_COUNT, 3, count), dtype=np.int64)
     if not kernels.decode(prior, octets, q, numbers, usual, length_level(frames, fps)):
         raise DamagedBlock(f"block holds a number longer than {kernels.ESCAPE} bits")

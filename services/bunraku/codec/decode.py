@@ -51,7 +51,7 @@ def decode_block(track: MotionTrack, data: bytes, prior: Prior | None = None) ->
     """
     head, q = coefficients.decode(prior or shipped(), data, track.block_frames, track.fps)
     size = step_size(head.step, head.frames)
-    values = np.linalg.inv(track.weights) @ (reconstruct(q) * size)
+    values = track.unweights @ (reconstruct(q) * size)
     reference = np.concatenate([root_reference(head.turn), track.reference_rotations])
     return MotionBlock(head.frames, q, values, reference)
 

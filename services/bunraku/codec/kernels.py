@@ -28,8 +28,10 @@ NUMBER_BITS = 17
 _FRAMES_AS_USUAL = 32440
 _MOST_FRAMES_BITS = 10
 
-FRAMES, STEP, TURN_X, TURN_Y, TURN_Z, COUNT = range(6)
-"""Places in a block's head: frames, step index, the root's turn on three axes (-32..31), frequencies."""
+_ROOT_ALONE = 512
+FRAMES, STEP, TURN_X, TURN_Y, TURN_Z, COUNT, CHANNELS = range(7)
+"""Places in a block's head: frames, step index, the root's turn on three axes (-32..31), frequencies, and channels that are
+coded: 19, or 2 where all joints stand as their references."""
 
 
 @njit(cache=True)
@@ -66,6 +68,8 @@ def _head(decoding: bool, state: Integers, data: Bytes, usual: int, head: Intege
         head[FRAMES] = _number(decoding, state, data, _MOST_FRAMES_BITS, head[FRAMES])
     if not 1 <= head[FRAMES] <= 1000:
         return False
+    alone = _bit(decoding, state, data, _ROOT_ALONE, 1 if head[CHANNELS] == 2 else 0)
+    head[CHANNELS] = 2 if alone else 19
     head[STEP] = _number(decoding, state, data, 8, head[STEP])
     for i in range(TURN_X, TURN_Z + 1):
         head[i] = _number(decoding, state, data, 6, head[i] + 32) - 32
@@ -104,7 +108,7 @@ def _body(
 ) -> bool:
     count, step = head[COUNT], head[STEP]
     seen = nothing_seen(count)
-    for channel in range(19):
+    for channel in range(head[CHANNELS]):
         for k in range(count):
             share(prior, seen, channel, k, count, step, length)
             for axis in range(3):
@@ -176,7 +180,7 @@ def examples(
     (0 none, 1 plus, 2 minus) with its context; the row after the last."""
     count, row = head[COUNT], first
     seen = nothing_seen(count)
-    for channel in range(19):
+    for channel in range(head[CHANNELS]):
         for k in range(count):
             share(prior, seen, channel, k, count, head[STEP], length)
             for axis in range(3):

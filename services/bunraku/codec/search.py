@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from types import ModuleType
 from typing import Any, Literal
 
@@ -20,17 +21,24 @@ from bunraku.motion.skeleton import PARENTS, Motion, points
 
 FINEST, COARSEST = 0, 255
 _SWEEPS = 3
+_SLACK = 0.6
+"""The live grade is content with a block whose largest error is this share of what it may be."""
 _PRICE_OF_MEAN = 0.35
 _PRICE_OF_MOST = 0.6
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Coded:
-    """A block's bytes, its `step` index, and the error in mm at each point and frame (23, n)."""
+    """A block at one `step` index, and its error in mm at each point and frame (23, n)."""
 
-    data: bytes
     step: int
     error: Array
+    _write: Callable[[], bytes]
+
+    @cached_property
+    def data(self) -> bytes:
+        """The block's bytes, coded when they are first asked for: most tries are never sent."""
+        return self._write()
 
 
 @cache
@@ -60,19 +68,14 @@ class BlockEncoder:
         table: Array = _compiled()[1].cost_table(self._prior)
         return table
 
-    @cached_property
-    def _weights(self) -> tuple[Array, Array]:
-        weight = self._track.weights
-        return weight, np.ascontiguousarray(np.linalg.inv(weight))
-
     def _body(self, turn: tuple[int, int, int]) -> Any:
         figure = self._track.figure
         reference = np.concatenate([root_reference(turn), self._track.reference_rotations])
-        return _compiled()[0].Body(figure.offsets, figure.tips, *self._weights, reference)
+        return _compiled()[0].Body(figure.offsets, figure.tips, self._track.weights, self._track.unweights, reference)
 
     def block(self, index: int, step: int, goal: Literal["first", "mean", "most"]) -> Coded:
         """Block `index` at one step: by the first pass alone, or refined for its mean or its largest error."""
-        _, _, feedback, refine = _compiled()
+        bodies, _, feedback, refine = _compiled()
         track = self._track
         start, frames = track.first_frame(index), track.frames_in(index)
         part = slice(start, start + frames)
@@ -89,8 +92,13 @@ class BlockEncoder:
             decoded = refine.refine(*given, _SWEEPS, _PRICE_OF_MEAN, False)
         elif goal == "most":
             decoded = refine.refine(*given, _SWEEPS, _PRICE_OF_MOST, True)
-        data = coefficients.encode(self._prior, Head(frames, step, (x, y, z)), q, track.block_frames, track.fps)
-        return Coded(data, step, np.linalg.norm(decoded - truth[1], axis=-1) * 1e3)
+        if track.still:
+            # the joints' references are the pose itself: following the root's error would cost more than it mends
+            q[2:] = 0
+            decoded = bodies.points(body, q, size, basis)
+        head = Head(frames, step, (x, y, z))
+        write = partial(coefficients.encode, self._prior, head, q, track.block_frames, track.fps)
+        return Coded(step, np.linalg.norm(decoded - truth[1], axis=-1) * 1e3, write)
 
     def bounded(self, index: int, bound: float, grade: str, near: int | None = None) -> Coded:
         """Block `index` with no point more than `bound` mm off, at the cheapest step found; the search starts at step
@@ -107,6 +115,8 @@ class BlockEncoder:
         good = step if holds(step) else None
         for _ in range(6 if grade == "best" else 1):
             most = max(float(tried[step].error.max()), 1e-9)
+            if grade == "live" and _SLACK * bound < most <= bound:
+                break
             move = int(np.clip(np.round(16 * np.log2(bound * 0.97 / most)), -48, 48))
             if good is not None and abs(move) <= 1:
                 break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,19 @@ class MotionTrack:
     figure: Figure
     reference: Array
     reference_bits: int
+    weights: Array = field(init=False, repr=False)
+    unweights: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """`weights` (19, 3, 3) is what a channel's values are multiplied with before they are quantised (SPEC.md,
+        Weights), `unweights` what undoes it."""
+        object.__setattr__(self, "weights", _weights(self.figure))
+        object.__setattr__(self, "unweights", np.ascontiguousarray(np.linalg.inv(self.weights)))
+
+    @property
+    def still(self) -> bool:
+        """Whether the joints' references are fine enough to be their only pose."""
+        return self.reference_bits == _BITS[1]
 
     @property
     def blocks(self) -> int:
@@ -73,7 +86,8 @@ class MotionTrack:
 
     def block_at(self, position_us: float) -> int:
         """Index of the block that holds the instant `position_us`, kept within the motion."""
-        frame = position_us * self.fps / 1e6 + 1e-6
+        # a start is rounded to the microsecond, and may be a little before its frame
+        frame = (position_us + 1) * self.fps / 1e6
         index = int((frame - self.first_frames) // self.block_frames) + 1 if frame >= self.first_frames else 0
         return min(max(index, 0), self.blocks - 1)
 
@@ -81,11 +95,6 @@ class MotionTrack:
     def reference_rotations(self) -> Array:
         """`reference` as quaternions (17, 4)."""
         return rotation.from_rotation_vector(self.reference * 2.0**-self.reference_bits)
-
-    @property
-    def weights(self) -> Array:
-        """What a channel's values are multiplied with before they are quantised (19, 3, 3): SPEC.md, Weights."""
-        return _weights(self.figure)
 
 
 def step_size(index: int, frames: int) -> float:
@@ -110,16 +119,11 @@ def _weights(figure: Figure) -> Array:
             points[PARENTS[joint]] += points[joint]
     weights = np.empty((CHANNEL_COUNT, 3, 3))
     weights[0] = points[0] ** (_LEVER / 2) * np.eye(3)
-    weights[1:] = [_root(square) for square in squares]
+    values, vectors = np.linalg.eigh(squares)
+    # the symmetric square root
+    weights[1:] = (vectors * np.sqrt(values)[:, None]) @ vectors.transpose(0, 2, 1)
     weighted: Array = weights * _CARE[:, None, None]
     return weighted
-
-
-def _root(square: Array) -> Array:
-    """The symmetric square root of a positive matrix (3, 3)."""
-    values, vectors = np.linalg.eigh(square)
-    root: Array = (vectors * np.sqrt(values)) @ vectors.T
-    return root
 
 
 def plan(motion: Motion, block_seconds: float = 1.0, first_seconds: float | None = None) -> tuple[MotionTrack, Motion]:

@@ -10,8 +10,11 @@ export interface BlockVectors {
     frames: number;
     block_frames: number;
     first_frames: number;
-    figure: string;
-    reference: string;
+    dancer: string;
+    /** What the dancer says: offsets (54) and tips (54) in metres, reference rotations (72). */
+    offsets: number[];
+    tips: number[];
+    reference: number[];
     /** [channel 19][3][3] */
     weights: number[][][];
   }[];
@@ -30,10 +33,10 @@ export interface BlockVectors {
 
 /** A golden track as a Description's map has it. */
 export function goldenDescription(which = 0): { type: string } & Record<string, unknown> {
-  const { weights: _, ...track } = vectors<BlockVectors>("blocks").tracks[which];
+  const { fps, frames, block_frames, first_frames, dancer } = vectors<BlockVectors>("blocks").tracks[which];
   return {
-    ...track, type: "motion", codec: "bunraku.motion/2", channels: 19, figure: bytes(track.figure),
-    reference: bytes(track.reference), rates: [{ kbps: 1.5, mean: 5, max: 20 }, { kbps: 5, mean: 1, max: 4 }],
+    fps, frames, block_frames, first_frames, type: "motion", codec: "bunraku.motion/2", channels: 19, dancer: bytes(dancer),
+    rates: [{ kbps: 1.5, mean: 5, max: 20 }, { kbps: 5, mean: 1, max: 4 }],
   };
 }
 

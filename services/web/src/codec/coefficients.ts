@@ -17,6 +17,7 @@ export const LARGEST_BLOCK = 65_536;
 export const MOST_FRAMES = 1_000;
 
 const FRAMES_AS_USUAL = 32440;
+const ROOT_ALONE = 512;
 const ESCAPE = 20;
 
 /** A block as it stands in its bytes. */
@@ -52,13 +53,14 @@ export function decodeCoefficients(prior: Prior, data: Uint8Array, usual: number
   if (frames < 1 || frames > MOST_FRAMES) {
     throw new DamagedBlock(`block says ${frames} frames; 1..${MOST_FRAMES} are allowed`);
   }
+  const channels = decoder.bit(ROOT_ALONE) ? 2 : CHANNEL_COUNT;
   const step = decoder.number(8);
   const turn = [decoder.number(6) - 32, decoder.number(6) - 32, decoder.number(6) - 32] as const;
   const count = decoder.number(32 - Math.clz32(frames));
   if (count > frames) throw new DamagedBlock(`block says ${count} frequencies for ${frames} frames`);
   const q = new Float64Array(CHANNEL_COUNT * 3 * count);
   const contexts = new Contexts(prior, count, step, lengthLevel(frames, fps));
-  for (let channel = 0; channel < CHANNEL_COUNT; channel++) {
+  for (let channel = 0; channel < channels; channel++) {
     for (let k = 0; k < count; k++) {
       contexts.share(channel, k);
       for (let axis = 0; axis < 3; axis++) {

@@ -1,68 +1,25 @@
 /** What the blocks of one motion have in common: sent once, in the Description (`proto/SPEC.md`, Track `motion`). */
 
-import { fromRotationVector } from "../motion/rotation";
-import { CHANNEL_COUNT, type Figure, JOINT_COUNT, TIPS } from "../motion/skeleton";
+import type { Figure } from "../motion/skeleton";
 import { MOST_FRAMES } from "./coefficients";
+import { unpackDancer } from "./dancer";
 import { DamagedBlock } from "./errors";
 import { channelWeights, type Weights } from "./weights";
 
 export const CODEC = "bunraku.motion/2";
 
-/** Metres in one unit of the figure's 16-bit offsets. */
-export const FIGURE_UNIT = 1e-4;
-
 /** Radians in one unit of a block's turn of the root. */
 export const TURN_UNIT = 0.1;
-
-// bits after the point of a reference in radians
-const MOST_REFERENCE_BITS = 14;
 
 // a day of 1 s blocks; and as many rates as a Data Packet can number
 const MOST_BLOCKS = 86_400;
 const MOST_RATES = 16;
 
-/** One encoding of a motion: kbit/s of Data over the duration, and its mean and max error in mm over joints and tips. */
+/** One encoding of a motion: kbit/s of blocks over the duration, mean error in mm over joints and tips, and what none exceeds. */
 export interface Rate {
   kbps: number;
   mean: number;
   max: number;
-}
-
-/** The figure of 138 bytes: 18 offsets and 5 tips, each 3 x i16 little-endian in `FIGURE_UNIT`. */
-export function unpackFigure(data: Uint8Array): Figure {
-  const numbers = 3 * (JOINT_COUNT + TIPS.length);
-  if (data.length !== 2 * numbers) throw new DamagedBlock(`a figure has ${2 * numbers} bytes, not ${data.length}`);
-  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
-  const figure = { offsets: new Float64Array(JOINT_COUNT * 3), tips: new Float64Array(JOINT_COUNT * 3) };
-  for (let i = 0; i < JOINT_COUNT * 3; i++) figure.offsets[i] = view.getInt16(2 * i, true) * FIGURE_UNIT;
-  TIPS.forEach((joint, tip) => {
-    for (let axis = 0; axis < 3; axis++) {
-      figure.tips[joint * 3 + axis] = view.getInt16(2 * ((JOINT_COUNT + tip) * 3 + axis), true) * FIGURE_UNIT;
-    }
-  });
-  return figure;
-}
-
-/**
- * The rotations (72, w x y z; the root's the identity) that each joint's channel is relative to, of 103 bytes: a byte b, then
- * joints 1-17, each a rotation vector of 3 x i16 little-endian in 2^-b radians.
- */
-export function unpackReference(data: Uint8Array): Float64Array {
-  const size = 1 + 6 * (CHANNEL_COUNT - 2);
-  if (data.length !== size) throw new DamagedBlock(`references have ${size} bytes, not ${data.length}`);
-  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
-  const bits = view.getUint8(0);
-  if (bits > MOST_REFERENCE_BITS) {
-    throw new DamagedBlock(`references are in 2^-${bits} radians; ${MOST_REFERENCE_BITS} is the most`);
-  }
-  const reference = new Float64Array(JOINT_COUNT * 4);
-  reference[0] = 1;
-  for (let joint = 1; joint < JOINT_COUNT; joint++) {
-    const at = 1 + (joint - 1) * 6;
-    const [x, y, z] = [0, 2, 4].map((axis) => view.getInt16(at + axis, true) * 2 ** -bits);
-    fromRotationVector(reference, joint * 4, x, y, z);
-  }
-  return reference;
 }
 
 /** Constants of a motion's blocks, as in the Description. */
@@ -101,7 +58,7 @@ export class MotionTrack {
    * @throws DamagedBlock where it tells of none that can be played here
    */
   static fromDescription(map: Readonly<Record<string, unknown>>): MotionTrack {
-    const { codec, fps, frames, block_frames: blockFrames, first_frames: firstFrames, figure, reference, rates, front } = map;
+    const { codec, fps, frames, block_frames: blockFrames, first_frames: firstFrames, dancer, rates, front } = map;
     const whole = (value: unknown, most: number) => Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
     if (codec !== CODEC) throw new DamagedBlock(`motion is of codec ${String(codec)}; this client reads ${CODEC}`);
     if (!Number.isFinite(fps) || Number(fps) <= 0) throw new DamagedBlock("motion needs fps, a number above zero");
@@ -110,9 +67,7 @@ export class MotionTrack {
     if (!whole(firstFrames, Math.min(Number(frames), MOST_FRAMES))) {
       throw new DamagedBlock(`motion needs first_frames, 1..${MOST_FRAMES} and no more than its frames`);
     }
-    if (!(figure instanceof Uint8Array && reference instanceof Uint8Array)) {
-      throw new DamagedBlock("motion needs figure and reference, bytes");
-    }
+    if (!(dancer instanceof Uint8Array)) throw new DamagedBlock("motion needs a dancer, bytes");
     if (!Array.isArray(rates) || rates.length < 1 || rates.length > MOST_RATES) {
       throw new DamagedBlock(`motion needs rates, 1..${MOST_RATES} of them`);
     }
@@ -121,9 +76,10 @@ export class MotionTrack {
       if (![kbps, mean, max].every(Number.isFinite)) throw new DamagedBlock(`rate ${nth} needs kbps, mean and max, numbers`);
       return { kbps: kbps!, mean: mean!, max: max! };
     });
+    const { figure, reference } = unpackDancer(dancer);
     return new MotionTrack(
-      Number(fps), Number(frames), Number(blockFrames), Number(firstFrames), unpackFigure(figure), unpackReference(reference),
-      known, Number.isFinite(front) ? Number(front) : 0,
+      Number(fps), Number(frames), Number(blockFrames), Number(firstFrames), figure, reference, known,
+      Number.isFinite(front) ? Number(front) : 0,
     );
   }
 

@@ -1,0 +1,29 @@
+/** Milliseconds to decode blocks: JSON on standard input, for `make bench-codec`. The last line printed is one JSON object. */
+import { readFileSync } from "node:fs";
+import { decodeBlock } from "../../src/codec/decode";
+import { unpackDancer } from "../../src/codec/dancer";
+import { MotionTrack } from "../../src/codec/track";
+
+interface Coded {
+  track: { fps: number; frames: number; blockFrames: number; firstFrames: number; dancer: string };
+  blocks: string[];
+}
+
+const bytes = (hex: string) => Uint8Array.from(Buffer.from(hex, "hex"));
+const work = (JSON.parse(readFileSync(0, "utf8")) as Coded[]).flatMap(({ track, blocks }) => {
+  const { figure, reference } = unpackDancer(bytes(track.dancer));
+  const of = new MotionTrack(track.fps, track.frames, track.blockFrames, track.firstFrames, figure, reference);
+  return blocks.map((block) => ({ of, block: bytes(block) }));
+});
+
+const spent: number[] = [];
+for (let round = 0; round < 3; round++) {
+  spent.length = 0;
+  for (const { of, block } of work) {
+    const began = performance.now();
+    decodeBlock(of, block);
+    spent.push(performance.now() - began);
+  }
+}
+spent.sort((a, b) => a - b);
+console.log(JSON.stringify({ blocks: spent.length, median_ms: spent[spent.length >> 1], largest_ms: spent[spent.length - 1] }));
