@@ -30,7 +30,8 @@ def load(corpus: Path, name: str) -> Motion:
 
 
 def family(name: str) -> str:
-    """Clips that could share dancers, stages or tools; figures are told with priors that saw none of a clip's family."""
+    """Clips that could share dancers, stages or tools; figures are told with priors that saw none of a clip's
+    family."""
     for family in ("perfume", "isaac", "mass"):
         if name.startswith(family):
             return family

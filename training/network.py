@@ -102,9 +102,13 @@ def _loss(
             slope += by * (high_odds - low_odds)
             if high <= value:
                 break
+        slope *= 4
+        if high >= UNARY:
+            # an escape's length goes down by two bits with every octave of the scale
+            loss += (2 * np.floor(np.log2(high - UNARY + 1)) + 1) * _LN2
+            slope -= 2 * _LN2
         # at the end of the table only a way back is followed
         if not (below and slope > 0) and not (above and slope < 0):
-            slope *= 4
             d_bias[group, axis] += slope
             for i in range(FEATURES):
                 d_linear[group, i] += slope * f[i]

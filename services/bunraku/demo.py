@@ -55,6 +55,6 @@ def _fingerprint() -> str:
     """Of all code on the dance's way into the library."""
     digest = hashlib.sha256()
     for room in ("motion", "codec", "ingest"):
-        for source in sorted((_HERE / room).glob("*.py")):
+        for source in sorted([*(_HERE / room).glob("*.py"), *(_HERE / room).glob("*.json")]):
             digest.update(source.read_bytes())
     return digest.hexdigest()

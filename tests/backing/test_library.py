@@ -54,6 +54,14 @@ async def test_memory_is_bounded_and_what_fell_out_is_read_again(monkeypatch: py
     assert shelf._cached == sum(stored.size for stored in kept.values())
 
 
+async def test_a_motion_of_another_codec_is_none_until_it_is_sent_again(tmp_path: Path) -> None:
+    shelf = Library.open(f"file://{tmp_path}")
+    await shelf.put("m1", pack("m1", ENCODED).replace(b"bunraku.motion/2", b"bunraku.motion/1"))
+    assert await shelf.get("m1") is None
+    await shelf.put("m1", pack("m1", ENCODED))
+    assert await shelf.get("m1") is not None
+
+
 def test_an_object_is_one_map() -> None:
     assert set(msgpack.unpackb(pack("m", ENCODED))) == {"description", "packets"}
 

@@ -1,7 +1,7 @@
 """How small motion is: `make bench-codec CORPUS=../shared/mocap`. The last line printed is one JSON object.
 
-Every clip is encoded with a prior that saw none of its family, when asked for a mean or a largest error. Its kbit/s count
-all that a viewer receives of the motion over the clip: blocks, Data heads, WebSocket frames, and the dancer (limb
+Every clip is encoded with a prior that saw none of its family, when asked for a mean or a largest error. Its kbit/s
+count all that a viewer receives of the motion over the clip: blocks, Data heads, WebSocket frames, and the dancer (limb
 lengths and references) from the Description. `--quick` takes every third clip.
 """
 
@@ -16,16 +16,16 @@ import time
 from pathlib import Path
 
 import numpy as np
+from training import corpus as clips
 
+from bunraku.codec.dancer import pack_dancer
 from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import LADDER, encode_mean, encode_motion, warm
 from bunraku.codec.prior import Prior, parse, shipped
-from bunraku.codec.dancer import pack_dancer
 from bunraku.codec.track import MotionTrack
 from bunraku.motion.skeleton import Motion
 from bunraku.wire.messages import Data
 from tests.bench import peers
-from training import corpus as clips
 
 GOALS = (("mean", 1.0), ("mean", 5.0), ("max", 10.0), ("max", 2.0))
 PEERS = {"acl": "acl", "meshopt": "meshopt_brotli"}
@@ -125,7 +125,10 @@ def main() -> None:
     motions = {name: clips.load(folder, name) for name in names}
     ratios: dict[str, list[float]] = {}
     rates: dict[str, list[float]] = {}
-    print(f"{'clip':<16}" + "".join(f"{kind} {error:g} mm".rjust(12) + f"{'acl':>8}{'meshopt':>9}" for kind, error in GOALS))
+    print(
+        f"{'clip':<16}"
+        + "".join(f"{kind} {error:g} mm".rjust(12) + f"{'acl':>8}{'meshopt':>9}" for kind, error in GOALS)
+    )
     for name, motion in motions.items():
         row = f"{name:<16}"
         for kind, error in GOALS:

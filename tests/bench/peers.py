@@ -1,4 +1,5 @@
-"""The peers' measured points, read as the bench reads them (`peers.json`: clip, peer, rows of kbit/s, mean, max, ...)."""
+"""The peers' measured points, read as the bench reads them (`peers.json`: clip, peer, rows of kbit/s, mean, max,
+...)."""
 
 from __future__ import annotations
 

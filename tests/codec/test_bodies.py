@@ -47,14 +47,16 @@ def test_a_block_s_pose_is_that_of_the_decoder() -> None:
         track.figure.offsets,
         track.figure.tips,
         weight,
-        np.linalg.inv(weight),
+        track.unweights,
         np.concatenate([root_reference((3, -9, 1)), track.reference_rotations]),
     )
     basis = transform.basis(30, 8, np.arange(30.0))
     vectors, orientation, placed = np.zeros((18, 30, 3)), np.zeros((18, 30, 4)), np.zeros((23, 30, 3))
     bodies.pose(body, q, 0.01, np.ascontiguousarray(basis.T), vectors, orientation, placed)
     tracks = transform.inverse(np.linalg.inv(weight) @ (reconstruct(q) * 0.01), 30, np.arange(30.0))
-    rotations = rotation.multiply(np.broadcast_to(body.reference, (30, 18, 4)), rotation.from_rotation_vector(tracks[:, 1:]))
+    rotations = rotation.multiply(
+        np.broadcast_to(body.reference, (30, 18, 4)), rotation.from_rotation_vector(tracks[:, 1:])
+    )
     np.testing.assert_allclose(placed.transpose(1, 0, 2), points(track.figure, tracks[:, 0], rotations), atol=1e-10)
     turned = world(track.figure, tracks[:, 0], rotations)[1]
     np.testing.assert_allclose(orientation.transpose(1, 0, 2), turned, atol=1e-10)

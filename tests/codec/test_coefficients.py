@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec import coefficients, prior
-from bunraku.codec.coefficients import LARGEST_BLOCK, Head, Integers
+from bunraku.codec.coefficients import LARGEST_BLOCK, Head
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.prior import Integers
 from bunraku.motion.skeleton import CHANNEL_COUNT
 
 PRIOR = prior.shipped()

@@ -37,7 +37,9 @@ def test_scales_stay_within_their_bounds() -> None:
 
 def test_the_hidden_layer_of_a_prior_is_heard() -> None:
     loud = PRIOR._replace(
-        hidden_class=np.full_like(PRIOR.hidden_class, 1 << 20), out=np.full_like(PRIOR.out, 4096), hidden=0 * PRIOR.hidden
+        hidden_class=np.full_like(PRIOR.hidden_class, 1 << 20),
+        out=np.full_like(PRIOR.out, 4096),
+        hidden=0 * PRIOR.hidden,
     )
     seen = contexts.nothing_seen(3)
     contexts.share(loud, seen, 0, 0, 3, 120, 64)

@@ -36,7 +36,7 @@ def test_the_figure_moves_by_half_a_grid_step_at_most() -> None:
 
 def test_giants_are_refused() -> None:
     figure = standard_figure()
-    with pytest.raises(ValueError, match="9.1 m long; 3.3"):
+    with pytest.raises(ValueError, match=r"9\.1 m long; 3\.3"):
         on_grid(Figure(figure.offsets + np.eye(JOINT_COUNT, 3) * 9.0, figure.tips))
 
 
@@ -50,11 +50,9 @@ def test_any_bytes_are_a_dancer_or_refused(data: bytes) -> None:
     assert bits <= MOST_BITS
 
 
-def test_wrong_dancers_are_refused() -> None:
-    for data, says in ((b"", "1.."), (bytes(LARGEST_DANCER + 1), "bytes"), (bytes([15, 0]), "finest"), (b"\0" + b"\xff" * 90, "")):
-        try:
-            unpack_dancer(data)
-        except DamagedBlock as error:
-            assert says in str(error)
-        else:
-            assert says == ""
+@pytest.mark.parametrize(
+    ("data", "says"), [(b"", "not 0"), (bytes(LARGEST_DANCER + 1), "not 1025"), (bytes([15, 0]), "finest")]
+)
+def test_wrong_dancers_are_refused(data: bytes, says: str) -> None:
+    with pytest.raises(DamagedBlock, match=says):
+        unpack_dancer(data)

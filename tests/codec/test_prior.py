@@ -16,7 +16,7 @@ def test_levels_are_sixteen_log_2() -> None:
 
 def test_relatives_are_coded_before_and_mirrors_are_the_other_side() -> None:
     channels = np.arange(19)
-    assert (RELATIVES < channels).all()
+    assert (channels > RELATIVES).all()
     channel = {name: index + 1 for index, name in enumerate(JOINTS)}
     parent, mirror, grandparent = RELATIVES
     assert parent[channel["l_knee"]] == channel["l_hip"]

@@ -19,7 +19,7 @@ def test_slopes_are_those_of_the_error() -> None:
         TRACK.figure.offsets,
         TRACK.figure.tips,
         weight,
-        np.linalg.inv(weight),
+        TRACK.unweights,
         np.concatenate([root_reference((0, 9, 0)), TRACK.reference_rotations]),
     )
     basis = np.ascontiguousarray(transform.basis(30, 6, np.arange(30.0)).T)

@@ -26,7 +26,7 @@ def test_the_error_of_a_block_is_that_of_its_bytes(goal: str) -> None:
 
 
 def test_refining_costs_fewer_bytes_or_errs_less() -> None:
-    first, mean, most = (ENCODER.block(0, 112, goal) for goal in ("first", "mean", "most"))  # type: ignore[arg-type]
+    first, mean, most = (ENCODER.block(0, 112, goal) for goal in ("first", "mean", "most"))
     assert len(mean.data) * mean.error.mean() < len(first.data) * first.error.mean()
     assert most.error.max() / most.error.mean() < mean.error.max() / mean.error.mean()
 

@@ -48,7 +48,9 @@ def test_sixteen_steps_are_twice_as_coarse() -> None:
 
 def test_very_high_frame_rates_keep_blocks_within_the_format() -> None:
     still = wandering_motion(0.01, 240.0, 1)
-    motion = Motion(still.figure, 5000.0, np.tile(still.root[:1], (4001, 1)), np.tile(still.rotations[:1], (4001, 1, 1)))
+    motion = Motion(
+        still.figure, 5000.0, np.tile(still.root[:1], (4001, 1)), np.tile(still.rotations[:1], (4001, 1, 1))
+    )
     track, _ = plan(motion)
     assert track.block_frames == 1000
     assert sum(track.frames_in(i) for i in range(track.blocks)) == 4001

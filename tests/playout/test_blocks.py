@@ -10,7 +10,7 @@ from bunraku.motion.skeleton import points
 from bunraku.playout.blocks import BlockStore
 from tests.vectors.blocks import wandering_motion
 
-MOTION = wandering_motion(3.4, 30.0, 3)
+MOTION = wandering_motion(4.0, 30.0, 3)
 ENCODED = encode_motion(MOTION, ladder=(20.0, 2.0), grade="live")
 
 
@@ -50,9 +50,9 @@ def test_ahead_counts_what_is_here_without_a_gap() -> None:
     held = store(0, 1, 3)
     assert held.ahead(500_000, loop=True) == 1_500_000
     assert held.ahead(2_500_000, loop=True) == 0
-    assert held.ahead(3_200_000, loop=True) == 200_000 + 2_000_000
-    assert held.ahead(3_200_000, loop=False) == 200_000
-    assert store(0, 1, 2, 3).ahead(1_000_000, loop=True) == ENCODED.track.start_us(1) + 3_400_000 - 1_000_000
+    assert held.ahead(3_200_000, loop=True) == 800_000 + 2_000_000
+    assert held.ahead(3_200_000, loop=False) == 800_000
+    assert store(0, 1, 2, 3).ahead(1_000_000, loop=True) == ENCODED.track.start_us(1) + 4_000_000 - 1_000_000
 
 
 def test_the_end_of_a_loop_leads_into_its_beginning() -> None:
@@ -68,7 +68,8 @@ def test_the_end_of_a_loop_leads_into_its_beginning() -> None:
 
 def test_blocks_of_another_motion_are_refused() -> None:
     held = store()
+    other = encode_motion(wandering_motion(0.7, 30.0, 3), ladder=(20.0,), grade="live")
     with pytest.raises(ValueError, match="not of this motion"):
-        held.put(3, 0, decode_block(ENCODED.track, ENCODED.rates[0].blocks[0]))
+        held.put(3, 0, decode_block(other.track, other.rates[0].blocks[0]))
     with pytest.raises(ValueError, match="not of this motion"):
         held.put(4, 0, decode_block(ENCODED.track, ENCODED.rates[0].blocks[0]))

@@ -10,7 +10,7 @@ from bunraku.playout.timeline import edit, start
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import wandering_motion
 
-TRACK: MotionTrack = plan(wandering_motion(12.5, 30.0, 4))[0]
+TRACK: MotionTrack = plan(wandering_motion(12.0, 30.0, 4))[0]
 SECOND = 1_000_000
 
 
@@ -37,9 +37,9 @@ def test_nothing_is_sent_twice_over_two_rounds_but_the_quick_start() -> None:
 
 
 def test_it_stops_at_the_end_without_a_loop_and_follows_a_seek() -> None:
-    state = start("m", TRACK.duration_us, 0, loop=False, position=11 * SECOND)
+    state = start("m", TRACK.duration_us, 0, loop=False, position=10 * SECOND)
     pacer = Pacer(TRACK, 4)
-    assert [index for index, _ in drain(pacer, state, 0, 2)] == [11, 12]
+    assert [index for index, _ in drain(pacer, state, 0, 2)] == [10, 11]
     assert drain(pacer, edit(state, 0, position=5 * SECOND), 0, 2)[0] == (5, 0)
 
 

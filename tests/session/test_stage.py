@@ -9,7 +9,7 @@ import pytest
 
 from bunraku.backing.bus import MemoryBus
 from bunraku.backing.library import Library, StoredMotion, pack
-from bunraku.codec import coefficients
+from bunraku.codec import decode
 from bunraku.codec.encode import encode_motion
 from bunraku.marionette.merge import Marionette
 from bunraku.session import stage as stages
@@ -41,7 +41,9 @@ class Audience:
 
 async def stored(name: str, seed: int) -> StoredMotion:
     library = Library.open("memory:///")
-    await library.put(name, pack(name, encode_motion(wandering_motion(2.3, 30.0, seed), ladder=(30.0, 5.0), grade="live")))
+    await library.put(
+        name, pack(name, encode_motion(wandering_motion(2.3, 30.0, seed), ladder=(30.0, 5.0), grade="live"))
+    )
     motion = await library.get(name)
     assert motion is not None
     return motion
@@ -54,7 +56,7 @@ async def bus() -> MemoryBus:
 
 @pytest.fixture
 async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
-    await asyncio.to_thread(coefficients.warm)
+    await asyncio.to_thread(decode.warm)
     motion = await stored("one", 5)
     opened = Stage("s", motion, Marionette(motion.track.figure), bus, playing=True, loop=True)
     yield opened

@@ -10,6 +10,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bunraku.client import Client
+from bunraku.codec.track import read_track
 from bunraku.wire.messages import (
     SUBPROTOCOL,
     ChannelHeader,
@@ -59,12 +60,13 @@ async def test_the_server_speaks_first_in_the_papers_order(server: str, motion: 
     assert isinstance(description, Description)
     assert isinstance(timeline, TimelineState)
     assert abs(timeline.clock - header.now) < 1_000_000
+    track = read_track(description.tracks[0])
+    best = len(description.tracks[0]["rates"]) - 1
     assert [(d.start, d.rate) for d in data if isinstance(d, Data)] == [
         (0, 0),
-        (1_000_000, 3),
-        (2_000_000, 3),
-        (3_000_000, 3),
+        *((track.start_us(index), best) for index in (1, 2, 3)),
     ]
+    assert track.start_us(1) == 500_000
 
 
 async def test_a_pinned_rate_is_kept_after_the_first_block(server: str, motion: str) -> None:
@@ -82,7 +84,7 @@ async def test_without_the_motion_track_no_block_comes(server: str, motion: str)
 
 async def test_blocks_over_http_are_the_same_bytes_and_may_be_kept_for_ever(server: str, motion: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
-        block = await http.get(f"/v1/motions/{motion}/blocks/3/1")
+        block = await http.get(f"/v1/motions/{motion}/blocks/4/1")
         description = await http.get(f"/v1/motions/{motion}/description")
         assert (await http.get(f"/v1/motions/{motion}/blocks/9/0")).status_code == 404
         assert (await http.get(f"/v1/motions/{motion}/blocks/0/x")).status_code == 422

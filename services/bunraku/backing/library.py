@@ -13,6 +13,7 @@ import obstore
 from obstore.store import LocalStore, ObjectStore, from_url
 
 from bunraku.codec.encode import EncodedMotion
+from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.track import MotionTrack, read_track
 from bunraku.wire.messages import Data, Description
 
@@ -66,7 +67,8 @@ class Library:
         await obstore.put_async(self._store, _path(motion), packed)
 
     async def get(self, motion: str) -> StoredMotion | None:
-        """The motion of this id; what could not be an id is no motion, and never a path."""
+        """The motion of this id, None where there is none in a codec that is spoken; what could not be an id is never a
+        path."""
         if not (motion.isascii() and motion.isalnum()):
             return None
         if motion in self._cache:
@@ -78,7 +80,11 @@ class Library:
         except FileNotFoundError:
             return None
         track = msgpack.unpackb(values["description"][1:])["tracks"][0]
-        stored = StoredMotion(motion, values["description"], values["packets"], read_track(track))
+        try:
+            stored = StoredMotion(motion, values["description"], values["packets"], read_track(track))
+        except DamagedBlock:
+            # of a codec that is no longer spoken: its file can be sent again
+            return None
         self._keep(stored)
         return stored
 

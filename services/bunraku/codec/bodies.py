@@ -43,7 +43,7 @@ BELOW, BELOW_COUNT = _lists([_below(joint) for joint in range(JOINT_COUNT)])
 """Joints that turn with each joint, itself first."""
 MOVED, MOVED_COUNT = _lists(
     [
-        [k for k in _below(joint)[1:]] + [JOINT_COUNT + TIPS.index(k) for k in _below(joint) if k in TIPS]
+        _below(joint)[1:] + [JOINT_COUNT + TIPS.index(k) for k in _below(joint) if k in TIPS]
         for joint in range(JOINT_COUNT)
     ]
 )
@@ -129,7 +129,8 @@ def reconstructed(q: int) -> float:
 
 @njit(cache=True)
 def values(q: Integers, channel: int, size: float, unweight: Array, basis: Array) -> Array:
-    """The values (n, 3) of a channel with coefficients `q` (19, 3, K) at steps of `size`, over the rows of `basis` (K, n)."""
+    """The values (n, 3) of a channel with coefficients `q` (19, 3, K) at steps of `size`, over the rows of `basis`
+    (K, n)."""
     count = basis.shape[0]
     coefficients = np.zeros((count, 3))
     v = np.zeros(3)

@@ -18,8 +18,8 @@ MOST_FRAMES = 1_000
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What stands before the coefficients: `frames`, the `step` index (0..255), and `turn`, the whole tenths of a radian
-    (-32..31) of the rotation vector that the root's rotations are relative to."""
+    """What stands before the coefficients: `frames`, the `step` index (0..255), and `turn`, the whole tenths of a
+    radian (-32..31) of the rotation vector that the root's rotations are relative to."""
 
     frames: int
     step: int
@@ -45,8 +45,8 @@ def length_level(frames: int, fps: float) -> int:
 
 
 def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> bytes:
-    """Bytes of a block of `fps` frames a second with coefficients `q` (19, 3, K), K <= frames; zero frequencies at the end
-    cost nothing, nor does the number of frames where it is `usual`.
+    """Bytes of a block of `fps` frames a second with coefficients `q` (19, 3, K), K <= frames; zero frequencies at
+    the end cost nothing, nor does the number of frames where it is `usual`.
 
     Raises ValueError for a coefficient or block that is too large.
     """
@@ -60,7 +60,8 @@ def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> byt
     length = kernels.encode(prior, q, numbers, usual, length_level(head.frames, fps), out)
     if not 0 <= length <= LARGEST_BLOCK:
         raise ValueError("a coefficient is too large to be coded: the step is too fine for this motion")
-    return out[1:length].tobytes().rstrip(b"\0")
+    written: bytes = out[1:length].tobytes()
+    return written.rstrip(b"\0")
 
 
 def decode(prior: Prior, data: bytes, usual: int, fps: float) -> tuple[Head, Integers]:

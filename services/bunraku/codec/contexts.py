@@ -20,9 +20,10 @@ _PAD = 3
 
 
 class Seen(NamedTuple):
-    """Levels of what is coded: `axis` (19, 3, K + 8) of each coefficient and `mean` (19, K + 8) over its axes, shifted by
-    three so that there are zeros on both sides; `total` (K + 8) of the means over the channels done; `run` (K + 1) of
-    the means of this channel up to each frequency; and room for the sums: `shared` (1 + HIDDEN), `features` (32)."""
+    """Levels of what is coded: `axis` (19, 3, K + 8) of each coefficient and `mean` (19, K + 8) over its axes,
+    shifted by three so that there are zeros on both sides; `total` (K + 8) of the means over the channels done; `run`
+    (K + 1) of the means of this channel up to each frequency; and room for the sums: `shared` (1 + HIDDEN),
+    `features` (32)."""
 
     axis: Integers
     mean: Integers
@@ -113,7 +114,7 @@ def scale(prior: Prior, seen: Seen, channel: int, axis: int, k: int) -> int:
             x += f[i] * prior.hidden[j, i]
         if x > 0:
             result += (min(x >> 8, 32767) * prior.out[j, group]) >> 12
-    return min(max(result, LOW), HIGH)
+    return min(max(result, LOW), HIGH)  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
@@ -142,4 +143,4 @@ def sign_context(q: Integers, channel: int, axis: int, k: int) -> int:
     """Context of a sign: a movement that a block cuts off leaves every second frequency with one sign."""
     near = min(max(q[channel, axis, k - 2], -2), 2) if k > 2 else 0
     far = min(max(q[channel, axis, k - 4], -1), 1) if k > 4 else 0
-    return 3 * (near + 2) + far + 1  # type: ignore[no-any-return]
+    return 3 * (near + 2) + far + 1

@@ -34,10 +34,13 @@ GROUPS: Integers = np.array(
 
 
 def on_grid(figure: Figure) -> Figure:
-    """`figure` as it will be decoded: on the grid of `FIGURE_UNIT`. Raises ValueError for a limb longer than the code has."""
+    """`figure` as it will be decoded: on the grid of `FIGURE_UNIT`. Raises ValueError for a limb longer than the code
+    has."""
     numbers = np.round(np.concatenate([figure.offsets, figure.tips]) / FIGURE_UNIT)
     if abs(numbers).max() >= LARGEST // 2:
-        raise ValueError(f"a limb is {abs(numbers).max() * FIGURE_UNIT:.1f} m long; {LARGEST // 2 * FIGURE_UNIT:.1f} m is the most")
+        raise ValueError(
+            f"a limb is {abs(numbers).max() * FIGURE_UNIT:.1f} m long; {LARGEST // 2 * FIGURE_UNIT:.1f} m is the most"
+        )
     return Figure(numbers[:JOINT_COUNT] * FIGURE_UNIT, numbers[JOINT_COUNT:] * FIGURE_UNIT)
 
 
@@ -64,4 +67,9 @@ def unpack_dancer(data: bytes) -> tuple[Figure, Array, int]:
             lengths[row] += _FLIP * lengths[_TWIN[row]]
     tips = np.zeros((JOINT_COUNT, 3))
     tips[list(TIPS)] = lengths[JOINT_COUNT:] * FIGURE_UNIT
-    return Figure(lengths[:JOINT_COUNT] * FIGURE_UNIT, tips), numbers[3 * _ROWS :].reshape(-1, 3).astype(np.float64), data[0]
+    offsets = np.asarray(lengths[:JOINT_COUNT] * FIGURE_UNIT, dtype=np.float64)
+    return (
+        Figure(offsets, tips),
+        numbers[3 * _ROWS :].reshape(-1, 3).astype(np.float64),
+        data[0],
+    )

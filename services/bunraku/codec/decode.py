@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.codec import coefficients, transform
-from bunraku.codec.coefficients import Integers
-from bunraku.codec.prior import Prior, shipped
+from bunraku.codec.prior import Integers, Prior, shipped
 from bunraku.codec.track import TURN_UNIT, MotionTrack, step_size
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -16,8 +15,8 @@ from bunraku.motion.rotation import Array
 
 @dataclass(frozen=True, slots=True)
 class MotionBlock:
-    """A decoded block: `frames` frames, quantised `q` (19, 3, K), their values (19, 3, K) in metres and radians, and the
-    rotations they are relative to (18, 4)."""
+    """A decoded block: `frames` frames, quantised `q` (19, 3, K), their values (19, 3, K) in metres and radians, and
+    the rotations they are relative to (18, 4)."""
 
     frames: int
     q: Integers

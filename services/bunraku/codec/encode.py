@@ -59,7 +59,7 @@ def encode_motion(
     grade: Grade = "best",
     first_seconds: float | None = None,
     prior: Prior | None = None,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> EncodedMotion:
     """Encode `motion` in independent blocks at every largest error of `ladder` (mm), and check each by decoding it.
 

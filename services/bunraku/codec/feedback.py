@@ -128,8 +128,8 @@ def first_pass(
     length: int,
     q: Integers,
 ) -> Array:
-    """Fill `q` (19, 3, K) for a block whose true pose is `true_orientation` (18, n, 4), `true_points` (23, n, 3); K rows of
-    cosines `basis` (K, n); quantiser step `size` of index `step`. The decoded points (23, n, 3)."""
+    """Fill `q` (19, 3, K) for a block whose true pose is `true_orientation` (18, n, 4), `true_points` (23, n, 3); K
+    rows of cosines `basis` (K, n); quantiser step `size` of index `step`. The decoded points (23, n, 3)."""
     frames = basis.shape[1]
     seen = nothing_seen(basis.shape[0])
     orientation, points = np.zeros((18, frames, 4)), np.zeros((23, frames, 3))

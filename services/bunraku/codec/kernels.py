@@ -30,8 +30,8 @@ _MOST_FRAMES_BITS = 10
 
 _ROOT_ALONE = 512
 FRAMES, STEP, TURN_X, TURN_Y, TURN_Z, COUNT, CHANNELS = range(7)
-"""Places in a block's head: frames, step index, the root's turn on three axes (-32..31), frequencies, and channels that are
-coded: 19, or 2 where all joints stand as their references."""
+"""Places in a block's head: frames, step index, the root's turn on three axes (-32..31), frequencies, and channels
+that are coded: 19, or 2 where all joints stand as their references."""
 
 
 @njit(cache=True)
@@ -103,9 +103,7 @@ def _size(decoding: bool, state: Integers, data: Bytes, hazard: Integers, scaled
 
 
 @njit(cache=True)
-def _body(
-    decoding: bool, state: Integers, data: Bytes, prior: Prior, q: Integers, head: Integers, length: int
-) -> bool:
+def _body(decoding: bool, state: Integers, data: Bytes, prior: Prior, q: Integers, head: Integers, length: int) -> bool:
     count, step = head[COUNT], head[STEP]
     seen = nothing_seen(count)
     for channel in range(head[CHANNELS]):
@@ -138,20 +136,21 @@ def encode(prior: Prior, q: Integers, head: Integers, usual: int, length: int, o
 @njit(cache=True)
 def decode_head(data: Bytes, usual: int, head: Integers) -> bool:
     """Read the head alone; False where it cannot be one."""
-    return _head(True, start_decoder(data), data, usual, head)  # type: ignore[no-any-return]
+    return _head(True, start_decoder(data), data, usual, head)
 
 
 @njit(cache=True)
 def decode(prior: Prior, data: Bytes, q: Integers, head: Integers, usual: int, length: int) -> bool:
     """Read a block into `q`, zeros of (19, 3, count); False where it cannot be one."""
     state = start_decoder(data)
-    return _head(True, state, data, usual, head) and _body(True, state, data, prior, q, head, length)  # type: ignore[no-any-return]
+    return _head(True, state, data, usual, head) and _body(True, state, data, prior, q, head, length)
 
 
 @njit(cache=True)
 def numbers(decoding: bool, data: Bytes, values: Integers, groups: Integers) -> int:
-    """Write `values` into `data`, or read them from it: each number's bits less one in unary by the models of its group,
-    which learn, the low bits and the sign equiprobable. The length, its first byte being of no use; -1 where it cannot be."""
+    """Write `values` into `data`, or read them from it: each number's bits less one in unary by the models of its
+    group, which learn, the low bits and the sign equiprobable. The length, its first byte being of no use; -1 where it
+    cannot be."""
     models = np.full((groups.max() + 1, NUMBER_BITS), EVEN)
     state = start_decoder(data) if decoding else start_encoder()
     for i in range(len(values)):

@@ -120,8 +120,8 @@ def _descend(
     price: float,
     change: Array,
 ) -> bool:
-    """One sweep over the frequencies of one axis, of which those of `sums`, their shared context, are used; `change` (n)
-    gets how its values move. Whether any did."""
+    """One sweep over the frequencies of one axis, of which those of `sums`, their shared context, are used; `change`
+    (n) gets how its values move. Whether any did."""
     used, frames = len(sums), basis.shape[1]
     reach = 0
     for x in range(3):
@@ -175,9 +175,7 @@ def _descend(
 
 
 @njit(cache=True)
-def _errors(
-    body: Body, true_orientation: Array, true_points: Array, orientation: Array, points: Array, turned: Array
-) -> Array:
+def _errors(true_orientation: Array, true_points: Array, orientation: Array, points: Array, turned: Array) -> Array:
     """How far points are off (23, n, 3); `turned` (18, n, 3) gets how far joints are turned, world axes."""
     q, v = np.zeros(4), np.zeros(3)
     for joint in range(18):
@@ -219,8 +217,8 @@ def refine(
     price: float,
     level: bool,
 ) -> Array:
-    """Improve `q` in place, arguments as in `first_pass`: `sweeps` times, a bit at `price` squared steps; `level` brings
-    the largest errors down rather than their squares' sum. The decoded points (23, n, 3)."""
+    """Improve `q` in place, arguments as in `first_pass`: `sweeps` times, a bit at `price` squared steps; `level`
+    brings the largest errors down rather than their squares' sum. The decoded points (23, n, 3)."""
     count, frames = basis.shape
     vectors, orientation, points = np.zeros((18, frames, 3)), np.zeros((18, frames, 4)), np.zeros((23, frames, 3))
     turned, weight = np.zeros((18, frames, 3)), np.ones((23, frames))
@@ -228,7 +226,7 @@ def refine(
     axes, sums = np.zeros((frames, 3)), np.zeros((count, 1 + HIDDEN), np.int64)
     for _ in range(sweeps):
         pose(body, q, size, basis, vectors, orientation, points)
-        off = _errors(body, true_orientation, true_points, orientation, points, turned)
+        off = _errors(true_orientation, true_points, orientation, points, turned)
         if level:
             _weigh(off, weight)
         used = 0

@@ -11,9 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from bunraku.codec import coefficients, transform
-from bunraku.codec.coefficients import Head, Integers
+from bunraku.codec.coefficients import Head
 from bunraku.codec.decode import root_reference
-from bunraku.codec.prior import Prior
+from bunraku.codec.prior import Integers, Prior
 from bunraku.codec.track import TURN_UNIT, MotionTrack, step_size
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -138,8 +138,8 @@ class BlockEncoder:
         return min((coded for step, coded in tried.items() if holds(step)), key=lambda coded: len(coded.data))
 
     def averaged(self, mean: float) -> list[Coded]:
-        """All blocks with a mean error over the motion of at most `mean` mm and near it: at the coarsest step that is fine
-        enough, as many blocks one step coarser as the mean allows."""
+        """All blocks with a mean error over the motion of at most `mean` mm and near it: at the coarsest step that is
+        fine enough, as many blocks one step coarser as the mean allows."""
         blocks, frames = self._track.blocks, self._track.frames
         tried: dict[int, list[Coded]] = {}
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.codec.dancer import FIGURE_UNIT, on_grid, pack_dancer, unpack_dancer
+from bunraku.codec.dancer import on_grid, pack_dancer, unpack_dancer
 from bunraku.codec.errors import DamagedBlock
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -127,8 +127,8 @@ def _weights(figure: Figure) -> Array:
 
 
 def plan(motion: Motion, block_seconds: float = 1.0, first_seconds: float | None = None) -> tuple[MotionTrack, Motion]:
-    """The track of `motion` in even blocks of about `block_seconds`, the first of `first_seconds` where that is given, and
-    the motion upon the track's figure.
+    """The track of `motion` in even blocks of about `block_seconds`, the first of `first_seconds` where that is
+    given, and the motion upon the track's figure.
 
     The figure goes to the track's grid (0.05 mm) before anything is encoded, so that limb lengths are exact ever after.
     """

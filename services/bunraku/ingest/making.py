@@ -6,13 +6,18 @@ from pathlib import Path
 
 from bunraku.backing.library import pack
 from bunraku.codec import encode
-from bunraku.codec.encode import encode_motion
+from bunraku.codec.encode import Grade, encode_motion
 from bunraku.ingest.results import Made, Refused
 from bunraku.marionette.limbs import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.analysis import analyse
 from bunraku.motion.bvh import read
 from bunraku.motion.errors import UnreadableMotion
+
+FIRST_SECONDS = 0.5
+"""Of the first block, so that a dance starts soon on a narrow line."""
+MOST_FRAMES_AT_BEST = 6_000
+"""Longer motions are encoded in one pass: no one waits minutes for a few per cent."""
 
 _SMALLEST = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xrotation } MOTION Frames: 1 Frame Time: 0.1 0"
 
@@ -30,7 +35,8 @@ def make(motion: str, path: Path) -> Made | Refused:
         return Refused(error.title, error.detail, error.line, error.field, error.hint or None)
     except ProportionsError as error:
         return Refused("No puppet's arms", f"its arms cannot be pulled: {error}", field=error.field, hint=error.hint)
-    encoded = encode_motion(analysis.motion)
+    grade: Grade = "best" if analysis.motion.frames <= MOST_FRAMES_AT_BEST else "live"
+    encoded = encode_motion(analysis.motion, first_seconds=FIRST_SECONDS, grade=grade)
     track = encoded.track
     return Made(
         pack(motion, encoded),

@@ -53,11 +53,14 @@ class Uploads:
     async def add(self, motion: str, path: Path, filename: str) -> tuple[Entry, bool]:
         """The motion of the file at `path`, whose id is `motion`, and whether it is new; raises `ProblemError`."""
         known = await self._backing.catalogue.get(motion)
-        if known is not None:
+        if known is not None and await self._backing.library.get(motion) is not None:
             return known, False
         async with self._places:
             made = await jobs.run(motion, path, self._backing.settings.upload_seconds)
         size = await asyncio.to_thread(os.path.getsize, path)
+        if known is not None and isinstance(made, Made):
+            # stored in a codec that is no longer spoken: made anew
+            await self._backing.catalogue.remove(motion)
         return await self._store(motion, made, filename, size)
 
     async def _receive(self, request: Request, path: Path) -> str:

@@ -38,7 +38,7 @@ function level(scale: number, probability: number) {
 
 const number = (value: number, bits: number) =>
   Array.from({ length: bits }, (_, i) => ({ bit: (value >> (bits - 1 - i)) & 1, probability: 16384 }));
-const head = [{ bit: 1, probability: 32440 }, ...number(90, 8), ...number(32, 6), ...number(31, 6), ...number(33, 6), ...number(1, 5)];
+const head = [{ bit: 1, probability: 32440 }, { bit: 0, probability: 512 }, ...number(90, 8), ...number(32, 6), ...number(31, 6), ...number(33, 6), ...number(1, 5)];
 const ones = (count: number, probability: number) => new Array(count).fill({ bit: 1, probability });
 
 test("the largest size there can be is above 2^31, and right", () => {
