@@ -14,7 +14,7 @@ UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/index.html services/web/vite.config.ts -type f 2>/dev/null)
 
-.PHONY: help setup demo test lint test-python test-web vectors clean
+.PHONY: help setup demo test lint test-python test-web vectors prior clean
 
 help:
 	@echo "make demo    set everything up and open the dancing puppet   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
@@ -54,7 +54,7 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python services/bunraku/codec/*.py services/bunraku/motion/bvh_numbers.py
+.setup/warm: .setup/python services/bunraku/codec/*.py services/bunraku/codec/prior.json services/bunraku/motion/bvh_numbers.py
 	@echo "setup: compiling reader and codec"
 	@$(BIN)/bunraku warm
 	@touch $@
@@ -80,6 +80,10 @@ test: setup lint test-web test-python
 
 vectors: .setup/python
 	$(BIN)/python -m tests.vectors
+
+# trains the codec's prior on a folder of clips, about ten minutes
+prior: .setup/python
+	$(BIN)/python -m training.prior $(or $(CORPUS),../shared/mocap)
 
 bench-%: setup
 	$(BIN)/python -m tests.bench.$(subst -,_,$*) $(ARGUMENTS)

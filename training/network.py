@@ -17,8 +17,8 @@ from bunraku.codec.prior import AXES, CLASSES, FEATURES, HIDDEN, ROWS, SIGNS, UN
 
 Array = npt.NDArray[np.float64]
 _LN2 = float(np.log(2))
-_RATES = (1.2, 4.0, 2.0, 2.0, 2.0, 1.2, 4.0)
-_DECAY = (3e-3, 1e-3, 3e-3, 1e-3, 0.0, 1e-3, 0.0)
+_RATES = (0.3, 1.0, 0.5, 0.5, 0.5, 0.3, 1.0)
+_DECAY = (5e-5, 5e-4, 5e-5, 5e-4, 0.0, 0.0, 0.0)
 # biases are drawn to their mean, the others to nothing
 _TO_MEAN = (False, True, False, True, False, False, False)
 

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bunraku.motion.skeleton import INDEX, world
+from tests.vectors.blocks import wandering_motion
+from training import corpus
+
+
+def test_a_mirrored_dance_is_the_dance_in_a_mirror() -> None:
+    motion = wandering_motion(0.5, 30.0, 3)
+    twin = corpus.mirrored(motion)
+    here = world(motion.figure, motion.root, motion.rotations)[0]
+    there = world(twin.figure, twin.root, twin.rotations)[0]
+    flip = np.array([-1.0, 1.0, 1.0])
+    np.testing.assert_allclose(there[:, INDEX["l_wrist"]], here[:, INDEX["r_wrist"]] * flip, atol=1e-9)
+    np.testing.assert_allclose(there[:, INDEX["skullbase"]], here[:, INDEX["skullbase"]] * flip, atol=1e-9)
+
+
+def test_only_licensed_motion_is_learned_from(tmp_path: Path) -> None:
+    (tmp_path / "CORPUS.csv").write_text(
+        "clip,licence_as_stated\na,MIT\nb,repo LICENSE Apache-2.0; motion origin not stated\nc,\n", encoding="utf-8"
+    )
+    assert corpus.licensed(tmp_path) == {"a"}
+
+
+def test_families_and_an_empty_folder(tmp_path: Path) -> None:
+    assert [corpus.family(name) for name in ("perfume_A", "isaac_01_01", "mass_cart", "13_07")] == [
+        "perfume",
+        "isaac",
+        "mass",
+        "cmu",
+    ]
+    with pytest.raises(FileNotFoundError, match="hanim19"):
+        corpus.names(tmp_path)
+
+
+def test_real_clips_are_read(shared: Path) -> None:
+    folder = shared / "mocap"
+    assert corpus.licensed(folder) < set(corpus.names(folder))
+    motion = corpus.load(folder, "perfume_C")
+    assert (motion.fps, motion.frames) == (40.0, 1299)
+    np.testing.assert_allclose(np.linalg.norm(motion.rotations, axis=-1), 1, atol=1e-9)
