@@ -16,7 +16,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-from training import corpus as clips
 
 from bunraku.codec.dancer import pack_dancer
 from bunraku.codec.decode import decode_block
@@ -26,6 +25,7 @@ from bunraku.codec.track import MotionTrack
 from bunraku.motion.skeleton import Motion
 from bunraku.wire.messages import Data
 from tests.bench import peers
+from training import corpus as clips
 
 GOALS = (("mean", 1.0), ("mean", 5.0), ("max", 10.0), ("max", 2.0))
 PEERS = {"acl": "acl", "meshopt": "meshopt_brotli"}
