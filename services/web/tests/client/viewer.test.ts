@@ -253,7 +253,7 @@ describe("what cannot be played", () => {
     ["no motion", [{ type: "audio" }], "the stream has no motion in it"],
     ["another codec", [{ ...goldenDescription(), codec: "bunraku.motion/9" }], "motion is of codec bunraku.motion/9"],
     ["no frames", [{ ...goldenDescription(), frames: 0 }], "motion needs frames"],
-    ["a figure cut short", [{ ...goldenDescription(), figure: new Uint8Array(9) }], "a figure has 138 bytes, not 9"],
+    ["a dancer cut short", [{ ...goldenDescription(), dancer: new Uint8Array(0) }], "a dancer has 1..1024 bytes, not 0"],
     ["no rates", [{ ...goldenDescription(), rates: [] }], "motion needs rates"],
     ["a rate of nothing", [{ ...goldenDescription(), rates: [null] }], "rate 0 needs kbps"],
   ])("%s ends it and says why", (_, tracks, why) => {
