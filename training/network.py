@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from bunraku.codec.prior import AXES, CLASSES, FEATURES, HIDDEN, ROWS, SIGNS, UNARY, Prior
+from bunraku.codec.prior import AXES, CLASSES, FEATURES, HAZARD_OF, HIDDEN, ROWS, SIGNS, UNARY, Prior
 
 Array = npt.NDArray[np.float64]
 _LN2 = float(np.log(2))
@@ -38,7 +38,7 @@ def start(seed: int = 0) -> list[Array]:
         np.zeros((HIDDEN, AXES)),
         random.normal(0, 0.1, (HIDDEN, CLASSES)),
         random.normal(0, 0.02, (HIDDEN, CLASSES)),
-        np.log(odds / (1 - odds)),
+        np.tile(np.log(odds / (1 - odds)), (HAZARD_OF[-1] + 1, 1)),
     ]
 
 
@@ -86,6 +86,7 @@ def _loss(
         place = (scale - shift + 7) * 4
         at = min(int(place), ROWS - 2)
         weight = min(place - at, 1.0)
+        at += ROWS * HAZARD_OF[group]
         high, slope = size >> shift, 0.0
         loss += shift * _LN2
         for value in range(UNARY):

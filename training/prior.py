@@ -47,7 +47,7 @@ def examples(folder: Path, name: str, current: Prior, round_: int) -> Examples:
             data = encoder.block(index, step, "mean").data
             head, q = decode(current, data, track.block_frames, track.fps)
             rows = q.size
-            numbers = np.array([head.frames, head.step, *head.turn, q.shape[2], 19], dtype=np.int64)
+            numbers = np.array([head.frames, head.step, head.heading, q.shape[2], 19], dtype=np.int64)
             f, w = np.zeros((rows, FEATURES), dtype=np.int64), np.zeros((rows, 5), dtype=np.int64)
             kernels.examples(current, q, numbers, length_level(head.frames, track.fps), f, w, 0)
             features.append(f.astype(np.int16))

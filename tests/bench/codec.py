@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 
-from bunraku.codec.dancer import pack_dancer
 from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import LADDER, encode_mean, encode_motion, warm
 from bunraku.codec.prior import Prior, parse, shipped
@@ -42,7 +41,7 @@ def received(track: MotionTrack, blocks: list[bytes]) -> int:
     """Bytes of a motion on its way to a viewer."""
     packets = [len(Data(0, 0, track.start_us(index), block).pack()) for index, block in enumerate(blocks)]
     framed = sum(size + (2 if size < 126 else 4) for size in packets)
-    return framed + len(pack_dancer(track.figure, track.reference, track.reference_bits))
+    return framed + len(track.dancer.pack())
 
 
 def ours(motion: Motion, goal: tuple[str, float], prior: Prior, block_seconds: float) -> float:
@@ -98,7 +97,7 @@ def decode_ms_typescript(motions: dict[str, Motion]) -> float | None:
             "frames": track.frames,
             "blockFrames": track.block_frames,
             "firstFrames": track.first_frames,
-            "dancer": pack_dancer(track.figure, track.reference, track.reference_bits).hex(),
+            "dancer": track.dancer.pack().hex(),
         }
         coded.append({"track": described, "blocks": [block.hex() for block in rate.blocks]})
     with tempfile.TemporaryDirectory() as folder:

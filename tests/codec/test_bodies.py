@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from bunraku.codec import bodies, transform
 from bunraku.codec.bodies import BELOW, BELOW_COUNT, MOVED, MOVED_COUNT, Body
-from bunraku.codec.decode import reconstruct, root_reference
+from bunraku.codec.decode import reconstruct
 from bunraku.codec.track import plan
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import INDEX, JOINT_COUNT, TIPS, points, world
@@ -48,7 +48,7 @@ def test_a_block_s_pose_is_that_of_the_decoder() -> None:
         track.figure.tips,
         weight,
         track.unweights,
-        np.concatenate([root_reference((3, -9, 1)), track.reference_rotations]),
+        track.reference_rotations(-9),
     )
     basis = transform.basis(30, 8, np.arange(30.0))
     vectors, orientation, placed = np.zeros((18, 30, 3)), np.zeros((18, 30, 4)), np.zeros((23, 30, 3))

@@ -15,7 +15,7 @@ def test_bit_length() -> None:
 def test_examples_have_every_coefficient_in_the_coder_s_order() -> None:
     random = np.random.default_rng(3)
     q = random.integers(-3, 4, (19, 3, 6))
-    head = np.array([30, 120, 0, 0, 0, 6, 19], dtype=np.int64)
+    head = np.array([30, 120, 0, 6, 19], dtype=np.int64)
     features, where = np.zeros((q.size, FEATURES), np.int64), np.zeros((q.size, 5), np.int64)
     assert kernels.examples(PRIOR, q, head, 64, features, where, 0) == q.size
     np.testing.assert_array_equal(where[:, 2], abs(q).transpose(0, 2, 1).ravel())
@@ -24,7 +24,7 @@ def test_examples_have_every_coefficient_in_the_coder_s_order() -> None:
 
 
 def test_what_cannot_be_a_head_is_said() -> None:
-    head = np.zeros(7, dtype=np.int64)
+    head = np.zeros(5, dtype=np.int64)
     # nothing but zeros takes the lower part always: 30 frames, all bits of the count set
     assert not kernels.decode_head(np.zeros(9, dtype=np.uint8), 30, head)
     assert head[kernels.COUNT] == 31

@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 
 from bunraku.codec import bodies, prior, refine, transform
-from bunraku.codec.decode import root_reference
 from bunraku.codec.search import BlockEncoder
 from bunraku.codec.track import plan
 from bunraku.motion.skeleton import points
@@ -20,7 +19,7 @@ def test_slopes_are_those_of_the_error() -> None:
         TRACK.figure.tips,
         weight,
         TRACK.unweights,
-        np.concatenate([root_reference((0, 9, 0)), TRACK.reference_rotations]),
+        TRACK.reference_rotations(9),
     )
     basis = np.ascontiguousarray(transform.basis(30, 6, np.arange(30.0)).T)
     q = np.random.default_rng(2).integers(-9, 10, (19, 3, 6))

@@ -62,7 +62,7 @@ def test_a_track_survives_its_description() -> None:
     assert (again.fps, again.frames, again.block_frames) == (track.fps, track.frames, track.block_frames)
     assert again.first_frames == track.first_frames
     np.testing.assert_allclose(again.weights, track.weights, atol=1e-12)
-    np.testing.assert_allclose(again.reference_rotations, track.reference_rotations, atol=1e-12)
+    np.testing.assert_allclose(again.reference_rotations(7), track.reference_rotations(7), atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import numpy as np
 
 from bunraku.codec import coefficients
 from bunraku.codec.coefficients import Head
-from bunraku.codec.dancer import pack_dancer
 from bunraku.codec.decode import decode_block
 from bunraku.codec.prior import Integers, shipped
 from bunraku.codec.search import BlockEncoder
@@ -78,7 +77,7 @@ def vector(track: MotionTrack, number: int, data: bytes) -> dict[str, Any]:
         "block": text(data),
         "frames": start.frames,
         "step": start.step,
-        "turn": list(start.turn),
+        "heading": start.heading,
         "q": q.ravel().tolist(),
         "poses": poses,
     }
@@ -91,10 +90,10 @@ def describe(track: MotionTrack) -> dict[str, Any]:
         "frames": track.frames,
         "block_frames": track.block_frames,
         "first_frames": track.first_frames,
-        "dancer": text(pack_dancer(track.figure, track.reference, track.reference_bits)),
+        "dancer": text(track.dancer.pack()),
         "offsets": track.figure.offsets.ravel().tolist(),
         "tips": track.figure.tips.ravel().tolist(),
-        "reference": np.concatenate([rotation.IDENTITY, track.reference_rotations.ravel()]).tolist(),
+        "reference": track.reference_rotations().ravel().tolist(),
         "weights": track.weights.tolist(),
     }
 
@@ -122,20 +121,20 @@ def make() -> dict[str, Any]:
         coded = BlockEncoder(tracks[number], of, shipped()).block(index, step, goal)
         valid.append(vector(tracks[number], number, coded.data))
     random = np.random.default_rng(9)
-    for number, frames, step, turn, count, most in (
-        (0, 30, 0, (0, 0, 0), 0, 1),
-        (0, 1, 0, (-32, 31, 0), 1, 12),
-        (1, 2, 255, (31, 0, -32), 2, 3),
-        (0, 31, 7, (1, -2, 3), 31, 1 << 12),
-        (0, 30, 0, (-3, 2, -1), 24, 1 << 20),
-        (1, 240, 77, (0, 16, 0), 70, 60),
-        (2, 1000, 100, (0, -1, 0), 40, 1 << 8),
+    for number, frames, step, heading, count, most in (
+        (0, 30, 0, 0, 0, 1),
+        (0, 1, 0, 31, 1, 12),
+        (1, 2, 255, -32, 2, 3),
+        (0, 31, 7, -2, 31, 1 << 12),
+        (0, 30, 0, 2, 24, 1 << 20),
+        (1, 240, 77, 16, 70, 60),
+        (2, 1000, 100, -1, 40, 1 << 8),
     ):
         track = tracks[number]
         q = wild(random, count, most)
-        data = coefficients.encode(shipped(), Head(frames, step, turn), q, track.block_frames, track.fps)
+        data = coefficients.encode(shipped(), Head(frames, step, heading), q, track.block_frames, track.fps)
         valid.append(vector(track, number, data))
-    rest = [(9, 8), (32, 6), (32, 6), (32, 6)]
+    rest = [(9, 8), (32, 6)]
     invalid = {
         "empty: more frequencies than frames": b"",
         "no frames": head(rest, 0),

@@ -18,12 +18,12 @@ MOST_FRAMES = 1_000
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What stands before the coefficients: `frames`, the `step` index (0..255), and `turn`, the whole tenths of a
-    radian (-32..31) of the rotation vector that the root's rotations are relative to."""
+    """What stands before the coefficients: `frames`, the `step` index (0..255), and `heading`, the turn about y that
+    the root's rotations are relative to, in 1/64 of a whole one (-32..31)."""
 
     frames: int
     step: int
-    turn: tuple[int, int, int]
+    heading: int
 
 
 @cache
@@ -36,7 +36,7 @@ def _kernels() -> ModuleType:
 def warm(prior: Prior) -> None:
     """Load the compiled code, or compile it where that was never done: seconds that no one should wait for later."""
     ones = np.ones((CHANNEL_COUNT, 3, 2), dtype=np.int64)
-    decode(prior, encode(prior, Head(2, 100, (0, 0, 0)), ones, 2, 30.0), 2, 30.0)
+    decode(prior, encode(prior, Head(2, 100, 0), ones, 2, 30.0), 2, 30.0)
 
 
 def length_level(frames: int, fps: float) -> int:
@@ -56,7 +56,7 @@ def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> byt
     kernels = _kernels()
     out = kernels.room(q)
     channels = CHANNEL_COUNT if q[2:].any() else 2
-    numbers = np.array([head.frames, head.step, *head.turn, count, channels], dtype=np.int64)
+    numbers = np.array([head.frames, head.step, head.heading, count, channels], dtype=np.int64)
     length = kernels.encode(prior, q, numbers, usual, length_level(head.frames, fps), out)
     if not 0 <= length <= LARGEST_BLOCK:
         raise ValueError("a coefficient is too large to be coded: the step is too fine for this motion")
@@ -69,32 +69,33 @@ def decode(prior: Prior, data: bytes, usual: int, fps: float) -> tuple[Head, Int
     if len(data) > LARGEST_BLOCK:
         raise DamagedBlock(f"a block has at most {LARGEST_BLOCK} bytes, not {len(data)}")
     kernels = _kernels()
-    numbers = np.zeros(7, dtype=np.int64)
+    numbers = np.zeros(5, dtype=np.int64)
     octets = np.array(bytearray(data), dtype=np.uint8)
     if not kernels.decode_head(octets, usual, numbers):
         raise DamagedBlock(
-            f"block says {numbers[0]} frames and {numbers[5]} frequencies; 1..{MOST_FRAMES} and no more are allowed"
+            f"block says {numbers[0]} frames and {numbers[3]} frequencies; 1..{MOST_FRAMES} and no more are allowed"
         )
-    frames, step, x, y, z, count = map(int, numbers[:6])
+    frames, step, heading, count = map(int, numbers[:4])
     q = np.zeros((CHANNEL_COUNT, 3, count), dtype=np.int64)
     if not kernels.decode(prior, octets, q, numbers, usual, length_level(frames, fps)):
         raise DamagedBlock(f"block holds a number longer than {kernels.ESCAPE} bits")
-    return Head(frames, step, (x, y, z)), q
+    return Head(frames, step, heading), q
 
 
-def encode_numbers(values: Integers, groups: Integers) -> bytes:
-    """Bytes of some whole numbers, each of a group with models of its own; raises ValueError for one above 2^16."""
+def encode_numbers(values: Integers, groups: Integers, twins: Integers) -> bytes:
+    """Bytes of some whole numbers, each of a group with models of its own and perhaps with a twin before it, by its
+    place; raises ValueError for one above 2^16."""
     out = np.zeros(64 + 8 * len(values), dtype=np.uint8)
-    length = _kernels().numbers(False, out, np.array(values, dtype=np.int64), groups)
+    length = _kernels().numbers(False, out, np.array(values, dtype=np.int64), groups, twins)
     if length < 0:
         raise ValueError("a number is too large to be coded")
     return out[1:length].tobytes().rstrip(b"\0")
 
 
-def decode_numbers(data: bytes, groups: Integers) -> Integers:
+def decode_numbers(data: bytes, groups: Integers, twins: Integers) -> Integers:
     """The numbers of `encode_numbers`; raises `DamagedBlock`."""
     kernels = _kernels()
     values = np.zeros(len(groups), dtype=np.int64)
-    if kernels.numbers(True, np.array(bytearray(data), dtype=np.uint8), values, groups) < 0:
-        raise DamagedBlock(f"a number is longer than {kernels.NUMBER_BITS} bits")
+    if kernels.numbers(True, np.array(bytearray(data), dtype=np.uint8), values, groups, twins) < 0:
+        raise DamagedBlock(f"a number is longer than {kernels.NUMBER_BITS} bits, or less than none")
     return values

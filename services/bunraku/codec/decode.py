@@ -8,7 +8,7 @@ import numpy as np
 
 from bunraku.codec import coefficients, transform
 from bunraku.codec.prior import Integers, Prior, shipped
-from bunraku.codec.track import TURN_UNIT, MotionTrack, step_size
+from bunraku.codec.track import MotionTrack, step_size
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 
@@ -38,11 +38,6 @@ def reconstruct(q: Integers) -> Array:
     return values
 
 
-def root_reference(turn: tuple[int, int, int]) -> Array:
-    """The rotation (1, 4) that a block's root is relative to."""
-    return rotation.from_rotation_vector(np.array([turn]) * TURN_UNIT)
-
-
 def decode_block(track: MotionTrack, data: bytes, prior: Prior | None = None) -> MotionBlock:
     """Decode one block of `track`; raises `DamagedBlock` on what cannot be one.
 
@@ -51,8 +46,7 @@ def decode_block(track: MotionTrack, data: bytes, prior: Prior | None = None) ->
     head, q = coefficients.decode(prior or shipped(), data, track.block_frames, track.fps)
     size = step_size(head.step, head.frames)
     values = track.unweights @ (reconstruct(q) * size)
-    reference = np.concatenate([root_reference(head.turn), track.reference_rotations])
-    return MotionBlock(head.frames, q, values, reference)
+    return MotionBlock(head.frames, q, values, track.reference_rotations(head.heading))
 
 
 def warm() -> None:

@@ -27,7 +27,7 @@ from bunraku.codec.bodies import (
 )
 from bunraku.codec.contexts import Seen, nothing_seen, scale, see, see_channel, see_frequency, share
 from bunraku.codec.costs import bits
-from bunraku.codec.prior import Integers, Prior
+from bunraku.codec.prior import CLASS_OF, Integers, Prior
 
 AIM = 0.85
 """Share of the least-squares correction that is taken: all of it would chase the quantiser's noise."""
@@ -63,7 +63,7 @@ def _choose(
                 least = np.inf
                 for candidate in (nearest, nearest - 1, 0):
                     off = ideal - reconstructed(candidate)
-                    cost = off * off + _PRICE * bits(costs, expected, candidate)
+                    cost = off * off + _PRICE * bits(costs, CLASS_OF[k], expected, candidate)
                     if cost < least:
                         least, best = cost, candidate
             q[channel, axis, k] = best if wanted[k, axis] > 0 else -best

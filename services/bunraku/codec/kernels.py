@@ -18,20 +18,22 @@ from bunraku.codec.contexts import (
     share,
     sign_context,
 )
-from bunraku.codec.prior import CLASS_OF, ROWS, UNARY, Integers, Prior
+from bunraku.codec.prior import CLASS_OF, HAZARD_OF, ROWS, UNARY, Integers, Prior
 from bunraku.codec.rangecoder import EVEN, Bytes, decode_bit, encode_bit, finish, start_decoder, start_encoder
 
 ESCAPE = 20
 """Bits of an escape's length, at most."""
 NUMBER_BITS = 17
 """Bits of a dancer's number, less one, are fewer."""
+_LONGER = 22938
+"""Odds of another bit before any number is seen, 0.7."""
 _FRAMES_AS_USUAL = 32440
 _MOST_FRAMES_BITS = 10
 
 _ROOT_ALONE = 512
-FRAMES, STEP, TURN_X, TURN_Y, TURN_Z, COUNT, CHANNELS = range(7)
-"""Places in a block's head: frames, step index, the root's turn on three axes (-32..31), frequencies, and channels
-that are coded: 19, or 2 where all joints stand as their references."""
+FRAMES, STEP, HEADING, COUNT, CHANNELS = range(5)
+"""Places in a block's head: frames, step index, heading (-32..31), frequencies, and channels that are coded: 19, or 2
+where all joints stand as their references."""
 
 
 @njit(cache=True)
@@ -71,20 +73,20 @@ def _head(decoding: bool, state: Integers, data: Bytes, usual: int, head: Intege
     alone = _bit(decoding, state, data, _ROOT_ALONE, 1 if head[CHANNELS] == 2 else 0)
     head[CHANNELS] = 2 if alone else 19
     head[STEP] = _number(decoding, state, data, 8, head[STEP])
-    for i in range(TURN_X, TURN_Z + 1):
-        head[i] = _number(decoding, state, data, 6, head[i] + 32) - 32
+    head[HEADING] = _number(decoding, state, data, 6, head[HEADING] + 32) - 32
     head[COUNT] = _number(decoding, state, data, bit_length(head[FRAMES]), head[COUNT])
     return head[COUNT] <= head[FRAMES]  # type: ignore[no-any-return]
 
 
 @njit(cache=True)
-def _size(decoding: bool, state: Integers, data: Bytes, hazard: Integers, scaled: int, size: int) -> int:
-    """A coefficient's size where about 2^(scaled / 256) is expected; -1 where it cannot be one."""
+def _size(decoding: bool, state: Integers, data: Bytes, hazard: Integers, group: int, scaled: int, size: int) -> int:
+    """The size of a coefficient of class `group` where about 2^(scaled / 256) is expected; -1 where it cannot be."""
     shift = (scaled >> 8) - 3 if scaled >= 1024 else 0
     place = (scaled - shift * 256 + 7 * 256) * 4
     row, weight = place >> 8, place & 255
     if row > ROWS - 2:
         row, weight = ROWS - 2, 256
+    row += ROWS * HAZARD_OF[group]
     high, value = size >> shift, 0
     while value < UNARY:
         probability = (hazard[row, value] * (256 - weight) + hazard[row + 1, value] * weight) >> 8
@@ -111,7 +113,7 @@ def _body(decoding: bool, state: Integers, data: Bytes, prior: Prior, q: Integer
             share(prior, seen, channel, k, count, step, length)
             for axis in range(3):
                 scaled = scale(prior, seen, channel, axis, k)
-                size = _size(decoding, state, data, prior.hazard, scaled, abs(q[channel, axis, k]))
+                size = _size(decoding, state, data, prior.hazard, CLASS_OF[k], scaled, abs(q[channel, axis, k]))
                 if size < 0:
                     return False
                 if size > 0:
@@ -147,27 +149,45 @@ def decode(prior: Prior, data: Bytes, q: Integers, head: Integers, usual: int, l
 
 
 @njit(cache=True)
-def numbers(decoding: bool, data: Bytes, values: Integers, groups: Integers) -> int:
-    """Write `values` into `data`, or read them from it: each number's bits less one in unary by the models of its
-    group, which learn, the low bits and the sign equiprobable. The length, its first byte being of no use; -1 where it
-    cannot be."""
-    models = np.full((groups.max() + 1, NUMBER_BITS), EVEN)
+def _learned(decoding: bool, state: Integers, data: Bytes, model: Integers, at: int, bit: int) -> int:
+    got = _bit(decoding, state, data, model[at], bit)
+    moved = model[at] + (((32768 if got else 0) - model[at]) >> 3)
+    model[at] = min(max(moved, 1024), 31744)
+    return got
+
+
+@njit(cache=True)
+def numbers(decoding: bool, data: Bytes, values: Integers, groups: Integers, twins: Integers) -> int:
+    """Write `values` into `data`, or read them from it, each by the models of its group, which learn: of a number its
+    size plus one, its bits less one in unary, then its low bits, then the sign; of one with a twin before it what its
+    size differs from the twin's, in the same way, and whether its sign does. The length, its first byte being of no
+    use; -1 where it cannot be."""
+    lengths = np.full((groups.max() + 1, NUMBER_BITS), _LONGER)
+    signs = np.full(groups.max() + 1, EVEN)
     state = start_decoder(data) if decoding else start_encoder()
     for i in range(len(values)):
-        model, size = models[groups[i]], abs(values[i]) + 1
+        group, twin = groups[i], abs(values[twins[i]]) if twins[i] >= 0 else 0
+        rest = abs(values[i]) - twin
+        size = abs(rest) + 1
         bits, length = 0 if decoding else bit_length(size) - 1, 0
-        while length < NUMBER_BITS:
-            more = _bit(decoding, state, data, model[length], 1 if bits > length else 0)
-            moved = model[length] + (((32768 if more else 0) - model[length]) >> 3)
-            model[length] = min(max(moved, 1024), 31744)
-            if not more:
-                break
+        while length < NUMBER_BITS and _learned(
+            decoding, state, data, lengths[group], length, 1 if bits > length else 0
+        ):
             length += 1
         if length == NUMBER_BITS:
             return -1
         size = (1 << length | _number(decoding, state, data, length, size)) - 1
-        if size > 0:
-            values[i] = -size if _bit(decoding, state, data, EVEN, 1 if values[i] < 0 else 0) else size
+        if twins[i] < 0:
+            sign = size > 0 and _bit(decoding, state, data, EVEN, 1 if values[i] < 0 else 0)
+        else:
+            smaller = size > 0 and _bit(decoding, state, data, EVEN, 1 if rest < 0 else 0)
+            size = twin - size if smaller else twin + size
+            if size < 0:
+                return -1
+            other = values[twins[i]] < 0
+            differs = size > 0 and _learned(decoding, state, data, signs, group, 1 if (values[i] < 0) != other else 0)
+            sign = other != differs
+        values[i] = -size if sign else size
     return 0 if decoding else finish(state, data)
 
 

@@ -26,6 +26,8 @@ CLASSES = 7
 """Classes of frequencies: 0, 1, 2, 3-4, 5-8, 9-15, 16 and above."""
 ROWS = 48
 """Scales of the hazards: 2^-7 .. 2^4.75 in quarter octaves."""
+HAZARD_OF: Integers = np.array([0, 0, 0, 1, 1, 2, 2], dtype=np.int64)
+"""Of each class the table of hazards: its sizes are spread alike."""
 UNARY = 18
 """Decisions "larger than this?" before an escape."""
 SIGNS = 15
@@ -37,8 +39,8 @@ class Prior(NamedTuple):
     """The network from features to a scale (int64, weights in 1/4096), the hazards of each scale, the signs' odds.
 
     `linear` (CLASSES, FEATURES) and `bias` (CLASSES, AXES); `hidden` (HIDDEN, FEATURES), `hidden_bias` (HIDDEN, AXES),
-    `hidden_class` (HIDDEN, CLASSES) and `out` (HIDDEN, CLASSES); `hazard` (ROWS, UNARY) and `sign` (CLASSES, SIGNS) are
-    probabilities of a 1 in 1/32768.
+    `hidden_class` (HIDDEN, CLASSES) and `out` (HIDDEN, CLASSES); `hazard` (3 * ROWS, UNARY), three tables, and `sign`
+    (CLASSES, SIGNS) are probabilities of a 1 in 1/32768.
     """
 
     linear: Integers
@@ -58,7 +60,7 @@ SHAPES = Prior(
     hidden_bias=(HIDDEN, AXES),  # type: ignore[arg-type]
     hidden_class=(HIDDEN, CLASSES),  # type: ignore[arg-type]
     out=(HIDDEN, CLASSES),  # type: ignore[arg-type]
-    hazard=(ROWS, UNARY),  # type: ignore[arg-type]
+    hazard=(3 * ROWS, UNARY),  # type: ignore[arg-type]
     sign=(CLASSES, SIGNS),  # type: ignore[arg-type]
 )
 """Shape of each array of a `Prior`."""

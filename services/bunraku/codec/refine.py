@@ -24,7 +24,7 @@ from bunraku.codec.bodies import (
 )
 from bunraku.codec.contexts import Seen, nothing_seen, scale, see, see_channel, see_frequency, share
 from bunraku.codec.costs import bits
-from bunraku.codec.prior import HIDDEN, Integers, Prior
+from bunraku.codec.prior import CLASS_OF, HIDDEN, Integers, Prior
 
 _TWIST = 0.03**2
 """Weight of an orientation's error, radians squared against metres squared: what no point shows must stay right too."""
@@ -153,9 +153,9 @@ def _descend(
             if fresh:
                 seen.shared[:] = sums[k]
                 expected = scale(prior, seen, channel, axis, k)
-                before = bits(costs, expected, abs(now))
+                before = bits(costs, CLASS_OF[k], expected, abs(now))
                 fresh = False
-            cost = worse + price * (bits(costs, expected, magnitude) - before)
+            cost = worse + price * (bits(costs, CLASS_OF[k], expected, magnitude) - before)
             if cost < least:
                 least, best = cost, candidate
         if best != now:

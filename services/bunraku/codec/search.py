@@ -12,9 +12,8 @@ import numpy as np
 
 from bunraku.codec import coefficients, transform
 from bunraku.codec.coefficients import Head
-from bunraku.codec.decode import root_reference
 from bunraku.codec.prior import Integers, Prior
-from bunraku.codec.track import TURN_UNIT, MotionTrack, step_size
+from bunraku.codec.track import MotionTrack, step_size
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import PARENTS, Motion, points
@@ -68,9 +67,8 @@ class BlockEncoder:
         table: Array = _compiled()[1].cost_table(self._prior)
         return table
 
-    def _body(self, turn: tuple[int, int, int]) -> Any:
-        figure = self._track.figure
-        reference = np.concatenate([root_reference(turn), self._track.reference_rotations])
+    def _body(self, heading: int) -> Any:
+        figure, reference = self._track.figure, self._track.reference_rotations(heading)
         return _compiled()[0].Body(figure.offsets, figure.tips, self._track.weights, self._track.unweights, reference)
 
     def block(self, index: int, step: int, goal: Literal["first", "mean", "most"]) -> Coded:
@@ -79,9 +77,8 @@ class BlockEncoder:
         track = self._track
         start, frames = track.first_frame(index), track.frames_in(index)
         part = slice(start, start + frames)
-        middle = rotation.to_rotation_vector(self._root[start + frames // 2])
-        x, y, z = (int(i) for i in np.clip(np.round(middle / TURN_UNIT), -32, 31))
-        body = self._body((x, y, z))
+        heading = self._track.heading(self._root[start + frames // 2])
+        body = self._body(heading)
         basis = np.ascontiguousarray(transform.basis(frames, frames, np.arange(frames, dtype=np.float64)).T)
         size, length = step_size(step, frames), coefficients.length_level(frames, track.fps)
         truth = np.ascontiguousarray(self._orientation[:, part]), np.ascontiguousarray(self._points[:, part])
@@ -96,7 +93,7 @@ class BlockEncoder:
             # the joints' references are the pose itself: following the root's error would cost more than it mends
             q[2:] = 0
             decoded = bodies.points(body, q, size, basis)
-        head = Head(frames, step, (x, y, z))
+        head = Head(frames, step, heading)
         write = partial(coefficients.encode, self._prior, head, q, track.block_frames, track.fps)
         return Coded(step, np.linalg.norm(decoded - truth[1], axis=-1) * 1e3, write)
 

@@ -7,27 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.codec.dancer import on_grid, pack_dancer, unpack_dancer
+from bunraku.codec.dancer import FINEST_GRID, MOST_GRID, Dancer, on_grid
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.weights import weights
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import CHANNEL_COUNT, INDEX, JOINT_COUNT, PARENTS, TIPS, Figure, Motion
+from bunraku.motion.skeleton import CHANNEL_COUNT, INDEX, Figure, Motion
 
 CODEC = "bunraku.motion/2"
-TURN_UNIT = 0.1
-"""Radians in one unit of a block's turn of the root."""
+HEADINGS = 64
+"""Headings of a block's root in a whole turn about y."""
 STEP_UNIT = 2.0**-16
 """Quantiser step of index 0 for a block of 30 frames, metres; sixteen indices make it twice as large."""
-_BITS = 3, 14
+_BITS = 2, 14
 """Bits after the point of references in radians: of a motion, and of one that stands still."""
 
-_LEVER = 0.45
-_TWIST = 0.06**2
-# how much finer than its lever says a channel is coded: root position and rotation, sacroiliac, wrists, head, toes
-_CARE = np.ones(CHANNEL_COUNT)
-_CARE[[0, 1, 2]] = 1.15, 0.88, 0.88
-_CARE[[INDEX[name] + 1 for name in ("l_midtarsal", "r_midtarsal")]] = 0.87
-_CARE[[INDEX[name] + 1 for name in ("skullbase", "l_wrist", "r_wrist")]] = 0.9
+_GRID = 0.4e-3
+"""A figure's grid is about this share, in metres, of a mean error in mm: finer costs more bytes than it mends."""
+_LEFT_HIP, _RIGHT_HIP = INDEX["l_hip"], INDEX["r_hip"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,30 +32,32 @@ class MotionTrack:
     """Constants of a motion's blocks.
 
     `fps` and `frames` as in `Motion`; the first block has `first_frames` frames, every other but perhaps the last
-    `block_frames`; `figure` is the dancer, on the grid of `FIGURE_UNIT`; `reference` (17, 3) whole numbers are each
-    joint's typical rotation, a rotation vector in 2^-`reference_bits` radians.
+    `block_frames`.
     """
 
     fps: float
     frames: int
     block_frames: int
     first_frames: int
-    figure: Figure
-    reference: Array
-    reference_bits: int
+    dancer: Dancer
     weights: Array = field(init=False, repr=False)
     unweights: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """`weights` (19, 3, 3) is what a channel's values are multiplied with before they are quantised (SPEC.md,
         Weights), `unweights` what undoes it."""
-        object.__setattr__(self, "weights", _weights(self.figure))
+        object.__setattr__(self, "weights", weights(self.figure, self.dancer.rotations()))
         object.__setattr__(self, "unweights", np.ascontiguousarray(np.linalg.inv(self.weights)))
+
+    @property
+    def figure(self) -> Figure:
+        """The dancer's, as it is decoded."""
+        return self.dancer.figure
 
     @property
     def still(self) -> bool:
         """Whether the joints' references are fine enough to be their only pose."""
-        return self.reference_bits == _BITS[1]
+        return self.dancer.reference_bits == _BITS[1]
 
     @property
     def blocks(self) -> int:
@@ -91,10 +90,17 @@ class MotionTrack:
         index = int((frame - self.first_frames) // self.block_frames) + 1 if frame >= self.first_frames else 0
         return min(max(index, 0), self.blocks - 1)
 
-    @property
-    def reference_rotations(self) -> Array:
-        """`reference` as quaternions (17, 4)."""
-        return rotation.from_rotation_vector(self.reference * 2.0**-self.reference_bits)
+    def reference_rotations(self, heading: int = 0) -> Array:
+        """What a block of this `heading` tells rotations from: quaternions (18, 4)."""
+        rotations = self.dancer.rotations()
+        rotations[0] = rotation.multiply(_about_y(heading * 2 * np.pi / HEADINGS), rotations[0])
+        return rotations
+
+    def heading(self, root: Array) -> int:
+        """The heading (-32..31) that brings the root's reference nearest to a rotation (4,)."""
+        w, _, y, _ = rotation.multiply(root, rotation.conjugate(self.dancer.rotations()[0]))
+        turned = round(float(np.arctan2(y, w)) * HEADINGS / np.pi)
+        return (turned + HEADINGS // 2) % HEADINGS - HEADINGS // 2
 
 
 def step_size(index: int, frames: int) -> float:
@@ -102,51 +108,35 @@ def step_size(index: int, frames: int) -> float:
     return float(STEP_UNIT * 2.0 ** (index / 16) * np.sqrt(frames / 30.0))
 
 
-def _weights(figure: Figure) -> Array:
-    points = np.ones(JOINT_COUNT)
-    points[list(TIPS)] += 1
-    squares = np.zeros((JOINT_COUNT, 3, 3))
-
-    def add(joint: int, arm: Array, count: float) -> None:
-        squares[joint] += count**_LEVER * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-
-    for joint in range(JOINT_COUNT - 1, -1, -1):
-        squares[joint] += _TWIST * np.eye(3)
-        if joint in TIPS:
-            add(joint, figure.tips[joint], 1)
-        if joint > 0:
-            add(PARENTS[joint], figure.offsets[joint], points[joint])
-            points[PARENTS[joint]] += points[joint]
-    weights = np.empty((CHANNEL_COUNT, 3, 3))
-    weights[0] = points[0] ** (_LEVER / 2) * np.eye(3)
-    values, vectors = np.linalg.eigh(squares)
-    # the symmetric square root
-    weights[1:] = (vectors * np.sqrt(values)[:, None]) @ vectors.transpose(0, 2, 1)
-    weighted: Array = weights * _CARE[:, None, None]
-    return weighted
+def _about_y(angle: Array | float) -> Array:
+    return rotation.about_axis(1, np.asarray(angle, dtype=np.float64))
 
 
-def plan(motion: Motion, block_seconds: float = 1.0, first_seconds: float | None = None) -> tuple[MotionTrack, Motion]:
+def plan(
+    motion: Motion, block_seconds: float = 1.0, first_seconds: float | None = None, mean: float = 0.1
+) -> tuple[MotionTrack, Motion]:
     """The track of `motion` in even blocks of about `block_seconds`, the first of `first_seconds` where that is
     given, and the motion upon the track's figure.
 
-    The figure goes to the track's grid (0.05 mm) before anything is encoded, so that limb lengths are exact ever after.
+    The figure goes to a grid that a mean error of `mean` mm asks for before anything is encoded, so that limb lengths
+    are exact ever after.
     """
-    figure = on_grid(motion.figure)
-    joints = motion.rotations[:, 1:]
+    grid = min(max(int(np.log2(mean * _GRID / FINEST_GRID)), 0), MOST_GRID)
+    figure = on_grid(motion.figure, grid)
+    # the root as if the left hip were always along x
+    left = rotation.rotate(motion.rotations[:, 0], figure.offsets[_LEFT_HIP] - figure.offsets[_RIGHT_HIP])
+    joints = motion.rotations.copy()
+    joints[:, 0] = rotation.multiply(_about_y(np.arctan2(left[:, 2], left[:, 0])), joints[:, 0])
     # the mean direction of the quaternions, taken on one hemisphere
     aligned = joints * np.sign(np.sum(joints * joints[:1], axis=-1, keepdims=True) + 1e-12)
-    mean = rotation.to_rotation_vector(rotation.normalise(aligned.mean(axis=0)))
-    still = np.allclose(motion.rotations, motion.rotations[:1], atol=2.0 ** -_BITS[1])
-    reference_bits = _BITS[still]
-    reference = np.round(mean * 2.0**reference_bits)
+    typical = rotation.to_rotation_vector(rotation.normalise(aligned.mean(axis=0)))
+    bits = _BITS[np.allclose(motion.rotations, motion.rotations[:1], atol=2.0 ** -_BITS[1])]
+    dancer = Dancer(figure, grid, np.round(typical * 2.0**bits), bits)
     frames = motion.frames
     first = 0 if first_seconds is None else min(max(1, round(first_seconds * motion.fps)), frames, 1000)
     pieces = max(1, round((frames - first) / (block_seconds * motion.fps)))
     block_frames = min(max(1, -(-(frames - first) // pieces)), 1000)
-    track = MotionTrack(
-        motion.fps, frames, block_frames, first or min(block_frames, frames), figure, reference, reference_bits
-    )
+    track = MotionTrack(motion.fps, frames, block_frames, first or min(block_frames, frames), dancer)
     return track, Motion(figure, motion.fps, motion.root, motion.rotations)
 
 
@@ -161,7 +151,7 @@ def describe_track(track: MotionTrack, rates: list[dict[str, float]]) -> dict[st
         "block_frames": track.block_frames,
         "first_frames": track.first_frames,
         "rates": rates,
-        "dancer": pack_dancer(track.figure, track.reference, track.reference_bits),
+        "dancer": track.dancer.pack(),
     }
 
 
@@ -183,4 +173,4 @@ def read_track(described: dict[str, Any]) -> MotionTrack:
         raise DamagedBlock("a motion's track has fps and frames above zero and blocks of 1..1000 frames")
     if not isinstance(dancer, bytes):
         raise DamagedBlock("a motion's track has a dancer, bytes")
-    return MotionTrack(float(fps), frames, block_frames, first_frames, *unpack_dancer(dancer))
+    return MotionTrack(float(fps), frames, block_frames, first_frames, Dancer.unpack(dancer))
