@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from bunraku.codec.coefficients import SCENE_CHANNELS
 from bunraku.codec.contexts import (
     nothing_seen,
     scale,
@@ -31,7 +32,8 @@ _MOST_FRAMES_BITS = 10
 _ROOT_ALONE = 512
 FRAMES, STEP, TURN_X, TURN_Y, TURN_Z, COUNT, CHANNELS = range(7)
 """Places in a block's head: frames, step index, the root's turn on three axes (-32..31), frequencies, and channels
-that are coded: 19, or 2 where all joints stand as their references."""
+that are coded: 19, or 2 where all joints stand as their references; a scene's 3 are known beforehand, and its head
+says neither them nor a turn."""
 
 
 @njit(cache=True)
@@ -68,11 +70,14 @@ def _head(decoding: bool, state: Integers, data: Bytes, usual: int, head: Intege
         head[FRAMES] = _number(decoding, state, data, _MOST_FRAMES_BITS, head[FRAMES])
     if not 1 <= head[FRAMES] <= 1000:
         return False
-    alone = _bit(decoding, state, data, _ROOT_ALONE, 1 if head[CHANNELS] == 2 else 0)
-    head[CHANNELS] = 2 if alone else 19
+    scene = head[CHANNELS] == SCENE_CHANNELS
+    if not scene:
+        alone = _bit(decoding, state, data, _ROOT_ALONE, 1 if head[CHANNELS] == 2 else 0)
+        head[CHANNELS] = 2 if alone else 19
     head[STEP] = _number(decoding, state, data, 8, head[STEP])
-    for i in range(TURN_X, TURN_Z + 1):
-        head[i] = _number(decoding, state, data, 6, head[i] + 32) - 32
+    if not scene:
+        for i in range(TURN_X, TURN_Z + 1):
+            head[i] = _number(decoding, state, data, 6, head[i] + 32) - 32
     head[COUNT] = _number(decoding, state, data, bit_length(head[FRAMES]), head[COUNT])
     return head[COUNT] <= head[FRAMES]  # type: ignore[no-any-return]
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from bunraku.codec.dancer import on_grid, pack_dancer, unpack_dancer
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.timing import Timing, even_blocks, read_timing
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import CHANNEL_COUNT, INDEX, JOINT_COUNT, PARENTS, TIPS, Figure, Motion
@@ -31,18 +32,13 @@ _CARE[[INDEX[name] + 1 for name in ("skullbase", "l_wrist", "r_wrist")]] = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class MotionTrack:
-    """Constants of a motion's blocks.
+class MotionTrack(Timing):
+    """Constants of a motion's blocks, beside their timing.
 
-    `fps` and `frames` as in `Motion`; the first block has `first_frames` frames, every other but perhaps the last
-    `block_frames`; `figure` is the dancer, on the grid of `FIGURE_UNIT`; `reference` (17, 3) whole numbers are each
+    `figure` is the dancer, on the grid of `FIGURE_UNIT`; `reference` (17, 3) whole numbers are each
     joint's typical rotation, a rotation vector in 2^-`reference_bits` radians.
     """
 
-    fps: float
-    frames: int
-    block_frames: int
-    first_frames: int
     figure: Figure
     reference: Array
     reference_bits: int
@@ -59,37 +55,6 @@ class MotionTrack:
     def still(self) -> bool:
         """Whether the joints' references are fine enough to be their only pose."""
         return self.reference_bits == _BITS[1]
-
-    @property
-    def blocks(self) -> int:
-        """Number of blocks."""
-        return 1 - (-(self.frames - self.first_frames) // self.block_frames)
-
-    @property
-    def duration_us(self) -> int:
-        """Length in microseconds."""
-        return round(self.frames * 1e6 / self.fps)
-
-    def first_frame(self, index: int) -> int:
-        """Frame of the motion with which block `index` starts."""
-        return self.first_frames + (index - 1) * self.block_frames if index > 0 else 0
-
-    def frames_in(self, index: int) -> int:
-        """Frames of block `index`."""
-        if index == 0:
-            return self.first_frames
-        return min(self.block_frames, self.frames - self.first_frame(index))
-
-    def start_us(self, index: int) -> int:
-        """Motion time of the first frame of block `index`, microseconds: the timestamp of its Data Packet."""
-        return round(self.first_frame(index) * 1e6 / self.fps)
-
-    def block_at(self, position_us: float) -> int:
-        """Index of the block that holds the instant `position_us`, kept within the motion."""
-        # a start is rounded to the microsecond, and may be a little before its frame
-        frame = (position_us + 1) * self.fps / 1e6
-        index = int((frame - self.first_frames) // self.block_frames) + 1 if frame >= self.first_frames else 0
-        return min(max(index, 0), self.blocks - 1)
 
     @property
     def reference_rotations(self) -> Array:
@@ -140,12 +105,9 @@ def plan(motion: Motion, block_seconds: float = 1.0, first_seconds: float | None
     still = np.allclose(motion.rotations, motion.rotations[:1], atol=2.0 ** -_BITS[1])
     reference_bits = _BITS[still]
     reference = np.round(mean * 2.0**reference_bits)
-    frames = motion.frames
-    first = 0 if first_seconds is None else min(max(1, round(first_seconds * motion.fps)), frames, 1000)
-    pieces = max(1, round((frames - first) / (block_seconds * motion.fps)))
-    block_frames = min(max(1, -(-(frames - first) // pieces)), 1000)
+    timing = even_blocks(motion.fps, motion.frames, block_seconds, first_seconds)
     track = MotionTrack(
-        motion.fps, frames, block_frames, first or min(block_frames, frames), figure, reference, reference_bits
+        timing.fps, timing.frames, timing.block_frames, timing.first_frames, figure, reference, reference_bits
     )
     return track, Motion(figure, motion.fps, motion.root, motion.rotations)
 
@@ -169,18 +131,8 @@ def read_track(described: dict[str, Any]) -> MotionTrack:
     """The track of `describe_track`; raises `DamagedBlock` where it is not one, or of another codec."""
     if described.get("codec") != CODEC:
         raise DamagedBlock(f"the motion is in {described.get('codec')!r}; this reads {CODEC!r}")
-    fps = described.get("fps")
-    frames, block_frames, first_frames = (described.get(key) for key in ("frames", "block_frames", "first_frames"))
+    timing = read_timing(described, "motion")
     dancer = described.get("dancer")
-    if not (
-        isinstance(fps, float | int)
-        and isinstance(frames, int)
-        and isinstance(block_frames, int)
-        and isinstance(first_frames, int)
-    ):
-        raise DamagedBlock("a motion's track has numbers fps, frames, block_frames and first_frames")
-    if not (fps > 0 and 0 < first_frames <= min(frames, 1000) and 0 < block_frames <= 1000):
-        raise DamagedBlock("a motion's track has fps and frames above zero and blocks of 1..1000 frames")
     if not isinstance(dancer, bytes):
         raise DamagedBlock("a motion's track has a dancer, bytes")
-    return MotionTrack(float(fps), frames, block_frames, first_frames, *unpack_dancer(dancer))
+    return MotionTrack(timing.fps, timing.frames, timing.block_frames, timing.first_frames, *unpack_dancer(dancer))
