@@ -47,13 +47,13 @@ def wild(random: np.random.Generator, count: int, most: int) -> Integers:
     return quantised
 
 
-def head(numbers: list[tuple[int, int]], frames: int | None = None) -> bytes:
+def head(numbers: list[tuple[int, int]], frames: int | None = None, scene: bool = False) -> bytes:
     """The head of a block of `frames` frames (None: as usual) that says any `numbers` (value, bits) after them, by
-    the definition of the range coder in whole numbers of any size. It is the lowest number of its interval, so zeros
-    behind it read as ones for ever."""
+    the definition of the range coder in whole numbers of any size; a `scene`'s has no bit for its channels. It is the
+    lowest number of its interval, so zeros behind it read as ones for ever."""
     low, span, size = 0, 0xFFFFFFFF, 4
     unusual = [] if frames is None else [(16384, bool(frames >> i & 1)) for i in range(9, -1, -1)]
-    bits = [(32440, frames is None), *unusual, (512, False)]
+    bits = [(32440, frames is None), *unusual, *([] if scene else [(512, False)])]
     bits += [(16384, bool(value >> i & 1)) for value, n in numbers for i in range(n - 1, -1, -1)]
     for probability, bit in bits:
         bound = (span >> 15) * probability

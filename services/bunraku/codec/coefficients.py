@@ -15,7 +15,7 @@ from bunraku.motion.skeleton import CHANNEL_COUNT
 LARGEST_BLOCK = 65_536
 MOST_FRAMES = 1_000
 SCENE_CHANNELS = 3
-"""Channels of a camera's or a light's block; a motion's has 19."""
+"""Channels of a camera's or a light's block, the last with one axis only; a motion's has 19."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def length_level(frames: int, fps: float) -> int:
 def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> bytes:
     """Bytes of a block of `fps` frames a second with coefficients `q` (19, 3, K), K <= frames; zero frequencies at
     the end cost nothing, nor does the number of frames where it is `usual`. `q` (3, 3, K) are a camera's or light's:
-    such a block does not say the head's turn.
+    such a block says neither the head's turn nor the last channel's second and third axis, zeros.
 
     Raises ValueError for a coefficient or block that is too large.
     """

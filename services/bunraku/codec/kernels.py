@@ -112,9 +112,10 @@ def _body(decoding: bool, state: Integers, data: Bytes, prior: Prior, q: Integer
     count, step = head[COUNT], head[STEP]
     seen = nothing_seen(count)
     for channel in range(head[CHANNELS]):
+        axes = 1 if channel == 2 and head[CHANNELS] == SCENE_CHANNELS else 3
         for k in range(count):
             share(prior, seen, channel, k, count, step, length)
-            for axis in range(3):
+            for axis in range(axes):
                 scaled = scale(prior, seen, channel, axis, k)
                 size = _size(decoding, state, data, prior.hazard, scaled, abs(q[channel, axis, k]))
                 if size < 0:

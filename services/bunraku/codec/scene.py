@@ -141,7 +141,7 @@ def describe_scene(track: SceneTrack, rates: list[dict[str, float]]) -> dict[str
 def read_scene(described: dict[str, Any]) -> SceneTrack:
     """The track of `describe_scene`; raises `DamagedBlock` where it is not one, or of another codec."""
     kind, full, reference = (described.get(key) for key in ("type", "full", "reference"))
-    if kind not in _SCALES:
+    if kind not in ("camera", "light"):
         raise DamagedBlock(f"a scene's track is of type camera or light, not {kind!r}")
     if described.get("codec") != CODEC:
         raise DamagedBlock(f"the {kind} is in {described.get('codec')!r}; this reads {CODEC!r}")

@@ -43,7 +43,8 @@ export function lengthLevel(frames: number, fps: number): number {
 
 /**
  * Head and coefficients of a block of a motion with `fps` frames a second whose blocks have `usual` frames. The work is bounded
- * by 57,000 coefficients of at most 70 bits. A block of `SCENE_CHANNELS` says in its head neither channels nor a turn.
+ * by 57,000 coefficients of at most 70 bits. A block of `SCENE_CHANNELS` says in its head neither channels nor a turn,
+ * and its last channel has one axis.
  *
  * @throws DamagedBlock
  */
@@ -61,16 +62,17 @@ export function decodeCoefficients(
   const scene = all === SCENE_CHANNELS;
   const channels = !scene && decoder.bit(ROOT_ALONE) ? 2 : all;
   const step = decoder.number(8);
-  const axis = () => (scene ? 0 : decoder.number(6) - 32);
-  const turn = [axis(), axis(), axis()] as const;
+  const tenths = () => (scene ? 0 : decoder.number(6) - 32);
+  const turn = [tenths(), tenths(), tenths()] as const;
   const count = decoder.number(32 - Math.clz32(frames));
   if (count > frames) throw new DamagedBlock(`block says ${count} frequencies for ${frames} frames`);
   const q = new Float64Array(all * 3 * count);
   const contexts = new Contexts(prior, count, step, lengthLevel(frames, fps));
   for (let channel = 0; channel < channels; channel++) {
+    const axes = scene && channel === 2 ? 1 : 3;
     for (let k = 0; k < count; k++) {
       contexts.share(channel, k);
-      for (let axis = 0; axis < 3; axis++) {
+      for (let axis = 0; axis < axes; axis++) {
         const size = decodeSize(decoder, prior.hazard, contexts.scale(channel, axis, k));
         if (size > 0) {
           const at = (channel * 3 + axis) * count + k;
