@@ -24,6 +24,7 @@ _FINEST, _COARSEST = 0, 255
 _ROUNDINGS = 0.5, 0.4, 0.3, 0.2
 """What is added to a coefficient before it is rounded down: the less, the more zeros, but at a finer step."""
 _BEYOND = 8
+"""Steps that are tried past the first that is too coarse."""
 
 
 @dataclass(frozen=True, slots=True)
