@@ -38,7 +38,7 @@ def examples(folder: Path, name: str, current: Prior, round_: int) -> Examples:
     motion = corpus.load(folder, name)
     for number, step in enumerate(STEPS):
         turned = corpus.mirrored(motion) if (number + round_) % 2 else motion
-        track, turned = plan(turned, float(random.choice(LENGTHS)))
+        track = plan(turned, float(random.choice(LENGTHS)))
         encoder = BlockEncoder(track, turned, current)
         share = min(1.0, LONG / motion.duration) * 0.6
         for index in range(track.blocks):

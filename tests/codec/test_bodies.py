@@ -40,7 +40,7 @@ def test_what_turns_and_moves_with_a_joint() -> None:
 
 
 def test_a_block_s_pose_is_that_of_the_decoder() -> None:
-    track, _ = plan(wandering_motion(1.0, 30.0, 4))
+    track = plan(wandering_motion(1.0, 30.0, 4))
     q = np.random.default_rng(5).integers(-4, 5, (19, 3, 8))
     weight = track.weights
     body = Body(

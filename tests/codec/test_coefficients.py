@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec import coefficients, prior
-from bunraku.codec.coefficients import LARGEST_BLOCK, Head
+from bunraku.codec.coefficients import LARGEST_BLOCK, SCENE_CHANNELS, Head
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.prior import Integers
 from bunraku.motion.skeleton import CHANNEL_COUNT
@@ -39,8 +39,20 @@ def test_heads_and_coefficients_come_back_bit_for_bit(
     assert not q[:, :, used:].any()
 
 
+@given(st.integers(0, 1000), st.integers(1, 60), st.floats(0, 20_000), st.integers(60, 1000), st.integers(0, 255))
+def test_a_scene_comes_back_bit_for_bit(seed: int, count: int, size: float, frames: int, step: int) -> None:
+    q = spectrum(seed, count, size)[:SCENE_CHANNELS]
+    q[2, 1:] = 0
+    head = Head(frames, step, 0)
+    again, back = coefficients.decode(PRIOR, coefficients.encode(PRIOR, head, q, 60, FPS), 60, FPS, SCENE_CHANNELS)
+    assert again == head
+    used = back.shape[2]
+    np.testing.assert_array_equal(back, q[:, :, :used])
+    assert not q[:, :, used:].any()
+
+
 def test_the_largest_numbers_come_back_and_larger_ones_are_refused() -> None:
-    head = Head(30, 0, (0, 0, 0))
+    head = Head(30, 0, 0)
     q = np.zeros((CHANNEL_COUNT, 3, 2), dtype=np.int64)
     q[0, 0], q[18, 2] = ((1 << 19) - 2, -(1 << 18)), (-5, 1 << 17)
     np.testing.assert_array_equal(
@@ -53,8 +65,9 @@ def test_the_largest_numbers_come_back_and_larger_ones_are_refused() -> None:
 
 def test_head_and_end_cost_few_bytes() -> None:
     q = np.zeros((CHANNEL_COUNT, 3, 30), dtype=np.int64)
-    assert len(coefficients.encode(PRIOR, Head(30, 200, (31, -32, 7)), q, 30, FPS)) <= 6
-    assert len(coefficients.encode(PRIOR, Head(999, 200, (31, -32, 7)), q, 30, FPS)) <= 9
+    assert len(coefficients.encode(PRIOR, Head(30, 200, -32), q, 30, FPS)) <= 6
+    assert len(coefficients.encode(PRIOR, Head(999, 200, -32), q, 30, FPS)) <= 9
+    assert len(coefficients.encode(PRIOR, Head(30, 200, 0), q[:SCENE_CHANNELS], 30, FPS)) <= 3
 
 
 @given(st.binary(max_size=300), st.integers(1, 120))

@@ -5,54 +5,66 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.codec.dancer import FIGURE_UNIT, LARGEST_DANCER, MOST_BITS, on_grid, pack_dancer, unpack_dancer
+from bunraku.codec.dancer import LARGEST_DANCER, MOST_BITS, MOST_GRID, Dancer, on_grid, unit
 from bunraku.codec.errors import DamagedBlock
-from bunraku.motion.skeleton import JOINT_COUNT, TIPS, Figure, standard_figure
+from bunraku.motion.skeleton import INDEX, JOINT_COUNT, TIPS, Figure, standard_figure
 
 
-@given(st.integers(0, 999), st.floats(0, 1.0), st.integers(0, MOST_BITS), st.integers(0, 30_000))
-def test_dancers_survive_their_bytes(seed: int, size: float, bits: int, turn: int) -> None:
+@given(
+    st.integers(0, 999), st.floats(0, 1.0), st.integers(0, MOST_GRID), st.integers(0, MOST_BITS), st.integers(0, 30_000)
+)
+def test_dancers_survive_their_bytes(seed: int, size: float, grid: int, bits: int, turn: int) -> None:
     random = np.random.default_rng(seed)
     tips = np.zeros((JOINT_COUNT, 3))
     tips[list(TIPS)] = random.normal(0, size, (len(TIPS), 3)).clip(-3, 3)
-    figure = on_grid(Figure(random.normal(0, size, (JOINT_COUNT, 3)).clip(-3, 3), tips))
-    reference = random.integers(-turn, turn + 1, (17, 3)).astype(np.float64)
-    again, turned, precision = unpack_dancer(pack_dancer(figure, reference, bits))
-    np.testing.assert_allclose(again.offsets, figure.offsets, atol=1e-12)
-    np.testing.assert_allclose(again.tips, figure.tips, atol=1e-12)
-    np.testing.assert_array_equal(turned, reference)
-    assert precision == bits
+    figure = on_grid(Figure(random.normal(0, size, (JOINT_COUNT, 3)).clip(-3, 3), tips), grid)
+    reference = random.integers(-turn, turn + 1, (18, 3)).astype(np.float64)
+    again = Dancer.unpack(Dancer(figure, grid, reference, bits).pack())
+    np.testing.assert_allclose(again.figure.offsets, figure.offsets, atol=1e-12)
+    np.testing.assert_allclose(again.figure.tips, figure.tips, atol=1e-12)
+    np.testing.assert_array_equal(again.reference, reference)
+    assert (again.grid, again.reference_bits) == (grid, bits)
 
 
-def test_a_symmetric_figure_is_about_a_hundred_bytes_at_most() -> None:
-    reference = np.random.default_rng(1).integers(-8, 9, (17, 3)).astype(np.float64)
-    assert len(pack_dancer(on_grid(standard_figure()), reference, 3)) <= 120
+def test_a_mirrored_figure_costs_one_side_whatever_axes_its_bones_have() -> None:
+    reference, figure = np.zeros((18, 3)), on_grid(standard_figure(), 2)
+    size = len(Dancer(figure, 2, reference, 2).pack())
+    assert size <= 60
+    offsets = figure.offsets.copy()
+    offsets[INDEX["r_knee"]] = offsets[INDEX["l_knee"]]
+    offsets[INDEX["r_elbow"]] = offsets[INDEX["l_elbow"]] * [1, -1, -1]
+    assert len(Dancer(Figure(offsets, figure.tips), 2, reference, 2).pack()) <= size + 2
 
 
 def test_the_figure_moves_by_half_a_grid_step_at_most() -> None:
     figure = standard_figure()
-    assert abs(on_grid(figure).offsets - figure.offsets).max() <= FIGURE_UNIT / 2 + 1e-12
+    for grid in range(MOST_GRID + 1):
+        assert abs(on_grid(figure, grid).offsets - figure.offsets).max() <= unit(grid) / 2 + 1e-12
 
 
 def test_giants_are_refused() -> None:
     figure = standard_figure()
     with pytest.raises(ValueError, match=r"9\.1 m long; 3\.3"):
-        on_grid(Figure(figure.offsets + np.eye(JOINT_COUNT, 3) * 9.0, figure.tips))
+        on_grid(Figure(figure.offsets + np.eye(JOINT_COUNT, 3) * 9.0, figure.tips), 0)
 
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_a_dancer_or_refused(data: bytes) -> None:
     try:
-        figure, _, bits = unpack_dancer(data)
+        dancer = Dancer.unpack(data)
     except DamagedBlock:
         return
-    assert abs(figure.offsets).max() < 30
-    assert bits <= MOST_BITS
+    assert abs(dancer.figure.offsets).max() < 2 * LARGEST_LIMB
+    assert dancer.reference_bits <= MOST_BITS
+
+
+LARGEST_LIMB = (1 << 17) * unit(MOST_GRID)
 
 
 @pytest.mark.parametrize(
-    ("data", "says"), [(b"", "not 0"), (bytes(LARGEST_DANCER + 1), "not 1025"), (bytes([15, 0]), "finest")]
+    ("data", "says"),
+    [(b"", "not 0"), (bytes(LARGEST_DANCER + 1), "not 1025"), (bytes([15, 0]), "most"), (bytes([8 << 4, 0]), "most")],
 )
 def test_wrong_dancers_are_refused(data: bytes, says: str) -> None:
     with pytest.raises(DamagedBlock, match=says):
-        unpack_dancer(data)
+        Dancer.unpack(data)

@@ -13,7 +13,8 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import points
 from tests.vectors.blocks import wandering_motion
 
-TRACK, MOTION = plan(wandering_motion(2.0, 30.0, 11))
+MOTION = wandering_motion(2.0, 30.0, 11)
+TRACK = plan(MOTION)
 BLOCK = BlockEncoder(TRACK, MOTION, prior.shipped()).block(0, 96, "mean").data
 
 

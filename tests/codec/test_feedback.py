@@ -7,7 +7,8 @@ from bunraku.codec.search import BlockEncoder
 from bunraku.codec.track import plan
 from tests.vectors.blocks import wandering_motion
 
-TRACK, MOTION = plan(wandering_motion(1.0, 30.0, 3))
+MOTION = wandering_motion(1.0, 30.0, 3)
+TRACK = plan(MOTION)
 ENCODER = BlockEncoder(TRACK, MOTION, prior.shipped())
 
 

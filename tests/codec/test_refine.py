@@ -8,7 +8,8 @@ from bunraku.codec.track import plan
 from bunraku.motion.skeleton import points
 from tests.vectors.blocks import wandering_motion
 
-TRACK, MOTION = plan(wandering_motion(1.0, 30.0, 3))
+MOTION = wandering_motion(1.0, 30.0, 3)
+TRACK = plan(MOTION)
 
 
 def test_slopes_are_those_of_the_error() -> None:

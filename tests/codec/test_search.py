@@ -10,7 +10,8 @@ from bunraku.codec.track import plan
 from bunraku.motion.skeleton import points
 from tests.vectors.blocks import wandering_motion
 
-TRACK, MOTION = plan(wandering_motion(2.2, 30.0, 3))
+MOTION = wandering_motion(2.2, 30.0, 3)
+TRACK = plan(MOTION)
 ENCODER = BlockEncoder(TRACK, MOTION, prior.shipped())
 
 

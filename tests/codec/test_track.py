@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.track import describe_track, plan, read_track, step_size
-from bunraku.motion.skeleton import INDEX, Motion
+from bunraku.codec.track import HEADINGS, describe_track, plan, read_track, step_size
+from bunraku.motion.skeleton import Motion
 from tests.vectors.blocks import wandering_motion
 
 
@@ -13,7 +13,7 @@ from tests.vectors.blocks import wandering_motion
 @pytest.mark.parametrize("first", [None, 0.3])
 def test_blocks_tile_the_motion_evenly(fps: float, first: float | None) -> None:
     motion = wandering_motion(3.3, fps, 2)
-    track, _ = plan(motion, first_seconds=first)
+    track = plan(motion, first_seconds=first)
     assert sum(track.frames_in(i) for i in range(track.blocks)) == motion.frames
     assert abs(track.block_frames / fps - 1) < 0.15
     assert track.frames_in(track.blocks - 1) >= track.block_frames - track.blocks
@@ -26,19 +26,27 @@ def test_blocks_tile_the_motion_evenly(fps: float, first: float | None) -> None:
 
 
 def test_a_little_more_than_a_block_is_one_block() -> None:
-    assert plan(wandering_motion(1.3, 30.0, 2))[0].blocks == 1
-    assert plan(wandering_motion(1.3, 30.0, 2), first_seconds=2.0)[0].blocks == 1
+    assert plan(wandering_motion(1.3, 30.0, 2)).blocks == 1
+    assert plan(wandering_motion(1.3, 30.0, 2), first_seconds=2.0).blocks == 1
 
 
-def test_weights_fall_along_a_limb_and_are_least_along_a_bone() -> None:
-    weights = plan(wandering_motion(1.0, 30.0, 1))[0].weights
-    chain = [np.trace(weights[1 + INDEX[name]]) for name in ("l_hip", "l_knee", "l_ankle", "l_midtarsal")]
-    assert chain == sorted(chain, reverse=True)
-    knee = weights[1 + INDEX["l_knee"]]
-    np.testing.assert_allclose(knee, knee.T, atol=1e-12)
-    # the shank hangs down: turning about it moves only what is beside it
-    assert knee[1, 1] < 0.5 * knee[0, 0]
-    assert (np.linalg.eigvalsh(weights) > 0.05).all()
+def test_headings_follow_the_root_s_turning() -> None:
+    motion = wandering_motion(1.5, 30.0, 4)
+    track = plan(motion)
+    found = [track.heading(root) for root in motion.rotations[:, 0]]
+    assert min(found) >= -HEADINGS // 2
+    assert max(found) < HEADINGS // 2
+    assert len(set(found)) > 20
+    for heading in (-32, 0, 31):
+        assert track.heading(track.reference_rotations(heading)[0]) == heading
+
+
+def test_a_coarser_error_asks_for_a_coarser_figure() -> None:
+    motion = wandering_motion(1.0, 30.0, 1)
+    tracks = [plan(motion, mean=mean) for mean in (0.1, 1.0, 5.0)]
+    assert [track.dancer.grid for track in tracks] == [0, 2, 4]
+    sizes = [len(track.dancer.pack()) for track in tracks]
+    assert sizes == sorted(sizes, reverse=True)
 
 
 def test_sixteen_steps_are_twice_as_coarse() -> None:
@@ -51,13 +59,13 @@ def test_very_high_frame_rates_keep_blocks_within_the_format() -> None:
     motion = Motion(
         still.figure, 5000.0, np.tile(still.root[:1], (4001, 1)), np.tile(still.rotations[:1], (4001, 1, 1))
     )
-    track, _ = plan(motion)
+    track = plan(motion)
     assert track.block_frames == 1000
     assert sum(track.frames_in(i) for i in range(track.blocks)) == 4001
 
 
 def test_a_track_survives_its_description() -> None:
-    track, _ = plan(wandering_motion(2.0, 29.97, 1), first_seconds=0.5)
+    track = plan(wandering_motion(2.0, 29.97, 1), first_seconds=0.5)
     again = read_track(describe_track(track, []))
     assert (again.fps, again.frames, again.block_frames) == (track.fps, track.frames, track.block_frames)
     assert again.first_frames == track.first_frames
@@ -79,7 +87,7 @@ def test_a_track_survives_its_description() -> None:
     ],
 )
 def test_a_wrong_description_is_refused(key: str, value: object, says: str) -> None:
-    described = describe_track(plan(wandering_motion(1.0, 30.0, 1))[0], [])
+    described = describe_track(plan(wandering_motion(1.0, 30.0, 1)), [])
     described[key] = value
     with pytest.raises(DamagedBlock, match=says):
         read_track(described)

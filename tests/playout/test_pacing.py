@@ -10,7 +10,7 @@ from bunraku.playout.timeline import edit, start
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import wandering_motion
 
-TRACK: MotionTrack = plan(wandering_motion(12.0, 30.0, 4))[0]
+TRACK: MotionTrack = plan(wandering_motion(12.0, 30.0, 4))
 SECOND = 1_000_000
 
 

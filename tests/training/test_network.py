@@ -54,8 +54,8 @@ def test_the_loss_is_what_the_coder_costs() -> None:
     for j in range(len(prior.hidden)):
         x = (f * prior.hidden[j]).sum(axis=1) + prior.hidden_bias[j, where[:, 1]] + prior.hidden_class[j, where[:, 0]]
         scaled += np.where(x > 0, (np.minimum(x >> 8, 32767) * prior.out[j, where[:, 0]]) >> 12, 0)
-    for expected, size in zip(np.clip(scaled, -1792, 3584), where[:, 2], strict=True):
-        spent += costs.bits(table, int(expected), int(size)) - (size > 0)
+    for group, expected, size in zip(where[:, 0], np.clip(scaled, -1792, 3584), where[:, 2], strict=True):
+        spent += costs.bits(table, group, int(expected), int(size)) - (size > 0)
     assert where[:, 2].max() > 1000
     np.testing.assert_allclose(loss(parameters, features, where)[0] / np.log(2), spent, rtol=0.03)
 

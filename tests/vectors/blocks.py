@@ -46,13 +46,13 @@ def wild(random: np.random.Generator, count: int, most: int) -> Integers:
     return quantised
 
 
-def head(numbers: list[tuple[int, int]], frames: int | None = None) -> bytes:
+def head(numbers: list[tuple[int, int]], frames: int | None = None, scene: bool = False) -> bytes:
     """The head of a block of `frames` frames (None: as usual) that says any `numbers` (value, bits) after them, by
-    the definition of the range coder in whole numbers of any size. It is the lowest number of its interval, so zeros
-    behind it read as ones for ever."""
+    the definition of the range coder in whole numbers of any size; a `scene`'s has no bit for its channels. It is the
+    lowest number of its interval, so zeros behind it read as ones for ever."""
     low, span, size = 0, 0xFFFFFFFF, 4
     unusual = [] if frames is None else [(16384, bool(frames >> i & 1)) for i in range(9, -1, -1)]
-    bits = [(32440, frames is None), *unusual, (512, False)]
+    bits = [(32440, frames is None), *unusual, *([] if scene else [(512, False)])]
     bits += [(16384, bool(value >> i & 1)) for value, n in numbers for i in range(n - 1, -1, -1)]
     for probability, bit in bits:
         bound = (span >> 15) * probability
@@ -100,11 +100,12 @@ def describe(track: MotionTrack) -> dict[str, Any]:
 
 def make() -> dict[str, Any]:
     """Tracks; blocks of several lengths and steps with coefficients and poses; and broken ones with the reason."""
-    even, motion = plan(wandering_motion(2.6, 30.0, 7))
-    even = replace(even, block_frames=30, first_frames=30)
-    quick, swift = plan(wandering_motion(1.1, 59.94, 8), 0.5, 0.1)
+    motion, swift = wandering_motion(2.6, 30.0, 7), wandering_motion(1.1, 59.94, 8)
+    even = replace(plan(motion), block_frames=30, first_frames=30)
+    quick = plan(swift, 0.5, 0.1, mean=2.0)
     stood = np.repeat(motion.rotations[3:4], 20, axis=0)
-    still, statue = plan(Motion(standard_figure(), 24.0, motion.root[:20] * 0, stood))
+    statue = Motion(standard_figure(), 24.0, motion.root[:20] * 0, stood)
+    still = plan(statue)
     tracks = [even, quick, still]
     valid = []
     goals: tuple[tuple[int, Motion, int, int, Literal["first", "mean"]], ...] = (

@@ -8,10 +8,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tests.vectors import blocks, messages
+from tests.vectors import blocks, messages, scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "proto" / "vectors"
-MAKERS: dict[str, Callable[[], Any]] = {"blocks.json": blocks.make, "messages.json": messages.make}
+MAKERS: dict[str, Callable[[], Any]] = {
+    "blocks.json": blocks.make,
+    "messages.json": messages.make,
+    "scene.json": scene.make,
+}
 
 
 def files() -> dict[str, str]:

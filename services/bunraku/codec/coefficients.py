@@ -14,6 +14,8 @@ from bunraku.motion.skeleton import CHANNEL_COUNT
 
 LARGEST_BLOCK = 65_536
 MOST_FRAMES = 1_000
+SCENE_CHANNELS = 3
+"""Channels of a camera's or a light's block, the last with one axis only; a motion's has 19."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +48,8 @@ def length_level(frames: int, fps: float) -> int:
 
 def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> bytes:
     """Bytes of a block of `fps` frames a second with coefficients `q` (19, 3, K), K <= frames; zero frequencies at
-    the end cost nothing, nor does the number of frames where it is `usual`.
+    the end cost nothing, nor does the number of frames where it is `usual`. `q` (3, 3, K) are a camera's or light's:
+    such a block says neither the head's turn nor the last channel's second and third axis, zeros.
 
     Raises ValueError for a coefficient or block that is too large.
     """
@@ -55,7 +58,7 @@ def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> byt
     q = np.ascontiguousarray(q[:, :, :count], dtype=np.int64)
     kernels = _kernels()
     out = kernels.room(q)
-    channels = CHANNEL_COUNT if q[2:].any() else 2
+    channels = SCENE_CHANNELS if len(q) == SCENE_CHANNELS else CHANNEL_COUNT if q[2:].any() else 2
     numbers = np.array([head.frames, head.step, head.heading, count, channels], dtype=np.int64)
     length = kernels.encode(prior, q, numbers, usual, length_level(head.frames, fps), out)
     if not 0 <= length <= LARGEST_BLOCK:
@@ -64,19 +67,19 @@ def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> byt
     return written.rstrip(b"\0")
 
 
-def decode(prior: Prior, data: bytes, usual: int, fps: float) -> tuple[Head, Integers]:
-    """Head and coefficients (19, 3, K) of a block; raises `DamagedBlock`."""
+def decode(prior: Prior, data: bytes, usual: int, fps: float, channels: int = CHANNEL_COUNT) -> tuple[Head, Integers]:
+    """Head and coefficients (`channels`, 3, K) of a block; raises `DamagedBlock`."""
     if len(data) > LARGEST_BLOCK:
         raise DamagedBlock(f"a block has at most {LARGEST_BLOCK} bytes, not {len(data)}")
     kernels = _kernels()
-    numbers = np.zeros(5, dtype=np.int64)
+    numbers = np.array([0, 0, 0, 0, channels], dtype=np.int64)
     octets = np.array(bytearray(data), dtype=np.uint8)
     if not kernels.decode_head(octets, usual, numbers):
         raise DamagedBlock(
             f"block says {numbers[0]} frames and {numbers[3]} frequencies; 1..{MOST_FRAMES} and no more are allowed"
         )
     frames, step, heading, count = map(int, numbers[:4])
-    q = np.zeros((CHANNEL_COUNT, 3, count), dtype=np.int64)
+    q = np.zeros((channels, 3, count), dtype=np.int64)
     if not kernels.decode(prior, octets, q, numbers, usual, length_level(frames, fps)):
         raise DamagedBlock(f"block holds a number longer than {kernels.ESCAPE} bits")
     return Head(frames, step, heading), q

@@ -68,7 +68,7 @@ def encode_motion(
 
     `progress` is told the share done, 0..1. Raises ValueError for a motion that no step can hold to its error.
     """
-    track, motion = plan(motion, block_seconds, first_seconds, min(ladder) * _MEAN_OF_MOST)
+    track = plan(motion, block_seconds, first_seconds, min(ladder) * _MEAN_OF_MOST)
     encoder = BlockEncoder(track, motion, prior or shipped())
     rates = []
     for number, bound in enumerate(ladder):
@@ -84,7 +84,7 @@ def encode_mean(
     motion: Motion, mean: float, block_seconds: float = 1.0, prior: Prior | None = None
 ) -> tuple[MotionTrack, Rate]:
     """Encode `motion` at one step, or two neighbours, so that its mean error comes up to `mean` mm and not above."""
-    track, motion = plan(motion, block_seconds, mean=mean)
+    track = plan(motion, block_seconds, mean=mean)
     encoder = BlockEncoder(track, motion, prior or shipped())
     blocks = encoder.averaged(mean)
     return track, measure(track, motion, [block.data for block in blocks], np.inf, prior)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from bunraku.codec.coefficients import SCENE_CHANNELS
 from bunraku.codec.contexts import (
     nothing_seen,
     scale,
@@ -33,7 +34,8 @@ _MOST_FRAMES_BITS = 10
 _ROOT_ALONE = 512
 FRAMES, STEP, HEADING, COUNT, CHANNELS = range(5)
 """Places in a block's head: frames, step index, heading (-32..31), frequencies, and channels that are coded: 19, or 2
-where all joints stand as their references."""
+where all joints stand as their references; a scene's 3 are known beforehand, and its head says neither them nor a
+heading."""
 
 
 @njit(cache=True)
@@ -70,10 +72,13 @@ def _head(decoding: bool, state: Integers, data: Bytes, usual: int, head: Intege
         head[FRAMES] = _number(decoding, state, data, _MOST_FRAMES_BITS, head[FRAMES])
     if not 1 <= head[FRAMES] <= 1000:
         return False
-    alone = _bit(decoding, state, data, _ROOT_ALONE, 1 if head[CHANNELS] == 2 else 0)
-    head[CHANNELS] = 2 if alone else 19
+    scene = head[CHANNELS] == SCENE_CHANNELS
+    if not scene:
+        alone = _bit(decoding, state, data, _ROOT_ALONE, 1 if head[CHANNELS] == 2 else 0)
+        head[CHANNELS] = 2 if alone else 19
     head[STEP] = _number(decoding, state, data, 8, head[STEP])
-    head[HEADING] = _number(decoding, state, data, 6, head[HEADING] + 32) - 32
+    if not scene:
+        head[HEADING] = _number(decoding, state, data, 6, head[HEADING] + 32) - 32
     head[COUNT] = _number(decoding, state, data, bit_length(head[FRAMES]), head[COUNT])
     return head[COUNT] <= head[FRAMES]  # type: ignore[no-any-return]
 
@@ -109,9 +114,10 @@ def _body(decoding: bool, state: Integers, data: Bytes, prior: Prior, q: Integer
     count, step = head[COUNT], head[STEP]
     seen = nothing_seen(count)
     for channel in range(head[CHANNELS]):
+        axes = 1 if channel == 2 and head[CHANNELS] == SCENE_CHANNELS else 3
         for k in range(count):
             share(prior, seen, channel, k, count, step, length)
-            for axis in range(3):
+            for axis in range(axes):
                 scaled = scale(prior, seen, channel, axis, k)
                 size = _size(decoding, state, data, prior.hazard, CLASS_OF[k], scaled, abs(q[channel, axis, k]))
                 if size < 0:

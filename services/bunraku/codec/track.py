@@ -9,6 +9,7 @@ import numpy as np
 
 from bunraku.codec.dancer import FINEST_GRID, MOST_GRID, Dancer, on_grid
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.timing import Timing, even_blocks, read_timing
 from bunraku.codec.weights import weights
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -28,17 +29,9 @@ _LEFT_HIP, _RIGHT_HIP = INDEX["l_hip"], INDEX["r_hip"]
 
 
 @dataclass(frozen=True, slots=True)
-class MotionTrack:
-    """Constants of a motion's blocks.
+class MotionTrack(Timing):
+    """Constants of a motion's blocks, beside their timing."""
 
-    `fps` and `frames` as in `Motion`; the first block has `first_frames` frames, every other but perhaps the last
-    `block_frames`.
-    """
-
-    fps: float
-    frames: int
-    block_frames: int
-    first_frames: int
     dancer: Dancer
     weights: Array = field(init=False, repr=False)
     unweights: Array = field(init=False, repr=False)
@@ -58,37 +51,6 @@ class MotionTrack:
     def still(self) -> bool:
         """Whether the joints' references are fine enough to be their only pose."""
         return self.dancer.reference_bits == _BITS[1]
-
-    @property
-    def blocks(self) -> int:
-        """Number of blocks."""
-        return 1 - (-(self.frames - self.first_frames) // self.block_frames)
-
-    @property
-    def duration_us(self) -> int:
-        """Length in microseconds."""
-        return round(self.frames * 1e6 / self.fps)
-
-    def first_frame(self, index: int) -> int:
-        """Frame of the motion with which block `index` starts."""
-        return self.first_frames + (index - 1) * self.block_frames if index > 0 else 0
-
-    def frames_in(self, index: int) -> int:
-        """Frames of block `index`."""
-        if index == 0:
-            return self.first_frames
-        return min(self.block_frames, self.frames - self.first_frame(index))
-
-    def start_us(self, index: int) -> int:
-        """Motion time of the first frame of block `index`, microseconds: the timestamp of its Data Packet."""
-        return round(self.first_frame(index) * 1e6 / self.fps)
-
-    def block_at(self, position_us: float) -> int:
-        """Index of the block that holds the instant `position_us`, kept within the motion."""
-        # a start is rounded to the microsecond, and may be a little before its frame
-        frame = (position_us + 1) * self.fps / 1e6
-        index = int((frame - self.first_frames) // self.block_frames) + 1 if frame >= self.first_frames else 0
-        return min(max(index, 0), self.blocks - 1)
 
     def reference_rotations(self, heading: int = 0) -> Array:
         """What a block of this `heading` tells rotations from: quaternions (18, 4)."""
@@ -114,13 +76,9 @@ def _about_y(angle: Array | float) -> Array:
 
 def plan(
     motion: Motion, block_seconds: float = 1.0, first_seconds: float | None = None, mean: float = 0.1
-) -> tuple[MotionTrack, Motion]:
+) -> MotionTrack:
     """The track of `motion` in even blocks of about `block_seconds`, the first of `first_seconds` where that is
-    given, and the motion upon the track's figure.
-
-    The figure goes to a grid that a mean error of `mean` mm asks for before anything is encoded, so that limb lengths
-    are exact ever after.
-    """
+    given, its figure on a grid that a mean error of `mean` mm asks for."""
     grid = min(max(int(np.log2(mean * _GRID / FINEST_GRID)), 0), MOST_GRID)
     figure = on_grid(motion.figure, grid)
     # the root as if the left hip were always along x
@@ -132,12 +90,8 @@ def plan(
     typical = rotation.to_rotation_vector(rotation.normalise(aligned.mean(axis=0)))
     bits = _BITS[np.allclose(motion.rotations, motion.rotations[:1], atol=2.0 ** -_BITS[1])]
     dancer = Dancer(figure, grid, np.round(typical * 2.0**bits), bits)
-    frames = motion.frames
-    first = 0 if first_seconds is None else min(max(1, round(first_seconds * motion.fps)), frames, 1000)
-    pieces = max(1, round((frames - first) / (block_seconds * motion.fps)))
-    block_frames = min(max(1, -(-(frames - first) // pieces)), 1000)
-    track = MotionTrack(motion.fps, frames, block_frames, first or min(block_frames, frames), dancer)
-    return track, Motion(figure, motion.fps, motion.root, motion.rotations)
+    timing = even_blocks(motion.fps, motion.frames, block_seconds, first_seconds)
+    return MotionTrack(timing.fps, timing.frames, timing.block_frames, timing.first_frames, dancer)
 
 
 def describe_track(track: MotionTrack, rates: list[dict[str, float]]) -> dict[str, Any]:
@@ -159,18 +113,8 @@ def read_track(described: dict[str, Any]) -> MotionTrack:
     """The track of `describe_track`; raises `DamagedBlock` where it is not one, or of another codec."""
     if described.get("codec") != CODEC:
         raise DamagedBlock(f"the motion is in {described.get('codec')!r}; this reads {CODEC!r}")
-    fps = described.get("fps")
-    frames, block_frames, first_frames = (described.get(key) for key in ("frames", "block_frames", "first_frames"))
+    timing = read_timing(described, "motion")
     dancer = described.get("dancer")
-    if not (
-        isinstance(fps, float | int)
-        and isinstance(frames, int)
-        and isinstance(block_frames, int)
-        and isinstance(first_frames, int)
-    ):
-        raise DamagedBlock("a motion's track has numbers fps, frames, block_frames and first_frames")
-    if not (fps > 0 and 0 < first_frames <= min(frames, 1000) and 0 < block_frames <= 1000):
-        raise DamagedBlock("a motion's track has fps and frames above zero and blocks of 1..1000 frames")
     if not isinstance(dancer, bytes):
         raise DamagedBlock("a motion's track has a dancer, bytes")
-    return MotionTrack(float(fps), frames, block_frames, first_frames, Dancer.unpack(dancer))
+    return MotionTrack(timing.fps, timing.frames, timing.block_frames, timing.first_frames, Dancer.unpack(dancer))

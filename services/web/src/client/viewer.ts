@@ -1,7 +1,8 @@
 /** A viewer of a motion or a session: what comes over the line, and the pose to draw at any instant. */
 
 import { DamagedBlock } from "../codec/errors";
-import { MotionTrack, type Rate } from "../codec/track";
+import type { Rate } from "../codec/timing";
+import { MotionTrack } from "../codec/track";
 import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
 import { BlockStore } from "../playout/blocks";
 import { ReferenceClock } from "../playout/clock";

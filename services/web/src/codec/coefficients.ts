@@ -20,6 +20,9 @@ const FRAMES_AS_USUAL = 32440;
 const ROOT_ALONE = 512;
 const ESCAPE = 20;
 
+/** Channels of a camera's or a light's block; a motion's has 19. */
+export const SCENE_CHANNELS = 3;
+
 /** A block as it stands in its bytes. */
 export interface Coefficients {
   frames: number;
@@ -29,7 +32,7 @@ export interface Coefficients {
   turn: readonly [x: number, y: number, z: number];
   /** Frequencies of each track. */
   count: number;
-  /** Whole numbers [channel 19][axis 3][`count`]; the largest there can be is a little above 2^31. */
+  /** Whole numbers [channel][axis 3][`count`]; the largest there can be is a little above 2^31. */
   q: Float64Array;
 }
 
@@ -40,11 +43,14 @@ export function lengthLevel(frames: number, fps: number): number {
 
 /**
  * Head and coefficients of a block of a motion with `fps` frames a second whose blocks have `usual` frames. The work is bounded
- * by 57,000 coefficients of at most 70 bits.
+ * by 57,000 coefficients of at most 70 bits. A block of `SCENE_CHANNELS` says in its head neither channels nor a turn,
+ * and its last channel has one axis.
  *
  * @throws DamagedBlock
  */
-export function decodeCoefficients(prior: Prior, data: Uint8Array, usual: number, fps: number): Coefficients {
+export function decodeCoefficients(
+  prior: Prior, data: Uint8Array, usual: number, fps: number, all = CHANNEL_COUNT,
+): Coefficients {
   if (data.length > LARGEST_BLOCK) {
     throw new DamagedBlock(`a block has at most ${LARGEST_BLOCK} bytes, not ${data.length}`);
   }
@@ -53,17 +59,20 @@ export function decodeCoefficients(prior: Prior, data: Uint8Array, usual: number
   if (frames < 1 || frames > MOST_FRAMES) {
     throw new DamagedBlock(`block says ${frames} frames; 1..${MOST_FRAMES} are allowed`);
   }
-  const channels = decoder.bit(ROOT_ALONE) ? 2 : CHANNEL_COUNT;
+  const scene = all === SCENE_CHANNELS;
+  const channels = !scene && decoder.bit(ROOT_ALONE) ? 2 : all;
   const step = decoder.number(8);
-  const turn = [decoder.number(6) - 32, decoder.number(6) - 32, decoder.number(6) - 32] as const;
+  const tenths = () => (scene ? 0 : decoder.number(6) - 32);
+  const turn = [tenths(), tenths(), tenths()] as const;
   const count = decoder.number(32 - Math.clz32(frames));
   if (count > frames) throw new DamagedBlock(`block says ${count} frequencies for ${frames} frames`);
-  const q = new Float64Array(CHANNEL_COUNT * 3 * count);
+  const q = new Float64Array(all * 3 * count);
   const contexts = new Contexts(prior, count, step, lengthLevel(frames, fps));
   for (let channel = 0; channel < channels; channel++) {
+    const axes = scene && channel === 2 ? 1 : 3;
     for (let k = 0; k < count; k++) {
       contexts.share(channel, k);
-      for (let axis = 0; axis < 3; axis++) {
+      for (let axis = 0; axis < axes; axis++) {
         const size = decodeSize(decoder, prior.hazard, contexts.scale(channel, axis, k));
         if (size > 0) {
           const at = (channel * 3 + axis) * count + k;

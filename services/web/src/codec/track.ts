@@ -1,9 +1,9 @@
 /** What the blocks of one motion have in common: sent once, in the Description (`proto/SPEC.md`, Track `motion`). */
 
 import type { Figure } from "../motion/skeleton";
-import { MOST_FRAMES } from "./coefficients";
 import { unpackDancer } from "./dancer";
 import { DamagedBlock } from "./errors";
+import { type Described, type Rate, readRates, readTiming, Timing } from "./timing";
 import { channelWeights, type Weights } from "./weights";
 
 export const CODEC = "bunraku.motion/2";
@@ -11,21 +11,8 @@ export const CODEC = "bunraku.motion/2";
 /** Radians in one unit of a block's turn of the root. */
 export const TURN_UNIT = 0.1;
 
-// a day of 1 s blocks; and as many rates as a Data Packet can number
-const MOST_BLOCKS = 86_400;
-const MOST_RATES = 16;
-
-/** One encoding of a motion: kbit/s of blocks over the duration, mean error in mm over joints and tips, and what none exceeds. */
-export interface Rate {
-  kbps: number;
-  mean: number;
-  max: number;
-}
-
 /** Constants of a motion's blocks, as in the Description. */
-export class MotionTrack {
-  /** Number of blocks. */
-  readonly blocks: number;
+export class MotionTrack extends Timing {
   readonly weights: Weights;
 
   /**
@@ -39,16 +26,16 @@ export class MotionTrack {
    * @param front where the dance faces over its length, radians about y from z towards x
    */
   constructor(
-    readonly fps: number,
-    readonly frames: number,
-    readonly blockFrames: number,
-    readonly firstFrames: number,
+    fps: number,
+    frames: number,
+    blockFrames: number,
+    firstFrames: number,
     readonly figure: Figure,
     readonly reference: Float64Array,
     readonly rates: readonly Rate[] = [],
     readonly front = 0,
   ) {
-    this.blocks = 1 + Math.ceil((frames - firstFrames) / blockFrames);
+    super(fps, frames, blockFrames, firstFrames);
     this.weights = channelWeights(figure);
   }
 
@@ -57,57 +44,16 @@ export class MotionTrack {
    *
    * @throws DamagedBlock where it tells of none that can be played here
    */
-  static fromDescription(map: Readonly<Record<string, unknown>>): MotionTrack {
-    const { codec, fps, frames, block_frames: blockFrames, first_frames: firstFrames, dancer, rates, front } = map;
-    const whole = (value: unknown, most: number) => Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
+  static fromDescription(map: Described): MotionTrack {
+    const { codec, dancer, front } = map;
     if (codec !== CODEC) throw new DamagedBlock(`motion is of codec ${String(codec)}; this client reads ${CODEC}`);
-    if (!Number.isFinite(fps) || Number(fps) <= 0) throw new DamagedBlock("motion needs fps, a number above zero");
-    if (!whole(blockFrames, MOST_FRAMES)) throw new DamagedBlock(`motion needs block_frames, 1..${MOST_FRAMES}`);
-    if (!whole(frames, Number(blockFrames) * MOST_BLOCKS)) throw new DamagedBlock("motion needs frames, at least one");
-    if (!whole(firstFrames, Math.min(Number(frames), MOST_FRAMES))) {
-      throw new DamagedBlock(`motion needs first_frames, 1..${MOST_FRAMES} and no more than its frames`);
-    }
+    const { fps, frames, blockFrames, firstFrames } = readTiming(map, "motion");
     if (!(dancer instanceof Uint8Array)) throw new DamagedBlock("motion needs a dancer, bytes");
-    if (!Array.isArray(rates) || rates.length < 1 || rates.length > MOST_RATES) {
-      throw new DamagedBlock(`motion needs rates, 1..${MOST_RATES} of them`);
-    }
-    const known = rates.map((rate: Partial<Rate> | null, nth): Rate => {
-      const { kbps, mean, max } = rate ?? {};
-      if (![kbps, mean, max].every(Number.isFinite)) throw new DamagedBlock(`rate ${nth} needs kbps, mean and max, numbers`);
-      return { kbps: kbps!, mean: mean!, max: max! };
-    });
+    const rates = readRates(map, "motion");
     const { figure, reference } = unpackDancer(dancer);
     return new MotionTrack(
-      Number(fps), Number(frames), Number(blockFrames), Number(firstFrames), figure, reference, known,
+      fps, frames, blockFrames, firstFrames, figure, reference, rates,
       Number.isFinite(front) ? Number(front) : 0,
     );
-  }
-
-  /** Length in microseconds. */
-  get durationUs(): number {
-    return Math.round((this.frames * 1e6) / this.fps);
-  }
-
-  /** Frame of the motion with which block `index` starts. */
-  firstFrame(index: number): number {
-    return index > 0 ? this.firstFrames + (index - 1) * this.blockFrames : 0;
-  }
-
-  /** Frames of block `index`. */
-  framesIn(index: number): number {
-    return index > 0 ? Math.min(this.blockFrames, this.frames - this.firstFrame(index)) : this.firstFrames;
-  }
-
-  /** Motion time of the first frame of block `index`, microseconds. */
-  startUs(index: number): number {
-    return Math.round((this.firstFrame(index) * 1e6) / this.fps);
-  }
-
-  /** Index of the block that holds the instant `positionUs`, kept within the motion. */
-  blockAt(positionUs: number): number {
-    // a block's start is rounded to the microsecond
-    const frame = ((positionUs + 1) * this.fps) / 1e6;
-    const index = frame >= this.firstFrames ? Math.floor((frame - this.firstFrames) / this.blockFrames) + 1 : 0;
-    return Math.min(index, this.blocks - 1);
   }
 }

@@ -1,0 +1,37 @@
+"""A block of a camera or a light to its numbers at any instant (SPEC.md, Tracks `camera` and `light`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bunraku.codec import coefficients, transform
+from bunraku.codec.coefficients import SCENE_CHANNELS
+from bunraku.codec.decode import reconstruct
+from bunraku.codec.prior import Integers, Prior, shipped
+from bunraku.codec.scene import SceneTrack
+from bunraku.codec.track import step_size
+from bunraku.motion.rotation import Array
+
+
+@dataclass(frozen=True, slots=True)
+class SceneBlock:
+    """A decoded block of `track`: `frames` frames, quantised `q` (3, 3, K) and their values (3, 3, K), metres."""
+
+    track: SceneTrack
+    frames: int
+    q: Integers
+    values: Array
+
+    def at(self, instants: Array | float) -> Array:
+        """The seven numbers (m, 7) at `instants` (m,), in frames from the block's first; any real in -1/2 .. frames -
+        1/2."""
+        instants = np.atleast_1d(np.asarray(instants, dtype=np.float64))
+        return self.track.seen(transform.inverse(self.values, self.frames, instants))
+
+
+def decode_scene(track: SceneTrack, data: bytes, prior: Prior | None = None) -> SceneBlock:
+    """Decode one block of `track`; raises `DamagedBlock` on what cannot be one. `prior` as in `decode_block`."""
+    head, q = coefficients.decode(prior or shipped(), data, track.block_frames, track.fps, SCENE_CHANNELS)
+    return SceneBlock(track, head.frames, q, reconstruct(q) * step_size(head.step, head.frames))

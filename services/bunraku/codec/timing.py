@@ -1,0 +1,76 @@
+"""When the blocks of a track are: the same of a motion and of the scene about it (SPEC.md, Description)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+from bunraku.codec.coefficients import MOST_FRAMES
+from bunraku.codec.errors import DamagedBlock
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """A track of `frames` frames, `fps` a second; the first block has `first_frames` frames, every other but perhaps
+    the last `block_frames`."""
+
+    fps: float
+    frames: int
+    block_frames: int
+    first_frames: int
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return 1 - (-(self.frames - self.first_frames) // self.block_frames)
+
+    @property
+    def duration_us(self) -> int:
+        """Length in microseconds."""
+        return round(self.frames * 1e6 / self.fps)
+
+    def first_frame(self, index: int) -> int:
+        """Frame of the motion with which block `index` starts."""
+        return self.first_frames + (index - 1) * self.block_frames if index > 0 else 0
+
+    def frames_in(self, index: int) -> int:
+        """Frames of block `index`."""
+        if index == 0:
+            return self.first_frames
+        return min(self.block_frames, self.frames - self.first_frame(index))
+
+    def start_us(self, index: int) -> int:
+        """Motion time of the first frame of block `index`, microseconds: the timestamp of its Data Packet."""
+        return round(self.first_frame(index) * 1e6 / self.fps)
+
+    def block_at(self, position_us: float) -> int:
+        """Index of the block that holds the instant `position_us`, kept within the motion."""
+        # a start is rounded to the microsecond, and may be a little before its frame
+        frame = (position_us + 1) * self.fps / 1e6
+        index = int((frame - self.first_frames) // self.block_frames) + 1 if frame >= self.first_frames else 0
+        return min(max(index, 0), self.blocks - 1)
+
+
+def even_blocks(fps: float, frames: int, block_seconds: float = 1.0, first_seconds: float | None = None) -> Timing:
+    """`frames` frames in even blocks of about `block_seconds`, the first of `first_seconds` where that is given."""
+    first = 0 if first_seconds is None else min(max(1, round(first_seconds * fps)), frames, MOST_FRAMES)
+    pieces = max(1, round((frames - first) / (block_seconds * fps)))
+    block_frames = min(max(1, -(-(frames - first) // pieces)), MOST_FRAMES)
+    return Timing(fps, frames, block_frames, first or min(block_frames, frames))
+
+
+def read_timing(described: dict[str, Any], what: str) -> Timing:
+    """The timing that a Description's map of a track (`what`, for the message) tells; raises `DamagedBlock`."""
+    fps = described.get("fps")
+    frames, block_frames, first_frames = (described.get(key) for key in ("frames", "block_frames", "first_frames"))
+    if not (
+        isinstance(fps, float | int)
+        and isinstance(frames, int)
+        and isinstance(block_frames, int)
+        and isinstance(first_frames, int)
+    ):
+        raise DamagedBlock(f"a {what}'s track has numbers fps, frames, block_frames and first_frames")
+    if not (0 < fps < inf and 0 < first_frames <= min(frames, MOST_FRAMES) and 0 < block_frames <= MOST_FRAMES):
+        raise DamagedBlock(f"a {what}'s track has fps and frames above zero and blocks of 1..{MOST_FRAMES} frames")
+    return Timing(float(fps), frames, block_frames, first_frames)

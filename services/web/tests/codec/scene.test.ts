@@ -1,0 +1,107 @@
+import * as fc from "fast-check";
+import { describe, expect, test } from "vitest";
+import { decodeCoefficients, SCENE_CHANNELS } from "../../src/codec/coefficients";
+import { DamagedBlock } from "../../src/codec/errors";
+import { shippedPrior } from "../../src/codec/prior";
+import { decodeScene, NUMBERS, SceneTrack } from "../../src/codec/scene";
+import { bytes, vectors } from "../vectors";
+
+interface SceneVectors {
+  tracks: Record<string, unknown>[];
+  valid: {
+    track: number;
+    block: string;
+    frames: number;
+    step: number;
+    q: number[];
+    values: { instant: number; numbers: number[] }[];
+  }[];
+  /** Of the first track. */
+  invalid: { why: string; block: string }[];
+}
+
+const golden = vectors<SceneVectors>("scene");
+const tracks = golden.tracks.map((track) => SceneTrack.fromDescription(track));
+
+describe("golden blocks", () => {
+  test.each(golden.valid)("of track $track, $frames frames at step $step", (vector) => {
+    const track = tracks[vector.track];
+    const { frames, step, turn, q } = decodeCoefficients(
+      shippedPrior(), bytes(vector.block), track.blockFrames, track.fps, SCENE_CHANNELS,
+    );
+    expect([frames, step, [...turn]]).toEqual([vector.frames, vector.step, [0, 0, 0]]);
+    expect([...q]).toEqual(vector.q);
+    const block = decodeScene(track, bytes(vector.block));
+    expect(block.frames).toBe(vector.frames);
+    const out = new Float64Array(NUMBERS);
+    for (const { instant, numbers } of vector.values) {
+      block.at(instant, out);
+      numbers.forEach((value, i) => expect(Math.abs(out[i] - value)).toBeLessThan(1e-9 * Math.max(1, Math.abs(value))));
+    }
+  });
+
+  test.each(golden.invalid)("refuses: $why", ({ block }) => {
+    expect(() => decodeScene(tracks[0], bytes(block))).toThrow(DamagedBlock);
+  });
+
+  test("are of cameras and lights, moving and still", () => {
+    expect(tracks.map(({ kind, blocks }) => [kind, blocks])).toEqual([["camera", 3], ["light", 6], ["camera", 1]]);
+    expect(golden.valid.map(({ q }) => q.length)).toContain(0);
+  });
+});
+
+test("what is no block decodes to finite numbers or is refused", () => {
+  const blocks = golden.valid.map((vector) => ({ track: tracks[vector.track], whole: bytes(vector.block) }));
+  const change = fc.tuple(fc.nat(), fc.nat(255));
+  const out = new Float64Array(NUMBERS);
+  let decoded = 0, refused = 0;
+  const survives = (track: SceneTrack, data: Uint8Array): void => {
+    try {
+      const block = decodeScene(track, data);
+      block.at(block.frames / 2, out);
+      expect(out.every(Number.isFinite)).toBe(true);
+      expect(out[6]).toBeGreaterThanOrEqual(0);
+      decoded++;
+    } catch (error) {
+      if (!(error instanceof DamagedBlock)) throw error;
+      refused++;
+    }
+  };
+  fc.assert(
+    fc.property(
+      fc.constantFrom(...blocks), fc.array(change, { minLength: 1, maxLength: 8 }), fc.double({ min: 0, max: 1, noNaN: true }),
+      fc.uint8Array({ maxLength: 400 }),
+      ({ track, whole }, changes, part, any) => {
+        const damaged = whole.slice();
+        for (const [where, value] of changes) damaged[where % damaged.length] = value;
+        survives(track, damaged);
+        survives(track, whole.subarray(0, Math.floor(part * whole.length)));
+        survives(track, any);
+      },
+    ),
+    { numRuns: 1000 },
+  );
+  console.log(`${decoded} damaged scene blocks decoded, ${refused} refused`);
+});
+
+describe("a description that cannot be played is refused with what it lacks", () => {
+  test.each([
+    [{ type: "motion" }, "a camera or a light"],
+    [{ codec: "bunraku.motion/2" }, "bunraku.motion/2"],
+    [{ fps: 0 }, "light needs fps"],
+    [{ first_frames: 0 }, "first_frames"],
+    [{ full: 0 }, "full"],
+    [{ full: "800" }, "full"],
+    [{ full: 1e7 }, "full"],
+    [{ reference: [0, 0, 0, 0, 0, 0] }, "reference"],
+    [{ reference: [0, 0, 0, 0, 0, 0, NaN] }, "reference"],
+    [{ reference: [0, 0, 0, 0, 0, 0, "1"] }, "reference"],
+    [{ reference: null }, "reference"],
+    [{ rates: [] }, "light needs rates"],
+    [{ rates: [{ kbps: 1, mean: 1 }] }, "rate 0"],
+  ])("%o", (change, what) => {
+    const read = () => SceneTrack.fromDescription({ ...golden.tracks[1], ...change });
+    expect(read).toThrow(DamagedBlock);
+    expect(read).toThrow(what);
+  });
+});

@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.scene_decode import decode_scene
+from bunraku.codec.scene_encode import EncodedScene, encode_scene
+from tests.vectors.scene import camera, light
+
+SCENES = [encode_scene(make(2.0, 30.0), ladder=(4.0,)) for make in (camera, light)]
+
+
+def test_it_is_a_function_of_time() -> None:
+    for make, scene in zip((camera, light), SCENES, strict=True):
+        instants = np.arange(8, 8 * 29) / 8.0
+        values = decode_scene(scene.track, scene.rates[0].blocks[0]).at(instants)
+        fine = make(2.0, 240.0).values[8 : 8 * 29]
+        off = scene.track.coded(values) - scene.track.coded(fine)
+        assert np.linalg.norm(off, axis=-1).max() < 0.01
+
+
+@given(st.sampled_from(SCENES), st.data())
+def test_damage_is_survived(scene: EncodedScene, data: st.DataObject) -> None:
+    track, whole = scene.track, scene.rates[0].blocks[1]
+    damaged = bytearray(whole)
+    bit = data.draw(st.integers(0, len(whole) * 8 - 1))
+    damaged[bit // 8] ^= 1 << bit % 8
+    for broken in (bytes(damaged), whole[: data.draw(st.integers(0, len(whole)))], data.draw(st.binary(max_size=400))):
+        try:
+            block = decode_scene(track, broken)
+        except DamagedBlock:
+            continue
+        assert 1 <= block.frames <= 1000
+        values = block.at(np.array([-0.5, 0.0, block.frames - 0.5]))
+        assert values.shape == (3, 7)
+        assert np.isfinite(values).all()

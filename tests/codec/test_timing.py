@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.timing import Timing, even_blocks, read_timing
+
+
+@given(st.floats(1, 240), st.integers(1, 5000), st.floats(0.1, 3), st.none() | st.floats(0.01, 5))
+def test_blocks_tile_any_track_and_are_found_by_time(
+    fps: float, frames: int, block: float, first: float | None
+) -> None:
+    timing = even_blocks(fps, frames, block, first)
+    lengths = [timing.frames_in(index) for index in range(timing.blocks)]
+    assert sum(lengths) == frames
+    assert 1 <= min(lengths) <= max(lengths) <= 1000
+    for index in range(timing.blocks):
+        assert timing.first_frame(index) == sum(lengths[:index])
+        assert timing.block_at(timing.start_us(index)) == index
+    assert timing.block_at(-5) == 0
+    assert timing.block_at(timing.duration_us * 2) == timing.blocks - 1
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("fps", "fast", "a light's track has numbers"),
+        ("frames", 2.5, "numbers"),
+        ("fps", 0, "above zero"),
+        ("fps", float("nan"), "above zero"),
+        ("fps", float("inf"), "above zero"),
+        ("block_frames", 1001, "1..1000"),
+        ("first_frames", 0, "1..1000"),
+        ("first_frames", 91, "1..1000"),
+    ],
+)
+def test_a_wrong_timing_is_refused(key: str, value: object, says: str) -> None:
+    described: dict[str, object] = {"fps": 30, "frames": 90, "block_frames": 30, "first_frames": 15}
+    assert read_timing(described, "light") == Timing(30.0, 90, 30, 15)
+    with pytest.raises(DamagedBlock, match=says):
+        read_timing(described | {key: value}, "light")

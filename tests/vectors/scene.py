@@ -1,0 +1,100 @@
+"""Golden blocks of cameras and lights, valid and invalid."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+
+from bunraku.codec import coefficients
+from bunraku.codec.coefficients import SCENE_CHANNELS, Head
+from bunraku.codec.prior import Integers, shipped
+from bunraku.codec.scene import Scene, SceneTrack
+from bunraku.codec.scene_decode import decode_scene
+from bunraku.codec.scene_encode import encode_scene
+from tests.vectors.blocks import head, text
+
+
+def camera(seconds: float, fps: float) -> Scene:
+    """Round the dancer at about three metres, from either side, nearing and zooming."""
+    t = np.arange(round(seconds * fps)) * (2 * np.pi / fps)
+    angle, distance = 0.5 * np.sin(t / 11), 3.2 + 0.6 * np.sin(t / 7 + 1)
+    position = [distance * np.sin(angle), 1.4 + 0.3 * np.sin(t / 9), distance * np.cos(angle)]
+    gaze = [0.4 * np.sin(t / 5), 1.0 + 0.1 * np.sin(t / 2.3), 0.3 * np.cos(t / 6)]
+    return Scene("camera", fps, np.stack([*position, *gaze, np.radians(40 + 8 * np.sin(t / 8))], axis=1))
+
+
+def light(seconds: float, fps: float) -> Scene:
+    """A lamp that sways, turns from warm to blue and is dimmed to nothing and up again; 800 at its full."""
+    t = np.arange(round(seconds * fps)) * (2 * np.pi / fps)
+    position = [2 + 0.2 * np.sin(t / 3), 4 + 0.1 * np.cos(t / 3), 1 + 0 * t]
+    blue = 0.5 + 0.5 * np.sin(t / 4)
+    intensity = 800 * np.maximum(0, np.cos(t / 5)) ** 2
+    return Scene("light", fps, np.stack([*position, 1 - 0.6 * blue, 0.8 - 0.2 * blue, blue, intensity], axis=1))
+
+
+def vector(track: SceneTrack, number: int, data: bytes) -> dict[str, Any]:
+    """A valid block of track `number` and what it decodes to."""
+    start, q = coefficients.decode(shipped(), data, track.block_frames, track.fps, SCENE_CHANNELS)
+    instants = (0.0, start.frames / 3 - 0.5, start.frames - 1.0, start.frames - 0.5)
+    values = decode_scene(track, data).at(np.array(instants))
+    return {
+        "track": number,
+        "block": text(data),
+        "frames": start.frames,
+        "step": start.step,
+        "q": q.ravel().tolist(),
+        "values": [{"instant": t, "numbers": row.tolist()} for t, row in zip(instants, values, strict=True)],
+    }
+
+
+def _wild(random: np.random.Generator, count: int, most: int) -> Integers:
+    size = np.floor(2.0 ** random.uniform(0, np.log2(most + 1), (SCENE_CHANNELS, 3, count))).astype(np.int64)
+    quantised: Integers = size * random.choice([-1, 0, 1], size.shape)
+    quantised[2, 1:] = 0
+    return quantised
+
+
+def make() -> dict[str, Any]:
+    """Tracks as in a Description; blocks of several lengths and steps; and broken ones of the first track."""
+    still = Scene("camera", 24.0, np.repeat(camera(0.1, 24.0).values[:1], 30, axis=0))
+    scenes = (
+        encode_scene(camera(2.6, 30.0), ladder=(20.0, 1.0)),
+        encode_scene(light(2.6, 59.94), 0.5, ladder=(10.0,), first_seconds=0.1),
+        encode_scene(still, ladder=(1.0,)),
+    )
+    tracks = [scene.track for scene in scenes]
+    valid = [
+        vector(tracks[number], number, data)
+        for number, scene in enumerate(scenes)
+        for rate in scene.rates
+        for data in rate.blocks
+    ]
+    random = np.random.default_rng(10)
+    for number, frames, step, count, most in (
+        (0, 1, 255, 1, 3),
+        (0, 30, 7, 30, 1 << 12),
+        (1, 30, 60, 30, 1 << 16),
+        (0, 1000, 100, 40, 1 << 8),
+        (1, 31, 0, 9, 1 << 20),
+        (0, 60, 255, 60, 1 << 19),
+    ):
+        track = tracks[number]
+        q = _wild(random, count, most)
+        data = coefficients.encode(shipped(), Head(frames, step, 0), q, track.block_frames, track.fps)
+        valid.append(vector(track, number, data))
+    usual = tracks[0].block_frames
+    invalid = {
+        "no frames": head([(9, 8)], 0, scene=True),
+        "too many frames": head([(9, 8), (4, 10)], 1001, scene=True),
+        "more frequencies than frames": head([(9, 8), (5, 3)], 4, scene=True),
+        "more frequencies than the usual frames": head([(9, 8), (usual + 1, usual.bit_length())], scene=True),
+        "an escape too long": head([(9, 8), (1, usual.bit_length())], scene=True) + bytes(30),
+        "too large": base64.b64decode(valid[-1]["block"]) + bytes(65_536),
+    }
+    return {
+        "tracks": [scene.describe() for scene in scenes],
+        "valid": valid,
+        "invalid": [{"why": why, "block": text(data)} for why, data in invalid.items()],
+    }
