@@ -18,6 +18,12 @@ TURN_UNIT = 0.1
 """Radians in one unit of a block's turn of the root."""
 STEP_UNIT = 2.0**-16
 """Quantiser step of index 0 for a block of 30 frames, metres; sixteen indices make it twice as large."""
+MOST_FPS = 100_000
+"""Frames a second, at most: instants are whole microseconds."""
+MOST_BLOCKS = 86_400
+"""Of a motion: a day of seconds."""
+MOST_US = 1 << 48
+"""A motion is shorter: block times have six bytes."""
 _BITS = 3, 14
 """Bits after the point of references in radians: of a motion, and of one that stands still."""
 
@@ -179,8 +185,12 @@ def read_track(described: dict[str, Any]) -> MotionTrack:
         and isinstance(first_frames, int)
     ):
         raise DamagedBlock("a motion's track has numbers fps, frames, block_frames and first_frames")
-    if not (fps > 0 and 0 < first_frames <= min(frames, 1000) and 0 < block_frames <= 1000):
-        raise DamagedBlock("a motion's track has fps and frames above zero and blocks of 1..1000 frames")
+    if not (0 < fps <= MOST_FPS and 0 < first_frames <= min(frames, 1000) and 0 < block_frames <= 1000):
+        raise DamagedBlock(
+            f"a motion's track has fps above zero, at most {MOST_FPS}, frames above zero and blocks of 1..1000 frames"
+        )
+    if frames > MOST_BLOCKS * block_frames or frames * 1e6 / fps >= MOST_US:
+        raise DamagedBlock(f"a motion has at most {MOST_BLOCKS} blocks and less than 2^48 microseconds")
     if not isinstance(dancer, bytes):
         raise DamagedBlock("a motion's track has a dancer, bytes")
     return MotionTrack(float(fps), frames, block_frames, first_frames, *unpack_dancer(dancer))

@@ -11,6 +11,9 @@ export const CODEC = "bunraku.motion/2";
 /** Radians in one unit of a block's turn of the root. */
 export const TURN_UNIT = 0.1;
 
+// instants are whole microseconds, of six bytes in a Data Packet
+const MOST_FPS = 100_000;
+const MOST_US = 2 ** 48;
 // a day of 1 s blocks; and as many rates as a Data Packet can number
 const MOST_BLOCKS = 86_400;
 const MOST_RATES = 16;
@@ -61,9 +64,12 @@ export class MotionTrack {
     const { codec, fps, frames, block_frames: blockFrames, first_frames: firstFrames, dancer, rates, front } = map;
     const whole = (value: unknown, most: number) => Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
     if (codec !== CODEC) throw new DamagedBlock(`motion is of codec ${String(codec)}; this client reads ${CODEC}`);
-    if (!Number.isFinite(fps) || Number(fps) <= 0) throw new DamagedBlock("motion needs fps, a number above zero");
+    if (!(Number.isFinite(fps) && Number(fps) > 0 && Number(fps) <= MOST_FPS)) {
+      throw new DamagedBlock(`motion needs fps, a number above zero and at most ${MOST_FPS}`);
+    }
     if (!whole(blockFrames, MOST_FRAMES)) throw new DamagedBlock(`motion needs block_frames, 1..${MOST_FRAMES}`);
     if (!whole(frames, Number(blockFrames) * MOST_BLOCKS)) throw new DamagedBlock("motion needs frames, at least one");
+    if ((Number(frames) * 1e6) / Number(fps) >= MOST_US) throw new DamagedBlock("motion needs to last less than 2^48 microseconds");
     if (!whole(firstFrames, Math.min(Number(frames), MOST_FRAMES))) {
       throw new DamagedBlock(`motion needs first_frames, 1..${MOST_FRAMES} and no more than its frames`);
     }
