@@ -82,7 +82,7 @@ def test_hypothesis(
 
 
 @pytest.mark.timeout(600)
-def test_atheris(tmp_path: Path, cache: pytest.Cache, tally: Callable[[str], None]) -> None:
+def test_atheris(tmp_path: Path, tally: Callable[[str], None]) -> None:
     if find_spec("atheris") is None:
         why = "atheris is not installed: it has wheels for CPython 3.11 to 3.14 on Linux, x86-64"
         pytest.fail(why) if os.environ.get("CI") else pytest.skip(why)
@@ -93,7 +93,7 @@ def test_atheris(tmp_path: Path, cache: pytest.Cache, tally: Callable[[str], Non
     done = subprocess.run(
         [sys.executable, "-m", "tests.fuzz", corpus, file, *options],
         cwd=REPOSITORY,
-        env=os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(cache.mkdir("numba-with-bounds-checked"))},
+        env=os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path / "numba")},
         capture_output=True,
         text=True,
         timeout=580,
