@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import hypothesis
@@ -17,6 +17,24 @@ hypothesis.settings.register_profile("bunraku", deadline=None)
 hypothesis.settings.load_profile("bunraku")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+TALLIES = pytest.StashKey[list[str]]()
+
+
+@pytest.fixture
+def tally(pytestconfig: pytest.Config) -> Callable[[str], None]:
+    """Says a line at the end of the run, when all is well too."""
+    return pytestconfig.stash.setdefault(TALLIES, []).append
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Prints what tests counted."""
+    lines = config.stash.get(TALLIES, [])
+    if lines:
+        terminalreporter.section("counted")
+        for line in lines:
+            terminalreporter.line(line)
 
 
 @pytest.fixture(scope="session")

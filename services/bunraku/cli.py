@@ -66,17 +66,26 @@ def upload(
     as_json: Json = False,
 ) -> None:
     """Upload a motion file, and say what was made of it."""
-    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
     from rich.table import Table
 
     from bunraku.client.api import Client
 
     async def run() -> dict[str, Any]:
-        columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
+        columns = (
+            TextColumn("{task.fields[name]}", markup=False),
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.description}"),
+        )
         with Progress(*columns, console=err, disable=as_json or not err.is_terminal, transient=True) as progress:
-            task = progress.add_task(file.name, total=file.stat().st_size)
+            task = progress.add_task("sending", name=file.name, total=1)
+
+            def at(stage: str, share: float) -> None:
+                progress.update(task, description=stage, completed=share)
+
             async with Client(server) as client:
-                return await client.upload(file, lambda sent, _: progress.update(task, completed=sent))
+                return await client.upload(file, lambda sent, size: at("sending", sent / size), at)
 
     motion = _ask(run, server)
     if as_json:

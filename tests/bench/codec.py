@@ -2,7 +2,8 @@
 
 Every clip is encoded with a prior that saw none of its family, when asked for a mean or a largest error. Its kbit/s
 count all that a viewer receives of the motion over the clip: blocks, Data heads, WebSocket frames, and the dancer (limb
-lengths and references) from the Description. `--quick` takes every third clip.
+lengths and references) from the Description. `--quick` takes every third clip. With PICTURE=FILE more errors are asked
+for, and rate over error is drawn (SVG).
 """
 
 from __future__ import annotations
@@ -23,11 +24,13 @@ from bunraku.codec.prior import Prior, parse, shipped
 from bunraku.codec.track import MotionTrack
 from bunraku.motion.skeleton import Motion
 from bunraku.wire.messages import Data
-from tests.bench import peers
+from tests.bench import peers, picture
 from training import corpus as clips
 
 GOALS = (("mean", 1.0), ("mean", 5.0), ("max", 10.0), ("max", 2.0))
 PEERS = {"acl": "acl", "meshopt": "meshopt_brotli"}
+COLUMNS = {"mean": peers.MEAN, "max": peers.MOST}
+DRAWN = {"mean": (0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0), "max": (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)}
 PRIORS = Path(__file__).with_name("priors")
 
 
@@ -39,7 +42,7 @@ def prior_for(name: str) -> Prior:
 
 def received(track: MotionTrack, blocks: list[bytes]) -> int:
     """Bytes of a motion on its way to a viewer."""
-    packets = [len(Data(0, 0, track.start_us(index), block).pack()) for index, block in enumerate(blocks)]
+    packets = [len(Data(0, 0, index, block).pack()) for index, block in enumerate(blocks)]
     framed = sum(size + (2 if size < 126 else 4) for size in packets)
     return framed + len(track.dancer.pack())
 
@@ -57,6 +60,34 @@ def ours(motion: Motion, goal: tuple[str, float], prior: Prior, block_seconds: f
 
 def geometric(values: list[float]) -> float:
     return float(np.exp(np.mean(np.log(values))))
+
+
+def draw(
+    motions: dict[str, Motion],
+    measured: dict[str, dict[str, peers.Rows]],
+    rates: dict[tuple[str, float], list[float]],
+    block_seconds: float,
+) -> str:
+    """The picture of rate over error; our `rates` (kbit/s of each clip) are added where they lack an error."""
+    panels = []
+    for kind, title in (("mean", "Mean error"), ("max", "Largest error, held in every block")):
+        for error in DRAWN[kind]:
+            goal = kind, error
+            if goal not in rates:
+                rates[goal] = [ours(motion, goal, prior_for(name), block_seconds) for name, motion in motions.items()]
+            print(f"drawn: {kind} {error:g} mm, {geometric(rates[goal]):.2f} kbit/s", flush=True)
+        points = [(error, geometric(rates[kind, error])) for error in DRAWN[kind]]
+        curves = [picture.Curve("Bunraku", "#b3301f", points, measured=True)]
+        for name, peer, colour in (("meshoptimizer + brotli", "meshopt", "#27418f"), ("ACL", "acl", "#7d5a14")):
+            rows = [measured[clip][PEERS[peer]] for clip in motions]
+            theirs = peers.curve(rows, COLUMNS[kind], points[0][0], points[-1][0])
+            curves.append(picture.Curve(name, colour, theirs))
+        panels.append(picture.Panel(title, curves, tuple(error for of, error in GOALS if of == kind)))
+    note = (
+        f"Geometric means over {len(motions)} clips. Ours: all that a viewer receives, in independent blocks of "
+        f"{block_seconds:g} s. The others: whole clips at once."
+    )
+    return picture.draw((panels[0], panels[1]), note)
 
 
 def speeds(motions: dict[str, Motion]) -> dict[str, float]:
@@ -123,7 +154,7 @@ def main() -> None:
     names = [name for name in clips.names(folder) if name in measured][:: 3 if asked.quick else 1]
     motions = {name: clips.load(folder, name) for name in names}
     ratios: dict[str, list[float]] = {}
-    rates: dict[str, list[float]] = {}
+    rates: dict[tuple[str, float], list[float]] = {}
     print(
         f"{'clip':<16}"
         + "".join(f"{kind} {error:g} mm".rjust(12) + f"{'acl':>8}{'meshopt':>9}" for kind, error in GOALS)
@@ -133,14 +164,18 @@ def main() -> None:
         for kind, error in GOALS:
             key = f"{kind}_{error:g}mm"
             kbps = ours(motion, (kind, error), prior_for(name), asked.block_seconds)
-            rates.setdefault(f"kbps_{key}", []).append(kbps)
+            rates.setdefault((kind, error), []).append(kbps)
             row += f"{kbps:12.2f}"
             for peer, column in PEERS.items():
-                theirs = peers.kbps(measured[name][column], peers.MEAN if kind == "mean" else peers.MOST, error)
+                theirs = peers.kbps(measured[name][column], COLUMNS[kind], error)
                 ratios.setdefault(f"{peer}_{key}", []).append(theirs / kbps)
                 row += f"{theirs / kbps:8.2f}" if peer == "acl" else f"{theirs / kbps:9.2f}"
         print(row, flush=True)
-    figures = {key: round(geometric(values), 3) for key, values in (ratios | rates).items()}
+    told = ratios | {f"kbps_{kind}_{error:g}mm": values for (kind, error), values in rates.items()}
+    figures = {key: round(geometric(values), 3) for key, values in told.items()}
+    if os.environ.get("PICTURE"):
+        drawn = draw(motions, measured, rates, asked.block_seconds)
+        Path(os.environ["PICTURE"]).write_text(drawn, encoding="utf-8", newline="\n")
     figures |= {key: round(value, 3) for key, value in speeds(motions).items()}
     typescript = decode_ms_typescript(motions)
     figures["decode_ms_typescript"] = round(typescript, 3) if typescript is not None else -1.0

@@ -11,6 +11,8 @@ import numpy as np
 
 Rows = list[list[float]]
 MEAN, MOST = 1, 2
+CURVE = 48
+"""Points of a curve."""
 
 
 def read(corpus: Path) -> dict[str, dict[str, Rows]]:
@@ -38,6 +40,15 @@ def kbps(rows: Rows, column: int, error: float) -> float:
         raise ValueError(f"the peer was measured from {points[0][0]} to {points[-1][0]} mm, not at {error}")
     errors, rates = np.log(np.array(points)).T
     return math.exp(float(np.interp(math.log(error), errors, rates)))
+
+
+def curve(clips: list[Rows], column: int, least: float, most: float) -> list[tuple[float, float]]:
+    """(error mm, geometric mean of kbit/s over the clips) from `least` to `most`, as far as every clip was measured."""
+    hulls = [hull(rows, column) for rows in clips]
+    low, high = max(least, *(points[0][0] for points in hulls)), min(most, *(points[-1][0] for points in hulls))
+    # ends that rounding cannot put outside
+    errors = np.clip(np.geomspace(low, high, CURVE), low, high)
+    return [(float(e), math.exp(np.mean([math.log(kbps(rows, column, e)) for rows in clips]))) for e in errors]
 
 
 def _above(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:

@@ -23,3 +23,12 @@ def test_a_peer_is_read_log_log_between_its_points() -> None:
     assert peers.kbps(ROWS, peers.MEAN, 8**0.5) == pytest.approx(20**0.5)
     with pytest.raises(ValueError, match="measured from"):
         peers.kbps(ROWS, peers.MEAN, 0.4)
+
+
+def test_a_curve_is_the_geometric_mean_where_every_clip_was_measured() -> None:
+    slower = [[row[0] * 4, *row[1:]] for row in ROWS if row[1] < 4]
+    points = peers.curve([ROWS, slower], peers.MEAN, 0.1, 100.0)
+    assert (points[0][0], points[-1][0]) == (0.5, 3.0)
+    assert points[0][1] == pytest.approx(60.0)
+    assert [error for error, _ in points] == sorted(error for error, _ in points)
+    assert peers.curve([ROWS], peers.MEAN, 1.0, 2.0)[0] == pytest.approx((1.0, 10.0))

@@ -5,7 +5,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from bunraku.client import Client, ServerProblem
+from bunraku.client import Client, ServerProblem, api
+from tests.servers import clip
 
 
 async def test_upload_tells_how_far_it_is_and_what_was_made(server: str, clip_file: Path) -> None:
@@ -20,6 +21,21 @@ async def test_upload_tells_how_far_it_is_and_what_was_made(server: str, clip_fi
     assert gone.value.status == 404
     assert told[-1] == (motion["bytes"],) * 2
     assert told == sorted(told)
+
+
+async def test_upload_tells_what_the_server_does_with_it(
+    server: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(api, "EVERY", 0.01)
+    told: list[tuple[str, float]] = []
+    path = tmp_path / "long.bvh"
+    path.write_bytes(clip(20.0, 77))
+    async with Client(server) as client:
+        await client.upload(path, made=lambda stage, share: told.append((stage, share)))
+    assert {stage for stage, _ in told} <= {"waiting", "reading", "encoding"}
+    shares = [share for stage, share in told if stage == "encoding"]
+    assert len(set(shares)) > 1
+    assert shares == sorted(shares)
 
 
 async def test_a_refusal_says_line_and_hint(server: str, tmp_path: Path) -> None:

@@ -3,6 +3,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import msgpack
+import numpy as np
+import pytest
 
 from bunraku.ingest.making import make
 from bunraku.ingest.results import Made, Refused
@@ -12,9 +14,12 @@ from tests.servers import clip
 def test_a_motion_is_made_and_described(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(clip(1.5))
-    made = make("m1", source)
+    shares: list[float] = []
+    made = make("m1", source, shares.append)
     assert isinstance(made, Made)
     assert made.described["blocks"] == 2
+    # the start, and two blocks at each rate
+    assert shares == pytest.approx(np.linspace(0, 1, 1 + 2 * len(made.described["rates"])))
     assert [len(rate) for rate in msgpack.unpackb(made.packed)["packets"]] == [2] * len(made.described["rates"])
 
 

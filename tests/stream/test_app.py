@@ -62,9 +62,9 @@ async def test_the_server_speaks_first_in_the_papers_order(server: str, motion: 
     assert abs(timeline.clock - header.now) < 1_000_000
     track = read_track(description.tracks[0])
     best = len(description.tracks[0]["rates"]) - 1
-    assert [(d.start, d.rate) for d in data if isinstance(d, Data)] == [
+    assert [(d.index, d.rate) for d in data if isinstance(d, Data)] == [
         (0, 0),
-        *((track.start_us(index), best) for index in (1, 2, 3)),
+        *((index, best) for index in (1, 2, 3)),
     ]
     assert track.start_us(1) == 500_000
 

@@ -48,7 +48,8 @@ def make() -> dict[str, Any]:
     examples: list[Message] = [
         ChannelHeader(motion="k3v9q", now=NOW, channels=19, software="0.1.0"),
         Description("k3v9q", [{"type": "motion", "fps": 60.0, "figure": bytes(range(138))}]),
-        Data(0, 3, 281_474_976_710_000, b"\x01block"),
+        Data(0, 3, 86_399, b"\x01block"),
+        Data(1, 0, 5, b""),
         TimelineState(7, "k3v9q", NOW, 1_500_000, True, False, 32_475_000),
         Overlay(65_535, NOW, {0: (1, -2, 3, -32_767, 32_767, 0, 7, 8, 9), 3: (0, 0, 0, 1, 1, 1, -5, -6, -7)}),
         Overlay(0, NOW, {}),
@@ -82,8 +83,9 @@ def make() -> dict[str, Any]:
         "input of a fifth limb": target[:1] + b"\x04" + target[2:],
         "overlay shorter than its mask": bytes([5, 1]) + bytes(10),
         "overlay with a fifth limb": bytes([5, 16]) + bytes(10),
-        "data without a time": bytes([3, 0, 0]),
-        "pong too long": examples[7].pack() + b"\0",
+        "data without an index": bytes([3, 0]),
+        "data with an index too long": bytes([3, 0, 128, 128, 128, 1]),
+        "pong too long": examples[8].pack() + b"\0",
     }
     return {
         "valid": [

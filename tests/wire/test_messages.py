@@ -44,7 +44,7 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
     st.builds(ChannelHeader, motion=TEXT, now=TIME, channels=TIME, software=TEXT),
     st.builds(Description, motion=TEXT, tracks=st.lists(st.dictionaries(TEXT, st.binary(max_size=9)), max_size=2)),
     st.builds(
-        Data, track=st.integers(0, 15), rate=st.integers(0, 15), start=st.integers(0, (1 << 48) - 1), block=st.binary()
+        Data, track=st.integers(0, 15), rate=st.integers(0, 15), index=st.integers(0, (1 << 21) - 1), block=st.binary()
     ),
     st.builds(
         TimelineState,
@@ -122,7 +122,7 @@ def test_unknown_types_are_skipped_and_unknown_keys_too() -> None:
 
 
 def test_sizes_are_those_of_the_contract() -> None:
-    assert len(Data(0, 3, 1_000_000, b"").pack()) == 8
+    assert [len(Data(0, 3, index, b"").pack()) for index in (0, 127, 128, 86_399)] == [3, 3, 4, 5]
     assert len(Overlay(1, 2, {0: (0,) * 9, 3: (1,) * 9}).pack()) == 12 + 36
     assert len(Ping(1, 2).pack()) == len(Pong(1, 2, 3, 4).pack()) == len(Input(0, 0, 1, 1, 1, (0, 0, 0)).pack()) == 32
 

@@ -37,9 +37,8 @@ class StoredMotion:
 
 def pack(motion: str, encoded: EncodedMotion) -> bytes:
     """The object of an encoded motion."""
-    track = encoded.track
     packets = [
-        [Data(0, number, track.start_us(index), block).pack() for index, block in enumerate(rate.blocks)]
+        [Data(0, number, index, block).pack() for index, block in enumerate(rate.blocks)]
         for number, rate in enumerate(encoded.rates)
     ]
     description = Description(motion, [encoded.describe()]).pack()

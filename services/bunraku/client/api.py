@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
+import secrets
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any, Self
@@ -14,6 +16,8 @@ import httpx2
 TIMEOUT = httpx2.Timeout(10.0, read=120.0)
 """Seconds; an answer to an upload comes when it is encoded."""
 CHUNK = 1 << 16
+EVERY = 0.25
+"""Seconds between two questions how far an upload is."""
 
 
 class ServerProblem(Exception):
@@ -43,9 +47,16 @@ class Client:
     async def __aexit__(self, *_: object) -> None:
         await self._http.aclose()
 
-    async def upload(self, path: Path, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
-        """Upload a motion file and wait until it can be watched; `progress` is told bytes sent and in all."""
+    async def upload(
+        self,
+        path: Path,
+        progress: Callable[[int, int], None] | None = None,
+        made: Callable[[str, float], None] | None = None,
+    ) -> dict[str, Any]:
+        """Upload a motion file and wait until it can be watched; `progress` is told bytes sent and in all, and `made`
+        again and again what the server does with it (`waiting`, `reading`, `encoding`) and the share done, 0..1."""
         size = await asyncio.to_thread(os.path.getsize, path)
+        name = secrets.token_urlsafe(16)
 
         async def chunks() -> AsyncIterator[bytes]:
             sent = 0
@@ -56,13 +67,28 @@ class Client:
                     if progress is not None:
                         progress(sent, size)
 
-        return await self._ask(
-            "POST",
-            "/v1/motions",
-            params={"filename": path.name},
-            content=chunks(),
-            headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
-        )
+        following = asyncio.create_task(self._follow(name, made)) if made is not None else None
+        try:
+            return await self._ask(
+                "POST",
+                "/v1/motions",
+                params={"filename": path.name, "upload": name},
+                content=chunks(),
+                headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
+            )
+        finally:
+            if following is not None:
+                following.cancel()
+                await asyncio.wait((following,))
+
+    async def _follow(self, upload: str, told: Callable[[str, float], None]) -> None:
+        """Tell how far an upload is until cancelled. What fails in this is no matter: the upload's own answer tells."""
+        while True:
+            await asyncio.sleep(EVERY)
+            with contextlib.suppress(ServerProblem, httpx2.TransportError):
+                said = await self._ask("GET", f"/v1/uploads/{upload}")
+                if said["stage"] != "receiving":
+                    told(said["stage"], said["share"])
 
     async def motions(self) -> list[dict[str, Any]]:
         """All motions, newest first."""

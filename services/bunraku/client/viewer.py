@@ -137,7 +137,7 @@ class Viewer:
             began = time.perf_counter()
             block = decode_block(self.track, message.block)
             self._decode = time.perf_counter() - began
-            self._blocks.put(self.track.block_at(message.start), message.rate, block)
+            self._blocks.put(message.index, message.rate, block)
             self.figures.blocks += 1
             self.figures.rate = message.rate
         elif isinstance(message, Overlay):

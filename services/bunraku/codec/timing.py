@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
 from typing import Any
 
 from bunraku.codec.coefficients import MOST_FRAMES
 from bunraku.codec.errors import DamagedBlock
+
+MOST_FPS = 100_000
+"""Frames a second, at most: instants are whole microseconds."""
+MOST_BLOCKS = 86_400
+"""Of a track: a day of seconds."""
+MOST_US = 1 << 48
+"""A track is shorter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +47,7 @@ class Timing:
         return min(self.block_frames, self.frames - self.first_frame(index))
 
     def start_us(self, index: int) -> int:
-        """Motion time of the first frame of block `index`, microseconds: the timestamp of its Data Packet."""
+        """Motion time of the first frame of block `index`, microseconds."""
         return round(self.first_frame(index) * 1e6 / self.fps)
 
     def block_at(self, position_us: float) -> int:
@@ -71,6 +77,11 @@ def read_timing(described: dict[str, Any], what: str) -> Timing:
         and isinstance(first_frames, int)
     ):
         raise DamagedBlock(f"a {what}'s track has numbers fps, frames, block_frames and first_frames")
-    if not (0 < fps < inf and 0 < first_frames <= min(frames, MOST_FRAMES) and 0 < block_frames <= MOST_FRAMES):
-        raise DamagedBlock(f"a {what}'s track has fps and frames above zero and blocks of 1..{MOST_FRAMES} frames")
+    if not (0 < fps <= MOST_FPS and 0 < first_frames <= min(frames, MOST_FRAMES) and 0 < block_frames <= MOST_FRAMES):
+        raise DamagedBlock(
+            f"a {what}'s track has fps above zero, at most {MOST_FPS}, frames above zero and blocks of "
+            f"1..{MOST_FRAMES} frames"
+        )
+    if frames > MOST_BLOCKS * block_frames or frames * 1e6 / fps >= MOST_US:
+        raise DamagedBlock(f"a {what} has at most {MOST_BLOCKS} blocks and less than 2^48 microseconds")
     return Timing(float(fps), frames, block_frames, first_frames)

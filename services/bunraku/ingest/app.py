@@ -5,14 +5,19 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
-from fastapi import FastAPI, Query, Request, Response
+from fastapi import FastAPI, Path, Query, Request, Response
 from fastapi.responses import JSONResponse
+from starlette.requests import ClientDisconnect
 
 from bunraku.backing import problems
 from bunraku.backing.backing import Backing
 from bunraku.backing.catalogue import BadCursor, Entry
 from bunraku.backing.problems import ProblemError
+from bunraku.ingest.progress import Progress
 from bunraku.ingest.uploads import Uploads
+
+NAME = r"^[A-Za-z0-9_-]{8,64}$"
+"""Of an upload, chosen at random by its sender."""
 
 
 def entry_json(entry: Entry) -> dict[str, Any]:
@@ -28,10 +33,29 @@ def create_app(backing: Backing) -> FastAPI:
     uploads = Uploads(backing)
 
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BODY)
-    async def upload(request: Request, filename: Annotated[str, Query(min_length=1, max_length=255)]) -> Response:
-        """Make a motion of the file in the request's body. The same bytes again give the same motion, with 200."""
-        entry, new = await uploads.take(request, filename)
+    async def upload(
+        request: Request,
+        filename: Annotated[str, Query(min_length=1, max_length=255)],
+        upload: Annotated[str | None, Query(pattern=NAME)] = None,
+    ) -> Response:
+        """Make a motion of the file in the request's body. The same bytes again give the same motion, with 200. With a
+        random name in `upload`, `GET /v1/uploads/{upload}` says meanwhile how far it is."""
+        try:
+            entry, new = await uploads.take(request, filename, upload)
+        except ClientDisconnect:
+            # nobody is there to read this
+            return Response(status_code=400)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+
+    @app.get("/v1/uploads/{upload}", tags=["motions"])
+    async def progress(upload: Annotated[str, Path(pattern=NAME)], response: Response) -> Progress:
+        """How far an upload is that is under way: what is being done, and the share of that which is done. 404 before
+        and after."""
+        found = uploads.progress(upload)
+        if found is None:
+            raise ProblemError(404, "No such upload", f"no upload {upload!r} is under way here")
+        response.headers["Cache-Control"] = "no-store"
+        return found
 
     @app.get("/v1/motions", tags=["motions"])
     async def page(

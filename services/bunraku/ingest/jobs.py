@@ -11,13 +11,17 @@ import asyncio
 import contextlib
 import multiprocessing
 import resource
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 from bunraku.ingest.results import Made, Refused
 
 MEMORY = 4 << 30
 """Bytes of address space that a job may take."""
+SHARES = 100
+"""Times that a job says how far it is, at most: few enough that its pipe never fills."""
 
 _context = multiprocessing.get_context("forkserver")
 _context.set_forkserver_preload(["bunraku.ingest.making"])
@@ -27,8 +31,16 @@ def _work(answer: Connection, motion: str, path: Path) -> None:
     from bunraku.ingest.making import make
 
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    told = -1
+
+    def tell(share: float) -> None:
+        nonlocal told
+        if int(share * SHARES) > told:
+            told = int(share * SHARES)
+            answer.send(share)
+
     try:
-        answer.send(make(motion, path))
+        answer.send(make(motion, path, tell))
     except MemoryError:
         answer.send(
             Refused(
@@ -37,16 +49,23 @@ def _work(answer: Connection, motion: str, path: Path) -> None:
         )
 
 
-async def run(motion: str, path: Path, seconds: float) -> Made | Refused:
+async def run(
+    motion: str, path: Path, seconds: float, progress: Callable[[float], None] = lambda _: None
+) -> Made | Refused:
     """`making.make` in a process of its own, ended after `seconds`."""
     receiver, sender = _context.Pipe(duplex=False)
     process = _context.Process(target=_work, args=(sender, motion, path), daemon=True)
-    await asyncio.to_thread(process.start)
-    sender.close()
     try:
-        async with asyncio.timeout(seconds):
-            arrived = await _readable(receiver)
-        result = await asyncio.to_thread(receiver.recv) if arrived else None
+        await _to_its_end(process.start)
+        sender.close()
+        end = asyncio.get_running_loop().time() + seconds
+        while True:
+            async with asyncio.timeout_at(end):
+                await _readable(receiver)
+            result = await _to_its_end(receiver.recv)
+            if not isinstance(result, float):
+                break
+            progress(result)
     except TimeoutError:
         return Refused(
             "Takes too long",
@@ -56,28 +75,41 @@ async def run(motion: str, path: Path, seconds: float) -> Made | Refused:
     except EOFError:
         result = None
     finally:
-        process.kill()
-        await asyncio.to_thread(process.join)
-        process.close()
+        if process.pid is not None:
+            process.kill()
+            await asyncio.to_thread(process.join)
+            process.close()
+        sender.close()
         receiver.close()
     if isinstance(result, Made | Refused):
         return result
     return Refused("Unreadable motion", "the reader broke off on this file", hint="please report it with the file")
 
 
-async def _readable(receiver: Connection) -> bool:
+async def _to_its_end(work: Callable[[], Any]) -> Any:
+    """The result of `work` in a thread. One who is cancelled waits for it all the same: process and pipe are put away
+    only when no thread is at them."""
+    working = asyncio.ensure_future(asyncio.to_thread(work))
+    try:
+        return await asyncio.shield(working)
+    except asyncio.CancelledError:
+        await asyncio.gather(working, return_exceptions=True)
+        raise
+
+
+async def _readable(receiver: Connection) -> None:
     """Wait until something has come through the pipe, or it was closed."""
     loop = asyncio.get_running_loop()
-    arrived: asyncio.Future[bool] = loop.create_future()
+    arrived: asyncio.Future[None] = loop.create_future()
     number = receiver.fileno()
 
     def come() -> None:
         if not arrived.done():
-            arrived.set_result(True)
+            arrived.set_result(None)
 
     loop.add_reader(number, come)
     try:
-        return await arrived
+        await arrived
     finally:
         with contextlib.suppress(ValueError, OSError):
             loop.remove_reader(number)

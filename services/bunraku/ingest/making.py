@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from bunraku.backing.library import pack
@@ -25,8 +26,9 @@ encode.warm()
 read(_SMALLEST)
 
 
-def make(motion: str, path: Path) -> Made | Refused:
-    """Read, analyse and encode the file at `path` as the motion of this id."""
+def make(motion: str, path: Path, progress: Callable[[float], None] = lambda _: None) -> Made | Refused:
+    """Read, analyse and encode the file at `path` as the motion of this id; `progress` is told the share encoded, 0..1,
+    from where encoding begins."""
     try:
         analysis = analyse(read(path.read_bytes()))
         for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
@@ -36,7 +38,8 @@ def make(motion: str, path: Path) -> Made | Refused:
     except ProportionsError as error:
         return Refused("No puppet's arms", f"its arms cannot be pulled: {error}", field=error.field, hint=error.hint)
     grade: Grade = "best" if analysis.motion.frames <= MOST_FRAMES_AT_BEST else "live"
-    encoded = encode_motion(analysis.motion, first_seconds=FIRST_SECONDS, grade=grade)
+    progress(0.0)
+    encoded = encode_motion(analysis.motion, first_seconds=FIRST_SECONDS, grade=grade, progress=progress)
     track = encoded.track
     return Made(
         pack(motion, encoded),

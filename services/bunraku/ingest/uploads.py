@@ -6,15 +6,17 @@ import asyncio
 import base64
 import hashlib
 import os
+import secrets
 import tempfile
 from pathlib import Path, PurePath
 
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.catalogue import Entry
 from bunraku.backing.problems import ProblemError
 from bunraku.ingest import jobs
+from bunraku.ingest.progress import Progress
 from bunraku.ingest.results import Made, Refused
 
 AT_ONCE = 2
@@ -35,40 +37,73 @@ class Uploads:
     def __init__(self, backing: Backing) -> None:
         self._backing = backing
         self._places = asyncio.Semaphore(AT_ONCE)
-        self._under_way = 0
+        self._under_way: dict[str, Progress] = {}
 
-    async def take(self, request: Request, filename: str) -> tuple[Entry, bool]:
-        """The motion of the request's body, and whether it is new; raises `ProblemError`."""
-        if self._under_way >= WAITING:
+    def progress(self, upload: str) -> Progress | None:
+        """How far an upload is by the name that its sender gave it, None when it is not, or no longer, under way."""
+        return self._under_way.get(upload)
+
+    async def take(self, request: Request, filename: str, upload: str | None = None) -> tuple[Entry, bool]:
+        """The motion of the request's body, and whether it is new; while it is under way its `progress` can be asked
+        for by the name `upload`.
+
+        Raises `ProblemError`, and `ClientDisconnect` where the sender goes away: all that was begun is then ended.
+        """
+        if len(self._under_way) >= WAITING:
             raise ProblemError(503, "Busy", f"{WAITING} uploads are under way", hint="try again in a few seconds")
-        self._under_way += 1
+        if upload in self._under_way:
+            raise ProblemError(409, "Name in use", f"another upload is called {upload!r}", field="upload")
+        # a name that nobody can ask for, where none was given
+        name = upload or f"/{secrets.token_hex()}"
+        progress = self._under_way[name] = Progress()
         try:
             with tempfile.TemporaryDirectory(prefix="bunraku-upload-") as folder:
                 path = Path(folder) / "source"
-                motion = await self._receive(request, path)
-                return await self.add(motion, path, filename)
+                motion = await self._receive(request, path, progress)
+                return await self._while_there(request, motion, path, filename, progress)
         finally:
-            self._under_way -= 1
+            del self._under_way[name]
 
-    async def add(self, motion: str, path: Path, filename: str) -> tuple[Entry, bool]:
+    async def add(self, motion: str, path: Path, filename: str, progress: Progress | None = None) -> tuple[Entry, bool]:
         """The motion of the file at `path`, whose id is `motion`, and whether it is new; raises `ProblemError`."""
+        progress = progress or Progress()
+        progress.at("waiting")
         known = await self._backing.catalogue.get(motion)
         if known is not None and await self._backing.library.get(motion) is not None:
             return known, False
         async with self._places:
-            made = await jobs.run(motion, path, self._backing.settings.upload_seconds)
+            progress.at("reading")
+            seconds = self._backing.settings.upload_seconds
+            made = await jobs.run(motion, path, seconds, lambda share: progress.at("encoding", share))
         size = await asyncio.to_thread(os.path.getsize, path)
         if known is not None and isinstance(made, Made):
             # stored in a codec that is no longer spoken: made anew
             await self._backing.catalogue.remove(motion)
         return await self._store(motion, made, filename, size)
 
-    async def _receive(self, request: Request, path: Path) -> str:
+    async def _while_there(
+        self, request: Request, motion: str, path: Path, filename: str, progress: Progress
+    ) -> tuple[Entry, bool]:
+        """As `add`, broken off when the sender of the request goes away."""
+        adding = asyncio.create_task(self.add(motion, path, filename, progress))
+        leaving = asyncio.create_task(_gone(request))
+        try:
+            await asyncio.wait((adding, leaving), return_when=asyncio.FIRST_COMPLETED)
+            if not adding.done():
+                raise ClientDisconnect
+            return adding.result()
+        finally:
+            adding.cancel()
+            leaving.cancel()
+            await asyncio.wait((adding, leaving))
+
+    async def _receive(self, request: Request, path: Path, progress: Progress) -> str:
         limit = self._backing.settings.upload_bytes
         too_large = ProblemError(
             413, "Too large", f"a file may have {limit} bytes", limit=limit, hint="cut it into shorter clips"
         )
-        if int(request.headers.get("content-length") or 0) > limit:
+        announced = int(request.headers.get("content-length") or 0)
+        if announced > limit:
             raise too_large
         digest, size, pending = hashlib.sha256(), 0, bytearray()
         with path.open("wb") as file:
@@ -76,6 +111,7 @@ class Uploads:
                 size += len(chunk)
                 if size > limit:
                     raise too_large
+                progress.at("receiving", size / announced if announced else 0.0)
                 digest.update(chunk)
                 pending += chunk
                 if len(pending) >= CHUNK:
@@ -95,3 +131,9 @@ class Uploads:
         entry = Entry(motion, clock(), described)
         new = await self._backing.catalogue.add(entry)
         return (entry if new else (await self._backing.catalogue.get(motion) or entry)), new
+
+
+async def _gone(request: Request) -> None:
+    """Wait until the sender of a request whose body is read has gone away."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass

@@ -175,24 +175,30 @@ class Alive(_Packed):
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """One block of one track at one rate; `start` is the motion time of its first frame, microseconds."""
+    """Block `index` (below 2^21) of one track at one rate."""
 
     TYPE: ClassVar[int] = 3
     track: int
     rate: int
-    start: int
+    index: int
     block: bytes
 
     def pack(self) -> bytes:
-        """The message as bytes: 8 and the block."""
-        return bytes([self.TYPE, self.track << 4 | self.rate]) + self.start.to_bytes(6, "little") + self.block
+        """The message as bytes: 3 to 5 and the block."""
+        low = [self.index >> shift & 127 | 128 for shift in (0, 7) if self.index >> shift + 7]
+        return bytes([self.TYPE, self.track << 4 | self.rate, *low, self.index >> 7 * len(low)]) + self.block
 
     @classmethod
     def unpack(cls, data: bytes) -> Data:
         """The message of `pack`."""
-        if len(data) < 8:
-            raise MalformedMessage(f"Data has 8 bytes and a block, not {len(data)}")
-        return cls(data[1] >> 4, data[1] & 15, int.from_bytes(data[2:8], "little"), data[8:])
+        index, end = 0, 2
+        for shift in (0, 7, 14):
+            if end < len(data):
+                index |= (data[end] & 127) << shift
+                end += 1
+                if data[end - 1] < 128:
+                    return cls(data[1] >> 4, data[1] & 15, index, data[end:])
+        raise MalformedMessage("Data has a track and rate, an index of 1 to 3 bytes, and a block")
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,30 +106,64 @@ export function editSession(id: string, edit: SessionEdit): Promise<Session> {
   return ask("PATCH", `/v1/sessions/${encodeURIComponent(id)}`, edit) as Promise<Session>;
 }
 
+/** Where an upload is: on its way, or in the server's hands; and the share of that which is done, 0..1. */
+export interface UploadProgress {
+  stage: "sending" | "waiting" | "reading" | "encoding";
+  share: number;
+}
+
+/** Milliseconds between two questions how far the server is with an upload. */
+export const ASK_EVERY = 400;
+
 /**
- * Uploads a motion capture file. `onProgress` is told the share sent, 0..1; fetch cannot say that, so this is an
- * XMLHttpRequest. Cancelled by `signal`, it rejects with the signal's reason.
+ * Uploads a motion capture file. `onProgress` is told how far it is: fetch cannot say what is sent, so this is an
+ * XMLHttpRequest; what the server does then is asked for. Cancelled by `signal`, it rejects with the signal's reason.
  *
  * @throws ProblemError
  */
-export function uploadMotion(file: File, onProgress?: (share: number) => void, signal?: AbortSignal): Promise<Motion> {
+export function uploadMotion(file: File, onProgress?: (progress: UploadProgress) => void, signal?: AbortSignal): Promise<Motion> {
   return new Promise((resolve, reject) => {
     signal?.throwIfAborted();
+    const upload = randomName();
     const request = new XMLHttpRequest();
+    const ended = new AbortController();
     const cancel = () => request.abort();
     signal?.addEventListener("abort", cancel, { once: true });
-    request.upload.addEventListener("progress", ({ loaded, total }) => onProgress?.(total > 0 ? loaded / total : 0));
-    request.addEventListener("loadend", () => signal?.removeEventListener("abort", cancel));
+    request.upload.addEventListener("progress", ({ loaded, total }) => {
+      onProgress?.({ stage: "sending", share: total > 0 ? loaded / total : 0 });
+    });
+    request.upload.addEventListener("load", () => {
+      if (onProgress) void follow(upload, onProgress, ended.signal);
+    });
+    request.addEventListener("loadend", () => {
+      ended.abort();
+      signal?.removeEventListener("abort", cancel);
+    });
     request.addEventListener("abort", () => reject(signal?.reason as Error));
     request.addEventListener("error", () => reject(ProblemError.unreachable()));
     request.addEventListener("load", () => {
       if (request.status >= 300) reject(ProblemError.from(request.status, request.responseText));
       else resolve(JSON.parse(request.responseText) as Motion);
     });
-    request.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}`);
+    request.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${upload}`);
     request.setRequestHeader("Content-Type", "application/octet-stream");
     request.send(file);
   });
+}
+
+/** Tells what the server does with an upload, until `ended`. What fails in this is no matter: the upload's own answer tells. */
+async function follow(upload: string, tell: (progress: UploadProgress) => void, ended: AbortSignal): Promise<void> {
+  while (!ended.aborted) {
+    const said = (await ask("GET", `/v1/uploads/${upload}`).catch(() => null)) as UploadProgress | { stage: "receiving" } | null;
+    if (ended.aborted) return;
+    if (said && said.stage !== "receiving") tell(said);
+    await new Promise((resolve) => setTimeout(resolve, ASK_EVERY));
+  }
+}
+
+/** 32 hexadecimal digits. `crypto.randomUUID` is not there on a page without TLS. */
+function randomName(): string {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 function page(cursor: string | undefined): string {

@@ -374,7 +374,7 @@ export class Viewer extends EventTarget {
   private keep(message: Data, now: number): void {
     if (!this.store || message.track !== this.trackIndex) return;
     try {
-      if (!this.store.put(message.start, message.rate, message.block)) return;
+      if (!this.store.put(message.index, message.rate, message.block)) return;
     } catch (error) {
       if (!(error instanceof DamagedBlock)) throw error;
       this.damaged++;

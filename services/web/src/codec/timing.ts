@@ -3,6 +3,9 @@
 import { MOST_FRAMES } from "./coefficients";
 import { DamagedBlock } from "./errors";
 
+// instants are whole microseconds, a track is shorter than 2^48 of them
+const MOST_FPS = 100_000;
+const MOST_US = 2 ** 48;
 // a day of 1 s blocks; and as many rates as a Data Packet can number
 const MOST_BLOCKS = 86_400;
 const MOST_RATES = 16;
@@ -69,9 +72,12 @@ export type Described = Readonly<Record<string, unknown>>;
 export function readTiming(map: Described, what: string): Timing {
   const { fps, frames, block_frames: blockFrames, first_frames: firstFrames } = map;
   const whole = (value: unknown, most: number) => Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
-  if (!Number.isFinite(fps) || Number(fps) <= 0) throw new DamagedBlock(`${what} needs fps, a number above zero`);
+  if (!(Number.isFinite(fps) && Number(fps) > 0 && Number(fps) <= MOST_FPS)) {
+    throw new DamagedBlock(`${what} needs fps, a number above zero and at most ${MOST_FPS}`);
+  }
   if (!whole(blockFrames, MOST_FRAMES)) throw new DamagedBlock(`${what} needs block_frames, 1..${MOST_FRAMES}`);
   if (!whole(frames, Number(blockFrames) * MOST_BLOCKS)) throw new DamagedBlock(`${what} needs frames, at least one`);
+  if ((Number(frames) * 1e6) / Number(fps) >= MOST_US) throw new DamagedBlock(`${what} needs to last less than 2^48 microseconds`);
   if (!whole(firstFrames, Math.min(Number(frames), MOST_FRAMES))) {
     throw new DamagedBlock(`${what} needs first_frames, 1..${MOST_FRAMES} and no more than its frames`);
   }

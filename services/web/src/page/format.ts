@@ -1,5 +1,7 @@
 /** Numbers as people read them. */
 
+import type { UploadProgress } from "../client/library";
+
 /** Seconds as m:ss, or h:mm:ss. */
 export function clockTime(seconds: number): string {
   const whole = Math.max(0, Math.floor(Number.isFinite(seconds) ? seconds : 0));
@@ -19,6 +21,11 @@ export function uploadProgress(loaded: number, total: number, seconds: number): 
   if (loaded >= total) return `${share}, reading the dance`;
   if (seconds < 0.5 || loaded <= 0) return share;
   return `${share}, ${Math.max(1, Math.round(((total - loaded) / loaded) * seconds))} s left`;
+}
+
+/** What the server does with an upload, in words. */
+export function makingProgress(stage: UploadProgress["stage"]): string {
+  return { sending: "sending", waiting: "waiting for its turn", reading: "reading the dance", encoding: "encoding the dance" }[stage];
 }
 
 /** A number with a sensible count of digits: 3.45, 12.3, 184. */

@@ -1,6 +1,7 @@
 /** The library drawer: drop zone, uploads with true progress, problems in plain words, and the list of dances. */
+import type { UploadProgress } from "../client/library";
 import { element, setAttribute, setText } from "./dom";
-import { clockTime, uploadProgress } from "./format";
+import { clockTime, makingProgress, uploadProgress } from "./format";
 import { icon, motionGlyph } from "./icons";
 import { createPanel, type Panel } from "./panels";
 
@@ -13,7 +14,10 @@ export interface Piece {
 }
 
 export interface UploadRow {
-  progress(loaded: number, total: number, seconds: number): void;
+  /** Bytes sent and in all, after so many seconds. */
+  sending(loaded: number, total: number, seconds: number): void;
+  /** What the server does with it, and the share done. */
+  making(stage: UploadProgress["stage"], share: number): void;
   remove(): void;
 }
 
@@ -66,14 +70,17 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
       const row = element("div", { class: "upload" }, element("div", { class: "upload-row" }, element("span", { class: "upload-name" }, name), share), bar);
       row.append(element("div", { class: "upload-row" }, state, stop));
       doing.append(row);
+      const show = (done: number, words: string) => {
+        const percent = Math.floor(done * 100);
+        setText(share, `${percent} %`);
+        setText(state, words);
+        fill.style.width = `${percent}%`;
+        bar.setAttribute("aria-valuenow", String(percent));
+        bar.setAttribute("aria-valuetext", `${words}, ${percent} %`);
+      };
       return {
-        progress(loaded, total, seconds) {
-          const percent = total > 0 ? Math.floor((loaded / total) * 100) : 0;
-          setText(share, `${percent} %`);
-          setText(state, uploadProgress(loaded, total, seconds));
-          fill.style.width = `${percent}%`;
-          bar.setAttribute("aria-valuenow", String(percent));
-        },
+        sending: (loaded, total, seconds) => show(total > 0 ? loaded / total : 0, uploadProgress(loaded, total, seconds)),
+        making: (stage, done) => show(done, makingProgress(stage)),
         remove: () => row.remove(),
       };
     },

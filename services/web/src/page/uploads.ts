@@ -11,7 +11,10 @@ export async function uploadAll(files: readonly File[], library: Library, done: 
   for (const { file, abort, row } of waiting) {
     const started = performance.now();
     try {
-      const motion = await uploadMotion(file, (share) => row.progress(share * file.size, file.size, (performance.now() - started) / 1000), abort.signal);
+      const motion = await uploadMotion(file, ({ stage, share }) => {
+        if (stage === "sending") row.sending(share * file.size, file.size, (performance.now() - started) / 1000);
+        else row.making(stage, share);
+      }, abort.signal);
       row.remove();
       await done(motion);
     } catch (error) {

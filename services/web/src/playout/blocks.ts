@@ -19,18 +19,13 @@ export class BlockStore {
   }
 
   /**
-   * Decodes the block whose first frame stands at motion time `startUs` and keeps it, unless as good a one is here already;
-   * whether it was kept.
+   * Decodes block `index` and keeps it, unless as good a one is here already; whether it was kept.
    *
    * @throws DamagedBlock where it cannot be decoded or is not of this motion
    */
-  put(startUs: number, rate: number, data: Uint8Array): boolean {
+  put(index: number, rate: number, data: Uint8Array): boolean {
     const { track } = this;
-    const index = track.blockAt(startUs);
-    // a frame's time is rounded to the microsecond
-    if (Math.abs(track.startUs(index) - startUs) > 1) {
-      throw new DamagedBlock(`no block of this motion begins at ${startUs} µs`);
-    }
+    if (index >= track.blocks) throw new DamagedBlock(`this motion has ${track.blocks} blocks, and none of index ${index}`);
     if (this.rates[index] >= rate) return false;
     const block = decodeBlock(track, data);
     if (block.frames !== track.framesIn(index)) {

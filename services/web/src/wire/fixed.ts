@@ -4,7 +4,9 @@ import { LIMBS } from "../motion/skeleton";
 import { MalformedMessage } from "./errors";
 import { type Data, type Input, type Overlay, type Ping, type Pong, TARGET, TYPES } from "./messages";
 
-const DATA_HEADER = 8;
+/** Before the index of a block, which is LEB128 of three bytes at most. */
+const DATA_HEADER = 2;
+const MOST_INDEX_BYTES = 3;
 const OVERLAY_HEADER = 12;
 const LIMB_NUMBERS = 9;
 const SHORT = 32;
@@ -37,19 +39,31 @@ function short(bytes: Uint8Array, name: string): DataView {
 }
 
 export function packData(message: Data): Uint8Array<ArrayBuffer> {
-  const [bytes, view] = empty("Data", DATA_HEADER + message.block.length);
+  const index: number[] = [];
+  for (let rest = message.index; ; rest >>= 7) {
+    if (rest < 128) {
+      index.push(rest);
+      break;
+    }
+    index.push((rest & 127) | 128);
+  }
+  const [bytes] = empty("Data", DATA_HEADER + index.length + message.block.length);
   bytes[1] = (message.track << 4) | message.rate;
-  view.setUint32(2, message.start % WORD, true);
-  view.setUint16(6, Math.floor(message.start / WORD), true);
-  bytes.set(message.block, DATA_HEADER);
+  bytes.set(index, DATA_HEADER);
+  bytes.set(message.block, DATA_HEADER + index.length);
   return bytes;
 }
 
 export function unpackData(bytes: Uint8Array): Data {
-  if (bytes.length < DATA_HEADER) throw new MalformedMessage(`Data has 8 bytes and a block, not ${bytes.length}`);
-  const view = viewOf(bytes);
-  const start = view.getUint16(6, true) * WORD + view.getUint32(2, true);
-  return { name: "Data", track: bytes[1] >> 4, rate: bytes[1] & 15, start, block: bytes.subarray(DATA_HEADER) };
+  let index = 0;
+  for (let i = 0; i < MOST_INDEX_BYTES && DATA_HEADER + i < bytes.length; i++) {
+    const byte = bytes[DATA_HEADER + i];
+    index |= (byte & 127) << (7 * i);
+    if (byte < 128) {
+      return { name: "Data", track: bytes[1] >> 4, rate: bytes[1] & 15, index, block: bytes.subarray(DATA_HEADER + i + 1) };
+    }
+  }
+  throw new MalformedMessage("Data has a track and rate, an index of 1 to 3 bytes, and a block");
 }
 
 export function packOverlay(message: Overlay): Uint8Array<ArrayBuffer> {

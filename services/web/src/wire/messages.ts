@@ -27,12 +27,12 @@ export interface Description {
   tracks: Track[];
 }
 
-/** One block of one track at one rate; `start` is the motion time of its first frame. `block` shares the message's memory. */
+/** Block `index` of one track at one rate. `block` shares the message's memory. */
 export interface Data {
   name: "Data";
   track: number;
   rate: number;
-  start: number;
+  index: number;
   block: Uint8Array;
 }
 

@@ -1,7 +1,10 @@
 import { afterEach, describe, expect, test, vi } from "vitest";
 import * as library from "../../src/client/library";
 
-afterEach(() => vi.unstubAllGlobals());
+afterEach(() => {
+  vi.unstubAllGlobals();
+  vi.useRealTimers();
+});
 
 /** Answers every request with `status` and `body`; the requests made. */
 function answering(status: number, body: string): [string, RequestInit][] {
@@ -99,14 +102,40 @@ describe("uploads", () => {
 
   test("send the file as it is, tell their progress, and give the motion", async () => {
     vi.stubGlobal("XMLHttpRequest", Request);
-    const shares: number[] = [];
-    const motion = library.uploadMotion(file, (share) => shares.push(share));
-    expect(Request.last.asked).toEqual(["POST", "/v1/motions?filename=my%20dance.bvh", file]);
+    const told: library.UploadProgress[] = [];
+    const motion = library.uploadMotion(file, (progress) => told.push(progress));
+    expect(Request.last.asked).toEqual(["POST", expect.stringMatching(/^\/v1\/motions\?filename=my%20dance.bvh&upload=[0-9a-f]{32}$/), file]);
     expect(Request.last.headers).toEqual({ "Content-Type": "application/octet-stream" });
     Request.last.upload.dispatchEvent(Object.assign(new Event("progress"), { loaded: 3, total: 9 }));
     Request.last.answer(201, '{"id": "abc"}');
     expect((await motion).id).toBe("abc");
-    expect(shares).toEqual([1 / 3]);
+    expect(told).toEqual([{ stage: "sending", share: 1 / 3 }]);
+  });
+
+  test("ask what the server does with them once they are sent, until it answers", async () => {
+    vi.useFakeTimers();
+    vi.stubGlobal("XMLHttpRequest", Request);
+    const answers = [
+      { stage: "receiving", share: 1 }, { stage: "waiting", share: 0 }, null, { stage: "encoding", share: 0.25 }, { stage: "encoding", share: 0.5 },
+    ];
+    const asked: string[] = [];
+    vi.stubGlobal("fetch", (path: string) => {
+      asked.push(path);
+      const answer = answers[asked.length - 1];
+      return Promise.resolve(new Response(JSON.stringify(answer), { status: answer ? 200 : 404 }));
+    });
+    const told: library.UploadProgress[] = [];
+    const motion = library.uploadMotion(file, (progress) => told.push(progress));
+    await vi.advanceTimersByTimeAsync(5 * library.ASK_EVERY);
+    expect(asked).toEqual([]);
+    Request.last.upload.dispatchEvent(new Event("load"));
+    await vi.advanceTimersByTimeAsync(4.5 * library.ASK_EVERY);
+    Request.last.answer(201, '{"id": "abc"}');
+    await motion;
+    await vi.advanceTimersByTimeAsync(5 * library.ASK_EVERY);
+    expect(told).toEqual([{ stage: "waiting", share: 0 }, { stage: "encoding", share: 0.25 }, { stage: "encoding", share: 0.5 }]);
+    const name = new URLSearchParams(String(Request.last.asked[1]).split("?")[1]).get("upload");
+    expect(asked).toEqual(new Array(5).fill(`/v1/uploads/${name}`));
   });
 
   test("are refused with the server's words", async () => {

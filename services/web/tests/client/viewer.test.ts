@@ -46,8 +46,8 @@ function timeline(change: Partial<TimelineState> = {}): Message {
   };
 }
 
-function data(start: number, rate: number, block: Uint8Array): Message {
-  return { name: "Data", track: 1, rate, start, block };
+function data(index: number, rate: number, block: Uint8Array): Message {
+  return { name: "Data", track: 1, rate, index, block };
 }
 
 /** A viewer whose server has greeted it, described the dance, and started it now. */
@@ -122,7 +122,7 @@ test("where the block needed is missing the pose holds still, and that is one ga
   viewer.poseAt(now);
   let line: LineFigures = viewer.line();
   expect([line.gaps, line.bufferSeconds, line.reason]).toEqual([1, 0, "waiting for a block"]);
-  Line.last.say(data(1_000_000, 0, lowest));
+  Line.last.say(data(1, 0, lowest));
   expect(viewer.poseAt(now)).not.toEqual(held);
   line = viewer.line();
   expect([line.gaps, line.reason]).toEqual([1, "chosen by the server"]);
@@ -168,7 +168,7 @@ test("pings in a burst, then every two seconds, and takes the smallest round tri
 
 test("reports once a second what is ready and how long drawing takes", () => {
   watching();
-  Line.last.say(data(0, 1, best), data(1_000_000, 0, lowest));
+  Line.last.say(data(0, 1, best), data(1, 0, lowest));
   for (let frame = 0; frame < 200; frame++) viewer.drawn(8);
   pass(1_000);
   const [report] = Line.last.of("Report");
@@ -235,7 +235,7 @@ describe("when the line is lost", () => {
 describe("what cannot be played", () => {
   test("a damaged block is passed over and counted", () => {
     watching();
-    Line.last.say(data(0, 1, best.subarray(0, 0)), data(0, 1, last), data(123, 0, best));
+    Line.last.say(data(0, 1, best.subarray(0, 0)), data(0, 1, last), data(3, 0, best));
     Line.last.raw(Uint8Array.of(4, 0xc1));
     expect(viewer.damaged).toBe(4);
     expect([...viewer.blocks]).toEqual([-1, -1, -1]);
@@ -245,7 +245,7 @@ describe("what cannot be played", () => {
 
   test("other tracks' data is skipped", () => {
     watching();
-    Line.last.say({ name: "Data", track: 0, rate: 1, start: 0, block: best });
+    Line.last.say({ name: "Data", track: 0, rate: 1, index: 0, block: best });
     expect([viewer.damaged, ...viewer.blocks]).toEqual([0, -1, -1, -1]);
   });
 

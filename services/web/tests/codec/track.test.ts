@@ -1,7 +1,9 @@
+import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import { DamagedBlock } from "../../src/codec/errors";
 import { MotionTrack } from "../../src/codec/track";
 import { goldenDescription, goldenTrack } from "../golden";
+import { Outcome } from "../outcome";
 
 test("blocks are found by time, whatever the rounding and the length of the first", () => {
   const { figure, reference } = goldenTrack();
@@ -35,6 +37,8 @@ describe("a description that cannot be played is refused with what it lacks", ()
     [{ codec: "bunraku.motion/1" }, "codec bunraku.motion/1"],
     [{ fps: 0 }, "fps"],
     [{ fps: NaN }, "fps"],
+    [{ fps: 1e6 }, "fps"],
+    [{ fps: 5e-324 }, "2^48"],
     [{ fps: "60" }, "fps"],
     [{ block_frames: 0 }, "block_frames"],
     [{ block_frames: 1001 }, "block_frames"],
@@ -53,4 +57,25 @@ describe("a description that cannot be played is refused with what it lacks", ()
     expect(read).toThrow(DamagedBlock);
     expect(read).toThrow(what);
   });
+});
+
+test("a description with anything in it is of a track whose every block has its place, or refused", () => {
+  const value = fc.oneof(
+    fc.anything(), fc.double(), fc.double({ min: 0, max: 1e-300 }), fc.integer(), fc.integer({ min: 0, max: 2000 }), fc.uint8Array(),
+  );
+  const changes = fc.dictionary(fc.constantFrom(...Object.keys(goldenDescription())), value, { maxKeys: 3 });
+  const outcome = new Outcome(DamagedBlock);
+  fc.assert(
+    fc.property(fc.nat(2), changes, (which, change) => {
+      outcome.of(() => {
+        const track = MotionTrack.fromDescription({ ...goldenDescription(which), ...change });
+        const last = track.blocks - 1;
+        expect(track.durationUs).toBeLessThan(2 ** 48);
+        expect(track.framesIn(last)).toBeGreaterThan(0);
+        expect(track.blockAt(track.startUs(last))).toBe(last);
+      });
+    }),
+    { numRuns: 3000 },
+  );
+  outcome.tell("descriptions");
 });

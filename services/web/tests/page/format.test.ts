@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import { byteCount, clockTime, figure, initial, pieceName, uploadProgress } from "../../src/page/format";
+import { byteCount, clockTime, figure, initial, makingProgress, pieceName, uploadProgress } from "../../src/page/format";
 
 describe("figures for people", () => {
   test("times", () => {
@@ -15,6 +15,12 @@ describe("figures for people", () => {
     expect(uploadProgress(8_100_000, 13_000_000, 6.6)).toBe("8.1 MB of 13.0 MB, 4 s left");
     expect(uploadProgress(0, 13_000_000, 2)).toBe("0.0 kB of 13.0 MB");
     expect(uploadProgress(13_000_000, 13_000_000, 9)).toBe("13.0 MB of 13.0 MB, reading the dance");
+  });
+
+  test("what becomes of an upload", () => {
+    expect((["waiting", "reading", "encoding"] as const).map(makingProgress)).toEqual([
+      "waiting for its turn", "reading the dance", "encoding the dance",
+    ]);
   });
 
   test("digits, initials and names", () => {

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from bunraku.ingest.progress import Progress
+from bunraku.ingest.uploads import WAITING
+from tests.servers import clip, running
+
+
+async def followed(http: httpx2.AsyncClient, upload: str, until: str | None, posting: asyncio.Task[Any]) -> list[Any]:
+    """What the server says of an upload, once after the other, up to a stage or to the end of `posting`."""
+    said: list[Any] = []
+    while not posting.done() and (until is None or not said or said[-1]["stage"] != until):
+        answer = await http.get(f"/v1/uploads/{upload}")
+        if answer.status_code == 200:
+            assert answer.headers["cache-control"] == "no-store"
+            said.append(answer.json())
+        else:
+            assert answer.status_code == 404
+    return said
+
+
+def post(http: httpx2.AsyncClient, upload: str, data: bytes) -> asyncio.Task[httpx2.Response]:
+    asked = {"filename": "clip.bvh", "upload": upload}
+    return asyncio.create_task(http.post("/v1/motions", params=asked, content=data))
+
+
+def test_a_stage_begins_at_nothing() -> None:
+    progress = Progress()
+    assert (progress.stage, progress.share) == ("receiving", 0.0)
+    progress.at("encoding", 0.5)
+    progress.at("waiting")
+    assert (progress.stage, progress.share) == ("waiting", 0.0)
+
+
+async def test_shares_rise_while_an_upload_is_encoded_and_end_with_it(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server, timeout=120) as http:
+        posting = post(http, "upload-one", clip(12.0, 900))
+        said = await followed(http, "upload-one", None, posting)
+        assert (await posting).status_code == 201
+        assert (await http.get("/v1/uploads/upload-one")).status_code == 404
+        again = post(http, "upload-one", clip(12.0, 900))
+        assert (await again).status_code == 200
+    stages = [each["stage"] for each in said]
+    order = ["receiving", "waiting", "reading", "encoding"]
+    assert stages == sorted(stages, key=order.index)
+    shares = [each["share"] for each in said if each["stage"] == "encoding"]
+    assert shares == sorted(shares)
+    assert len(set(shares)) > 5
+    assert 0 <= shares[0] < 0.5 < shares[-1] <= 1
+
+
+async def test_who_goes_away_takes_the_upload_along(tmp_path: Path) -> None:
+    with running(tmp_path) as url:
+        async with httpx2.AsyncClient(base_url=url, timeout=120) as http:
+            posting = post(http, "upload-two", clip(60.0, 901))
+            await followed(http, "upload-two", "encoding", posting)
+            other = await post(http, "upload-two", clip(0.3))
+            assert other.status_code == 409
+            assert other.json()["field"] == "upload"
+            posting.cancel()
+            while (await http.get("/v1/uploads/upload-two")).status_code == 200:
+                pass
+            assert (await http.get("/v1/motions")).json()["items"] == []
+            # and its place is free
+            answers = [await post(http, f"upload-{number:02}", clip(0.2, 902)) for number in range(WAITING + 1)]
+            assert {answer.status_code for answer in answers} == {200, 201}
+
+
+@pytest.mark.parametrize("name", ["short", "x" * 65, "with%20blank", "né-à-mesure"])
+async def test_names_are_plain(server: str, name: str) -> None:
+    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+        asked = await http.get(f"/v1/uploads/{name}")
+        assert asked.status_code == 422
+        assert asked.json()["field"] == "upload"
+        posted = await post(http, name, clip(0.2))
+        assert posted.status_code == 422
