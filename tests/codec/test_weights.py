@@ -26,14 +26,13 @@ def test_weights_fall_along_a_limb_and_are_least_along_a_bone() -> None:
         assert rows[1] < 0.5 * min(rows[0], rows[2])
 
 
-def test_a_bent_knee_s_first_axis_is_its_hinge() -> None:
-    bent = STANDING.copy()
-    bent[INDEX["l_knee"]] = rotation.from_rotation_vector(np.array([0.8, 0.0, 0.3]))
-    knee = weights(FIGURE, bent)[1 + INDEX["l_knee"]]
-    thigh = rotation.rotate(rotation.conjugate(bent[INDEX["l_knee"]]), FIGURE.offsets[INDEX["l_knee"]])
-    shank = FIGURE.offsets[INDEX["l_ankle"]]
-    hinge = np.cross(thigh, shank)
-    first = knee @ hinge
+@pytest.mark.parametrize("thigh", [np.zeros(3), np.array([0.4, 0.2, 1.1]), np.array([-1.3, 0.0, 0.2])])
+def test_a_bent_knee_s_first_axis_is_its_hinge(thigh: rotation.Array) -> None:
+    bent, hip, knee = STANDING.copy(), INDEX["l_hip"], INDEX["l_knee"]
+    bent[hip], bent[knee] = rotation.from_rotation_vector(np.array([thigh, [0.8, 0.0, 0.3]]))
+    before = rotation.rotate(rotation.conjugate(bent[knee]), FIGURE.offsets[knee])
+    hinge = np.cross(before, FIGURE.offsets[INDEX["l_ankle"]])
+    first = weights(FIGURE, bent)[1 + knee] @ hinge
     assert abs(first[0]) > 20 * max(abs(first[1]), abs(first[2]))
 
 

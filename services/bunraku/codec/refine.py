@@ -28,6 +28,9 @@ from bunraku.codec.prior import CLASS_OF, HIDDEN, Integers, Prior
 
 _TWIST = 0.03**2
 """Weight of an orientation's error, radians squared against metres squared: what no point shows must stay right too."""
+_LEAST = 2
+"""Sweeps before it is asked whether a bound is met."""
+_HOPELESS = 1.25
 _MORE = 3
 """Frequencies above a channel's last that a sweep may use."""
 
@@ -186,19 +189,34 @@ def _errors(true_orientation: Array, true_points: Array, orientation: Array, poi
     return points - true_points
 
 
+@njit(cache=True)
+def _largest(off: Array) -> float:
+    most = 0.0
+    for point in range(23):
+        for t in range(off.shape[1]):
+            e = off[point, t]
+            most = max(most, e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+    return np.sqrt(most)  # type: ignore[no-any-return]
+
+
 @njit(cache=True, fastmath=True)
-def _weigh(off: Array, weight: Array) -> None:
-    """Weights (23, n) that grow with each point's error, so that the largest comes down."""
+def _weigh(off: Array, weight: Array, again: bool) -> None:
+    """Weights (23, n) that grow with each point's error, so that the largest comes down; `again` half by what they were
+    before, as Lawson's iteration finds a least largest error."""
     mean = 0.0
     for point in range(23):
         for t in range(off.shape[1]):
             e = off[point, t]
-            weight[point, t] = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-            mean += weight[point, t]
+            mean += np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
     mean = mean / weight.size + 1e-12
+    total = 0.0
     for point in range(23):
         for t in range(off.shape[1]):
-            weight[point, t] = (weight[point, t] + 0.3 * mean) / (1.3 * mean)
+            e = off[point, t]
+            now = (np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) + 0.3 * mean) / (1.3 * mean)
+            weight[point, t] = np.sqrt(now * weight[point, t]) if again else now
+            total += weight[point, t]
+    weight *= weight.size / total
 
 
 @njit(cache=True)
@@ -215,20 +233,24 @@ def refine(
     q: Integers,
     sweeps: int,
     price: float,
-    level: bool,
+    bound: float,
 ) -> Array:
-    """Improve `q` in place, arguments as in `first_pass`: `sweeps` times, a bit at `price` squared steps; `level`
-    brings the largest errors down rather than their squares' sum. The decoded points (23, n, 3)."""
+    """Improve `q` in place, arguments as in `first_pass`: in `sweeps` sweeps at most, a bit at `price` squared steps.
+    Where there is a `bound` in metres the largest errors are brought down rather than their squares' sum, until none is
+    above it, or that is out of reach. The decoded points (23, n, 3)."""
     count, frames = basis.shape
     vectors, orientation, points = np.zeros((18, frames, 3)), np.zeros((18, frames, 4)), np.zeros((23, frames, 3))
     turned, weight = np.zeros((18, frames, 3)), np.ones((23, frames))
     slope, bend, change = np.zeros(frames), np.zeros(frames), np.zeros(frames)
     axes, sums = np.zeros((frames, 3)), np.zeros((count, 1 + HIDDEN), np.int64)
-    for _ in range(sweeps):
+    for sweep in range(sweeps):
         pose(body, q, size, basis, vectors, orientation, points)
         off = _errors(true_orientation, true_points, orientation, points, turned)
-        if level:
-            _weigh(off, weight)
+        if bound > 0:
+            over = _largest(off) / bound
+            if sweep >= _LEAST and (over <= 1 or over > _HOPELESS):
+                return points
+            _weigh(off, weight, sweep >= _LEAST)
         used = 0
         for k in range(count):
             for track in range(57):

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bunraku.codec import coefficients, transform
+from bunraku.codec.allocation import cheapest
 from bunraku.codec.coefficients import Head
 from bunraku.codec.prior import Integers, Prior
 from bunraku.codec.track import MotionTrack, step_size
@@ -19,10 +20,17 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import PARENTS, Motion, points
 
 FINEST, COARSEST = 0, 255
-_SWEEPS = 3
+POINTS = 23
+"""Joints and tips that an error is told of."""
+_SWEEPS_OF_MEAN = 5
+_SWEEPS_OF_MOST = 8
 _SLACK = 0.6
 """The live grade is content with a block whose largest error is this share of what it may be."""
 _PRICE_OF_MEAN = 0.35
+_PRICES_OF_MEAN = 0.28, 0.45
+"""Of a bit, in squared steps; a mean error is looked for at the first, then met with those on both its sides."""
+_AROUND = 6
+"""Steps up and down that blocks of one mean error may have."""
 _PRICE_OF_MOST = 0.6
 
 
@@ -71,7 +79,14 @@ class BlockEncoder:
         figure, reference = self._track.figure, self._track.reference_rotations(heading)
         return _compiled()[0].Body(figure.offsets, figure.tips, self._track.weights, self._track.unweights, reference)
 
-    def block(self, index: int, step: int, goal: Literal["first", "mean", "most"]) -> Coded:
+    def block(
+        self,
+        index: int,
+        step: int,
+        goal: Literal["first", "mean", "most"],
+        bound: float = 0.0,
+        price: float = _PRICE_OF_MEAN,
+    ) -> Coded:
         """Block `index` at one step: by the first pass alone, or refined for its mean or its largest error."""
         bodies, _, feedback, refine = _compiled()
         track = self._track
@@ -86,9 +101,9 @@ class BlockEncoder:
         given = (self._prior, self._costs, body, *truth, basis, size, step, length, q)
         decoded = feedback.first_pass(*given)
         if goal == "mean":
-            decoded = refine.refine(*given, _SWEEPS, _PRICE_OF_MEAN, False)
+            decoded = refine.refine(*given, _SWEEPS_OF_MEAN, price, 0.0)
         elif goal == "most":
-            decoded = refine.refine(*given, _SWEEPS, _PRICE_OF_MOST, True)
+            decoded = refine.refine(*given, _SWEEPS_OF_MOST, _PRICE_OF_MOST, bound * 1e-3)
         if track.still:
             # the joints' references are the pose itself: following the root's error would cost more than it mends
             q[2:] = 0
@@ -105,7 +120,7 @@ class BlockEncoder:
 
         def holds(step: int) -> bool:
             if step not in tried:
-                tried[step] = self.block(index, step, goal)
+                tried[step] = self.block(index, step, goal, bound)
             return bool(tried[step].error.max() <= bound * (1 - 1e-6))
 
         step = near if near is not None else int(np.clip(16 * np.log2(bound * 2e-4 / 2.0**-16), FINEST, COARSEST))
@@ -129,40 +144,37 @@ class BlockEncoder:
             step = max(step - 4, FINEST)
             good = step if holds(step) else None
         if grade == "best":
-            for more in (1, 2, 3, 4, 6):
+            for more in (2, 4, 6):
                 if good + more <= COARSEST:
                     holds(good + more)
         return min((coded for step, coded in tried.items() if holds(step)), key=lambda coded: len(coded.data))
 
     def averaged(self, mean: float) -> list[Coded]:
-        """All blocks with a mean error over the motion of at most `mean` mm and near it: at the coarsest step that is
-        fine enough, as many blocks one step coarser as the mean allows."""
-        blocks, frames = self._track.blocks, self._track.frames
-        tried: dict[int, list[Coded]] = {}
+        """All blocks with a mean error over the motion of at most `mean` mm and near it: each at several steps and
+        prices, of which those are taken that together have the fewest bytes."""
+        blocks, budget = range(self._track.blocks), mean * POINTS * self._track.frames
+        tried: dict[int, float] = {}
 
         def at(step: int) -> float:
             if step not in tried:
-                tried[step] = [self.block(index, step, "mean") for index in range(blocks)]
-            return sum(float(block.error.sum()) for block in tried[step]) / (23 * frames)
+                tried[step] = sum(float(self.block(index, step, "mean").error.sum()) for index in blocks)
+            return tried[step]
 
         low, high = FINEST, COARSEST
         step = int(np.clip(16 * np.log2(mean * 2e-3 / 2.0**-16), FINEST + 1, COARSEST - 1))
         while high - low > 1:
             error = at(step)
-            if error <= mean:
+            if error <= budget:
                 low = step
             else:
                 high = step
-            guess = step + int(np.clip(np.round(19 * np.log2(mean / max(error, 1e-9))), -64, 64))
+            guess = step + int(np.clip(np.round(19 * np.log2(budget / max(error, 1e-9))), -64, 64))
             step = min(max(guess, low + 1), high - 1)
-        if low not in tried and at(low) > mean:
+        if at(low) > budget:
             raise ValueError(f"the motion cannot be held to a mean error of {mean} mm")
-        at(high)
-        chosen, room = list(tried[low]), mean * 23 * frames - sum(float(block.error.sum()) for block in tried[low])
-        gains = [(len(a.data) - len(b.data), i) for i, (a, b) in enumerate(zip(tried[low], tried[high], strict=True))]
-        for gain, index in sorted(gains, reverse=True):
-            worse = float(tried[high][index].error.sum() - tried[low][index].error.sum())
-            if gain > 0 and worse <= room:
-                chosen[index] = tried[high][index]
-                room -= worse
-        return chosen
+        steps = range(max(low - _AROUND, FINEST), min(low + _AROUND, COARSEST) + 1, 2)
+        tries = [(step, price) for step in steps for price in _PRICES_OF_MEAN]
+        coded = [[self.block(index, step, "mean", price=price) for index in blocks] for step, price in tries]
+        sizes = np.array([[float(len(block.data)) for block in row] for row in coded])
+        errors = np.array([[float(block.error.sum()) for block in row] for row in coded])
+        return [coded[row][index] for index, row in enumerate(cheapest(sizes, errors, budget))]

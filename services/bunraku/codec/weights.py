@@ -55,15 +55,16 @@ def _axes(figure: Figure, reference: Array) -> Array:
     standing = reference.copy()
     for joint in range(1, JOINT_COUNT):
         standing[joint] = rotation.multiply(standing[PARENTS[joint]], reference[joint])
-    onto = rotation.to_matrix(standing)
+    upright = rotation.to_matrix(standing)
+    onto = upright.copy()
     for joint in range(JOINT_COUNT):
         arms = [figure.offsets[child] for child in range(JOINT_COUNT) if PARENTS[child] == joint]
         arms += [figure.tips[joint]] if joint in TIPS else []
-        bone = _direction(onto[joint] @ arms[0]) if len(arms) == 1 else None
+        bone = _direction(upright[joint] @ arms[0]) if len(arms) == 1 else None
         if bone is None:
             continue
-        before = _direction(onto[PARENTS[joint]] @ figure.offsets[joint]) if joint in _HINGED else None
-        onto[joint] = _along(bone, joint in _UPWARD, before).T @ onto[joint]
+        before = _direction(upright[PARENTS[joint]] @ figure.offsets[joint]) if joint in _HINGED else None
+        onto[joint] = _along(bone, joint in _UPWARD, before).T @ upright[joint]
     return onto
 
 
