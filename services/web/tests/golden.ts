@@ -11,7 +11,7 @@ export interface BlockVectors {
     block_frames: number;
     first_frames: number;
     dancer: string;
-    /** What the dancer says: offsets (54) and tips (54) in metres, reference rotations (72). */
+    /** What the dancer says: offsets (54) and tips (54) in metres, reference rotations (72, the root's first). */
     offsets: number[];
     tips: number[];
     reference: number[];
@@ -23,7 +23,7 @@ export interface BlockVectors {
     block: string;
     frames: number;
     step: number;
-    turn: number[];
+    heading: number;
     q: number[];
     poses: { instant: number; root: number[]; rotations: number[] }[];
   }[];

@@ -7,7 +7,7 @@ import { CHANNEL_COUNT } from "../motion/skeleton";
 import { CLASS_OF, Contexts, signContext } from "./contexts";
 import { DamagedBlock } from "./errors";
 import { level } from "./levels";
-import { type Prior, ROWS, SIGNS, UNARY } from "./prior";
+import { HAZARD_OF, type Prior, ROWS, SIGNS, UNARY } from "./prior";
 import { EVEN, RangeDecoder } from "./rangecoder";
 
 /** Most bytes of a block. */
@@ -20,6 +20,9 @@ const FRAMES_AS_USUAL = 32440;
 const ROOT_ALONE = 512;
 const ESCAPE = 20;
 
+/** Of each frequency where its table of hazards starts. */
+const HAZARD_AT = Uint16Array.from(CLASS_OF, (group) => HAZARD_OF[group] * ROWS * UNARY);
+
 /** Channels of a camera's or a light's block; a motion's has 19. */
 export const SCENE_CHANNELS = 3;
 
@@ -28,8 +31,8 @@ export interface Coefficients {
   frames: number;
   /** Step index, 0..255. */
   step: number;
-  /** Rotation vector that the root's rotations are relative to, whole tenths of a radian. */
-  turn: readonly [x: number, y: number, z: number];
+  /** The turn about y that the root's rotations are relative to, in 1/64 of a whole one, -32..31; 0 of a scene. */
+  heading: number;
   /** Frequencies of each track. */
   count: number;
   /** Whole numbers [channel][axis 3][`count`]; the largest there can be is a little above 2^31. */
@@ -43,7 +46,7 @@ export function lengthLevel(frames: number, fps: number): number {
 
 /**
  * Head and coefficients of a block of a motion with `fps` frames a second whose blocks have `usual` frames. The work is bounded
- * by 57,000 coefficients of at most 70 bits. A block of `SCENE_CHANNELS` says in its head neither channels nor a turn,
+ * by 57,000 coefficients of at most 70 bits. A block of `SCENE_CHANNELS` says in its head neither channels nor a heading,
  * and its last channel has one axis.
  *
  * @throws DamagedBlock
@@ -62,8 +65,7 @@ export function decodeCoefficients(
   const scene = all === SCENE_CHANNELS;
   const channels = !scene && decoder.bit(ROOT_ALONE) ? 2 : all;
   const step = decoder.number(8);
-  const tenths = () => (scene ? 0 : decoder.number(6) - 32);
-  const turn = [tenths(), tenths(), tenths()] as const;
+  const heading = scene ? 0 : decoder.number(6) - 32;
   const count = decoder.number(32 - Math.clz32(frames));
   if (count > frames) throw new DamagedBlock(`block says ${count} frequencies for ${frames} frames`);
   const q = new Float64Array(all * 3 * count);
@@ -73,7 +75,7 @@ export function decodeCoefficients(
     for (let k = 0; k < count; k++) {
       contexts.share(channel, k);
       for (let axis = 0; axis < axes; axis++) {
-        const size = decodeSize(decoder, prior.hazard, contexts.scale(channel, axis, k));
+        const size = decodeSize(decoder, prior.hazard, HAZARD_AT[k], contexts.scale(channel, axis, k));
         if (size > 0) {
           const at = (channel * 3 + axis) * count + k;
           const odds = prior.sign[CLASS_OF[k] * SIGNS + signContext(q, at, k)];
@@ -85,11 +87,11 @@ export function decodeCoefficients(
     }
     contexts.seeChannel(channel);
   }
-  return { frames, step, turn, count, q };
+  return { frames, step, heading, count, q };
 }
 
-/** A coefficient's size where about 2^(`scale` / 256) is expected. */
-function decodeSize(decoder: RangeDecoder, hazard: Int32Array, scale: number): number {
+/** A coefficient's size where about 2^(`scale` / 256) is expected, by the table of hazards that starts at `table`. */
+function decodeSize(decoder: RangeDecoder, hazard: Int32Array, table: number, scale: number): number {
   const shift = scale >= 1024 ? (scale >> 8) - 3 : 0;
   const place = (scale - shift * 256 + 7 * 256) * 4;
   let row = place >> 8, weight = place & 255;
@@ -98,7 +100,7 @@ function decodeSize(decoder: RangeDecoder, hazard: Int32Array, scale: number): n
     weight = 256;
   }
   let value = 0;
-  for (let at = row * UNARY; value < UNARY; value++, at++) {
+  for (let at = table + row * UNARY; value < UNARY; value++, at++) {
     if (!decoder.bit((hazard[at] * (256 - weight) + hazard[at + UNARY] * weight) >> 8)) break;
   }
   if (value === UNARY) {

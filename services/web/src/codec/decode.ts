@@ -4,7 +4,7 @@ import { fromRotationVector, multiply } from "../motion/rotation";
 import { CHANNEL_COUNT, JOINT_COUNT, type Pose } from "../motion/skeleton";
 import { decodeCoefficients, MOST_FRAMES } from "./coefficients";
 import { type Prior, shippedPrior } from "./prior";
-import { type MotionTrack, TURN_UNIT } from "./track";
+import type { MotionTrack } from "./track";
 import { basis } from "./transform";
 
 /** Quantiser step of index 0 for a block of 30 frames, metres; sixteen indices make it twice as large. */
@@ -65,7 +65,7 @@ export function reconstruct(q: number): number {
  * @throws DamagedBlock on what cannot be one
  */
 export function decodeBlock(track: MotionTrack, data: Uint8Array, prior: Prior = shippedPrior()): MotionBlock {
-  const { frames, step, turn, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps);
+  const { frames, step, heading, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps);
   const size = stepSize(step, frames);
   const { inverses } = track.weights;
   // in place: of each frequency the three axes are read before they are written
@@ -81,7 +81,5 @@ export function decodeBlock(track: MotionTrack, data: Uint8Array, prior: Prior =
       q[at + 2 * count] = inverses[w + 6] * x + inverses[w + 7] * y + inverses[w + 8] * z;
     }
   }
-  const reference = track.reference.slice();
-  fromRotationVector(reference, 0, turn[0] * TURN_UNIT, turn[1] * TURN_UNIT, turn[2] * TURN_UNIT);
-  return new MotionBlock(frames, count, q, reference);
+  return new MotionBlock(frames, count, q, track.referenceRotations(heading));
 }

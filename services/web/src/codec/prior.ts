@@ -13,8 +13,11 @@ export const HIDDEN = 8;
 /** Sums of a coefficient: the linear one, then one for each hidden unit. */
 export const SUMS = 1 + HIDDEN;
 export const CLASSES = 7;
-/** Scales of the hazards: 2^-7 .. 2^4.75 in quarter octaves. */
+/** Scales of a table of hazards: 2^-7 .. 2^4.75 in quarter octaves. */
 export const ROWS = 48;
+/** Of each class the table of hazards: its sizes are spread alike. */
+export const HAZARD_OF: readonly number[] = [0, 0, 0, 1, 1, 2, 2];
+const TABLES = 3;
 /** Decisions "larger than this?" before an escape. */
 export const UNARY = 18;
 /** Sign contexts of a class. */
@@ -29,7 +32,7 @@ export interface Prior {
   readonly biases: Float64Array;
   /** [class][hidden unit] */
   readonly out: Int32Array;
-  /** [row][decision] */
+  /** [table][row][decision] */
   readonly hazard: Int32Array;
   /** [class][context] */
   readonly sign: Int32Array;
@@ -37,7 +40,7 @@ export interface Prior {
 
 const SHAPES = {
   linear: [CLASSES, FEATURES], bias: [CLASSES, AXES], hidden: [HIDDEN, FEATURES], hidden_bias: [HIDDEN, AXES],
-  hidden_class: [HIDDEN, CLASSES], out: [HIDDEN, CLASSES], hazard: [ROWS, UNARY], sign: [CLASSES, SIGNS],
+  hidden_class: [HIDDEN, CLASSES], out: [HIDDEN, CLASSES], hazard: [TABLES * ROWS, UNARY], sign: [CLASSES, SIGNS],
 } as const;
 
 /** A prior as it stands in JSON: rows of integers by name. */

@@ -1,15 +1,17 @@
 /** What the blocks of one motion have in common: sent once, in the Description (`proto/SPEC.md`, Track `motion`). */
 
+import { multiply } from "../motion/rotation";
 import type { Figure } from "../motion/skeleton";
-import { unpackDancer } from "./dancer";
+import { aboutAxis } from "../motion/vector";
+import { type Dancer, unpackDancer } from "./dancer";
 import { DamagedBlock } from "./errors";
 import { type Described, type Rate, readRates, readTiming, Timing } from "./timing";
 import { channelWeights, type Weights } from "./weights";
 
 export const CODEC = "bunraku.motion/2";
 
-/** Radians in one unit of a block's turn of the root. */
-export const TURN_UNIT = 0.1;
+/** Headings of a block's root in a whole turn about y. */
+export const HEADINGS = 64;
 
 /** Constants of a motion's blocks, as in the Description. */
 export class MotionTrack extends Timing {
@@ -20,8 +22,7 @@ export class MotionTrack extends Timing {
    * @param frames frames of the whole motion
    * @param blockFrames frames of every block but the first and perhaps the last
    * @param firstFrames frames of the first block
-   * @param figure the dancer
-   * @param reference the joints' reference rotations (72)
+   * @param dancer limb lengths, and what rotations are told from
    * @param rates what each rate costs and keeps, from the lowest to the highest
    * @param front where the dance faces over its length, radians about y from z towards x
    */
@@ -30,13 +31,26 @@ export class MotionTrack extends Timing {
     frames: number,
     blockFrames: number,
     firstFrames: number,
-    readonly figure: Figure,
-    readonly reference: Float64Array,
+    readonly dancer: Dancer,
     readonly rates: readonly Rate[] = [],
     readonly front = 0,
   ) {
     super(fps, frames, blockFrames, firstFrames);
-    this.weights = channelWeights(figure);
+    this.weights = channelWeights(dancer.figure, dancer.reference);
+  }
+
+  /** The dancer's, as it is decoded. */
+  get figure(): Figure {
+    return this.dancer.figure;
+  }
+
+  /** What a block of this `heading` tells rotations from (72). */
+  referenceRotations(heading: number): Float64Array {
+    const rotations = this.dancer.reference.slice();
+    const turn = new Float64Array(4);
+    aboutAxis(turn, 0, 1, (heading * 2 * Math.PI) / HEADINGS);
+    multiply(rotations, 0, turn, 0, rotations, 0);
+    return rotations;
   }
 
   /**
@@ -50,9 +64,8 @@ export class MotionTrack extends Timing {
     const { fps, frames, blockFrames, firstFrames } = readTiming(map, "motion");
     if (!(dancer instanceof Uint8Array)) throw new DamagedBlock("motion needs a dancer, bytes");
     const rates = readRates(map, "motion");
-    const { figure, reference } = unpackDancer(dancer);
     return new MotionTrack(
-      fps, frames, blockFrames, firstFrames, figure, reference, rates,
+      fps, frames, blockFrames, firstFrames, unpackDancer(dancer), rates,
       Number.isFinite(front) ? Number(front) : 0,
     );
   }

@@ -1,9 +1,10 @@
 /**
- * What a channel's values are multiplied with before they are quantised: how far a turn about each direction moves the body
- * (`proto/SPEC.md`, Weights).
+ * What a channel's values are multiplied with before they are quantised, from the dancer alone (`proto/SPEC.md`, Weights): how
+ * far a small turn moves what hangs on the joint, on axes that mean the same on every skeleton.
  */
 
 import { CHANNEL_COUNT, type Figure, JOINT_COUNT, JOINTS, PARENTS, TIPS } from "../motion/skeleton";
+import { codedAxes, product } from "./axes";
 
 const LEVER = 0.45;
 const TWIST = 0.06 ** 2;
@@ -14,14 +15,14 @@ CARE.set([1.15, 0.88, 0.88]);
 for (const name of ["l_midtarsal", "r_midtarsal"]) CARE[JOINTS.indexOf(name) + 1] = 0.87;
 for (const name of ["skullbase", "l_wrist", "r_wrist"]) CARE[JOINTS.indexOf(name) + 1] = 0.9;
 
-/** The weight of each channel and its inverse: symmetric matrices [channel 19][3][3]. */
+/** The weight of each channel and its inverse: matrices [channel 19][3][3]. */
 export interface Weights {
   readonly weights: Float64Array;
   readonly inverses: Float64Array;
 }
 
-/** The weights of the channels of a dancer. */
-export function channelWeights(figure: Figure): Weights {
+/** The weights of the channels of a figure whose rotations are told from `reference` (72). */
+export function channelWeights(figure: Figure, reference: Float64Array): Weights {
   const squares = Array.from({ length: JOINT_COUNT }, () => Float64Array.of(TWIST, 0, 0, 0, TWIST, 0, 0, 0, TWIST));
   const points = Array.from({ length: JOINT_COUNT }, (_, joint) => (TIPS.includes(joint) ? 2 : 1));
   for (let joint = JOINT_COUNT - 1; joint >= 0; joint--) {
@@ -38,19 +39,26 @@ export function channelWeights(figure: Figure): Weights {
     weights[axis * 4] = weight;
     inverses[axis * 4] = 1 / weight;
   }
+  const axes = codedAxes(figure, reference);
   squares.forEach((square, joint) => {
     const care = CARE[joint + 1];
     const { values, vectors } = eigen(square);
-    for (let i = 0; i < 9; i++) {
-      const row = Math.floor(i / 3) * 3, column = (i % 3) * 3;
-      for (let j = 0; j < 3; j++) {
-        const product = vectors[row + j] * vectors[column + j], root = Math.sqrt(values[j]) * care;
-        weights[(joint + 1) * 9 + i] += product * root;
-        inverses[(joint + 1) * 9 + i] += product / root;
-      }
-    }
+    const symmetric = (power: number) => spectral(vectors, values.map((value) => (Math.sqrt(value) * care) ** power));
+    const own = axes.subarray(joint * 9, joint * 9 + 9);
+    weights.set(product(own, symmetric(1)), (joint + 1) * 9);
+    // a rotation's inverse is its transpose
+    inverses.set(product(symmetric(-1), transpose(own)), (joint + 1) * 9);
   });
   return { weights, inverses };
+}
+
+/** The symmetric matrix of eigenvectors (columns) and eigenvalues. */
+function spectral(vectors: Float64Array, values: Float64Array): Float64Array {
+  return product(vectors.map((part, i) => part * values[i % 3]), transpose(vectors));
+}
+
+function transpose(m: Float64Array): Float64Array {
+  return Float64Array.of(m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]);
 }
 
 /** Adds count^0.45 (|a|^2 I - a a^T) of the arm a of a joint to `square`. */

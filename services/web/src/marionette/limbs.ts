@@ -10,7 +10,7 @@ import { Arm } from "./arm";
 import { clampThigh, kneeBend } from "./leg";
 import { verticalNormal } from "./plane";
 import { WRIST_LIMIT, proportionsOf, type Proportions } from "./proportions";
-import { aboutAxis, across, cross, dot, fromColumns, length, normalise, put, squareTo, unit } from "./vector";
+import { aboutAxis, across, cross, dot, fromColumns, length, normalise, put, squareTo, unit } from "../motion/vector";
 
 const SACROILIAC = 1;
 const VL5 = 10;

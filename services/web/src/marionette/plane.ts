@@ -5,7 +5,7 @@
  */
 
 import { rotate, type Numbers } from "../motion/rotation";
-import { across, between, cross, dot, length, squareTo, unit } from "./vector";
+import { across, between, cross, dot, length, squareTo, unit } from "../motion/vector";
 
 /** Distance from the vertical axis, in arm lengths, at which the plane is drawn half as fast as far away. */
 const NEAR_AXIS = 0.05;

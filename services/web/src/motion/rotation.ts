@@ -34,6 +34,20 @@ export function rotate(out: Numbers, outAt: number, q: Numbers, qAt: number, v: 
   out[outAt + 2] = c + w * tz + x * ty - y * tx;
 }
 
+/** The rotation as a matrix [3][3] (nine numbers); its columns are the turned axes. */
+export function toMatrix(out: Numbers, outAt: number, q: Numbers, qAt: number): void {
+  const w = q[qAt], x = q[qAt + 1], y = q[qAt + 2], z = q[qAt + 3];
+  out[outAt] = 1 - 2 * (y * y + z * z);
+  out[outAt + 1] = 2 * (x * y - w * z);
+  out[outAt + 2] = 2 * (x * z + w * y);
+  out[outAt + 3] = 2 * (x * y + w * z);
+  out[outAt + 4] = 1 - 2 * (x * x + z * z);
+  out[outAt + 5] = 2 * (y * z - w * x);
+  out[outAt + 6] = 2 * (x * z - w * y);
+  out[outAt + 7] = 2 * (y * z + w * x);
+  out[outAt + 8] = 1 - 2 * (x * x + y * y);
+}
+
 /** Quaternion of a rotation vector (axis times angle, radians, of any length). */
 export function fromRotationVector(out: Numbers, outAt: number, x: number, y: number, z: number): void {
   const angle = Math.sqrt(x * x + y * y + z * z);

@@ -11,8 +11,7 @@ interface Coded {
 
 const bytes = (hex: string) => Uint8Array.from(Buffer.from(hex, "hex"));
 const work = (JSON.parse(readFileSync(0, "utf8")) as Coded[]).flatMap(({ track, blocks }) => {
-  const { figure, reference } = unpackDancer(bytes(track.dancer));
-  const of = new MotionTrack(track.fps, track.frames, track.blockFrames, track.firstFrames, figure, reference);
+  const of = new MotionTrack(track.fps, track.frames, track.blockFrames, track.firstFrames, unpackDancer(bytes(track.dancer)));
   return blocks.map((block) => ({ of, block: bytes(block) }));
 });
 

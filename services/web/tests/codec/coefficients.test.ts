@@ -10,8 +10,8 @@ const { tracks, valid } = vectors<BlockVectors>("blocks");
 
 test.each(valid)("golden head and coefficients: $frames frames at step $step", (vector) => {
   const { block_frames: usual, fps } = tracks[vector.track];
-  const { frames, step, turn, count, q } = decodeCoefficients(shippedPrior(), bytes(vector.block), usual, fps);
-  expect([frames, step, [...turn]]).toEqual([vector.frames, vector.step, vector.turn]);
+  const { frames, step, heading, count, q } = decodeCoefficients(shippedPrior(), bytes(vector.block), usual, fps);
+  expect([frames, step, heading]).toEqual([vector.frames, vector.step, vector.heading]);
   expect(count * 57).toBe(vector.q.length);
   expect([...q]).toEqual(vector.q);
 });
@@ -26,19 +26,23 @@ test("a block's duration in sixteenths of a second", () => {
   expect([lengthLevel(30, 30), lengthLevel(1, 1000), lengthLevel(1000, 1e-3), lengthLevel(40, 59.94)]).toEqual([65, 0, 192, 57]);
 });
 
-/** A prior whose every scale is `scale` and every hazard and sign `probability`. */
-function level(scale: number, probability: number) {
+/** A prior whose every scale is `scale`, and every sign and hazard `probability`, or those of each table. */
+function level(scale: number, probability: number, tables = [probability, probability, probability]) {
   const rows = (count: number, length: number, value: number) => Array.from({ length: count }, () => new Array<number>(length).fill(value));
   return readPrior({
     linear: rows(CLASSES, FEATURES, 0), bias: rows(CLASSES, AXES, scale << 8), hidden: rows(HIDDEN, FEATURES, 0),
     hidden_bias: rows(HIDDEN, AXES, 0), hidden_class: rows(HIDDEN, CLASSES, 0), out: rows(HIDDEN, CLASSES, 0),
-    hazard: rows(ROWS, UNARY, probability), sign: rows(CLASSES, SIGNS, probability),
+    hazard: tables.flatMap((each) => rows(ROWS, UNARY, each)), sign: rows(CLASSES, SIGNS, probability),
   });
 }
 
 const number = (value: number, bits: number) =>
   Array.from({ length: bits }, (_, i) => ({ bit: (value >> (bits - 1 - i)) & 1, probability: 16384 }));
-const head = [{ bit: 1, probability: 32440 }, { bit: 0, probability: 512 }, ...number(90, 8), ...number(32, 6), ...number(31, 6), ...number(33, 6), ...number(1, 5)];
+/** A head of 30 frames as usual, step 90 and heading -5. */
+const headOf = (count: number) => [
+  { bit: 1, probability: 32440 }, { bit: 0, probability: 512 }, ...number(90, 8), ...number(27, 6), ...number(count, 5),
+];
+const head = headOf(1);
 const ones = (count: number, probability: number) => new Array(count).fill({ bit: 1, probability });
 
 test("the largest size there can be is above 2^31, and right", () => {
@@ -47,9 +51,24 @@ test("the largest size there can be is above 2^31, and right", () => {
     ...number(2 ** 11 - 1, 11), { bit: 1, probability: 9000 },
     ...new Array(56).fill([{ bit: 0, probability: 9000 }, ...number(0, 11)]).flat(),
   ];
-  const { q, turn } = decodeCoefficients(level(3584, 9000), encode(bits), 30, 30);
-  expect(turn).toEqual([0, -1, 1]);
+  const { q, step, heading } = decodeCoefficients(level(3584, 9000), encode(bits), 30, 30);
+  expect([step, heading]).toEqual([90, -5]);
   expect([...q]).toEqual([-((2 ** 20 - 1 + UNARY - 1) * 2 ** 11 + 2 ** 11 - 1), ...new Array(56).fill(0)]);
+});
+
+test("each class of frequencies has the hazards of its table", () => {
+  const tables = [9000, 20000, 30000];
+  const count = 18;
+  // of every frequency three sizes of one, plus
+  const bits = [
+    ...headOf(count),
+    ...Array.from({ length: 19 * count }, (_, i) => {
+      const k = i % count, probability = tables[k < 3 ? 0 : k < 9 ? 1 : 2];
+      const one = [{ bit: 1, probability }, { bit: 0, probability }, { bit: 0, probability: 11000 }];
+      return [...one, ...one, ...one];
+    }).flat(),
+  ];
+  expect([...decodeCoefficients(level(0, 11000, tables), encode(bits), 30, 30).q]).toEqual(new Array(57 * count).fill(1));
 });
 
 test("an escape of twenty ones is refused", () => {

@@ -58,7 +58,7 @@ const rows = (count: number, length: number, most: number) => fc.array(row(lengt
 const anyPrior: fc.Arbitrary<PriorValues> = fc.record({
   linear: rows(CLASSES, FEATURES, 1500), bias: rows(CLASSES, AXES, 300_000), hidden: rows(HIDDEN, FEATURES, 3000),
   hidden_bias: rows(HIDDEN, AXES, 300_000), hidden_class: rows(HIDDEN, CLASSES, 300_000), out: rows(HIDDEN, CLASSES, 6000),
-  hazard: rows(ROWS, UNARY, 1), sign: rows(CLASSES, SIGNS, 1),
+  hazard: rows(3 * ROWS, UNARY, 1), sign: rows(CLASSES, SIGNS, 1),
 });
 
 test("the scale is the definition's for any prior and any sizes", () => {
@@ -91,7 +91,7 @@ test("a scale keeps within its ends", () => {
   const flat = (count: number, length: number, value = 0) => Array.from({ length: count }, () => new Array<number>(length).fill(value));
   const values = {
     linear: flat(CLASSES, FEATURES), hidden: flat(HIDDEN, FEATURES), hidden_bias: flat(HIDDEN, AXES), hidden_class: flat(HIDDEN, CLASSES),
-    out: flat(HIDDEN, CLASSES), hazard: flat(ROWS, UNARY), sign: flat(CLASSES, SIGNS),
+    out: flat(HIDDEN, CLASSES), hazard: flat(3 * ROWS, UNARY), sign: flat(CLASSES, SIGNS),
   };
   for (const [bias, wanted] of [[1 << 28, HIGHEST_SCALE], [-(1 << 28), LOWEST_SCALE], [-1, -1], [511, 1]]) {
     const contexts = new Contexts(readPrior({ ...values, bias: flat(CLASSES, AXES, bias) }), 1, 0, 0);

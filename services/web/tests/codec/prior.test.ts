@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import values from "../../../bunraku/codec/prior.json";
-import { AXES, CLASSES, FEATURES, HIDDEN, readPrior, ROWS, SIGNS, shippedPrior, SUMS, UNARY } from "../../src/codec/prior";
+import { AXES, CLASSES, FEATURES, HAZARD_OF, HIDDEN, readPrior, ROWS, SIGNS, shippedPrior, SUMS, UNARY } from "../../src/codec/prior";
 
 test("every number of the shipped prior stands where it is read", () => {
   const { weights, biases, out, hazard, sign } = shippedPrior();
@@ -18,7 +18,8 @@ test("every number of the shipped prior stands where it is read", () => {
   }
   expect([...hazard]).toEqual(values.hazard.flat());
   expect([...sign]).toEqual(values.sign.flat());
-  expect([hazard.length, sign.length]).toEqual([ROWS * UNARY, CLASSES * SIGNS]);
+  expect([hazard.length, sign.length]).toEqual([(Math.max(...HAZARD_OF) + 1) * ROWS * UNARY, CLASSES * SIGNS]);
+  expect(HAZARD_OF.length).toBe(CLASSES);
 });
 
 test("no sum of the shipped prior can pass 32 bits, whatever the features", () => {
@@ -43,6 +44,6 @@ test("all its probabilities are above none and below all", () => {
 });
 
 test("a prior of another shape is refused by name", () => {
-  expect(() => readPrior({ ...values, hazard: values.hazard.slice(1) })).toThrow("a prior's hazard has 48 rows of 18 numbers");
+  expect(() => readPrior({ ...values, hazard: values.hazard.slice(1) })).toThrow("a prior's hazard has 144 rows of 18 numbers");
   expect(() => readPrior({ ...values, sign: values.sign.map((row) => row.slice(1)) })).toThrow("sign");
 });

@@ -26,10 +26,10 @@ const tracks = golden.tracks.map((track) => SceneTrack.fromDescription(track));
 describe("golden blocks", () => {
   test.each(golden.valid)("of track $track, $frames frames at step $step", (vector) => {
     const track = tracks[vector.track];
-    const { frames, step, turn, q } = decodeCoefficients(
+    const { frames, step, heading, q } = decodeCoefficients(
       shippedPrior(), bytes(vector.block), track.blockFrames, track.fps, SCENE_CHANNELS,
     );
-    expect([frames, step, [...turn]]).toEqual([vector.frames, vector.step, [0, 0, 0]]);
+    expect([frames, step, heading]).toEqual([vector.frames, vector.step, 0]);
     expect([...q]).toEqual(vector.q);
     const block = decodeScene(track, bytes(vector.block));
     expect(block.frames).toBe(vector.frames);

@@ -2,14 +2,15 @@ import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import { DamagedBlock } from "../../src/codec/errors";
 import { MotionTrack } from "../../src/codec/track";
+import { fromRotationVector, multiply, rotate } from "../../src/motion/rotation";
 import { goldenDescription, goldenTrack } from "../golden";
 import { Outcome } from "../outcome";
 
 test("blocks are found by time, whatever the rounding and the length of the first", () => {
-  const { figure, reference } = goldenTrack();
+  const { dancer } = goldenTrack();
   for (const fps of [24, 29.97, 30, 59.94, 60, 119.88, 120]) {
     for (const first of [1, 6, Math.round(fps), Math.round(fps * 3), Math.round(fps * 9.5)]) {
-      const track = new MotionTrack(fps, Math.round(fps * 9.5), Math.round(fps), first, figure, reference);
+      const track = new MotionTrack(fps, Math.round(fps * 9.5), Math.round(fps), first, dancer);
       for (let index = 0; index < track.blocks; index++) {
         expect(track.blockAt(track.startUs(index))).toBe(index);
         if (index > 0) expect(track.blockAt(track.startUs(index) - 1e3)).toBe(index - 1);
@@ -22,6 +23,25 @@ test("blocks are found by time, whatever the rounding and the length of the firs
       expect(frames.reduce((sum, each) => sum + each)).toBe(track.frames);
     }
   }
+});
+
+test("a heading turns the root's reference about y by sixty-fourths, and no other", () => {
+  const track = goldenTrack(1);
+  const { reference } = track.dancer;
+  expect([...track.referenceRotations(0)]).toEqual([...reference]);
+  for (const heading of [-32, -7, 16, 31]) {
+    const turned = track.referenceRotations(heading);
+    expect([...turned.subarray(4)]).toEqual([...reference.subarray(4)]);
+    const turn = new Float64Array(4), wanted = new Float64Array(4);
+    fromRotationVector(turn, 0, 0, (heading * Math.PI) / 32, 0);
+    multiply(wanted, 0, turn, 0, reference, 0);
+    wanted.forEach((value, i) => expect(turned[i]).toBeCloseTo(value, 12));
+  }
+  // a quarter of a whole turn brings what pointed along z along x
+  const [before, after] = [new Float64Array(3), new Float64Array(3)];
+  rotate(before, 0, reference, 0, Float64Array.of(0, 0, 1), 0);
+  rotate(after, 0, track.referenceRotations(16), 0, Float64Array.of(0, 0, 1), 0);
+  [before[2], before[1], -before[0]].forEach((value, i) => expect(after[i]).toBeCloseTo(value, 12));
 });
 
 test("the golden tracks' blocks", () => {
@@ -50,6 +70,7 @@ describe("a description that cannot be played is refused with what it lacks", ()
     [{ dancer: "text" }, "dancer"],
     [{ dancer: new Uint8Array(0) }, "bytes"],
     [{ dancer: new Uint8Array(103).fill(15) }, "2^-15 radians"],
+    [{ dancer: new Uint8Array(103).fill(0x82) }, "grid is 8"],
     [{ rates: Array(17).fill({ kbps: 1, mean: 1, max: 1 }) }, "rates"],
     [{ rates: [{ kbps: 1, mean: 1 }] }, "rate 0"],
   ])("%o", (change, what) => {

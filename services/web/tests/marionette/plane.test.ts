@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { Plane, verticalNormal } from "../../src/marionette/plane";
-import { dot, length, unit } from "../../src/marionette/vector";
+import { dot, length, unit } from "../../src/motion/vector";
 import { golden } from "./golden";
 
 test("the plane follows as the golden vectors say, and the tip stays in it", () => {

@@ -1,6 +1,6 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { conjugate, fromRotationVector, multiply, rotate, slerp, toRotationVector } from "../../src/motion/rotation";
+import { conjugate, fromRotationVector, multiply, rotate, slerp, toMatrix, toRotationVector } from "../../src/motion/rotation";
 
 const part = fc.double({ min: -4, max: 4, noNaN: true });
 const vector = fc.tuple(part, part, part);
@@ -46,6 +46,17 @@ test("a rotation and its conjugate are none", () => {
       conjugate(back, 0, q, 0);
       multiply(back, 0, back, 0, q, 0);
       near(back, [1, 0, 0, 0]);
+    }),
+  );
+});
+
+test("a matrix turns as its quaternion", () => {
+  fc.assert(
+    fc.property(turn, vector, (q, v) => {
+      const m = new Float64Array(9), turned = new Float64Array(3);
+      toMatrix(m, 0, q, 0);
+      rotate(turned, 0, q, 0, Float64Array.from(v), 0);
+      near([0, 3, 6].map((row) => m[row] * v[0] + m[row + 1] * v[1] + m[row + 2] * v[2]), turned, 1e-11);
     }),
   );
 });

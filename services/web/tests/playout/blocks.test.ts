@@ -1,7 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { decodeBlock } from "../../src/codec/decode";
 import { DamagedBlock } from "../../src/codec/errors";
-import { MotionTrack } from "../../src/codec/track";
 import { restPose } from "../../src/motion/skeleton";
 import { BlockStore } from "../../src/playout/blocks";
 import { type BlockVectors, goldenTrack } from "../golden";

@@ -1,9 +1,9 @@
 /**
- * What the limbs need beside `motion/rotation`: directions and frames, in flat arrays (`out` at `outAt`), without
+ * What is needed beside `rotation`: directions and frames, in flat arrays (`out` at `outAt`), without
  * allocation. Input and output may be the same array.
  */
 
-import type { Numbers } from "../motion/rotation";
+import type { Numbers } from "./rotation";
 
 /** Scalar product of two vectors (3). */
 export function dot(a: Numbers, aAt: number, b: Numbers, bAt: number): number {

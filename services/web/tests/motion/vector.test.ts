@@ -3,7 +3,7 @@ import { expect, test } from "vitest";
 import { conjugate, multiply, rotate } from "../../src/motion/rotation";
 import {
   aboutAxis, across, between, cross, dot, fromColumns, length, normalise, squareTo, unit,
-} from "../../src/marionette/vector";
+} from "../../src/motion/vector";
 
 const part = fc.double({ min: -1, max: 1, noNaN: true });
 const direction = fc

@@ -1,0 +1,25 @@
+/** Figures and references of any shape, for tests by property. */
+
+import * as fc from "fast-check";
+import { fromRotationVector } from "../../src/motion/rotation";
+import { restPose } from "../../src/motion/skeleton";
+
+const metres = fc.oneof(fc.constant(0), fc.double({ min: -3.3, max: 3.3, noNaN: true }));
+const lengths = fc.array(metres, { minLength: 54, maxLength: 54 }).map((values) => Float64Array.from(values));
+
+export const figure = fc.record({ offsets: lengths, tips: lengths });
+
+/** A rotation for each joint (72). */
+export const references = fc
+  .array(fc.double({ min: -2, max: 2, noNaN: true }), { minLength: 54, maxLength: 54 })
+  .map((vectors) => {
+    const rotations = new Float64Array(72);
+    for (let joint = 0; joint < 18; joint++) {
+      const [x, y, z] = vectors.slice(joint * 3);
+      fromRotationVector(rotations, joint * 4, x, y, z);
+    }
+    return rotations;
+  });
+
+/** No joint turned (72). */
+export const STANDING = restPose().rotations;
