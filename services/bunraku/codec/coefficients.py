@@ -49,7 +49,7 @@ def length_level(frames: int, fps: float) -> int:
 def encode(prior: Prior, head: Head, q: Integers, usual: int, fps: float) -> bytes:
     """Bytes of a block of `fps` frames a second with coefficients `q` (19, 3, K), K <= frames; zero frequencies at
     the end cost nothing, nor does the number of frames where it is `usual`. `q` (3, 3, K) are a camera's or light's:
-    such a block says neither the head's turn nor the last channel's second and third axis, zeros.
+    such a block says neither the head's heading nor the last channel's second and third axis, zeros.
 
     Raises ValueError for a coefficient or block that is too large.
     """

@@ -21,6 +21,7 @@ export function codedAxes(figure: Figure, reference: Float64Array): Float64Array
     if (joint > 0) multiply(standing, joint * 4, standing, PARENTS[joint] * 4, reference, joint * 4);
     toMatrix(onto, joint * 9, standing, joint * 4);
   }
+  const upright = onto.slice();
   for (let joint = 0; joint < JOINT_COUNT; joint++) {
     const arms = PARENTS.flatMap((parent, child) => (parent === joint ? [figure.offsets.subarray(child * 3, child * 3 + 3)] : []));
     if (TIPS.includes(joint)) arms.push(figure.tips.subarray(joint * 3, joint * 3 + 3));
@@ -28,7 +29,7 @@ export function codedAxes(figure: Figure, reference: Float64Array): Float64Array
     const bone = arms.length === 1 ? direction(own, arms[0]) : null;
     if (!bone) continue;
     const offset = figure.offsets.subarray(joint * 3, joint * 3 + 3);
-    const before = HINGED.includes(joint) ? direction(onto.subarray(PARENTS[joint] * 9), offset) : null;
+    const before = HINGED.includes(joint) ? direction(upright.subarray(PARENTS[joint] * 9), offset) : null;
     own.set(product(along(bone, UPWARD.includes(joint), before), own));
   }
   return onto;
