@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from bunraku.codec import coefficients
-from bunraku.codec.coefficients import LARGEST_BLOCK, MOST_FRAMES
+from bunraku.codec.coefficients import LARGEST_BLOCK
 from bunraku.codec.dancer import LARGEST_DANCER, Dancer
 from bunraku.codec.decode import MotionBlock, decode_block
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import shipped
+from bunraku.codec.prior import MOST_FRAMES, shipped
 from bunraku.codec.track import CODEC, MotionTrack, read_track
 from bunraku.wire.messages import Description, MalformedMessage, unpack
 from tests.vectors.blocks import wild

@@ -129,7 +129,7 @@ def make() -> dict[str, Any]:
         (0, 31, 7, -2, 31, 1 << 12),
         (0, 30, 0, 2, 24, 1 << 20),
         (1, 240, 77, 16, 70, 60),
-        (2, 1000, 100, -1, 40, 1 << 8),
+        (2, 512, 100, -1, 40, 1 << 8),
     ):
         track = tracks[number]
         q = wild(random, count, most)
@@ -139,7 +139,7 @@ def make() -> dict[str, Any]:
     invalid = {
         "empty: more frequencies than frames": b"",
         "no frames": head(rest, 0),
-        "too many frames": head([*rest, (4, 10)], 1001),
+        "too many frames": head([*rest, (4, 10)], 513),
         "more frequencies than frames": head([*rest, (5, 3)], 4),
         "more frequencies than the usual frames": head([*rest, (31, 5)]),
         "an escape too long": head([*rest, (1, 5)]) + bytes(30),

@@ -76,7 +76,7 @@ def make() -> dict[str, Any]:
         (0, 1, 255, 1, 3),
         (0, 30, 7, 30, 1 << 12),
         (1, 30, 60, 30, 1 << 16),
-        (0, 1000, 100, 40, 1 << 8),
+        (0, 512, 100, 40, 1 << 8),
         (1, 31, 0, 9, 1 << 20),
         (0, 60, 255, 60, 1 << 19),
     ):
@@ -87,7 +87,7 @@ def make() -> dict[str, Any]:
     usual = tracks[0].block_frames
     invalid = {
         "no frames": head([(9, 8)], 0, scene=True),
-        "too many frames": head([(9, 8), (4, 10)], 1001, scene=True),
+        "too many frames": head([(9, 8), (4, 10)], 513, scene=True),
         "more frequencies than frames": head([(9, 8), (5, 3)], 4, scene=True),
         "more frequencies than the usual frames": head([(9, 8), (usual + 1, usual.bit_length())], scene=True),
         "an escape too long": head([(9, 8), (1, usual.bit_length())], scene=True) + bytes(30),

@@ -9,11 +9,10 @@ from types import ModuleType
 import numpy as np
 
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import LEVELS, Integers, Prior
+from bunraku.codec.prior import LEVELS, MOST_FRAMES, Integers, Prior
 from bunraku.motion.skeleton import CHANNEL_COUNT
 
 LARGEST_BLOCK = 65_536
-MOST_FRAMES = 1_000
 SCENE_CHANNELS = 3
 """Channels of a camera's or a light's block, the last with one axis only; a motion's has 19."""
 

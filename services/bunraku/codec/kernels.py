@@ -19,7 +19,7 @@ from bunraku.codec.contexts import (
     share,
     sign_context,
 )
-from bunraku.codec.prior import CLASS_OF, HAZARD_OF, ROWS, UNARY, Integers, Prior
+from bunraku.codec.prior import CLASS_OF, HAZARD_OF, MOST_FRAMES, ROWS, UNARY, Integers, Prior
 from bunraku.codec.rangecoder import EVEN, Bytes, decode_bit, encode_bit, finish, start_decoder, start_encoder
 
 ESCAPE = 20
@@ -70,7 +70,7 @@ def _head(decoding: bool, state: Integers, data: Bytes, usual: int, head: Intege
         head[FRAMES] = usual
     else:
         head[FRAMES] = _number(decoding, state, data, _MOST_FRAMES_BITS, head[FRAMES])
-    if not 1 <= head[FRAMES] <= 1000:
+    if not 1 <= head[FRAMES] <= MOST_FRAMES:
         return False
     scene = head[CHANNELS] == SCENE_CHANNELS
     if not scene:

@@ -93,7 +93,9 @@ def _level(size: int) -> int:
 LEVELS: Integers = np.array([_level(size) for size in range(4096)], dtype=np.int64)
 """`_level` of 0 .. 4095; larger ones count as the last."""
 
-CLASS_OF: Integers = np.digitize(np.arange(1001), [1, 2, 3, 5, 9, 16]).astype(np.int64)
+MOST_FRAMES = 512
+"""Frames of a block, at most: two seconds at 240 a second, and what a browser decodes in a tenth of one."""
+CLASS_OF: Integers = np.digitize(np.arange(MOST_FRAMES + 1), [1, 2, 3, 5, 9, 16]).astype(np.int64)
 """Class of each frequency."""
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from bunraku.codec.coefficients import MOST_FRAMES
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.prior import MOST_FRAMES
 
 MOST_FPS = 100_000
 """Frames a second, at most: instants are whole microseconds."""

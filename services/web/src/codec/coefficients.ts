@@ -14,7 +14,7 @@ import { EVEN, RangeDecoder } from "./rangecoder";
 export const LARGEST_BLOCK = 65_536;
 
 /** Most frames of a block. */
-export const MOST_FRAMES = 1_000;
+export const MOST_FRAMES = 512;
 
 const FRAMES_AS_USUAL = 32440;
 const ROOT_ALONE = 512;
@@ -46,7 +46,7 @@ export function lengthLevel(frames: number, fps: number): number {
 
 /**
  * Head and coefficients of a block of a motion with `fps` frames a second whose blocks have `usual` frames. The work is bounded
- * by 57,000 coefficients of at most 70 bits. A block of `SCENE_CHANNELS` says in its head neither channels nor a heading,
+ * by 29,184 coefficients of at most 70 bits. A block of `SCENE_CHANNELS` says in its head neither channels nor a heading,
  * and its last channel has one axis.
  *
  * @throws DamagedBlock

@@ -12,7 +12,7 @@ export const LOWEST_SCALE = -7 * 256;
 export const HIGHEST_SCALE = 14 * 256;
 
 /** Class of each frequency: 0, 1, 2, 3-4, 5-8, 9-15, 16 and above. */
-export const CLASS_OF = Uint8Array.from({ length: 1001 }, (_, k) => [1, 2, 3, 5, 9, 16].filter((first) => k >= first).length);
+export const CLASS_OF = Uint8Array.from({ length: 513 }, (_, k) => [1, 2, 3, 5, 9, 16].filter((first) => k >= first).length);
 
 // a channel that is missing reads zeros here
 const NONE = CHANNEL_COUNT;
