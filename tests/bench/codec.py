@@ -110,9 +110,13 @@ def speeds(motions: dict[str, Motion]) -> dict[str, float]:
     for motion in motions.values():
         track, rate = encode_mean(motion, 1.0)
         for block in rate.blocks:
-            began = time.perf_counter()
-            decode_block(track, block)
-            spent.append(time.perf_counter() - began)
+            # the best of three: others share the machine
+            tries = []
+            for _ in range(3):
+                began = time.perf_counter()
+                decode_block(track, block)
+                tries.append(time.perf_counter() - began)
+            spent.append(min(tries))
     figures["decode_ms_python"] = float(np.median(spent)) * 1e3
     return figures
 

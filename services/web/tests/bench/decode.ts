@@ -15,14 +15,14 @@ const work = (JSON.parse(readFileSync(0, "utf8")) as Coded[]).flatMap(({ track, 
   return blocks.map((block) => ({ of, block: bytes(block) }));
 });
 
-const spent: number[] = [];
-for (let round = 0; round < 3; round++) {
-  spent.length = 0;
-  for (const { of, block } of work) {
+// the best of some rounds of each block: others share the machine
+const spent = new Array<number>(work.length).fill(Infinity);
+for (let round = 0; round < 5; round++) {
+  work.forEach(({ of, block }, nth) => {
     const began = performance.now();
     decodeBlock(of, block);
-    spent.push(performance.now() - began);
-  }
+    spent[nth] = Math.min(spent[nth], performance.now() - began);
+  });
 }
 spent.sort((a, b) => a - b);
 console.log(JSON.stringify({ blocks: spent.length, median_ms: spent[spent.length >> 1], largest_ms: spent[spent.length - 1] }));
