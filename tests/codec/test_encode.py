@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,15 @@ def test_progress_rises_to_one() -> None:
     encode_motion(wandering_motion(2.0, 30.0, 5), grade="live", progress=told.append)
     assert told == sorted(told)
     assert told[-1] == 1.0
+
+
+def test_threads_change_nothing() -> None:
+    motion = wandering_motion(2.0, 30.0, 5)
+    one = encode_motion(motion, ladder=(20.0, 5.0, 60.0))
+    with ThreadPoolExecutor(3) as pool:
+        more = encode_motion(motion, ladder=(20.0, 5.0, 60.0), spread=pool.map)
+    assert [rate.blocks for rate in one.rates] == [rate.blocks for rate in more.rates]
+    assert [rate.bound for rate in more.rates] == [20.0, 5.0, 60.0]
 
 
 def test_a_block_beyond_its_bound_is_never_let_through() -> None:

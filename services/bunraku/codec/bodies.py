@@ -183,7 +183,7 @@ def pose(body: Body, q: Integers, size: float, basis: Array, vectors: Array, ori
         place_children(body, joint, orientation, points)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def points(body: Body, q: Integers, size: float, basis: Array) -> Array:
     """Only the points (23, n, 3) of a block."""
     frames = basis.shape[1]

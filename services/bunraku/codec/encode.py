@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, Literal
 
 import numpy as np
@@ -41,6 +42,10 @@ class Rate:
     bound: float
 
 
+Spread = Callable[[Callable[[float], Rate], Iterable[float]], Iterable[Rate]]
+"""What `map` does."""
+
+
 @dataclass(frozen=True, slots=True)
 class EncodedMotion:
     """A motion at every rate, lowest first, upon one track; `front` is where it faces (`skeleton.front`)."""
@@ -63,20 +68,26 @@ def encode_motion(
     first_seconds: float | None = None,
     prior: Prior | None = None,
     progress: Callable[[float], None] = lambda _: None,
+    spread: Spread = map,
 ) -> EncodedMotion:
     """Encode `motion` in independent blocks at every largest error of `ladder` (mm), and check each by decoding it.
 
-    `progress` is told the share done, 0..1. Raises ValueError for a motion that no step can hold to its error.
+    `progress` is told the share done, 0..1. `spread` makes the rates: `map`, or a pool's, as the compiled code lets
+    other threads run; `progress` is then called from them. Raises ValueError for a motion that no step can hold to its error.
     """
     track = plan(motion, block_seconds, first_seconds, min(ladder) * _MEAN_OF_MOST)
     encoder = BlockEncoder(track, motion, prior or shipped())
-    rates = []
-    for number, bound in enumerate(ladder):
+    done = count(1)
+
+    def encode(bound: float) -> Rate:
         coded: list[Coded] = []
         for index in range(track.blocks):
             coded.append(encoder.bounded(index, bound, grade, coded[-1].step if coded else None))
-            progress((number + (index + 1) / track.blocks) / len(ladder))
-        rates.append(measure(track, motion, [block.data for block in coded], bound, prior))
+            progress(next(done) / (track.blocks * len(ladder)))
+        return measure(track, motion, [block.data for block in coded], bound, prior)
+
+    # the finest take the longest
+    rates = list(spread(encode, ladder[::-1]))[::-1]
     return EncodedMotion(track, rates, front(motion))
 
 

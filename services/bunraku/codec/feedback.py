@@ -115,7 +115,7 @@ def _aim(body: Body, joint: int, orientation: Array, off: Array, aimed: Array) -
     multiply(q, orientation, aimed)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def first_pass(
     prior: Prior,
     costs: Array,

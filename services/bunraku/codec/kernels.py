@@ -132,7 +132,7 @@ def _body(decoding: bool, state: Integers, data: Bytes, prior: Prior, q: Integer
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def encode(prior: Prior, q: Integers, head: Integers, usual: int, length: int, out: Bytes) -> int:
     """Write a block into `out`; the length, its first byte being of no use, or -1 where a coefficient is too large."""
     state = start_encoder()
@@ -147,7 +147,7 @@ def decode_head(data: Bytes, usual: int, head: Integers) -> bool:
     return _head(True, start_decoder(data), data, usual, head)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def decode(prior: Prior, data: Bytes, q: Integers, head: Integers, usual: int, length: int) -> bool:
     """Read a block into `q`, zeros of (19, 3, count); False where it cannot be one."""
     state = start_decoder(data)

@@ -219,7 +219,7 @@ def _weigh(off: Array, weight: Array, again: bool) -> None:
     weight *= weight.size / total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def refine(
     prior: Prior,
     costs: Array,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Lock
 
 from bunraku.backing.library import pack
 from bunraku.codec import encode
@@ -39,7 +42,16 @@ def make(motion: str, path: Path, progress: Callable[[float], None] = lambda _: 
         return Refused("No puppet's arms", f"its arms cannot be pulled: {error}", field=error.field, hint=error.hint)
     grade: Grade = "best" if analysis.motion.frames <= MOST_FRAMES_AT_BEST else "live"
     progress(0.0)
-    encoded = encode_motion(analysis.motion, first_seconds=FIRST_SECONDS, grade=grade, progress=progress)
+    telling = Lock()
+
+    def told(share: float) -> None:
+        with telling:
+            progress(share)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        encoded = encode_motion(
+            analysis.motion, first_seconds=FIRST_SECONDS, grade=grade, progress=told, spread=pool.map
+        )
     track = encoded.track
     return Made(
         pack(motion, encoded),
