@@ -32,10 +32,10 @@ def processes(group: int) -> set[int]:
 
 
 @pytest.fixture
-def up(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """`bunraku up --demo` and its address."""
+def up(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """`bunraku up` with the options of the test, and its address."""
     process = subprocess.Popen(
-        [BUNRAKU, "up", "--demo", "--port", "0", "--data", tmp_path / "data"],
+        [BUNRAKU, "up", *request.param, "--port", "0", "--data", tmp_path / "data"],
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
@@ -57,6 +57,7 @@ def up(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
         process.stdout.close()
 
 
+@pytest.mark.parametrize("up", [["--demo"]], indirect=True)
 def test_the_demo_dances_and_ctrl_c_leaves_nothing(up: tuple[subprocess.Popen[str], str]) -> None:
     process, url = up
     with httpx2.Client(base_url=url) as http:
@@ -91,6 +92,7 @@ def test_the_demo_dances_and_ctrl_c_leaves_nothing(up: tuple[subprocess.Popen[st
         time.sleep(0.01)
 
 
+@pytest.mark.parametrize("up", [[]], indirect=True)
 def test_a_port_in_use_is_said_in_words(up: tuple[subprocess.Popen[str], str]) -> None:
     _, url = up
     second = subprocess.run(

@@ -19,7 +19,7 @@ from tests.fuzz.targets import DESCRIBED, TARGETS, seeds
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLES = 1_000
-RUNS = 5_000
+RUNS = 3_000
 LONGEST_SHOWN = 4_096
 """Bytes of a seed for Hypothesis, which prints what fails."""
 

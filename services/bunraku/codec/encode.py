@@ -73,7 +73,8 @@ def encode_motion(
     """Encode `motion` in independent blocks at every largest error of `ladder` (mm), and check each by decoding it.
 
     `progress` is told the share done, 0..1. `spread` makes the rates: `map`, or a pool's, as the compiled code lets
-    other threads run; `progress` is then called from them. Raises ValueError for a motion that no step can hold to its error.
+    other threads run; `progress` is then called from them. Raises ValueError for a motion that no step can hold to its
+    error.
     """
     track = plan(motion, block_seconds, first_seconds, min(ladder) * _MEAN_OF_MOST)
     encoder = BlockEncoder(track, motion, prior or shipped())

@@ -1,11 +1,8 @@
 /** A file dropped on the page in a real browser. */
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
-import type { Stage } from "../../src/stage/stage";
 import { launch } from "./chromium";
 import { chromium, startServer, type RunningServer } from "./server";
-
-type Inside = { bunraku: { stage: Stage } };
 
 const PATIENCE = 90_000;
 
@@ -19,7 +16,7 @@ describe.skipIf(!path)("a drop on the page", { timeout: 2 * PATIENCE }, () => {
   let page: Page;
 
   beforeAll(async () => {
-    [server, browser] = await Promise.all([startServer({ demo: true }), launch(path ?? "")]);
+    [server, browser] = await Promise.all([startServer({ demo: false }), launch(path ?? "")]);
     // Small, as the picture is drawn in software.
     page = await browser.newPage({ viewport: { width: 500, height: 400 }, reducedMotion: "reduce" });
     page.setDefaultTimeout(PATIENCE);
@@ -27,7 +24,7 @@ describe.skipIf(!path)("a drop on the page", { timeout: 2 * PATIENCE }, () => {
       throw error;
     });
     await page.goto(server.url);
-    await page.waitForFunction(() => (window as unknown as Partial<Inside>).bunraku?.stage?.puppet?.group.visible ?? false);
+    await page.getByRole("complementary", { name: "Library" }).waitFor();
   }, PATIENCE);
   afterAll(async () => {
     await browser?.close();
