@@ -82,22 +82,3 @@ def decode(prior: Prior, data: bytes, usual: int, fps: float, channels: int = CH
     if not kernels.decode(prior, octets, q, numbers, usual, length_level(frames, fps)):
         raise DamagedBlock(f"block holds a number longer than {kernels.ESCAPE} bits")
     return Head(frames, step, heading), q
-
-
-def encode_numbers(values: Integers, groups: Integers, twins: Integers) -> bytes:
-    """Bytes of some whole numbers, each of a group with models of its own and perhaps with a twin before it, by its
-    place; raises ValueError for one above 2^16."""
-    out = np.zeros(64 + 8 * len(values), dtype=np.uint8)
-    length = _kernels().numbers(False, out, np.array(values, dtype=np.int64), groups, twins)
-    if length < 0:
-        raise ValueError("a number is too large to be coded")
-    return out[1:length].tobytes().rstrip(b"\0")
-
-
-def decode_numbers(data: bytes, groups: Integers, twins: Integers) -> Integers:
-    """The numbers of `encode_numbers`; raises `DamagedBlock`."""
-    kernels = _kernels()
-    values = np.zeros(len(groups), dtype=np.int64)
-    if kernels.numbers(True, np.array(bytearray(data), dtype=np.uint8), values, groups, twins) < 0:
-        raise DamagedBlock(f"a number is longer than {kernels.NUMBER_BITS} bits, or less than none")
-    return values

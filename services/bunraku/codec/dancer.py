@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bunraku.codec import coefficients
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.numbers import decode_numbers, encode_numbers
 from bunraku.codec.prior import Integers
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -59,7 +59,7 @@ class Dancer:
         """The dancer's bytes."""
         lengths = np.concatenate([self.figure.offsets, self.figure.tips[list(TIPS)]]) / unit(self.grid)
         numbers = np.round(np.concatenate([lengths.ravel(), self.reference.ravel()])).astype(np.int64)
-        return bytes([self.grid << 4 | self.reference_bits]) + coefficients.encode_numbers(numbers, GROUPS, TWINS)
+        return bytes([self.grid << 4 | self.reference_bits]) + encode_numbers(numbers, GROUPS, TWINS)
 
     @classmethod
     def unpack(cls, data: bytes) -> Dancer:
@@ -72,7 +72,7 @@ class Dancer:
                 f"a dancer's grid is {grid} and its reference in 2^-{bits} radians; {MOST_GRID} and 2^-{MOST_BITS} are "
                 "the most"
             )
-        numbers = coefficients.decode_numbers(data[1:], GROUPS, TWINS)
+        numbers = decode_numbers(data[1:], GROUPS, TWINS)
         lengths = numbers[: 3 * _ROWS].reshape(-1, 3).astype(np.float64) * unit(grid)
         tips = np.zeros((JOINT_COUNT, 3))
         tips[list(TIPS)] = lengths[JOINT_COUNT:]

@@ -24,10 +24,6 @@ from bunraku.codec.rangecoder import EVEN, Bytes, decode_bit, encode_bit, finish
 
 ESCAPE = 20
 """Bits of an escape's length, at most."""
-NUMBER_BITS = 17
-"""Bits of a dancer's number, less one, are fewer."""
-_LONGER = 22938
-"""Odds of another bit before any number is seen, 0.7."""
 _FRAMES_AS_USUAL = 32440
 _MOST_FRAMES_BITS = 10
 
@@ -152,49 +148,6 @@ def decode(prior: Prior, data: Bytes, q: Integers, head: Integers, usual: int, l
     """Read a block into `q`, zeros of (19, 3, count); False where it cannot be one."""
     state = start_decoder(data)
     return _head(True, state, data, usual, head) and _body(True, state, data, prior, q, head, length)
-
-
-@njit(cache=True)
-def _learned(decoding: bool, state: Integers, data: Bytes, model: Integers, at: int, bit: int) -> int:
-    got = _bit(decoding, state, data, model[at], bit)
-    moved = model[at] + (((32768 if got else 0) - model[at]) >> 3)
-    model[at] = min(max(moved, 1024), 31744)
-    return got
-
-
-@njit(cache=True)
-def numbers(decoding: bool, data: Bytes, values: Integers, groups: Integers, twins: Integers) -> int:
-    """Write `values` into `data`, or read them from it, each by the models of its group, which learn: of a number its
-    size plus one, its bits less one in unary, then its low bits, then the sign; of one with a twin before it what its
-    size differs from the twin's, in the same way, and whether its sign does. The length, its first byte being of no
-    use; -1 where it cannot be."""
-    lengths = np.full((groups.max() + 1, NUMBER_BITS), _LONGER)
-    signs = np.full(groups.max() + 1, EVEN)
-    state = start_decoder(data) if decoding else start_encoder()
-    for i in range(len(values)):
-        group, twin = groups[i], abs(values[twins[i]]) if twins[i] >= 0 else 0
-        rest = abs(values[i]) - twin
-        size = abs(rest) + 1
-        bits, length = 0 if decoding else bit_length(size) - 1, 0
-        while length < NUMBER_BITS and _learned(
-            decoding, state, data, lengths[group], length, 1 if bits > length else 0
-        ):
-            length += 1
-        if length == NUMBER_BITS:
-            return -1
-        size = (1 << length | _number(decoding, state, data, length, size)) - 1
-        if twins[i] < 0:
-            sign = size > 0 and _bit(decoding, state, data, EVEN, 1 if values[i] < 0 else 0)
-        else:
-            smaller = size > 0 and _bit(decoding, state, data, EVEN, 1 if rest < 0 else 0)
-            size = twin - size if smaller else twin + size
-            if size < 0:
-                return -1
-            other = values[twins[i]] < 0
-            differs = size > 0 and _learned(decoding, state, data, signs, group, 1 if (values[i] < 0) != other else 0)
-            sign = other != differs
-        values[i] = -size if sign else size
-    return 0 if decoding else finish(state, data)
 
 
 @njit(cache=True)
