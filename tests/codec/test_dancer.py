@@ -9,6 +9,8 @@ from bunraku.codec.dancer import LARGEST_DANCER, MOST_BITS, MOST_GRID, Dancer, o
 from bunraku.codec.errors import DamagedBlock
 from bunraku.motion.skeleton import INDEX, JOINT_COUNT, TIPS, Figure, standard_figure
 
+LARGEST_LIMB = (1 << 17) * unit(MOST_GRID)
+
 
 @given(
     st.integers(0, 999), st.floats(0, 1.0), st.integers(0, MOST_GRID), st.integers(0, MOST_BITS), st.integers(0, 30_000)
@@ -56,9 +58,6 @@ def test_any_bytes_are_a_dancer_or_refused(data: bytes) -> None:
         return
     assert abs(dancer.figure.offsets).max() < 2 * LARGEST_LIMB
     assert dancer.reference_bits <= MOST_BITS
-
-
-LARGEST_LIMB = (1 << 17) * unit(MOST_GRID)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,10 @@ INSTRUMENTED = [
     "bunraku.codec.coefficients",
     "bunraku.codec.dancer",
     "bunraku.codec.decode",
+    "bunraku.codec.numbers",
+    "bunraku.codec.timing",
     "bunraku.codec.track",
+    "bunraku.codec.weights",
     "bunraku.wire.messages",
     "tests.fuzz.targets",
 ]

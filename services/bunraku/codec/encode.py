@@ -95,7 +95,7 @@ def encode_motion(
 def encode_mean(
     motion: Motion, mean: float, block_seconds: float = 1.0, prior: Prior | None = None
 ) -> tuple[MotionTrack, Rate]:
-    """Encode `motion` at one step, or two neighbours, so that its mean error comes up to `mean` mm and not above."""
+    """Encode `motion` so that its mean error comes up to `mean` mm and not above, allotted among its blocks."""
     track = plan(motion, block_seconds, mean=mean)
     encoder = BlockEncoder(track, motion, prior or shipped())
     blocks = encoder.averaged(mean)

@@ -17,10 +17,10 @@ from bunraku.codec.prior import Integers, Prior
 from bunraku.codec.track import MotionTrack, step_size
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import PARENTS, Motion, points
+from bunraku.motion.skeleton import JOINT_COUNT, PARENTS, TIPS, Motion, points
 
 FINEST, COARSEST = 0, 255
-POINTS = 23
+POINTS = JOINT_COUNT + len(TIPS)
 """Joints and tips that an error is told of."""
 _SWEEPS_OF_MEAN = 5
 _SWEEPS_OF_MOST = 8
@@ -87,7 +87,8 @@ class BlockEncoder:
         bound: float = 0.0,
         price: float = _PRICE_OF_MEAN,
     ) -> Coded:
-        """Block `index` at one step: by the first pass alone, or refined for its mean or its largest error."""
+        """Block `index` at one step: by the first pass alone, or refined for its mean error, a bit at `price` squared
+        steps, or until no point is more than `bound` mm off."""
         bodies, _, feedback, refine = _compiled()
         track = self._track
         start, frames = track.first_frame(index), track.frames_in(index)

@@ -8,7 +8,7 @@ import { BlockStore } from "../playout/blocks";
 import { ReferenceClock } from "../playout/clock";
 import { Overlays } from "../playout/overlay";
 import { positionAt, Timelines } from "../playout/timeline";
-import type { Data, Description, Edit, Message, Overlay, Pong, Presence, TimelineState } from "../wire/messages";
+import type { Data, Description, Edit, Message, Overlay, Presence, TimelineState } from "../wire/messages";
 import { Connection } from "./connection";
 import { fetchMarionette } from "./marionette";
 import { Meter } from "./meter";
@@ -307,7 +307,7 @@ export class Viewer extends EventTarget {
         this.tell("presence");
         break;
       case "Pong":
-        this.pong(message, now);
+        this.clock.pong(message.sent, message.received, message.answered, now * 1000);
         break;
       default:
         break;
@@ -389,10 +389,6 @@ export class Viewer extends EventTarget {
     this.overlays.put(message);
     const late = (this.clock.at(now * 1000) - message.due) / 1000;
     this.latency = this.latency === null ? late : this.latency + NEWEST * (late - this.latency);
-  }
-
-  private pong(message: Pong, now: number): void {
-    this.clock.pong(message.sent, message.received, message.answered, now * 1000);
   }
 
   private tell(event: string): void {
