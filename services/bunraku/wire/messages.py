@@ -81,12 +81,14 @@ class TimelineState(_Packed):
 
 @dataclass(frozen=True, slots=True)
 class Presence(_Packed):
-    """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS`."""
+    """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS`, `asks` the ids of those
+    who ask for it, first come first."""
 
     TYPE = 6
     viewers: Count
     puppeteers: list[dict[str, Any]]
     limbs: list[str | None]
+    asks: list[list[str]] = field(default_factory=lambda: [[] for _ in LIMBS])
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +127,17 @@ class Refusal(_Packed):
     limb: Limb
     reason: str
     holder: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Notice(_Packed):
+    """An input was not taken as it came: brought within `reach`, refused for want of an `owner`'s right, or dropped for
+    its `rate`; `reason` is one of these three words, `detail` says it to a person."""
+
+    TYPE = 12
+    limb: Limb
+    reason: str
+    detail: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +184,15 @@ class Alive(_Packed):
 
     TYPE = 69
     limbs: Annotated[list[Limb], Field(max_length=len(LIMBS))] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Ask(_Packed):
+    """Asks the holder of a limb for it, or no longer."""
+
+    TYPE = 71
+    limb: Limb
+    wanted: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,15 +326,15 @@ class Input:
 
 Message = (
     ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-    | Ping | Edit | Report | Claim | Release | Alive | Input
+    | Notice | Ping | Edit | Report | Claim | Release | Alive | Ask | Input
 )  # fmt: skip
 
 _FIXED = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)}
 _MAPS: dict[int, TypeAdapter[Any]] = {
     kind.TYPE: TypeAdapter(kind)
     for kind in (
-        ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Edit, Report, Claim,
-        Release, Alive,
+        ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Edit, Report,
+        Claim, Release, Alive, Ask,
     )
 }  # fmt: skip
 
