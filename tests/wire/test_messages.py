@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from bunraku.wire import messages
 from bunraku.wire.messages import (
     Alive,
+    Ask,
     ChannelHeader,
     Claim,
     Data,
@@ -20,6 +21,7 @@ from bunraku.wire.messages import (
     Input,
     MalformedMessage,
     Message,
+    Notice,
     Overlay,
     Ping,
     Pong,
@@ -67,6 +69,7 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
         viewers=TIME,
         puppeteers=st.lists(st.dictionaries(TEXT, TEXT), max_size=3),
         limbs=st.lists(st.none() | TEXT, max_size=4),
+        asks=st.lists(st.lists(TEXT, max_size=3), min_size=4, max_size=4),
     ),
     st.builds(Ping, sequence=U32, sent=TIME),
     st.builds(Pong, sequence=U32, sent=TIME, received=TIME, answered=TIME),
@@ -79,6 +82,8 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
     st.builds(Claim, limb=LIMB),
     st.builds(Release, limb=LIMB, epoch=U32),
     st.builds(Alive, limbs=st.lists(LIMB, max_size=4)),
+    st.builds(Notice, limb=LIMB, reason=TEXT, detail=TEXT),
+    st.builds(Ask, limb=LIMB, wanted=st.booleans()),
     st.builds(
         Input,
         limb=LIMB,
@@ -150,5 +155,5 @@ def test_a_malformed_message_says_what_is_wrong(data: bytes, says: str) -> None:
 def test_types_are_unique_and_client_types_start_at_64() -> None:
     types = [kind.TYPE for kind in messages.Message.__args__]
     assert len(set(types)) == len(types)
-    client = {Ping, Edit, Report, Claim, Release, Alive, Input}
+    client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Input}
     assert {kind for kind in messages.Message.__args__ if kind.TYPE >= 64} == client

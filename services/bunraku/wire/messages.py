@@ -131,7 +131,8 @@ class Refusal(_Packed):
 
 @dataclass(frozen=True, slots=True)
 class Notice(_Packed):
-    """What became of inputs that were not taken as they came: `reason` is `reach`, `owner` or `rate`."""
+    """An input was not taken as it came: brought within `reach`, refused for want of an `owner`'s right, or dropped for
+    its `rate`; `reason` is one of these three words, `detail` says it to a person."""
 
     TYPE = 12
     limb: Limb

@@ -81,7 +81,7 @@ describe("the start", () => {
     pass(80);
     Line.last.accept();
     Line.last.say(header(), description(), timeline({ clock: UNIX + 80_000 }));
-    Line.last.say({ name: "Presence", viewers: 1, puppeteers: [], limbs: [null, null, null, null] });
+    Line.last.say({ name: "Presence", viewers: 1, puppeteers: [], limbs: [null, null, null, null], asks: [[], [], [], []] });
     expect(viewer.poseAt(now)).toBeNull();
     Line.last.say(data(0, 0, lowest));
     expect(told).toEqual(["open", "figure", "blocks", "timeline", "presence", "blocks"]);
