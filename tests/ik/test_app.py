@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from bunraku.ik.app import create_app
-from bunraku.marionette import arm, leg, table
+from bunraku.marionette import arms, leg, table
 from bunraku.marionette.proportions import Proportions
 
 IDENTITY = "396-352-252-560-320-120"
@@ -70,9 +70,11 @@ def test_a_batch_in_either_form(client: TestClient, said: str, heard: str) -> No
     assert answer.headers["content-type"] == heard
     got = answer.json() if heard == "application/json" else msgpack.unpackb(answer.content)
     proportions = Proportions.parse(IDENTITY)
-    wanted = arm.solve(proportions, table.build_table(proportions), np.array(asked["targets"], dtype=np.float64))
-    for name in ("azimuth", "t0", "t1", "t2", "elbow", "wrist", "tip"):
+    wanted = arms.solve(proportions, table.build_table(proportions), np.array(asked["targets"], dtype=np.float64))
+    for name in ("azimuth", "elbow", "wrist", "tip"):
         np.testing.assert_array_equal(got["arms"][name], getattr(wanted, name))
+    for name, angle in zip(("t0", "t1", "t2"), wanted.angles(), strict=True):
+        np.testing.assert_array_equal(got["arms"][name], angle)
     np.testing.assert_allclose(got["arms"]["tip"], asked["targets"], atol=1e-12)
     assert got["legs"] == {"hip": [0.7, -0.2, leg.THIGH_GREATEST], "knee": [0.7, 0.0, leg.THIGH_GREATEST]}
 
