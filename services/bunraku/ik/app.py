@@ -97,7 +97,7 @@ def create_app() -> FastAPI:
     ) -> Response:
         """The arm while its tip runs round a circle (`circle`) or along a line (`horizontal`): the paper's figures 8
         and 9, drawn for this arm as the paper solves it and as we do."""
-        arm, known = parse_proportions(proportions), {figure: figure for figure in figures.FIGURES}.get(name)
+        arm, known = parse_proportions(proportions), next((one for one in figures.FIGURES if one == name), None)
         if known is None:
             hint = " or ".join(figures.FIGURES)
             raise ProblemError(404, "No such figure", f"there is no figure {name[:60]!r}", field="name", hint=hint)

@@ -26,8 +26,8 @@ BODIES = (
     Body(
         "de Leva",
         Proportions.of((0.2817, 0.2689, 0.1879), (0.0271, 0.0162, 0.0061)),
-        "P. de Leva, Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters, J. Biomechanics 29 (1996), table 4, "
-        "men: shoulder, elbow and wrist centres in metres, the hand to the tip of the third finger",
+        "P. de Leva, Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters, J. Biomechanics 29 (1996), "
+        "table 4, men: shoulder, elbow and wrist centres in metres, the hand to the tip of the third finger",
     ),
     Body(
         "H-Anim",
