@@ -107,9 +107,16 @@ class Arm:
         """The nearest distance that is solved for."""
         return min(max(r, self.inner), OUTER_RADIUS)
 
-    def angles(self, r: float, beta: float) -> tuple[float, float, float]:
-        """Link angles t0, t1, t2 for a tip at distance `r` (already clamped) and elevation `beta`, -pi/2..pi/2."""
+    def limits(self, r: float) -> tuple[float, float]:
+        """Least and greatest wrist bend, radians, that reach `r` (clamped) with elbow and wrist within their limits."""
         upper, fore, hand = self.proportions.lengths
+        straight, folded = upper + fore, self._folded
+        high = min(WRIST_LIMIT, _acos1((r * r - straight * straight - hand * hand) / (2.0 * straight * hand)))
+        low = self._lean - ELBOW_LIMIT + _acos1((r * r - folded * folded - hand * hand) / (2.0 * folded * hand))
+        return min(max(low, 0.0), high), high
+
+    def bend(self, r: float, beta: float) -> float:
+        """The wrist bend, radians, at which gravity leaves an arm with its tip at (`r`, `beta`), from the table."""
         u = (1.0 - sqrt((1.0 - r) / (1.0 - self.inner))) * (SIDE - 1)
         v = (beta / pi + 0.5) * (SIDE - 1)
         i, j = min(max(int(u), 0), SIDE - 2), min(max(int(v), 0), SIDE - 2)
@@ -117,16 +124,24 @@ class Arm:
         row, after = self._node[i], self._node[i + 1]
         share = (row[j] * (1.0 - q) + row[j + 1] * q) * (1.0 - p)
         share += (after[j] * (1.0 - q) + after[j + 1] * q) * p
-        straight, folded = upper + fore, self._folded
-        high = min(WRIST_LIMIT, _acos1((r * r - straight * straight - hand * hand) / (2.0 * straight * hand)))
-        low = self._lean - ELBOW_LIMIT + _acos1((r * r - folded * folded - hand * hand) / (2.0 * folded * hand))
-        low = min(max(low, 0.0), high)
-        bend = low + share * (high - low)
+        low, high = self.limits(r)
+        return low + share * (high - low)
+
+    def close(self, r: float, beta: float, bend: float) -> tuple[float, float, float]:
+        """Link angles t0, t1, t2 that bring the tip to (`r`, `beta`) with the wrist bent by `bend`, elbow below.
+
+        Exact for any `bend` within `limits(r)`; beyond them the arm does not reach, or a joint breaks its limit.
+        """
+        upper, fore, hand = self.proportions.lengths
         x, y = fore + hand * cos(bend), hand * sin(bend)
         lower = hypot(x, y)
         t0 = beta - _acos1((upper * upper + r * r - lower * lower) / (2.0 * upper * r))
         t1 = t0 + _acos1((r * r - upper * upper - lower * lower) / (2.0 * upper * lower)) - atan2(y, x)
         return t0, t1, t1 + bend
+
+    def angles(self, r: float, beta: float) -> tuple[float, float, float]:
+        """Link angles t0, t1, t2 for a tip at distance `r` (already clamped) and elevation `beta`, -pi/2..pi/2."""
+        return self.close(r, beta, self.bend(r, beta))
 
 
 def _acos(x: Array) -> Array:

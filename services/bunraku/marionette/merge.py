@@ -13,10 +13,18 @@ import numpy as np
 
 from bunraku.marionette import handover, vector
 from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.handover import HandMix, Handover
+from bunraku.marionette.elbow import Elbow, lift_between
+from bunraku.marionette.follow import STILL, Follower
+from bunraku.marionette.handover import (
+    HAND_ACCELERATION,
+    THIGH_ACCELERATION,
+    Handover,
+    Turn,
+    acceleration_home,
+)
 from bunraku.marionette.limbs import ArmRig, Joints, LegRig, Limb, Pose
-from bunraku.marionette.ownership import Grant, Input, Ownership, Refusal
-from bunraku.marionette.plane import Plane
+from bunraku.marionette.ownership import Grant, Input, Outcome, Ownership, Refusal
+from bunraku.marionette.proportions import OUTER_RADIUS
 from bunraku.marionette.steering import Steering
 from bunraku.marionette.vector import Vector
 from bunraku.motion.rotation import Array
@@ -24,6 +32,16 @@ from bunraku.motion.skeleton import Figure
 
 LONGEST_STEP = 0.1
 """Seconds: after a longer pause between two poses the limbs move as if only this had passed."""
+MOST_REACH = 0.9995
+"""Arm lengths: a pulled arm is never quite locked, so that its elbow leaves the line at a bounded speed."""
+LEAST_REACH = 0.15
+"""Arm lengths from the shoulder that a hand is pulled to at least: nearer in, the elbow would have to whirl."""
+HAND_HOME = 60.0
+"""Arm lengths per second squared, against the dance, that a hand let go comes back with at most."""
+ARRIVED = 1e-6
+"""Arm lengths, or radians, within which a limb is the dance's again."""
+LEAST_WEIGHT = 1e-9
+"""A limb on its last way home is still solved for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,57 +69,111 @@ def apply(rotations: Array, overlay: Overlay | None) -> Array:
 class _PulledHand:
     def __init__(self, figure: Figure, limb: Limb) -> None:
         self.rig = ArmRig(figure, limb)
-        self._hand: Vector | None = None
-        self._plane: Plane | None = None
-        self._mix = HandMix()
-        self._blend = ArmBlend(self.rig)
+        self._own: Vector | None = None
+        self._velocity = STILL
+        self.rest()
 
     def rest(self) -> None:
-        self._hand = self._plane = None
-        self._mix = HandMix()
+        self._follower: Follower | None = None
+        self._home: float | None = None
+        self._elbow = Elbow(self.rig.arm, self.rig.shoulder)
+        self._turn = Turn()
         self._blend = ArmBlend(self.rig)
 
-    def pose(self, pose: Pose, steering: Steering, weight: float, now: int, seconds: float) -> Joints:
+    def see(self, pose: Pose, seconds: float) -> Vector:
+        """The dance's own hand; where it was before and how fast it goes are kept."""
+        own = self.rig.target(self.rig.dance(pose))
+        moved = vector.subtract(own, self._own or own)
+        self._velocity = vector.scale(moved, 1.0 / seconds) if seconds > 0.0 else STILL
+        self._own = own
+        return own
+
+    def pose(
+        self, pose: Pose, steering: Steering, held: bool, weight: float, now: int, seconds: float
+    ) -> Joints | None:
         rig = self.rig
         dance = rig.dance(pose)
-        own = rig.target(dance)
-        steering.begin(own, now)
-        steering.advance(now)
-        wanted = steering.value or own
-        self._hand = handover.follow_hand(self._hand or own, wanted, rig.arm, seconds)
-        target, turn = self._mix.mix(own, self._hand, weight)
-        direction, up = rig.direction(target), rig.up(pose)
-        if self._plane is None:
-            self._plane = Plane(rig.bend_axis(dance), direction)
-        normal = self._plane.follow(direction, vector.length(target), up, seconds)
-        return self._blend.joints(dance, rig.bend(target, up), target, turn, normal, weight)
+        before, had = self._own, self._velocity
+        own = self.see(pose, seconds)
+        before, velocity = before or own, self._velocity
+        if self._follower is None:
+            self._follower = Follower(before, had)
+            steering.begin(own)
+        follower = self._follower
+        if held:
+            self._home = None
+            wanted = steering.value(now) or own
+            size = vector.length(wanted)
+            wanted = vector.scale(rig.direction(wanted), min(max(size, LEAST_REACH), MOST_REACH))
+            hand = follower.step(wanted, seconds, HAND_ACCELERATION, rig.arm.inner, OUTER_RADIUS)
+        else:
+            if self._home is None:
+                away = vector.length(vector.subtract(follower.place, before))
+                speed = vector.length(vector.subtract(follower.velocity, velocity))
+                self._home = acceleration_home(away, speed, HAND_HOME)
+            hand = follower.step(own, seconds, self._home, rig.arm.inner, OUTER_RADIUS, velocity)
+            if weight <= 0.0 and vector.length(vector.subtract(hand, own)) < ARRIVED:
+                return None
+        direction, up = rig.direction(hand), rig.up(pose)
+        if not self._elbow.known:
+            elbow, chord = rig.places(dance)[0], rig.direction(own)
+            self._elbow.begin(chord, rig.bend_axis(dance), lift_between(elbow, chord))
+        tip, normal, bend = self._elbow.follow(direction, vector.length(hand), up, seconds)
+        bent = rig.bend(vector.length(tip), bend)
+        # the dance may hold its arms where the marionette's shoulders do not go: what they allow comes in with the weight
+        target = vector.add(hand, vector.scale(vector.subtract(tip, hand), weight))
+        turn = self._turn.follow(own, target, weight)
+        return self._blend.joints(dance, bent, target, turn, normal, max(weight, LEAST_WEIGHT))
 
 
 class _PulledLeg:
     def __init__(self, figure: Figure, limb: Limb) -> None:
         self.rig = LegRig(figure, limb)
-        self._theta: float | None = None
+        self._own: float | None = None
+        self._velocity = STILL
+        self.rest()
 
     def rest(self) -> None:
-        self._theta = None
+        self._follower: Follower | None = None
+        self._home: float | None = None
 
-    def pose(self, pose: Pose, steering: Steering, weight: float, now: int, seconds: float) -> Joints:
+    def see(self, pose: Pose, seconds: float) -> float:
+        """The dance's own thigh; where it was before and how fast it goes are kept."""
         own = self.rig.angle(pose)
-        steering.begin((own, 0.0, 0.0), now)
-        steering.advance(now)
-        wanted = steering.value[0] if steering.value else own
-        start = own if self._theta is None else self._theta
-        self._theta = handover.follow_thigh(start, wanted, seconds)
-        theta = own + weight * (self._theta - own)
-        return handover.mix_joints(self.rig.dance(pose), self.rig.hang(theta, pose), weight)
+        moved = own - (own if self._own is None else self._own)
+        self._velocity = (moved / seconds, 0.0, 0.0) if seconds > 0.0 else STILL
+        self._own = own
+        return own
+
+    def pose(
+        self, pose: Pose, steering: Steering, held: bool, weight: float, now: int, seconds: float
+    ) -> Joints | None:
+        known, had = self._own, self._velocity
+        own = self.see(pose, seconds)
+        before, velocity = own if known is None else known, self._velocity
+        if self._follower is None:
+            self._follower = Follower((before, 0.0, 0.0), had)
+            steering.begin((own, 0.0, 0.0))
+        if held:
+            self._home = None
+            wanted = steering.value(now) or (own, 0.0, 0.0)
+            theta = self._follower.step(wanted, seconds, THIGH_ACCELERATION)[0]
+        else:
+            if self._home is None:
+                away, speed = self._follower.place[0] - before, self._follower.velocity[0] - velocity[0]
+                self._home = acceleration_home(abs(away), abs(speed), THIGH_ACCELERATION)
+            theta = self._follower.step((own, 0.0, 0.0), seconds, self._home, carried=velocity)[0]
+            if weight <= 0.0 and abs(theta - own) < ARRIVED:
+                return None
+        return handover.mix_joints(self.rig.dance(pose), self.rig.hang(theta, pose), max(weight, LEAST_WEIGHT))
 
 
 class Marionette:
     """One puppet: who holds its limbs, and the overlay that follows from it."""
 
-    def __init__(self, figure: Figure) -> None:
-        """As `set_figure`."""
-        self._ownership = Ownership()
+    def __init__(self, figure: Figure, epochs: tuple[int, ...] = (0, 0, 0, 0)) -> None:
+        """As `set_figure`; `epochs` are those that a puppet at rest had, to go on from."""
+        self._ownership = Ownership(epochs)
         self._handovers = {limb: Handover() for limb in Limb}
         self._last: int | None = None
         self.set_figure(figure)
@@ -137,8 +209,20 @@ class Marionette:
         """The puppeteer still holds `limbs`, without a new input."""
         self._ownership.alive(puppeteer, list(limbs), now)
 
-    def input(self, puppeteer: str, given: Input, now: int) -> bool:
-        """Takes an input; False if it moves nothing (another's limb, another epoch, not a new sequence).
+    def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
+        """Asks for a limb that another holds, or no longer; whether the asks have changed."""
+        return self._ownership.ask(limb, puppeteer, wanted, now)
+
+    def asks(self) -> tuple[tuple[str, ...], ...]:
+        """Of each limb the ids of those who ask for it, first come first."""
+        return self._ownership.asks()
+
+    def settle(self, now: int) -> tuple[list[tuple[str, Grant]], bool]:
+        """Grants free limbs to those who asked first: whose and what, and whether any asks have changed."""
+        return self._ownership.settle(now)
+
+    def input(self, puppeteer: str, given: Input, now: int) -> Outcome:
+        """Takes an input, or says why it moves nothing.
 
         Raises `ValueError` for an input no controller gives: numbers that are not finite, an unknown kind.
         """
@@ -148,26 +232,51 @@ class Marionette:
         """Lets go the limbs whose holders have fallen silent; says which, and whose they were."""
         return self._ownership.expire(now)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the dance is alone: nobody holds a limb, and all are back."""
+        return all(steering is None for steering in map(self._ownership.steering, Limb))
+
+    @property
+    def epochs(self) -> tuple[int, ...]:
+        """Of each limb the epoch of its last grant."""
+        return tuple(map(self._ownership.epoch, Limb))
+
+    def see(self, rotations: Array, now: int) -> None:
+        """The dance's pose before the first that `overlay` is asked for after a rest. Two of them, a frame apart, let a
+        limb that is taken in motion go on from there at the speed it has."""
+        seconds = self._step(now)
+        pose: Pose = rotations.tolist()
+        for limb in self._limbs.values():
+            limb.see(pose, seconds)
+
+    def _step(self, now: int) -> float:
+        seconds = 0.0 if self._last is None else min(max(now - self._last, 0) * 1e-6, LONGEST_STEP)
+        self._last = now
+        return seconds
+
     def overlay(self, rotations: Array, now: int) -> Overlay | None:
         """What lies over the dance's pose (18, 4), local quaternions, at clock time `now`; None if no limb is pulled.
 
-        Call it once for each pose that is shown, in order: blends and planes move on by the time between calls.
+        Call it once for each pose that is shown, in order: limbs move on by the time between calls.
         """
-        seconds = 0.0 if self._last is None else min(max(now - self._last, 0) * 1e-6, LONGEST_STEP)
-        self._last = now
+        seconds = self._step(now)
         pulled: list[Limb] = []
         turned: list[Joints] = []
-        pose: Pose | None = None
+        pose: Pose = rotations.tolist()
         for limb, holder in zip(Limb, self._ownership.holders(), strict=True):
-            hand = self._handovers[limb]
+            hand, puppet = self._handovers[limb], self._limbs[limb]
             hand.advance(holder is not None, seconds)
             steering = self._ownership.steering(limb)
-            if steering is None or (holder is None and hand.progress == 0.0):
+            held = holder is not None
+            joints = puppet.pose(pose, steering, held, hand.weight, now, seconds) if steering is not None else None
+            if joints is None:
                 self._ownership.forget(limb)
-                self._limbs[limb].rest()
+                if steering is not None:
+                    puppet.rest()
+                else:
+                    puppet.see(pose, seconds)
                 continue
-            if pose is None:
-                pose = rotations.tolist()
             pulled.append(limb)
-            turned.append(self._limbs[limb].pose(pose, steering, hand.weight, now, seconds))
+            turned.append(joints)
         return Overlay(tuple(pulled), np.array(turned)) if pulled else None

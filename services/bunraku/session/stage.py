@@ -234,7 +234,7 @@ class Stage:
 
     async def _prepare(self, due: int) -> None:
         """Decode what `_pose` will need about `due`, in a thread: it takes milliseconds, the first time seconds."""
-        track, packets = self._motion.track, self._motion.packets[-1]
+        track, packets = self._motion.track, self._motion.dance[-1]
         first = track.block_at(timeline.position_at(self.timeline, due))
         for index in (first, (first + 1) % track.blocks):
             if self._dance.rate(index) < 0:

@@ -148,6 +148,7 @@ function wasInvited(): boolean {
 /** Watches a session, leaving the one before. */
 function enter(id: string): Room {
   room?.close();
+  stage?.trail.clear();
   room = new Room(id, ownName(query, Math.random()), (error) => {
     page.toast(error instanceof ProblemError ? `${error.title}: ${error.detail}` : String(error));
   });
@@ -261,7 +262,7 @@ function frame(): void {
     lit: pointer?.near === limb || focused === limb || selected,
     pull: hands?.pull(limb) ?? null,
   }));
-  stage.draw(pose, states, seconds);
+  stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.clockTime(now));
   page.tags.render(limbs, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
   if (pose) invite(now);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);

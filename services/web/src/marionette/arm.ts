@@ -45,6 +45,7 @@ export class Arm {
   private readonly folded: number;
   private readonly lean: number;
   private readonly angle = new Float64Array(3);
+  private readonly limit = new Float64Array(2);
 
   constructor(readonly proportions: Proportions, private readonly table: Float64Array) {
     this.inner = innerRadius(proportions);
@@ -59,20 +60,34 @@ export class Arm {
     return Math.min(Math.max(r, this.inner), OUTER_RADIUS);
   }
 
-  /** t0, t1, t2 for a tip at distance `r` (already clamped) and elevation `beta`, -pi/2..pi/2. */
-  angles(out: Numbers, outAt: number, r: number, beta: number): void {
+  /** Least and greatest wrist bend (2), radians, that reach `r` (clamped) with elbow and wrist within their limits. */
+  limits(out: Numbers, outAt: number, r: number): void {
     const { upper, fore, hand } = this.proportions;
+    const straight = upper + fore, folded = this.folded;
+    const high = Math.min(WRIST_LIMIT, acos((r * r - straight * straight - hand * hand) / (2 * straight * hand)));
+    const low = this.lean - ELBOW_LIMIT + acos((r * r - folded * folded - hand * hand) / (2 * folded * hand));
+    out[outAt] = Math.min(Math.max(low, 0), high);
+    out[outAt + 1] = high;
+  }
+
+  /** The wrist bend, radians, at which gravity leaves an arm with its tip at (`r`, `beta`), from the table. */
+  bend(r: number, beta: number): number {
     const u = (1 - Math.sqrt((1 - r) / (1 - this.inner))) * (SIDE - 1);
     const v = (beta / Math.PI + 0.5) * (SIDE - 1);
     const i = Math.min(Math.max(Math.trunc(u), 0), SIDE - 2), j = Math.min(Math.max(Math.trunc(v), 0), SIDE - 2);
-    const p = u - i, q = v - j, at = i * SIDE + j, node = this.table;
+    const p = u - i, q = v - j, at = i * SIDE + j, node = this.table, limit = this.limit;
     const share =
       (node[at] * (1 - q) + node[at + 1] * q) * (1 - p) + (node[at + SIDE] * (1 - q) + node[at + SIDE + 1] * q) * p;
-    const straight = upper + fore, folded = this.folded;
-    const high = Math.min(WRIST_LIMIT, acos((r * r - straight * straight - hand * hand) / (2 * straight * hand)));
-    const least = this.lean - ELBOW_LIMIT + acos((r * r - folded * folded - hand * hand) / (2 * folded * hand));
-    const low = Math.min(Math.max(least, 0), high);
-    const bend = low + share * (high - low);
+    this.limits(limit, 0, r);
+    return limit[0] + share * (limit[1] - limit[0]);
+  }
+
+  /**
+   * t0, t1, t2 that bring the tip to (`r`, `beta`) with the wrist bent by `bend`, elbow below. Exact for any `bend` within
+   * `limits`; beyond them the arm does not reach, or a joint breaks its limit.
+   */
+  close(out: Numbers, outAt: number, r: number, beta: number, bend: number): void {
+    const { upper, fore, hand } = this.proportions;
     const x = fore + hand * Math.cos(bend), y = hand * Math.sin(bend);
     const lower = Math.sqrt(x * x + y * y);
     const t0 = beta - acos((upper * upper + r * r - lower * lower) / (2 * upper * r));
@@ -80,6 +95,11 @@ export class Arm {
     out[outAt] = t0;
     out[outAt + 1] = t1;
     out[outAt + 2] = t1 + bend;
+  }
+
+  /** t0, t1, t2 for a tip at distance `r` (already clamped) and elevation `beta`, -pi/2..pi/2. */
+  angles(out: Numbers, outAt: number, r: number, beta: number): void {
+    this.close(out, outAt, r, beta, this.bend(r, beta));
   }
 
   /**

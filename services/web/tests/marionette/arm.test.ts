@@ -1,3 +1,4 @@
+import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import { Arm, SOLVED, TABLE_BYTES, readTable } from "../../src/marionette/arm";
 import { ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, parseProportions } from "../../src/marionette/proportions";
@@ -43,6 +44,32 @@ describe.each(golden.arms)("the arm $proportions", ({ proportions, table, sha256
       expect(wrist).toBeLessThan(WRIST_LIMIT + 1e-9);
     }
   });
+});
+
+test("every bend within the limits closes on the tip", () => {
+  const { proportions, table } = golden.arms[0];
+  const shape = parseProportions(proportions), arm = new Arm(shape, readTable(bytes(table)));
+  const unit = fc.double({ min: 0, max: 1, noNaN: true });
+  fc.assert(
+    fc.property(unit, unit, unit, (far, up, share) => {
+      const r = arm.inner + far * (OUTER_RADIUS - arm.inner), beta = (up - 0.5) * Math.PI;
+      const out = new Float64Array(3);
+      arm.limits(out, 0, r);
+      const [low, high] = out;
+      const hung = arm.bend(r, beta);
+      expect(hung).toBeGreaterThan(low - 1e-12);
+      expect(hung).toBeLessThan(high + 1e-12);
+      arm.close(out, 0, r, beta, low + share * (high - low));
+      const [t0, t1, t2] = out;
+      const x = shape.upper * Math.cos(t0) + shape.fore * Math.cos(t1) + shape.hand * Math.cos(t2);
+      const y = shape.upper * Math.sin(t0) + shape.fore * Math.sin(t1) + shape.hand * Math.sin(t2);
+      expect(Math.hypot(x - r * Math.cos(beta), y - r * Math.sin(beta))).toBeLessThan(1e-11);
+      expect(t1 - t0).toBeGreaterThan(-1e-9);
+      expect(t1 - t0).toBeLessThan(ELBOW_LIMIT + 1e-9);
+      expect(t2 - t1).toBeGreaterThan(-1e-12);
+      expect(t2 - t1).toBeLessThan(WRIST_LIMIT + 1e-12);
+    }),
+  );
 });
 
 test("bytes that are no table are refused", () => {
