@@ -42,8 +42,8 @@ export class Holding {
     on<{ limb: number; asked: boolean }>("grant", ({ limb, asked }) => {
       if (asked) this.#given(limb);
     });
-    on<{ limb: number }>("lapsed", ({ limb }) => {
-      this.page.toast(`The ${limbName(limb)} was not given`);
+    on<{ limb: number; free: boolean }>("lapsed", ({ limb, free }) => {
+      this.page.toast(free ? `The ${limbName(limb)} is free now` : `The ${limbName(limb)} was not given`);
       this.render();
     });
     on<{ detail: string }>("notice", ({ detail }) => this.page.strings.notice(detail));

@@ -1,7 +1,7 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
-import { createSession, ProblemError, type Motion } from "./client/library";
+import { createSession, keep, ProblemError, type Motion } from "./client/library";
 import { Holding } from "./holding";
 import type { Commands } from "./input/commands";
 import type { GamepadInput } from "./input/gamepad";
@@ -9,6 +9,7 @@ import type { Hands } from "./input/hands";
 import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { PointerInput } from "./input/pointer";
 import type { VelocityInputs } from "./input/velocity";
+import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
 import { createPage } from "./page/page";
 import { PHONE } from "./page/panels";
@@ -27,6 +28,7 @@ const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvas
 const query = new URLSearchParams(location.search);
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const pieces = new Pieces();
+const name = ownName(query, Math.random());
 
 let stage: Stage | null = null;
 let hands: Hands | null = null;
@@ -46,6 +48,17 @@ const page = createPage(document.body, {
   play,
   loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
   seek: (seconds) => room?.seek(seconds, performance.now()),
+  keep: keepThis({
+    keep: (session, called) => keep(session, { name: called, camera: stage?.trail.keyframes() ?? [] }),
+    toast: (message, action) => page.toast(message, action),
+    session: () => room && { id: room.id, piece: pieces.find(room.viewer.motion)?.name ?? "" },
+    puppeteer: name,
+    kept: async () => {
+      await pieces.refresh();
+      renderPieces();
+    },
+    choose: (motion) => void choose(motion),
+  }),
   files: (files) => {
     page.panels.open("library");
     void uploadAll(files, page.library, uploaded);
@@ -149,7 +162,7 @@ function wasInvited(): boolean {
 function enter(id: string): Room {
   room?.close();
   stage?.trail.clear();
-  room = new Room(id, ownName(query, Math.random()), (error) => {
+  room = new Room(id, name, (error) => {
     page.toast(error instanceof ProblemError ? `${error.title}: ${error.detail}` : String(error));
   });
   const { viewer, puppeteer } = room;

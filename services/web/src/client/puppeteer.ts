@@ -46,8 +46,8 @@ export interface PuppeteerOptions {
 }
 
 /**
- * Events: "welcome"; "grant" (detail: `{limb, asked}`, asked where it came by asking), "refusal" (detail: `{limb, reason, holder}`), "lapsed" (detail: `{limb}`: it was
- * asked for in vain), "notice" (detail: `{limb, reason, detail}`), "presence", "closed" (detail: the reason).
+ * Events: "welcome"; "grant" (detail: `{limb, asked}`, asked where it came by asking), "refusal" (detail: `{limb, reason, holder}`), "lapsed" (detail: `{limb, free}`: it
+ * was asked for in vain; `free` where nobody holds it), "notice" (detail: `{limb, reason, detail}`), "presence", "closed" (detail: the reason).
  */
 export class Puppeteer extends EventTarget {
   id: string | null = null;
@@ -218,13 +218,15 @@ export class Puppeteer extends EventTarget {
     this.holdings.forEach((hold, limb) => {
       if (hold.ask === "none") return;
       if (asks[limb].includes(this.id ?? "")) hold.ask = "listed";
+      // told that it is free, the session did not take the ask: its holder had let go before
+      else if (limbs[limb] === null) this.lapse(hold, true);
       else if (hold.ask === "listed" && limbs[limb] !== this.id) this.lapse(hold);
     });
   }
 
-  private lapse(hold: Hold): void {
+  private lapse(hold: Hold, free = false): void {
     hold.ask = "none";
-    this.dispatchEvent(new CustomEvent("lapsed", { detail: { limb: hold.pull.limb } }));
+    this.dispatchEvent(new CustomEvent("lapsed", { detail: { limb: hold.pull.limb, free } }));
   }
 
   private noticed({ limb, reason, detail }: Notice): void {

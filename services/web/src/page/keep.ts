@@ -2,8 +2,8 @@
 import { ProblemError, type Motion } from "../client/library";
 import type { Toast } from "./toast";
 
-/** Keeps a session's performance as a new motion, with the camera's moves if wished. Rejects with ProblemError. */
-export type Keep = (session: string, as: { name: string; camera: boolean }) => Promise<Motion>;
+/** Keeps a session's performance as a new motion of a name. Rejects with ProblemError. */
+export type Keep = (session: string, name: string) => Promise<Motion>;
 
 export interface KeepOptions {
   keep: Keep;
@@ -23,7 +23,7 @@ export function keepThis({ keep, toast, session, puppeteer, kept, choose }: Keep
     const now = session();
     if (!now) return;
     try {
-      const motion = await keep(now.id, { name: keptName(now.piece, puppeteer), camera: true });
+      const motion = await keep(now.id, keptName(now.piece, puppeteer));
       await kept(motion);
       toast(`Kept: ${motion.name}`, { label: "Dance it", act: () => choose(motion.id) });
     } catch (error) {

@@ -31,8 +31,8 @@ export function createKeysModal(root: HTMLElement, change: (mapping: Mapping) =>
   const editor = createMappingEditor(change);
   const state = element("p", { class: "pad-state" });
   const sliders = SLIDERS.map(({ name, label, most }) => {
-    const value = element("output");
-    const input = element("input", { type: "range", min: 0, max: most, step: 0.01, onInput: () => change({ ...mapping, [name]: Number(input.value) }) });
+    const value = element("span", { class: "value", "aria-hidden": "true" });
+    const input = element("input", { type: "range", "aria-label": label, min: 0, max: most, step: 0.01, onInput: () => change({ ...mapping, [name]: Number(input.value) }) });
     return { name, value, input, row: element("label", { class: "slider" }, element("span", {}, label), value, input) };
   });
   const reset = element("button", { class: "text-button", type: "button", onClick: () => change(DEFAULT_MAPPING) }, "Back to the default");
@@ -69,7 +69,9 @@ export function createKeysModal(root: HTMLElement, change: (mapping: Mapping) =>
       drawing.label(now);
       for (const { name, value, input } of sliders) {
         input.value = String(now[name]);
-        setText(value, now[name] > 0 ? `${Math.round(now[name] * 100)} %` : "off");
+        const told = now[name] > 0 ? `${Math.round(now[name] * 100)} %` : "off";
+        setText(value, told);
+        input.setAttribute("aria-valuetext", told);
       }
       reset.disabled = now === DEFAULT_MAPPING;
     },

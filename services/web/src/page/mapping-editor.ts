@@ -68,7 +68,7 @@ export function createMappingEditor(change: (mapping: Mapping) => void): Mapping
     row.clash.hidden = clashes.length === 0;
     const waiting = awaited?.command === command;
     setAttribute(row.add, "aria-pressed", waiting);
-    row.add.replaceChildren(waiting ? "press it" : icon("add"));
+    row.add.replaceChildren(waiting ? "press a key" : icon("add"));
   };
   const remove = (control: Control, command: Command) => {
     change(unbind(mapping, control, command));

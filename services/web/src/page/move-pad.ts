@@ -5,6 +5,8 @@ import { element } from "./dom";
 import { icon } from "./icons";
 import { LIMB_NAMES } from "./model";
 
+/** As they stand, three in a row. */
+const WAYS = ["nearer", "up", "further", "left", "down", "right"];
 /** How long an activation that is no press lasts (a screen reader's, a voice's), milliseconds. */
 const NUDGE = 250;
 
@@ -22,8 +24,9 @@ export function createMovePad(limb: number, press: (input: DigitalInput, down: b
     else down.delete(input);
     press(input, to);
   };
-  const pad = element("div", { class: "move-pad", role: "group", "aria-label": `Move the ${LIMB_NAMES[limb].toLowerCase()}`, hidden: true });
-  for (const input of DIGITAL_INPUTS.filter((one) => effectOf(one).limb === limb)) pad.append(button(input, set));
+  const pad = element("div", { class: "move-pad", role: "group", "aria-label": `Move the ${LIMB_NAMES[limb].toLowerCase()}`, "data-leg": limb >= 2, hidden: true });
+  const inputs = DIGITAL_INPUTS.filter((one) => effectOf(one).limb === limb);
+  for (const way of WAYS) for (const input of inputs) if (wayName(input) === way) pad.append(button(input, set));
   return {
     element: pad,
     show(shown) {
@@ -35,7 +38,7 @@ export function createMovePad(limb: number, press: (input: DigitalInput, down: b
 
 function button(input: DigitalInput, set: (input: DigitalInput, down: boolean) => void): HTMLButtonElement {
   const way = wayName(input);
-  const made = element("button", { class: "move", type: "button", "data-way": way, "aria-label": way.charAt(0).toUpperCase() + way.slice(1) });
+  const made = element("button", { class: "move", type: "button", "aria-label": way.charAt(0).toUpperCase() + way.slice(1) });
   made.append(way === "nearer" ? "Near" : way === "further" ? "Far" : icon(way as "left"));
   let pressed = false;
   const change = (to: boolean) => {

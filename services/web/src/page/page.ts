@@ -52,7 +52,7 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   const messages = element("div", { class: "messages" });
   root.append(messages);
   const library = createLibrary(root, { files: on.files, choose: on.choose, remove: on.remove, close: () => panels.close("library") });
-  const strings = createStringsCard(root, { ...on, close: () => panels.close("strings") });
+  const strings = createStringsCard(root, { ...on, close: () => panels.close("strings"), keys: () => keys.show() });
   const line = createLineCard(root, () => panels.close("line"));
   const transport = createTransport(root, { ...on, panel: (name) => panels.toggle(name) });
   const elements = new Map<PanelName, HTMLElement>([

@@ -31,7 +31,7 @@ export interface StringsActions {
 
 type Doing = "toggle" | "ask" | "withdraw" | "give";
 
-export function createStringsCard(root: HTMLElement, on: StringsActions & { close(): void }): StringsCard {
+export function createStringsCard(root: HTMLElement, on: StringsActions & { close(): void; keys(): void }): StringsCard {
   const panel = createPanel(root, "strings", "Strings", on.close);
   const lights = (limb: number) => ({
     onFocus: () => on.focus(limb),
@@ -71,7 +71,9 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
   });
   const hint = element("p", { class: "strings-hint" }, "Drag a ring on the stage, or press ", element("kbd", {}, "1"), " to ", element("kbd", {}, "4"), ".");
   const notice = element("p", { class: "strings-notice", role: "status", "aria-live": "polite" });
-  panel.body.append(element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)), hint, notice);
+  // on a phone the header has no room for it
+  const keys = element("button", { class: "text-button", type: "button", onClick: on.keys }, "Touch, gamepad and keys");
+  panel.body.append(element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)), hint, notice, keys);
   const dock = element("nav", { class: "dock", "aria-label": "Take a string" }, ...discs.map(({ disc }) => disc));
   root.append(dock);
   let fading: ReturnType<typeof setTimeout> | undefined;

@@ -191,14 +191,19 @@ describe("asking for a limb that another holds", () => {
     expect(puppeteer.asks(0)).toBe(true);
     presence(held, [["a1"], [], [], []]);
     presence(held, [[], [], [], []]);
-    expect([puppeteer.asks(0), told]).toEqual([false, [["lapsed", { limb: 0 }]]]);
+    expect([puppeteer.asks(0), told]).toEqual([false, [["lapsed", { limb: 0, free: false }]]]);
+  });
+
+  test("lapses when its holder let go before the session heard of it", () => {
+    presence([null, null, null, null], [[], [], [], []]);
+    expect([puppeteer.asks(0), told]).toEqual([false, [["lapsed", { limb: 0, free: true }]]]);
   });
 
   test("lapses after 20 seconds in a session that knows of no asking, and with the line", () => {
     pass(19_000);
     expect(puppeteer.asks(0)).toBe(true);
     pass(1_100);
-    expect([puppeteer.asks(0), told]).toEqual([false, [["lapsed", { limb: 0 }]]]);
+    expect([puppeteer.asks(0), told]).toEqual([false, [["lapsed", { limb: 0, free: false }]]]);
     puppeteer.ask(0);
     line.end(1006);
     expect(puppeteer.asks(0)).toBe(false);

@@ -26,7 +26,7 @@ describe("keep this", () => {
     const asked: unknown[] = [];
     const { run, told, actions } = page(async (...of) => (asked.push(of), MOTION));
     await run();
-    expect(asked).toEqual([["s1", { name: "Sanbaso, as Aiko pulled it", camera: true }]]);
+    expect(asked).toEqual([["s1", "Sanbaso, as Aiko pulled it"]]);
     expect(told).toEqual(["kept m2", "Kept: Kept dance"]);
     actions[0]?.act();
     expect(told.at(-1)).toBe("choose m2");
