@@ -57,8 +57,8 @@ def accuracy(random: np.random.Generator) -> dict[str, float]:
             stored = table.table_of(proportions.identity)
             found = ik_accuracy.measure(proportions, stored, ACCURACY_TARGETS, random)
             print(
-                f"{body.name + after.replace('_', ' '):<22}{found.tip_error_max:10.1e}{found.angle_error_mean_deg:13.4f}"
-                f"{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}{100.0 * found.paper_tip_mean:18.4f}"
+                f"{body.name + after.replace('_', ' '):<22}{found.tip_error_max:10.1e}"
+                f"{found.angle_error_mean_deg:13.4f}{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}{100.0 * found.paper_tip_mean:18.4f}"
                 f"{100.0 * found.paper_tip_max:7.3f}",
                 flush=True,
             )
