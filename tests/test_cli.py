@@ -23,6 +23,7 @@ def test_upload_list_watch_and_version_speak_json(server: str, clip_file: Path) 
         figures = json.loads(watched.stdout)
         assert figures["frames"] > 0
         assert figures["first_pose_ms"] > 0
+        assert (figures["camera_blocks"], figures["camera"]) == (0, None)
     assert json.loads(RUN.invoke(app, ["version", "--json"]).stdout) == {"version": __version__}
 
 
@@ -40,6 +41,9 @@ def test_failures_are_said_in_words(server: str, tmp_path: Path) -> None:
         ["upload", str(bad), "--server", server],
         ["watch", "none", "--server", server],
         ["watch", f"{server}/v1/motions/none", "--seconds", "1"],
+        ["watch", f"{server}/v1/health"],
+        ["keep", "none", "--server", server],
+        ["keep", f"{server}/v1/motions/none"],
         ["list", "--server", "http://127.0.0.1:9"],
         ["upload", str(tmp_path / "missing.bvh"), "--server", server],
     ):

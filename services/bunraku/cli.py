@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import socket
 import sys
 import webbrowser
 from pathlib import Path
 from typing import Annotated, Any
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 import typer
 from rich.console import Console
@@ -156,6 +157,35 @@ def watch(
 
 
 @app.command()
+def keep(
+    session: Annotated[str, typer.Argument(help="A session: its id, its page, or its API address.")],
+    name: Annotated[
+        str | None, typer.Option(help="What the motion is called; default: as the dance, and kept.")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="How much of what was shown last; default: all that can be kept.", min=0.1)
+    ] = None,
+    server: Server = HERE,
+    as_json: Json = False,
+) -> None:
+    """Keep what a session has shown as a new motion, pulled limbs and all."""
+    from bunraku.client.api import Client
+
+    async def run() -> dict[str, Any]:
+        base, kind, identity = _address(session)
+        if kind == "motions":
+            raise typer.BadParameter("a motion is kept already: give a session", param_hint="SESSION")
+        async with Client(base or server) as client:
+            return await client.keep(identity, name, seconds)
+
+    motion = _ask(run, server)
+    if as_json:
+        out.print_json(data=motion)
+        return
+    out.print(f"Kept {motion['duration']:.1f} s as {motion['id']}: {motion['name']}", markup=False, highlight=False)
+
+
+@app.command()
 def version(as_json: Json = False) -> None:
     """Print the version."""
     out.print_json(data={"version": __version__}) if as_json else out.print(__version__)
@@ -171,22 +201,35 @@ async def _stream_url(client: Any, address: str) -> str:
     """The socket of a motion or session, given by its address, its page or its id."""
     from bunraku.client.api import Client, ServerProblem
 
-    parts = urlsplit(address)
-    if parts.scheme in ("ws", "wss"):
+    if urlsplit(address).scheme in ("ws", "wss"):
         return address
-    if parts.scheme in ("http", "https"):
-        base = Client(f"{parts.scheme}://{parts.netloc}")
-        query = dict(pair.partition("=")[::2] for pair in parts.query.split("&"))
-        path = f"/v1/sessions/{query['session']}" if "session" in query else parts.path.rstrip("/")
-        return base.socket_url(path if path.endswith("/stream") else f"{path}/stream")
+    base, kind, identity = _address(address)
+    if base is not None:
+        return Client(base).socket_url(f"/v1/{kind}/{identity}/stream")
     try:
-        await client.session(address)
+        await client.session(identity)
         kind = "sessions"
     except ServerProblem:
-        await client.motion(address)
+        await client.motion(identity)
         kind = "motions"
-    socket_url: str = client.socket_url(f"/v1/{kind}/{address}/stream")
+    socket_url: str = client.socket_url(f"/v1/{kind}/{identity}/stream")
     return socket_url
+
+
+def _address(address: str) -> tuple[str | None, str | None, str]:
+    """Server, kind (`motions` or `sessions`) and id of what is given by its page or its API address; of a mere id only
+    that. Raises `typer.BadParameter` for an address of something else."""
+    parts = urlsplit(address)
+    if parts.scheme not in ("http", "https", "ws", "wss"):
+        return None, None, address
+    base = f"{parts.scheme.replace('ws', 'http')}://{parts.netloc}"
+    query = dict(pair.partition("=")[::2] for pair in parts.query.split("&"))
+    if "session" in query:
+        return base, "sessions", unquote(query["session"])
+    found = re.fullmatch(r"(.*)/v1/(motions|sessions)/([^/]+)(?:/(?:stream)?)?", parts.path)
+    if found is None:
+        raise typer.BadParameter(f"no motion and no session is at {address}")
+    return base + found[1], found[2], unquote(found[3])
 
 
 def _ask(run: Any, server: str) -> Any:

@@ -9,7 +9,11 @@ from bunraku.backing import library
 from bunraku.backing.library import Library, pack
 from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import encode_motion
+from bunraku.codec.scene import SceneTrack
+from bunraku.codec.scene_decode import decode_scene
+from bunraku.codec.scene_encode import encode_scene
 from bunraku.wire.messages import Data, Description, unpack
+from tests.vectors import scene as scenes
 from tests.vectors.blocks import wandering_motion
 
 ENCODED = encode_motion(wandering_motion(2.5, 30.0, 8), ladder=(30.0, 5.0), grade="live")
@@ -23,12 +27,70 @@ async def test_a_motion_comes_back_ready_to_be_sent(tmp_path: Path) -> None:
     description = unpack(stored.description)
     assert isinstance(description, Description)
     assert description.tracks[0]["rates"][1]["mean"] == round(ENCODED.rates[1].mean, 3)
-    for rate, packets in enumerate(stored.packets):
+    for rate, packets in enumerate(stored.dance):
         for index, packet in enumerate(packets):
             data = unpack(packet)
             assert isinstance(data, Data)
             assert (data.rate, data.index) == (rate, index)
             assert decode_block(stored.track, data.block).frames == stored.track.frames_in(index)
+
+
+async def test_cameras_and_lights_are_tracks_of_their_own(tmp_path: Path) -> None:
+    shelf = Library.open(f"file://{tmp_path}")
+    beside = [encode_scene(scenes.camera(2.5, 30.0), ladder=(10.0,)), encode_scene(scenes.light(2.0, 24.0))]
+    await shelf.put("m1", pack("m1", ENCODED, beside))
+    stored = await shelf.get("m1")
+    assert stored is not None
+    assert [len(track) for track in stored.packets] == [2, 1, 5]
+    assert stored.track.figure.offsets.shape == (18, 3)
+    assert stored.front == round(ENCODED.front, 3)
+    assert stored.size > sum(len(packet) for rate in stored.dance for packet in rate) + len(stored.description)
+    for number, kind in ((1, "camera"), (2, "light")):
+        track = stored.tracks[number]
+        assert isinstance(track, SceneTrack)
+        assert track.kind == kind
+        for rate, packets in enumerate(stored.packets[number]):
+            for index, packet in enumerate(packets):
+                data = unpack(packet)
+                assert isinstance(data, Data)
+                assert (data.track, data.rate, data.index) == (number, rate, index)
+                assert decode_scene(track, data.block).frames == track.frames_in(index)
+
+
+def test_more_tracks_than_can_be_numbered_are_refused() -> None:
+    still = encode_scene(scenes.camera(0.1, 30.0), ladder=(10.0,))
+    assert len(library.unpack("m", pack("m", ENCODED, [still] * 15)).tracks) == 16
+    with pytest.raises(ValueError, match="at most 16 tracks, not 17"):
+        pack("m", ENCODED, [still] * 16)
+
+
+async def test_an_object_from_when_a_motion_was_one_track_still_opens(tmp_path: Path) -> None:
+    shelf = Library.open(f"file://{tmp_path}")
+    now = msgpack.unpackb(pack("m1", ENCODED))
+    await shelf.put("m1", msgpack.packb({"description": now["description"], "packets": now["tracks"][0]}))
+    stored = await shelf.get("m1")
+    assert stored is not None
+    assert stored.packets == now["tracks"]
+    assert len(stored.tracks) == 1
+
+
+async def test_a_log_is_kept_until_it_is_removed(tmp_path: Path) -> None:
+    shelf = Library.open(f"file://{tmp_path}")
+    await shelf.put_log("a-log_1", b"what was done")
+    assert await Library.open(f"file://{tmp_path}").get_log("a-log_1") == b"what was done"
+    assert (tmp_path / "logs" / "a-log_1").is_file()
+    await shelf.remove_log("a-log_1")
+    await shelf.remove_log("a-log_1")
+    assert await shelf.get_log("a-log_1") is None
+
+
+@pytest.mark.parametrize("name", ["", "../m1", "a/b", "a b", "é", "a" * 65])
+async def test_what_could_not_be_a_logs_name_is_never_a_path(tmp_path: Path, name: str) -> None:
+    shelf = Library.open(f"file://{tmp_path}")
+    with pytest.raises(ValueError, match="log's name"):
+        await shelf.put_log(name, b"")
+    assert await shelf.get_log(name) is None
+    await shelf.remove_log(name)
 
 
 async def test_what_was_removed_is_gone_and_removing_it_again_is_nothing(tmp_path: Path) -> None:
@@ -63,7 +125,7 @@ async def test_a_motion_of_another_codec_is_none_until_it_is_sent_again(tmp_path
 
 
 def test_an_object_is_one_map() -> None:
-    assert set(msgpack.unpackb(pack("m", ENCODED))) == {"description", "packets"}
+    assert set(msgpack.unpackb(pack("m", ENCODED))) == {"description", "tracks"}
 
 
 @pytest.mark.parametrize("motion", ["", "../m1", "a/b", "a//b", "m1\0", "é", ".", "motions/m1"])

@@ -6,10 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bunraku.backing.library import Library, pack
 from bunraku.client import Client, StreamEnded, Viewer
+from bunraku.codec.encode import encode_motion
+from bunraku.codec.scene_encode import encode_scene
 from bunraku.motion.skeleton import points
 from bunraku.playout.blocks import Pose
+from bunraku.wire.messages import Data, Description, TimelineState
+from tests.servers import running
 from tests.vectors.blocks import wandering_motion
+from tests.vectors.scene import camera, light
 
 
 async def test_it_shows_the_dance_that_was_uploaded(server: str, tmp_path: Path) -> None:
@@ -60,3 +66,64 @@ async def test_a_stream_that_is_refused_says_why(server: str) -> None:
     async with Client(server) as client:
         with pytest.raises(StreamEnded, match="No such motion"):
             await Viewer(client.socket_url("/v1/motions/none/stream")).watch(1)
+
+
+async def test_it_shows_camera_and_light_beside_the_dance(tmp_path: Path) -> None:
+    encoded = encode_motion(wandering_motion(2.0, 30.0, 5), ladder=(30.0, 5.0), grade="live")
+    filmed, lit = camera(2.0, 30.0), light(2.0, 30.0)
+    scenes = [encode_scene(filmed, ladder=(20.0, 1.0)), encode_scene(lit, ladder=(20.0, 1.0))]
+    await Library.open(f"file://{tmp_path}/library").put("filmed", pack("filmed", encoded, scenes))
+    with running(tmp_path) as url:
+        viewer = Viewer(Client(url).socket_url("/v1/motions/filmed/stream"))
+        seen: dict[int, list[np.ndarray | None]] = {}
+        figures = await viewer.watch(1.0, lambda t, _: seen.update({t: [viewer.scene_at(t, n) for n in (0, 1)]}))
+    assert [track.kind for track in viewer.scenes] == ["camera", "light"]
+    assert (figures.blocks, figures.camera_blocks, figures.light_blocks) == (2, 2, 2)
+    state = viewer.timelines.newest
+    assert state is not None
+    shown = 0
+    for reference, (seen_camera, seen_light) in seen.items():
+        frame = ((reference - state.clock) % 2_000_000) * 30 / 1e6
+        if frame > 59 or seen_camera is None or seen_light is None:
+            continue
+        for values, truth in ((seen_camera, filmed.values), (seen_light, lit.values)):
+            wanted = [np.interp(frame, np.arange(60), truth[:, number]) for number in range(7)]
+            np.testing.assert_allclose(values, wanted, atol=0.03, rtol=0.03)
+        shown += 1
+    assert shown > 10
+    last = viewer.camera_at(max(seen))
+    assert last is not None
+    assert viewer.scene_at(max(seen), 2) is None
+    said = figures.as_json()["camera"]
+    np.testing.assert_allclose([*said["position"], *said["gaze"], said["fov"]], last, atol=0.05)
+
+
+def told(tracks: list[dict[str, object]]) -> Viewer:
+    viewer = Viewer("ws://stage/stream")
+    viewer._take(Description("m", tracks).pack())
+    viewer._take(TimelineState(1, "m", 0, 0, False, True, 1_000_000).pack())
+    return viewer
+
+
+def test_blocks_of_tracks_that_it_does_not_know_are_skipped() -> None:
+    encoded = encode_motion(wandering_motion(1.0, 30.0, 5), ladder=(30.0,), grade="live")
+    filmed = encode_scene(camera(1.0, 30.0), ladder=(20.0,))
+    later = filmed.describe() | {"codec": "bunraku.scene/9"}
+    viewer = told([{"type": "scent"}, encoded.describe(), later])
+    for track in (0, 2, 7):
+        viewer._take(Data(track, 0, 0, b"\1\2\3").pack())
+    assert viewer.pose_at(0) is None
+    assert viewer.scenes == []
+    assert viewer.camera_at(0) is None
+    viewer._take(Data(1, 0, 0, encoded.rates[0].blocks[0]).pack())
+    assert viewer.pose_at(0) is not None
+    assert (viewer.figures.blocks, viewer.figures.camera_blocks) == (1, 0)
+
+
+def test_a_stream_without_a_dance_says_so() -> None:
+    with pytest.raises(StreamEnded, match="no motion track in it, only camera"):
+        told([encode_scene(camera(1.0, 30.0), ladder=(20.0,)).describe()])
+    with pytest.raises(StreamEnded, match="only nothing"):
+        told([])
+    with pytest.raises(StreamEnded, match=r"bunraku\.motion/9"):
+        told([{"type": "motion", "codec": "bunraku.motion/9"}])

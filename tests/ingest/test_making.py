@@ -20,7 +20,7 @@ def test_a_motion_is_made_and_described(tmp_path: Path) -> None:
     assert made.described["blocks"] == 2
     # the start, and two blocks at each rate
     assert shares == pytest.approx(np.linspace(0, 1, 1 + 2 * len(made.described["rates"])))
-    assert [len(rate) for rate in msgpack.unpackb(made.packed)["packets"]] == [2] * len(made.described["rates"])
+    assert [len(rate) for rate in msgpack.unpackb(made.packed)["tracks"][0]] == [2] * len(made.described["rates"])
 
 
 def test_real_clips_become_motions(shared: Path) -> None:

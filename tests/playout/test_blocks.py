@@ -5,10 +5,14 @@ import pytest
 
 from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import encode_motion
+from bunraku.codec.scene import Scene
+from bunraku.codec.scene_decode import decode_scene
+from bunraku.codec.scene_encode import EncodedScene, encode_scene
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import points
-from bunraku.playout.blocks import BlockStore
+from bunraku.playout.blocks import BlockStore, SceneStore
 from tests.vectors.blocks import wandering_motion
+from tests.vectors.scene import camera
 
 MOTION = wandering_motion(4.0, 30.0, 3)
 ENCODED = encode_motion(MOTION, ladder=(20.0, 2.0), grade="live")
@@ -73,3 +77,44 @@ def test_blocks_of_another_motion_are_refused() -> None:
         held.put(3, 0, decode_block(other.track, other.rates[0].blocks[0]))
     with pytest.raises(ValueError, match="not of this motion"):
         held.put(4, 0, decode_block(ENCODED.track, ENCODED.rates[0].blocks[0]))
+
+
+def shown_scene(scene: Scene, *missing: int) -> tuple[EncodedScene, SceneStore]:
+    encoded = encode_scene(scene, ladder=(1.0,))
+    held = SceneStore(encoded.track)
+    for index, block in enumerate(encoded.rates[0].blocks):
+        if index not in missing:
+            held.put(index, 0, decode_scene(encoded.track, block))
+    return encoded, held
+
+
+def test_a_camera_is_shown_at_every_frame_and_is_none_where_its_block_is_missing() -> None:
+    scene = camera(4.0, 30.0)
+    _, held = shown_scene(scene, 2)
+    for frame in (0, 17, 29, 30, 59, 90, 119):
+        values = held.scene_at(round(frame * 1e6 / 30), True, 4_000_000)
+        assert values is not None
+        np.testing.assert_allclose(values, scene.values[frame], atol=2e-3)
+    assert held.scene_at(2_500_000, True, 4_000_000) is None
+
+
+def test_a_camera_goes_over_borders_and_round_a_loop_in_a_line() -> None:
+    scene = camera(4.0, 30.0)
+    _, held = shown_scene(scene)
+    for before, after in ((29, 30), (119, 0)):
+        quarter = held.scene_at(round((before + 0.25) * 1e6 / 30), True, 4_000_000)
+        assert quarter is not None
+        truth = 0.75 * scene.values[before] + 0.25 * scene.values[after]
+        np.testing.assert_allclose(quarter, truth, atol=2e-3)
+    last = held.scene_at(4_000_000, False, 4_000_000)
+    assert last is not None
+    np.testing.assert_allclose(last, scene.values[-1], atol=0.02)
+
+
+def test_past_its_end_a_shorter_camera_stands_still_in_a_loop_too() -> None:
+    scene = camera(2.0, 30.0)
+    _, held = shown_scene(scene)
+    for position in (1_980_000, 2_000_000, 2_400_000, 3_999_999):
+        values = held.scene_at(position, True, 4_000_000)
+        assert values is not None
+        np.testing.assert_allclose(values, scene.values[-1], atol=0.02)

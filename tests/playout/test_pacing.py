@@ -4,17 +4,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bunraku.codec.timing import Timing, even_blocks
 from bunraku.codec.track import MotionTrack, plan
-from bunraku.playout.pacing import AHEAD, Pacer
+from bunraku.playout.pacing import AHEAD, UPGRADE, Due, Paced, Pacer
 from bunraku.playout.timeline import edit, start
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import wandering_motion
 
 TRACK: MotionTrack = plan(wandering_motion(12.0, 30.0, 4))
 SECOND = 1_000_000
+CAMERA = even_blocks(60.0, 720)
+"""As long as the motion, in blocks of the same seconds."""
 
 
-def drain(pacer: Pacer, state: TimelineState, clock: int, rate: int) -> list[tuple[int, int]]:
+def alone(rates: int = 4) -> Pacer:
+    return Pacer([Paced(0, TRACK, rates, True)])
+
+
+def beside(*timings: Timing, rates: int = 4) -> Pacer:
+    """Of a motion, and scenes of three rates beside it."""
+    scenes = [Paced(number, timing, 3, False) for number, timing in enumerate(timings, 1)]
+    return Pacer([Paced(0, TRACK, rates, True), *scenes])
+
+
+def drain_all(pacer: Pacer, state: TimelineState, clock: int, rate: int) -> list[Due]:
     sent = []
     while (due := pacer.next(state, clock, rate)) is not None:
         sent.append(due)
@@ -22,14 +35,18 @@ def drain(pacer: Pacer, state: TimelineState, clock: int, rate: int) -> list[tup
     return sent
 
 
+def drain(pacer: Pacer, state: TimelineState, clock: int, rate: int) -> list[tuple[int, int]]:
+    return [(due.index, due.rate) for due in drain_all(pacer, state, clock, rate)]
+
+
 def test_it_starts_low_and_fills_what_lies_ahead() -> None:
     state = start("m", TRACK.duration_us, 0)
-    assert drain(Pacer(TRACK, 4), state, 0, 3) == [(0, 0), (1, 3), (2, 3), (3, 3), (4, 3)]
+    assert drain(alone(), state, 0, 3) == [(0, 0), (1, 3), (2, 3), (3, 3), (4, 3)]
 
 
 def test_nothing_is_sent_twice_over_two_rounds_but_the_quick_start() -> None:
     state = start("m", TRACK.duration_us, 0)
-    pacer = Pacer(TRACK, 4)
+    pacer = alone()
     sent = []
     for clock in range(0, 2 * TRACK.duration_us, 100_000):
         sent += drain(pacer, state, clock, 3)
@@ -38,7 +55,7 @@ def test_nothing_is_sent_twice_over_two_rounds_but_the_quick_start() -> None:
 
 def test_it_stops_at_the_end_without_a_loop_and_follows_a_seek() -> None:
     state = start("m", TRACK.duration_us, 0, loop=False, position=10 * SECOND)
-    pacer = Pacer(TRACK, 4)
+    pacer = alone()
     assert [index for index, _ in drain(pacer, state, 0, 2)] == [10, 11]
     assert drain(pacer, edit(state, 0, position=5 * SECOND), 0, 2)[0] == (5, 0)
 
@@ -46,14 +63,14 @@ def test_it_stops_at_the_end_without_a_loop_and_follows_a_seek() -> None:
 @given(st.integers(0, 40 * SECOND), st.integers(-3, 9))
 def test_the_block_on_show_always_comes_first(clock: int, rate: int) -> None:
     state = start("m", TRACK.duration_us, 0)
-    due = Pacer(TRACK, 4).next(state, clock, rate)
+    due = alone().next(state, clock, rate)
     assert due is not None
-    assert due[0] == TRACK.block_at(clock % TRACK.duration_us)
+    assert due.index == TRACK.block_at(clock % TRACK.duration_us)
 
 
 def test_wait_ends_when_the_next_block_is_in_reach() -> None:
     state = start("m", TRACK.duration_us, 0)
-    pacer = Pacer(TRACK, 4)
+    pacer = alone()
     drain(pacer, state, 0, 3)
     wait = pacer.wait(state, 0)
     assert wait is not None
@@ -64,4 +81,66 @@ def test_wait_ends_when_the_next_block_is_in_reach() -> None:
 
 def test_a_motion_without_rates_is_refused() -> None:
     with pytest.raises(ValueError, match="rate"):
-        Pacer(TRACK, 0)
+        alone(0)
+
+
+def test_the_base_motion_comes_first_then_camera_and_light_then_better_motion() -> None:
+    state = start("m", TRACK.duration_us, 0)
+    pacer = beside(CAMERA, CAMERA)
+    sent = [(due.track, due.index, due.rate) for due in drain_all(pacer, state, 0, 0)]
+    assert sent == [(track, index, 0) for index in range(5) for track in range(3)]
+    better = [(due.track, due.index, due.rate, due.better) for due in drain_all(pacer, state, 0, 3)]
+    assert better == [(track, index, 3 if track == 0 else 2, True) for index in range(1, 5) for track in range(3)]
+    # what is missing goes before what could only be better
+    pacer = beside(CAMERA)
+    drain_all(pacer, state, 0, 0)
+    later = drain_all(pacer, state, SECOND, 3)
+    assert [(due.track, due.index) for due in later[:2]] == [(0, 5), (1, 5)]
+    assert all(due.better for due in later[2:])
+
+
+def test_a_viewer_of_the_camera_alone_is_sent_that() -> None:
+    state = start("m", TRACK.duration_us, 0)
+    pacer = Pacer([Paced(1, CAMERA, 3, False)])
+    assert [(due.track, due.index, due.rate) for due in drain_all(pacer, state, 0, 3)] == [(1, i, 2) for i in range(5)]
+    assert Pacer([]).next(state, 0, 3) is None
+    assert Pacer([]).wait(state, 0) is None
+
+
+@given(
+    st.integers(1, 1500),
+    st.sampled_from([24.0, 30.0, 59.94]),
+    st.integers(0, 11_999_999),
+    st.integers(0, 3),
+    st.booleans(),
+)
+def test_a_scene_of_any_length_is_sent_whole_once_in_time_and_never_again(
+    frames: int, fps: float, position: int, rate: int, loop: bool
+) -> None:
+    timing = even_blocks(fps, frames)
+    state = start("m", TRACK.duration_us, 0, position=position, loop=loop)
+    pacer = Pacer([Paced(1, timing, 4, False)])
+    sent: list[int] = []
+    clock = 0
+    while clock < 2 * TRACK.duration_us:
+        sent += [due.index for due in drain_all(pacer, state, clock, rate)]
+        where = position + clock
+        on_show = min(where, TRACK.duration_us) if not loop else where % TRACK.duration_us
+        assert timing.block_at(min(on_show, TRACK.duration_us - 1)) in sent
+        wait = pacer.wait(state, clock)
+        assert wait is not None
+        assert wait > 0
+        clock += wait
+    shown = timing.block_at(TRACK.duration_us - 1) + 1
+    assert sorted(sent) == list(range(0 if loop else timing.block_at(position), shown))
+
+
+@given(st.integers(0, 11_999_999), st.integers(0, 3), st.integers(0, 3))
+def test_what_is_sent_again_is_better_and_can_still_be_used(position: int, before: int, rate: int) -> None:
+    state = start("m", TRACK.duration_us, 0, position=position)
+    pacer = beside(CAMERA)
+    had = {(due.track, due.index): due.rate for due in drain_all(pacer, state, 0, before)}
+    for due in drain_all(pacer, state, 0, rate):
+        assert due.better
+        assert due.distance > UPGRADE
+        assert due.rate > had[due.track, due.index]

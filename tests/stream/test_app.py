@@ -88,6 +88,10 @@ async def test_blocks_over_http_are_the_same_bytes_and_may_be_kept_for_ever(serv
         description = await http.get(f"/v1/motions/{motion}/description")
         assert (await http.get(f"/v1/motions/{motion}/blocks/9/0")).status_code == 404
         assert (await http.get(f"/v1/motions/{motion}/blocks/0/x")).status_code == 422
+        assert (await http.get(f"/v1/motions/{motion}/blocks/4/1?track=0")).content == block.content
+        absent = await http.get(f"/v1/motions/{motion}/blocks/0/0?track=1")
+        assert (absent.status_code, absent.json()["field"]) == (404, "track")
+        assert (await http.get(f"/v1/motions/{motion}/blocks/0/0?track=-1")).status_code == 404
         assert (await http.get("/v1/motions/none/description")).status_code == 404
     assert "immutable" in block.headers["cache-control"]
     async with socket(server, f"/v1/motions/{motion}/stream") as connection:

@@ -8,10 +8,12 @@ from bunraku.backing.backing import clock
 from bunraku.backing.library import Library, pack
 from bunraku.backing.sockets import TOO_SLOW, Refusal
 from bunraku.codec.encode import encode_motion
+from bunraku.codec.scene_encode import encode_scene
 from bunraku.playout import timeline
 from bunraku.stream.viewers import QUEUE, Viewer
 from bunraku.wire.messages import ChannelHeader, Data, Overlay, Ping, Pong, Presence, Report, TimelineState, unpack
 from tests.vectors.blocks import wandering_motion
+from tests.vectors.scene import camera, light
 
 
 @pytest.fixture
@@ -20,6 +22,9 @@ async def library() -> Library:
     for name, seconds in (("one", 9.2), ("two", 2.0)):
         encoded = encode_motion(wandering_motion(seconds, 30.0, 9), ladder=(30.0, 5.0), grade="live")
         await shelf.put(name, pack(name, encoded))
+    encoded = encode_motion(wandering_motion(2.0, 30.0, 9), ladder=(30.0, 5.0), grade="live")
+    scenes = [encode_scene(make(2.0, 30.0), ladder=(20.0, 4.0)) for make in (camera, light)]
+    await shelf.put("filmed", pack("filmed", encoded, scenes))
     return shelf
 
 
@@ -107,3 +112,29 @@ async def test_reports_change_the_rate(library: Library) -> None:
     data = await line.count(Data, 8)
     sending.cancel()
     assert [d.rate for d in data if isinstance(d, Data)][-2:] == [0, 0]
+
+
+async def test_all_tracks_are_counted_and_sent_the_motion_first(library: Library) -> None:
+    viewer, line = Viewer(library, None), Line()
+    viewer.timeline(timeline.start("filmed", 2_000_000, clock(), playing=False))
+    sending = asyncio.create_task(viewer.send(line.put))
+    data = await line.count(Data, 6)
+    sending.cancel()
+    header = unpack(line.sent[0])
+    assert isinstance(header, ChannelHeader)
+    assert header.channels == 19 + 3 + 3
+    assert [(d.track, d.index, d.rate) for d in data if isinstance(d, Data)] == [
+        *((0, 0, 0), (1, 0, 1), (2, 0, 1)),
+        *((track, 1, 1) for track in range(3)),
+    ]
+
+
+async def test_only_the_tracks_that_are_wanted_are_sent(library: Library) -> None:
+    viewer, line = Viewer(library, None, ("light", "audio")), Line()
+    viewer.timeline(timeline.start("filmed", 2_000_000, clock()))
+    sending = asyncio.create_task(viewer.send(line.put))
+    data = await line.count(Data, 2)
+    viewer.ping(Ping(1, 2))
+    await line.count(Pong, 1)
+    sending.cancel()
+    assert [(d.track, d.index) for d in data if isinstance(d, Data)] == [(2, 0), (2, 1)]

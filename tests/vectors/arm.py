@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.marionette import arms, table, vector
+from bunraku.marionette import arms, table
 from bunraku.marionette.limbs import ArmRig, LegRig, Limb
-from bunraku.marionette.plane import Plane
 from bunraku.marionette.proportions import Proportions
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -85,23 +84,6 @@ def _identities(random: np.random.Generator) -> list[dict[str, Any]]:
     return cases
 
 
-def _plane(random: np.random.Generator) -> dict[str, Any]:
-    """A hand that wanders under the shoulder, and the normals its plane has."""
-    up = vector.unit((0.1, 0.9, -0.2), (0.0, 1.0, 0.0))
-    places = np.array([0.0, -0.6, 0.0]) + np.cumsum(random.uniform(-0.08, 0.08, (30, 3)), axis=0) * [1.0, 0.2, 1.0]
-    places = np.round(places, 6)
-    start = (-1.0, 0.0, 0.0)
-    plane: Plane | None = None
-    steps = []
-    for x, y, z in places.tolist():
-        direction = vector.unit((x, y, z), (0.0, -1.0, 0.0))
-        if plane is None:
-            plane = Plane(start, direction)
-        normal = plane.follow(direction, vector.length((x, y, z)), up, 1.0 / 60.0)
-        steps.append({"target": [x, y, z], "normal": _numbers(normal)})
-    return {"start": list(start), "up": _numbers(up), "seconds": 1.0 / 60.0, "steps": steps}
-
-
 def _poses(random: np.random.Generator) -> Array:
     """Four poses of random joints (4, 18, 4), the last the rest."""
     vectors = random.uniform(-0.6, 0.6, (4, 18, 3))
@@ -135,7 +117,6 @@ def make() -> dict[str, Any]:
     random = np.random.default_rng(20)
     return {
         "arms": [_solves(identity, random) for identity in IDENTITIES],
-        "plane": _plane(random),
         "limbs": _limbs(random),
         "identities": _identities(random),
     }

@@ -9,6 +9,7 @@ import msgpack
 
 from bunraku.wire.messages import (
     Alive,
+    Ask,
     ChannelHeader,
     Claim,
     Data,
@@ -17,6 +18,7 @@ from bunraku.wire.messages import (
     Grant,
     Input,
     Message,
+    Notice,
     Overlay,
     Ping,
     Pong,
@@ -43,6 +45,11 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def _vector(message: Message, data: bytes) -> dict[str, Any]:
+    fields = {f.name: getattr(message, f.name) for f in dataclasses.fields(message)}
+    return {"name": type(message).__name__, "type": message.TYPE, "fields": _plain(fields), "bytes": text(data)}
+
+
 def make() -> dict[str, Any]:
     """One of every message with its fields, and broken ones with the reason."""
     examples: list[Message] = [
@@ -54,12 +61,14 @@ def make() -> dict[str, Any]:
         Overlay(65_535, NOW, {0: (1, -2, 3, -32_767, 32_767, 0, 7, 8, 9), 3: (0, 0, 0, 1, 1, 1, -5, -6, -7)}),
         Overlay(0, NOW, {}),
         Presence(3, [{"id": "a1", "name": "Aiko あ", "colour": 0}], ["a1", None, None, None]),
+        Presence(0, [], [None] * 4, [["b2", "c3"], [], [], ["b2"]]),
         Pong(4_000_000_000, 123_456_789_012, NOW, NOW + 31),
         Problem("Too slow", "40 messages waited"),
         Welcome("a1", 4, 120_000),
         Grant(2, 9),
         Refusal(1, "held", "a1"),
         Refusal(1, "lost"),
+        Notice(0, "reach", "the left hand was brought within 1 arm length of its shoulder"),
         Ping(4_000_000_000, 123_456_789_012),
         Edit(playing=False),
         Edit(position=0, loop=True),
@@ -67,6 +76,8 @@ def make() -> dict[str, Any]:
         Claim(3),
         Release(0, 9),
         Alive([0, 3]),
+        Ask(0, True),
+        Ask(3, False),
         Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)),
         Input(2, Input.VELOCITY, 9, 13, NOW, (-1.0, 0.0, 0.0)),
     ]
@@ -85,18 +96,13 @@ def make() -> dict[str, Any]:
         "overlay with a fifth limb": bytes([5, 16]) + bytes(10),
         "data without an index": bytes([3, 0]),
         "data with an index too long": bytes([3, 0, 128, 128, 128, 1]),
-        "pong too long": examples[8].pack() + b"\0",
+        "pong too long": examples[9].pack() + b"\0",
     }
+    alone = Presence(3, [], ["a1", None, None, None])
+    older = bytes([6]) + msgpack.packb({"viewers": 3, "puppeteers": [], "limbs": alone.limbs})
     return {
-        "valid": [
-            {
-                "name": type(message).__name__,
-                "type": message.TYPE,
-                "fields": _plain({f.name: getattr(message, f.name) for f in dataclasses.fields(message)}),
-                "bytes": text(message.pack()),
-            }
-            for message in examples
-        ],
+        "valid": [_vector(message, message.pack()) for message in examples],
+        "older": [{"why": "presence without asks: nobody asks", **_vector(alone, older)}],
         "skipped": [text(b"\x3f later"), text(b"\xff")],
         "invalid": [{"why": why, "bytes": text(data)} for why, data in invalid.items()],
     }

@@ -69,3 +69,10 @@ def test_broken_messages_are_refused_and_unknown_ones_skipped() -> None:
         with pytest.raises(MalformedMessage):
             unpack(base64.b64decode(broken["bytes"]))
     assert [unpack(base64.b64decode(data)) for data in vectors["skipped"]] == [None, None]
+
+
+def test_messages_that_say_less_are_read() -> None:
+    for older in committed("messages.json")["older"]:
+        message = unpack(base64.b64decode(older["bytes"]))
+        assert type(message).__name__ == older["name"]
+        assert {name: getattr(message, name) for name in older["fields"]} == older["fields"]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from bunraku.wire import messages
 from bunraku.wire.messages import (
     Alive,
+    Ask,
     ChannelHeader,
     Claim,
     Data,
@@ -20,6 +21,7 @@ from bunraku.wire.messages import (
     Input,
     MalformedMessage,
     Message,
+    Notice,
     Overlay,
     Ping,
     Pong,
@@ -67,6 +69,7 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
         viewers=TIME,
         puppeteers=st.lists(st.dictionaries(TEXT, TEXT), max_size=3),
         limbs=st.lists(st.none() | TEXT, max_size=4),
+        asks=st.lists(st.lists(TEXT, max_size=3), min_size=4, max_size=4),
     ),
     st.builds(Ping, sequence=U32, sent=TIME),
     st.builds(Pong, sequence=U32, sent=TIME, received=TIME, answered=TIME),
@@ -79,6 +82,8 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
     st.builds(Claim, limb=LIMB),
     st.builds(Release, limb=LIMB, epoch=U32),
     st.builds(Alive, limbs=st.lists(LIMB, max_size=4)),
+    st.builds(Notice, limb=LIMB, reason=TEXT, detail=TEXT),
+    st.builds(Ask, limb=LIMB, wanted=st.booleans()),
     st.builds(
         Input,
         limb=LIMB,
@@ -124,6 +129,7 @@ def test_unknown_types_are_skipped_and_unknown_keys_too() -> None:
 def test_sizes_are_those_of_the_contract() -> None:
     assert [len(Data(0, 3, index, b"").pack()) for index in (0, 127, 128, 86_399)] == [3, 3, 4, 5]
     assert len(Overlay(1, 2, {0: (0,) * 9, 3: (1,) * 9}).pack()) == 12 + 36
+    assert len(Overlay(1, 2, {0: (0,) * 9}, ({0: (1,) * 9},)).pack()) == 12 + 36
     assert len(Ping(1, 2).pack()) == len(Pong(1, 2, 3, 4).pack()) == len(Input(0, 0, 1, 1, 1, (0, 0, 0)).pack()) == 32
 
 
@@ -138,7 +144,8 @@ def test_sizes_are_those_of_the_contract() -> None:
         (bytes([70]) + b"\0" * 30, "32 bytes"),
         (Input(0, 1, 1, 1, 1, (float("nan"), 0, 0)).pack(), "finite"),
         (Input(0, 1, 1, 1, 1, (float("inf"), 0, 0)).pack(), "finite"),
-        (bytes([5, 16]) + bytes(10), "mask"),
+        (bytes([5, 0x11]) + bytes(28), "48 bytes"),
+        (bytes([5, 1]) + bytes(5), "12 bytes"),
         (bytes([5, 1]) + bytes(10), "30 bytes"),
     ],
 )
@@ -150,5 +157,5 @@ def test_a_malformed_message_says_what_is_wrong(data: bytes, says: str) -> None:
 def test_types_are_unique_and_client_types_start_at_64() -> None:
     types = [kind.TYPE for kind in messages.Message.__args__]
     assert len(set(types)) == len(types)
-    client = {Ping, Edit, Report, Claim, Release, Alive, Input}
+    client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Input}
     assert {kind for kind in messages.Message.__args__ if kind.TYPE >= 64} == client

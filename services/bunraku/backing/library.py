@@ -1,12 +1,16 @@
 """Encoded motions as objects: written once, never changed, in a folder or an object store by URL.
 
-An object holds one motion whole: its Description and every Data message of every rate, ready to be sent.
+An object holds one motion whole: its Description and every Data message of every track and rate, ready to be sent.
+Beside the motions lie the logs of sessions that are about to become motions, each as long as that takes.
 """
 
 from __future__ import annotations
 
+import re
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import msgpack
 import obstore
@@ -14,36 +18,77 @@ from obstore.store import LocalStore, ObjectStore, from_url
 
 from bunraku.codec.encode import EncodedMotion
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.scene import SceneTrack, read_scene
+from bunraku.codec.scene_encode import EncodedScene
 from bunraku.codec.track import MotionTrack, read_track
 from bunraku.wire.messages import Data, Description
 
 CACHE_BYTES = 64 << 20
+MOST_TRACKS = 16
+"""Tracks that a Data message can number."""
+
+Track = MotionTrack | SceneTrack
+_LOG_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
 @dataclass(frozen=True, slots=True)
 class StoredMotion:
-    """A motion as it is sent: `packets[rate][index]` are whole Data messages, lowest rate first."""
+    """A motion as it is sent: the tracks of its Description, the motion first, and `packets[track][rate][index]`, whole
+    Data messages, lowest rate first; `front` is where the dance faces, radians about y from z towards x."""
 
     id: str
     description: bytes
-    packets: list[list[bytes]]
-    track: MotionTrack
+    tracks: tuple[Track, ...]
+    packets: list[list[list[bytes]]]
+    front: float = 0.0
+
+    @property
+    def track(self) -> MotionTrack:
+        """The motion's own track, whose length is the motion's."""
+        motion = self.tracks[0]
+        assert isinstance(motion, MotionTrack)
+        return motion
+
+    @property
+    def dance(self) -> list[list[bytes]]:
+        """The Data messages of the motion's own track, by rate and index."""
+        return self.packets[0]
 
     @property
     def size(self) -> int:
         """Bytes of all messages."""
-        return len(self.description) + sum(len(packet) for rate in self.packets for packet in rate)
+        packets = (packet for track in self.packets for rate in track for packet in rate)
+        return len(self.description) + sum(map(len, packets))
 
 
-def pack(motion: str, encoded: EncodedMotion) -> bytes:
-    """The object of an encoded motion."""
+def pack(motion: str, encoded: EncodedMotion, scenes: Sequence[EncodedScene] = ()) -> bytes:
+    """The object of an encoded motion, with the cameras and lights that belong to it.
+
+    Raises ValueError where there are more tracks than a Data message can number.
+    """
+    tracks: list[EncodedMotion | EncodedScene] = [encoded, *scenes]
+    if len(tracks) > MOST_TRACKS:
+        raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, not {len(tracks)}")
     packets = [
-        [Data(0, number, index, block).pack() for index, block in enumerate(rate.blocks)]
-        for number, rate in enumerate(encoded.rates)
+        [
+            [Data(number, nth, index, block).pack() for index, block in enumerate(rate.blocks)]
+            for nth, rate in enumerate(track.rates)
+        ]
+        for number, track in enumerate(tracks)
     ]
-    description = Description(motion, [encoded.describe()]).pack()
-    packed: bytes = msgpack.packb({"description": description, "packets": packets})
+    description = Description(motion, [track.describe() for track in tracks]).pack()
+    packed: bytes = msgpack.packb({"description": description, "tracks": packets})
     return packed
+
+
+def unpack(motion: str, packed: bytes) -> StoredMotion:
+    """The motion in an object that `pack` made; raises `DamagedBlock` where it is in a codec that is not spoken."""
+    values = msgpack.unpackb(packed)
+    described: list[dict[str, Any]] = msgpack.unpackb(values["description"][1:])["tracks"]
+    # objects from when a motion was one track have its packets alone
+    packets = values["tracks"] if "tracks" in values else [values["packets"]]
+    tracks: tuple[Track, ...] = (read_track(described[0]), *map(read_scene, described[1:]))
+    return StoredMotion(motion, values["description"], tracks, packets, float(described[0].get("front", 0.0)))
 
 
 class Library:
@@ -73,14 +118,11 @@ class Library:
         if motion in self._cache:
             self._cache.move_to_end(motion)
             return self._cache[motion]
-        try:
-            found = await obstore.get_async(self._store, _path(motion))
-            values = msgpack.unpackb(bytes(await found.bytes_async()))
-        except FileNotFoundError:
+        packed = await self._read(_path(motion))
+        if packed is None:
             return None
-        track = msgpack.unpackb(values["description"][1:])["tracks"][0]
         try:
-            stored = StoredMotion(motion, values["description"], values["packets"], read_track(track))
+            stored = unpack(motion, packed)
         except DamagedBlock:
             # of a codec that is no longer spoken: its file can be sent again
             return None
@@ -91,8 +133,33 @@ class Library:
         """Remove a motion's object; nothing happens where there is none."""
         dropped = self._cache.pop(motion, None)
         self._cached -= dropped.size if dropped else 0
+        await self._delete(_path(motion))
+
+    async def put_log(self, name: str, data: bytes) -> None:
+        """Store a session's log under a random name of 1..64 of A-Z a-z 0-9 _ -; raises ValueError for another."""
+        if not _LOG_NAME.fullmatch(name):
+            raise ValueError(f"a log's name is 1..64 of A-Z a-z 0-9 _ -, not {name[:80]!r}")
+        await obstore.put_async(self._store, _log_path(name), data)
+
+    async def get_log(self, name: str) -> bytes | None:
+        """The log of this name, None where there is none."""
+        return await self._read(_log_path(name)) if _LOG_NAME.fullmatch(name) else None
+
+    async def remove_log(self, name: str) -> None:
+        """Remove a log; nothing happens where there is none."""
+        if _LOG_NAME.fullmatch(name):
+            await self._delete(_log_path(name))
+
+    async def _read(self, path: str) -> bytes | None:
         try:
-            await obstore.delete_async(self._store, _path(motion))
+            found = await obstore.get_async(self._store, path)
+            return bytes(await found.bytes_async())
+        except FileNotFoundError:
+            return None
+
+    async def _delete(self, path: str) -> None:
+        try:
+            await obstore.delete_async(self._store, path)
         except FileNotFoundError:
             return
 
@@ -107,3 +174,7 @@ class Library:
 
 def _path(motion: str) -> str:
     return f"motions/{motion}.bunraku"
+
+
+def _log_path(name: str) -> str:
+    return f"logs/{name}"

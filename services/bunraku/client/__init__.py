@@ -1,4 +1,5 @@
-"""The Python SDK: `api.Client` uploads and lists, `viewer.Viewer` watches, `puppeteer.Puppeteer` pulls.
+"""The Python SDK: `api.Client` uploads and lists, `viewer.Viewer` watches, `puppeteer.Puppeteer` pulls,
+`one_euro.OneEuro` steadies what pulls.
 
 Names are imported where they are first used: listing motions need not load a decoder.
 """
@@ -7,19 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bunraku.client.api import Client, ServerProblem
+    from bunraku.client.one_euro import OneEuro
     from bunraku.client.puppeteer import Puppeteer, Refused
     from bunraku.client.viewer import Figures, StreamEnded, Viewer
 
 _HOMES = {
     "Client": "api",
     "ServerProblem": "api",
+    "OneEuro": "one_euro",
     "Puppeteer": "puppeteer",
     "Refused": "puppeteer",
     "Figures": "viewer",
     "StreamEnded": "viewer",
     "Viewer": "viewer",
 }
-__all__ = ["Client", "Figures", "Puppeteer", "Refused", "ServerProblem", "StreamEnded", "Viewer"]
+__all__ = ["Client", "Figures", "OneEuro", "Puppeteer", "Refused", "ServerProblem", "StreamEnded", "Viewer"]
 
 
 def __getattr__(name: str) -> Any:

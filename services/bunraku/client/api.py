@@ -6,15 +6,15 @@ import asyncio
 import contextlib
 import os
 import secrets
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 from urllib.parse import quote, urlsplit, urlunsplit
 
 import httpx2
 
-TIMEOUT = httpx2.Timeout(10.0, read=120.0)
-"""Seconds; an answer to an upload comes when it is encoded."""
+TIMEOUT = httpx2.Timeout(10.0, read=130.0)
+"""Seconds; an answer to an upload comes when it is encoded, and a session is kept within 120 s."""
 CHUNK = 1 << 16
 EVERY = 0.25
 """Seconds between two questions how far an upload is."""
@@ -120,6 +120,20 @@ class Client:
     async def edit_session(self, session: str, **edit: Any) -> dict[str, Any]:
         """Edit a session: any of `playing`, `position` (microseconds), `loop`, `motion`."""
         return await self._ask("PATCH", f"/v1/sessions/{quote(session, safe='')}", json=edit)
+
+    async def keep(
+        self,
+        session: str,
+        name: str | None = None,
+        seconds: float | None = None,
+        camera: Sequence[Mapping[str, Any]] = (),
+    ) -> dict[str, Any]:
+        """Keep what a session has shown, the last `seconds` of it or all that can be kept, as a new motion, and wait
+        until it can be watched. `camera`, if any, are keyframes in order of time: `time` on the reference clock in
+        microseconds, `position` and `gaze` in metres in the dance's frame, `fov` in radians."""
+        given = {"name": name, "seconds": seconds, "camera": [dict(key) for key in camera] or None}
+        asked = {key: value for key, value in given.items() if value is not None}
+        return await self._ask("POST", f"/v1/sessions/{quote(session, safe='')}/recordings", json=asked)
 
     def socket_url(self, path: str) -> str:
         """The WebSocket address of a path of this server."""

@@ -12,6 +12,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bunraku.client.api import Client
+from bunraku.client.one_euro import OneEuro
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
     LIMBS,
@@ -104,8 +105,15 @@ class Puppeteer:
         if number in self._epochs:
             await self._send(Release(number, self._epochs.pop(number)).pack())
 
-    async def target(self, limb: str, x: float, y: float = 0.0, z: float = 0.0) -> None:
-        """Pull a held hand's tip to a place in the shoulder's frame, arm lengths; a leg's thigh to the angle `x`."""
+    async def target(
+        self, limb: str, x: float, y: float = 0.0, z: float = 0.0, *, smooth: OneEuro | None = None
+    ) -> None:
+        """Pull a held hand's tip to a place in the shoulder's frame, arm lengths; a leg's thigh to the angle `x`.
+
+        `smooth`, one for each limb and kept from call to call, steadies what a noisy source says.
+        """
+        if smooth is not None:
+            x, y, z = smooth.filter((x, y, z), time.monotonic())
         await self._input(limb, Input.TARGET, (x, y, z))
 
     async def velocity(self, limb: str, x: float, y: float = 0.0, z: float = 0.0) -> None:

@@ -15,9 +15,13 @@ from websockets.exceptions import ConnectionClosed
 
 from bunraku.codec import decode
 from bunraku.codec.decode import decode_block
+from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.scene import SceneTrack, read_scene
+from bunraku.codec.scene_decode import decode_scene
 from bunraku.codec.track import MotionTrack, read_track
+from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
-from bunraku.playout.blocks import BlockStore, Pose
+from bunraku.playout.blocks import BlockStore, Pose, SceneStore
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.overlays import Overlays
 from bunraku.wire.messages import (
@@ -46,13 +50,16 @@ class StreamEnded(Exception):
 
 @dataclass(slots=True)
 class Figures:
-    """How a viewer fared. Times in milliseconds; `kbps` counts all payload received over the time watched."""
+    """How a viewer fared. Times in milliseconds; `kbps` counts all payload received over the time watched; `blocks` are
+    the motion's, `camera` where the show's camera was last: `position` and `gaze` in metres, `fov` in radians."""
 
     seconds: float = 0.0
     first_pose_ms: float | None = None
     frames: int = 0
     gaps: int = 0
     blocks: int = 0
+    camera_blocks: int = 0
+    light_blocks: int = 0
     overlays: int = 0
     bytes: int = 0
     kbps: float = 0.0
@@ -60,10 +67,19 @@ class Figures:
     clock_offset_ms: float = 0.0
     clock_error_ms: float | None = None
     overlay_early_ms: float | None = None
+    camera: dict[str, Any] | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The figures as plain values."""
-        return {key: round(value, 3) if isinstance(value, float) else value for key, value in asdict(self).items()}
+        return {key: _rounded(value) for key, value in asdict(self).items()}
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_rounded(part) for part in value]
+    return round(value, 3) if isinstance(value, float) else value
 
 
 class Viewer:
@@ -77,7 +93,10 @@ class Viewer:
         self.track: MotionTrack | None = None
         self.presence: Presence | None = None
         self.motion: str | None = None
+        self.scenes: list[SceneTrack] = []
         self._blocks: BlockStore | None = None
+        self._track_number = 0
+        self._scene_stores: dict[int, SceneStore] = {}
         self._overlays = Overlays()
         self._early: list[float] = []
         self._decode = 0.0
@@ -121,6 +140,20 @@ class Viewer:
             return None
         return pose[0], self._overlays.lay(pose[1], reference)
 
+    def scene_at(self, reference: int, scene: int = 0) -> Array | None:
+        """The seven numbers (7,) of the camera or light `scenes[scene]` at clock time `reference` (SPEC.md, Scene
+        block), None where nothing is there to be shown."""
+        state = self.timelines.at(reference)
+        if state is None or state.motion != self.motion or not 0 <= scene < len(self.scenes):
+            return None
+        store = list(self._scene_stores.values())[scene]
+        return store.scene_at(timeline.position_at(state, reference), state.loop, state.duration)
+
+    def camera_at(self, reference: int) -> Array | None:
+        """As `scene_at`, of the show's camera: the first one there is."""
+        kinds = [track.kind for track in self.scenes]
+        return self.scene_at(reference, kinds.index("camera")) if "camera" in kinds else None
+
     async def _receive(self, connection: ClientConnection) -> None:
         try:
             async for data in connection:
@@ -133,13 +166,8 @@ class Viewer:
 
     def _take(self, data: bytes) -> None:
         message = unpack(data)
-        if isinstance(message, Data) and self._blocks is not None and self.track is not None:
-            began = time.perf_counter()
-            block = decode_block(self.track, message.block)
-            self._decode = time.perf_counter() - began
-            self._blocks.put(message.index, message.rate, block)
-            self.figures.blocks += 1
-            self.figures.rate = message.rate
+        if isinstance(message, Data):
+            self._keep(message)
         elif isinstance(message, Overlay):
             self.figures.overlays += 1
             now = self.clock.at(_local())
@@ -153,13 +181,46 @@ class Viewer:
         elif isinstance(message, ChannelHeader):
             self.clock.guess(message.now, _local())
         elif isinstance(message, Description):
-            motion = next(track for track in message.tracks if track.get("type") == "motion")
-            self.track, self.motion = read_track(motion), message.motion
-            self._blocks = BlockStore(self.track)
+            self._describe(message)
         elif isinstance(message, Presence):
             self.presence = message
         elif isinstance(message, Problem):
             raise StreamEnded(f"{message.title}: {message.detail}")
+
+    def _describe(self, description: Description) -> None:
+        """Take in the tracks that can be read here: the motion must, and of others what is not known is skipped."""
+        numbers = [n for n, track in enumerate(description.tracks) if track.get("type") == "motion"]
+        if not numbers:
+            kinds = ", ".join(str(track.get("type")) for track in description.tracks) or "nothing"
+            raise StreamEnded(f"the stream has no motion track in it, only {kinds}: there is no dance to show")
+        try:
+            self.track = read_track(description.tracks[numbers[0]])
+        except DamagedBlock as error:
+            raise StreamEnded(str(error)) from None
+        self.motion, self._track_number = description.motion, numbers[0]
+        self._blocks = BlockStore(self.track)
+        self._scene_stores = {}
+        for number, track in enumerate(description.tracks):
+            if track.get("type") in ("camera", "light"):
+                with contextlib.suppress(DamagedBlock):
+                    self._scene_stores[number] = SceneStore(read_scene(track))
+        self.scenes = [store.track for store in self._scene_stores.values()]
+
+    def _keep(self, data: Data) -> None:
+        """Decode a block of a track that is known, and keep it."""
+        began = time.perf_counter()
+        if data.track in self._scene_stores:
+            store = self._scene_stores[data.track]
+            store.put(data.index, data.rate, decode_scene(store.track, data.block))
+            if store.track.kind == "camera":
+                self.figures.camera_blocks += 1
+            else:
+                self.figures.light_blocks += 1
+        elif data.track == self._track_number and self._blocks is not None:
+            self._blocks.put(data.index, data.rate, decode_block(self._blocks.track, data.block))
+            self._decode = time.perf_counter() - began
+            self.figures.blocks += 1
+            self.figures.rate = data.rate
 
     async def _ask_time(self, connection: ClientConnection) -> None:
         for sequence in range(1 << 32):
@@ -178,6 +239,9 @@ class Viewer:
         while loop.time() < end:
             reference = self.clock.at(_local())
             pose = self.pose_at(reference)
+            if (camera := self.camera_at(reference)) is not None:
+                x = camera.tolist()
+                self.figures.camera = {"position": x[:3], "gaze": x[3:6], "fov": x[6]}
             if pose is not None:
                 if self.figures.first_pose_ms is None:
                     self.figures.first_pose_ms = (time.monotonic() - self._began) * 1e3

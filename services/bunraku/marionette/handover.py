@@ -1,29 +1,40 @@
 """Between the dance and a puppeteer's hand: what keeps a limb from jumping when it is taken and let go.
 
-The *target* is blended, then the limb is solved. Over the same time `blend` brings the joints from the dance's way of
-reaching a place to the marionette's.
+The *place* of the limb goes over at a bounded acceleration (`follow`), then the limb is solved. Over the same time the
+joints are brought from the dance's way of reaching a place to the marionette's (`blend`), by the weight given here.
 """
 
 from __future__ import annotations
 
-from math import acos, asin, cos, pi
+from math import sqrt
 
 from bunraku.marionette import vector
-from bunraku.marionette.arm import Arm
 from bunraku.marionette.limbs import Joints
 from bunraku.marionette.vector import Quaternion, Vector
 
 TAKE = 0.150
-"""Seconds from the dance to a puppeteer's hand."""
-GIVE_BACK = 0.300
-"""Seconds from a puppeteer's hand to the dance."""
-TURN_SPEED = 3.0 * pi
-"""Radians per second that a hand goes round the shoulder at most, however its target jumps."""
-FOLD_SPEED = 2.0 * pi
-"""Radians per second that the arm folds and unfolds at most: the change of a where the hand is at cos a arm lengths,
-which is about half the elbow's bend. (A bound on the distance would let a nearly straight elbow snap.)"""
-THIGH_SPEED = 12.0
-"""Radians per second that a thigh is swung at most."""
+"""Seconds from the dance's way of holding a limb to the marionette's."""
+GIVE_BACK = 0.350
+"""Seconds from the marionette's way to the dance's."""
+HAND_ACCELERATION = 75.0
+"""Arm lengths per second squared: a quarter of an arm is crossed in 0.12 s."""
+THIGH_ACCELERATION = 60.0
+"""Radians per second squared."""
+RETURN = 0.300
+"""Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds."""
+LEAST_ACCELERATION = 6.0
+
+
+def acceleration_home(distance: float, speed: float, most: float) -> float:
+    """What brings a limb back in `RETURN` that is `distance` away and goes away at `speed`, by braking, speeding up and
+    braking again; within `LEAST_ACCELERATION` and `most`."""
+    low, high = LEAST_ACCELERATION, most
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        turned = distance + speed * speed / (2.0 * middle)
+        late = speed / middle + 2.0 * sqrt(turned / middle) > RETURN
+        low, high = (middle, high) if late else (low, middle)
+    return high
 
 
 def minimum_jerk(x: float) -> float:
@@ -39,7 +50,7 @@ class Handover:
 
     @property
     def weight(self) -> float:
-        """Of the puppeteer's target, 0..1."""
+        """Of the marionette's way of holding the limb, 0..1."""
         return minimum_jerk(self.progress)
 
     def advance(self, held: bool, seconds: float) -> None:
@@ -48,51 +59,26 @@ class Handover:
         self.progress = min(max(self.progress + step, 0.0), 1.0)
 
 
-def follow_hand(hand: Vector, target: Vector, arm: Arm, seconds: float) -> Vector:
-    """The hand on its way round the shoulder to `target`: at `TURN_SPEED` and `FOLD_SPEED` at most, and always at a
-    distance the arm is solved for (all in arm lengths)."""
-    down = (0.0, -1.0, 0.0)
-    here, there = vector.unit(hand, down), vector.unit(target, down)
-    fold, wanted = acos(arm.clamp(vector.length(hand))), acos(arm.clamp(vector.length(target)))
-    angle = _angle(here, there)
-    most = TURN_SPEED * seconds
-    direction = there if angle <= most else _toward(here, there, angle, most / angle)
-    return vector.scale(direction, cos(fold + _limited(wanted - fold, FOLD_SPEED * seconds)))
+class Turn:
+    """The turn that brings the direction of the dance's hand to that of the pulled one, on a way round the shoulder.
 
-
-def follow_thigh(theta: float, target: float, seconds: float) -> float:
-    """The thigh on its way to `target`, radians, at `THIGH_SPEED` at most."""
-    return theta + _limited(target - theta, THIGH_SPEED * seconds)
-
-
-class HandMix:
-    """The target between the dance's hand and the pulled one, on a way round the shoulder and not through it.
-
-    The way is a turn that brings one direction to the other. It is carried on from call to call, so that two hands that
-    pass opposite each other do not make it change sides.
+    It is carried on from call to call, so that two hands that pass opposite each other do not make it change sides.
     """
 
     def __init__(self) -> None:
         self._turn: Quaternion | None = None
 
-    def mix(self, dance: Vector, pulled: Vector, weight: float) -> tuple[Vector, Quaternion]:
-        """The target at `weight`, exactly either hand at 0 and 1, and the turn from the dance's direction to it."""
+    def follow(self, dance: Vector, pulled: Vector, weight: float) -> Quaternion:
+        """The turn from the direction of `dance` to that of `pulled`; all the way there, at `weight` 1, it starts
+        afresh from the shortest."""
         down = (0.0, -1.0, 0.0)
         here, there = vector.unit(dance, down), vector.unit(pulled, down)
         if self._turn is None:
             turn = vector.between(here, there)
         else:
             turn = vector.multiply(vector.between(vector.rotate(self._turn, here), there), self._turn)
-        if weight >= 1.0:
-            # all the way there any turn will do: start afresh from the shortest
-            self._turn = None
-            return pulled, turn
-        self._turn = vector.normalise(turn)
-        part = vector.part_of(self._turn, max(weight, 0.0))
-        if weight <= 0.0:
-            return dance, part
-        reach = (1.0 - weight) * vector.length(dance) + weight * vector.length(pulled)
-        return vector.scale(vector.rotate(part, here), reach), part
+        self._turn = None if weight >= 1.0 else vector.normalise(turn)
+        return turn
 
 
 def mix_joints(dance: Joints, hung: Joints, weight: float) -> Joints:
@@ -101,19 +87,3 @@ def mix_joints(dance: Joints, hung: Joints, weight: float) -> Joints:
         return hung if weight >= 1.0 else dance
     a, b, c = (vector.slerp(one, other, weight) for one, other in zip(dance, hung, strict=True))
     return (a, b, c)
-
-
-def _angle(a: Vector, b: Vector) -> float:
-    # by the half chord: the arc cosine alone loses small angles
-    half = 0.5 * vector.length(vector.subtract(a, b))
-    return 2.0 * asin(min(half, 1.0))
-
-
-def _toward(a: Vector, b: Vector, angle: float, share: float) -> Vector:
-    """The unit vector on the great circle from `a` to `b`, `angle` apart, at a share of the way."""
-    axis = vector.unit(vector.cross(a, b), vector.across(a))
-    return vector.rotate(vector.about(axis, angle * share), a)
-
-
-def _limited(step: float, most: float) -> float:
-    return min(max(step, -most), most)

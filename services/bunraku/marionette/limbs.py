@@ -16,9 +16,10 @@ from math import atan2, pi
 
 from bunraku.marionette import vector
 from bunraku.marionette.arm import Arm
+from bunraku.marionette.elbow import elevation, vertical_normal
 from bunraku.marionette.leg import clamp_thigh, knee_bend
-from bunraku.marionette.plane import vertical_normal
 from bunraku.marionette.proportions import WRIST_LIMIT, Proportions
+from bunraku.marionette.shoulder import Shoulder
 from bunraku.marionette.table import table_of
 from bunraku.marionette.vector import Quaternion, Vector
 from bunraku.motion.skeleton import INDEX, Figure
@@ -82,6 +83,7 @@ class ArmRig:
         self.arm = Arm(proportions, table_of(proportions.identity))
         first, second, third = self.links
         self._frames = (link_frame(first, BEND_AXIS), link_frame(second, BEND_AXIS), link_frame(third, BEND_AXIS))
+        self.shoulder = Shoulder(right=limb is Limb.RIGHT_HAND)
         side = 1.0 if limb is Limb.LEFT_HAND else -1.0
         # the more the wrist bends, the more the palm turns down: to the side a wrist bends little
         self._palm_down = side * pi / 2.0
@@ -125,28 +127,23 @@ class ArmRig:
         """The frame of an arm's plane: x the unit `direction` to the tip, z the unit `normal`, square to it."""
         return vector.from_columns(direction, vector.cross(normal, direction), normal)
 
-    def bend(self, target: Vector, up: Vector) -> Joints:
-        """The arm that reaches as far as `target`, in the frame of its chord: that frame times the first is the
-        shoulder's rotation.
-
-        `up` is the world's up, a unit vector on the axes of vl5. A target out of reach is brought in.
-        """
-        direction = self.direction(target)
-        beta = atan2(vector.dot(direction, up), vector.length(vector.square_to(direction, up)))
-        t0, t1, t2 = self.arm.angles(self.arm.clamp(vector.length(target)), beta)
+    def bend(self, reach: float, bend: float) -> Joints:
+        """The arm that reaches as far as `reach` (arm lengths) with its wrist bent by `bend` radians, in the frame of
+        its chord: that frame times the first is the shoulder's rotation."""
+        t0, t1, t2 = self.arm.close(reach, 0.0, bend)
         first, second, third = self._frames
         share = (t2 - t1) / WRIST_LIMIT
         palm = vector.about((1.0, 0.0, 0.0), self._palm_down * share * share * (3.0 - 2.0 * share))
         elbow = vector.multiply(vector.multiply(_about_z(t1 - t0), palm), vector.conjugate(second))
         wrist = vector.multiply(vector.multiply(_about_z(t2 - t1), palm), vector.conjugate(third))
         return (
-            vector.multiply(_about_z(t0 - beta), vector.conjugate(first)),
+            vector.multiply(_about_z(t0), vector.conjugate(first)),
             vector.normalise(vector.multiply(first, elbow)),
             vector.normalise(vector.multiply(vector.multiply(second, vector.conjugate(palm)), wrist)),
         )
 
     def hang(self, target: Vector, up: Vector, normal: Vector | None = None) -> Joints:
-        """The arm with its tip at `target`, in the plane of `normal` (by default the vertical one).
+        """The arm with its tip at `target` as gravity alone has it, in the plane of `normal` (by default the vertical).
 
         `up` is the world's up and `normal` the axis of the elbow's bend, unit vectors on the axes of vl5; `normal` is
         square to the target. A target out of reach is brought in, its direction kept.
@@ -157,7 +154,8 @@ class ArmRig:
         if normal is None:
             ahead = vector.unit(vector.square_to(FORWARDS, up), UP)
             normal = vector.unit(vector.square_to(vector.cross(ahead, up), direction), vector.across(direction))
-        shoulder, elbow, wrist = self.bend(target, up)
+        reach = self.arm.clamp(vector.length(target))
+        shoulder, elbow, wrist = self.bend(reach, self.arm.bend(reach, elevation(direction, up)))
         return (vector.normalise(vector.multiply(self.chord(direction, normal), shoulder)), elbow, wrist)
 
 

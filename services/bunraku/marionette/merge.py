@@ -11,14 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bunraku.marionette import handover, vector
-from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.handover import HandMix, Handover
-from bunraku.marionette.limbs import ArmRig, Joints, LegRig, Limb, Pose
-from bunraku.marionette.ownership import Grant, Input, Ownership, Refusal
-from bunraku.marionette.plane import Plane
-from bunraku.marionette.steering import Steering
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.handover import Handover
+from bunraku.marionette.limbs import Joints, Limb, Pose
+from bunraku.marionette.ownership import Grant, Input, Outcome, Ownership, Refusal
+from bunraku.marionette.pulled import PulledHand, PulledLeg
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 
@@ -48,60 +44,12 @@ def apply(rotations: Array, overlay: Overlay | None) -> Array:
     return merged
 
 
-class _PulledHand:
-    def __init__(self, figure: Figure, limb: Limb) -> None:
-        self.rig = ArmRig(figure, limb)
-        self._hand: Vector | None = None
-        self._plane: Plane | None = None
-        self._mix = HandMix()
-        self._blend = ArmBlend(self.rig)
-
-    def rest(self) -> None:
-        self._hand = self._plane = None
-        self._mix = HandMix()
-        self._blend = ArmBlend(self.rig)
-
-    def pose(self, pose: Pose, steering: Steering, weight: float, now: int, seconds: float) -> Joints:
-        rig = self.rig
-        dance = rig.dance(pose)
-        own = rig.target(dance)
-        steering.begin(own, now)
-        steering.advance(now)
-        wanted = steering.value or own
-        self._hand = handover.follow_hand(self._hand or own, wanted, rig.arm, seconds)
-        target, turn = self._mix.mix(own, self._hand, weight)
-        direction, up = rig.direction(target), rig.up(pose)
-        if self._plane is None:
-            self._plane = Plane(rig.bend_axis(dance), direction)
-        normal = self._plane.follow(direction, vector.length(target), up, seconds)
-        return self._blend.joints(dance, rig.bend(target, up), target, turn, normal, weight)
-
-
-class _PulledLeg:
-    def __init__(self, figure: Figure, limb: Limb) -> None:
-        self.rig = LegRig(figure, limb)
-        self._theta: float | None = None
-
-    def rest(self) -> None:
-        self._theta = None
-
-    def pose(self, pose: Pose, steering: Steering, weight: float, now: int, seconds: float) -> Joints:
-        own = self.rig.angle(pose)
-        steering.begin((own, 0.0, 0.0), now)
-        steering.advance(now)
-        wanted = steering.value[0] if steering.value else own
-        start = own if self._theta is None else self._theta
-        self._theta = handover.follow_thigh(start, wanted, seconds)
-        theta = own + weight * (self._theta - own)
-        return handover.mix_joints(self.rig.dance(pose), self.rig.hang(theta, pose), weight)
-
-
 class Marionette:
     """One puppet: who holds its limbs, and the overlay that follows from it."""
 
-    def __init__(self, figure: Figure) -> None:
-        """As `set_figure`."""
-        self._ownership = Ownership()
+    def __init__(self, figure: Figure, epochs: tuple[int, ...] = (0, 0, 0, 0)) -> None:
+        """As `set_figure`; `epochs` are those that a puppet at rest had, to go on from."""
+        self._ownership = Ownership(epochs)
         self._handovers = {limb: Handover() for limb in Limb}
         self._last: int | None = None
         self.set_figure(figure)
@@ -112,8 +60,8 @@ class Marionette:
         The first arm of its proportions takes a tenth of a second, to build its table. Raises `ProportionsError` for a
         figure whose arms are too short to hang, and changes nothing.
         """
-        limbs: dict[Limb, _PulledHand | _PulledLeg] = {
-            limb: _PulledHand(figure, limb) if limb.is_hand else _PulledLeg(figure, limb) for limb in Limb
+        limbs: dict[Limb, PulledHand | PulledLeg] = {
+            limb: PulledHand(figure, limb) if limb.is_hand else PulledLeg(figure, limb) for limb in Limb
         }
         self._limbs = limbs
 
@@ -137,8 +85,20 @@ class Marionette:
         """The puppeteer still holds `limbs`, without a new input."""
         self._ownership.alive(puppeteer, list(limbs), now)
 
-    def input(self, puppeteer: str, given: Input, now: int) -> bool:
-        """Takes an input; False if it moves nothing (another's limb, another epoch, not a new sequence).
+    def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
+        """Asks for a limb that another holds, or no longer; whether the asks have changed."""
+        return self._ownership.ask(limb, puppeteer, wanted, now)
+
+    def asks(self) -> tuple[tuple[str, ...], ...]:
+        """Of each limb the ids of those who ask for it, first come first."""
+        return self._ownership.asks()
+
+    def settle(self, now: int) -> tuple[list[tuple[str, Grant]], bool]:
+        """Grants free limbs to those who asked first: whose and what, and whether any asks have changed."""
+        return self._ownership.settle(now)
+
+    def input(self, puppeteer: str, given: Input, now: int) -> Outcome:
+        """Takes an input, or says why it moves nothing.
 
         Raises `ValueError` for an input no controller gives: numbers that are not finite, an unknown kind.
         """
@@ -148,26 +108,52 @@ class Marionette:
         """Lets go the limbs whose holders have fallen silent; says which, and whose they were."""
         return self._ownership.expire(now)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the dance is alone: nobody holds a limb, and all are back."""
+        return all(steering is None for steering in map(self._ownership.steering, Limb))
+
+    @property
+    def epochs(self) -> tuple[int, ...]:
+        """Of each limb the epoch of its last grant."""
+        return tuple(map(self._ownership.epoch, Limb))
+
+    def see(self, rotations: Array, now: int) -> None:
+        """The dance's pose before the first that `overlay` is asked for after a rest. Two of them, a frame apart, let a
+        limb that is taken in motion go on from there at the speed it has."""
+        seconds = self._step(now)
+        pose: Pose = rotations.tolist()
+        for limb in self._limbs.values():
+            limb.see(pose, seconds)
+
+    def _step(self, now: int) -> float:
+        seconds = 0.0 if self._last is None else min(max(now - self._last, 0) * 1e-6, LONGEST_STEP)
+        self._last = now
+        return seconds
+
     def overlay(self, rotations: Array, now: int) -> Overlay | None:
         """What lies over the dance's pose (18, 4), local quaternions, at clock time `now`; None if no limb is pulled.
 
-        Call it once for each pose that is shown, in order: blends and planes move on by the time between calls.
+        Call it once for each pose that is shown, in order: limbs move on by the time between calls.
         """
-        seconds = 0.0 if self._last is None else min(max(now - self._last, 0) * 1e-6, LONGEST_STEP)
-        self._last = now
+        seconds = self._step(now)
         pulled: list[Limb] = []
         turned: list[Joints] = []
-        pose: Pose | None = None
+        pose: Pose = rotations.tolist()
         for limb, holder in zip(Limb, self._ownership.holders(), strict=True):
-            hand = self._handovers[limb]
+            hand, puppet = self._handovers[limb], self._limbs[limb]
             hand.advance(holder is not None, seconds)
+            puppet.see(pose, seconds)
             steering = self._ownership.steering(limb)
-            if steering is None or (holder is None and hand.progress == 0.0):
-                self._ownership.forget(limb)
-                self._limbs[limb].rest()
+            if steering is None:
                 continue
-            if pose is None:
-                pose = rotations.tolist()
+            steering.begin(puppet.place)
+            wanted = steering.value(now) if holder is not None else None
+            joints = puppet.pull(pose, wanted, hand.weight, seconds)
+            if joints is None:
+                self._ownership.forget(limb)
+                puppet.rest()
+                continue
             pulled.append(limb)
-            turned.append(self._limbs[limb].pose(pose, steering, hand.weight, now, seconds))
+            turned.append(joints)
         return Overlay(tuple(pulled), np.array(turned)) if pulled else None

@@ -1,20 +1,24 @@
-"""Who holds which limb: claims, epochs, inputs, and what happens when a puppeteer falls silent.
+"""Who holds which limb: claims, asks, epochs, inputs, and what happens when a puppeteer falls silent.
 
 A limb has at most one holder. Every grant has a new epoch, and inputs of another epoch move nothing, so that what a
-former holder sent late is harmless. Times are clock time in µs and come in as arguments.
+former holder sent late is harmless. A held limb can be asked for; nothing is taken by force, but who asked first gets
+it when it becomes free. Times are clock time in µs and come in as arguments.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import Enum
 from typing import Literal
 
 from bunraku.marionette.limbs import Limb
-from bunraku.marionette.steering import Kind, Steering
+from bunraku.marionette.steering import Kind, Late, Steering
 from bunraku.marionette.vector import Vector
 
 LOST_AFTER = 500_000
 """Without a word from its holder for this many µs a limb returns to the dance."""
+ASK_LASTS = 20_000_000
+"""An ask is forgotten after this many µs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +44,7 @@ class Input:
     """One sample of a controller, as message 70 of the contract.
 
     `values` of a hand: arm lengths on the axes of vl5 from the shoulder, or as velocity -1..1 of full speed; of a leg
-    the first is the thigh's angle in radians, or -1..1 of full speed. `sampled` is clock time in µs.
+    the first is the thigh's angle in radians, or -1..1 of full speed. `sampled` is in µs, on the sender's clock.
     """
 
     limb: int
@@ -51,12 +55,25 @@ class Input:
     values: Vector
 
 
+class Outcome(Enum):
+    """What became of an input."""
+
+    TAKEN = "taken"
+    """It counts."""
+    REACH = "reach"
+    """It counts, brought within reach."""
+    OWNER = "owner"
+    """It moves nothing: the limb is another's, or nobody's."""
+    LATE = "late"
+    """It moves nothing: of an epoch before, a duplicate, or too late."""
+
+
 @dataclass(slots=True)
 class _Hold:
     holder: str | None = None
     epoch: int = 0
-    sequence: int = -1
     steering: Steering | None = None
+    asks: dict[str, int] = field(default_factory=dict)
 
     def free(self, now: int) -> None:
         self.holder = None
@@ -67,12 +84,16 @@ class _Hold:
 class Ownership:
     """The four limbs of one puppet and their holders."""
 
-    def __init__(self) -> None:
-        self._holds = {limb: _Hold() for limb in Limb}
+    def __init__(self, epochs: tuple[int, ...] = (0, 0, 0, 0)) -> None:
+        self._holds = {limb: _Hold(epoch=epoch) for limb, epoch in zip(Limb, epochs, strict=True)}
 
     def holders(self) -> tuple[str | None, ...]:
         """The holder's id of each limb, or None."""
         return tuple(hold.holder for hold in self._holds.values())
+
+    def asks(self) -> tuple[tuple[str, ...], ...]:
+        """Of each limb the ids of those who ask for it, first come first."""
+        return tuple(tuple(hold.asks) for hold in self._holds.values())
 
     def epoch(self, limb: Limb) -> int:
         """The epoch of the limb's last grant; 0 before the first."""
@@ -89,13 +110,40 @@ class Ownership:
         hold = self._holds[Limb(limb)]
         if hold.holder not in (None, puppeteer):
             return Refusal(limb, hold.holder, "held")
-        # a limb still on its way back to the dance is taken where the last hand left it
-        left = hold.steering.value if hold.steering else None
+        hold.asks.pop(puppeteer, None)
         hold.holder = puppeteer
         hold.epoch += 1
-        hold.sequence = -1
-        hold.steering = Steering(Limb(limb), now, left)
+        hold.steering = Steering(Limb(limb).is_hand, now)
         return Grant(Limb(limb), hold.epoch)
+
+    def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
+        """Asks for a limb that another holds, or no longer; whether the asks have changed."""
+        if limb not in Limb.__members__.values():
+            return False
+        hold = self._holds[Limb(limb)]
+        if not wanted:
+            return hold.asks.pop(puppeteer, None) is not None
+        if hold.holder in (None, puppeteer):
+            return False
+        new = puppeteer not in hold.asks
+        hold.asks[puppeteer] = now + ASK_LASTS
+        return new
+
+    def settle(self, now: int) -> tuple[list[tuple[str, Grant]], bool]:
+        """Grants free limbs to those who asked first: whose and what, and whether any asks have changed. Asks that are
+        too old are forgotten."""
+        grants: list[tuple[str, Grant]] = []
+        changed = False
+        for limb, hold in self._holds.items():
+            for old in [who for who, until in hold.asks.items() if until <= now]:
+                del hold.asks[old]
+                changed = True
+            if hold.holder is None and hold.asks:
+                first = next(iter(hold.asks))
+                grant = self.claim(limb, first, now)
+                assert isinstance(grant, Grant)
+                grants.append((first, grant))
+        return grants, changed or bool(grants)
 
     def release(self, limb: int, puppeteer: str, epoch: int, now: int) -> bool:
         """Frees a limb; False, and nothing changes, if it is not this puppeteer's at this epoch."""
@@ -106,10 +154,12 @@ class Ownership:
         return True
 
     def leave(self, puppeteer: str, now: int) -> tuple[Limb, ...]:
-        """Frees all that a puppeteer holds; says which limbs."""
+        """Frees all that a puppeteer holds and forgets what it asked for; says which limbs became free."""
         freed = tuple(limb for limb, hold in self._holds.items() if hold.holder == puppeteer)
         for limb in freed:
             self._holds[limb].free(now)
+        for hold in self._holds.values():
+            hold.asks.pop(puppeteer, None)
         return freed
 
     def alive(self, puppeteer: str, limbs: list[int], now: int) -> None:
@@ -119,19 +169,19 @@ class Ownership:
             if hold is not None and hold.steering is not None:
                 hold.steering.hear(now)
 
-    def input(self, puppeteer: str, given: Input, now: int) -> bool:
-        """Takes an input; False, and nothing moves, if the limb is not this puppeteer's at this epoch, or the sequence
-        is not above the last. Raises `ValueError` for numbers that are not finite or an unknown kind."""
+    def input(self, puppeteer: str, given: Input, now: int) -> Outcome:
+        """Takes an input, or says why not. Raises `ValueError` for numbers that are not finite or an unknown kind."""
         kind = Kind(given.kind)
         hold = self._held(given.limb, puppeteer)
-        if hold is None or hold.steering is None or hold.epoch != given.epoch or given.sequence <= hold.sequence:
-            return False
-        if kind is Kind.TARGET:
-            hold.steering.target(given.values, given.sampled, now)
-        else:
-            hold.steering.velocity(given.values, given.sampled, now)
-        hold.sequence = given.sequence
-        return True
+        if hold is None or hold.steering is None:
+            return Outcome.OWNER
+        if hold.epoch != given.epoch:
+            return Outcome.LATE
+        try:
+            within = hold.steering.input(kind, given.values, given.sequence, given.sampled, now)
+        except Late:
+            return Outcome.LATE
+        return Outcome.TAKEN if within else Outcome.REACH
 
     def expire(self, now: int) -> list[tuple[Limb, str]]:
         """Frees the limbs whose holders have been silent for `LOST_AFTER`; says which, and whose they were."""

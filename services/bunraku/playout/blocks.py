@@ -1,10 +1,15 @@
-"""The blocks a viewer holds, and the dance's pose at any instant (SPEC.md, Motion block)."""
+"""The blocks a viewer holds, and what they show at any instant (SPEC.md, Motion block and Scene block)."""
 
 from __future__ import annotations
+
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from bunraku.codec.decode import MotionBlock
+from bunraku.codec.scene import SceneTrack
+from bunraku.codec.scene_decode import SceneBlock
+from bunraku.codec.timing import Timing
 from bunraku.codec.track import MotionTrack
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -13,14 +18,24 @@ Pose = tuple[Array, Array]
 """Root position (3,) in metres and joint rotations (18, 4), each in its parent's frame."""
 
 
-class BlockStore:
-    """Decoded blocks of one motion, of each the best rate that came."""
+class _Block(Protocol):
+    @property
+    def frames(self) -> int:
+        """Frames of the block."""
 
-    def __init__(self, track: MotionTrack) -> None:
+
+Block = TypeVar("Block", bound=_Block)
+Track = TypeVar("Track", bound=Timing)
+
+
+class _Store(Generic[Track, Block]):
+    """Decoded blocks of one track, of each the best rate that came."""
+
+    def __init__(self, track: Track) -> None:
         self.track = track
-        self._blocks: dict[int, tuple[int, MotionBlock]] = {}
+        self._blocks: dict[int, tuple[int, Block]] = {}
 
-    def put(self, index: int, rate: int, block: MotionBlock) -> bool:
+    def put(self, index: int, rate: int, block: Block) -> bool:
         """Keep a block unless a better one is here; whether it was kept. One that does not fit the track is refused
         with ValueError."""
         if not 0 <= index < self.track.blocks or block.frames != self.track.frames_in(index):
@@ -45,29 +60,83 @@ class BlockStore:
             end = turn * track.duration_us + min(track.start_us(block + 1), track.duration_us)
         return max(end - position, 0)
 
-    def pose_at(self, position: int, loop: bool = True) -> Pose | None:
-        """The pose at motion time `position` in microseconds, None where its block is missing.
-
-        Between the last frame of a block and the first of the next it is the mix of the two where the next is here, at
-        the end of a loop too.
-        """
+    def _at(self, position: int, loop: bool) -> tuple[Block, float, Block | None] | None:
+        """The block at motion time `position` and the instant in it, in frames from its first; past its last frame
+        also the block that follows, where that is here. None where the block is missing."""
         track = self.track
         index = track.block_at(position)
         if index not in self._blocks:
             return None
         block = self._blocks[index][1]
         instant = position * track.fps / 1e6 - track.first_frame(index)
-        past = instant - (block.frames - 1)
         following = index + 1 if index + 1 < track.blocks else 0 if loop else -1
-        if past <= 0 or following not in self._blocks:
-            root, rotations = block.at(np.clip(instant, -0.5, block.frames - 0.5))
+        if instant <= block.frames - 1 or following not in self._blocks:
+            return block, min(max(instant, -0.5), block.frames - 0.5), None
+        return block, instant, self._blocks[following][1]
+
+
+class BlockStore(_Store[MotionTrack, MotionBlock]):
+    """Decoded blocks of one motion, of each the best rate that came."""
+
+    def pose_at(self, position: int, loop: bool = True) -> Pose | None:
+        """The pose at motion time `position` in microseconds, None where its block is missing.
+
+        Between the last frame of a block and the first of the next it is the mix of the two where the next is here, at
+        the end of a loop too.
+        """
+        found = self._at(position, loop)
+        if found is None:
+            return None
+        block, instant, following = found
+        if following is None:
+            root, rotations = block.at(instant)
             return root[0], rotations[0]
-        (root, rotations), (next_root, next_rotations) = (
-            block.at(block.frames - 1.0),
-            self._blocks[following][1].at(0.0),
-        )
-        mix = min(past, 1.0)
+        (root, rotations), (next_root, next_rotations) = block.at(block.frames - 1.0), following.at(0.0)
+        mix = min(instant - (block.frames - 1), 1.0)
         return (
             root[0] + mix * (next_root[0] - root[0]),
             rotation.slerp(rotations[0], next_rotations[0], np.full(len(rotations[0]), mix)),
         )
+
+    def rotations_at(self, positions: list[int], loop: bool = True) -> list[Array | None]:
+        """The rotations (18, 4) of `pose_at` at some motion times at once, which costs little more than one."""
+        found: list[Array | None] = [None] * len(positions)
+        together: dict[int, tuple[MotionBlock, list[int], list[float]]] = {}
+        for nth, position in enumerate(positions):
+            place = self._at(position, loop)
+            if place is None:
+                continue
+            block, instant, following = place
+            if following is not None:
+                pose = self.pose_at(position, loop)
+                found[nth] = None if pose is None else pose[1]
+            else:
+                _, members, instants = together.setdefault(id(block), (block, [], []))
+                members.append(nth)
+                instants.append(instant)
+        for block, members, instants in together.values():
+            for nth, rotations in zip(members, block.at(np.array(instants))[1], strict=True):
+                found[nth] = rotations
+        return found
+
+
+class SceneStore(_Store[SceneTrack, SceneBlock]):
+    """Decoded blocks of one camera or light, of each the best rate that came."""
+
+    def scene_at(self, position: int, loop: bool, duration: int) -> Array | None:
+        """The seven numbers (7,) at `position` of a motion of `duration` microseconds, None where the block is missing.
+
+        Between blocks they are the linear mix, at the end of a loop too where the track is as long as the motion; past
+        the end of a shorter one they stand still.
+        """
+        whole = self.track.duration_us + 1e6 / self.track.fps > duration
+        found = self._at(position, loop and whole)
+        if found is None:
+            return None
+        block, instant, following = found
+        if following is None:
+            values: Array = block.at(instant)[0]
+            return values
+        last, first = block.at(block.frames - 1.0)[0], following.at(0.0)[0]
+        mixed: Array = last + min(instant - (block.frames - 1), 1.0) * (first - last)
+        return mixed

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
+from math import atan2, sqrt
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.wire.messages import Overlay
 
+Quaternion = Sequence[float]
 JOINTS: tuple[tuple[int, int, int], ...] = ((12, 13, 14), (15, 16, 17), (2, 3, 4), (6, 7, 8))
 """The joints of each limb."""
 UNIT = np.pi / 32767
@@ -26,9 +29,12 @@ class Overlays:
         self._overlays: deque[Overlay] = deque(maxlen=KEPT)
 
     def put(self, overlay: Overlay) -> None:
-        """Take in an overlay; one that is not due after the last is ignored."""
-        if not self._overlays or overlay.due > self._overlays[-1].due:
-            self._overlays.append(overlay)
+        """Take in an overlay, frame by frame; one that is not due after the last is ignored."""
+        frames = (*overlay.earlier, overlay.limbs)
+        for nth, limbs in enumerate(frames):
+            due = overlay.due - (len(frames) - 1 - nth) * Overlay.FRAME
+            if not self._overlays or due > self._overlays[-1].due:
+                self._overlays.append(Overlay(overlay.sequence, due, limbs))
 
     def lay(self, rotations: Array, clock: int) -> Array:
         """The dance's pose (18, 4) at `clock` with the pulled limbs over it.
@@ -42,8 +48,11 @@ class Overlays:
                 after = overlay
                 break
             before = overlay
-        if before is None or (after is None and clock - before.due > LASTS):
+        if before is None or clock - before.due > LASTS:
             return rotations
+        if after is not None and after.due - before.due > LASTS:
+            # the first after a silence begins when it is due
+            after = None
         merged = rotations.copy()
         for limb, numbers in (after or before).limbs.items():
             joints = list(JOINTS[limb])
@@ -56,10 +65,17 @@ class Overlays:
         return merged
 
 
-def pack_joints(rotations: Array) -> tuple[int, ...]:
-    """Three joints' rotations (3, 4) as an overlay's nine numbers."""
-    numbers = np.round(rotation.to_rotation_vector(rotations) / UNIT)
-    return tuple(map(int, np.clip(numbers, -32767, 32767).ravel()))
+def pack_joints(rotations: Sequence[Quaternion]) -> tuple[int, ...]:
+    """Three joints' unit quaternions as an overlay's nine numbers; in plain floats, as it is done at the stage's
+    rate."""
+    numbers: list[int] = []
+    for w, x, y, z in rotations:
+        sine = sqrt(x * x + y * y + z * z)
+        # of the two quaternions of a rotation the one that turns by less than half a round
+        angle = 2.0 * atan2(sine, w) if w >= 0.0 else -2.0 * atan2(sine, -w)
+        scale = angle / (sine * UNIT) if sine > 1e-12 else 2.0 / UNIT
+        numbers += (round(min(max(part * scale, -32767.0), 32767.0)) for part in (x, y, z))
+    return tuple(numbers)
 
 
 def unpack_joints(numbers: tuple[int, ...]) -> Array:

@@ -1,12 +1,17 @@
 """Which block goes to a viewer next, and when (design.md, The line).
 
-The server pushes ahead of the play position: the first block at the lowest rate, so that something moves at once, then
-what lies within `AHEAD` at the chosen rate. What a viewer already has is not sent again.
+The server pushes ahead of the play position: the motion's first block at the lowest rate, so that something moves at
+once, then the camera and light that go with it, then what lies within `AHEAD` at the chosen rate, the soonest first and
+the motion first where several are due; last, better versions of what was sent. What a viewer already has is not sent
+again.
 """
 
 from __future__ import annotations
 
-from bunraku.codec.track import MotionTrack
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bunraku.codec.timing import Timing
 from bunraku.playout.timeline import position_at
 from bunraku.wire.messages import TimelineState
 
@@ -16,42 +21,82 @@ UPGRADE = 500_000
 """A better version of a block that a viewer has is worth sending only if it can still be decoded before it is shown."""
 
 
+@dataclass(frozen=True, slots=True)
+class Paced:
+    """A track that is sent: its index in the Description, when its blocks are, and how many rates it has. The blocks of
+    a `base` track come first, and the first of them at the lowest rate: the motion's."""
+
+    number: int
+    timing: Timing
+    rates: int
+    base: bool
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Due:
+    """A block to be sent, those to be sent first being the least: whether it only betters one that was sent, how long
+    until it is shown in microseconds, whether it can wait for others of the same instant, and which one it is."""
+
+    better: bool
+    distance: int
+    beside: bool
+    track: int
+    index: int
+    rate: int
+
+
 class Pacer:
-    """What one viewer has been sent of one motion."""
+    """What one viewer has been sent of one motion's tracks."""
 
-    def __init__(self, track: MotionTrack, rates: int) -> None:
-        if rates < 1:
-            raise ValueError("a motion has one rate at least")
-        self._track = track
-        self._rates = rates
-        self._sent: dict[int, int] = {}
+    def __init__(self, tracks: Sequence[Paced]) -> None:
+        """Raises ValueError for a track without rates."""
+        if any(track.rates < 1 for track in tracks):
+            raise ValueError("a track has one rate at least")
+        self._tracks = tracks
+        self._sent: dict[tuple[int, int], int] = {}
 
-    def next(self, state: TimelineState, clock: int, rate: int) -> tuple[int, int] | None:
-        """Index and rate of the block to send now, None when enough is on its way.
+    def next(self, state: TimelineState, clock: int, rate: int) -> Due | None:
+        """The block to send now, None when enough is on its way.
 
-        A block counts as sent once it was returned. `rate` is the wanted rate, kept within those there are.
+        A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has.
         """
-        rate = min(max(rate, 0), self._rates - 1)
         position = position_at(state, clock)
-        first = self._track.block_at(position)
-        if first not in self._sent:
-            self._sent[first] = 0
-            return first, 0
-        for count in range(self._track.blocks):
-            index, turn = (first + count) % self._track.blocks, (first + count) // self._track.blocks
-            distance = self._track.start_us(index) + turn * self._track.duration_us - position
-            if distance > AHEAD or (turn and not state.loop):
-                break
-            if index not in self._sent or (self._sent[index] < rate and distance > UPGRADE):
-                self._sent[index] = rate
-                return index, rate
-        return None
+        found = [due for track in self._tracks if (due := self._due(track, state, position, rate)) is not None]
+        if not found:
+            return None
+        due = min(found)
+        self._sent[due.track, due.index] = due.rate
+        return due
 
     def wait(self, state: TimelineState, clock: int) -> int | None:
         """Microseconds until the next block comes within reach, None while nothing moves."""
-        if not state.playing:
+        if not state.playing or not self._tracks:
             return None
-        track = self._track
-        reach = (position_at(state, clock) + AHEAD) % track.duration_us
-        following = track.block_at(reach) + 1
-        return (track.start_us(following) if following < track.blocks else track.duration_us) - reach + 1_000
+        reach = (position_at(state, clock) + AHEAD) % state.duration
+        return min(_following(track.timing, reach, state.duration) for track in self._tracks) - reach + 1_000
+
+    def _due(self, track: Paced, state: TimelineState, position: int, rate: int) -> Due | None:
+        """What is to be sent first of one track."""
+        timing, rate = track.timing, min(max(rate, 0), track.rates - 1)
+        # a track may be shorter or longer than the motion, and turns with it
+        blocks = timing.block_at(state.duration - 1) + 1
+        first = min(timing.block_at(position), blocks - 1)
+        better = None
+        for count in range(blocks):
+            turn, index = divmod(first + count, blocks)
+            distance = max(timing.start_us(index) + turn * state.duration - position, 0)
+            if distance > AHEAD or (turn and not state.loop):
+                break
+            sent = self._sent.get((track.number, index))
+            if sent is None:
+                quick = track.base and count == 0
+                return Due(False, distance, not track.base, track.number, index, 0 if quick else rate)
+            if sent < rate and distance > UPGRADE and better is None:
+                better = Due(True, distance, not track.base, track.number, index, rate)
+        return better
+
+
+def _following(timing: Timing, reach: int, duration: int) -> int:
+    """When the block after the one at `reach` starts, or the motion anew; microseconds."""
+    following = timing.block_at(reach) + 1
+    return min(timing.start_us(following), duration) if following < timing.blocks else duration

@@ -15,10 +15,9 @@ from bunraku.backing.sockets import Refusal
 from bunraku.playout import timeline
 from bunraku.stream import viewers
 from bunraku.stream.sessions import WatchedSessions
-from bunraku.stream.viewers import Viewer
+from bunraku.stream.viewers import TRACKS, Viewer
 
 IMMUTABLE = {"Cache-Control": "public, max-age=31536000, immutable"}
-TRACKS = ("motion", "audio", "camera", "light")
 
 RateQuery = Annotated[int | None, Query(ge=0, le=15)]
 TracksQuery = Annotated[str, Query(max_length=64)]
@@ -42,9 +41,13 @@ def create_app(backing: Backing) -> FastAPI:
         return Response((await stored(motion)).description, media_type=_BYTES, headers=IMMUTABLE)
 
     @app.get("/v1/motions/{motion}/blocks/{rate}/{index}", tags=["blocks"], response_class=Response)
-    async def block(motion: str, rate: int, index: int) -> Response:
-        """One Data message (message 3): the same bytes as over a socket, to be kept for ever."""
-        packets = (await stored(motion)).packets
+    async def block(motion: str, rate: int, index: int, track: int = 0) -> Response:
+        """One Data message (message 3): the same bytes as over a socket, to be kept for ever. `track` is the track's
+        index in the Description: 0 is the motion."""
+        tracks = (await stored(motion)).packets
+        if not 0 <= track < len(tracks):
+            raise ProblemError(404, "No such track", f"tracks are 0..{len(tracks) - 1}", field="track")
+        packets = tracks[track]
         if not (0 <= rate < len(packets) and 0 <= index < len(packets[rate])):
             raise ProblemError(
                 404, "No such block", f"rates are 0..{len(packets) - 1}, blocks 0..{len(packets[0]) - 1}"
@@ -57,7 +60,7 @@ def create_app(backing: Backing) -> FastAPI:
     ) -> None:
         try:
             await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wants_motion(tracks))
+            viewer = Viewer(backing.library, rate, _wanted(tracks))
             found = await backing.library.get(motion)
             if found is None:
                 raise Refusal(sockets.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
@@ -72,7 +75,7 @@ def create_app(backing: Backing) -> FastAPI:
     async def watch_session(socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "") -> None:
         try:
             await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wants_motion(tracks))
+            viewer = Viewer(backing.library, rate, _wanted(tracks))
             try:
                 await sessions.join(session, viewer)
             except NobodyAnswers:
@@ -90,10 +93,11 @@ def create_app(backing: Backing) -> FastAPI:
 _BYTES = "application/octet-stream"
 
 
-def _wants_motion(tracks: str) -> bool:
-    """Whether `tracks` asks for motion; raises `Refusal` for a name that is no track."""
-    wanted = [name for name in tracks.split(",") if name]
+def _wanted(tracks: str) -> tuple[str, ...]:
+    """The types of tracks that `tracks` asks for, all of them where it names none; raises `Refusal` for a name that is
+    no track."""
+    wanted = tuple(name for name in tracks.split(",") if name)
     unknown = [name for name in wanted if name not in TRACKS]
     if unknown:
         raise Refusal(sockets.BROKEN, "Unknown track", f"tracks are {', '.join(TRACKS)}, not {unknown[0]!r}")
-    return not wanted or "motion" in wanted
+    return wanted or TRACKS

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Container
 
 from starlette.websockets import WebSocket
 
@@ -17,9 +17,11 @@ from bunraku import __version__
 from bunraku.backing.backing import clock
 from bunraku.backing.library import Library, StoredMotion
 from bunraku.backing.sockets import BROKEN, NOT_FOUND, TOO_SLOW, Refusal, converse, receive
+from bunraku.codec.coefficients import SCENE_CHANNELS
+from bunraku.codec.scene import SceneTrack
 from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.playout import timeline
-from bunraku.playout.pacing import Pacer
+from bunraku.playout.pacing import Paced, Pacer
 from bunraku.playout.rate import RateChoice
 from bunraku.wire.messages import (
     ChannelHeader,
@@ -34,15 +36,18 @@ from bunraku.wire.messages import (
 
 QUEUE = 64
 """Messages that may wait for a viewer."""
+TRACKS = ("motion", "audio", "camera", "light")
+"""Types of tracks that a viewer may ask for."""
 
 
 class Viewer:
     """What one viewer has been sent and is still to be sent."""
 
-    def __init__(self, library: Library, pinned: int | None, motion_track: bool = True) -> None:
+    def __init__(self, library: Library, pinned: int | None, wanted: Container[str] = TRACKS) -> None:
+        """`pinned` is the rate to keep to, if any; `wanted` the types of tracks whose blocks are sent."""
         self._library = library
         self._pinned = pinned
-        self._motion_track = motion_track
+        self._wanted = wanted
         self._control: deque[bytes] = deque()
         self._pings: deque[tuple[Ping, int]] = deque(maxlen=8)
         self._overlay: bytes | None = None
@@ -119,10 +124,10 @@ class Viewer:
             motion = await self._library.get(state.motion)
             if motion is None:
                 raise Refusal(NOT_FOUND, "No such motion", f"there is no motion {state.motion[:40]!r}")
-            rates = len(motion.packets)
-            self._motion, self._pacer = motion, Pacer(motion.track, rates) if self._motion_track else None
-            self._rate = RateChoice(rates, self._pinned)
-            await put(ChannelHeader(motion.id, clock(), CHANNEL_COUNT, __version__).pack())
+            self._motion, self._pacer = motion, Pacer(_paced(motion, self._wanted))
+            self._rate = RateChoice(len(motion.dance), self._pinned)
+            channels = sum(SCENE_CHANNELS if isinstance(t, SceneTrack) else CHANNEL_COUNT for t in motion.tracks)
+            await put(ChannelHeader(motion.id, clock(), channels, __version__).pack())
             await put(motion.description)
         await put(state.pack())
 
@@ -131,7 +136,7 @@ class Viewer:
         if state is None or self._pacer is None or self._motion is None or self._rate is None:
             return None
         due = self._pacer.next(state, clock(), self._rate.rate)
-        return None if due is None else self._motion.packets[due[1]][due[0]]
+        return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
     async def _rest(self) -> None:
         """Until something is to be sent again."""
@@ -140,6 +145,16 @@ class Viewer:
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(None if wait is None else wait / 1e6):
                 await self._wake.wait()
+
+
+def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
+    """The tracks of a motion whose blocks a viewer wants."""
+    kinds = [track.kind if isinstance(track, SceneTrack) else "motion" for track in motion.tracks]
+    return [
+        Paced(number, track, len(motion.packets[number]), kind == "motion")
+        for number, (track, kind) in enumerate(zip(motion.tracks, kinds, strict=True))
+        if kind in wanted
+    ]
 
 
 async def serve(socket: WebSocket, viewer: Viewer, private: bool) -> None:

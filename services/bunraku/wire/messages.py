@@ -81,12 +81,14 @@ class TimelineState(_Packed):
 
 @dataclass(frozen=True, slots=True)
 class Presence(_Packed):
-    """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS`."""
+    """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS`, `asks` the ids of those
+    who ask for it, first come first."""
 
     TYPE = 6
     viewers: Count
     puppeteers: list[dict[str, Any]]
     limbs: list[str | None]
+    asks: list[list[str]] = field(default_factory=lambda: [[] for _ in LIMBS])
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +127,17 @@ class Refusal(_Packed):
     limb: Limb
     reason: str
     holder: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Notice(_Packed):
+    """An input was not taken as it came: brought within `reach`, refused for want of an `owner`'s right, or dropped for
+    its `rate`; `reason` is one of these three words, `detail` says it to a person."""
+
+    TYPE = 12
+    limb: Limb
+    reason: str
+    detail: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +187,15 @@ class Alive(_Packed):
 
 
 @dataclass(frozen=True, slots=True)
+class Ask(_Packed):
+    """Asks the holder of a limb for it, or no longer."""
+
+    TYPE = 71
+    limb: Limb
+    wanted: Annotated[bool, Field(strict=True)]
+
+
+@dataclass(frozen=True, slots=True)
 class Data:
     """Block `index` (below 2^21) of one track at one rate."""
 
@@ -203,30 +225,42 @@ class Data:
 
 @dataclass(frozen=True, slots=True)
 class Overlay:
-    """Pulled limbs at clock time `due`: limb -> three rotation vectors of its joints, in units of pi/32767."""
+    """Pulled limbs at clock time `due`: limb -> three rotation vectors of its joints, in units of pi/32767.
+
+    `earlier` are the same limbs in the frames before, oldest first, each `FRAME` µs after the one before it.
+    """
 
     TYPE: ClassVar[int] = 5
+    FRAME: ClassVar[int] = 16_667
+    MOST: ClassVar[int] = 16
     sequence: int
     due: int
     limbs: dict[int, tuple[int, ...]]
+    earlier: tuple[dict[int, tuple[int, ...]], ...] = ()
 
     def pack(self) -> bytes:
-        """The message as bytes: 12 and 18 a limb."""
+        """The message as bytes: 12 and 18 a limb and frame."""
         limbs = sorted(self.limbs)
-        mask = sum(1 << limb for limb in limbs)
-        numbers = [n for limb in limbs for n in self.limbs[limb]]
-        return struct.pack(f"<BBHQ{len(numbers)}h", self.TYPE, mask, self.sequence & 0xFFFF, self.due, *numbers)
+        head = sum(1 << limb for limb in limbs) | len(self.earlier) << 4
+        numbers = [n for frame in (*self.earlier, self.limbs) for limb in limbs for n in frame[limb]]
+        return struct.pack(f"<BBHQ{len(numbers)}h", self.TYPE, head, self.sequence & 0xFFFF, self.due, *numbers)
 
     @classmethod
     def unpack(cls, data: bytes) -> Overlay:
         """The message of `pack`."""
-        if len(data) < 12 or data[1] >= 1 << len(LIMBS):
-            raise MalformedMessage("Overlay has 12 bytes at least and a mask of 4 limbs")
+        if len(data) < 12:
+            raise MalformedMessage("Overlay has 12 bytes at least")
         limbs = [limb for limb in range(len(LIMBS)) if data[1] >> limb & 1]
-        if len(data) != 12 + 18 * len(limbs):
-            raise MalformedMessage(f"Overlay of {len(limbs)} limbs has {12 + 18 * len(limbs)} bytes, not {len(data)}")
-        _, _, sequence, due, *numbers = struct.unpack(f"<BBHQ{9 * len(limbs)}h", data)
-        return cls(sequence, due, {limb: tuple(numbers[9 * i : 9 * i + 9]) for i, limb in enumerate(limbs)})
+        size = 12 + 18 * len(limbs) * ((data[1] >> 4) + 1)
+        if len(data) != size:
+            raise MalformedMessage(f"Overlay of {len(limbs)} limbs has {size} bytes, not {len(data)}")
+        _, head, sequence, due, *numbers = struct.unpack(f"<BBHQ{(size - 12) // 2}h", data)
+        parts = [tuple(numbers[at : at + 9]) for at in range(0, len(numbers), 9)]
+        frames = [
+            dict(zip(limbs, parts[len(limbs) * frame : len(limbs) * (frame + 1)], strict=True))
+            for frame in range((head >> 4) + 1)
+        ]
+        return cls(sequence, due, frames[-1], tuple(frames[:-1]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,15 +338,15 @@ class Input:
 
 Message = (
     ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-    | Ping | Edit | Report | Claim | Release | Alive | Input
+    | Notice | Ping | Edit | Report | Claim | Release | Alive | Ask | Input
 )  # fmt: skip
 
 _FIXED = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)}
 _MAPS: dict[int, TypeAdapter[Any]] = {
     kind.TYPE: TypeAdapter(kind)
     for kind in (
-        ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Edit, Report, Claim,
-        Release, Alive,
+        ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Edit, Report,
+        Claim, Release, Alive, Ask,
     )
 }  # fmt: skip
 

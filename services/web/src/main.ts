@@ -1,12 +1,15 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
-import { createSession, ProblemError, type Motion } from "./client/library";
+import { createSession, keep, ProblemError, type Motion } from "./client/library";
+import { Holding } from "./holding";
+import type { Commands } from "./input/commands";
 import type { GamepadInput } from "./input/gamepad";
-import type { Hands, Source } from "./input/hands";
-import type { KeyboardInput } from "./input/keyboard";
+import type { Hands } from "./input/hands";
+import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { PointerInput } from "./input/pointer";
-import { holders, LIMB_NAMES, type Holder } from "./page/model";
+import type { VelocityInputs } from "./input/velocity";
+import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
 import { createPage } from "./page/page";
 import { PHONE } from "./page/panels";
@@ -25,17 +28,19 @@ const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvas
 const query = new URLSearchParams(location.search);
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const pieces = new Pieces();
+const name = ownName(query, Math.random());
 
 let stage: Stage | null = null;
 let hands: Hands | null = null;
 let pointer: PointerInput | null = null;
-let keyboard: KeyboardInput | null = null;
+let velocity: VelocityInputs | null = null;
+let commands: Commands | null = null;
 let pad: GamepadInput | null = null;
 let room: Room | null = null;
-let connected = false;
 let focused: number | null = null;
 let invitedAt: number | null = null;
 let theme: ThemeChoice | null = null;
+let mapping = loadMapping();
 
 const page = createPage(document.body, {
   share: () => void share(),
@@ -43,6 +48,17 @@ const page = createPage(document.body, {
   play,
   loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
   seek: (seconds) => room?.seek(seconds, performance.now()),
+  keep: keepThis({
+    keep: (session, called) => keep(session, { name: called, camera: stage?.trail.keyframes() ?? [] }),
+    toast: (message, action) => page.toast(message, action),
+    session: () => room && { id: room.id, piece: pieces.find(room.viewer.motion)?.name ?? "" },
+    puppeteer: name,
+    kept: async () => {
+      await pieces.refresh();
+      renderPieces();
+    },
+    choose: (motion) => void choose(motion),
+  }),
   files: (files) => {
     page.panels.open("library");
     void uploadAll(files, page.library, uploaded);
@@ -51,10 +67,25 @@ const page = createPage(document.body, {
   remove: (piece) => {
     if (confirm(`Remove "${piece.name}" from the library?`)) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
   },
-  toggle: (limb) => (hands?.source(limb) ? hands.letGo(limb) : take(limb, "keys")),
+  toggle: (limb) => holding.toggle(limb),
+  ask: (limb) => holding.ask(limb),
+  withdraw: (limb) => holding.withdraw(limb),
+  give: (limb) => holding.give(limb),
+  select: (limb) => velocity?.hold(limb) && holding.render(),
+  press: (input, down) => {
+    if (down) commands?.press(`page ${input}`, [input], 1, performance.now());
+    else commands?.release(`page ${input}`, performance.now());
+  },
+  mapping: (now) => {
+    mapping = now;
+    saveMapping(now);
+    page.keys.mapping(now);
+    holding.render();
+  },
   focus: (limb) => (focused = limb),
   reframe: resize,
 });
+const holding = new Holding(page, () => mapping);
 theme = createTheme((now) => {
   page.header.theme(now);
   stage?.setTheme(now);
@@ -109,36 +140,6 @@ function renderPieces(): void {
   page.header.piece(pieces.find(room?.viewer.motion ?? null)?.name ?? "");
 }
 
-/** Holders as the session says, and one's own limbs at once, before it has answered. */
-function held(): (Holder | null)[] {
-  const { puppeteer, viewer } = room ?? {};
-  const told = holders(viewer?.presence ?? null, puppeteer?.id ?? null);
-  return told.map((holder, limb) => {
-    if (hands?.source(limb)) return { id: puppeteer?.id ?? "", name: "You", colour: puppeteer?.colour ?? 0, mine: true };
-    return holder?.mine ? null : holder;
-  });
-}
-
-function renderStrings(): void {
-  page.strings.render(held(), connected && room !== null);
-}
-
-function take(limb: number, source: Source): boolean {
-  const holder = held()[limb];
-  if (holder && !holder.mine) {
-    refused(limb);
-    return false;
-  }
-  endInvitation();
-  return hands?.take(limb, source) ?? false;
-}
-
-function refused(limb: number): void {
-  stage?.strings.refuse(limb);
-  const holder = held()[limb];
-  page.toast(holder ? `${holder.name} holds the ${LIMB_NAMES[limb].toLowerCase()}` : `The ${LIMB_NAMES[limb].toLowerCase()} was let go`);
-}
-
 function endInvitation(): void {
   invitedAt = -Infinity;
   page.tags.invite(null);
@@ -160,11 +161,12 @@ function wasInvited(): boolean {
 /** Watches a session, leaving the one before. */
 function enter(id: string): Room {
   room?.close();
-  room = new Room(id, ownName(query, Math.random()), (error) => {
+  stage?.trail.clear();
+  room = new Room(id, name, (error) => {
     page.toast(error instanceof ProblemError ? `${error.title}: ${error.detail}` : String(error));
   });
   const { viewer, puppeteer } = room;
-  if (hands) hands.puppeteer = puppeteer;
+  holding.enter(room);
   const url = new URL(location.href);
   url.searchParams.set("session", id);
   history.replaceState(null, "", url);
@@ -177,26 +179,18 @@ function enter(id: string): Room {
   const renderTimeline = () => page.transport.timeline(viewer.timeline?.playing ?? false, viewer.timeline?.loop ?? false, viewer.timeline !== null);
   viewer.addEventListener("timeline", renderTimeline);
   viewer.addEventListener("blocks", () => page.transport.blocks(viewer.blocks, viewer.rates.length));
-  const renderPeople = () => {
-    page.header.people(viewer.presence, puppeteer.id);
-    renderStrings();
-  };
+  const renderPeople = () => page.header.people(viewer.presence, puppeteer.id);
   viewer.addEventListener("presence", renderPeople);
   puppeteer.addEventListener("welcome", renderPeople);
-  puppeteer.addEventListener("refusal", (event) => {
-    const { limb } = (event as CustomEvent<{ limb: number }>).detail;
-    hands?.refused(limb);
-    refused(limb);
-  });
   viewer.addEventListener("open", () => {
-    connected = true;
+    holding.connected = true;
     page.notice(null);
-    renderStrings();
+    holding.render();
   });
   viewer.addEventListener("closed", (event) => {
-    const wasConnected = connected;
-    connected = false;
-    renderStrings();
+    const wasConnected = holding.connected;
+    holding.connected = false;
+    holding.render();
     const reason = String((event as CustomEvent<string>).detail);
     if (viewer.ended) page.notice("The session has ended", reason);
     else if (wasConnected) page.toast(`The line was lost: ${reason}`);
@@ -218,7 +212,7 @@ function expose(): void {
 }
 
 async function openStage(): Promise<void> {
-  const { createGamepad, createKeyboard, createPointer, Hands, Stage } = await import("./theatre");
+  const { Commands, createGamepad, createPointer, Hands, listenToKeyboard, Stage, VelocityInputs } = await import("./theatre");
   try {
     stage = new Stage(canvas, query.get("quality") === "best");
   } catch {
@@ -229,17 +223,27 @@ async function openStage(): Promise<void> {
   calm.addEventListener("change", () => stage && (stage.still = calm.matches));
   if (theme) stage.setTheme(theme.theme);
   hands = new Hands(stage);
-  hands.changed = renderStrings;
-  pointer = createPointer(canvas, stage, hands, (limb) => !held()[limb], refused);
-  keyboard = createKeyboard(window, hands, {
-    take: (limb) => take(limb, "keys"),
+  hands.changed = () => {
+    if (invitedAt !== -Infinity && [0, 1, 2, 3].some((limb) => hands?.source(limb))) endInvitation();
+    holding.render();
+  };
+  const may = (limb: number) => holding.free(limb);
+  pointer = createPointer(canvas, stage, hands, { may, refused: (limb) => holding.refused(limb), smoothing: () => mapping.pointerSmoothing });
+  velocity = new VelocityInputs(hands, { take: (limb) => holding.take(limb, "velocity"), free: may });
+  commands = new Commands(hands, velocity, {
+    ask: () => holding.ask(),
+    give: () => holding.give(),
     play,
-    step,
-    panel: (name) => page.panels.toggle(name),
-    keys: () => page.keys.show(),
-    escape: () => page.panels.closeLast(),
+    back: () => step(-1),
+    forward: () => step(1),
+    keep: () => page.transport.keep(),
+    library: () => page.panels.toggle("library"),
+    strings: () => page.panels.toggle("strings"),
+    line: () => page.panels.toggle("line"),
   });
-  pad = createGamepad(hands, { take: (limb) => take(limb, "pad"), play, step }, () => navigator.getGamepads());
+  listenToKeyboard(window, commands, velocity, () => mapping, { keys: () => page.keys.show(), escape: () => page.panels.closeLast() });
+  pad = createGamepad(commands, () => mapping, () => navigator.getGamepads());
+  holding.theatre = { hands, velocity, shake: (limb) => stage?.strings.refuse(limb) };
   if (room) {
     hands.puppeteer = room.puppeteer;
     if (room.viewer.figure) stage.setFigure(room.viewer.figure, room.viewer.front);
@@ -260,26 +264,26 @@ function frame(): void {
   const seconds = (now - before) / 1000;
   before = now;
   const { viewer } = room ?? {};
-  pointer?.update();
-  keyboard?.update();
-  pad?.update(now);
+  pointer?.update(now);
+  pad?.update(now, !page.keys.listening);
+  velocity?.update(now);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
   const pose = viewer?.poseAt(now) ?? null;
-  const all = held();
-  const states = all.map((holder, limb): StringState => ({
+  const limbs = holding.limbs();
+  const states = limbs.map(({ holder, selected }, limb): StringState => ({
     holder: holder?.colour ?? null,
-    lit: pointer?.near === limb || focused === limb || keyboard?.limb === limb,
+    lit: pointer?.near === limb || focused === limb || selected,
     pull: hands?.pull(limb) ?? null,
   }));
-  stage.draw(pose, states, seconds);
-  page.tags.render(all, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
+  stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.clockTime(now));
+  page.tags.render(limbs, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
   if (pose) invite(now);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);
   if (viewer && now - sampled >= SAMPLE_EVERY) {
     sampled = now;
     const line = viewer.line();
     page.line.sample(line, viewer.rates.length);
-    page.transport.health(page.line.health(line, connected));
+    page.transport.health(page.line.health(line, holding.connected));
   }
   viewer?.drawn(performance.now() - now);
 }
@@ -321,7 +325,8 @@ async function start(): Promise<void> {
   }
 }
 
-renderStrings();
+page.keys.mapping(mapping);
+holding.render();
 page.transport.health("none");
 void openStage();
 void start();

@@ -1,6 +1,8 @@
 /** Everything that stands on three.js, in one piece: the page is painted before it has come. */
+export { Commands } from "./input/commands";
 export { createGamepad } from "./input/gamepad";
 export { Hands } from "./input/hands";
-export { createKeyboard } from "./input/keyboard";
+export { listenToKeyboard } from "./input/keyboard";
 export { createPointer } from "./input/pointer";
+export { VelocityInputs } from "./input/velocity";
 export { Stage } from "./stage/stage";

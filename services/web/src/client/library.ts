@@ -34,6 +34,24 @@ export interface SessionEdit {
   motion?: string;
 }
 
+/**
+ * Where a camera stood: `time` on the reference clock in microseconds, `position` and the point gazed at in metres in the
+ * dance's frame, the vertical field of view in radians.
+ */
+export interface CameraKeyframe {
+  time: number;
+  position: [number, number, number];
+  gaze: [number, number, number];
+  fov: number;
+}
+
+/** What to keep of a session: the last `seconds` of what it showed, or all that can be kept, with camera moves if any. */
+export interface Recording {
+  name?: string;
+  seconds?: number;
+  camera?: readonly CameraKeyframe[];
+}
+
 /** One page of a list, and the cursor of the next. */
 export interface Page<T> {
   items: T[];
@@ -104,6 +122,11 @@ export function getSession(id: string): Promise<Session> {
 /** Plays, pauses, seeks, loops, or changes the motion, for everyone. */
 export function editSession(id: string, edit: SessionEdit): Promise<Session> {
   return ask("PATCH", `/v1/sessions/${encodeURIComponent(id)}`, edit) as Promise<Session>;
+}
+
+/** Keeps what a session has shown as a new motion; resolves when it can be watched, with seconds of work done. */
+export function keep(session: string, recording: Recording = {}): Promise<Motion> {
+  return ask("POST", `/v1/sessions/${encodeURIComponent(session)}/recordings`, recording) as Promise<Motion>;
 }
 
 /** Where an upload is: on its way, or in the server's hands; and the share of that which is done, 0..1. */

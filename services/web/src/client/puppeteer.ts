@@ -1,18 +1,20 @@
 /** A puppeteer: claims limbs of a session's puppet and says where they should be. */
 
 import { LIMBS, type Pose } from "../motion/skeleton";
-import { type Grant, type Message, type Presence, type Refusal, TARGET, VELOCITY } from "../wire/messages";
+import { type Grant, type Message, type Notice, type Presence, type Refusal, TARGET, VELOCITY } from "../wire/messages";
 import { Connection } from "./connection";
 import { HAND_SPEED, LEG_SPEED, Pull, REACH, THIGH } from "./pull";
 import type { Solver } from "./solver";
 import type { Viewer } from "./viewer";
 
 /** An input of a limb goes out so often at most, milliseconds: the newest wins. */
-const INPUT_EVERY = 33;
+const INPUT_EVERY = 16;
 /** Said so often that a limb is held still, milliseconds. */
 const ALIVE_EVERY = 100;
 /** With more bytes than these waiting for the line, inputs wait too, and the newest goes when it is free. */
 const CROWDED = 512;
+/** An ask for a held limb ends after this, milliseconds (SPEC, Ownership). */
+export const ASK_LASTS = 20_000;
 
 /** One limb as the session knows it. */
 interface Hold {
@@ -29,6 +31,9 @@ interface Hold {
   /** When the last input went out, and when the session last heard of the limb at all; local milliseconds. */
   inputAt: number;
   heardAt: number;
+  /** Whether it is asked of its holder, and whether Presence has shown so; and since when. */
+  ask: "none" | "said" | "listed";
+  askedAt: number;
 }
 
 export interface PuppeteerOptions {
@@ -41,7 +46,8 @@ export interface PuppeteerOptions {
 }
 
 /**
- * Events: "welcome"; "grant" (detail: `{limb}`), "refusal" (detail: `{limb, reason, holder}`), "presence", "closed" (detail: the reason).
+ * Events: "welcome"; "grant" (detail: `{limb, asked}`, asked where it came by asking), "refusal" (detail: `{limb, reason, holder}`), "lapsed" (detail: `{limb, free}`: it
+ * was asked for in vain; `free` where nobody holds it), "notice" (detail: `{limb, reason, detail}`), "presence", "closed" (detail: the reason).
  */
 export class Puppeteer extends EventTarget {
   id: string | null = null;
@@ -64,6 +70,7 @@ export class Puppeteer extends EventTarget {
     this.now = options.now ?? (() => performance.now());
     this.holdings = LIMBS.map((_, limb) => ({
       pull: new Pull(limb), wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], anchored: false, inputAt: 0, heardAt: 0,
+      ask: "none", askedAt: 0,
     }));
     this.connection = new Connection({
       url: () => options.url,
@@ -79,9 +86,7 @@ export class Puppeteer extends EventTarget {
   claim(limb: number): void {
     const hold = this.holdings[limb];
     if (hold.wanted) return;
-    hold.wanted = true;
-    hold.news = "none";
-    hold.pull.take(this.now());
+    this.claimed(hold);
     if (this.id !== null) this.connection.send({ name: "Claim", limb });
   }
 
@@ -91,6 +96,27 @@ export class Puppeteer extends EventTarget {
     if (!hold.wanted) return;
     if (hold.epoch !== null) this.connection.send({ name: "Release", limb, epoch: hold.epoch });
     this.drop(hold);
+  }
+
+  /** Asks the holder of a limb for it: it comes with a grant, unclaimed, or the ask lapses. */
+  ask(limb: number): void {
+    const hold = this.holdings[limb];
+    if (hold.wanted || hold.ask !== "none" || !this.connection.send({ name: "Ask", limb, wanted: true })) return;
+    hold.ask = "said";
+    hold.askedAt = this.now();
+  }
+
+  /** Asks no longer. */
+  withdraw(limb: number): void {
+    const hold = this.holdings[limb];
+    if (hold.ask === "none") return;
+    hold.ask = "none";
+    this.connection.send({ name: "Ask", limb, wanted: false });
+  }
+
+  /** Whether the limb is asked for here. */
+  asks(limb: number): boolean {
+    return this.holdings[limb].ask !== "none";
   }
 
   /** Whether the session has granted the limb. */
@@ -143,7 +169,11 @@ export class Puppeteer extends EventTarget {
         break;
       case "Presence":
         this.presence = message;
+        this.listed(message);
         this.dispatchEvent(new Event("presence"));
+        break;
+      case "Notice":
+        this.noticed(message);
         break;
       case "Grant":
         this.granted(message);
@@ -158,6 +188,9 @@ export class Puppeteer extends EventTarget {
 
   private granted({ limb, epoch }: Grant): void {
     const hold = this.holdings[limb];
+    const asked = !hold.wanted && hold.ask !== "none";
+    hold.ask = "none";
+    if (asked) this.claimed(hold);
     if (!hold.wanted) {
       // let go before the answer came
       this.connection.send({ name: "Release", limb, epoch });
@@ -172,7 +205,32 @@ export class Puppeteer extends EventTarget {
     hold.inputAt = -Infinity;
     hold.heardAt = this.now();
     this.say(hold, this.now());
-    this.dispatchEvent(new CustomEvent("grant", { detail: { limb } }));
+    this.dispatchEvent(new CustomEvent("grant", { detail: { limb, asked } }));
+  }
+
+  private claimed(hold: Hold): void {
+    hold.wanted = true;
+    hold.news = "none";
+    hold.pull.take(this.now());
+  }
+
+  private listed({ asks, limbs }: Presence): void {
+    this.holdings.forEach((hold, limb) => {
+      if (hold.ask === "none") return;
+      if (asks[limb].includes(this.id ?? "")) hold.ask = "listed";
+      // told that it is free, the session did not take the ask: its holder had let go before
+      else if (limbs[limb] === null) this.lapse(hold, true);
+      else if (hold.ask === "listed" && limbs[limb] !== this.id) this.lapse(hold);
+    });
+  }
+
+  private lapse(hold: Hold, free = false): void {
+    hold.ask = "none";
+    this.dispatchEvent(new CustomEvent("lapsed", { detail: { limb: hold.pull.limb, free } }));
+  }
+
+  private noticed({ limb, reason, detail }: Notice): void {
+    this.dispatchEvent(new CustomEvent("notice", { detail: { limb, reason, detail } }));
   }
 
   private refused({ limb, reason, holder }: Refusal): void {
@@ -200,6 +258,8 @@ export class Puppeteer extends EventTarget {
     this.ended = final;
     for (const hold of this.holdings) {
       hold.epoch = null;
+      // whoever goes asks no longer
+      hold.ask = "none";
       if (final) this.drop(hold);
     }
     if (final) clearInterval(this.speaking);
@@ -208,7 +268,11 @@ export class Puppeteer extends EventTarget {
 
   private speak(): void {
     const now = this.now();
-    for (const hold of this.holdings) this.say(hold, now);
+    for (const hold of this.holdings) {
+      this.say(hold, now);
+      // a session that knows of no asking never lists one
+      if (hold.ask === "said" && now - hold.askedAt > ASK_LASTS) this.lapse(hold);
+    }
     const quiet = this.holdings.filter(({ epoch, heardAt }) => epoch !== null && now - heardAt >= ALIVE_EVERY);
     if (quiet.length === 0) return;
     const limbs = quiet.map(({ pull }) => pull.limb);

@@ -1,44 +1,24 @@
 /** A viewer of a motion or a session: what comes over the line, and the pose to draw at any instant. */
 
 import { DamagedBlock } from "../codec/errors";
+import type { SceneTrack } from "../codec/scene";
 import type { Rate } from "../codec/timing";
-import { MotionTrack } from "../codec/track";
 import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
-import { BlockStore } from "../playout/blocks";
+import type { BlockStore } from "../playout/blocks";
 import { ReferenceClock } from "../playout/clock";
 import { Overlays } from "../playout/overlay";
 import { positionAt, Timelines } from "../playout/timeline";
+import { Tracks } from "../playout/tracks";
 import type { Data, Description, Edit, Message, Overlay, Presence, TimelineState } from "../wire/messages";
 import { Connection } from "./connection";
+import type { LineFigures } from "./line-figures";
 import { fetchMarionette } from "./marionette";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
 import type { Solver, SolverOf } from "./solver";
 
 export type Timeline = TimelineState;
-export type { Presence };
-
-/** How the line fares. Numbers that nothing is known of yet are null. */
-export interface LineFigures {
-  /** Index of the rate shown, -1 before the first block. */
-  rate: number;
-  /** Kilobits a second that come, all messages counted. */
-  kbps: number;
-  /** Seconds of motion ready ahead of the play position. */
-  bufferSeconds: number;
-  /** The reference clock minus this machine's own. */
-  clockOffsetMs: number | null;
-  /** How far the clock may be off at most. */
-  clockErrorMs: number | null;
-  /** How late overlays come after they are due; below zero, how early. */
-  latencyMs: number | null;
-  /** From the making of this viewer to its first pose. */
-  firstPoseMs: number | null;
-  /** How often the block needed was missing while playing. */
-  gaps: number;
-  /** Why it is as it is, in plain words. */
-  reason: string;
-}
+export type { LineFigures, Presence };
 
 export interface ViewerOptions {
   /** `ws(s)://.../stream` of a motion or a session. */
@@ -85,8 +65,7 @@ export class Viewer extends EventTarget {
   private readonly reporting: ReturnType<typeof setInterval>;
   private pinging: ReturnType<typeof setTimeout> | undefined;
   private pings = 0;
-  private store: BlockStore | null = null;
-  private trackIndex = 0;
+  private tracks: Tracks | null = null;
   private solver: Solver | null = null;
   private readonly dance = restPose();
   private readonly merged = restPose();
@@ -116,6 +95,10 @@ export class Viewer extends EventTarget {
       onClosed: (reason, final) => this.lost(reason, final),
     });
     this.reporting = setInterval(() => this.report(), REPORT_EVERY);
+  }
+
+  private get store(): BlockStore | null {
+    return this.tracks?.dance ?? null;
   }
 
   /** The dancer's lengths, null before the first Description. */
@@ -185,6 +168,28 @@ export class Viewer extends EventTarget {
     this.overlays.lay(clock, merged);
     if (this.solver) this.puppeteer?.lay(merged, nowMs, this.solver);
     return merged;
+  }
+
+  /** Cameras and lights of the motion, in the Description's order. */
+  get scenes(): readonly SceneTrack[] {
+    return this.tracks?.scenes.map((store) => store.track) ?? [];
+  }
+
+  /**
+   * The seven numbers of the camera or light `scenes[scene]` at local `nowMs` (`proto/SPEC.md`, Scene block); null before there
+   * are any; where the block needed is missing they stand still. The storage is used again by the next call.
+   */
+  sceneAt(nowMs: number, scene = 0): Float64Array | null {
+    const clock = this.clock.at(nowMs * 1000);
+    const timeline = this.timelines.at(clock);
+    if (!timeline || timeline.motion !== this.motion) return null;
+    return this.tracks?.scenes[scene]?.sceneAt(positionAt(timeline, clock), timeline.loop, timeline.duration) ?? null;
+  }
+
+  /** As `sceneAt`, of the show's camera: the first there is. */
+  cameraAt(nowMs: number): Float64Array | null {
+    const camera = this.tracks?.scenes.findIndex((store) => store.track.kind === "camera") ?? -1;
+    return camera < 0 ? null : this.sceneAt(nowMs, camera);
   }
 
   /** Shows `puppeteer`'s own limbs at once. */
@@ -317,22 +322,14 @@ export class Viewer extends EventTarget {
   private describe(message: Description): void {
     // what an id names never changes, so the blocks of the same motion are good still
     if (message.motion === this.motion && this.store) return;
-    const index = message.tracks.findIndex((track) => track.type === "motion");
-    if (index < 0) {
-      this.connection.close("the stream has no motion in it");
-      return;
-    }
-    let track: MotionTrack;
     try {
-      track = MotionTrack.fromDescription(message.tracks[index]);
+      this.tracks = new Tracks(message.tracks);
     } catch (error) {
       if (!(error instanceof DamagedBlock)) throw error;
       this.connection.close(error.message);
       return;
     }
-    this.trackIndex = index;
     this.motion = message.motion;
-    this.store = new BlockStore(track);
     this.overlays.clear();
     this.shown = false;
     this.missing = -1;
@@ -372,14 +369,16 @@ export class Viewer extends EventTarget {
   }
 
   private keep(message: Data, now: number): void {
-    if (!this.store || message.track !== this.trackIndex) return;
+    const store = this.tracks?.store(message.track);
+    if (!store) return;
     try {
-      if (!this.store.put(message.index, message.rate, message.block)) return;
+      if (!store.put(message.index, message.rate, message.block)) return;
     } catch (error) {
       if (!(error instanceof DamagedBlock)) throw error;
       this.damaged++;
       return;
     }
+    if (store !== this.store) return;
     const took = this.now() - now;
     this.decodeMs += (this.decodeMs === 0 ? 1 : NEWEST) * (took - this.decodeMs);
     this.tell("blocks");

@@ -1,59 +1,56 @@
-/** Polls the first standard gamepad and hands its sticks to the strings. */
-import { readPad, type PadReading } from "./gamepad-mapping";
-import type { Hands } from "./hands";
+/** Polls the first standard gamepad and carries out what its controls are bound to. */
+import type { Commands } from "./commands";
+import { readPad } from "./gamepad-reading";
+import { isPadControl, type Control, type Mapping } from "./mapping";
+import { OneEuro, smoothness } from "./one-euro";
 
-/** A limb whose stick has rested this long is let go, and the dance has it back. Milliseconds. */
-const REST = 700;
-/** A refused limb is asked for again no sooner than this. Milliseconds. */
-const PATIENCE = 1500;
-
-export interface GamepadActions {
-  take(limb: number): boolean;
-  play(): void;
-  step(blocks: number): void;
-}
+/** Of the smoothing of a stick, Hz for each full push a second: a flick is followed within a frame or two. */
+const BETA = 3;
 
 export interface GamepadInput {
   /** The pad in use, for the picture of it; null when none is there. */
   readonly pad: Gamepad | null;
-  /** Reads the pad. Once a frame, with a time that never runs backwards, milliseconds. */
-  update(now: number): void;
+  /** Reads the pad. Once a frame, with a time that never runs backwards, milliseconds. Not `acting`, it only looks which pad there is. */
+  update(now: number, acting?: boolean): void;
 }
 
-export function createGamepad(hands: Hands, actions: GamepadActions, pads: () => readonly (Gamepad | null)[]): GamepadInput {
-  const moved = [-Infinity, -Infinity, -Infinity, -Infinity];
-  const asked = [-Infinity, -Infinity, -Infinity, -Infinity];
-  let before: PadReading | null = null;
+export function createGamepad(commands: Commands, mapping: () => Mapping, pads: () => readonly (Gamepad | null)[]): GamepadInput {
+  const filters = [0, 1].map(() => new OneEuro(2, { minCutoff: 1, beta: BETA, derivativeCutoff: 1 }));
   let pad: Gamepad | null = null;
+  let before: readonly Control[] = [];
+
+  /** The axes, the sticks among them without their noise. One at rest is at rest: nothing of its movement lingers on. */
+  const smooth = (axes: readonly number[], { deadZone, stickSmoothing }: Mapping, now: number): number[] => {
+    const settings = smoothness(stickSmoothing, BETA);
+    const smoothed = [...axes];
+    filters.forEach((filter, side) => {
+      const [x, y] = axes.slice(side * 2, side * 2 + 2);
+      if (!settings || y === undefined || Math.hypot(x, y) <= deadZone) {
+        filter.reset();
+        return;
+      }
+      filter.settings = settings;
+      [smoothed[side * 2], smoothed[side * 2 + 1]] = filter.filter([x, y], now / 1000);
+    });
+    return smoothed;
+  };
+
   return {
     get pad() {
       return pad;
     },
-    update(now) {
+    update(now, acting = true) {
       pad = pads().find((one) => one?.connected && one.mapping === "standard") ?? null;
-      if (!pad) {
-        for (let limb = 0; limb < 4; limb++) if (hands.source(limb) === "pad") hands.letGo(limb);
-        before = null;
+      if (!pad || !acting) {
+        commands.forget(isPadControl);
+        before = [];
         return;
       }
-      const reading = readPad(pad);
-      reading.limbs.forEach((direction, limb) => {
-        const active = direction.some((part) => part !== 0);
-        if (active) moved[limb] = now;
-        if (active && hands.source(limb) === null && now - asked[limb] > PATIENCE) {
-          asked[limb] = now;
-          actions.take(limb);
-        }
-        if (hands.source(limb) !== "pad") return;
-        hands.move(limb, ...direction);
-        if (now - moved[limb] > REST) {
-          hands.letGo(limb);
-          asked[limb] = -Infinity;
-        }
-      });
-      if (reading.play && !before?.play) actions.play();
-      if (reading.seek !== 0 && reading.seek !== before?.seek) actions.step(reading.seek);
-      before = reading;
+      const asked = readPad({ axes: smooth(pad.axes, mapping(), now), buttons: pad.buttons }, mapping());
+      const down = asked.map(({ control }) => control);
+      for (const control of before) if (!down.includes(control)) commands.release(control, now);
+      for (const { control, commands: wanted, strength } of asked) commands.press(control, wanted, strength, now);
+      before = down;
     },
   };
 }

@@ -1,4 +1,4 @@
-/** The puppeteer's own hands on the strings: pointer, keys and pad say where in the audience's terms, this says it to the session. */
+/** The puppeteer's own hands on the strings: pointers and inputs of speed say where in the audience's terms, this says it to the session. */
 import { Vector3 } from "three";
 import type { Puppeteer } from "../client/puppeteer";
 import { JOINTS } from "../motion/skeleton";
@@ -6,7 +6,8 @@ import type { Puppet } from "../stage/puppet";
 import type { Stage } from "../stage/stage";
 import { handTarget, inChest, orientation, place, thighAngle } from "./frames";
 
-export type Source = "pointer" | "keys" | "pad" | "page";
+/** What holds a limb: a pointer that it follows, or keys, pad and buttons that move it. */
+export type Source = "pointer" | "velocity";
 
 export class Hands {
   /** Told whenever what is held here changes. */

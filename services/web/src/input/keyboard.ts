@@ -1,103 +1,47 @@
-/** Everything by keyboard alone: limbs, their movement, playing, seeking and the panels. */
-import type { Hands } from "./hands";
-import { directionOf, isDirection, limbOf } from "./keys";
-
-/** A key held longer than this lets its limb go when it comes up; a shorter press leaves the limb held. Milliseconds. */
-const LONG_PRESS = 400;
+/** Everything by keyboard alone: what keys are bound to, and Escape and ? that are fixed. */
+import type { Commands } from "./commands";
+import { isHeld, isPadControl, type Mapping } from "./mapping";
+import type { VelocityInputs } from "./velocity";
 
 export interface KeyboardActions {
-  /** Asks for a limb on behalf of the keys; false when it cannot be had. */
-  take(limb: number): boolean;
-  play(): void;
-  /** Seeks by so many blocks. */
-  step(blocks: number): void;
-  panel(name: "library" | "strings" | "line"): void;
+  /** Shows what the keys do. */
   keys(): void;
   /** Escape with nothing held: shut what is open. */
   escape(): void;
 }
 
-const PANELS = { KeyL: "library", KeyS: "strings", KeyN: "line" } as const;
-
-export interface KeyboardInput {
-  /** The limb that the keys move; null for none. */
-  readonly limb: number | null;
-  /** Sends the speed of the keys held down. Once a frame. */
-  update(): void;
-}
-
-export function createKeyboard(target: Window, hands: Hands, actions: KeyboardActions): KeyboardInput {
-  const down = new Set<string>();
-  const pressed = new Map<number, { at: number; fresh: boolean }>();
-  let limb: number | null = null;
-
-  /** The limb taken last that the keys still hold. */
-  const current = () => {
-    if (limb !== null && hands.source(limb) !== "keys") limb = [0, 1, 2, 3].find((one) => hands.source(one) === "keys") ?? null;
-    return limb;
-  };
+export function listenToKeyboard(target: Window, commands: Commands, velocity: VelocityInputs, mapping: () => Mapping, actions: KeyboardActions): void {
   target.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || typing(event.target) || document.querySelector("dialog[open]")) return;
-    const chosen = limbOf(event.code);
-    if (chosen !== null) {
-      event.preventDefault();
-      if (event.repeat) return;
-      const fresh = hands.source(chosen) === null;
-      if (fresh && !actions.take(chosen)) return;
-      if (!fresh && hands.source(chosen) !== "keys") return;
-      pressed.set(chosen, { at: event.timeStamp, fresh });
-      limb = chosen;
-      return;
-    }
-    if (isDirection(event.code) && current() !== null) {
-      event.preventDefault();
-      down.add(event.code);
-      return;
-    }
-    if (command(event)) event.preventDefault();
+    if (press(event)) event.preventDefault();
   });
-  const command = (event: KeyboardEvent): boolean => {
+  const press = (event: KeyboardEvent): boolean => {
     const { code } = event;
-    const onControl = event.target instanceof Element && event.target.closest("button, a, [role=slider]") !== null;
-    if (code === "Escape") {
-      if (current() === null) actions.escape();
-      for (let one = 0; one < 4; one++) if (hands.source(one) === "keys") hands.letGo(one);
-    } else if (code === "Space") {
-      if (onControl || event.repeat) return false;
-      actions.play();
-    } else if (code === "ArrowLeft" || code === "ArrowRight") {
-      actions.step(code === "ArrowLeft" ? -1 : 1);
-    } else if (event.key === "?" && !event.repeat) {
-      actions.keys();
-    } else if (code in PANELS && !event.repeat) {
-      actions.panel(PANELS[code as keyof typeof PANELS]);
-    } else {
-      return false;
+    if (commands.isDown(code)) {
+      if (event.repeat) commands.repeat(code);
+      return true;
     }
+    if (event.repeat) return false;
+    if (code === "Escape") {
+      if (velocity.selected === null) actions.escape();
+      for (let limb = 0; limb < 4; limb++) velocity.letGo(limb);
+      return true;
+    }
+    if (event.key === "?") {
+      actions.keys();
+      return true;
+    }
+    const bound = mapping().bindings[code] ?? [];
+    const held = bound.filter(isHeld);
+    const meant = velocity.selected !== null && held.length > 0 ? held : bound.filter((command) => !isHeld(command));
+    // a button or link that has the focus is pressed by these two
+    const onControl = event.target instanceof Element && event.target.closest("button, a, [role=slider]") !== null;
+    if (meant.length === 0 || (onControl && (code === "Space" || code === "Enter"))) return false;
+    commands.press(code, meant, 1, event.timeStamp);
     return true;
   };
-  target.addEventListener("keyup", (event) => {
-    down.delete(event.code);
-    const chosen = limbOf(event.code);
-    const press = chosen === null ? undefined : pressed.get(chosen);
-    if (chosen === null || !press) return;
-    pressed.delete(chosen);
-    const long = event.timeStamp - press.at > LONG_PRESS;
-    // A tap takes and the next tap lets go; a long press holds for as long as it lasts.
-    if ((long || !press.fresh) && hands.source(chosen) === "keys") hands.letGo(chosen);
-  });
-  target.addEventListener("blur", () => down.clear());
-  return {
-    get limb() {
-      return current();
-    },
-    update() {
-      const now = current();
-      for (let one = 0; one < 4; one++) {
-        if (hands.source(one) === "keys") hands.move(one, ...(one === now ? directionOf(down) : ([0, 0, 0] as const)));
-      }
-    },
-  };
+  target.addEventListener("keyup", (event) => commands.release(event.code, event.timeStamp));
+  target.addEventListener("blur", () => commands.forget((control) => !isPadControl(control)));
 }
 
 function typing(target: EventTarget | null): boolean {

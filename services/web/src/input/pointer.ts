@@ -2,16 +2,19 @@
 import { Vector3 } from "three";
 import type { Stage } from "../stage/stage";
 import type { Hands } from "./hands";
+import { OneEuro, smoothness } from "./one-euro";
 
 /** How near a handle a pointer takes hold, CSS pixels, whatever size the ring is drawn. */
 export const GRAB = 44;
 const ORBIT = 0.005;
+/** Of the smoothing of what is pulled, Hz for each metre a second. */
+const BETA = 12;
 
 export interface PointerInput {
   /** The limb under the pointer, lit; null for none. */
   readonly near: number | null;
-  /** Pulls again what is held: the dance moves under a resting pointer. Once a frame. */
-  update(): void;
+  /** Pulls again what is held: the dance moves under a resting pointer. Once a frame, with the time of events, milliseconds. */
+  update(now: number): void;
 }
 
 interface Drag {
@@ -21,10 +24,18 @@ interface Drag {
   /** From the pointer to the handle when it was taken, pixels. */
   dx: number;
   dy: number;
+  /** Of the place it is pulled to. */
+  filter: OneEuro;
 }
 
-/** `may(limb)` says whether a limb is free to take; `refused` is told when it is not. */
-export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Hands, may: (limb: number) => boolean, refused: (limb: number) => void): PointerInput {
+/** Whether a limb can be taken, and who is told when not; and how much a pull is smoothed, 0 to 1. */
+export interface PointerOptions {
+  may(limb: number): boolean;
+  refused(limb: number): void;
+  smoothing(): number;
+}
+
+export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Hands, { may, refused, smoothing }: PointerOptions): PointerInput {
   const drags = new Map<number, Drag>();
   let near: number | null = null;
   let orbiting: { id: number; x: number; y: number } | null = null;
@@ -46,10 +57,16 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
     if (limb === null) delete canvas.dataset.near;
     else canvas.dataset.near = "";
   };
-  const pull = ({ limb, x, y, dx, dy }: Drag) => {
+  const pull = ({ limb, x, y, dx, dy, filter }: Drag, now: number) => {
     if (!stage.puppet) return;
     const place = stage.fromScreen(x + dx, y + dy, stage.puppet.handle(limb, handle));
-    if (place) hands.pullTo(limb, place);
+    if (!place) return;
+    const settings = smoothness(smoothing(), BETA);
+    if (settings) {
+      filter.settings = settings;
+      place.fromArray(filter.filter(place.toArray(), now / 1000));
+    }
+    hands.pullTo(limb, place);
   };
 
   canvas.addEventListener("pointerdown", (event) => {
@@ -67,14 +84,14 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
     }
     if (!stage.puppet || !hands.take(limb, "pointer")) return;
     const at = stage.toScreen(stage.puppet.handle(limb, handle));
-    drags.set(pointerId, { limb, x, y, dx: at.x - x, dy: at.y - y });
+    drags.set(pointerId, { limb, x, y, dx: at.x - x, dy: at.y - y, filter: new OneEuro(3, { minCutoff: 1, beta: BETA, derivativeCutoff: 1 }) });
     canvas.dataset.pulling = "";
   });
   canvas.addEventListener("pointermove", (event) => {
     const drag = drags.get(event.pointerId);
     if (drag) {
       [drag.x, drag.y] = [event.clientX, event.clientY];
-      pull(drag);
+      pull(drag, event.timeStamp);
     } else if (orbiting?.id === event.pointerId) {
       stage.audience.orbit((orbiting.x - event.clientX) * ORBIT, (event.clientY - orbiting.y) * ORBIT);
       orbiting = { id: event.pointerId, x: event.clientX, y: event.clientY };
@@ -96,9 +113,9 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
     get near() {
       return near;
     },
-    update() {
+    update(now) {
       for (const [id, drag] of drags) {
-        if (hands.source(drag.limb) === "pointer") pull(drag);
+        if (hands.source(drag.limb) === "pointer") pull(drag, now);
         else drags.delete(id);
       }
     },

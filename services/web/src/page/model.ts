@@ -23,6 +23,34 @@ export interface Holder {
   mine: boolean;
 }
 
+/** One who asks for a limb that another holds. */
+export interface Asker {
+  id: string;
+  name: string;
+  colour: number;
+}
+
+/** What the page shows of a limb. */
+export interface LimbState {
+  holder: Holder | null;
+  /** Others who ask for it, first come first. */
+  askers: readonly Asker[];
+  /** Whether it is asked for from here. */
+  asked: boolean;
+  /** Whether keys and buttons of "the held string" move it. */
+  selected: boolean;
+}
+
+/** Those who ask for each of the four limbs, without oneself. */
+export function askers(presence: Presence | null, self: string | null): Asker[][] {
+  return [0, 1, 2, 3].map((limb) =>
+    (presence?.asks[limb] ?? []).filter((id) => id !== self).map((id) => {
+      const person = presence?.puppeteers.find((one) => one.id === id);
+      return { id, name: person?.name || "Someone", colour: person?.colour ?? 0 };
+    }),
+  );
+}
+
 /** Holders of the four limbs, null where free. */
 export function holders(presence: Presence | null, self: string | null): (Holder | null)[] {
   return [0, 1, 2, 3].map((limb) => {

@@ -1,26 +1,29 @@
 /** Everything of the page that is not the stage, put together: one call of `render...` per kind of news. */
+import type { Mapping } from "../input/mapping";
+import { createAsks, type Asks } from "./asks";
 import { createHeader, type Header } from "./header";
 import { createKeysModal, type KeysModal } from "./keys-modal";
 import { acceptDrops, createLibrary, type Library, type Piece } from "./library";
 import { createLineCard, type LineCard } from "./line-card";
 import { element } from "./dom";
 import { createPanels, PHONE, type Panels } from "./panels";
-import { createStringsCard, type StringsCard } from "./strings-card";
+import { createStringsCard, type StringsActions, type StringsCard } from "./strings-card";
 import { createTags, type Tags } from "./tags";
 import { createToast, type Toast } from "./toast";
 import { createTransport, type PanelName, type Transport } from "./transport";
 
-export interface PageActions {
+export interface PageActions extends StringsActions {
   share(): void;
   theme(): void;
   play(): void;
   loop(): void;
   seek(seconds: number): void;
+  /** Keeps the performance as a new motion; left out, it cannot be kept here. */
+  keep?(): Promise<void>;
   files(files: readonly File[]): void;
   choose(id: string): void;
   remove(piece: Piece): void;
-  toggle(limb: number): void;
-  focus(limb: number | null): void;
+  mapping(mapping: Mapping): void;
   /** A panel opened or shut: the stage may have to be framed anew. */
   reframe(): void;
 }
@@ -33,6 +36,7 @@ export interface Page {
   readonly line: LineCard;
   readonly keys: KeysModal;
   readonly tags: Tags;
+  readonly asks: Asks;
   readonly panels: Panels;
   readonly toast: Toast;
   /** Words on an empty stage; null for none. */
@@ -40,15 +44,17 @@ export interface Page {
 }
 
 export function createPage(root: HTMLElement, on: PageActions): Page {
-  const tags = createTags(root);
+  const tags = createTags(root, on.ask);
   const notice = element("div", { class: "notice", role: "status", hidden: true });
   root.append(notice);
-  const keys = createKeysModal(root);
+  const keys = createKeysModal(root, on.mapping);
   const header = createHeader(root, { share: on.share, theme: on.theme, keys: () => keys.show() });
+  const messages = element("div", { class: "messages" });
+  root.append(messages);
   const library = createLibrary(root, { files: on.files, choose: on.choose, remove: on.remove, close: () => panels.close("library") });
-  const strings = createStringsCard(root, { toggle: on.toggle, focus: on.focus, close: () => panels.close("strings") });
+  const strings = createStringsCard(root, { ...on, close: () => panels.close("strings"), keys: () => keys.show() });
   const line = createLineCard(root, () => panels.close("line"));
-  const transport = createTransport(root, { play: on.play, loop: on.loop, seek: on.seek, panel: (name) => panels.toggle(name) });
+  const transport = createTransport(root, { ...on, panel: (name) => panels.toggle(name) });
   const elements = new Map<PanelName, HTMLElement>([
     ["library", library.panel.element],
     ["strings", strings.panel.element],
@@ -66,7 +72,8 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   acceptDrops(root, on.files);
   return {
     header, transport, library, strings, line, keys, tags, panels,
-    toast: createToast(root),
+    asks: createAsks(messages, on.give),
+    toast: createToast(messages),
     notice(title, text = "") {
       notice.hidden = title === null;
       if (title !== null) notice.replaceChildren(element("b", {}, title), text);

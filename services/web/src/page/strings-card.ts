@@ -1,17 +1,37 @@
 /** Who holds which limb: the card of four rows, and the dock of four discs that stands in while the card is shut. */
+import type { DigitalInput } from "../input/inputs";
 import { element, setAttribute, setText } from "./dom";
 import { limbIcon } from "./icons";
-import { LIMB_NAMES, LIMB_ORDER, limbKey, type Holder } from "./model";
+import { LIMB_NAMES, LIMB_ORDER, limbKey, type Holder, type LimbState } from "./model";
+import { createMovePad } from "./move-pad";
 import { createPanel, type Panel } from "./panels";
+
+/** A notice stands so long, milliseconds. */
+const NOTICE = 5_000;
 
 export interface StringsCard {
   readonly panel: Panel;
-  /** Shows holders by limb; without `ready` nothing can be taken. */
-  render(holders: readonly (Holder | null)[], ready: boolean): void;
+  /** Shows the limbs; without `ready` nothing can be taken. */
+  render(limbs: readonly LimbState[], ready: boolean): void;
   dock(shown: boolean): void;
+  /** A quiet line about an input that was not taken as it came. */
+  notice(text: string): void;
 }
 
-export function createStringsCard(root: HTMLElement, on: { toggle(limb: number): void; focus(limb: number | null): void; close(): void }): StringsCard {
+export interface StringsActions {
+  toggle(limb: number): void;
+  ask(limb: number): void;
+  withdraw(limb: number): void;
+  give(limb: number): void;
+  select(limb: number): void;
+  focus(limb: number | null): void;
+  /** A button of the page goes down or comes up. */
+  press(input: DigitalInput, down: boolean): void;
+}
+
+type Doing = "toggle" | "ask" | "withdraw" | "give";
+
+export function createStringsCard(root: HTMLElement, on: StringsActions & { close(): void; keys(): void }): StringsCard {
   const panel = createPanel(root, "strings", "Strings", on.close);
   const lights = (limb: number) => ({
     onFocus: () => on.focus(limb),
@@ -21,9 +41,28 @@ export function createStringsCard(root: HTMLElement, on: { toggle(limb: number):
   });
   const rows = LIMB_ORDER.map((limb) => {
     const state = element("small");
-    const action = element("button", { class: "limb-action", type: "button", onClick: () => on.toggle(limb), ...lights(limb) });
-    const row = element("li", {}, element("span", { class: "limb-glyph" }, limbIcon(limb)), element("span", {}, element("b", {}, LIMB_NAMES[limb]), state), action);
-    return { limb, row, state, action };
+    const glyph = element("button", { class: "limb-glyph", type: "button", disabled: true, "aria-label": `Move the ${LIMB_NAMES[limb].toLowerCase()}`, onClick: () => on.select(limb) }, limbIcon(limb));
+    let doing: Doing = "toggle";
+    const action = element("button", { class: "limb-action", type: "button", onClick: () => on[doing](limb), ...lights(limb) });
+    const pad = createMovePad(limb, on.press);
+    const row = element("li", {}, glyph, element("span", {}, element("b", {}, LIMB_NAMES[limb]), state), action, pad.element);
+    const render = (limbState: LimbState, ready: boolean) => {
+      const { holder, askers, asked, selected } = limbState;
+      setAttribute(row, "style", colour(holder));
+      setText(state, said(limbState));
+      if (!holder) state.append(element("span", { class: "key-hint" }, `, key ${limbKey(limb)}`));
+      doing = !holder ? "toggle" : holder.mine ? (askers.length > 0 ? "give" : "toggle") : asked ? "withdraw" : "ask";
+      const word = doing === "toggle" ? (holder ? "Release" : "Take") : { give: "Give", ask: "Ask", withdraw: "Withdraw" }[doing];
+      setText(action, word);
+      action.setAttribute("aria-label", ACTION_NAMES[word](LIMB_NAMES[limb].toLowerCase()));
+      action.disabled = !ready;
+      setAttribute(action, "data-mine", holder?.mine ?? false);
+      const mine = holder?.mine ?? false;
+      glyph.disabled = !mine || !ready;
+      setAttribute(glyph, "aria-pressed", mine ? String(selected) : null);
+      pad.show(mine && selected && ready);
+    };
+    return { limb, row, render };
   });
   const discs = LIMB_ORDER.map((limb) => {
     const name = element("span", { hidden: true });
@@ -31,37 +70,57 @@ export function createStringsCard(root: HTMLElement, on: { toggle(limb: number):
     return { limb, disc, name };
   });
   const hint = element("p", { class: "strings-hint" }, "Drag a ring on the stage, or press ", element("kbd", {}, "1"), " to ", element("kbd", {}, "4"), ".");
-  panel.body.append(element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)), hint);
+  const notice = element("p", { class: "strings-notice", role: "status", "aria-live": "polite" });
+  // on a phone the header has no room for it
+  const keys = element("button", { class: "text-button", type: "button", onClick: on.keys }, "Touch, gamepad and keys");
+  panel.body.append(element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)), hint, notice, keys);
   const dock = element("nav", { class: "dock", "aria-label": "Take a string" }, ...discs.map(({ disc }) => disc));
   root.append(dock);
+  let fading: ReturnType<typeof setTimeout> | undefined;
   return {
     panel,
     dock(shown) {
       dock.hidden = !shown;
     },
-    render(holders, ready) {
-      const colour = (holder: Holder | null) => (holder ? `--colour: var(--holder-${holder.colour})` : null);
-      for (const { limb, row, state, action } of rows) {
-        const holder = holders[limb];
-        setAttribute(row, "style", colour(holder));
-        setText(state, holder ? (holder.mine ? "You hold this" : `${holder.name} holds this`) : "Free");
-        if (!holder) state.append(element("span", { class: "key-hint" }, `, key ${limbKey(limb)}`));
-        const word = !holder ? "Take" : holder.mine ? "Release" : "Held";
-        setText(action, word);
-        action.setAttribute("aria-label", `${word} ${LIMB_NAMES[limb].toLowerCase()}`);
-        action.disabled = !ready || (holder !== null && !holder.mine);
-        setAttribute(action, "data-mine", holder?.mine ?? false);
-      }
+    notice(text) {
+      clearTimeout(fading);
+      setText(notice, text);
+      hint.hidden = true;
+      fading = setTimeout(() => {
+        setText(notice, "");
+        hint.hidden = false;
+      }, NOTICE);
+    },
+    render(limbs, ready) {
+      for (const { limb, render } of rows) render(limbs[limb], ready);
       for (const { limb, disc, name } of discs) {
-        const holder = holders[limb];
+        const { holder, asked } = limbs[limb];
         const limbName = LIMB_NAMES[limb].toLowerCase();
         setAttribute(disc, "style", colour(holder));
         setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute("aria-label", !holder ? `Take the ${limbName}` : holder.mine ? `Release the ${limbName}` : `${LIMB_NAMES[limb]}, held by ${holder.name}`);
+        disc.setAttribute("aria-label", !holder ? `Take the ${limbName}` : holder.mine ? `Release the ${limbName}` : `${LIMB_NAMES[limb]}, held by ${holder.name}${asked ? ", asked for" : ""}`);
         disc.disabled = !ready;
         name.hidden = !holder;
         setText(name, holder?.name ?? "");
       }
     },
   };
+}
+
+const ACTION_NAMES: Readonly<Record<string, (limb: string) => string>> = {
+  Take: (limb) => `Take ${limb}`,
+  Release: (limb) => `Release ${limb}`,
+  Give: (limb) => `Give ${limb}`,
+  Ask: (limb) => `Ask for ${limb}`,
+  Withdraw: (limb) => `Ask no longer for ${limb}`,
+};
+
+function colour(holder: Holder | null): string | null {
+  return holder ? `--colour: var(--holder-${holder.colour})` : null;
+}
+
+function said({ holder, askers, asked }: LimbState): string {
+  if (!holder) return "Free";
+  if (holder.mine) return askers.length > 0 ? `${askers[0].name} asks for it` : "You hold this";
+  return asked ? `You ask ${holder.name} for it` : `${holder.name} holds this`;
 }

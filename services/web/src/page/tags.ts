@@ -1,6 +1,6 @@
-/** Names over the strings, and once the invitation by the nearer hand. */
+/** Names over the strings, with "Ask" where another holds one, and once the invitation by the nearer hand. */
 import { element, setText } from "./dom";
-import { LIMB_NAMES, type Holder } from "./model";
+import { LIMB_NAMES, type LimbState } from "./model";
 
 export interface Place {
   x: number;
@@ -9,7 +9,7 @@ export interface Place {
 
 export interface Tags {
   /** Puts each holder's tag where its bar is on the screen, CSS pixels; null hides it. */
-  render(holders: readonly (Holder | null)[], places: readonly (Place | null)[]): void;
+  render(limbs: readonly LimbState[], places: readonly (Place | null)[]): void;
   /** Puts the invitation beside a place; null takes it away. */
   invite(place: Place | null): void;
 }
@@ -17,26 +17,29 @@ export interface Tags {
 /** Tags keep out of the header's way. */
 const TOP = 60;
 
-export function createTags(root: HTMLElement): Tags {
+/** `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. */
+export function createTags(root: HTMLElement, ask: (limb: number) => void): Tags {
   const layer = element("div", { class: "tags", "aria-hidden": "true" });
   root.append(layer);
-  const tags = [0, 1, 2, 3].map(() => {
+  const tags = [0, 1, 2, 3].map((i) => {
     const name = document.createTextNode("");
     const limb = element("span");
-    const tag = element("div", { class: "tag", hidden: true }, name, limb);
+    const button = element("button", { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => ask(i) }, "Ask");
+    const tag = element("div", { class: "tag", hidden: true }, name, limb, button);
     layer.append(tag);
-    return { name, limb, tag };
+    return { name, limb, button, tag };
   });
   const invitation = element("div", { class: "tag invitation", hidden: true }, "Take a hand");
   layer.append(invitation);
   return {
-    render(holders, places) {
-      tags.forEach(({ name, limb, tag }, i) => {
-        const [holder, place] = [holders[i], places[i]];
+    render(limbs, places) {
+      tags.forEach(({ name, limb, button, tag }, i) => {
+        const [{ holder, asked }, place] = [limbs[i], places[i]];
         tag.hidden = !holder || !place;
         if (!holder || !place) return;
         setText(name, holder.name);
-        setText(limb, LIMB_NAMES[i].toLowerCase());
+        setText(limb, asked ? "asked" : LIMB_NAMES[i].toLowerCase());
+        button.hidden = holder.mine || asked;
         tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
         const x = Math.min(innerWidth - 80, Math.max(80, place.x));
         tag.style.transform = `translate(${x.toFixed(1)}px, ${Math.max(TOP, place.y - 12).toFixed(1)}px) translate(-50%, -100%)`;

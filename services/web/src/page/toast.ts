@@ -1,15 +1,37 @@
-/** One short message at a time, read out politely, gone after a while. */
+/** One short message at a time, read out politely, gone after a while; it may offer one thing to do. */
 import { element } from "./dom";
 
-export type Toast = (message: string) => void;
+export interface ToastAction {
+  label: string;
+  /** The key that does the same, if there is one. */
+  key?: string | null;
+  act(): void;
+}
 
-export function createToast(root: HTMLElement, lasting = 3200): Toast {
+export type Toast = (message: string, action?: ToastAction) => void;
+
+/** Milliseconds; with something to do there is more to read and to reach. */
+const LASTING = 3_200;
+const OFFERED = 8_000;
+
+export function createToast(root: HTMLElement): Toast {
   const live = element("div", { role: "status", "aria-live": "polite" });
   root.append(live);
   let timer: ReturnType<typeof setTimeout> | undefined;
-  return (message) => {
+  const clear = () => live.replaceChildren();
+  return (message, action) => {
     clearTimeout(timer);
-    live.replaceChildren(element("div", { class: "toast" }, message));
-    timer = setTimeout(() => live.replaceChildren(), lasting);
+    const toast = element("div", { class: "toast" }, message);
+    if (action) {
+      const act = () => {
+        clear();
+        action.act();
+      };
+      const button = element("button", { class: "toast-action", type: "button", onClick: act }, action.label);
+      if (action.key) button.append(element("kbd", { class: "key-hint" }, action.key));
+      toast.append(button);
+    }
+    live.replaceChildren(toast);
+    timer = setTimeout(clear, action ? OFFERED : LASTING);
   };
 }

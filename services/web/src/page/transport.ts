@@ -1,4 +1,4 @@
-/** Play, seek, loop, and the three panels' buttons. */
+/** Play, seek, loop, keep, and the three panels' buttons. */
 import { element, setAttribute, setText } from "./dom";
 import { clockTime } from "./format";
 import { icon, type IconName } from "./icons";
@@ -13,6 +13,8 @@ export interface Transport {
   blocks(blocks: ArrayLike<number>, rates: number): void;
   expanded(panel: PanelName, open: boolean): void;
   health(health: Health): void;
+  /** Keeps what is on the stage, as its button does. */
+  keep(): void;
 }
 
 const PANELS: readonly { name: PanelName; label: string; icon: IconName }[] = [
@@ -20,13 +22,45 @@ const PANELS: readonly { name: PanelName; label: string; icon: IconName }[] = [
   { name: "strings", label: "Strings", icon: "strings" },
   { name: "line", label: "Line", icon: "line" },
 ];
+const KEEP = "Keep this";
+const KEEPING = "Keeping";
 const HEALTH: Readonly<Record<Health, string>> = { good: "good", poor: "short of data", lost: "not connected", none: "no dance yet" };
 
-export function createTransport(root: HTMLElement, on: { play(): void; loop(): void; seek(seconds: number): void; panel(panel: PanelName): void }): Transport {
+export interface TransportActions {
+  play(): void;
+  loop(): void;
+  seek(seconds: number): void;
+  panel(panel: PanelName): void;
+  /** Keeps the performance as a new motion; done, or given up and told why, when it resolves. Left out, it cannot be kept here. */
+  keep?(): Promise<void>;
+}
+
+export function createTransport(root: HTMLElement, on: TransportActions): Transport {
   const play = element("button", { class: "play", type: "button", disabled: true, onClick: on.play }, icon("play"));
   const [now, end] = [element("span"), element("span")];
   const seek = createSeek(on.seek);
   const loop = element("button", { class: "round-button loop", type: "button", "aria-label": "Loop", onClick: on.loop }, icon("loop"));
+  const keepName = element("span", {}, KEEP);
+  const keep = element("button", { class: "pill keep", type: "button", "aria-label": KEEP, disabled: true, hidden: !on.keep, onClick: () => void keepNow() }, icon("keep"), keepName);
+  let ready = false;
+  let keeping = false;
+  const showKeep = () => {
+    keep.disabled = !ready;
+    setAttribute(keep, "aria-busy", keeping);
+    setText(keepName, keeping ? KEEPING : KEEP);
+    keep.setAttribute("aria-label", keeping ? KEEPING : KEEP);
+  };
+  const keepNow = async () => {
+    if (!ready || keeping || !on.keep) return;
+    keeping = true;
+    showKeep();
+    try {
+      await on.keep();
+    } finally {
+      keeping = false;
+      showKeep();
+    }
+  };
   const dot = element("span", { class: "health", role: "img" });
   const pills = new Map(
     PANELS.map(({ name, label, icon: glyph }) => {
@@ -36,13 +70,15 @@ export function createTransport(root: HTMLElement, on: { play(): void; loop(): v
       return [name, pill] as const;
     }),
   );
-  const tools = element("div", { class: "tools" }, loop, element("span", { class: "tools-rule" }), ...pills.values());
+  const tools = element("div", { class: "tools" }, loop, keep, element("span", { class: "tools-rule" }), ...pills.values());
   const area = element("div", { class: "seek-area" }, element("div", { class: "times" }, now, end), seek.element);
   root.append(element("section", { class: "transport", "aria-label": "Transport" }, play, area, tools));
   let shown = "";
   return {
-    timeline(playing, looping, ready) {
+    timeline(playing, looping, known) {
+      ready = known;
       play.disabled = !ready;
+      showKeep();
       const state = playing ? "Pause" : "Play";
       setAttribute(loop, "aria-pressed", String(looping));
       if (shown === state) return;
@@ -59,6 +95,7 @@ export function createTransport(root: HTMLElement, on: { play(): void; loop(): v
     expanded(panel, open) {
       pills.get(panel)?.setAttribute("aria-expanded", String(open));
     },
+    keep: () => void keepNow(),
     health(health) {
       dot.dataset.state = health;
       dot.setAttribute("aria-label", HEALTH[health]);

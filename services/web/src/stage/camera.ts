@@ -1,5 +1,9 @@
-/** The seat in the audience: framing by layout, a small orbit that springs back, and a step back when hands reach far. */
-import { PerspectiveCamera, Vector3 } from "three";
+/**
+ * The audience's camera: a seat of one's own, framed by layout, with a small orbit that springs back and a step back when hands
+ * reach far; or the show's camera, where the motion has one and it is followed.
+ */
+import { MathUtils, PerspectiveCamera } from "three";
+import { createView, fovIn, mixViews, readView, type View } from "./view";
 
 export type Framing = "desktop" | "phone" | "sheet";
 
@@ -19,14 +23,27 @@ const PITCH_LOW = (-5 * Math.PI) / 180;
 const PITCH_HIGH = (15 * Math.PI) / 180;
 const EASE = 0.6;
 const REST = 4;
+/** Seconds that going over between one's own seat and the show's camera takes. */
+const OVER = 0.9;
 
 export class AudienceCamera {
   readonly camera = new PerspectiveCamera(26, 1, 0.1, 40);
+  /** What is seen, world frame, whatever the window's shape. */
+  readonly view: View = createView();
   still = false;
   scale = 1;
+  readonly #own = createView();
+  readonly #show = createView();
+  #hasShow = false;
+  /** What was chosen; null while nothing was. */
+  #choice: boolean | null = null;
+  /** Of the way over to the show's camera, 0..1. */
+  #over = 0;
+  /** Whether this motion's camera was seen yet: at first there is a cut to it. */
+  #met = false;
   #goal: readonly [visible: number, look: number] = FRAMINGS.desktop;
   #visible = FRAMINGS.desktop[0];
-  #look = FRAMINGS.desktop[1];
+  #height = FRAMINGS.desktop[1];
   #yaw = 0;
   #pitch = 0;
   #back = 0;
@@ -44,19 +61,59 @@ export class AudienceCamera {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Turns the view by a drag, radians; it springs back after 4 s untouched. */
+  /** Whether the motion has a camera of its own. */
+  get hasShow(): boolean {
+    return this.#hasShow;
+  }
+
+  /** Whether the show's camera is followed: where there is one, unless told otherwise or less motion is asked for. */
+  get following(): boolean {
+    return this.#hasShow && (this.#choice ?? !this.still);
+  }
+
+  /** Follows the show's camera, or returns to one's own seat; kept until told otherwise. */
+  follow(on: boolean): void {
+    this.#choice = on;
+  }
+
+  /** Another motion: its camera is met with a cut. */
+  cut(): void {
+    this.#met = false;
+    this.#hasShow = false;
+    this.#over = 0;
+  }
+
+  /** Turns the view by a drag, radians, in one's own seat; it springs back after 4 s untouched. */
   orbit(yaw: number, pitch: number): void {
+    if (this.following) this.follow(false);
     this.#yaw = Math.min(YAW, Math.max(-YAW, this.#yaw + yaw));
     this.#pitch = Math.min(PITCH_HIGH, Math.max(PITCH_LOW, this.#pitch + pitch));
     this.#untouched = 0;
   }
 
-  /** Moves on by `seconds`. `reach` is how far out the hands are, 0 the middle to 1 the edge of the picture. */
-  update(seconds: number, reach: number): void {
+  /**
+   * Moves on by `seconds`. `reach` is how far out the hands are, 0 the middle to 1 the edge of the picture; `show` the seven
+   * numbers of the show's camera, null where there is none.
+   */
+  update(seconds: number, reach: number, show: ArrayLike<number> | null = null): void {
+    this.#seat(seconds, this.#over === 0 ? reach : 0);
+    this.#hasShow = show !== null;
+    if (show) readView(show, this.#show);
+    const goal = this.following ? 1 : 0;
+    const cut = this.still || (show !== null && !this.#met);
+    this.#met ||= show !== null;
+    const step = cut ? 1 : seconds / OVER;
+    this.#over = Math.min(Math.max(goal, this.#over - step), this.#over + step);
+    mixViews(this.#own, this.#show, MathUtils.smootherstep(this.#over, 0, 1), this.view);
+    this.#look();
+  }
+
+  /** One's own seat, world frame. */
+  #seat(seconds: number, reach: number): void {
     const [visible, look] = this.#goal;
     const share = this.still ? 1 : 1 - Math.exp((-4 / EASE) * seconds);
     this.#visible += (visible - this.#visible) * share;
-    this.#look += (look - this.#look) * share;
+    this.#height += (look - this.#height) * share;
     this.#untouched += seconds;
     if (this.#untouched > REST) {
       const home = this.still ? 1 : 1 - Math.exp(-3 * seconds);
@@ -67,12 +124,28 @@ export class AudienceCamera {
     const wanted = Math.min(0.12, Math.max(0, (reach * (1 + this.#back)) / 0.92 - 1));
     this.#back += (wanted - this.#back) * (this.still ? 1 : 1 - Math.exp((wanted > this.#back ? -3 : -0.7) * seconds));
 
+    const { position, gaze } = this.#own;
     const distance = ((this.#visible / 2) * this.scale * (1 + this.#back)) / Math.tan(HALF_FIELD);
-    const look3 = new Vector3(0, this.#look * this.scale, 0);
+    gaze.set(0, this.#height * this.scale, 0);
     const flat = distance * Math.cos(this.#pitch);
-    this.camera.position.set(Math.sin(this.#yaw) * flat, look3.y + EYE * this.scale + distance * Math.sin(this.#pitch), Math.cos(this.#yaw) * flat);
-    const parent = this.camera.parent;
-    this.camera.lookAt(parent ? parent.localToWorld(look3) : look3);
-    this.camera.updateMatrixWorld();
+    position.set(Math.sin(this.#yaw) * flat, gaze.y + EYE * this.scale + distance * Math.sin(this.#pitch), Math.cos(this.#yaw) * flat);
+    const { parent } = this.camera;
+    if (parent) for (const place of [position, gaze]) parent.localToWorld(place);
+    this.#own.fov = 2 * HALF_FIELD;
+  }
+
+  /** Points the camera as the view says. One's own seat is framed for the window's shape already; the show's is not. */
+  #look(): void {
+    const { camera, view } = this;
+    const share = MathUtils.smootherstep(this.#over, 0, 1);
+    const fov = MathUtils.radToDeg(view.fov + share * (fovIn(view.fov, camera.aspect) - view.fov));
+    if (Math.abs(fov - camera.fov) > 1e-9) {
+      camera.fov = fov;
+      camera.updateProjectionMatrix();
+    }
+    camera.position.copy(view.position);
+    camera.parent?.worldToLocal(camera.position);
+    camera.lookAt(view.gaze);
+    camera.updateMatrixWorld();
   }
 }

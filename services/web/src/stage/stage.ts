@@ -13,6 +13,7 @@ import { QualityChoice } from "./quality";
 import { Rig } from "./rig";
 import type { Paint } from "./shading";
 import { Strings, type StringState } from "./strings";
+import { CameraTrail } from "./trail";
 
 /** Pixel ratios above these cost more than they show. */
 const SHARPEST = { desktop: 2, phone: 1.75 };
@@ -29,6 +30,8 @@ export class Stage {
   readonly rig = new Rig();
   readonly strings = new Strings();
   readonly audience = new AudienceCamera();
+  /** Where the audience's camera was, for keeping. */
+  readonly trail = new CameraTrail();
   readonly renderer: WebGLRenderer;
   puppet: Puppet | null = null;
   readonly #backdrop = backdropUniforms();
@@ -70,6 +73,21 @@ export class Stage {
     this.strings.still = on;
   }
 
+  /** Whether the motion on the stage has a camera of its own, the show's. */
+  get hasShow(): boolean {
+    return this.audience.hasShow;
+  }
+
+  /** Whether the show's camera is followed, by choice or by default; false where there is none. */
+  get following(): boolean {
+    return this.audience.following;
+  }
+
+  /** Follows the show's camera where there is one, or returns to the audience's own seat; dragging the view does the latter. */
+  follow(on: boolean): void {
+    this.audience.follow(on);
+  }
+
   setTheme(theme: Theme): void {
     if (theme === this.#themed) return;
     this.#themed = theme;
@@ -95,6 +113,7 @@ export class Stage {
     this.audience.scale = this.puppet.scale;
     this.#placeDisc();
     this.rig.reset(front);
+    this.audience.cut();
     // Every shader there will be, side by side: one after the other as they come into sight takes longer, and stutters.
     this.renderer.compile(this.scene, this.audience.camera);
   }
@@ -114,9 +133,10 @@ export class Stage {
 
   /**
    * Moves everything on to a pose (null: none yet) and its strings, and draws it if the graphics are done with the frame
-   * before; `interval` is the seconds since the last call.
+   * before; `interval` is the seconds since the last call, `show` the seven numbers of the show's camera, null where there is
+   * none, and `clock` the clock time of the pose in microseconds, by which the camera is remembered.
    */
-  draw(pose: Pose | null, states: readonly StringState[] = FREE, interval = 0): void {
+  draw(pose: Pose | null, states: readonly StringState[] = FREE, interval = 0, show: ArrayLike<number> | null = null, clock: number | null = null): void {
     const { puppet } = this;
     const seconds = Math.min(interval, LONGEST_STEP);
     if (puppet && pose) {
@@ -126,7 +146,8 @@ export class Stage {
       this.#floorAt.value = this.rig.group.position.y;
     }
     this.rig.group.updateMatrixWorld(true);
-    this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0);
+    this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0, show);
+    if (pose && clock !== null) this.trail.add(clock, this.audience.view);
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());
     this.#sinceDrawn += interval;
     if (!this.#gate.open) return;

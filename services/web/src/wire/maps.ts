@@ -41,13 +41,20 @@ const puppeteer = map((value): PuppeteerPresence => ({
   id: text(value.id) as string, name: text(value.name) as string, colour: count(value.colour) as number,
 }));
 
+/** Who asks for each limb; left out by those who know of no asking. */
+const asked: Field = (value) => {
+  if (value === undefined || value === null) return LIMBS.map(() => []);
+  const each = list(list(text))(value) as unknown[];
+  return (expect(each.length === LIMBS.length, "a list for each limb"), each);
+};
+
 const FIELDS: { [name in MapName]: Readonly<Record<string, Field>> } = {
   ChannelHeader: { motion: text, now: count, channels: count, software: text, version: count, clock: text },
   Description: { motion: text, tracks: list(track) },
   TimelineState: {
     epoch: count, motion: text, clock: count, position: count, playing: flag, loop: flag, duration: count,
   },
-  Presence: { viewers: count, puppeteers: list(puppeteer), limbs: list(optional(text)) },
+  Presence: { viewers: count, puppeteers: list(puppeteer), limbs: list(optional(text)), asks: asked },
   Problem: { title: text, detail: text },
   Welcome: { id: text, colour: count, lead: count },
   Grant: { limb, epoch: count },
@@ -57,6 +64,8 @@ const FIELDS: { [name in MapName]: Readonly<Record<string, Field>> } = {
   Claim: { limb },
   Release: { limb, epoch: count },
   Alive: { limbs: list(limb) },
+  Notice: { limb, reason: text, detail: text },
+  Ask: { limb, wanted: flag },
 };
 
 const NAMES = new Map(Object.keys(FIELDS).map((name) => [TYPES[name as MapName], name as MapName]));

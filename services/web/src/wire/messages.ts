@@ -63,12 +63,13 @@ export interface PuppeteerPresence {
   colour: number;
 }
 
-/** Who is here and who holds what: `limbs` has the holder's id, or null, for each of the four limbs. */
+/** Who is here and who holds what: for each of the four limbs its holder's id, or null, and the ids of those who ask for it, first come first. */
 export interface Presence {
   name: "Presence";
   viewers: number;
   puppeteers: PuppeteerPresence[];
   limbs: (string | null)[];
+  asks: string[][];
 }
 
 /** The answer to a Ping: its `sequence` and `sent`, and the clock times when it came and when this left. */
@@ -108,6 +109,14 @@ export interface Refusal {
   limb: number;
   reason: string;
   holder: string | null;
+}
+
+/** An input was not taken as it came; `reason` is one of `reach`, `owner`, `rate`, `detail` says it to a person. */
+export interface Notice {
+  name: "Notice";
+  limb: number;
+  reason: string;
+  detail: string;
 }
 
 /** Asks for the time; `sent` is the sender's own clock. As long as its answer, so that both ways cost the same. */
@@ -153,6 +162,13 @@ export interface Alive {
   limbs: number[];
 }
 
+/** Asks the holder of a limb for it, or no longer. */
+export interface Ask {
+  name: "Ask";
+  limb: number;
+  wanted: boolean;
+}
+
 export const VELOCITY = 0;
 export const TARGET = 1;
 
@@ -168,12 +184,13 @@ export interface Input {
 }
 
 export type ServerMessage =
-  | ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal;
-export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input;
+  | ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
+  | Notice;
+export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Ask | Input;
 export type Message = ServerMessage | ClientMessage;
 
 /** The type byte of each message. */
 export const TYPES: Readonly<Record<Message["name"], number>> = {
   ChannelHeader: 1, Description: 2, Data: 3, TimelineState: 4, Overlay: 5, Presence: 6, Pong: 7, Problem: 8, Welcome: 9,
-  Grant: 10, Refusal: 11, Ping: 64, Edit: 65, Report: 66, Claim: 67, Release: 68, Alive: 69, Input: 70,
+  Grant: 10, Refusal: 11, Notice: 12, Ping: 64, Edit: 65, Report: 66, Claim: 67, Release: 68, Alive: 69, Input: 70, Ask: 71,
 };

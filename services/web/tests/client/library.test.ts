@@ -38,6 +38,17 @@ test("sessions are made and edited with JSON", async () => {
   expect(made[0][1].headers).toEqual({ "Content-Type": "application/json" });
 });
 
+test("a session is kept with what was given of name, length and camera", async () => {
+  const made = answering(201, '{"id": "k"}');
+  expect((await library.keep("s/1")).id).toBe("k");
+  const key: library.CameraKeyframe = { time: 5, position: [0, 1, 4], gaze: [0, 1, 0], fov: 0.5 };
+  await library.keep("s", { name: "Ours", seconds: 12.5, camera: [key] });
+  expect(made.map(([path, { method, body }]) => [method, path, JSON.parse(String(body))])).toEqual([
+    ["POST", "/v1/sessions/s%2F1/recordings", {}],
+    ["POST", "/v1/sessions/s/recordings", { name: "Ours", seconds: 12.5, camera: [key] }],
+  ]);
+});
+
 test("a motion is removed", async () => {
   const made = answering(204, "");
   await library.deleteMotion("m");

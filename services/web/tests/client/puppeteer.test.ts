@@ -78,7 +78,7 @@ describe("a limb", () => {
     expect(line.of("Claim")).toEqual([{ name: "Claim", limb: 1 }]);
     expect(puppeteer.holds(1)).toBe(false);
     line.say({ name: "Grant", limb: 1, epoch: 7 });
-    expect(granted).toEqual([{ limb: 1 }]);
+    expect(granted).toEqual([{ limb: 1, asked: false }]);
     expect(puppeteer.holds(1)).toBe(true);
     puppeteer.release(1);
     expect(line.of("Release")).toEqual([{ name: "Release", limb: 1, epoch: 7 }]);
@@ -143,6 +143,88 @@ describe("a limb", () => {
   });
 });
 
+describe("asking for a limb that another holds", () => {
+  const presence = (limbs: (string | null)[], asks: string[][]) => line.say({ name: "Presence", viewers: 2, puppeteers: [], limbs, asks });
+  const held = ["b2", null, null, null];
+  let told: unknown[];
+
+  beforeEach(() => {
+    told = [];
+    for (const name of ["grant", "lapsed", "refusal"]) puppeteer.addEventListener(name, (event) => told.push([name, (event as CustomEvent).detail]));
+    puppeteer.ask(0);
+    puppeteer.ask(0);
+  });
+
+  test("is said once, and brings it by a grant, unclaimed", () => {
+    expect(line.of("Ask")).toEqual([{ name: "Ask", limb: 0, wanted: true }]);
+    presence(held, [["c3", "a1"], [], [], []]);
+    presence(held, [["a1"], [], [], []]);
+    expect([puppeteer.asks(0), puppeteer.holds(0), told]).toEqual([true, false, []]);
+    line.say({ name: "Grant", limb: 0, epoch: 9 });
+    presence(["a1", null, null, null], [[], [], [], []]);
+    expect([puppeteer.asks(0), puppeteer.holds(0)]).toEqual([false, true]);
+    expect(told).toEqual([["grant", { limb: 0, asked: true }]]);
+    puppeteer.target(0, 0.5, 0, 0);
+    expect([line.of("Claim"), line.of("Release"), line.of("Input").at(-1)?.epoch]).toEqual([[], [], 9]);
+  });
+
+  test("is not over when Presence tells of the grant before the grant", () => {
+    presence(held, [["a1"], [], [], []]);
+    presence(["a1", null, null, null], [[], [], [], []]);
+    line.say({ name: "Grant", limb: 0, epoch: 9 });
+    expect(told).toEqual([["grant", { limb: 0, asked: true }]]);
+  });
+
+  test("can be withdrawn; a grant that crosses that is given back", () => {
+    puppeteer.withdraw(0);
+    puppeteer.withdraw(0);
+    expect(line.of("Ask")).toEqual([{ name: "Ask", limb: 0, wanted: true }, { name: "Ask", limb: 0, wanted: false }]);
+    presence(held, [["a1"], [], [], []]);
+    expect(puppeteer.asks(0)).toBe(false);
+    line.say({ name: "Grant", limb: 0, epoch: 9 });
+    expect(line.of("Release")).toEqual([{ name: "Release", limb: 0, epoch: 9 }]);
+    expect(told).toEqual([]);
+  });
+
+  test("lapses when Presence no longer lists it", () => {
+    presence(held, [[], [], [], []]);
+    expect(puppeteer.asks(0)).toBe(true);
+    presence(held, [["a1"], [], [], []]);
+    presence(held, [[], [], [], []]);
+    expect([puppeteer.asks(0), told]).toEqual([false, [["lapsed", { limb: 0, free: false }]]]);
+  });
+
+  test("lapses when its holder let go before the session heard of it", () => {
+    presence([null, null, null, null], [[], [], [], []]);
+    expect([puppeteer.asks(0), told]).toEqual([false, [["lapsed", { limb: 0, free: true }]]]);
+  });
+
+  test("lapses after 20 seconds in a session that knows of no asking, and with the line", () => {
+    pass(19_000);
+    expect(puppeteer.asks(0)).toBe(true);
+    pass(1_100);
+    expect([puppeteer.asks(0), told]).toEqual([false, [["lapsed", { limb: 0, free: false }]]]);
+    puppeteer.ask(0);
+    line.end(1006);
+    expect(puppeteer.asks(0)).toBe(false);
+    puppeteer.ask(0);
+    expect(puppeteer.asks(0)).toBe(false);
+  });
+
+  test("is not for a limb that is held here", () => {
+    puppeteer.claim(1);
+    puppeteer.ask(1);
+    expect(line.of("Ask")).toHaveLength(1);
+  });
+});
+
+test("a notice is passed on", () => {
+  const told: unknown[] = [];
+  puppeteer.addEventListener("notice", (event) => told.push((event as CustomEvent).detail));
+  line.say({ name: "Notice", limb: 1, reason: "reach", detail: "too far" });
+  expect(told).toEqual([{ limb: 1, reason: "reach", detail: "too far" }]);
+});
+
 describe("inputs", () => {
   beforeEach(() => {
     puppeteer.claim(0);
@@ -169,8 +251,8 @@ describe("inputs", () => {
     }
     pass(100);
     const inputs = line.of("Input");
-    expect(inputs.length).toBeGreaterThan(10);
-    expect(inputs.length).toBeLessThan(20);
+    expect(inputs.length).toBeGreaterThan(25);
+    expect(inputs.length).toBeLessThan(40);
     expect(inputs[inputs.length - 1].values[0]).toBeCloseTo(0.499, 6);
   });
 

@@ -4,6 +4,7 @@ import { decodeBlock } from "../../src/codec/decode";
 import { restPose } from "../../src/motion/skeleton";
 import type { Message, Overlay, TimelineState } from "../../src/wire/messages";
 import { type BlockVectors, goldenDescription, goldenTrack } from "../golden";
+import { cameraBlocks, cameraNumbers, goldenScene } from "../scenes";
 import { bytes, vectors } from "../vectors";
 import { Line } from "./line";
 
@@ -80,7 +81,7 @@ describe("the start", () => {
     pass(80);
     Line.last.accept();
     Line.last.say(header(), description(), timeline({ clock: UNIX + 80_000 }));
-    Line.last.say({ name: "Presence", viewers: 1, puppeteers: [], limbs: [null, null, null, null] });
+    Line.last.say({ name: "Presence", viewers: 1, puppeteers: [], limbs: [null, null, null, null], asks: [[], [], [], []] });
     expect(viewer.poseAt(now)).toBeNull();
     Line.last.say(data(0, 0, lowest));
     expect(told).toEqual(["open", "figure", "blocks", "timeline", "presence", "blocks"]);
@@ -177,6 +178,48 @@ test("reports once a second what is ready and how long drawing takes", () => {
   expect(report.hidden).toBe(false);
   pass(2_000);
   expect(Line.last.of("Report")).toHaveLength(3);
+});
+
+describe("camera and light", () => {
+  const filmed = (): Message => ({
+    name: "Description", motion: "filmed", tracks: [goldenScene(1), goldenDescription(), goldenScene(0)],
+  });
+  const cameraData = (index: number, rate: number): Message => ({
+    name: "Data", track: 2, rate, index, block: cameraBlocks[rate][index],
+  });
+
+  test("are shown beside the dance at the same instant", () => {
+    watching();
+    Line.last.say(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }));
+    expect(viewer.scenes.map(({ kind }) => kind)).toEqual(["light", "camera"]);
+    expect(viewer.cameraAt(now)).toBeNull();
+    Line.last.say(cameraData(0, 0), cameraData(0, 1), cameraData(1, 1), data(0, 1, best));
+    expect([viewer.damaged, ...viewer.blocks]).toEqual([0, 1, -1, -1]);
+    expectNear(viewer.cameraAt(now)!, Float64Array.from(cameraNumbers(0)[0]));
+    expect(viewer.sceneAt(now, 1)).toEqual(viewer.cameraAt(now));
+    expect([viewer.sceneAt(now, 0), viewer.sceneAt(now, 2)]).toEqual([null, null]);
+    expect(viewer.poseAt(now)).not.toBeNull();
+    now = (26 / 30) * 1000;
+    viewer.cameraAt(now)!.forEach((value, i) => expect(value).toBeCloseTo(cameraNumbers(1)[0][i], 6));
+  });
+
+  test("belong to their motion", () => {
+    watching();
+    Line.last.say(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }), cameraData(0, 1));
+    expect(viewer.cameraAt(now)).not.toBeNull();
+    Line.last.say(header(), description());
+    expect([viewer.cameraAt(now), viewer.scenes.length]).toEqual([null, 0]);
+    Line.last.say(timeline({ epoch: 3 }));
+    expect(viewer.cameraAt(now)).toBeNull();
+  });
+
+  test("that are damaged are counted as such", () => {
+    watching();
+    Line.last.say(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }));
+    Line.last.say({ name: "Data", track: 2, rate: 0, index: 0, block: best.subarray(0, 0) });
+    Line.last.say({ name: "Data", track: 2, rate: 0, index: 9, block: cameraBlocks[0][0] });
+    expect(viewer.damaged).toBe(2);
+  });
 });
 
 describe("when the line is lost", () => {

@@ -1,117 +1,114 @@
 import { beforeEach, expect, test } from "vitest";
+import { Commands } from "../../src/input/commands";
 import { createGamepad, type GamepadInput } from "../../src/input/gamepad";
-import { BUTTON } from "../../src/input/gamepad-mapping";
 import type { Hands } from "../../src/input/hands";
+import { bind, DEFAULT_MAPPING, type Mapping } from "../../src/input/mapping";
+import { VelocityInputs } from "../../src/input/velocity";
 import { standingPuppet } from "../stage/standard-figure";
+import { deeds } from "./deeds";
+import { pad } from "./pads";
 import { handsBefore, Session } from "./session";
 
 const LEFT_HAND = 0;
+const [A, LEFT, RIGHT] = [0, 14, 15];
 
 let session: Session;
 let hands: Hands;
+let velocity: VelocityInputs;
 let pads: (Gamepad | null)[];
 let input: GamepadInput;
 let told: string[];
-let free: boolean;
-
-/** A pad as the browser tells of it. */
-function pad(axes = [0, 0, 0, 0], pressed: readonly number[] = [], mapping = "standard"): Gamepad {
-  const buttons = Array.from({ length: 17 }, (_, i) => ({ pressed: pressed.includes(i), touched: false, value: Number(pressed.includes(i)) }));
-  return { connected: true, mapping, axes, buttons } as unknown as Gamepad;
-}
+let mapping: Mapping;
 
 beforeEach(() => {
   session = new Session();
   hands = handsBefore(standingPuppet(), session);
   pads = [];
   told = [];
-  free = true;
-  input = createGamepad(
-    hands,
-    {
-      take: (limb) => {
-        told.push(`take ${limb}`);
-        return free && hands.take(limb, "pad");
-      },
-      play: () => told.push("play"),
-      step: (blocks) => told.push(`step ${blocks}`),
-    },
-    () => pads,
-  );
+  mapping = DEFAULT_MAPPING;
+  velocity = new VelocityInputs(hands, { take: (limb) => hands.take(limb, "velocity"), free: (limb) => hands.source(limb) === null });
+  input = createGamepad(new Commands(hands, velocity, deeds(told)), () => mapping, () => pads);
 });
 
-test("a stick that is moved takes its hand and moves it", () => {
+function frame(now: number, acting = true): void {
+  input.update(now, acting);
+  velocity.update(now);
+}
+
+test("a stick that is moved takes its hand and moves it, and at rest it stops at once", () => {
   pads = [pad([1, 0, 0, 0])];
-  input.update(0);
-  expect(told).toEqual(["take 0"]);
+  frame(0);
   expect(session.take()).toEqual([["claim", LEFT_HAND], ["velocity", LEFT_HAND, 1, 0, 0]]);
-  input.update(16);
-  expect(told).toEqual(["take 0"]);
-});
-
-test("a stick at rest stops its hand at once, and gives it back to the dance a while later", () => {
-  pads = [pad([0, -1, 0, 0])];
-  input.update(0);
-  pads = [pad()];
-  input.update(100);
+  frame(16);
+  pads = [pad([0.05, 0, 0, 0])];
+  frame(32);
   expect(session.said.at(-1)).toEqual(["velocity", LEFT_HAND, 0, 0, 0]);
-  input.update(700);
-  expect(hands.source(LEFT_HAND)).toBe("pad");
-  input.update(701);
-  expect(hands.source(LEFT_HAND)).toBe(null);
-  expect(session.said.at(-1)).toEqual(["release", LEFT_HAND]);
-  // And can be had again at once.
-  pads = [pad([0, -1, 0, 0])];
-  input.update(717);
-  expect(hands.source(LEFT_HAND)).toBe("pad");
 });
 
-test("a limb that another holds is asked for again now and then, not with every frame", () => {
-  free = false;
-  pads = [pad([1, 0, 0, 0])];
-  for (let now = 0; now <= 3200; now += 16) input.update(now);
-  expect(told).toEqual(["take 0", "take 0", "take 0"]);
-  expect(session.said).toEqual([]);
+test("a trembling stick is steadied, the more the more that is wished", () => {
+  const shake = (stickSmoothing: number) => {
+    mapping = { ...DEFAULT_MAPPING, stickSmoothing };
+    const said: number[] = [];
+    for (let i = 0; i < 200; i++) {
+      pads = [pad([0.6 + 0.1 * (i % 2), 0, 0, 0])];
+      frame(i * 16);
+      said.push(session.take().at(-1)?.[2] as number);
+    }
+    pads = [pad()];
+    frame(200 * 16);
+    const steady = said.slice(100);
+    return Math.max(...steady) - Math.min(...steady);
+  };
+  expect(shake(0)).toBeGreaterThan(0.1);
+  expect(shake(1)).toBeLessThan(0.04);
 });
 
-test("leaves alone what the pointer holds", () => {
-  hands.take(LEFT_HAND, "pointer");
-  session.take();
-  pads = [pad([1, 0, 0, 0])];
-  input.update(0);
-  pads = [];
-  input.update(16);
-  expect(hands.source(LEFT_HAND)).toBe("pointer");
-  expect([told, session.said]).toEqual([[], []]);
-});
-
-test("a pad that is pulled out lets go of all it holds", () => {
+test("pulled out, its limbs come to rest and are given back", () => {
   pads = [pad([1, 0, -1, 0])];
-  input.update(0);
-  expect([hands.source(0), hands.source(1)]).toEqual(["pad", "pad"]);
+  frame(0);
+  expect([hands.source(0), hands.source(1)]).toEqual(["velocity", "velocity"]);
   pads = [null];
-  input.update(16);
+  frame(16);
+  expect(session.said.slice(-2)).toEqual([["velocity", 0, 0, 0, 0], ["velocity", 1, 0, 0, 0]]);
+  frame(1000);
   expect([hands.source(0), hands.source(1), input.pad]).toEqual([null, null, null]);
-  expect(session.said.slice(-2)).toEqual([["release", 0], ["release", 1]]);
 });
 
 test("the first pad of the standard mapping that is connected is read", () => {
   const gone = { ...pad([1, 0, 0, 0]), connected: false } as Gamepad;
   const standard = pad();
-  pads = [null, gone, pad([1, 0, 0, 0], [BUTTON.play], ""), standard, pad([1, 0, 0, 0])];
-  input.update(0);
+  pads = [null, gone, pad([1, 0, 0, 0], { [A]: 1 }, ""), standard, pad([1, 0, 0, 0])];
+  frame(0);
   expect(input.pad).toBe(standard);
-  expect(told).toEqual([]);
+  expect([told, session.said]).toEqual([[], []]);
 });
 
 test("a button held down plays and seeks once", () => {
-  pads = [pad([0, 0, 0, 0], [BUTTON.play, BUTTON.left])];
-  input.update(0);
-  input.update(16);
-  expect(told).toEqual(["play", "step -1"]);
+  pads = [pad([0, 0, 0, 0], { [A]: 1, [LEFT]: 1 })];
+  frame(0);
+  frame(16);
+  expect(told).toEqual(["play", "back"]);
   pads = [pad()];
-  input.update(32);
-  pads = [pad([0, 0, 0, 0], [BUTTON.right])];
-  input.update(48);
-  expect(told).toEqual(["play", "step -1", "step 1"]);
+  frame(32);
+  pads = [pad([0, 0, 0, 0], { [RIGHT]: 1 })];
+  frame(48);
+  expect(told).toEqual(["play", "back", "forward"]);
+});
+
+test("what a button does is the mapping's to say, and nothing while one is being bound", () => {
+  mapping = bind(DEFAULT_MAPPING, "button:1", "right_leg+");
+  pads = [pad([0, 0, 0, 0], { 1: 1 })];
+  frame(0, false);
+  expect([session.said, input.pad]).toEqual([[], pads[0]]);
+  frame(16);
+  expect(session.take()).toEqual([["claim", 3], ["velocity", 3, 1, 0, 0]]);
+});
+
+test("pressing the shoulder button gives a pushed stick from the hand to the leg", () => {
+  pads = [pad([0, -1, 0, 0])];
+  frame(0);
+  session.take();
+  pads = [pad([0, -1, 0, 0], { 4: 1 })];
+  frame(16);
+  expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 0, 0], ["claim", 2], ["velocity", 2, 1, 0, 0]]);
 });

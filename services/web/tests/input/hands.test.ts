@@ -20,7 +20,7 @@ describe("taking and letting go", () => {
     const hands = handsBefore(null, session);
     let told = 0;
     hands.changed = () => told++;
-    expect(hands.take(LEFT_HAND, "keys")).toBe(true);
+    expect(hands.take(LEFT_HAND, "velocity")).toBe(true);
     expect(hands.take(LEFT_HAND, "pointer")).toBe(true);
     expect(hands.source(LEFT_HAND)).toBe("pointer");
     hands.letGo(LEFT_HAND);
@@ -32,18 +32,18 @@ describe("taking and letting go", () => {
 
   test("nothing can be held without a session, or in one that has ended", () => {
     const hands = handsBefore(null, null);
-    expect(hands.take(LEFT_HAND, "keys")).toBe(false);
+    expect(hands.take(LEFT_HAND, "velocity")).toBe(false);
     const session = new Session();
     session.ended = true;
     hands.puppeteer = session as unknown as Puppeteer;
-    expect(hands.take(LEFT_HAND, "keys")).toBe(false);
+    expect(hands.take(LEFT_HAND, "velocity")).toBe(false);
     expect([hands.source(LEFT_HAND), session.said]).toEqual([null, []]);
   });
 
   test("a refused limb is not released, since it was never had", () => {
     const session = new Session();
     const hands = handsBefore(null, session);
-    hands.take(LEFT_HAND, "pad");
+    hands.take(LEFT_HAND, "velocity");
     hands.refused(LEFT_HAND);
     hands.letGo(LEFT_HAND);
     expect(hands.source(LEFT_HAND)).toBe(null);
@@ -53,8 +53,8 @@ describe("taking and letting go", () => {
   test("all that is held is let go together, and nothing else", () => {
     const session = new Session();
     const hands = handsBefore(null, session);
-    hands.take(LEFT_HAND, "pad");
-    hands.take(RIGHT_LEG, "keys");
+    hands.take(LEFT_HAND, "velocity");
+    hands.take(RIGHT_LEG, "velocity");
     session.take();
     hands.letAllGo();
     expect(session.said).toEqual([["release", LEFT_HAND], ["release", RIGHT_LEG]]);
@@ -128,7 +128,7 @@ describe("moving", () => {
   test("the audience's right, up and nearer arrive in the axes of the chest", () => {
     const session = new Session();
     const hands = handsBefore(standingPuppet(Math.PI / 2), session);
-    hands.take(LEFT_HAND, "keys");
+    hands.take(LEFT_HAND, "velocity");
     session.take();
     hands.move(LEFT_HAND, 1, 0.5, 0);
     hands.move(LEFT_HAND, 0, 0, 1);
@@ -140,7 +140,7 @@ describe("moving", () => {
   test("of a leg only up counts", () => {
     const session = new Session();
     const hands = handsBefore(standingPuppet(), session);
-    hands.take(RIGHT_LEG, "keys");
+    hands.take(RIGHT_LEG, "velocity");
     hands.move(RIGHT_LEG, 1, -0.5, 1);
     expect(session.said.at(-1)).toEqual(["velocity", RIGHT_LEG, -0.5, 0, 0]);
   });
@@ -149,7 +149,7 @@ describe("moving", () => {
     const said = [0, 0.004].map((yaw) => {
       const session = new Session();
       const hands = handsBefore(standingPuppet(yaw), session);
-      hands.take(LEFT_HAND, "pad");
+      hands.take(LEFT_HAND, "velocity");
       hands.move(LEFT_HAND, 0.7, 0.3, 0);
       return session.said.at(-1)?.map((value) => (value === 0 ? 0 : value));
     });

@@ -2,8 +2,10 @@ import { describe, expect, test } from "vitest";
 import { decodeBlock } from "../../src/codec/decode";
 import { DamagedBlock } from "../../src/codec/errors";
 import { restPose } from "../../src/motion/skeleton";
-import { BlockStore } from "../../src/playout/blocks";
+import { SceneTrack } from "../../src/codec/scene";
+import { BlockStore, SceneStore } from "../../src/playout/blocks";
 import { type BlockVectors, goldenTrack } from "../golden";
+import { cameraBlocks, cameraNumbers, goldenScene } from "../scenes";
 import { bytes, vectors } from "../vectors";
 
 const golden = vectors<BlockVectors>("blocks").valid;
@@ -122,5 +124,56 @@ describe("the pose", () => {
     const wanted = restPose();
     decodeBlock(track, last).at(17.5, wanted);
     expect(stayed).toEqual(wanted);
+  });
+});
+
+describe("a camera", () => {
+  const DURATION = 2_600_000;
+
+  function camera(...missing: number[]): SceneStore {
+    const store = new SceneStore(SceneTrack.fromDescription(goldenScene()));
+    cameraBlocks[1].forEach((block, index) => missing.includes(index) || store.put(index, 1, block));
+    return store;
+  }
+
+  function expectNear(got: Float64Array | null, wanted: readonly number[]): void {
+    expect(got).not.toBeNull();
+    wanted.forEach((value, i) => expect(Math.abs(got![i] - value)).toBeLessThan(1e-6));
+  }
+
+  test("is the block's at a frame, and its blocks are kept as a motion's", () => {
+    const store = camera();
+    for (const index of [0, 1, 2]) {
+      const [first, last] = cameraNumbers(index);
+      expectNear(store.sceneAt((index * 26 * 1e6) / 30, true, DURATION), first);
+      expectNear(store.sceneAt(((index * 26 + 25) * 1e6) / 30, true, DURATION), last);
+    }
+    expect(store.put(0, 0, cameraBlocks[0][0])).toBe(false);
+    expect([...store.rates]).toEqual([1, 1, 1]);
+    expect(store.ahead(500_000, false)).toBe(2_100_000);
+    expect(() => store.put(3, 1, cameraBlocks[1][0])).toThrow(DamagedBlock);
+  });
+
+  test("goes over borders and round a loop in a line", () => {
+    const store = camera();
+    for (const [before, after] of [[0, 1], [2, 0]]) {
+      const [[, last], [first]] = [cameraNumbers(before), cameraNumbers(after)];
+      const quarter = last.map((value, i) => 0.75 * value + 0.25 * first[i]);
+      expectNear(store.sceneAt(((before * 26 + 25.25) * 1e6) / 30, true, DURATION), quarter);
+    }
+  });
+
+  test("stands still past its end in a loop too, where the motion is longer", () => {
+    const store = camera();
+    const end = Float64Array.from(store.sceneAt(DURATION, true, 2 * DURATION)!);
+    cameraNumbers(2)[1].forEach((value, i) => expect(Math.abs(end[i] - value)).toBeLessThan(0.02));
+    expect(store.sceneAt(1.9 * DURATION, true, 2 * DURATION)).toEqual(end);
+  });
+
+  test("stands still where its block is missing, and is nothing before there is any", () => {
+    const store = camera(0);
+    expect(store.sceneAt(0, true, DURATION)).toBeNull();
+    const seen = Float64Array.from(store.sceneAt(1_000_000, true, DURATION)!);
+    expect(store.sceneAt(0, true, DURATION)).toEqual(seen);
   });
 });

@@ -1,4 +1,4 @@
-import { Vector3 } from "three";
+import { Group, Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { AudienceCamera, type Framing } from "../../src/stage/camera";
 
@@ -102,4 +102,110 @@ test("the seat steps back from hands that reach out of the picture, by an eighth
   expect(audience.camera.position.z / near).toBeCloseTo(1.12, 3);
   run(audience, 12, 0.2);
   expect(audience.camera.position.z / near).toBeCloseTo(1, 3);
+});
+
+describe("the show's camera", () => {
+  const SHOW = [2, 1.6, 1, 0, 1.1, 0.2, 0.8];
+
+  function shown(aspect = 1.6): AudienceCamera {
+    const audience = seat("desktop", 900 * aspect, 900);
+    audience.still = false;
+    audience.update(1 / 60, 0, SHOW);
+    return audience;
+  }
+
+  function expectAt({ camera }: AudienceCamera, [x, y, z]: number[]): void {
+    expect(camera.getWorldPosition(new Vector3()).distanceTo(new Vector3(x, y, z))).toBeLessThan(1e-6);
+  }
+
+  test("is followed where there is one, from its first frame on", () => {
+    const audience = shown();
+    expect([audience.hasShow, audience.following]).toEqual([true, true]);
+    expectAt(audience, SHOW);
+    const centre = new Vector3(0, 1.1, 0.2).project(audience.camera);
+    expect(Math.hypot(centre.x, centre.y)).toBeLessThan(1e-9);
+    expect((audience.camera.fov * Math.PI) / 180).toBeCloseTo(0.8, 9);
+    expect(audience.view.fov).toBeCloseTo(0.8, 9);
+  });
+
+  test("is seen wider in a narrow window, while one's own seat is framed for it already", () => {
+    const audience = shown(0.5);
+    expect(Math.tan((audience.camera.fov * Math.PI) / 360)).toBeCloseTo((Math.tan(0.4) * 4) / 3 / 0.5, 9);
+    expect(audience.view.fov).toBeCloseTo(0.8, 9);
+    audience.follow(false);
+    for (let i = 0; i < 120; i++) audience.update(1 / 60, 0, SHOW);
+    expect(audience.camera.fov).toBeCloseTo(26, 9);
+  });
+
+  test("is left and come back to smoothly", () => {
+    const audience = shown();
+    const own = seat("desktop", 1440, 900).camera.position;
+    for (const [on, end] of [[false, own], [true, new Vector3(...SHOW.slice(0, 3))]] as const) {
+      audience.follow(on);
+      let before = audience.camera.position.clone();
+      let most = 0;
+      for (let i = 0; i < 90; i++) {
+        audience.update(1 / 60, 0, SHOW);
+        most = Math.max(most, audience.camera.position.distanceTo(before));
+        before = audience.camera.position.clone();
+      }
+      expect(audience.camera.position.distanceTo(end)).toBeLessThan(1e-6);
+      expect(most).toBeLessThan(0.4);
+      expect(audience.following).toBe(on);
+    }
+  });
+
+  test("is left by dragging the view, and what was chosen holds for the next motion", () => {
+    const audience = shown();
+    audience.orbit(0.1, 0);
+    expect([audience.hasShow, audience.following]).toEqual([true, false]);
+    audience.cut();
+    audience.update(1 / 60, 0, SHOW);
+    expect(audience.following).toBe(false);
+    expect(audience.camera.position.distanceTo(new Vector3(...SHOW.slice(0, 3)))).toBeGreaterThan(1);
+  });
+
+  test("a drag where there is none chooses nothing", () => {
+    const audience = seat("desktop", 1440, 900);
+    audience.still = false;
+    audience.orbit(0.1, 0);
+    expect([audience.hasShow, audience.following]).toEqual([false, false]);
+    audience.update(1 / 60, 0, SHOW);
+    expect(audience.following).toBe(true);
+  });
+
+  test("is not followed by default where less motion is asked for, and then gone over to with a cut", () => {
+    const audience = seat("desktop", 1440, 900);
+    audience.update(1 / 60, 0, SHOW);
+    expect([audience.hasShow, audience.following]).toEqual([true, false]);
+    expect(audience.camera.position.distanceTo(seat("desktop", 1440, 900).camera.position)).toBeLessThan(1e-9);
+    audience.follow(true);
+    audience.update(1 / 60, 0, SHOW);
+    expectAt(audience, SHOW);
+  });
+
+  test("that ends leads back to one's own seat", () => {
+    const audience = shown();
+    for (let i = 0; i < 90; i++) audience.update(1 / 60, 0, null);
+    expect(audience.following).toBe(false);
+    expect(audience.camera.position.distanceTo(seat("desktop", 1440, 900).camera.position)).toBeLessThan(1e-6);
+  });
+
+  test("is where it is in the world, wherever the rig has gone", () => {
+    const rig = new Group();
+    rig.position.set(3, 0.2, -2);
+    rig.rotation.y = 1;
+    rig.updateMatrixWorld(true);
+    const audience = new AudienceCamera();
+    rig.add(audience.camera);
+    audience.update(1 / 60, 0, SHOW);
+    expectAt(audience, SHOW);
+    const centre = new Vector3(0, 1.1, 0.2).project(audience.camera);
+    expect(Math.hypot(centre.x, centre.y)).toBeLessThan(1e-9);
+    audience.follow(false);
+    for (let i = 0; i < 90; i++) audience.update(1 / 60, 0, SHOW);
+    const seen = rig.worldToLocal(audience.view.position.clone());
+    expect(seen.distanceTo(audience.camera.position)).toBeLessThan(1e-9);
+    expect(audience.camera.position.x).toBeCloseTo(0, 9);
+  });
 });

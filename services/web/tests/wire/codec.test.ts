@@ -8,6 +8,7 @@ import { bytes, vectors } from "../vectors";
 
 interface Vectors {
   valid: { name: string; type: number; fields: Record<string, unknown>; bytes: string }[];
+  older: (Vectors["valid"][number] & { why: string })[];
   skipped: string[];
   invalid: { why: string; bytes: string }[];
 }
@@ -42,6 +43,10 @@ describe("golden messages", () => {
     if (vector.name !== "Description") expect(pack(message(vector))).toEqual(data);
   });
 
+  test.each(golden.older)("reads of those who say less: $why", (vector) => {
+    expect(unpack(bytes(vector.bytes))).toEqual(message(vector));
+  });
+
   test.each(golden.skipped)("skips %s", (data) => {
     expect(unpack(bytes(data))).toBeNull();
   });
@@ -56,6 +61,11 @@ test("what is wrong is said with its field", () => {
   expect(() => unpack(data)).toThrow("Grant, limb: must be a limb, 0..3");
 });
 
+test("askers are told for each of the four limbs", () => {
+  const data = pack({ name: "Presence", viewers: 1, puppeteers: [], limbs: [null, null, null, null], asks: [["a"], [], []] });
+  expect(() => unpack(data)).toThrow("Presence, asks: must be a list for each limb");
+});
+
 test("unknown keys are skipped", () => {
   const claim = { name: "Claim", limb: 2, later: "added" } as Message;
   expect(unpack(pack(claim))).toEqual({ name: "Claim", limb: 2 });
@@ -63,7 +73,7 @@ test("unknown keys are skipped", () => {
 
 test("any bytes are a message, skipped, or malformed", () => {
   const outcome = new Outcome(MalformedMessage);
-  const types = fc.constantFrom(...Array.from({ length: 12 }, (_, i) => i), 63, 64, 65, 66, 67, 68, 69, 70, 71, 255);
+  const types = fc.constantFrom(...Array.from({ length: 13 }, (_, i) => i), 63, 64, 65, 66, 67, 68, 69, 70, 71, 72, 255);
   fc.assert(
     fc.property(types, fc.uint8Array({ maxLength: 80 }), (type, rest) => {
       outcome.of(() => unpack(Uint8Array.of(type, ...rest)));

@@ -1,0 +1,287 @@
+"""What was done to a puppet, so that it can be done again: a session's log replays to the same motion.
+
+The log is a list of what the merge was told, in the order in which it was told it, with the clock times: claims,
+inputs, frames asked for, and so on. A `Marionette` told the same gives the same overlays to the last bit. It is
+bounded: it is cut into passages, each from a moment when the dance was alone to the next, and the oldest are dropped.
+
+As bytes: "bunraku.log/1", then a msgpack map; `passages` holds the entries as fixed records (`_RECORDS`).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import zip_longest
+from typing import Self
+
+import msgpack
+
+from bunraku.marionette.merge import Marionette, Overlay
+from bunraku.marionette.ownership import Grant, Input, Outcome, Refusal
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import Figure
+from bunraku.wire.messages import TimelineState, unpack
+
+MAGIC = b"bunraku.log/1"
+MOST_BYTES = 8 << 20
+"""A log is no larger: some hours of one limb in a hand."""
+MOST_TIMELINES = 10_000
+
+PoseAt = Callable[[int], Array | None]
+"""The dance's rotations (18, 4) at a clock time in µs, None where there is none."""
+
+_CLAIM, _RELEASE, _LEAVE, _ALIVE, _INPUT, _ASK, _SETTLE, _EXPIRE, _SEE, _OVERLAY, _DANCE = range(11)
+_RECORDS = {
+    _CLAIM: struct.Struct("<QHB"),
+    _RELEASE: struct.Struct("<QHBI"),
+    _LEAVE: struct.Struct("<QH"),
+    _ALIVE: struct.Struct("<QHB"),
+    _INPUT: struct.Struct("<QHBBIIq3d"),
+    _ASK: struct.Struct("<QHBB"),
+    _SETTLE: struct.Struct("<Q"),
+    _EXPIRE: struct.Struct("<Q"),
+    _SEE: struct.Struct("<QQ"),
+    _OVERLAY: struct.Struct("<QQ"),
+    _DANCE: struct.Struct("<QH"),
+}
+
+
+class DamagedLog(ValueError):
+    """Bytes that are not a log; the text says why."""
+
+
+@dataclass(slots=True)
+class Passage:
+    """From a moment when the dance was alone: the epochs and the motion at its beginning, and what was done since."""
+
+    epochs: tuple[int, ...]
+    motion: int
+    begin: int
+    records: bytearray = field(default_factory=bytearray)
+
+
+class Log:
+    """What was done to one puppet, and the timelines of its stage."""
+
+    def __init__(self) -> None:
+        self.timelines: deque[TimelineState] = deque(maxlen=MOST_TIMELINES)
+        self._names: list[str] = []
+        self._numbers: dict[str, int] = {}
+        self._passages: deque[Passage] = deque()
+        self._size = 0
+
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """The ids of the motions it was pulled over, in the order in which they came."""
+        return tuple(dict.fromkeys(state.motion for state in self.timelines))
+
+    @property
+    def begin(self) -> int | None:
+        """The clock time, µs, from which it knows all; None where nothing was done."""
+        return self._passages[0].begin if self._passages else None
+
+    def timeline(self, state: TimelineState) -> None:
+        """The stage has a new timeline."""
+        self.timelines.append(state)
+
+    def open(self, epochs: tuple[int, ...], motion: str, now: int) -> None:
+        """The dance is alone, and something is about to be done."""
+        self._passages.append(Passage(epochs, self._number(motion), now))
+
+    def note(self, kind: int, *values: object) -> None:
+        """Something was done; texts among `values` are names."""
+        numbers = (self._number(value) if isinstance(value, str) else value for value in values)
+        record = bytes((kind,)) + _RECORDS[kind].pack(*numbers)
+        self._passages[-1].records += record
+        self._size += len(record)
+        while self._size > MOST_BYTES:
+            # the passage under way too, if it is the only one: what is half known replays to nothing
+            dropped = self._passages.popleft()
+            self._size -= len(dropped.records)
+            if not self._passages:
+                self._passages.append(Passage((0,) * 4, dropped.motion, 1 << 63))
+                break
+
+    def pack(self) -> bytes:
+        """The log as bytes."""
+        passages = [[list(p.epochs), p.motion, p.begin, bytes(p.records)] for p in self._passages]
+        timelines = [state.pack() for state in self.timelines]
+        packed: bytes = msgpack.packb({"names": self._names, "timelines": timelines, "passages": passages})
+        return MAGIC + packed
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Self:
+        """The log in `data`; raises `DamagedLog`."""
+        if not data.startswith(MAGIC):
+            raise DamagedLog(f"a log begins with {MAGIC.decode()}")
+        try:
+            values = msgpack.unpackb(data[len(MAGIC) :])
+            log = cls()
+            log._names = [str(name) for name in values["names"]]
+            log._numbers = {name: number for number, name in enumerate(log._names)}
+            for state in map(unpack, values["timelines"]):
+                if not isinstance(state, TimelineState):
+                    raise DamagedLog("a log's timelines are messages of that kind")
+                log.timelines.append(state)
+            for epochs, motion, begin, records in values["passages"]:
+                log._passages.append(Passage(tuple(epochs), int(motion), int(begin), bytearray(records)))
+        except (ValueError, KeyError, TypeError, msgpack.UnpackException) as error:
+            raise DamagedLog(f"a damaged log: {error}") from error
+        return log
+
+    def replay(
+        self, figure_of: Callable[[str], Figure], pose_at: PoseAt, begin: int = 0
+    ) -> Iterator[tuple[int, Overlay | None]]:
+        """All frames again, in order: when each was due, and what lay over the dance; passages that were over before
+        clock time `begin` are left out.
+
+        `figure_of` gives the dancer of a motion's id. Raises `DamagedLog`.
+        """
+        passages = tuple(self._passages)
+        for passage, following in zip_longest(passages, passages[1:]):
+            if following is not None and following.begin <= begin:
+                continue
+            puppet = Marionette(figure_of(self._name(passage.motion)), passage.epochs)
+            yield from self._play(puppet, passage.records, figure_of, pose_at)
+
+    def _play(
+        self, puppet: Marionette, records: bytearray, figure_of: Callable[[str], Figure], pose_at: PoseAt
+    ) -> Iterator[tuple[int, Overlay | None]]:
+        at = 0
+        while at < len(records):
+            try:
+                layout = _RECORDS[records[at]]
+                kind, values = records[at], layout.unpack_from(records, at + 1)
+            except (KeyError, struct.error) as error:
+                raise DamagedLog("a log's records are cut or unknown") from error
+            at += 1 + layout.size
+            now = values[0]
+            if kind == _CLAIM:
+                puppet.claim(values[2], self._name(values[1]), now)
+            elif kind == _RELEASE:
+                puppet.release(values[2], self._name(values[1]), values[3], now)
+            elif kind == _LEAVE:
+                puppet.leave(self._name(values[1]), now)
+            elif kind == _ALIVE:
+                puppet.alive(self._name(values[1]), [limb for limb in range(4) if values[2] >> limb & 1], now)
+            elif kind == _INPUT:
+                _, who, limb, how, epoch, sequence, sampled, *numbers = values
+                x, y, z = numbers
+                puppet.input(self._name(who), Input(limb, how, epoch, sequence, sampled, (x, y, z)), now)
+            elif kind == _ASK:
+                puppet.ask(values[2], self._name(values[1]), bool(values[3]), now)
+            elif kind == _SETTLE:
+                puppet.settle(now)
+            elif kind == _EXPIRE:
+                puppet.expire(now)
+            elif kind == _DANCE:
+                puppet.set_figure(figure_of(self._name(values[1])))
+            else:
+                pose = pose_at(values[1])
+                if pose is None:
+                    continue
+                if kind == _SEE:
+                    puppet.see(pose, now)
+                else:
+                    yield values[1], puppet.overlay(pose, now)
+
+    def _number(self, name: str) -> int:
+        if name not in self._numbers:
+            self._numbers[name] = len(self._names)
+            self._names.append(name)
+        return self._numbers[name]
+
+    def _name(self, number: int) -> str:
+        if number >= len(self._names):
+            raise DamagedLog("a log names all that it tells of")
+        return self._names[number]
+
+
+class LoggedMarionette:
+    """A puppet that keeps a log of what is done to it; each method is `Marionette`'s."""
+
+    def __init__(self, puppet: Marionette, motion: str, log: Log) -> None:
+        """`puppet` is at rest, and of the motion of this id."""
+        self.puppet, self.log = puppet, log
+        self._motion = motion
+
+    def _note(self, kind: int, now: int, *values: object) -> None:
+        if self.puppet.at_rest:
+            if kind != _CLAIM:
+                # at rest nothing else has a consequence
+                return
+            self.log.open(self.puppet.epochs, self._motion, now)
+        self.log.note(kind, now, *values)
+
+    def set_figure(self, figure: Figure, motion: str, now: int) -> None:
+        """Another dancer, of the motion of this id."""
+        self.puppet.set_figure(figure)
+        self._note(_DANCE, now, motion)
+        self._motion = motion
+
+    def claim(self, limb: int, puppeteer: str, now: int) -> Grant | Refusal:
+        """As `Marionette.claim`."""
+        if 0 <= limb < 4:
+            self._note(_CLAIM, now, puppeteer, limb)
+        return self.puppet.claim(limb, puppeteer, now)
+
+    def release(self, limb: int, puppeteer: str, epoch: int, now: int) -> bool:
+        """As `Marionette.release`."""
+        released = self.puppet.release(limb, puppeteer, epoch, now)
+        if released:
+            self._note(_RELEASE, now, puppeteer, limb, epoch)
+        return released
+
+    def leave(self, puppeteer: str, now: int) -> None:
+        """As `Marionette.leave`."""
+        self._note(_LEAVE, now, puppeteer)
+        self.puppet.leave(puppeteer, now)
+
+    def alive(self, puppeteer: str, limbs: Iterable[int], now: int) -> None:
+        """As `Marionette.alive`."""
+        held = [limb for limb in limbs if 0 <= limb < 4]
+        self._note(_ALIVE, now, puppeteer, sum(1 << limb for limb in set(held)))
+        self.puppet.alive(puppeteer, held, now)
+
+    def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
+        """As `Marionette.ask`."""
+        if not 0 <= limb < 4:
+            return False
+        self._note(_ASK, now, puppeteer, limb, wanted)
+        return self.puppet.ask(limb, puppeteer, wanted, now)
+
+    def input(self, puppeteer: str, given: Input, now: int) -> Outcome:
+        """As `Marionette.input`."""
+        outcome = self.puppet.input(puppeteer, given, now)
+        if outcome in (Outcome.TAKEN, Outcome.REACH):
+            sampled = max(min(given.sampled, (1 << 63) - 1), -(1 << 63))
+            self._note(
+                _INPUT, now, puppeteer, given.limb, given.kind, given.epoch, given.sequence, sampled, *given.values
+            )
+        return outcome
+
+    def settle(self, now: int) -> tuple[list[tuple[str, Grant]], bool]:
+        """As `Marionette.settle`."""
+        grants, changed = self.puppet.settle(now)
+        if changed:
+            self._note(_SETTLE, now)
+        return grants, changed
+
+    def expire(self, now: int) -> list[tuple[int, str]]:
+        """As `Marionette.expire`."""
+        lost = self.puppet.expire(now)
+        if lost:
+            self._note(_EXPIRE, now)
+        return [(int(limb), who) for limb, who in lost]
+
+    def see(self, rotations: Array, due: int, now: int) -> None:
+        """As `Marionette.see`; the pose is the dance's at clock time `due`."""
+        self._note(_SEE, now, due)
+        self.puppet.see(rotations, now)
+
+    def overlay(self, rotations: Array, due: int, now: int) -> Overlay | None:
+        """As `Marionette.overlay`; the pose is the dance's at clock time `due`."""
+        self._note(_OVERLAY, now, due)
+        return self.puppet.overlay(rotations, now)

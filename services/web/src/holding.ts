@@ -1,0 +1,154 @@
+/** Who holds what, who asks for it, and what is done about it: between the session's word, one's own hands, and the page. */
+import type { Hands, Source } from "./input/hands";
+import { controlsOf, isPadControl, type Command, type Mapping } from "./input/mapping";
+import type { VelocityInputs } from "./input/velocity";
+import { controlName } from "./page/control-names";
+import { askers, holders, LIMB_NAMES, LIMB_ORDER, type LimbState } from "./page/model";
+import type { Page } from "./page/page";
+import type { Room } from "./room";
+
+/** What stands on the stage's chunk, and comes after the page. */
+export interface Theatre {
+  hands: Hands;
+  velocity: VelocityInputs;
+  /** The ring of a limb shakes. */
+  shake(limb: number): void;
+}
+
+export class Holding {
+  theatre: Theatre | null = null;
+  connected = false;
+  #room: Room | null = null;
+  /** The limb that was reached for in vain: what "ask" asks for. */
+  #wished: number | null = null;
+
+  constructor(private readonly page: Page, private readonly mapping: () => Mapping) {}
+
+  /** The session it is about from now on. */
+  enter(room: Room): void {
+    this.#room = room;
+    this.#wished = null;
+    const { viewer, puppeteer } = room;
+    if (this.theatre) this.theatre.hands.puppeteer = puppeteer;
+    const on = <T>(name: string, told: (detail: T) => void) => puppeteer.addEventListener(name, (event) => told((event as CustomEvent<T>).detail));
+    const render = () => this.render();
+    viewer.addEventListener("presence", render);
+    on("welcome", render);
+    on("presence", render);
+    on<{ limb: number }>("refusal", ({ limb }) => {
+      this.theatre?.hands.refused(limb);
+      this.refused(limb);
+    });
+    on<{ limb: number; asked: boolean }>("grant", ({ limb, asked }) => {
+      if (asked) this.#given(limb);
+    });
+    on<{ limb: number; free: boolean }>("lapsed", ({ limb, free }) => {
+      this.page.toast(free ? `The ${limbName(limb)} is free now` : `The ${limbName(limb)} was not given`);
+      this.render();
+    });
+    on<{ detail: string }>("notice", ({ detail }) => this.page.strings.notice(detail));
+  }
+
+  /** The four limbs as the session says, and one's own at once, before it has answered. */
+  limbs(): LimbState[] {
+    const { puppeteer, viewer } = this.#room ?? {};
+    const { hands, velocity } = this.theatre ?? {};
+    const told = holders(viewer?.presence ?? null, puppeteer?.id ?? null);
+    const asking = askers(viewer?.presence ?? null, puppeteer?.id ?? null);
+    return told.map((one, limb) => {
+      const mine = Boolean(hands?.source(limb));
+      const holder = mine ? { id: puppeteer?.id ?? "", name: "You", colour: puppeteer?.colour ?? 0, mine } : one?.mine ? null : one;
+      return { holder, askers: asking[limb], asked: puppeteer?.asks(limb) ?? false, selected: velocity?.selected === limb };
+    });
+  }
+
+  free(limb: number): boolean {
+    return !this.limbs()[limb].holder;
+  }
+
+  render(): void {
+    const limbs = this.limbs();
+    this.page.strings.render(limbs, this.connected && this.#room !== null);
+    this.page.asks.render(limbs, this.#key("give"));
+  }
+
+  /** Takes a limb if it is free; if not, says who has it. */
+  take(limb: number, source: Source): boolean {
+    if (!this.free(limb) && !this.theatre?.hands.source(limb)) {
+      this.refused(limb);
+      return false;
+    }
+    return this.theatre?.hands.take(limb, source) ?? false;
+  }
+
+  /** The page's button of a limb: takes it, or lets it go. */
+  toggle(limb: number): void {
+    const { hands, velocity } = this.theatre ?? {};
+    if (hands?.source(limb)) hands.letGo(limb);
+    else velocity?.hold(limb);
+  }
+
+  /** A limb that was reached for is another's. */
+  refused(limb: number): void {
+    this.theatre?.shake(limb);
+    const { holder, asked } = this.limbs()[limb];
+    if (!holder || holder.mine) {
+      this.page.toast(`The ${limbName(limb)} was let go`);
+    } else if (asked) {
+      this.page.toast(`You ask ${holder.name} for the ${limbName(limb)}`);
+    } else {
+      this.#wished = limb;
+      this.page.toast(`${holder.name} holds the ${limbName(limb)}`, { label: "Ask", key: this.#key("ask"), act: () => this.ask(limb) });
+    }
+  }
+
+  /** Asks the holder for a limb; without one, for that which was reached for last. */
+  ask(limb = this.#wished): void {
+    const holder = limb === null ? null : this.limbs()[limb].holder;
+    if (limb === null || !holder || holder.mine) {
+      this.page.toast("Reach for a string that another holds, then ask for it");
+      return;
+    }
+    this.#wished = null;
+    this.#room?.puppeteer.ask(limb);
+    this.page.toast(this.#room?.puppeteer.asks(limb) ? `You ask ${holder.name} for the ${limbName(limb)}` : "The line is lost; ask again when it is back");
+    this.render();
+  }
+
+  withdraw(limb: number): void {
+    this.#room?.puppeteer.withdraw(limb);
+    this.render();
+  }
+
+  /** Gives a limb to the first who asks for it; without one, the selected limb if it is asked for, else any that is. */
+  give(limb = this.#askedOfMe()): void {
+    if (limb === null) this.page.toast("Nobody asks for a string of yours");
+    else this.theatre?.hands.letGo(limb);
+  }
+
+  #askedOfMe(): number | null {
+    const limbs = this.limbs();
+    const asked = LIMB_ORDER.filter((limb) => limbs[limb].holder?.mine && limbs[limb].askers.length > 0);
+    return asked.find((limb) => limbs[limb].selected) ?? asked[0] ?? null;
+  }
+
+  #given(limb: number): void {
+    const { hands, velocity } = this.theatre ?? {};
+    if (!hands?.take(limb, "velocity")) {
+      this.#room?.puppeteer.release(limb);
+      return;
+    }
+    velocity?.hold(limb);
+    this.page.toast(`The ${limbName(limb)} is yours`);
+    this.render();
+  }
+
+  #key(command: Command): string | null {
+    const control = controlsOf(this.mapping(), command).find((one) => !isPadControl(one));
+    return control === undefined ? null : controlName(control);
+  }
+}
+
+function limbName(limb: number): string {
+  return LIMB_NAMES[limb].toLowerCase();
+}

@@ -1,0 +1,70 @@
+/** Carries out what a control is bound to, whichever device it is of. */
+import type { Hands } from "./hands";
+import { isInput } from "./inputs";
+import { limbTaken, type Action, type Command, type Control } from "./mapping";
+import type { VelocityInputs } from "./velocity";
+
+/** A control held longer than this lets its limb go when it comes up; a shorter press leaves the limb held. Milliseconds. */
+const LONG_PRESS = 400;
+
+/** What the page does for each action that takes no limb. */
+export type PageActions = Readonly<Record<Exclude<Action, `take_${string}`>, () => void>>;
+
+interface Press {
+  commands: readonly Command[];
+  at: number;
+  /** Limbs that this press took. */
+  took: readonly number[];
+}
+
+export class Commands {
+  readonly #pressed = new Map<Control, Press>();
+
+  constructor(private readonly hands: Hands, private readonly velocity: VelocityInputs, private readonly actions: PageActions) {}
+
+  /** Whether a control is down. */
+  isDown(control: Control): boolean {
+    return this.#pressed.has(control);
+  }
+
+  /** A control goes down, or is pressed more or less than before; `now` in milliseconds. */
+  press(control: Control, commands: readonly Command[], strength: number, now: number): void {
+    for (const command of commands) if (isInput(command)) this.velocity.set(control, command, strength);
+    if (this.#pressed.has(control)) return;
+    const limbs = commands.map(limbTaken).filter((limb) => limb !== null);
+    const took = limbs.filter((limb) => this.hands.source(limb) !== "pointer" && !this.velocity.holds(limb) && this.velocity.hold(limb));
+    this.#pressed.set(control, { commands, at: now, took });
+    for (const command of commands) if (!isInput(command) && limbTaken(command) === null) this.actions[command as keyof PageActions]();
+  }
+
+  /** A control that is down repeats by itself: seeking goes on, the rest is done once. */
+  repeat(control: Control): void {
+    for (const command of this.#pressed.get(control)?.commands ?? []) if (command === "back" || command === "forward") this.actions[command]();
+  }
+
+  /** A control comes up. */
+  release(control: Control, now: number): void {
+    const press = this.#pressed.get(control);
+    this.#pressed.delete(control);
+    if (!press) return;
+    this.#rest(control, press);
+    const long = now - press.at > LONG_PRESS;
+    for (const limb of press.commands.map(limbTaken)) {
+      // A tap takes and the next tap lets go; a long press holds for as long as it lasts.
+      if (limb !== null && (long || !press.took.includes(limb))) this.velocity.letGo(limb);
+    }
+  }
+
+  /** Lets all controls up whose names pass, without a tap's meaning. */
+  forget(which: (control: Control) => boolean): void {
+    for (const [control, press] of this.#pressed) {
+      if (!which(control)) continue;
+      this.#pressed.delete(control);
+      this.#rest(control, press);
+    }
+  }
+
+  #rest(control: Control, { commands }: Press): void {
+    for (const command of commands) if (isInput(command)) this.velocity.set(control, command, 0);
+  }
+}

@@ -1,0 +1,107 @@
+/**
+ * Moves limbs by speed: every key, pad control and button of the page that is held down stands here with the input it means. The first press takes the limb,
+ * several at once add up, opposite ones cancel (`directionOf`).
+ */
+import type { Hands } from "./hands";
+import { directionOf, effectOf, type DigitalInput, type HeldInput } from "./inputs";
+
+/** A limb taken by a push alone, all its inputs at rest for this long, is let go, and the dance has it back. Milliseconds. */
+const REST = 700;
+/** A limb that another held is tried again no sooner than this after it came free. Milliseconds. */
+const PATIENCE = 300;
+
+export interface VelocityActions {
+  /** Takes a limb for these inputs; false, and the person is told why, when it cannot be had. */
+  take(limb: number): boolean;
+  /** Whether nobody holds a limb. */
+  free(limb: number): boolean;
+}
+
+interface Motion {
+  active: boolean;
+  /** When it was last active, and last tried for, milliseconds. */
+  movedAt: number;
+  triedAt: number;
+  /** Taken by a push, and let go by rest. */
+  momentary: boolean;
+  /** Lost or let go while the push goes on: it has to rest before it takes again. */
+  spent: boolean;
+}
+
+export class VelocityInputs {
+  readonly #hands: Hands;
+  readonly #actions: VelocityActions;
+  readonly #down = new Map<string, { input: DigitalInput | HeldInput; strength: number }>();
+  readonly #motions: Motion[] = [0, 1, 2, 3].map(() => ({ active: false, movedAt: -Infinity, triedAt: -Infinity, momentary: false, spent: false }));
+  #selected: number | null = null;
+
+  constructor(hands: Hands, actions: VelocityActions) {
+    this.#hands = hands;
+    this.#actions = actions;
+  }
+
+  /** The limb that the inputs of "whichever is held" move; null for none. */
+  get selected(): number | null {
+    if (this.#selected === null || !this.holds(this.#selected)) this.#selected = [1, 0, 3, 2].find((limb) => this.holds(limb)) ?? null;
+    return this.#selected;
+  }
+
+  /** Presses an input by a control (any name), or changes how strongly; 0 lets it up. */
+  set(control: string, input: DigitalInput | HeldInput, strength: number): void {
+    if (strength > 0) this.#down.set(`${control} ${input}`, { input, strength });
+    else this.#down.delete(`${control} ${input}`);
+  }
+
+  /** Whether a limb is held until it is let go, and not by a push alone. */
+  holds(limb: number): boolean {
+    return this.#hands.source(limb) === "velocity" && !this.#motions[limb].momentary;
+  }
+
+  /** Holds a limb until it is let go, and selects it. False when it cannot be had. */
+  hold(limb: number): boolean {
+    if (this.#hands.source(limb) !== "velocity" && !this.#actions.take(limb)) return false;
+    this.#motions[limb].momentary = false;
+    this.#selected = limb;
+    return true;
+  }
+
+  letGo(limb: number): void {
+    if (this.#hands.source(limb) !== "velocity") return;
+    this.#motions[limb].spent = this.#motions[limb].active;
+    this.#hands.letGo(limb);
+  }
+
+  /** Takes, moves and lets go as the inputs say. Once a frame, with a time that never runs backwards, milliseconds. */
+  update(now: number): void {
+    const selected = this.selected;
+    const held: [DigitalInput | HeldInput, number][][] = [[], [], [], []];
+    for (const { input, strength } of this.#down.values()) {
+      const limb = effectOf(input).limb ?? selected;
+      if (limb !== null) held[limb].push([input, strength]);
+    }
+    held.forEach((inputs, limb) => this.#move(limb, inputs, now));
+  }
+
+  #move(limb: number, inputs: [DigitalInput | HeldInput, number][], now: number): void {
+    const motion = this.#motions[limb];
+    const fresh = inputs.length > 0 && !motion.active;
+    if (motion.momentary && this.#hands.source(limb) !== "velocity") {
+      motion.momentary = false;
+      motion.spent = true;
+    }
+    motion.active = inputs.length > 0;
+    if (motion.active) motion.movedAt = now;
+    else motion.spent = false;
+    const again = !motion.spent && now - motion.triedAt >= PATIENCE && this.#actions.free(limb);
+    if (motion.active && this.#hands.source(limb) === null && (fresh || again)) {
+      motion.triedAt = now;
+      motion.momentary = this.#actions.take(limb);
+    }
+    if (this.#hands.source(limb) !== "velocity") return;
+    this.#hands.move(limb, ...directionOf(inputs));
+    if (motion.momentary && now - motion.movedAt > REST) {
+      motion.momentary = false;
+      this.#hands.letGo(limb);
+    }
+  }
+}

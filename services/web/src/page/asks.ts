@@ -1,0 +1,33 @@
+/** What others ask of one's own limbs, standing until it is given, withdrawn or lapsed. Read out politely; nothing is taken by force. */
+import { element } from "./dom";
+import { LIMB_NAMES, LIMB_ORDER, type LimbState } from "./model";
+
+export interface Asks {
+  /** `key` gives the first of them. */
+  render(limbs: readonly LimbState[], key: string | null): void;
+}
+
+export function createAsks(root: HTMLElement, give: (limb: number) => void): Asks {
+  const live = element("div", { class: "asks", role: "status", "aria-live": "polite" });
+  root.append(live);
+  let shown = "";
+  return {
+    render(limbs, key) {
+      const asked = LIMB_ORDER.filter((limb) => limbs[limb].holder?.mine && limbs[limb].askers.length > 0);
+      const now = JSON.stringify([asked.map((limb) => [limb, limbs[limb].askers[0]]), key]);
+      if (now === shown) return;
+      shown = now;
+      const within = live.contains(document.activeElement);
+      live.replaceChildren(
+        ...asked.map((limb, i) => {
+          const { name, colour } = limbs[limb].askers[0];
+          const limbName = LIMB_NAMES[limb].toLowerCase();
+          const button = element("button", { class: "toast-action", type: "button", "aria-label": `Give the ${limbName} to ${name}`, onClick: () => give(limb) }, "Give");
+          if (key && i === 0) button.append(element("kbd", { class: "key-hint" }, key));
+          return element("div", { class: "toast ask", style: `--colour: var(--holder-${colour})` }, `${name} asks for the ${limbName}`, button);
+        }),
+      );
+      if (within) live.querySelector("button")?.focus();
+    },
+  };
+}

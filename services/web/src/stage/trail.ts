@@ -1,0 +1,101 @@
+/**
+ * Where the audience's camera was during the last ten minutes, as sparse keyframes: straight lines between them are as near to
+ * all that was seen as `NEAR` and `NEAR_ANGLE` say (the swing filter: the slopes that a line from the last keyframe may have are
+ * narrowed by every sample, and the first that none of them reaches ends it).
+ */
+import type { CameraKeyframe } from "../client/library";
+import type { View } from "./view";
+
+/** How far a line may be off the camera's position, and off the point it gazes at, metres. */
+export const NEAR = 0.002;
+/** How far off its field of view, radians. */
+export const NEAR_ANGLE = (0.2 * Math.PI) / 180;
+/** Microseconds that are remembered. */
+export const REMEMBERED = 600e6;
+/** More keyframes than this are never held: as many as a kept session may have. */
+export const MOST = 36_000;
+
+const NUMBERS = 7;
+/** Of each number, so that three of them together are within the bound. */
+const SLACK = [0, 1, 2, 3, 4, 5].map(() => NEAR / Math.sqrt(3)).concat(NEAR_ANGLE);
+
+/** Clock time, then the seven numbers of a camera. */
+type Sample = Float64Array;
+
+export class CameraTrail {
+  #keys: Sample[] = [];
+  /** The newest sample, where a line from the last keyframe may end. */
+  #newest: Sample | null = null;
+  readonly #lowest = new Float64Array(NUMBERS);
+  readonly #highest = new Float64Array(NUMBERS);
+
+  /** Notes the view at clock time `time`, microseconds. A time that is not after the last is passed over. */
+  add(time: number, { position, gaze, fov }: View): void {
+    const sample = Float64Array.of(time, position.x, position.y, position.z, gaze.x, gaze.y, gaze.z, fov);
+    if (!sample.every(Number.isFinite)) return;
+    const last = this.#newest ?? this.#keys.at(-1);
+    if (last && time <= last[0]) return;
+    if (this.#keys.length === 0) {
+      this.#begin(sample);
+      return;
+    }
+    if (this.#newest && !this.#reaches(sample)) this.#begin(this.#newest);
+    this.#narrow(sample);
+    this.#newest = sample;
+  }
+
+  /**
+   * Keyframes between two clock times, and those next to them on either side, so that the camera is known all along; ascending.
+   */
+  keyframes(begin = -Infinity, end = Infinity): CameraKeyframe[] {
+    const all = this.#newest ? [...this.#keys, this.#newest] : this.#keys;
+    const first = Math.max(0, all.findLastIndex((key) => key[0] <= begin));
+    const after = all.findIndex((key) => key[0] >= end);
+    return all.slice(first, after < 0 ? all.length : after + 1).map(keyframe);
+  }
+
+  clear(): void {
+    this.#keys = [];
+    this.#newest = null;
+  }
+
+  /** A line starts here. */
+  #begin(key: Sample): void {
+    this.#keys.push(key);
+    this.#newest = null;
+    this.#lowest.fill(-Infinity);
+    this.#highest.fill(Infinity);
+    const oldest = key[0] - REMEMBERED;
+    // the one before the oldest that is remembered is where its line comes from
+    const before = this.#keys.findIndex((one) => one[0] > oldest) - 1;
+    const drop = Math.max(before, this.#keys.length - MOST);
+    if (drop > 0) this.#keys.splice(0, drop);
+  }
+
+  /** Whether a line from the last keyframe to `sample` passes near all samples since. */
+  #reaches(sample: Sample): boolean {
+    const key = this.#keys[this.#keys.length - 1];
+    const span = sample[0] - key[0];
+    for (let n = 0; n < NUMBERS; n++) {
+      const slope = (sample[n + 1] - key[n + 1]) / span;
+      if (slope < this.#lowest[n] || slope > this.#highest[n]) return false;
+    }
+    return true;
+  }
+
+  #narrow(sample: Sample): void {
+    const key = this.#keys[this.#keys.length - 1];
+    const span = sample[0] - key[0];
+    for (let n = 0; n < NUMBERS; n++) {
+      const step = sample[n + 1] - key[n + 1];
+      this.#lowest[n] = Math.max(this.#lowest[n], (step - SLACK[n]) / span);
+      this.#highest[n] = Math.min(this.#highest[n], (step + SLACK[n]) / span);
+    }
+  }
+}
+
+/** Tenths of millimetres and of milliradians are enough. */
+function keyframe(sample: Sample): CameraKeyframe {
+  const [x, y, z, gx, gy, gz, fov] = Array.from(sample.subarray(1), (value) => Math.round(value * 1e4) / 1e4);
+  return { time: Math.round(sample[0]), position: [x, y, z], gaze: [gx, gy, gz], fov };
+}

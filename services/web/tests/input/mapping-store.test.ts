@@ -1,0 +1,42 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { bind, DEFAULT_MAPPING } from "../../src/input/mapping";
+import { loadMapping, saveMapping } from "../../src/input/mapping-store";
+
+let kept: Map<string, string>;
+
+beforeEach(() => {
+  kept = new Map();
+  vi.stubGlobal("localStorage", {
+    getItem: (key: string) => kept.get(key) ?? null,
+    setItem: (key: string, value: string) => kept.set(key, value),
+    removeItem: (key: string) => kept.delete(key),
+  });
+});
+afterEach(() => vi.unstubAllGlobals());
+
+test("what is kept comes back; the default is kept by keeping nothing", () => {
+  const mine = { ...bind(DEFAULT_MAPPING, "KeyZ", "keep"), deadZone: 0.3 };
+  expect(loadMapping()).toBe(DEFAULT_MAPPING);
+  saveMapping(mine);
+  expect(loadMapping()).toEqual(mine);
+  saveMapping(DEFAULT_MAPPING);
+  expect([loadMapping(), kept.size]).toEqual([DEFAULT_MAPPING, 0]);
+});
+
+test.each([
+  "", "{", "null", "7", "[]", '"text"', "{}", '{"version":1}', '{"version":1,"mapping":{"bindings":{"KeyW":["fly"]}}}',
+  JSON.stringify({ version: 2, mapping: DEFAULT_MAPPING }), JSON.stringify(DEFAULT_MAPPING),
+])("what cannot be read is the default: %s", (content) => {
+  saveMapping(bind(DEFAULT_MAPPING, "KeyZ", "keep"));
+  for (const key of kept.keys()) kept.set(key, content);
+  expect(loadMapping()).toBe(DEFAULT_MAPPING);
+});
+
+test("storage that is forbidden is no error", () => {
+  const forbidden = () => {
+    throw new Error("forbidden");
+  };
+  vi.stubGlobal("localStorage", { getItem: forbidden, setItem: forbidden, removeItem: forbidden });
+  expect(loadMapping()).toBe(DEFAULT_MAPPING);
+  expect(() => saveMapping({ ...DEFAULT_MAPPING })).not.toThrow();
+});

@@ -1,0 +1,88 @@
+import fc from "fast-check";
+import { describe, expect, test } from "vitest";
+import { DIGITAL_INPUTS, HELD_INPUTS } from "../../src/input/inputs";
+import {
+  ACTIONS, bind, conflictsOf, controlsOf, DEFAULT_MAPPING, isPadControl, limbTaken, readMapping, unbind, type Command, type Mapping,
+} from "../../src/input/mapping";
+
+const ALL: readonly Command[] = [...DIGITAL_INPUTS, ...HELD_INPUTS, ...ACTIONS];
+const command = fc.constantFrom(...ALL);
+const control = fc.constantFrom("KeyZ", "KeyW", "Digit1", "button:1", "axis:0+", "button:4 button:1", "F2");
+
+describe("the default", () => {
+  test("survives being written and read", () => {
+    expect(readMapping(JSON.parse(JSON.stringify(DEFAULT_MAPPING)))).toEqual(DEFAULT_MAPPING);
+  });
+
+  test("has no conflicts: keys of the held string give way to what they do without one", () => {
+    for (const [one, commands] of Object.entries(DEFAULT_MAPPING.bindings)) {
+      for (const does of commands) expect(conflictsOf(DEFAULT_MAPPING, one, does), `${one} ${does}`).toEqual([]);
+    }
+  });
+
+  test("reaches every hand and leg from the gamepad, and all limbs and actions from the keyboard", () => {
+    for (const input of DIGITAL_INPUTS) expect(controlsOf(DEFAULT_MAPPING, input).some(isPadControl), input).toBe(true);
+    for (const one of [...HELD_INPUTS, ...ACTIONS]) expect(controlsOf(DEFAULT_MAPPING, one).some((key) => !isPadControl(key)), one).toBe(true);
+  });
+});
+
+describe("editing", () => {
+  test("what is bound is found, what is unbound is gone, and nothing else changes", () => {
+    fc.assert(
+      fc.property(fc.array(fc.tuple(control, command), { maxLength: 12 }), control, command, (before, at, does) => {
+        const mapping = before.reduce((sum, [one, other]) => bind(sum, one, other), DEFAULT_MAPPING);
+        const bound = bind(mapping, at, does);
+        expect(controlsOf(bound, does)).toContain(at);
+        expect(readMapping(JSON.parse(JSON.stringify(bound)))).toEqual(bound);
+        const back = unbind(bound, at, does);
+        expect(controlsOf(back, does)).not.toContain(at);
+        for (const other of ALL) if (other !== does) expect(new Set(controlsOf(back, other))).toEqual(new Set(controlsOf(mapping, other)));
+      }),
+    );
+  });
+
+  test("a conflict is a second command at the same time", () => {
+    const twice = bind(DEFAULT_MAPPING, "Space", "keep");
+    expect(conflictsOf(twice, "Space", "keep")).toEqual(["play"]);
+    expect(conflictsOf(twice, "Space", "play")).toEqual(["keep"]);
+    expect(conflictsOf(bind(DEFAULT_MAPPING, "KeyW", "keep"), "KeyW", "keep")).toEqual([]);
+    expect(conflictsOf(bind(DEFAULT_MAPPING, "KeyW", "held_x+"), "KeyW", "held_x+")).toEqual(["held_y+"]);
+  });
+
+  test("with a button held, a control that does nothing any more stays silent; alone it is forgotten", () => {
+    expect(unbind(DEFAULT_MAPPING, "button:4 button:6", "left_hand_z-").bindings["button:4 button:6"]).toEqual([]);
+    expect("KeyK" in unbind(DEFAULT_MAPPING, "KeyK", "keep").bindings).toBe(false);
+  });
+});
+
+describe("a mapping from elsewhere", () => {
+  const broken: [string, unknown][] = [
+    ["nothing", null], ["a number", 7], ["a list", []], ["no bindings", { ...DEFAULT_MAPPING, bindings: undefined }],
+    ["a list of bindings", { ...DEFAULT_MAPPING, bindings: [] }],
+    ["an unknown command", { ...DEFAULT_MAPPING, bindings: { KeyW: ["fly"] } }],
+    ["commands that are no list", { ...DEFAULT_MAPPING, bindings: { KeyW: "play" } }],
+    ["an unknown control", { ...DEFAULT_MAPPING, bindings: { "wheel:1": ["play"] } }],
+    ["too many controls", { ...DEFAULT_MAPPING, bindings: Object.fromEntries(Array.from({ length: 401 }, (_, i) => [`K${i}`, []])) }],
+    ["a dead zone of all", { ...DEFAULT_MAPPING, deadZone: 1 }], ["no dead zone", { ...DEFAULT_MAPPING, deadZone: undefined }],
+    ["smoothing below none", { ...DEFAULT_MAPPING, stickSmoothing: -0.1 }], ["smoothing in words", { ...DEFAULT_MAPPING, pointerSmoothing: "much" }],
+  ];
+  test.each(broken)("is none: %s", (_, value) => {
+    expect(readMapping(value)).toBeNull();
+  });
+
+  test("is a mapping or null, never an error, whatever it is", () => {
+    fc.assert(
+      fc.property(fc.anything(), fc.anything(), (value, bindings) => {
+        for (const one of [value, { ...DEFAULT_MAPPING, bindings }]) {
+          const read: Mapping | null = readMapping(one);
+          if (read) expect(readMapping(read)).toEqual(read);
+        }
+      }),
+    );
+  });
+});
+
+test("four actions take a limb each", () => {
+  expect(ACTIONS.map(limbTaken).filter((limb) => limb !== null)).toEqual([1, 0, 3, 2]);
+  expect(limbTaken("held_x+")).toBeNull();
+});

@@ -1,0 +1,121 @@
+import { beforeEach, describe, expect, test } from "vitest";
+import type { Hands } from "../../src/input/hands";
+import { VelocityInputs } from "../../src/input/velocity";
+import { standingPuppet } from "../stage/standard-figure";
+import { handsBefore, Session } from "./session";
+
+const [LEFT_HAND, RIGHT_HAND, LEFT_LEG] = [0, 1, 2];
+
+let session: Session;
+let hands: Hands;
+let velocity: VelocityInputs;
+let told: number[];
+let others: Set<number>;
+
+beforeEach(() => {
+  session = new Session();
+  hands = handsBefore(standingPuppet(), session);
+  told = [];
+  others = new Set();
+  velocity = new VelocityInputs(hands, {
+    take: (limb) => {
+      told.push(limb);
+      return !others.has(limb) && hands.take(limb, "velocity");
+    },
+    free: (limb) => !others.has(limb) && hands.source(limb) === null,
+  });
+});
+
+test("the first press takes its limb and moves it; all at rest, it stops at once and is given back a while later", () => {
+  velocity.set("KeyU", "left_hand_x+", 1);
+  velocity.update(0);
+  expect(session.take()).toEqual([["claim", LEFT_HAND], ["velocity", LEFT_HAND, 1, 0, 0]]);
+  velocity.update(16);
+  velocity.set("KeyU", "left_hand_x+", 0);
+  velocity.update(100);
+  expect(session.said.at(-1)).toEqual(["velocity", LEFT_HAND, 0, 0, 0]);
+  velocity.update(716);
+  expect(hands.source(LEFT_HAND)).toBe("velocity");
+  velocity.update(717);
+  expect(hands.source(LEFT_HAND)).toBe(null);
+  expect(session.said.at(-1)).toEqual(["release", LEFT_HAND]);
+  velocity.set("KeyU", "left_hand_x+", 1);
+  velocity.update(733);
+  expect(hands.source(LEFT_HAND)).toBe("velocity");
+  expect(told).toEqual([LEFT_HAND, LEFT_HAND]);
+});
+
+test("opposite ones cancel and keep the limb, several limbs go at once, a leg goes up", () => {
+  velocity.set("KeyU", "left_hand_y+", 1);
+  velocity.set("button:3", "left_hand_y-", 1);
+  velocity.set("KeyI", "left_leg+", 1);
+  velocity.update(0);
+  velocity.update(2000);
+  expect(session.said.slice(-2)).toEqual([["velocity", LEFT_HAND, 0, 0, 0], ["velocity", LEFT_LEG, 1, 0, 0]]);
+  expect([LEFT_HAND, RIGHT_HAND, LEFT_LEG].map((limb) => hands.source(limb))).toEqual(["velocity", null, "velocity"]);
+});
+
+describe("the held string", () => {
+  test("is the limb taken last; inputs of it move that and nothing else", () => {
+    expect(velocity.selected).toBe(null);
+    velocity.set("KeyW", "held_y+", 1);
+    velocity.update(0);
+    expect(session.said).toEqual([]);
+    velocity.hold(LEFT_HAND);
+    velocity.hold(RIGHT_HAND);
+    expect(velocity.selected).toBe(RIGHT_HAND);
+    session.take();
+    velocity.update(16);
+    expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 0, 0], ["velocity", RIGHT_HAND, 0, 1, 0]]);
+    velocity.letGo(RIGHT_HAND);
+    expect(velocity.selected).toBe(LEFT_HAND);
+  });
+
+  test("is not one that a push alone took, until it is held; what is held is kept at rest", () => {
+    velocity.set("axis:0+", "left_hand_x+", 0.5);
+    velocity.update(0);
+    expect([velocity.selected, velocity.holds(LEFT_HAND)]).toEqual([null, false]);
+    velocity.hold(LEFT_HAND);
+    expect([velocity.selected, velocity.holds(LEFT_HAND)]).toEqual([LEFT_HAND, true]);
+    velocity.set("axis:0+", "left_hand_x+", 0);
+    velocity.update(5000);
+    expect(hands.source(LEFT_HAND)).toBe("velocity");
+  });
+});
+
+describe("a limb that another holds", () => {
+  test("is reached for once with every push, and taken when it comes free under one", () => {
+    others.add(LEFT_HAND);
+    velocity.set("axis:0+", "left_hand_x+", 1);
+    for (let now = 0; now <= 3200; now += 16) velocity.update(now);
+    expect([told, session.said]).toEqual([[LEFT_HAND], []]);
+    others.clear();
+    velocity.update(3216);
+    expect([told, hands.source(LEFT_HAND)]).toEqual([[LEFT_HAND, LEFT_HAND], "velocity"]);
+  });
+
+  test("taken away, or let go, under a push is not taken again before a rest", () => {
+    velocity.set("axis:0+", "left_hand_x+", 1);
+    velocity.update(0);
+    hands.refused(LEFT_HAND);
+    for (let now = 16; now <= 3200; now += 16) velocity.update(now);
+    expect(told).toEqual([LEFT_HAND]);
+    velocity.set("axis:0+", "left_hand_x+", 0);
+    velocity.update(3216);
+    velocity.set("axis:0+", "left_hand_x+", 1);
+    velocity.update(3232);
+    expect(hands.source(LEFT_HAND)).toBe("velocity");
+    velocity.letGo(LEFT_HAND);
+    for (let now = 3248; now <= 5000; now += 16) velocity.update(now);
+    expect(hands.source(LEFT_HAND)).toBe(null);
+  });
+});
+
+test("leaves alone what a pointer holds", () => {
+  hands.take(LEFT_HAND, "pointer");
+  session.take();
+  velocity.set("axis:0+", "left_hand_x+", 1);
+  velocity.update(0);
+  velocity.letGo(LEFT_HAND);
+  expect([hands.source(LEFT_HAND), told, session.said]).toEqual(["pointer", [], []]);
+});

@@ -1,0 +1,52 @@
+import { describe, expect, test } from "vitest";
+import { ProblemError, type Motion } from "../../src/client/library";
+import { keepThis, keptName, type Keep } from "../../src/page/keep";
+import type { ToastAction } from "../../src/page/toast";
+
+const MOTION = { id: "m2", name: "Kept dance" } as unknown as Motion;
+
+function page(keep: Keep, session: { id: string; piece: string } | null = { id: "s1", piece: "Sanbaso" }) {
+  const told: string[] = [];
+  const actions: (ToastAction | undefined)[] = [];
+  const run = keepThis({
+    keep, puppeteer: "Aiko",
+    toast: (message, action) => {
+      told.push(message);
+      actions.push(action);
+    },
+    session: () => session,
+    kept: async ({ id }) => void told.push(`kept ${id}`),
+    choose: (id) => told.push(`choose ${id}`),
+  });
+  return { run, told, actions };
+}
+
+describe("keep this", () => {
+  test("keeps the session under a name of its own, and offers the new dance", async () => {
+    const asked: unknown[] = [];
+    const { run, told, actions } = page(async (...of) => (asked.push(of), MOTION));
+    await run();
+    expect(asked).toEqual([["s1", "Sanbaso, as Aiko pulled it"]]);
+    expect(told).toEqual(["kept m2", "Kept: Kept dance"]);
+    actions[0]?.act();
+    expect(told.at(-1)).toBe("choose m2");
+  });
+
+  test("says what the server would not do", async () => {
+    const { run, told } = page(() => Promise.reject(new ProblemError(409, "Nothing to keep", "nobody has pulled yet")));
+    await run();
+    expect(told).toEqual(["Nothing to keep: nobody has pulled yet"]);
+  });
+
+  test("does nothing without a session, and hides no other error", async () => {
+    const { run, told } = page(async () => MOTION, null);
+    await run();
+    expect(told).toEqual([]);
+    await expect(page(() => Promise.reject(new TypeError("ours"))).run()).rejects.toThrow("ours");
+  });
+});
+
+test("what is kept of what was kept is named after the dance once", () => {
+  expect(keptName(keptName("Sanbaso", "Aiko"), "Mateo")).toBe("Sanbaso, as Mateo pulled it");
+  expect(keptName("", "Mateo")).toBe("A dance, as Mateo pulled it");
+});
