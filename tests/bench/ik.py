@@ -56,10 +56,10 @@ def accuracy(random: np.random.Generator) -> dict[str, float]:
             proportions = shape(body.proportions)
             stored = table.table_of(proportions.identity)
             found = ik_accuracy.measure(proportions, stored, ACCURACY_TARGETS, random)
+            paper = f"{100.0 * found.paper_tip_mean:18.4f}{100.0 * found.paper_tip_max:7.3f}"
             print(
                 f"{body.name + after.replace('_', ' '):<22}{found.tip_error_max:10.1e}"
-                f"{found.angle_error_mean_deg:13.4f}{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}{100.0 * found.paper_tip_mean:18.4f}"
-                f"{100.0 * found.paper_tip_max:7.3f}",
+                f"{found.angle_error_mean_deg:13.4f}{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}{paper}",
                 flush=True,
             )
             for name, value in found._asdict().items():
