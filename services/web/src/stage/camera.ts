@@ -71,6 +71,11 @@ export class AudienceCamera {
     return this.#hasShow && (this.#choice ?? !this.still);
   }
 
+  /** Whether the view is all from one's own seat. */
+  get seated(): boolean {
+    return this.#over === 0;
+  }
+
   /** Follows the show's camera, or returns to one's own seat; kept until told otherwise. */
   follow(on: boolean): void {
     this.#choice = on;
@@ -96,7 +101,7 @@ export class AudienceCamera {
    * numbers of the show's camera, null where there is none.
    */
   update(seconds: number, reach: number, show: ArrayLike<number> | null = null): void {
-    this.#seat(seconds, this.#over === 0 ? reach : 0);
+    this.#seat(seconds, this.seated ? reach : 0);
     this.#hasShow = show !== null;
     if (show) readView(show, this.#show);
     const goal = this.following ? 1 : 0;
