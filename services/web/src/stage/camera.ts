@@ -25,6 +25,8 @@ const EASE = 0.6;
 const REST = 4;
 /** Seconds that going over between one's own seat and the show's camera takes. */
 const OVER = 0.9;
+/** A view turned by less than this is not turned, radians. */
+const UNTURNED = 1e-3;
 
 export class AudienceCamera {
   readonly camera = new PerspectiveCamera(26, 1, 0.1, 40);
@@ -74,6 +76,11 @@ export class AudienceCamera {
   /** Whether the view is all from one's own seat. */
   get seated(): boolean {
     return this.#over === 0;
+  }
+
+  /** Whether the view is another than one has who touches nothing: turned, or the show's camera's. */
+  get moved(): boolean {
+    return !this.seated || Math.abs(this.#yaw) > UNTURNED || Math.abs(this.#pitch) > UNTURNED;
   }
 
   /** Follows the show's camera, or returns to one's own seat; kept until told otherwise. */

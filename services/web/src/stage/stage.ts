@@ -151,7 +151,7 @@ export class Stage {
     this.rig.group.updateMatrixWorld(true);
     this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0, show);
     this.#scenery.turn(this.audience.view, this.audience.seated, seconds);
-    if (pose && clock !== null) this.trail.add(clock, this.audience.view);
+    if (pose && clock !== null) this.trail.add(clock, this.audience.view, this.audience.moved);
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());
     this.#sinceDrawn += interval;
     if (!this.#gate.open) return;

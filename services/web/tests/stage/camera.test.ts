@@ -78,6 +78,19 @@ describe("turning the view", () => {
     expect(audience.camera.position.y).toBeGreaterThan(0.2);
   });
 
+  test("is told from a seat that nobody touched, until it has sprung back", () => {
+    const audience = seat("desktop", 800, 900);
+    audience.still = false;
+    expect(audience.moved).toBe(false);
+    audience.orbit(0.1, 0);
+    run(audience, 3.9);
+    expect(audience.moved).toBe(true);
+    run(audience, 5);
+    expect(audience.moved).toBe(false);
+    audience.update(1 / 60, 0, [2, 1.6, 1, 0, 1.1, 0.2, 0.8]);
+    expect([audience.following, audience.moved]).toEqual([true, true]);
+  });
+
   test("stays while it is touched, and springs back when left for four seconds", () => {
     const audience = seat("desktop", 800, 900);
     audience.still = false;
