@@ -168,13 +168,24 @@ describe("the show's camera", () => {
     }
   });
 
-  test("is left by dragging the view, and what was chosen holds for the next motion", () => {
+  test("is left by dragging the view, until it is chosen again or another motion comes", () => {
     const audience = shown();
-    audience.orbit(0.1, 0);
-    expect([audience.hasShow, audience.following]).toEqual([true, false]);
+    for (const back of [() => audience.follow(true), () => audience.cut()]) {
+      audience.orbit(0.1, 0);
+      audience.update(1 / 60, 0, SHOW);
+      expect([audience.hasShow, audience.following]).toEqual([true, false]);
+      back();
+      audience.update(1 / 60, 0, SHOW);
+      expect(audience.following).toBe(true);
+    }
+  });
+
+  test("that was chosen against is not followed in the next motion either", () => {
+    const audience = shown();
+    audience.follow(false);
     audience.cut();
     audience.update(1 / 60, 0, SHOW);
-    expect(audience.following).toBe(false);
+    expect([audience.hasShow, audience.following]).toEqual([true, false]);
     expect(audience.camera.position.distanceTo(new Vector3(...SHOW.slice(0, 3)))).toBeGreaterThan(1);
   });
 
