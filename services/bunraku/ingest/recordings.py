@@ -99,7 +99,7 @@ class Recordings:
         known = dance.description if dance is not None else {}
         title = known.get("name") or "A dance"
         return {
-            "name": (order.name or "").strip() or f"{title}, kept",
+            "name": (order.name or "").strip() or f"{title.removesuffix(', kept')}, kept",
             "filename": "",
             "bytes": size,
             "source": f"kept from a session of {title} ({made.described['kept_from']})",
