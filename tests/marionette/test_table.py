@@ -13,15 +13,29 @@ def test_nodes_are_the_lowest_of_a_fine_search(proportions: Proportions) -> None
     built = table.build_table(proportions)
     assert built.shape == (arm.SIDE, arm.SIDE)
     assert built.dtype == np.float16
-    u = np.arange(0, arm.SIDE, 7) / (arm.SIDE - 1)
-    v = np.arange(0, arm.SIDE, 7) / (arm.SIDE - 1)
-    r = np.minimum(1.0 - (1.0 - proportions.inner_radius) * (1.0 - u[:, None]) ** 2, OUTER_RADIUS) + 0.0 * v
-    beta = (v - 0.5) * np.pi + 0.0 * r
+    r, beta = (places[::7, ::7] for places in table.nodes(proportions))
     low, high = arm.bend_limits(proportions, r)
     shares = np.linspace(0.0, 1.0, 2001)[:, None, None]
     lowest = np.argmin(table.potential(proportions, r, beta, low + shares * (high - low)), axis=0) / 2000.0
-    off = np.abs(built[::7, ::7].astype(np.float64) - lowest) * (high - low)
-    assert float(np.degrees(off).max()) < 0.1
+    least, greatest = np.sin(0.5 * low), np.sin(0.5 * high)
+    bend = 2.0 * np.arcsin(least + built[::7, ::7].astype(np.float64) * (greatest - least))
+    assert float(np.degrees(np.abs(bend - low - lowest * (high - low))).max()) < 0.1
+
+
+@pytest.mark.parametrize("proportions", ARMS, ids=lambda p: p.identity)
+def test_a_lookup_at_a_node_is_the_node(proportions: Proportions) -> None:
+    built = table.build_table(proportions)
+    one = arm.Arm(proportions, built)
+    distances, elevations = table.nodes(proportions)
+    assert distances[0, 0] == pytest.approx(proportions.inner_radius, abs=1e-12)
+    assert distances[-1, 0] == OUTER_RADIUS
+    assert elevations[0, [0, -1]] == pytest.approx([-np.pi / 2.0, np.pi / 2.0])
+    for i, j in [(0, 0), (0, 63), (5, 17), (31, 31), (32, 32), (47, 3), (62, 60)]:
+        r, beta = float(distances[i, j]), float(elevations[i, j])
+        least, greatest = np.sin(0.5 * np.array(one.limits(r)))
+        assert (np.sin(0.5 * one.bend(r, beta)) - least) / (greatest - least) == pytest.approx(
+            float(built[i, j]), abs=1e-9
+        )
 
 
 def test_bytes_round_trip_and_fit_the_papers_size() -> None:

@@ -53,3 +53,12 @@ def test_late_and_repeated_overlays_are_ignored() -> None:
     overlays.put(Overlay(4, 400, {}))
     overlays.put(Overlay(5, 500, {}))
     assert turn(overlays.lay(DANCE, 500)[list(JOINTS[0])], PULLED) < 2e-4
+
+
+def test_the_first_after_a_silence_begins_when_it_is_due() -> None:
+    overlays = Overlays()
+    overlays.put(Overlay(0, 0, {}))
+    overlays.put(Overlay(1, 10 * LASTS, {0: pack_joints(PULLED)}))
+    for clock in (1, LASTS, 2 * LASTS, 10 * LASTS - 1):
+        np.testing.assert_array_equal(overlays.lay(DANCE, clock), DANCE)
+    assert turn(overlays.lay(DANCE, 10 * LASTS)[list(JOINTS[0])], PULLED) < 2e-4

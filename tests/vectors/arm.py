@@ -13,16 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.marionette import arm, table, vector
+from bunraku.marionette import arms, table, vector
 from bunraku.marionette.limbs import ArmRig, LegRig, Limb
-from bunraku.marionette.plane import Plane
 from bunraku.marionette.proportions import Proportions
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import standard_figure
 
 FILE = Path(__file__).resolve().parents[2] / "proto" / "vectors" / "arm.json"
-IDENTITIES = ("396-352-252-560-320-120", "400-400-200-334-333-333", "300-300-400-560-320-120")
+IDENTITIES = ("396-352-252-532-344-124", "400-400-200-334-333-333", "300-300-400-560-320-120")
 AWKWARD = [
     [0.0, -0.7, 0.0],
     [0.0, 0.7, 0.0],
@@ -45,7 +44,7 @@ def _solves(identity: str, random: np.random.Generator) -> dict[str, Any]:
     stored = table.build_table(proportions)
     data = table.to_bytes(stored)
     targets = np.round(np.concatenate([np.array(AWKWARD), random.uniform(-0.6, 0.6, (14, 3))]), 6)
-    solved = arm.solve(proportions, stored, targets)
+    solved = arms.solve(proportions, stored, targets)
     return {
         "proportions": identity,
         "inner_radius": _numbers(proportions.inner_radius),
@@ -63,7 +62,7 @@ def _solves(identity: str, random: np.random.Generator) -> dict[str, Any]:
             for target, azimuth, angles, elbow, wrist, tip in zip(
                 targets.tolist(),
                 _numbers(solved.azimuth),
-                _numbers(np.stack([solved.t0, solved.t1, solved.t2], axis=-1)),
+                _numbers(np.stack(solved.angles(), axis=-1)),
                 _numbers(solved.elbow),
                 _numbers(solved.wrist),
                 _numbers(solved.tip),
@@ -73,21 +72,16 @@ def _solves(identity: str, random: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _plane(random: np.random.Generator) -> dict[str, Any]:
-    """A hand that wanders under the shoulder, and the normals its plane has."""
-    up = vector.unit((0.1, 0.9, -0.2), (0.0, 1.0, 0.0))
-    places = np.array([0.0, -0.6, 0.0]) + np.cumsum(random.uniform(-0.08, 0.08, (30, 3)), axis=0) * [1.0, 0.2, 1.0]
-    places = np.round(places, 6)
-    start = (-1.0, 0.0, 0.0)
-    plane: Plane | None = None
-    steps = []
-    for x, y, z in places.tolist():
-        direction = vector.unit((x, y, z), (0.0, -1.0, 0.0))
-        if plane is None:
-            plane = Plane(start, direction)
-        normal = plane.follow(direction, vector.length((x, y, z)), up, 1.0 / 60.0)
-        steps.append({"target": [x, y, z], "normal": _numbers(normal)})
-    return {"start": list(start), "up": _numbers(up), "seconds": 1.0 / 60.0, "steps": steps}
+def _identities(random: np.random.Generator) -> list[dict[str, Any]]:
+    """What arms of these lengths, with and without masses of their own, are known by."""
+    cases: list[dict[str, Any]] = []
+    for nth in range(24):
+        a, b, c = np.round(random.uniform([0.2, 0.2, 0.1], [0.4, 0.35, 0.25]) * (1.0 if nth % 3 else 100.0), 6).tolist()
+        d, e, f = np.round(random.uniform(0.3, 3.0, 3), 6).tolist()
+        own = nth % 2 == 1
+        made = Proportions.of((a, b, c), (d, e, f) if own else None)
+        cases.append({"lengths": [a, b, c], "masses": [d, e, f] if own else None, "identity": made.identity})
+    return cases
 
 
 def _poses(random: np.random.Generator) -> Array:
@@ -123,8 +117,8 @@ def make() -> dict[str, Any]:
     random = np.random.default_rng(20)
     return {
         "arms": [_solves(identity, random) for identity in IDENTITIES],
-        "plane": _plane(random),
         "limbs": _limbs(random),
+        "identities": _identities(random),
     }
 
 

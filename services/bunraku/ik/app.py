@@ -1,4 +1,4 @@
-"""The inverse kinematics service: the arms' tables as resources, and lookups in batches."""
+"""The inverse kinematics service: the arms' tables and figures as resources, and lookups in batches."""
 
 from __future__ import annotations
 
@@ -14,27 +14,39 @@ from bunraku import __version__
 from bunraku.backing import problems
 from bunraku.backing.problems import ProblemError
 from bunraku.ik import batch
-from bunraku.marionette import table
+from bunraku.marionette import figures, table
 from bunraku.marionette.proportions import Proportions, ProportionsError
 
 CACHED_TABLES = 256
 """Tables kept as bytes: 2 MB."""
+CACHED_FIGURES = 32
+"""Figures kept as text: 1 MB."""
 FOREVER = "public, max-age=31536000, immutable"
 
 
 @dataclass(frozen=True, slots=True)
-class StoredTable:
-    """One table as it is served: its bytes and the strong entity tag of them."""
+class Stored:
+    """A resource as it is served: its bytes and the strong entity tag of them."""
 
     data: bytes
     etag: str
 
+    @classmethod
+    def of(cls, data: bytes) -> Stored:
+        """These bytes, and the tag of them."""
+        return cls(data, f'"{hashlib.sha256(data).hexdigest()[:32]}"')
+
 
 @lru_cache(maxsize=CACHED_TABLES)
-def stored_table(proportions: Proportions) -> StoredTable:
+def stored_table(proportions: Proportions) -> Stored:
     """The table of these proportions (already rounded to their identity), built the first time."""
-    data = table.to_bytes(table.build_table(proportions))
-    return StoredTable(data, f'"{hashlib.sha256(data).hexdigest()[:32]}"')
+    return Stored.of(table.to_bytes(table.build_table(proportions)))
+
+
+@lru_cache(maxsize=CACHED_FIGURES)
+def stored_figure(proportions: Proportions, name: figures.Figure) -> Stored:
+    """A figure of the arm with these proportions (already rounded), drawn the first time."""
+    return Stored.of(figures.draw(proportions, name).encode())
 
 
 def parse_proportions(identity: str) -> Proportions:
@@ -52,7 +64,7 @@ def create_app() -> FastAPI:
     # building is plain arithmetic on small arrays, one at a time is enough; the loop stays free
     building = asyncio.Semaphore(1)
 
-    async def table_for(proportions: Proportions) -> StoredTable:
+    async def table_for(proportions: Proportions) -> Stored:
         async with building:
             return await asyncio.to_thread(stored_table, proportions)
 
@@ -68,10 +80,30 @@ def create_app() -> FastAPI:
     async def arm_table(proportions: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
         """The table of bends of an arm with these proportions: `L0-L1-L2-M0-M1-M2` in thousandths."""
         stored = await table_for(parse_proportions(proportions))
-        headers = {"ETag": stored.etag, "Cache-Control": FOREVER}
-        if if_none_match is not None and _matches(if_none_match, stored.etag):
-            return Response(status_code=304, headers=headers)
-        return Response(stored.data, headers=headers, media_type="application/octet-stream")
+        return _resource(stored, "application/octet-stream", if_none_match)
+
+    @app.get(
+        "/v1/arms/{proportions}/figures/{name}",
+        response_class=Response,
+        responses={
+            200: {"content": {"image/svg+xml": {}}, "description": "the picture"},
+            304: {"description": "the client has it"},
+            404: {"content": {problems.MEDIA_TYPE: {}}, "description": "no figure has this name"},
+            422: {"content": {problems.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
+        },
+    )
+    async def arm_figure(
+        proportions: str, name: str, if_none_match: Annotated[str | None, Header()] = None
+    ) -> Response:
+        """The arm while its tip runs round a circle (`circle`) or along a line (`horizontal`): the paper's figures 8
+        and 9, drawn for this arm as the paper solves it and as we do."""
+        arm, known = parse_proportions(proportions), next((one for one in figures.FIGURES if one == name), None)
+        if known is None:
+            hint = " or ".join(figures.FIGURES)
+            raise ProblemError(404, "No such figure", f"there is no figure {name[:60]!r}", field="name", hint=hint)
+        async with building:
+            stored = await asyncio.to_thread(stored_figure, arm, known)
+        return _resource(stored, "image/svg+xml", if_none_match)
 
     @app.post("/v1/solve", response_model=batch.SolveAnswer, openapi_extra=batch.OPENAPI)
     async def solve(request: Request) -> Response:
@@ -86,6 +118,14 @@ def create_app() -> FastAPI:
         return Response(answer, media_type=accepted)
 
     return app
+
+
+def _resource(stored: Stored, media_type: str, if_none_match: str | None) -> Response:
+    """What never changes, or that the client has it."""
+    headers = {"ETag": stored.etag, "Cache-Control": FOREVER}
+    if if_none_match is not None and _matches(if_none_match, stored.etag):
+        return Response(status_code=304, headers=headers)
+    return Response(stored.data, headers=headers, media_type=media_type)
 
 
 def _matches(header: str, etag: str) -> bool:

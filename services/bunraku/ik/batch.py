@@ -11,7 +11,7 @@ from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bunraku.backing.problems import ProblemError, invalid_field
-from bunraku.marionette import arm, leg, table
+from bunraku.marionette import arms, leg, table
 from bunraku.marionette.proportions import Proportions
 
 JSON = "application/json"
@@ -127,10 +127,13 @@ def decode(body: bytes, kind: str) -> SolveRequest:
 def solve(asked: SolveRequest, proportions: Proportions, data: bytes, kind: str) -> bytes:
     """The answer as bytes of `kind`; `data` is the table's bytes."""
     targets = np.array(asked.targets, dtype=np.float64).reshape(-1, 3)
-    solved = arm.solve(proportions, table.from_bytes(data), targets)
+    solved = arms.solve(proportions, table.from_bytes(data), targets)
+    t0, t1, t2 = solved.angles()
     hip, knee = leg.solve(np.array(asked.legs, dtype=np.float64))
+    hung = {"azimuth": solved.azimuth, "t0": t0, "t1": t1, "t2": t2}
+    hung |= {"elbow": solved.elbow, "wrist": solved.wrist, "tip": solved.tip}
     answer = {
-        "arms": {name: getattr(solved, name).tolist() for name in Arms.model_fields},
+        "arms": {name: values.tolist() for name, values in hung.items()},
         "legs": {"hip": hip.tolist(), "knee": knee.tolist()},
     }
     if kind == JSON:

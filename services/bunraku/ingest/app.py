@@ -1,8 +1,9 @@
-"""The ingest service: uploads become motions; motions are listed, described and removed."""
+"""The ingest service: uploads and sessions become motions; motions are listed, described and removed."""
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Annotated, Any
 
 from fastapi import FastAPI, Path, Query, Request, Response
@@ -11,26 +12,32 @@ from starlette.requests import ClientDisconnect
 
 from bunraku.backing import problems
 from bunraku.backing.backing import Backing
-from bunraku.backing.catalogue import BadCursor, Entry
+from bunraku.backing.catalogue import BadCursor
 from bunraku.backing.problems import ProblemError
+from bunraku.ingest.entry import entry_json
 from bunraku.ingest.progress import Progress
+from bunraku.ingest.recordings import SUBJECT, Recordings
 from bunraku.ingest.uploads import Uploads
 
 NAME = r"^[A-Za-z0-9_-]{8,64}$"
 """Of an upload, chosen at random by its sender."""
 
 
-def entry_json(entry: Entry) -> dict[str, Any]:
-    """A motion as the API shows it."""
-    created = datetime.fromtimestamp(entry.created / 1e6, UTC).isoformat(timespec="milliseconds")
-    return {"id": entry.id, "created": created.replace("+00:00", "Z"), **entry.description}
-
-
 def create_app(backing: Backing) -> FastAPI:
     """The service upon `backing`."""
-    app = FastAPI(title="Bunraku ingest")
-    problems.install(app)
     uploads = Uploads(backing)
+    recordings = Recordings(backing, uploads.places)
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        answering = backing.bus.answer(SUBJECT, recordings.answer)
+        try:
+            yield
+        finally:
+            answering.end()
+
+    app = FastAPI(title="Bunraku ingest", lifespan=lifespan)
+    problems.install(app)
 
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BODY)
     async def upload(

@@ -1,8 +1,8 @@
-"""An upload's bytes to an encoded motion, in a process of its own.
+"""An upload's bytes, or a session's log, to an encoded motion, in a process of its own.
 
-Reading strangers' files and encoding them takes seconds of processor time and may go wrong in any way: a process apart
-keeps the service's loop free, and can be ended when it takes too long or too much. What a job needs is loaded in the
-process that jobs are forked from, never in the service.
+Reading strangers' files and encoding motions takes seconds of processor time and may go wrong in any way: a process
+apart keeps the service's loop free, and can be ended when it takes too long or too much. What a job needs is loaded in
+the process that jobs are forked from, never in the service.
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ import multiprocessing
 import resource
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from bunraku.ingest.results import Made, Refused
 
@@ -23,13 +22,26 @@ MEMORY = 4 << 30
 SHARES = 100
 """Times that a job says how far it is, at most: few enough that its pipe never fills."""
 
+Job = Literal["make", "keep"]
+"""`making.make` or `keeping.keep`."""
+
 _context = multiprocessing.get_context("forkserver")
-_context.set_forkserver_preload(["bunraku.ingest.making"])
+_context.set_forkserver_preload(["bunraku.ingest.making", "bunraku.ingest.keeping"])
 
 
-def _work(answer: Connection, motion: str, path: Path) -> None:
+_SHORTER: dict[Job, str] = {"make": "cut the file into shorter ones", "keep": "keep a shorter part"}
+_BROKEN_OFF: dict[Job, str] = {
+    "make": "the reader broke off on this file",
+    "keep": "the replay of this session broke off",
+}
+_REPORT: dict[Job, str] = {"make": "please report it with the file", "keep": "please report it"}
+
+
+def _work(answer: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
+    from bunraku.ingest.keeping import keep
     from bunraku.ingest.making import make
 
+    work: Callable[..., Made | Refused] = make if job == "make" else keep
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     told = -1
 
@@ -40,21 +52,17 @@ def _work(answer: Connection, motion: str, path: Path) -> None:
             answer.send(share)
 
     try:
-        answer.send(make(motion, path, tell))
+        answer.send(work(*arguments, tell))
     except MemoryError:
-        answer.send(
-            Refused(
-                "Too much motion", "reading this file takes more memory than one may", hint="cut it into shorter files"
-            )
-        )
+        answer.send(Refused("Too much motion", "this takes more memory than one may have", hint=_SHORTER[job]))
 
 
 async def run(
-    motion: str, path: Path, seconds: float, progress: Callable[[float], None] = lambda _: None
+    job: Job, arguments: tuple[Any, ...], seconds: float, progress: Callable[[float], None] = lambda _: None
 ) -> Made | Refused:
-    """`making.make` in a process of its own, ended after `seconds`."""
+    """A job with its `arguments` in a process of its own, ended after `seconds`; `progress` is told the share done."""
     receiver, sender = _context.Pipe(duplex=False)
-    process = _context.Process(target=_work, args=(sender, motion, path), daemon=True)
+    process = _context.Process(target=_work, args=(sender, job, arguments), daemon=True)
     try:
         await _to_its_end(process.start)
         sender.close()
@@ -67,11 +75,7 @@ async def run(
                 break
             progress(result)
     except TimeoutError:
-        return Refused(
-            "Takes too long",
-            f"reading and encoding took more than {seconds:g} s",
-            hint="cut the file into shorter ones",
-        )
+        return Refused("Takes too long", f"reading and encoding took more than {seconds:g} s", hint=_SHORTER[job])
     except EOFError:
         result = None
     finally:
@@ -83,7 +87,7 @@ async def run(
         receiver.close()
     if isinstance(result, Made | Refused):
         return result
-    return Refused("Unreadable motion", "the reader broke off on this file", hint="please report it with the file")
+    return Refused("Unreadable motion", _BROKEN_OFF[job], hint=_REPORT[job])
 
 
 async def _to_its_end(work: Callable[[], Any]) -> Any:

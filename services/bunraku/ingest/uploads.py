@@ -20,7 +20,7 @@ from bunraku.ingest.progress import Progress
 from bunraku.ingest.results import Made, Refused
 
 AT_ONCE = 2
-"""Uploads that are encoded at the same time; the rest wait."""
+"""Jobs that are at work at the same time; the rest wait."""
 WAITING = 16
 """Uploads that may be under way; one more is told to come again."""
 CHUNK = 1 << 20
@@ -35,8 +35,9 @@ class Uploads:
     """The uploads of one replica."""
 
     def __init__(self, backing: Backing) -> None:
+        """`places` bounds the jobs that are at work at the same time; the rest wait."""
         self._backing = backing
-        self._places = asyncio.Semaphore(AT_ONCE)
+        self.places = asyncio.Semaphore(AT_ONCE)
         self._under_way: dict[str, Progress] = {}
 
     def progress(self, upload: str) -> Progress | None:
@@ -71,10 +72,10 @@ class Uploads:
         known = await self._backing.catalogue.get(motion)
         if known is not None and await self._backing.library.get(motion) is not None:
             return known, False
-        async with self._places:
+        async with self.places:
             progress.at("reading")
             seconds = self._backing.settings.upload_seconds
-            made = await jobs.run(motion, path, seconds, lambda share: progress.at("encoding", share))
+            made = await jobs.run("make", (motion, path), seconds, lambda share: progress.at("encoding", share))
         size = await asyncio.to_thread(os.path.getsize, path)
         if known is not None and isinstance(made, Made):
             # stored in a codec that is no longer spoken: made anew

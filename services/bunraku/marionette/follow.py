@@ -15,6 +15,8 @@ from bunraku.marionette.vector import Vector
 
 JUMP = 4.0
 """Arm lengths (radians, of a thigh) per second: a target that moved faster has jumped, and has no speed of its own."""
+FASTEST = 5.0
+"""Arm lengths (radians) per second: no hand or thigh is sent farther in a second than that."""
 CLEARANCE = 0.35
 """Arm lengths from the shoulder within which a hand on its way elsewhere does not come: it goes round."""
 
@@ -60,7 +62,7 @@ class Follower:
         most = acceleration * seconds
         # the speed from which whole steps of the bounded acceleration come to rest after `distance`
         speed = most * (sqrt(0.25 + 2.0 * distance / (most * seconds)) - 0.5)
-        speed = min(speed, distance / seconds)
+        speed = min(speed, distance / seconds, FASTEST)
         # with a moving ground all velocities are against it
         ground = ahead if carried is not None else STILL
         aim = vector.subtract(vector.add(ahead, vector.scale(direction, speed)), ground)

@@ -13,6 +13,7 @@ import struct
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import Self
 
 import msgpack
@@ -130,12 +131,18 @@ class Log:
             raise DamagedLog(f"a damaged log: {error}") from error
         return log
 
-    def replay(self, figure_of: Callable[[str], Figure], pose_at: PoseAt) -> Iterator[tuple[int, Overlay | None]]:
-        """All frames again, in order: when each was due, and what lay over the dance.
+    def replay(
+        self, figure_of: Callable[[str], Figure], pose_at: PoseAt, begin: int = 0
+    ) -> Iterator[tuple[int, Overlay | None]]:
+        """All frames again, in order: when each was due, and what lay over the dance; passages that were over before
+        clock time `begin` are left out.
 
         `figure_of` gives the dancer of a motion's id. Raises `DamagedLog`.
         """
-        for passage in self._passages:
+        passages = tuple(self._passages)
+        for passage, following in zip_longest(passages, passages[1:]):
+            if following is not None and following.begin <= begin:
+                continue
             puppet = Marionette(figure_of(self._name(passage.motion)), passage.epochs)
             yield from self._play(puppet, passage.records, figure_of, pose_at)
 

@@ -11,37 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bunraku.marionette import handover, vector
-from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.elbow import Elbow, lift_between
-from bunraku.marionette.follow import STILL, Follower
-from bunraku.marionette.handover import (
-    HAND_ACCELERATION,
-    THIGH_ACCELERATION,
-    Handover,
-    Turn,
-    acceleration_home,
-)
-from bunraku.marionette.limbs import ArmRig, Joints, LegRig, Limb, Pose
+from bunraku.marionette.handover import Handover
+from bunraku.marionette.limbs import Joints, Limb, Pose
 from bunraku.marionette.ownership import Grant, Input, Outcome, Ownership, Refusal
-from bunraku.marionette.proportions import OUTER_RADIUS
-from bunraku.marionette.steering import Steering
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.pulled import PulledHand, PulledLeg
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 
 LONGEST_STEP = 0.1
 """Seconds: after a longer pause between two poses the limbs move as if only this had passed."""
-MOST_REACH = 0.9995
-"""Arm lengths: a pulled arm is never quite locked, so that its elbow leaves the line at a bounded speed."""
-LEAST_REACH = 0.15
-"""Arm lengths from the shoulder that a hand is pulled to at least: nearer in, the elbow would have to whirl."""
-HAND_HOME = 60.0
-"""Arm lengths per second squared, against the dance, that a hand let go comes back with at most."""
-ARRIVED = 1e-6
-"""Arm lengths, or radians, within which a limb is the dance's again."""
-LEAST_WEIGHT = 1e-9
-"""A limb on its last way home is still solved for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,108 +44,6 @@ def apply(rotations: Array, overlay: Overlay | None) -> Array:
     return merged
 
 
-class _PulledHand:
-    def __init__(self, figure: Figure, limb: Limb) -> None:
-        self.rig = ArmRig(figure, limb)
-        self._own: Vector | None = None
-        self._velocity = STILL
-        self.rest()
-
-    def rest(self) -> None:
-        self._follower: Follower | None = None
-        self._home: float | None = None
-        self._elbow = Elbow(self.rig.arm, self.rig.shoulder)
-        self._turn = Turn()
-        self._blend = ArmBlend(self.rig)
-
-    def see(self, pose: Pose, seconds: float) -> Vector:
-        """The dance's own hand; where it was before and how fast it goes are kept."""
-        own = self.rig.target(self.rig.dance(pose))
-        moved = vector.subtract(own, self._own or own)
-        self._velocity = vector.scale(moved, 1.0 / seconds) if seconds > 0.0 else STILL
-        self._own = own
-        return own
-
-    def pose(
-        self, pose: Pose, steering: Steering, held: bool, weight: float, now: int, seconds: float
-    ) -> Joints | None:
-        rig = self.rig
-        dance = rig.dance(pose)
-        before, had = self._own, self._velocity
-        own = self.see(pose, seconds)
-        before, velocity = before or own, self._velocity
-        if self._follower is None:
-            self._follower = Follower(before, had)
-            steering.begin(own)
-        follower = self._follower
-        if held:
-            self._home = None
-            wanted = steering.value(now) or own
-            size = vector.length(wanted)
-            wanted = vector.scale(rig.direction(wanted), min(max(size, LEAST_REACH), MOST_REACH))
-            hand = follower.step(wanted, seconds, HAND_ACCELERATION, rig.arm.inner, OUTER_RADIUS)
-        else:
-            if self._home is None:
-                away = vector.length(vector.subtract(follower.place, before))
-                speed = vector.length(vector.subtract(follower.velocity, velocity))
-                self._home = acceleration_home(away, speed, HAND_HOME)
-            hand = follower.step(own, seconds, self._home, rig.arm.inner, OUTER_RADIUS, velocity)
-            if weight <= 0.0 and vector.length(vector.subtract(hand, own)) < ARRIVED:
-                return None
-        direction, up = rig.direction(hand), rig.up(pose)
-        if not self._elbow.known:
-            elbow, chord = rig.places(dance)[0], rig.direction(own)
-            self._elbow.begin(chord, rig.bend_axis(dance), lift_between(elbow, chord))
-        tip, normal, bend = self._elbow.follow(direction, vector.length(hand), up, seconds)
-        bent = rig.bend(vector.length(tip), bend)
-        # the dance may hold its arms where the marionette's shoulders do not go: what they allow comes in with the weight
-        target = vector.add(hand, vector.scale(vector.subtract(tip, hand), weight))
-        turn = self._turn.follow(own, target, weight)
-        return self._blend.joints(dance, bent, target, turn, normal, max(weight, LEAST_WEIGHT))
-
-
-class _PulledLeg:
-    def __init__(self, figure: Figure, limb: Limb) -> None:
-        self.rig = LegRig(figure, limb)
-        self._own: float | None = None
-        self._velocity = STILL
-        self.rest()
-
-    def rest(self) -> None:
-        self._follower: Follower | None = None
-        self._home: float | None = None
-
-    def see(self, pose: Pose, seconds: float) -> float:
-        """The dance's own thigh; where it was before and how fast it goes are kept."""
-        own = self.rig.angle(pose)
-        moved = own - (own if self._own is None else self._own)
-        self._velocity = (moved / seconds, 0.0, 0.0) if seconds > 0.0 else STILL
-        self._own = own
-        return own
-
-    def pose(
-        self, pose: Pose, steering: Steering, held: bool, weight: float, now: int, seconds: float
-    ) -> Joints | None:
-        known, had = self._own, self._velocity
-        own = self.see(pose, seconds)
-        before, velocity = own if known is None else known, self._velocity
-        if self._follower is None:
-            self._follower = Follower((before, 0.0, 0.0), had)
-            steering.begin((own, 0.0, 0.0))
-        if held:
-            self._home = None
-            wanted = steering.value(now) or (own, 0.0, 0.0)
-            theta = self._follower.step(wanted, seconds, THIGH_ACCELERATION)[0]
-        else:
-            if self._home is None:
-                away, speed = self._follower.place[0] - before, self._follower.velocity[0] - velocity[0]
-                self._home = acceleration_home(abs(away), abs(speed), THIGH_ACCELERATION)
-            theta = self._follower.step((own, 0.0, 0.0), seconds, self._home, carried=velocity)[0]
-            if weight <= 0.0 and abs(theta - own) < ARRIVED:
-                return None
-        return handover.mix_joints(self.rig.dance(pose), self.rig.hang(theta, pose), max(weight, LEAST_WEIGHT))
-
-
 class Marionette:
     """One puppet: who holds its limbs, and the overlay that follows from it."""
 
@@ -184,8 +60,8 @@ class Marionette:
         The first arm of its proportions takes a tenth of a second, to build its table. Raises `ProportionsError` for a
         figure whose arms are too short to hang, and changes nothing.
         """
-        limbs: dict[Limb, _PulledHand | _PulledLeg] = {
-            limb: _PulledHand(figure, limb) if limb.is_hand else _PulledLeg(figure, limb) for limb in Limb
+        limbs: dict[Limb, PulledHand | PulledLeg] = {
+            limb: PulledHand(figure, limb) if limb.is_hand else PulledLeg(figure, limb) for limb in Limb
         }
         self._limbs = limbs
 
@@ -267,15 +143,16 @@ class Marionette:
         for limb, holder in zip(Limb, self._ownership.holders(), strict=True):
             hand, puppet = self._handovers[limb], self._limbs[limb]
             hand.advance(holder is not None, seconds)
+            puppet.see(pose, seconds)
             steering = self._ownership.steering(limb)
-            held = holder is not None
-            joints = puppet.pose(pose, steering, held, hand.weight, now, seconds) if steering is not None else None
+            if steering is None:
+                continue
+            steering.begin(puppet.place)
+            wanted = steering.value(now) if holder is not None else None
+            joints = puppet.pull(pose, wanted, hand.weight, seconds)
             if joints is None:
                 self._ownership.forget(limb)
-                if steering is not None:
-                    puppet.rest()
-                else:
-                    puppet.see(pose, seconds)
+                puppet.rest()
                 continue
             pulled.append(limb)
             turned.append(joints)

@@ -110,12 +110,10 @@ class Ownership:
         hold = self._holds[Limb(limb)]
         if hold.holder not in (None, puppeteer):
             return Refusal(limb, hold.holder, "held")
-        # a limb still on its way back to the dance is taken where the last hand left it
-        left = hold.steering.value(now) if hold.steering else None
         hold.asks.pop(puppeteer, None)
         hold.holder = puppeteer
         hold.epoch += 1
-        hold.steering = Steering(Limb(limb).is_hand, now, left)
+        hold.steering = Steering(Limb(limb).is_hand, now)
         return Grant(Limb(limb), hold.epoch)
 
     def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:

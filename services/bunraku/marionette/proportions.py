@@ -17,8 +17,10 @@ WRIST_LIMIT = radians(80.0)
 OUTER_RADIUS = 1.0 - 1e-6
 """The farthest a hand tip is solved for, in arm lengths: a fully straight arm has no bend left to choose."""
 
-WINTER = (0.028, 0.016, 0.006)
+WINTER_MASSES = (0.028, 0.016, 0.006)
 """Masses of upper arm, forearm and hand as parts of the body's (Winter, Biomechanics and Motor Control, table 4.1)."""
+WINTER_LENGTHS = (0.186, 0.146, 0.108)
+"""Lengths of the same as parts of the body's height (Drillis and Contini 1966, in Winter, figure 4.1)."""
 
 _NAMES = ("L0", "L1", "L2", "M0", "M1", "M2")
 _LEAST = (100, 100, 20, 1, 1, 1)
@@ -41,8 +43,17 @@ class Proportions:
     masses: tuple[float, float, float]
 
     @classmethod
-    def of(cls, lengths: tuple[float, float, float], masses: tuple[float, float, float] = WINTER) -> Proportions:
-        """From lengths and masses in any unit. Raises `ProportionsError` where a link is too short for a table."""
+    def of(cls, lengths: tuple[float, float, float], masses: tuple[float, float, float] | None = None) -> Proportions:
+        """From lengths and masses in any unit; without masses each link weighs by its length what Winter's does.
+
+        Raises `ProportionsError` where a link is too short for a table.
+        """
+        if masses is None:
+            a, b, c = (
+                length * mass / reference
+                for length, mass, reference in zip(lengths, WINTER_MASSES, WINTER_LENGTHS, strict=True)
+            )
+            masses = (a, b, c)
         whole, heavy = sum(lengths), sum(masses)
         if not (whole > 0.0 and heavy > 0.0):
             raise ProportionsError(

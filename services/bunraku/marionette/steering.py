@@ -60,19 +60,19 @@ class _Leg(NamedTuple):
 
 
 class Steering:
-    """One limb in one puppeteer's hands. `value` is None until the stage gives the dance's own by `begin`.
+    """One limb in one puppeteer's hands. `value` is None until an input or `begin` says where the limb is.
 
     It keeps its own time in µs: since it was made, less what its puppeteer was silent for beyond `HOLD_AFTER`.
     """
 
-    def __init__(self, is_hand: bool, now: int, value: Vector | None = None) -> None:
+    def __init__(self, is_hand: bool, now: int) -> None:
         self._is_hand = is_hand
         self._heard = now
         self._passed = 0
         self._quickest: int | None = None
         self._folded = -1
         self._samples: list[_Sample] = []
-        self._legs = [_Leg(0, value, None, 0, STILL)]
+        self._legs = [_Leg(0, None, None, 0, STILL)]
 
     @property
     def heard(self) -> int:
@@ -85,7 +85,7 @@ class Steering:
         return self._along(leg, max(self._time(now), leg.at))
 
     def begin(self, value: Vector) -> None:
-        """Starts from where the limb is, unless it was known where it starts."""
+        """Says where the limb was when it was taken, unless that was said before."""
         first = self._legs[0]
         if first.start is None:
             self._legs[0] = first._replace(start=value)

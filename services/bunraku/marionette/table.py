@@ -1,13 +1,14 @@
 """The table of an arm: for each place of the hand tip, where between its limits gravity leaves the wrist bend.
 
-Nodes are even in u = 1 - sqrt((1 - r) / (1 - inner)), which spaces them closer where the arm straightens and the angles
-change fast, and in the elevation. Values are in 0..1, float16: 8,192 bytes, within the paper's 8 kB.
+A value s in 0..1 tells the sine of half the bend: sin(d/2) = sin(lo/2) + s (sin(hi/2) - sin(lo/2)), float16: 8,192
+bytes, within the paper's 8 kB. Rows are even in (1 - q)(1 + 3q/4), q = sqrt((1 - r) / (1 - inner)): closer both where
+the arm straightens and where it folds, as angles change fast there. Columns are even in y / (x + |y|), x and y the
+tip's level and upward share: an elevation without an angle.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from math import pi
 
 import numpy as np
 
@@ -29,24 +30,40 @@ def potential(proportions: Proportions, r: Array, beta: Array, bend: Array) -> A
     return height
 
 
+def nodes(proportions: Proportions) -> tuple[Array, Array]:
+    """Where the nodes are: their distances and elevations (SIDE, SIDE), radians."""
+    u, v = np.meshgrid(np.linspace(0.0, 1.0, SIDE), np.linspace(-1.0, 1.0, SIDE), indexing="ij")
+    q = (np.sqrt(1.0 + 48.0 * (1.0 - u)) - 1.0) / 6.0
+    r = np.minimum(1.0 - (1.0 - proportions.inner_radius) * q * q, OUTER_RADIUS)
+    return r, np.arctan2(v, 1.0 - np.abs(v))
+
+
 def build_table(proportions: Proportions) -> Table:
     """The (SIDE, SIDE) table of these proportions: rows by distance, columns by elevation."""
-    u = np.linspace(0.0, 1.0, SIDE)[:, None]
-    inner = proportions.inner_radius
-    r = np.minimum(1.0 - (1.0 - inner) * (1.0 - u) ** 2, OUTER_RADIUS)
-    r, beta = np.broadcast_arrays(r, (np.linspace(-0.5, 0.5, SIDE) * pi)[None, :])
+    r, beta = nodes(proportions)
+    least, greatest = (np.sin(0.5 * bend) for bend in bend_limits(proportions, r))
+    bend = lowest_bend(proportions, r, beta)
+    share = (np.sin(0.5 * bend) - least) / np.maximum(greatest - least, 1e-12)
+    table: Table = np.clip(share, 0.0, 1.0).astype(np.float16)
+    return table
+
+
+def lowest_bend(proportions: Proportions, r: Array, beta: Array) -> Array:
+    """The wrist bend of least potential, radians, by a search of all bends and halving; of the shape of `r`."""
     low, high = bend_limits(proportions, r)
     shares = np.linspace(0.0, 1.0, _SCAN)
-    scan = potential(proportions, r, beta, low + shares[:, None, None] * (high - low))
-    best = np.argmin(scan, axis=0)
+    lowest, best = np.full(r.shape, np.inf), np.zeros(r.shape, dtype=np.int64)
+    for nth, share in enumerate(shares):
+        height = potential(proportions, r, beta, low + share * (high - low))
+        best = np.where(height < lowest, nth, best)
+        lowest = np.minimum(height, lowest)
     # the lowest sample and its neighbours hold the minimum; halve on the sign of the slope
     left, right = shares[np.maximum(best - 1, 0)], shares[np.minimum(best + 1, _SCAN - 1)]
     for _ in range(_HALVINGS):
         middle = 0.5 * (left + right)
         rising = _slope(proportions, r, beta, low + middle * (high - low)) > 0.0
         left, right = np.where(rising, left, middle), np.where(rising, middle, right)
-    table: Table = (0.5 * (left + right)).astype(np.float16)
-    return table
+    return low + 0.5 * (left + right) * (high - low)
 
 
 def _slope(proportions: Proportions, r: Array, beta: Array, bend: Array) -> Array:

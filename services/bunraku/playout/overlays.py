@@ -48,8 +48,11 @@ class Overlays:
                 after = overlay
                 break
             before = overlay
-        if before is None or (after is None and clock - before.due > LASTS):
+        if before is None or clock - before.due > LASTS:
             return rotations
+        if after is not None and after.due - before.due > LASTS:
+            # the first after a silence begins when it is due
+            after = None
         merged = rotations.copy()
         for limb, numbers in (after or before).limbs.items():
             joints = list(JOINTS[limb])

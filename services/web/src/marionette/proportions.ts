@@ -7,8 +7,8 @@ export const WRIST_LIMIT = (80 * Math.PI) / 180;
 /** The farthest a hand tip is solved for, in arm lengths. */
 export const OUTER_RADIUS = 1 - 1e-6;
 
-/** Masses of upper arm, forearm and hand as parts of the body's (Winter). */
-const WINTER = [0.028, 0.016, 0.006];
+/** Masses of upper arm, forearm and hand as parts of the body's (Winter), over their lengths as parts of its height. */
+const MASS_PER_LENGTH = [0.028 / 0.186, 0.016 / 0.146, 0.006 / 0.108];
 
 /** Lengths of upper arm, forearm and hand with sum 1, and the identity `L0-L1-L2-M0-M1-M2` of their table. */
 export interface Proportions {
@@ -18,14 +18,21 @@ export interface Proportions {
   readonly identity: string;
 }
 
-/** From link lengths in any unit. Throws `RangeError` for an arm without length. */
-export function proportionsOf(upper: number, fore: number, hand: number): Proportions {
+/**
+ * From lengths and masses in any unit; without masses each link weighs by its length what Winter's does. Throws
+ * `RangeError` for an arm without length or mass.
+ */
+export function proportionsOf(
+  upper: number, fore: number, hand: number, masses?: readonly [number, number, number],
+): Proportions {
+  const links = [upper, fore, hand];
   const whole = upper + fore + hand;
   if (!(upper > 0 && fore > 0 && hand > 0)) throw new RangeError("an arm's three links need lengths above zero");
-  const lengths = [upper / whole, fore / whole, hand / whole];
-  const heavy = WINTER[0] + WINTER[1] + WINTER[2];
-  const masses = WINTER.map((mass) => mass / heavy);
-  const identity = [...apportion(lengths), ...apportion(masses)].join("-");
+  const weights = masses ?? links.map((length, link) => length * MASS_PER_LENGTH[link]);
+  const heavy = weights[0] + weights[1] + weights[2];
+  if (!(heavy > 0)) throw new RangeError("an arm's three links need masses above zero");
+  const lengths = links.map((length) => length / whole);
+  const identity = [...apportion(lengths), ...apportion(weights.map((mass) => mass / heavy))].join("-");
   return { upper: lengths[0], fore: lengths[1], hand: lengths[2], identity };
 }
 

@@ -5,8 +5,16 @@ import { ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, parseProportions } from "../../
 import { bytes } from "../vectors";
 import { golden } from "./golden";
 
-function near(got: ArrayLike<number>, at: number, wanted: number[]): void {
-  for (let i = 0; i < wanted.length; i++) expect(Math.abs(got[at + i] - wanted[i])).toBeLessThan(1e-9);
+const place = fc.oneof(fc.double({ min: -1.2, max: 1.2, noNaN: true }), fc.constantFrom(0, 1e-170, 1e-20, -1e6));
+
+function near(got: ArrayLike<number>, at: number, wanted: number[], most = 1e-9): void {
+  for (let i = 0; i < wanted.length; i++) expect(Math.abs(got[at + i] - wanted[i])).toBeLessThan(most);
+}
+
+/** The angle between two links. */
+function bend(a: number[], b: number[]): number {
+  const dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  return Math.acos(Math.min(Math.max(dot / Math.hypot(...a) / Math.hypot(...b), -1), 1));
 }
 
 describe.each(golden.arms)("the arm $proportions", ({ proportions, table, sha256, inner_radius, solves }) => {
@@ -20,29 +28,39 @@ describe.each(golden.arms)("the arm $proportions", ({ proportions, table, sha256
   });
 
   test("it hangs as the golden vectors say", () => {
-    const out = new Float64Array(SOLVED);
+    const out = new Float64Array(SOLVED), angle = new Float64Array(3);
     for (const { target, azimuth, angles, elbow, wrist, tip } of solves) {
       arm.solve(out, 0, target[0], target[1], target[2]);
-      near(out, 0, [azimuth, ...angles, ...elbow, ...wrist, ...tip]);
+      near(out, 0, [Math.sin(azimuth), Math.cos(azimuth), ...elbow, ...wrist, ...tip]);
+      const level = Math.hypot(tip[0], tip[2]);
+      arm.angles(angle, 0, arm.clamp(Math.hypot(level, tip[1])), Math.atan2(tip[1], level));
+      near(angle, 0, angles);
     }
   });
 
-  test("its tip is exact and its joints within their limits", () => {
+  test("its tip is exact, its links keep their lengths, its joints their limits", () => {
     const out = new Float64Array(SOLVED);
-    for (let i = 0; i < 5000; i++) {
-      // directions and distances on a lattice that repeats nothing
-      const height = 2 * ((i * 0.6180339887498949) % 1) - 1, turn = i * 2.399963229728653;
-      const reach = arm.inner + (OUTER_RADIUS - arm.inner) * ((i * 0.7548776662466927) % 1);
-      const level = Math.sqrt(1 - height * height) * reach;
-      const x = level * Math.sin(turn), y = height * reach, z = level * Math.cos(turn);
-      arm.solve(out, 0, x, y, z);
-      expect(Math.hypot(out[10] - x, out[11] - y, out[12] - z)).toBeLessThan(1e-11);
-      const elbow = out[2] - out[1], wrist = out[3] - out[2];
-      expect(elbow).toBeGreaterThan(-1e-9);
-      expect(elbow).toBeLessThan(ELBOW_LIMIT + 1e-9);
-      expect(wrist).toBeGreaterThan(-1e-9);
-      expect(wrist).toBeLessThan(WRIST_LIMIT + 1e-9);
-    }
+    fc.assert(
+      fc.property(place, place, place, (x, y, z) => {
+        arm.solve(out, 0, x, y, z);
+        const size = Math.hypot(x, y, z), reach = arm.clamp(size);
+        // a target out of reach keeps its direction; the shoulder's own place is straight below
+        const [right, up, ahead] = size < 1e-12 ? [0, -reach, 0] : [x, y, z].map((part) => (part / size) * reach);
+        near(out, 8, [right, up, ahead], 1e-12);
+        const { upper, fore, hand } = arm.proportions;
+        const links = [2, 5, 8].map((at) => [0, 1, 2].map((axis) => out[at + axis] - (at > 2 ? out[at - 3 + axis] : 0)));
+        links.forEach((link, nth) => expect(Math.abs(Math.hypot(...link) - [upper, fore, hand][nth])).toBeLessThan(1e-12));
+        expect(bend(links[0], links[1])).toBeLessThan(ELBOW_LIMIT + 1e-9);
+        expect(bend(links[1], links[2])).toBeLessThan(WRIST_LIMIT + 1e-9);
+        // neither joint bends the other way: each link is turned on in one sense
+        const [sine, cosine] = out;
+        const level = links.map(([a, b, c]) => [a * sine + c * cosine, b]);
+        for (let k = 0; k < 2; k++) {
+          expect(level[k][0] * level[k + 1][1] - level[k][1] * level[k + 1][0]).toBeGreaterThan(-1e-12);
+        }
+      }),
+      { numRuns: 2000 },
+    );
   });
 });
 

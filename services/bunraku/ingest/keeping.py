@@ -1,0 +1,87 @@
+"""What a job does to keep a session: its log, replayed over the dance, to an encoded motion of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from threading import Lock
+
+import numpy as np
+
+from bunraku.backing.library import StoredMotion, pack
+from bunraku.codec.encode import Grade, encode_motion
+from bunraku.codec.scene import Scene
+from bunraku.codec.scene_encode import encode_scene
+from bunraku.ingest.making import FIRST_SECONDS, MOST_FRAMES_AT_BEST
+from bunraku.ingest.order import FPS, Keyframe, Order
+from bunraku.ingest.results import Made, Refused
+from bunraku.ingest.showing import MissingDance, Showing
+from bunraku.marionette.log import DamagedLog, Log
+from bunraku.motion.skeleton import Motion
+
+
+def keep(
+    motion: str,
+    order: Order,
+    log: bytes,
+    dances: dict[str, StoredMotion],
+    progress: Callable[[float], None] = lambda _: None,
+) -> Made | Refused:
+    """Replay `log` as `order` says and encode what was seen as the motion of this id; `dances` are those that the log
+    is over, by id. A session that changed its dance meanwhile is kept from where its last one came on.
+
+    `progress` is told the share encoded, 0..1.
+    """
+    showing = Showing(Log.unpack(log), dances)
+    times = [order.begin + round(number * 1e6 / FPS) for number in range(order.frames)]
+    states = [showing.timeline_at(time) for time in times]
+    last = states[-1]
+    if last is None:
+        return Refused("Nothing to keep", "no dance was on the stage in this interval", field="seconds")
+    times = times[1 + max((n for n, s in enumerate(states) if s is None or s.motion != last.motion), default=-1) :]
+    try:
+        poses = list(showing.poses(times))
+    except (MissingDance, DamagedLog) as error:
+        return Refused("Cannot be replayed", str(error))
+    dance = dances[last.motion]
+    # every one of these instants has a timeline and its dance
+    shown = [pose for pose in poses if pose is not None]
+    root, rotations = (np.stack(part) for part in zip(*shown, strict=True))
+    kept = Motion(dance.track.figure, float(FPS), root, rotations)
+    grade: Grade = "best" if kept.frames <= MOST_FRAMES_AT_BEST else "live"
+    telling = Lock()
+
+    def told(share: float) -> None:
+        with telling:
+            progress(share)
+
+    try:
+        scenes = [encode_scene(film(order.camera, times), first_seconds=FIRST_SECONDS)] if order.camera else []
+    except ValueError as error:
+        return Refused("Invalid camera", str(error), field="camera")
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        encoded = encode_motion(kept, first_seconds=FIRST_SECONDS, grade=grade, progress=told, spread=pool.map)
+    # the dance's front: a hand that was pulled turns no stage
+    encoded = replace(encoded, front=dance.front)
+    return Made(
+        pack(motion, encoded, scenes),
+        {
+            "duration": kept.duration,
+            "fps": kept.fps,
+            "frames": kept.frames,
+            "blocks": encoded.track.blocks,
+            "tracks": ["motion", *(scene.track.kind for scene in scenes)],
+            "rates": encoded.describe()["rates"],
+            "kept_from": dance.id,
+        },
+    )
+
+
+def film(keyframes: Sequence[Keyframe], times: Sequence[int]) -> Scene:
+    """The camera of `keyframes` at clock `times`: linear between two of them, still before the first and after the
+    last. Raises ValueError where it is no camera."""
+    keys = np.array(keyframes, dtype=np.float64)
+    values = np.stack([np.interp(np.array(times, dtype=np.float64), keys[:, 0], column) for column in keys.T[1:]], 1)
+    return Scene("camera", float(FPS), values)

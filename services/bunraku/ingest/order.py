@@ -1,0 +1,60 @@
+"""What the session service asks for on the bus when a session is to be kept as a motion (subject `ingest.keep`)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgpack
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+
+from bunraku.backing.problems import ProblemError, invalid_field
+
+FPS = 60
+"""Frames a second of a kept motion: as many as viewers are shown."""
+MOST_SECONDS = 600
+"""The longest that is kept in one motion."""
+MOST_KEYFRAMES = 36_001
+"""Of the camera: one a frame of the longest motion."""
+
+Clock = Annotated[int, Field(ge=0, lt=1 << 53)]
+Keyframe = Annotated[list[FiniteFloat], Field(min_length=8, max_length=8)]
+
+
+class Order(BaseModel):
+    """What to keep: clock times `begin` to `end`, microseconds, of the session whose log is the library's object `log`.
+
+    `camera` are keyframes in ascending order of clock time: time, position and the point gazed at in metres, vertical
+    field of view in radians. Without a `name` the motion has that of the dance.
+    """
+
+    model_config = ConfigDict(extra="ignore")
+    log: str
+    name: Annotated[str | None, Field(max_length=200)] = None
+    begin: Clock
+    end: Clock
+    camera: Annotated[list[Keyframe], Field(max_length=MOST_KEYFRAMES)] = []
+
+    @property
+    def frames(self) -> int:
+        """Frames of the motion, should all of it be kept."""
+        return max(round((self.end - self.begin) * FPS / 1e6), 0)
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Order:
+        """The order in a message of the bus; raises `ProblemError` with the field that is wrong."""
+        try:
+            order = cls.model_validate(msgpack.unpackb(data))
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise invalid_field(first["loc"], first["msg"]) from None
+        except (ValueError, msgpack.UnpackException) as error:
+            raise ProblemError(422, "Invalid request", f"not an order to keep a session: {error}") from None
+        if order.frames < 1:
+            raise ProblemError(422, "Nothing to keep", "the interval has no frame in it", field="seconds")
+        if order.frames > MOST_SECONDS * FPS:
+            raise ProblemError(
+                422, "Too long", f"at most {MOST_SECONDS} seconds are kept", field="seconds", hint="keep a shorter part"
+            )
+        if any(after[0] <= before[0] for before, after in zip(order.camera, order.camera[1:], strict=False)):
+            raise ProblemError(422, "Invalid request", "camera: its keyframes' times do not ascend", field="camera")
+        return order

@@ -1,0 +1,104 @@
+"""The paper's own arm (paper 4.2, 4.3): three angles in a table, looked up and interpolated.
+
+Kept to be measured against. Nodes are even over the half disc, 100 divisions of the distance and 18 of the elevation;
+each holds the angles t0, t1, t2 of least potential, float32; between nodes they are bilinear, so the tip misses its
+target by a little. Elbow and wrist bend as far as they like, as in the paper, though only in their own sense: among
+poses that are alike for gravity those are taken that the neighbours lead to, without which angles jump between nodes.
+
+In the plane: x outwards, y up; angles from x towards y, radians; lengths in arm lengths.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import numpy.typing as npt
+
+from bunraku.marionette.proportions import Proportions
+from bunraku.motion.rotation import Array
+
+DISTANCES, ELEVATIONS = 101, 19
+"""Nodes along r, 0..1, and along beta, -pi/2..pi/2."""
+PAPER_BYTES = DISTANCES * ELEVATIONS * 3 * 4
+"""Of a table: 23,028. The paper says "within 8 kB", which one of the three angles takes."""
+
+PaperTable = npt.NDArray[np.float32]
+_SCAN = 721
+_HALVINGS = 40
+_ASIDE = 1e-6
+"""Straight up and down an arm may bow to either side. A node there is taken this little from it, radians, so that the
+arm bows to the side it does beside it."""
+
+
+def build_paper_table(proportions: Proportions) -> PaperTable:
+    """The angles (3, DISTANCES, ELEVATIONS) of least potential, by a search of all poses and halving."""
+    r, beta = np.meshgrid(np.linspace(0.0, 1.0, DISTANCES), np.linspace(-0.5, 0.5, ELEVATIONS) * pi, indexing="ij")
+    beta = np.clip(beta, -0.5 * pi + _ASIDE, 0.5 * pi - _ASIDE)
+    step = 2.0 * pi / (_SCAN - 1)
+    best, lowest = np.zeros(r.shape), np.full(r.shape, np.inf)
+
+    def look(turn: Array) -> None:
+        nonlocal best, lowest
+        height = _height(proportions, _close(proportions, r, beta, turn))
+        # by more than rounding: poses that are alike keep their order
+        lower = height < lowest - 1e-13
+        best, lowest = np.where(lower, turn, best), np.where(lower, height, lowest)
+
+    for nth in range(_SCAN):
+        look(np.full(r.shape, nth * step))
+    for _ in range(_HALVINGS):
+        step *= 0.5
+        middle = best
+        look(middle - step)
+        look(middle + step)
+    return _close(proportions, r, beta, best).astype(np.float32)
+
+
+def paper_angles(table: PaperTable, r: Array, beta: Array) -> Array:
+    """Angles t0, t1, t2 (3, n) for tips at (`r`, `beta`), 0..1 and -pi/2..pi/2: bilinear between four nodes."""
+    u, v = r * (DISTANCES - 1), (beta / pi + 0.5) * (ELEVATIONS - 1)
+    i = np.clip(u.astype(np.int64), 0, DISTANCES - 2)
+    j = np.clip(v.astype(np.int64), 0, ELEVATIONS - 2)
+    p, q = u - i, v - j
+    nodes = table.astype(np.float64)
+    angles: Array = (nodes[:, i, j] * (1.0 - q) + nodes[:, i, j + 1] * q) * (1.0 - p)
+    angles += (nodes[:, i + 1, j] * (1.0 - q) + nodes[:, i + 1, j + 1] * q) * p
+    return angles
+
+
+def places(proportions: Proportions, angles: Array) -> npt.NDArray[np.complex128]:
+    """Elbow, wrist and tip (3, n) of link angles (3, n), as x + iy in the arm's plane."""
+    links = np.array(proportions.lengths)[:, None] * np.exp(1j * angles)
+    joints: npt.NDArray[np.complex128] = np.cumsum(links, axis=0)
+    return joints
+
+
+def tip_error(proportions: Proportions, table: PaperTable, r: Array, beta: Array) -> Array:
+    """How far (n,) tips are from their targets, in arm lengths: the paper's measure (4.3)."""
+    error: Array = np.abs(places(proportions, paper_angles(table, r, beta))[2] - r * np.exp(1j * beta))
+    return error
+
+
+def _close(proportions: Proportions, r: Array, beta: Array, turn: Array) -> Array:
+    """Link angles (3, ...) that bring the tip to (`r`, `beta`) with the upper arm turned down by `turn` from its
+    direction; NaN where the rest does not reach, or a joint would bend against its sense."""
+    upper, fore, hand = proportions.lengths
+    rest = upper**2 + r**2 - 2.0 * upper * r * np.cos(turn)
+    cosine = (rest - fore**2 - hand**2) / (2.0 * fore * hand)
+    bend = np.arccos(np.clip(cosine, -1.0, 1.0))
+    # from the upper arm to the line from elbow to tip, the way an elbow bends
+    chord = np.angle(r * np.exp(1j * turn) - upper)
+    chord = np.where(chord < -1e-9, chord + 2.0 * pi, chord)
+    elbow = chord - np.arctan2(hand * np.sin(bend), fore + hand * np.cos(bend))
+    possible = (np.abs(cosine) <= 1.0 + 1e-12) & (elbow >= -1e-7) & (elbow <= pi + 1e-7)
+    t0 = beta - turn
+    return np.where(possible, np.array([t0, t0 + elbow, t0 + elbow + bend]), np.nan)
+
+
+def _height(proportions: Proportions, angles: Array) -> Array:
+    """The part of the paper's E that a pose can change, twice and without g; infinite where there is no pose."""
+    upper, fore, _ = proportions.lengths
+    m0, m1, m2 = proportions.masses
+    height = (m0 + 2.0 * m1 + m2) * upper * np.sin(angles[0]) + (m1 + m2) * fore * np.sin(angles[1])
+    return np.where(np.isnan(height), np.inf, height)

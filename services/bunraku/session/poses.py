@@ -1,0 +1,67 @@
+"""The dance as a stage needs it: its rotations at clock times a little ahead, from its best blocks."""
+
+from __future__ import annotations
+
+import asyncio
+
+import numpy as np
+
+from bunraku.backing.library import StoredMotion
+from bunraku.codec.decode import decode_block
+from bunraku.motion.rotation import Array
+from bunraku.playout import timeline
+from bunraku.playout.blocks import BlockStore
+from bunraku.playout.timeline import Timelines
+from bunraku.wire.messages import Data
+
+AHEAD = 12
+"""Frames that are worked out at once: many cost little more than one."""
+
+
+class Poses:
+    """The dance of one stage."""
+
+    def __init__(self, motion: StoredMotion, timelines: Timelines) -> None:
+        self._motion = motion
+        self._timelines = timelines
+        self._blocks = BlockStore(motion.track)
+        self._known: dict[int, Array] = {}
+        self._epoch = -1
+
+    async def prepare(self, due: int) -> None:
+        """Decode what is needed about clock time `due`, in a thread: it takes milliseconds, the first time seconds."""
+        newest = self._timelines.newest
+        if newest is None or newest.motion != self._motion.id:
+            return
+        track, packets = self._motion.track, self._motion.dance[-1]
+        first = track.block_at(timeline.position_at(newest, due))
+        for index in (first, (first + 1) % track.blocks):
+            if self._blocks.rate(index) < 0:
+                packet = Data.unpack(packets[index])
+                self._blocks.put(index, packet.rate, await asyncio.to_thread(decode_block, track, packet.block))
+
+    def at(self, due: int, step: int) -> Array | None:
+        """The rotations (18, 4) at clock time `due`, None where the block is missing or another motion is on.
+
+        Those of the next `AHEAD` frames, `step` µs apart, are worked out with it, and hold until the timeline is edited.
+        """
+        newest = self._timelines.newest
+        if newest is None:
+            return None
+        if newest.epoch != self._epoch or due not in self._known:
+            self._epoch = newest.epoch
+            self._known = self._work_out([due + step * k for k in range(AHEAD)])
+        return self._known.get(due)
+
+    def _work_out(self, dues: list[int]) -> dict[int, Array]:
+        states = [self._timelines.at(due) for due in dues]
+        here = [
+            (due, timeline.position_at(state, due), state.loop)
+            for due, state in zip(dues, states, strict=True)
+            if state is not None and state.motion == self._motion.id
+        ]
+        if not here:
+            return {}
+        loops = np.array([loop for _, _, loop in here])
+        poses = self._blocks.rotations_at([position for _, position, _ in here], bool(loops[0]))
+        return {due: pose for (due, _, _), pose in zip(here, poses, strict=True) if pose is not None}

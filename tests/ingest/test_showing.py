@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from bunraku.ingest.showing import MissingDance, Showing
+from bunraku.marionette.log import Log, LoggedMarionette
+from bunraku.marionette.merge import Marionette
+from bunraku.marionette.ownership import Grant, Input
+from bunraku.playout import timeline
+from bunraku.playout.blocks import Pose
+from bunraku.playout.overlays import Overlays, pack_joints
+from bunraku.wire.messages import Overlay, TimelineState
+from tests.ingest.dances import BEGAN, DANCES, SECOND, log_of
+
+LEAD = 100_000
+TICK = 16_667
+
+
+class Stage:
+    """A session with one viewer, frame by frame, as the session service drives it."""
+
+    def __init__(self, motion: str) -> None:
+        self.log = Log()
+        self.state = timeline.start(motion, DANCES[motion].track.duration_us, BEGAN)
+        self.log.timeline(self.state)
+        self.puppet = LoggedMarionette(Marionette(DANCES[motion].track.figure), motion, self.log)
+        self.now = BEGAN
+        self._viewer = Overlays()
+        self._alone = True
+        self._sequence = 0
+        self.seen: list[tuple[int, Pose]] = []
+
+    def run(self, seconds: float) -> Iterator[int]:
+        """Each tick's clock time, before its overlay is made; what the viewer is shown of it is noted."""
+        for _ in range(round(seconds * 1e6 / TICK)):
+            yield self.now
+            self._overlay()
+            pose = self._dance().dance_at(self.now)
+            assert pose is not None
+            self.seen.append((self.now, (pose[0], self._viewer.lay(pose[1], self.now))))
+            self.now += TICK
+
+    def edit(self, state: TimelineState) -> None:
+        self.state = state
+        self.log.timeline(state)
+
+    def _dance(self) -> Showing:
+        return Showing(self.log, DANCES)
+
+    def _overlay(self) -> None:
+        if self.puppet.puppet.at_rest:
+            self._alone = True
+            return
+        for back in (2 * TICK, TICK) if self._alone else ():
+            before = self._dance().dance_at(self.now + LEAD - back)
+            assert before is not None
+            self.puppet.see(before[1], self.now + LEAD - back, self.now - back)
+        self._alone = False
+        pose = self._dance().dance_at(self.now + LEAD)
+        assert pose is not None
+        over = self.puppet.overlay(pose[1], self.now + LEAD, self.now)
+        pulled = zip(over.limbs, over.rotations.tolist(), strict=True) if over is not None else ()
+        limbs = {int(limb): pack_joints(joints) for limb, joints in pulled}
+        self._sequence += 1
+        self._viewer.put(Overlay(self._sequence, self.now + LEAD, limbs))
+
+
+def pulled_twice(motion: str) -> Stage:
+    """A hand is pulled, let go, and after a rest another with a leg."""
+    stage = Stage(motion)
+    for _ in stage.run(0.5):
+        pass
+    for limbs, seconds in (((0,), 1.2), ((1, 2), 0.7)):
+        grants = [stage.puppet.claim(limb, "ada", stage.now) for limb in limbs]
+        for number, now in enumerate(stage.run(seconds)):
+            for grant in grants:
+                assert isinstance(grant, Grant)
+                values = (0.5 + 0.3 * np.sin(number / 9), 0.2, 0.4) if grant.limb < 2 else (0.6, 0.0, 0.0)
+                stage.puppet.input("ada", Input(grant.limb, 1, grant.epoch, number + 1, now, values), now)
+        for grant in grants:
+            assert isinstance(grant, Grant)
+            assert stage.puppet.release(grant.limb, "ada", grant.epoch, stage.now)
+        for _ in stage.run(1.5):
+            pass
+        assert stage.puppet.puppet.at_rest
+    return stage
+
+
+def test_it_shows_again_what_a_viewer_saw_from_any_instant_on() -> None:
+    stage = pulled_twice("one")
+    log = Log.unpack(stage.log.pack())
+    plain = Showing(log, DANCES)
+    for first in (0, 31, 60, 150, 200, 260):
+        part = stage.seen[first:]
+        shown = list(Showing(log, DANCES).poses([clock for clock, _ in part]))
+        moved = 0.0
+        for (clock, seen), again in zip(part, shown, strict=True):
+            dance = plain.dance_at(clock)
+            assert again is not None
+            assert dance is not None
+            np.testing.assert_allclose(again[0], seen[0], atol=1e-12)
+            np.testing.assert_allclose(again[1], seen[1], atol=1e-9)
+            moved = max(moved, float(np.abs(again[1] - dance[1]).max()))
+        assert moved > 0.1
+
+
+def test_timelines_hold_from_when_they_are_due() -> None:
+    one = timeline.start("one", 3 * SECOND, BEGAN)
+    sought = timeline.edit(one, BEGAN + SECOND, position=2 * SECOND)
+    two = timeline.change(sought, BEGAN + 2 * SECOND, "two", 2 * SECOND)
+    showing = Showing(Log.unpack(log_of(one, sought, two)), DANCES)
+    assert showing.timeline_at(BEGAN - 1) is None
+    assert showing.dance_at(BEGAN - 1) is None
+    assert [showing.timeline_at(BEGAN + t) for t in (0, SECOND - 1, SECOND, 2 * SECOND)] == [one, one, sought, two]
+    assert list(showing.poses([BEGAN - 5, BEGAN - 1])) == [None, None]
+
+
+def test_a_dance_that_was_removed_is_missed() -> None:
+    one = timeline.start("one", 3 * SECOND, BEGAN)
+    with pytest.raises(MissingDance, match="one was removed"):
+        list(Showing(Log.unpack(log_of(one)), {}).poses([BEGAN]))
+
+
+def test_nothing_pulled_is_the_dance_alone() -> None:
+    one = timeline.start("one", 3 * SECOND, BEGAN)
+    showing = Showing(Log.unpack(log_of(one)), DANCES)
+    (pose,) = showing.poses([BEGAN + SECOND])
+    alone = showing.dance_at(BEGAN + SECOND)
+    assert pose is not None
+    assert alone is not None
+    np.testing.assert_array_equal(pose[1], alone[1])

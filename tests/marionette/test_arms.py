@@ -1,0 +1,96 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.marionette import arms, table
+from bunraku.marionette.arm import Arm, bend_limits
+from bunraku.marionette.proportions import ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, Proportions
+from tests.marionette.arms import ARMS, reachable
+
+places = st.tuples(*[st.floats(-1.5, 1.5)] * 3)
+
+
+@pytest.mark.parametrize("proportions", ARMS, ids=lambda p: p.identity)
+def test_the_tip_is_exact_and_the_joints_are_within_their_limits(proportions: Proportions) -> None:
+    targets = reachable(proportions, 20_000, seed=1)
+    solved = arms.solve(proportions, table.table_of(proportions.identity), targets)
+    assert float(np.abs(solved.tip - targets).max()) < 1e-14
+    t0, t1, t2 = solved.angles()
+    elbow, wrist = t1 - t0, t2 - t1
+    assert elbow.min() >= -1e-9
+    assert elbow.max() <= ELBOW_LIMIT + 1e-9
+    assert wrist.min() >= -1e-12
+    assert wrist.max() <= WRIST_LIMIT + 1e-12
+    links = np.diff(np.stack([np.zeros_like(solved.elbow), solved.elbow, solved.wrist, solved.tip]), axis=0)
+    sizes = np.linalg.norm(links, axis=2)
+    np.testing.assert_allclose(sizes, np.array(proportions.lengths)[:, None] * np.ones(len(targets)), atol=1e-12)
+
+
+@pytest.mark.parametrize("proportions", ARMS, ids=lambda p: p.identity)
+def test_the_arm_hangs_as_low_as_any_other_bend_would(proportions: Proportions) -> None:
+    targets = reachable(proportions, 500, seed=2)
+    solved = arms.solve(proportions, table.table_of(proportions.identity), targets)
+    r = np.linalg.norm(targets, axis=1)
+    beta = np.arcsin(targets[:, 1] / r)
+    low, high = bend_limits(proportions, r)
+    shares = np.linspace(0.0, 1.0, 400)[:, None]
+    every = table.potential(proportions, r, beta, low + shares * (high - low))
+    _, t1, t2 = solved.angles()
+    here = table.potential(proportions, r, beta, t2 - t1)
+    above = here - every.min(axis=0)
+    # a few hundredths of a degree from the minimum cost next to nothing; the corners near the shoulder are coarser
+    assert float(np.percentile(above, 98)) < 1e-4
+    assert float(above.max()) < 1e-3
+
+
+@given(st.sampled_from(ARMS), places)
+def test_one_arm_at_a_time_gives_the_same(proportions: Proportions, place: tuple[float, float, float]) -> None:
+    stored = table.table_of(proportions.identity)
+    target = np.array([place])
+    solved = arms.solve(proportions, stored, target)
+    one = Arm(proportions, stored)
+    rho, y = float(np.hypot(target[0, 0], target[0, 2])), float(target[0, 1])
+    beta = float(np.arctan2(y, rho)) if np.hypot(rho, y) >= 1e-12 else -np.pi / 2.0
+    angles = one.angles(one.clamp(float(np.hypot(rho, y))), beta)
+    np.testing.assert_allclose(angles, np.array(solved.angles())[:, 0], atol=1e-11)
+
+
+@given(st.sampled_from(ARMS), places)
+def test_out_of_reach_keeps_the_direction(proportions: Proportions, place: tuple[float, float, float]) -> None:
+    target = np.array([place])
+    size = float(np.linalg.norm(target))
+    tip = arms.solve(proportions, table.table_of(proportions.identity), target).tip[0]
+    reach = min(max(size, proportions.inner_radius), OUTER_RADIUS)
+    wanted = target[0] / size * reach if size >= 1e-12 else np.array([0.0, -reach, 0.0])
+    np.testing.assert_allclose(tip, wanted, atol=1e-9)
+
+
+@given(st.sampled_from(ARMS), places, st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+def test_a_small_step_of_the_hand_is_a_small_step_of_the_arm(
+    proportions: Proportions, place: tuple[float, float, float], step: tuple[float, float, float]
+) -> None:
+    """No jumps, away from the axis and from the straight arm: at most 12 radians of bend per arm length."""
+    here = np.array([place])
+    there = here + 1e-4 * np.array([step])
+    rho = np.hypot(here[:, 0], here[:, 2])
+    size = float(np.linalg.norm(here))
+    if rho < 0.02 or size > 0.97:
+        return
+    stored = table.table_of(proportions.identity)
+    a, b = arms.solve(proportions, stored, here), arms.solve(proportions, stored, there)
+    bends = [np.diff(np.array(solved.angles()), axis=0) for solved in (a, b)]
+    moved = float(np.abs(bends[0] - bends[1]).max())
+    assert moved <= 12.0 * 1e-4 * np.sqrt(3.0) / max(min(size, 1.0), 0.1)
+
+
+def test_straight_below_faces_forwards() -> None:
+    proportions = ARMS[0]
+    solved = arms.solve(
+        proportions, table.table_of(proportions.identity), np.array([[0.0, -0.7, 0.0], [0.0, 0.0, 0.0]])
+    )
+    assert solved.azimuth.tolist() == [0.0, 0.0]
+    assert solved.elbow[0, 2] < 0.0  # the elbow points back as a forearm is lifted forwards
+    np.testing.assert_allclose(solved.tip[1], [0.0, -proportions.inner_radius, 0.0], atol=1e-12)

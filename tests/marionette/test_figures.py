@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from bunraku.marionette.bodies import BODIES, Body
+from bunraku.marionette.figures import FIGURES, HEIGHT, WIDTH, Figure, draw, our_arm, papers_arm, path
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+NUMBER = re.compile(r"-?\d+\.\d+")
+H_ANIM = BODIES[2].proportions
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_pictures_in_the_docs_are_what_the_code_draws(name: Figure) -> None:
+    """Numbers to a fifth of a pixel: the last digit of a sine is the machine's own. To draw them anew:
+    `python -m tests.marionette.test_figures`."""
+    made, stored = draw(H_ANIM, name), (DOCS / f"arm-{name}.svg").read_text(encoding="utf-8")
+    assert NUMBER.sub("#", made) == NUMBER.sub("#", stored)
+    here, there = ([float(number) for number in NUMBER.findall(text)] for text in (made, stored))
+    np.testing.assert_allclose(here, there, atol=0.2)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
+def test_a_picture_stays_within_its_frame(name: Figure, body: Body) -> None:
+    image = ElementTree.fromstring(draw(body.proportions, name))
+    for way in image.iter("{http://www.w3.org/2000/svg}path"):
+        for x, y in (map(float, point.split(" ")) for point in way.attrib["d"][1:].split("L")):
+            assert 0.0 < x < WIDTH
+            assert 60.0 < y < HEIGHT - 30.0
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_tip_runs_where_the_figure_says(name: Figure) -> None:
+    tips = path(name, 200)
+    assert tips.real.min() > 0.0
+    assert np.abs(tips).max() < 1.0
+    if name == "circle":
+        assert np.ptp(np.abs(tips - tips[:-1].mean())) < 0.01
+    else:
+        assert np.ptp(tips.imag) == 0.0
+    assert np.abs(our_arm(H_ANIM, tips)[2] - tips).max() < 1e-14
+    theirs = np.abs(papers_arm(H_ANIM, tips)[2] - tips)
+    assert 1e-5 < theirs.max() < 0.003
+
+
+if __name__ == "__main__":
+    for figure in FIGURES:
+        (DOCS / f"arm-{figure}.svg").write_text(draw(H_ANIM, figure), encoding="utf-8", newline="\n")
