@@ -21,7 +21,7 @@ from bunraku.marionette.pulled import LEAST_REACH, MOST_REACH
 from bunraku.marionette.vector import Vector
 from bunraku.motion import choreography
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import Figure, standard_figure
+from bunraku.motion.skeleton import Figure
 
 FRAME = 16_667
 SPEED = 0.5
@@ -64,13 +64,11 @@ def slow_paths(inner: float) -> Iterator[Path]:
                     vector.subtract(middle, vector.scale(ahead, half)), vector.add(middle, vector.scale(ahead, half))
                 )
     for _ in range(60):
-        direction = vector.unit(tuple(random.normal(size=3)), UP)  # type: ignore[arg-type]
+        direction = vector.unit(_random(random), UP)
         yield line(vector.scale(direction, MOST_REACH), vector.scale(direction, inner))
         yield circle(random.uniform(0.3, 0.95), direction, SPEED)
     while True:
-        begin, end = (
-            vector.scale(vector.unit(tuple(random.normal(size=3)), UP), random.uniform(inner, MOST_REACH)) for _ in "ab"
-        )  # type: ignore[arg-type]
+        begin, end = (vector.scale(vector.unit(_random(random), UP), random.uniform(inner, MOST_REACH)) for _ in "ab")
         yield line(begin, end)
 
 
@@ -113,9 +111,9 @@ def elbow_steps(rig: ArmRig, path: Path) -> tuple[float, float, float]:
 
 
 class Handover(NamedTuple):
-    """One hand taken and let go: its greatest acceleration while it is held and on its way back, and that of the dance's
-    own hand meanwhile; and milliseconds from the grant until it is within a hundredth of where its puppeteer wants it, and
-    from the release until it is the dance's."""
+    """One hand taken and let go: its greatest acceleration while it is held and on its way back, and that of the
+    dance's own hand meanwhile; and milliseconds from the grant until it is within a hundredth of where its puppeteer
+    wants it, and from the release until it is the dance's."""
 
     taking: float
     returning: float
@@ -124,11 +122,10 @@ class Handover(NamedTuple):
     back_ms: float
 
 
-def handover(rig: ArmRig, figure: Figure, poses: Array, begin: int, away: Vector, phase: int) -> Handover:
-    """Takes the hand in frame `begin` of a dance (n, 18, 4), `phase` µs after it, asks for the place `away` from where the
-    dance has it, holds for half a second, and lets go."""
-    limb = rig.limb
-    puppet = Marionette(figure)
+def handover(limb: Limb, figure: Figure, poses: Array, begin: int, away: Vector, phase: int) -> Handover:
+    """Takes the hand in frame `begin` of a dance (n, 18, 4), `phase` µs after it, asks for the place `away` from where
+    the dance has it, holds for half a second, and lets go."""
+    rig, puppet = ArmRig(figure, limb), Marionette(figure)
     own = [rig.target(rig.dance(pose)) for pose in poses[begin - 3 : begin + 80].tolist()]
     times = [(begin - 3 + k) * FRAME for k in range(len(own))]
     hands = own[:4]
@@ -176,17 +173,16 @@ def handovers(count: int, distance: float) -> list[Handover]:
     random = np.random.default_rng(7)
     found: list[Handover] = []
     rigs = [ArmRig(motion.figure, limb) for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND)]
-    for rig, limb in zip(rigs, (Limb.LEFT_HAND, Limb.RIGHT_HAND), strict=True):
-        rig.limb = limb
     while len(found) < count:
-        rig = rigs[len(found) % 2]
+        limb = Limb(len(found) % 2)
+        rig = rigs[limb]
         begin = int(random.integers(4, len(motion.rotations) - 90))
         way = vector.unit(_random(random), UP)
         target = vector.add(rig.target(rig.dance(motion.rotations[begin].tolist())), vector.scale(way, distance))
         if LEAST_REACH < vector.length(target) < MOST_REACH and rig.shoulder.depth(rig.direction(target)) < 0.0:
             found.append(
                 handover(
-                    rig,
+                    limb,
                     motion.figure,
                     motion.rotations,
                     begin,

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from bunraku.marionette import vector
 from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.limbs import ArmRig, Joints, Limb
 from bunraku.marionette.elbow import elevation, vertical_normal
+from bunraku.marionette.limbs import ArmRig, Joints, Limb
 from bunraku.marionette.vector import IDENTITY
 from bunraku.motion.skeleton import standard_figure
 from tests.marionette.arms import dance

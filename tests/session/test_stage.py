@@ -11,10 +11,29 @@ from bunraku.backing.bus import MemoryBus
 from bunraku.backing.library import Library, StoredMotion, pack
 from bunraku.codec import decode
 from bunraku.codec.encode import encode_motion
+from bunraku.marionette.log import Log
 from bunraku.marionette.merge import Marionette
-from bunraku.session import stage as stages
-from bunraku.session.stage import LEAD, Full, Puppeteer, Stage
-from bunraku.wire.messages import Claim, Grant, Input, Overlay, Presence, Release, TimelineState, unpack
+from bunraku.motion import rotation
+from bunraku.playout.blocks import BlockStore
+from bunraku.playout.overlays import pack_joints
+from bunraku.playout.timeline import position_at
+from bunraku.session import puppeteers
+from bunraku.session.puppeteers import Full, Puppeteer
+from bunraku.session.stage import EDIT_LEAD, FRAME, FRAMES, Stage
+from bunraku.wire.messages import (
+    Ask,
+    Claim,
+    Data,
+    Grant,
+    Input,
+    Notice,
+    Overlay,
+    Presence,
+    Refusal,
+    Release,
+    TimelineState,
+    unpack,
+)
 from tests.vectors.blocks import wandering_motion
 
 
@@ -37,6 +56,12 @@ class Audience:
                 self._more.clear()
                 await self._more.wait()
         return found
+
+    async def alone(self) -> None:
+        """Until the dance is alone."""
+        count = 1
+        while (found := await self.until(count, Overlay)) and found[-1].limbs:  # type: ignore[attr-defined]
+            count = len(found) + 1
 
 
 async def stored(name: str, seed: int) -> StoredMotion:
@@ -76,14 +101,15 @@ async def test_overlays_carry_only_pulled_limbs_and_end_with_an_empty_one(stage:
     stage.hear(aiko, Input(0, Input.TARGET, epoch, 1, 0, (0.5, 0.2, 0.4)))
     await audience.until(20, Overlay)
     stage.hear(aiko, Release(0, epoch))
-    async with asyncio.timeout(10):
-        while not isinstance(last := audience.heard[-1], Overlay) or last.limbs:
-            await audience.until(len([m for m in audience.heard if isinstance(m, Overlay)]) + 1, Overlay)
+    await audience.alone()
     overlays = [m for m in audience.heard if isinstance(m, Overlay)]
     assert {tuple(o.limbs) for o in overlays} == {(0,), ()}
     assert [o.sequence for o in overlays] == list(range(overlays[0].sequence, overlays[0].sequence + len(overlays)))
     dues = np.diff([o.due for o in overlays])
-    assert (dues > 0).all()
+    assert (dues % FRAME == 0).all()
+    assert (dues >= FRAME * FRAMES).all()
+    assert {len(o.earlier) for o in overlays if o.limbs} <= set(range(FRAMES))
+    assert max(len(o.earlier) for o in overlays) == FRAMES - 1
     assert overlays[-1].limbs == {}
 
 
@@ -94,7 +120,7 @@ async def test_edits_hold_for_everyone_a_lead_from_now(stage: Stage, bus: Memory
     (state,) = await audience.until(1, TimelineState)
     assert isinstance(state, TimelineState)
     assert (state.epoch, state.playing) == (before.epoch + 1, False)
-    assert state.clock >= before.clock + LEAD
+    assert state.clock >= before.clock + EDIT_LEAD
 
 
 async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: MemoryBus) -> None:
@@ -117,7 +143,7 @@ async def test_colours_are_given_in_order_and_again_when_free(stage: Stage) -> N
 
 
 async def test_a_stage_is_full_some_day(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stages, "PUPPETEERS", 2)
+    monkeypatch.setattr(puppeteers, "MOST", 2)
     stage.join("a")
     stage.join("b")
     with pytest.raises(Full):
@@ -135,7 +161,80 @@ async def test_presence_counts_viewers_of_all_replicas(bus: MemoryBus) -> None:
 
 async def test_one_who_does_not_listen_is_marked(stage: Stage) -> None:
     aiko = stage.join("Aiko")
-    for _ in range(stages.QUEUE):
+    for _ in range(puppeteers.QUEUE):
         stage.hear(aiko, Claim(0))
     assert aiko.overrun
-    assert len(aiko.waiting) == stages.QUEUE
+    assert len(aiko.waiting) == puppeteers.QUEUE
+
+
+async def test_an_asked_limb_goes_to_who_asked_when_it_is_let_go(stage: Stage, bus: MemoryBus) -> None:
+    audience = Audience(bus)
+    aiko, ben = stage.join("Aiko"), stage.join("Ben")
+    stage.hear(aiko, Claim(1))
+    stage.hear(ben, Claim(1))
+    assert unpack(ben.waiting[-1]) == Refusal(1, "held", aiko.id)
+    stage.hear(ben, Ask(1, True))
+    assert stage.presence.asks == [[], [ben.id], [], []]
+    stage.hear(aiko, Release(1, granted(aiko).epoch))
+    assert granted(ben).limb == 1
+    assert stage.presence.limbs[1] == ben.id
+    assert stage.presence.asks == [[]] * 4
+    presences = [m for m in audience.heard if isinstance(m, Presence)]
+    assert [ben.id] in [p.asks[1] for p in presences]
+    stage.leave(ben)
+    assert stage.presence.limbs[1] is None
+
+
+async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(stage: Stage) -> None:
+    aiko, ben = stage.join("Aiko"), stage.join("Ben")
+    stage.hear(aiko, Claim(0))
+    epoch = granted(aiko).epoch
+    for number in range(5):
+        stage.hear(aiko, Input(0, Input.TARGET, epoch, number, 0, (900.0, 0.0, 0.0)))
+        stage.hear(ben, Input(0, Input.TARGET, epoch, number, 0, (0.1, 0.0, 0.0)))
+    told = [m for m in map(unpack, aiko.waiting) if isinstance(m, Notice)]
+    assert [(m.limb, m.reason) for m in told] == [(0, "reach")]
+    told = [m for m in map(unpack, ben.waiting) if isinstance(m, Notice)]
+    assert [(m.limb, m.reason) for m in told] == [(0, "owner")]
+    assert "left hand" in told[0].detail
+
+
+async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -> None:
+    """Two people pull, let go, and pull again; every frame that was published comes again from the log's bytes."""
+    audience = Audience(bus)
+    aiko, ben = stage.join("Aiko"), stage.join("Ben")
+    for passage in range(2):
+        stage.hear(aiko, Claim(0))
+        stage.hear(ben, Claim(3))
+        hand, leg = granted(aiko).epoch, granted(ben).epoch
+        for number in range(12):
+            stage.hear(aiko, Input(0, Input.TARGET, hand, number, 16_000 * number, (0.4, 0.05 * number - 0.2, 0.3)))
+            stage.hear(ben, Input(3, Input.VELOCITY, leg, number, 16_000 * number, (0.5, 0.0, 0.0)))
+            count = len([m for m in audience.heard if isinstance(m, Overlay)])
+            await audience.until(count + 1, Overlay)
+        stage.hear(aiko, Release(0, hand))
+        stage.hear(ben, Release(3, leg))
+        await audience.alone()
+        assert passage == 0 or stage.log.begin is not None
+    shown: dict[int, dict[int, tuple[int, ...]]] = {}
+    for overlay in audience.heard:
+        if isinstance(overlay, Overlay):
+            frames = (*overlay.earlier, overlay.limbs)
+            shown |= {overlay.due - FRAME * (len(frames) - 1 - nth): limbs for nth, limbs in enumerate(frames)}
+    motion = await stored("one", 5)
+    blocks = BlockStore(motion.track)
+    for index, packet in enumerate(motion.dance[-1]):
+        blocks.put(index, 0, decode.decode_block(motion.track, Data.unpack(packet).block))
+    state = stage.timeline
+
+    def pose_at(due: int) -> rotation.Array:
+        pose = blocks.pose_at(position_at(state, due), state.loop)
+        assert pose is not None
+        return pose[1]
+
+    again = {
+        due: dict(zip(map(int, over.limbs), map(pack_joints, over.rotations.tolist()), strict=True)) if over else {}
+        for due, over in Log.unpack(stage.log.pack()).replay(lambda _: motion.track.figure, pose_at)
+    }
+    # once the dance is alone nothing is noted
+    assert {due: again.get(due) or {} for due in shown} == shown

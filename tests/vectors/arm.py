@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.marionette import arms, table, vector
+from bunraku.marionette import arms, table
 from bunraku.marionette.limbs import ArmRig, LegRig, Limb
 from bunraku.marionette.proportions import Proportions
 from bunraku.motion import rotation

@@ -1,7 +1,7 @@
 """Golden vectors of a limb that is taken, pulled and let go, frame by frame (`proto/vectors/pulled.json`).
 
-The dance is told by numbers, not frames: joint j turns by the rotation vector swing * sin(2 pi hertz t + phase), part by
-part, in seconds; so the file stays small.
+The dance is told by numbers, not frames: joint j turns by the rotation vector swing * sin(2 pi hertz t + phase), part
+by part, in seconds; so the file stays small.
 """
 
 from __future__ import annotations

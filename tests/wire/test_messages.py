@@ -129,6 +129,7 @@ def test_unknown_types_are_skipped_and_unknown_keys_too() -> None:
 def test_sizes_are_those_of_the_contract() -> None:
     assert [len(Data(0, 3, index, b"").pack()) for index in (0, 127, 128, 86_399)] == [3, 3, 4, 5]
     assert len(Overlay(1, 2, {0: (0,) * 9, 3: (1,) * 9}).pack()) == 12 + 36
+    assert len(Overlay(1, 2, {0: (0,) * 9}, ({0: (1,) * 9},)).pack()) == 12 + 36
     assert len(Ping(1, 2).pack()) == len(Pong(1, 2, 3, 4).pack()) == len(Input(0, 0, 1, 1, 1, (0, 0, 0)).pack()) == 32
 
 
@@ -143,7 +144,8 @@ def test_sizes_are_those_of_the_contract() -> None:
         (bytes([70]) + b"\0" * 30, "32 bytes"),
         (Input(0, 1, 1, 1, 1, (float("nan"), 0, 0)).pack(), "finite"),
         (Input(0, 1, 1, 1, 1, (float("inf"), 0, 0)).pack(), "finite"),
-        (bytes([5, 16]) + bytes(10), "mask"),
+        (bytes([5, 0x11]) + bytes(28), "48 bytes"),
+        (bytes([5, 1]) + bytes(5), "12 bytes"),
         (bytes([5, 1]) + bytes(10), "30 bytes"),
     ],
 )

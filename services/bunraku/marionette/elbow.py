@@ -1,12 +1,12 @@
 """Where the elbow goes: where gravity wants it, at a bounded speed, and never where no shoulder lets it.
 
-With the hand tip given, an arm is still free in two ways: it turns about the chord, the line from shoulder to tip, and it
-trades the wrist's bend for the elbow's, which lifts the upper arm off the chord more or less. Gravity alone would put it
-into the vertical plane with the bend of least energy. That plane is undefined straight above and below the shoulder, so a
-hand that passes there would throw the elbow across; and an arm that leaves its full stretch would snap its elbow out. So
-both are remembered: the plane is carried along with the hand by the shortest turn and swings towards the vertical one, the
-faster the farther the hand is from the axis, and the lift follows gravity's. The tip is exact at every instant, as only
-the two freedoms are slowed down, never the hand.
+With the hand tip given, an arm is still free in two ways: it turns about the chord, the line from shoulder to tip, and
+it trades the wrist's bend for the elbow's, which lifts the upper arm off the chord more or less. Gravity alone would
+put it into the vertical plane with the bend of least energy. That plane is undefined straight above and below the
+shoulder, so a hand that passes there would throw the elbow across; and an arm that leaves its full stretch would snap
+its elbow out. So both are remembered: the plane is carried along with the hand by the shortest turn and swings towards
+the vertical one, the faster the farther the hand is from the axis, and the lift follows gravity's. The tip is exact at
+every instant, as only the two freedoms are slowed down, never the hand.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ FASTEST = 2.0 * pi
 SPEED = 1.68
 """Arm lengths per second: what the hand's way and the change of bend leave of this is there for the swing."""
 SLOPE = 2.4
-"""Arm lengths that the elbow is off the chord at most, for each arm length that the tip is short of full stretch: gravity
-alone would have it snap into the line with the last of them."""
+"""Arm lengths that the elbow is off the chord at most, for each arm length that the tip is short of full stretch:
+gravity alone would have it snap into the line with the last of them."""
 LEAST_SPEED = 0.1
 """Arm lengths per second that are there for the swing in any case."""
 CLEAR = 1e-7
@@ -41,7 +41,8 @@ LIFT_SPEED = 1.2
 
 class Hanging(NamedTuple):
     """An arm's freedoms settled: where the `tip` is, in arm lengths (not where it was asked to be only while the
-    shoulder's limit leaves no other way), the unit `normal` of the arm's plane, square to it, and the wrist's `bend`."""
+    shoulder's limit leaves no other way), the unit `normal` of the arm's plane, square to it, and the wrist's
+    `bend`."""
 
     tip: Vector
     normal: Vector

@@ -69,8 +69,8 @@ class Turn:
         self._turn: Quaternion | None = None
 
     def follow(self, dance: Vector, pulled: Vector, weight: float) -> Quaternion:
-        """The turn from the direction of `dance` to that of `pulled`; all the way there, at `weight` 1, it starts afresh
-        from the shortest."""
+        """The turn from the direction of `dance` to that of `pulled`; all the way there, at `weight` 1, it starts
+        afresh from the shortest."""
         down = (0.0, -1.0, 0.0)
         here, there = vector.unit(dance, down), vector.unit(pulled, down)
         if self._turn is None:

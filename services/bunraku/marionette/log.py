@@ -1,8 +1,8 @@
 """What was done to a puppet, so that it can be done again: a session's log replays to the same motion.
 
-The log is a list of what the merge was told, in the order in which it was told it, with the clock times: claims, inputs,
-frames asked for, and so on. A `Marionette` told the same gives the same overlays to the last bit. It is bounded: it is
-cut into passages, each from a moment when the dance was alone to the next, and the oldest are dropped.
+The log is a list of what the merge was told, in the order in which it was told it, with the clock times: claims,
+inputs, frames asked for, and so on. A `Marionette` told the same gives the same overlays to the last bit. It is
+bounded: it is cut into passages, each from a moment when the dance was alone to the next, and the oldest are dropped.
 
 As bytes: "bunraku.log/1", then a msgpack map; `passages` holds the entries as fixed records (`_RECORDS`).
 """

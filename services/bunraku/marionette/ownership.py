@@ -1,8 +1,8 @@
 """Who holds which limb: claims, asks, epochs, inputs, and what happens when a puppeteer falls silent.
 
 A limb has at most one holder. Every grant has a new epoch, and inputs of another epoch move nothing, so that what a
-former holder sent late is harmless. A held limb can be asked for; nothing is taken by force, but who asked first gets it
-when it becomes free. Times are clock time in µs and come in as arguments.
+former holder sent late is harmless. A held limb can be asked for; nothing is taken by force, but who asked first gets
+it when it becomes free. Times are clock time in µs and come in as arguments.
 """
 
 from __future__ import annotations

@@ -117,7 +117,7 @@ class PulledHand(_Pulled):
             self._elbow.begin(chord, rig.bend_axis(dance), lift_between(elbow, chord))
         tip, normal, bend = self._elbow.follow(rig.direction(hand), vector.length(hand), rig.up(pose), seconds)
         bent = rig.bend(vector.length(tip), bend)
-        # the dance may hold its arms where the marionette's shoulders do not go: what they allow comes in with the weight
+        # the dance may hold its arms where the marionette's shoulders do not go: that they do not comes with the weight
         target = vector.add(hand, vector.scale(vector.subtract(tip, hand), weight))
         turn = self._turn.follow(own, target, weight)
         return self._blend.joints(dance, bent, target, turn, normal, max(weight, LEAST_WEIGHT))

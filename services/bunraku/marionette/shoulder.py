@@ -3,8 +3,8 @@
 A hand in space leaves an arm free to turn about the line from shoulder to tip, and to bend the wrist more or less. So
 where gravity would put the upper arm into a direction that no shoulder has, it is turned about that line as little as
 brings it out, then the wrist is bent otherwise, and only where no bend helps is the hand brought nearer, its direction
-kept. (Reach cones: Wilhelms and Van Gelder, Fast and Easy Reach-Cone Joint Limits, 2001; here their complement, as caps,
-which makes every answer closed.)
+kept. (Reach cones: Wilhelms and Van Gelder, Fast and Easy Reach-Cone Joint Limits, 2001; here their complement, as
+caps, which makes every answer closed.)
 
 Directions are unit vectors on the axes of vl5: x to the left, y up, z forwards.
 """

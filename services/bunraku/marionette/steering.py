@@ -99,7 +99,8 @@ class Steering:
     def input(self, kind: Kind, values: Vector, sequence: int, sampled: int, now: int) -> bool:
         """Takes an input in; whether it asked for a place within reach.
 
-        Raises `ValueError` if a number is not finite, `Late` for a sequence that came before, or comes after `KEPT` newer.
+        Raises `ValueError` if a number is not finite, `Late` for a sequence that came before, or comes after `KEPT`
+        newer.
         """
         if not all(isfinite(part) for part in values):
             raise ValueError(f"an input's numbers must be finite, not {values}")
@@ -110,13 +111,13 @@ class Steering:
         lag = now - sampled
         self._quickest = lag if self._quickest is None else min(self._quickest, lag)
         made = self._passed - min(lag - self._quickest, HOLD_AFTER)
-        within = self._speed(values) if kind is Kind.VELOCITY else self._reach(values)
+        within = self._speed(values) if kind is Kind.VELOCITY else within_reach(self._is_hand, values)
         self._samples.insert(at, _Sample(sequence, max(made, 0), kind, within))
         self._recount(at)
         if len(self._samples) > KEPT:
             self._folded = self._samples.pop(0).sequence
             self._legs.pop(0)
-        return kind is Kind.VELOCITY or within[0] == values[0] and (not self._is_hand or within == values)
+        return kind is Kind.VELOCITY or (within[0] == values[0] and (not self._is_hand or within == values))
 
     def stop(self, now: int) -> None:
         """Nobody moves it any more: the value stays as it is at `now`."""
@@ -147,23 +148,26 @@ class Steering:
             return vector.add(leg.start, vector.scale(way, passed / leg.way))
         if leg.start is None or leg.speed == STILL:
             return leg.start
-        return self._reach(vector.add(leg.start, vector.scale(leg.speed, (at - leg.at) * 1e-6)))
+        return within_reach(self._is_hand, vector.add(leg.start, vector.scale(leg.speed, (at - leg.at) * 1e-6)))
 
     def _speed(self, values: Vector) -> Vector:
         full = HAND_SPEED if self._is_hand else LEG_SPEED
         x, y, z = (min(max(part, -1.0), 1.0) * full for part in values)
         return (x, y, z) if self._is_hand else (x, 0.0, 0.0)
 
-    def _reach(self, value: Vector) -> Vector:
-        if not self._is_hand:
-            return (clamp_thigh(value[0]), 0.0, 0.0)
-        largest = max(abs(part) for part in value)
-        if largest <= 0.5:
-            return value
-        # by the largest part first: the square of a huge one has no room in a float
-        near = vector.scale(value, 1.0 / largest)
-        reach = vector.length(near)
-        return value if largest * reach <= 1.0 else vector.scale(near, 1.0 / reach)
+
+def within_reach(is_hand: bool, value: Vector) -> Vector:
+    """The nearest place that a hand can be asked to, within an arm length of the shoulder; or the nearest thigh
+    angle."""
+    if not is_hand:
+        return (clamp_thigh(value[0]), 0.0, 0.0)
+    largest = max(abs(part) for part in value)
+    if largest <= 0.5:
+        return value
+    # by the largest part first: the square of a huge one has no room in a float
+    near = vector.scale(value, 1.0 / largest)
+    reach = vector.length(near)
+    return value if largest * reach <= 1.0 else vector.scale(near, 1.0 / reach)
 
 
 class Late(Exception):

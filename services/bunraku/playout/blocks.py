@@ -98,6 +98,27 @@ class BlockStore(_Store[MotionTrack, MotionBlock]):
             rotation.slerp(rotations[0], next_rotations[0], np.full(len(rotations[0]), mix)),
         )
 
+    def rotations_at(self, positions: list[int], loop: bool = True) -> list[Array | None]:
+        """The rotations (18, 4) of `pose_at` at some motion times at once, which costs little more than one."""
+        found: list[Array | None] = [None] * len(positions)
+        together: dict[int, tuple[MotionBlock, list[int], list[float]]] = {}
+        for nth, position in enumerate(positions):
+            place = self._at(position, loop)
+            if place is None:
+                continue
+            block, instant, following = place
+            if following is not None:
+                pose = self.pose_at(position, loop)
+                found[nth] = None if pose is None else pose[1]
+            else:
+                _, members, instants = together.setdefault(id(block), (block, [], []))
+                members.append(nth)
+                instants.append(instant)
+        for block, members, instants in together.values():
+            for nth, rotations in zip(members, block.at(np.array(instants))[1], strict=True):
+                found[nth] = rotations
+        return found
+
 
 class SceneStore(_Store[SceneTrack, SceneBlock]):
     """Decoded blocks of one camera or light, of each the best rate that came."""

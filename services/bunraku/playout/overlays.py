@@ -66,7 +66,8 @@ class Overlays:
 
 
 def pack_joints(rotations: Sequence[Quaternion]) -> tuple[int, ...]:
-    """Three joints' unit quaternions as an overlay's nine numbers; in plain floats, as it is done at the stage's rate."""
+    """Three joints' unit quaternions as an overlay's nine numbers; in plain floats, as it is done at the stage's
+    rate."""
     numbers: list[int] = []
     for w, x, y, z in rotations:
         sine = sqrt(x * x + y * y + z * z)

@@ -20,7 +20,8 @@ from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
 from bunraku.marionette.merge import Marionette
 from bunraku.playout.timeline import position_at
-from bunraku.session import control
+from bunraku.session import control, recordings
+from bunraku.session.recordings import Recording
 from bunraku.session.stage import Stage
 
 MOST = 1_000
@@ -169,6 +170,13 @@ def create_app(backing: Backing) -> FastAPI:
         """End a session."""
         sessions.get(session)
         await sessions.end(session)
+
+    @app.post("/v1/sessions/{session}/recordings", status_code=201, tags=["sessions"])
+    async def record(session: str, recording: Recording) -> JSONResponse:
+        """Keep what was shown as a motion in the library: the dance with what was pulled, and the camera if one is
+        given."""
+        motion = await recordings.keep(sessions.get(session), recording, backing)
+        return JSONResponse(motion, 201, {"Location": f"/v1/motions/{motion['id']}"})
 
     @app.websocket("/v1/sessions/{session}/control")
     async def pull(socket: WebSocket, session: str, name: str = "Someone") -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from starlette.websockets import WebSocket
 
 from bunraku.backing import sockets
 from bunraku.backing.backing import clock
 from bunraku.backing.sockets import Refusal
-from bunraku.session.stage import QUEUE, Full, Puppeteer, Stage
-from bunraku.wire.messages import MalformedMessage, Ping, Pong, unpack
+from bunraku.session.puppeteers import QUEUE, Full, Puppeteer
+from bunraku.session.stage import Stage
+from bunraku.wire.messages import Input, MalformedMessage, Ping, Pong, unpack
 
+EXCESS = 0.004
+"""Seconds that one who says too much waits for each message: the line fills, and the sender's own writes wait."""
 NAME = 40
 """Characters of a puppeteer's name."""
 
@@ -39,8 +44,14 @@ async def _listen(socket: WebSocket, stage: Stage, puppeteer: Puppeteer) -> None
             message = unpack(data)
         except MalformedMessage as error:
             raise Refusal(sockets.BROKEN, "Malformed message", str(error)) from None
+        now = clock()
+        if not puppeteer.may_speak(now):
+            if isinstance(message, Input):
+                puppeteer.notice(message.limb, "rate", now)
+                await asyncio.sleep(EXCESS)
+                continue
+            await asyncio.sleep(EXCESS)
         if isinstance(message, Ping):
-            now = clock()
             puppeteer.tell(Pong(message.sequence, message.sent, now, now).pack())
         else:
             stage.hear(puppeteer, message)

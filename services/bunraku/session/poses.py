@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 
-import numpy as np
-
 from bunraku.backing.library import StoredMotion
 from bunraku.codec.decode import decode_block
 from bunraku.motion.rotation import Array
@@ -43,7 +41,8 @@ class Poses:
     def at(self, due: int, step: int) -> Array | None:
         """The rotations (18, 4) at clock time `due`, None where the block is missing or another motion is on.
 
-        Those of the next `AHEAD` frames, `step` µs apart, are worked out with it, and hold until the timeline is edited.
+        Those of the next `AHEAD` frames, `step` µs apart, are worked out with it, and hold until the timeline is
+        edited.
         """
         newest = self._timelines.newest
         if newest is None:
@@ -62,6 +61,5 @@ class Poses:
         ]
         if not here:
             return {}
-        loops = np.array([loop for _, _, loop in here])
-        poses = self._blocks.rotations_at([position for _, position, _ in here], bool(loops[0]))
+        poses = self._blocks.rotations_at([position for _, position, _ in here], here[0][2])
         return {due: pose for (due, _, _), pose in zip(here, poses, strict=True) if pose is not None}

@@ -9,27 +9,27 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import secrets
-from collections import deque
-from dataclasses import dataclass, field
 
 import msgpack
 
 from bunraku.backing.backing import clock
 from bunraku.backing.bus import Bus, Subscription
 from bunraku.backing.library import StoredMotion
-from bunraku.codec.decode import decode_block
+from bunraku.marionette.log import Log, LoggedMarionette
 from bunraku.marionette.merge import Marionette
+from bunraku.marionette.merge import Overlay as Pulled
 from bunraku.marionette.ownership import Grant as Granted
 from bunraku.marionette.ownership import Input as Given
+from bunraku.marionette.ownership import Outcome
 from bunraku.playout import timeline
-from bunraku.playout.blocks import BlockStore, Pose
 from bunraku.playout.overlays import pack_joints
+from bunraku.session.poses import Poses
+from bunraku.session.puppeteers import Puppeteer, Puppeteers
 from bunraku.wire import messages
 from bunraku.wire.messages import (
     Alive,
+    Ask,
     Claim,
-    Data,
     Grant,
     Input,
     Overlay,
@@ -40,38 +40,15 @@ from bunraku.wire.messages import (
     Welcome,
 )
 
-LEAD = 100_000
-"""How far ahead of now overlays and edits are due, microseconds."""
-TICK = 1 / 60
-QUEUE = 64
-"""Messages that may wait for a puppeteer."""
-COLOURS = 5
-PUPPETEERS = 32
-"""Puppeteers of one session."""
-
-
-class Full(Exception):
-    """A session that has as many puppeteers as it may."""
-
-
-@dataclass(eq=False, slots=True)
-class Puppeteer:
-    """One who may take limbs, and what is still to be said to them."""
-
-    id: str
-    name: str
-    colour: int
-    waiting: deque[bytes] = field(default_factory=deque)
-    wake: asyncio.Event = field(default_factory=asyncio.Event)
-    overrun: bool = False
-
-    def tell(self, message: bytes) -> None:
-        """Queue a message; too many that wait mark the puppeteer as overrun."""
-        if len(self.waiting) >= QUEUE:
-            self.overrun = True
-        else:
-            self.waiting.append(message)
-        self.wake.set()
+LEAD = 60_000
+"""How far ahead of now overlays are due, microseconds: a message every two frames, and its way to a viewer near by."""
+EDIT_LEAD = 100_000
+"""How far ahead of now edits of the timeline are due, microseconds."""
+FRAME = Overlay.FRAME
+FRAMES = 2
+"""Frames in one message: on a narrow line packets count, not bytes."""
+LONGEST_PAUSE = 6
+"""Frames: a stage that was kept from working for longer leaves them out."""
 
 
 class Stage:
@@ -86,13 +63,15 @@ class Stage:
         self._bus = bus
         self._timelines = timeline.Timelines()
         self._timelines.put(timeline.start(motion.id, motion.track.duration_us, clock(), playing=playing, loop=loop))
-        self._puppeteers: dict[str, Puppeteer] = {}
+        self._puppeteers = Puppeteers()
         self._viewers: dict[str, int] = {}
         self._engaged = asyncio.Event()
         self._sequence = 0
         self._overlay: bytes | None = None
         self.seen = clock()
-        self._marionette = marionette
+        self.log = Log()
+        self.log.timeline(self.timeline)
+        self._marionette = LoggedMarionette(marionette, motion.id, self.log)
         self._set(motion)
         subject = f"session.{session}"
         self._subscriptions: list[Subscription] = [
@@ -123,64 +102,83 @@ class Stage:
 
     @property
     def presence(self) -> Presence:
-        """Who is here and who holds what."""
-        puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self._puppeteers.values()]
-        return Presence(sum(self._viewers.values()), puppeteers, list(self._marionette.holders()))
+        """Who is here, who holds what, and who asks for it."""
+        puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self._puppeteers]
+        puppet = self._marionette.puppet
+        asks = [list(limb) for limb in puppet.asks()]
+        return Presence(sum(self._viewers.values()), puppeteers, list(puppet.holders()), asks)
 
     def edit(self, *, playing: bool | None, position: int | None, loop: bool | None) -> TimelineState:
-        """Edit the timeline for everyone, `LEAD` from now."""
-        return self._put(timeline.edit(self.timeline, clock() + LEAD, playing=playing, position=position, loop=loop))
+        """Edit the timeline for everyone, `EDIT_LEAD` from now."""
+        due = clock() + EDIT_LEAD
+        return self._put(timeline.edit(self.timeline, due, playing=playing, position=position, loop=loop))
 
     async def change(self, motion: StoredMotion) -> TimelineState:
         """Another motion for everyone, from its start; limbs stay in the hands they are in."""
-        await asyncio.to_thread(self._marionette.set_figure, motion.track.figure)
+        # the first arm of its proportions takes a tenth of a second; the loop goes on meanwhile
+        await asyncio.to_thread(Marionette, motion.track.figure)
+        self._marionette.set_figure(motion.track.figure, motion.id, clock())
         self._set(motion)
-        return self._put(timeline.change(self.timeline, clock() + LEAD, motion.id, motion.track.duration_us))
+        return self._put(timeline.change(self.timeline, clock() + EDIT_LEAD, motion.id, motion.track.duration_us))
 
     def join(self, name: str) -> Puppeteer:
-        """A puppeteer comes, with the first free colour; raises `Full`."""
-        if len(self._puppeteers) >= PUPPETEERS:
-            raise Full(f"{PUPPETEERS} puppeteers are here already")
-        used = [p.colour for p in self._puppeteers.values()]
-        colour = min(range(COLOURS), key=lambda c: (used.count(c), c))
-        puppeteer = Puppeteer(secrets.token_hex(5), name, colour)
-        self._puppeteers[puppeteer.id] = puppeteer
-        puppeteer.tell(Welcome(puppeteer.id, colour, LEAD).pack())
+        """A puppeteer comes; raises `Full`."""
+        puppeteer = self._puppeteers.join(name)
+        puppeteer.tell(Welcome(puppeteer.id, puppeteer.colour, LEAD).pack())
         self._announce()
         return puppeteer
 
     def leave(self, puppeteer: Puppeteer) -> None:
-        """A puppeteer goes; what they held goes back to the dance."""
-        self._puppeteers.pop(puppeteer.id, None)
-        self._marionette.leave(puppeteer.id, clock())
+        """A puppeteer goes; what they held goes to who asked for it, or back to the dance."""
+        self._puppeteers.leave(puppeteer)
+        now = clock()
+        self._marionette.leave(puppeteer.id, now)
+        self._settle(now)
         self._announce()
 
     def hear(self, puppeteer: Puppeteer, message: messages.Message | None) -> None:
         """What a puppeteer's controller says."""
         now = clock()
+        who = puppeteer.id
         if isinstance(message, Claim):
-            answer = self._marionette.claim(message.limb, puppeteer.id, now)
+            answer = self._marionette.claim(message.limb, who, now)
             if isinstance(answer, Granted):
-                puppeteer.tell(Grant(answer.limb, answer.epoch).pack())
-                self._engaged.set()
+                self._granted(who, answer)
                 self._announce()
             else:
                 puppeteer.tell(Refusal(message.limb, answer.reason, answer.holder).pack())
         elif isinstance(message, Release):
-            if self._marionette.release(message.limb, puppeteer.id, message.epoch, now):
+            if self._marionette.release(message.limb, who, message.epoch, now):
+                self._settle(now)
                 self._announce()
         elif isinstance(message, Alive):
-            self._marionette.alive(puppeteer.id, message.limbs, now)
+            self._marionette.alive(who, message.limbs, now)
+        elif isinstance(message, Ask):
+            if self._marionette.ask(message.limb, who, message.wanted, now):
+                self._announce()
         elif isinstance(message, Input):
             given = Given(message.limb, message.kind, message.epoch, message.sequence, message.sampled, message.values)
-            self._marionette.input(puppeteer.id, given, now)
+            outcome = self._marionette.input(who, given, now)
+            if outcome in (Outcome.REACH, Outcome.OWNER):
+                puppeteer.notice(message.limb, outcome.value, now)
+
+    def _granted(self, who: str, grant: Granted) -> None:
+        self._puppeteers.tell(who, Grant(grant.limb, grant.epoch).pack())
+        self._engaged.set()
+
+    def _settle(self, now: int) -> bool:
+        """Limbs that became free go to who asked for them; whether asks have changed."""
+        grants, changed = self._marionette.settle(now)
+        for who, grant in grants:
+            self._granted(who, grant)
+        return changed
 
     def _set(self, motion: StoredMotion) -> None:
-        self._motion = motion
-        self._dance = BlockStore(motion.track)
+        self._poses = Poses(motion, self._timelines)
 
     def _put(self, state: TimelineState) -> TimelineState:
         self._timelines.put(state)
+        self.log.timeline(state)
         self._bus.publish(f"session.{self.id}.timeline", state.pack())
         return state
 
@@ -188,7 +186,7 @@ class Stage:
         self.seen = clock()
         packed = self.presence.pack()
         self._bus.publish(f"session.{self.id}.presence", packed)
-        for puppeteer in self._puppeteers.values():
+        for puppeteer in self._puppeteers:
             puppeteer.tell(packed)
 
     async def _state(self, _: bytes) -> bytes:
@@ -203,47 +201,51 @@ class Stage:
         self._announce()
 
     async def _run(self) -> None:
-        loop = asyncio.get_running_loop()
         while True:
             await self._engaged.wait()
-            due = loop.time()
-            while True:
-                await self._prepare(clock() + LEAD)
-                if not self._tick(clock()):
-                    break
-                due = max(due + TICK, loop.time() - TICK)
-                await asyncio.sleep(max(due - loop.time(), 0))
             self._engaged.clear()
+            frame = clock() // FRAME + 1
+            await self._poses.prepare(frame * FRAME + LEAD)
+            for before in (frame - 2, frame - 1):
+                due = before * FRAME + LEAD
+                if (pose := self._poses.at(due, FRAME)) is not None:
+                    self._marionette.see(pose, due, before * FRAME)
+            while self._frames(range(frame, frame + FRAMES)):
+                # a stage that was kept from working goes on from where it should be, in step with the others
+                frame = max(frame + FRAMES, clock() // FRAME - LONGEST_PAUSE)
+                await asyncio.sleep(((frame + FRAMES - 1) * FRAME - clock()) * 1e-6)
+                await self._poses.prepare(frame * FRAME + LEAD)
 
-    def _tick(self, now: int) -> bool:
-        """Publish the overlay due `LEAD` from `now`; whether any limb is still pulled."""
+    def _frames(self, frames: range) -> bool:
+        """Publish what lies over the dance in some frames, each due `LEAD` after its time; whether any limb is
+        pulled."""
+        now = clock()
         lost = self._marionette.expire(now)
         for limb, holder in lost:
-            if holder in self._puppeteers:
-                self._puppeteers[holder].tell(Refusal(int(limb), "lost").pack())
-        if lost:
+            self._puppeteers.tell(holder, Refusal(limb, "lost").pack())
+        if self._settle(now) or lost:
             self._announce()
-        due = now + LEAD
-        pose = self._pose(due)
-        pulled = self._marionette.overlay(pose[1], now) if pose is not None else None
+        shown: list[Pulled | None] = []
+        for frame in frames:
+            due = frame * FRAME + LEAD
+            pose = self._poses.at(due, FRAME)
+            shown.append(self._marionette.overlay(pose, due, frame * FRAME) if pose is not None else None)
         self._sequence += 1
-        limbs = dict(zip(map(int, pulled.limbs), map(pack_joints, pulled.rotations), strict=True)) if pulled else {}
-        self._overlay = Overlay(self._sequence, due, limbs).pack() if limbs else None
-        self._bus.publish(f"session.{self.id}.overlay", self._overlay or Overlay(self._sequence, due, {}).pack())
-        return pulled is not None or any(self._marionette.holders())
+        message = _overlay(self._sequence, frames[-1] * FRAME + LEAD, shown)
+        self._overlay = message if shown[-1] is not None else None
+        self._bus.publish(f"session.{self.id}.overlay", message)
+        return not self._marionette.puppet.at_rest
 
-    async def _prepare(self, due: int) -> None:
-        """Decode what `_pose` will need about `due`, in a thread: it takes milliseconds, the first time seconds."""
-        track, packets = self._motion.track, self._motion.dance[-1]
-        first = track.block_at(timeline.position_at(self.timeline, due))
-        for index in (first, (first + 1) % track.blocks):
-            if self._dance.rate(index) < 0:
-                dance, packet = self._dance, Data.unpack(packets[index])
-                dance.put(index, packet.rate, await asyncio.to_thread(decode_block, track, packet.block))
 
-    def _pose(self, due: int) -> Pose | None:
-        """The dance at clock time `due`, at its best rate."""
-        state = self._timelines.at(due)
-        if state is None or state.motion != self._motion.id:
-            return None
-        return self._dance.pose_at(timeline.position_at(state, due), state.loop)
+def _overlay(sequence: int, due: int, shown: list[Pulled | None]) -> bytes:
+    """The message of some frames: those of the end that have the limbs of the last."""
+    last = shown[-1].limbs if shown[-1] is not None else ()
+    frames: list[dict[int, tuple[int, ...]]] = []
+    for pulled in reversed(shown):
+        if (pulled.limbs if pulled is not None else ()) != last:
+            break
+        turned = pulled.rotations.tolist() if pulled is not None else []
+        frames.append({int(limb): pack_joints(joints) for limb, joints in zip(last, turned, strict=True)})
+    if not last:
+        return Overlay(sequence, due, {}).pack()
+    return Overlay(sequence, due, frames[0], tuple(reversed(frames[1:]))).pack()

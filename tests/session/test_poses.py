@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import numpy as np
+
+from bunraku.backing.library import Library, StoredMotion, pack
+from bunraku.codec.decode import decode_block
+from bunraku.codec.encode import encode_motion
+from bunraku.playout import timeline
+from bunraku.playout.blocks import BlockStore
+from bunraku.playout.timeline import Timelines
+from bunraku.session.poses import Poses
+from bunraku.wire.messages import Data
+from tests.vectors.blocks import wandering_motion
+
+STEP = 16_667
+
+
+async def stored() -> StoredMotion:
+    library = Library.open("memory:///")
+    await library.put("one", pack("one", encode_motion(wandering_motion(2.3, 30.0, 5), ladder=(5.0,), grade="live")))
+    motion = await library.get("one")
+    assert motion is not None
+    return motion
+
+
+async def test_the_dance_ahead_is_the_dance_at_each_instant_also_over_the_ends_of_blocks_and_the_loop() -> None:
+    motion = await stored()
+    track = motion.track
+    timelines = Timelines()
+    timelines.put(timeline.start("one", track.duration_us, 1_000_000))
+    poses, blocks = Poses(motion, timelines), BlockStore(track)
+    for index, packet in enumerate(motion.dance[-1]):
+        blocks.put(index, 0, decode_block(track, Data.unpack(packet).block))
+    for frame in range(200):
+        due = 1_000_000 + frame * STEP
+        await poses.prepare(due)
+        wanted = blocks.pose_at(due - 1_000_000 - (due - 1_000_000) // track.duration_us * track.duration_us)
+        found = poses.at(due, STEP)
+        assert wanted is not None
+        assert found is not None
+        np.testing.assert_allclose(found, wanted[1], atol=1e-12)
+
+
+async def test_an_edit_holds_at_once_and_another_motion_has_no_pose_here() -> None:
+    motion = await stored()
+    timelines = Timelines()
+    first = timeline.start("one", motion.track.duration_us, 0)
+    timelines.put(first)
+    poses = Poses(motion, timelines)
+    assert poses.at(500_000, STEP) is None
+    await poses.prepare(500_000)
+    moving = poses.at(500_000, STEP)
+    paused = timeline.edit(first, 500_000, position=200_000, playing=False)
+    timelines.put(paused)
+    await poses.prepare(500_000)
+    still = poses.at(500_000, STEP)
+    assert moving is not None
+    assert still is not None
+    assert np.abs(moving - still).max() > 1e-3
+    np.testing.assert_array_equal(poses.at(500_000 + 40 * STEP, STEP), still)
+    timelines.put(timeline.change(paused, 600_000, "two", 5_000_000))
+    await poses.prepare(700_000)
+    assert poses.at(700_000, STEP) is None
