@@ -1,4 +1,4 @@
-/** What a puppeteer has in the hand, in a real browser: keys bound anew and remembered, arrows pressed and held, a held limb asked for and given. */
+/** What a puppeteer has in the hand, in a real browser: keys bound anew and remembered, arrows pressed and held, a held limb asked for and given, a performance kept. */
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import type { Puppeteer } from "../../src/client/puppeteer";
@@ -113,7 +113,7 @@ describe.skipIf(!path)("a puppeteer's hands", { timeout: 2 * PATIENCE }, () => {
     await page.close();
   });
 
-  test("a held limb is asked for, shown to its holder, and given", async () => {
+  test("a held limb is asked for, shown to its holder, and given; and what was done is kept", async () => {
     const [aiko, mateo] = [await open("Aiko"), await open("Mateo")];
     await aiko.keyboard.press("Digit2");
     await mateo.getByRole("button", { name: "Left hand, held by Aiko" }).waitFor();
@@ -136,6 +136,11 @@ describe.skipIf(!path)("a puppeteer's hands", { timeout: 2 * PATIENCE }, () => {
     await aiko.getByRole("button", { name: "Left hand, held by Mateo" }).waitFor();
     expect([await source(aiko), await source(mateo)]).toEqual([null, "velocity"]);
     await asked.waitFor({ state: "detached" });
+    // What they did is kept by one key, and danced from the toast.
+    await aiko.keyboard.press("KeyK");
+    await aiko.getByRole("button", { name: "Dance it" }).click();
+    await aiko.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
+    await mateo.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
     await aiko.close();
     await mateo.close();
   });
