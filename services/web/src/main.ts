@@ -1,7 +1,7 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
-import { createSession, keep, ProblemError, type Motion } from "./client/library";
+import { createSession, keep, ProblemError, type CameraKeyframe, type Motion } from "./client/library";
 import { Holding } from "./holding";
 import type { Commands } from "./input/commands";
 import type { GamepadInput } from "./input/gamepad";
@@ -49,7 +49,7 @@ const page = createPage(document.body, {
   loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
   seek: (seconds) => room?.seek(seconds, performance.now()),
   keep: keepThis({
-    keep: (session, called) => keep(session, { name: called, camera: stage?.trail.keyframes() ?? [] }),
+    keep: (session, called) => keep(session, { name: called, camera: cameraMoves() }),
     toast: (message, action) => page.toast(message, action),
     session: () => room && { id: room.id, piece: pieces.find(room.viewer.motion)?.name ?? "" },
     puppeteer: name,
@@ -90,6 +90,12 @@ theme = createTheme((now) => {
   page.header.theme(now);
   stage?.setTheme(now);
 });
+
+/** What the camera did during the last round of the dance, which is what is kept; nothing where it was not moved. */
+function cameraMoves(): CameraKeyframe[] {
+  const clock = room?.viewer.clockTime(performance.now()) ?? null;
+  return room && clock !== null ? (stage?.trail.moves(clock - room.viewer.duration * 1e6) ?? []) : [];
+}
 
 function play(): void {
   if (room?.viewer.timeline) room.edit({ playing: !room.viewer.timeline.playing });
@@ -212,7 +218,7 @@ function expose(): void {
 }
 
 async function openStage(): Promise<void> {
-  const { Commands, createGamepad, createPointer, Hands, listenToKeyboard, Stage, VelocityInputs } = await import("./theatre");
+  const { Commands, createGamepad, createPointer, Hands, listenToKeyboard, listenToMouse, Stage, VelocityInputs } = await import("./theatre");
   try {
     stage = new Stage(canvas, query.get("quality") === "best");
   } catch {
@@ -228,7 +234,7 @@ async function openStage(): Promise<void> {
     holding.render();
   };
   const may = (limb: number) => holding.free(limb);
-  pointer = createPointer(canvas, stage, hands, { may, refused: (limb) => holding.refused(limb), smoothing: () => mapping.pointerSmoothing });
+  pointer = createPointer(canvas, stage, hands, { may, refused: (limb) => holding.refused(limb), smoothing: () => mapping.pointerSmoothing, nearer: (limb) => velocity?.nearer(limb) ?? 0 });
   velocity = new VelocityInputs(hands, { take: (limb) => holding.take(limb, "velocity"), free: may });
   commands = new Commands(hands, velocity, {
     ask: () => holding.ask(),
@@ -242,6 +248,7 @@ async function openStage(): Promise<void> {
     line: () => page.panels.toggle("line"),
   });
   listenToKeyboard(window, commands, velocity, () => mapping, { keys: () => page.keys.show(), escape: () => page.panels.closeLast() });
+  listenToMouse(canvas, window, commands, () => mapping);
   pad = createGamepad(commands, () => mapping, () => navigator.getGamepads());
   holding.theatre = { hands, velocity, shake: (limb) => stage?.strings.refuse(limb) };
   if (room) {
