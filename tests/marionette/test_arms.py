@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bunraku.marionette import arms, table
@@ -133,3 +133,19 @@ def test_arms_are_as_the_contract_says(proportions: Proportions, x: float, y: fl
     wanted = by_the_contract(proportions, stored, x, y)
     for joint, place in zip((solved.elbow, solved.wrist, solved.tip), wanted, strict=True):
         assert abs(joint[0, 2] + 1j * joint[0, 1] - place) < 1e-9
+
+
+@settings(max_examples=25)
+@given(st.integers(100, 780), st.data())
+def test_any_arm_there_is_a_table_for_is_exact(upper: int, data: st.DataObject) -> None:
+    fore = data.draw(st.integers(100, 980 - upper))
+    heavy = data.draw(st.integers(1, 998))
+    middle = data.draw(st.integers(1, 999 - heavy))
+    identity = f"{upper}-{fore}-{1000 - upper - fore}-{heavy}-{middle}-{1000 - heavy - middle}"
+    proportions = Proportions.parse(identity)
+    targets = reachable(proportions, 2_000, seed=upper)
+    solved = arms.solve(proportions, table.table_of(identity), targets)
+    assert float(np.abs(solved.tip - targets).max()) < 1e-14
+    t0, t1, t2 = solved.angles()
+    assert -1e-9 <= (t1 - t0).min() <= (t1 - t0).max() <= ELBOW_LIMIT + 1e-9
+    assert -1e-9 <= (t2 - t1).min() <= (t2 - t1).max() <= WRIST_LIMIT + 1e-9
