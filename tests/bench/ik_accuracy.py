@@ -9,7 +9,7 @@ import numpy as np
 
 from bunraku.marionette import arms
 from bunraku.marionette.arm import Table, bend_limits, close
-from bunraku.marionette.paper import build_paper_table, tip_error
+from bunraku.marionette.paper import build_paper_table, places, tip_error
 from bunraku.marionette.proportions import ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, Proportions
 from bunraku.motion.rotation import Array
 
@@ -84,6 +84,9 @@ def measure(proportions: Proportions, table: Table, count: int, random: np.rando
     targets = many[:count]
     r, beta = np.linalg.norm(targets, axis=1), np.arctan2(targets[:, 1], np.hypot(targets[:, 0], targets[:, 2]))
     off = np.degrees(np.abs(np.array([t0, t1, t2])[:, :count] - true_angles(proportions, r, beta))).max(axis=0)
+    # the tip as it was solved, and as the three angles alone put it
+    tip = places(proportions, np.array([t0, t1, t2]))[2]
+    wanted = np.hypot(many[:, 0], many[:, 2]) + 1j * many[:, 1]
     theirs = tip_error(
         proportions,
         build_paper_table(proportions),
@@ -91,7 +94,7 @@ def measure(proportions: Proportions, table: Table, count: int, random: np.rando
         random.uniform(-0.5, 0.5, 10 * count) * pi,
     )
     return Accuracy(
-        tip_error_max=float(np.linalg.norm(solved.tip - many, axis=1).max()),
+        tip_error_max=max(float(np.linalg.norm(solved.tip - many, axis=1).max()), float(np.abs(tip - wanted).max())),
         limits_broken_by=max(broken, 0.0),
         angle_error_mean_deg=float(off.mean()),
         angle_error_p99_deg=float(np.percentile(off, 99)),
