@@ -219,7 +219,7 @@ function expose(): void {
 }
 
 async function openStage(): Promise<void> {
-  const { Commands, createGamepad, createPointer, Hands, listenToKeyboard, Stage, VelocityInputs } = await import("./theatre");
+  const { Commands, createGamepad, createPointer, Hands, listenToKeyboard, listenToMouse, Stage, VelocityInputs } = await import("./theatre");
   try {
     stage = new Stage(canvas, query.get("quality") === "best");
   } catch {
@@ -235,7 +235,7 @@ async function openStage(): Promise<void> {
     holding.render();
   };
   const may = (limb: number) => holding.free(limb);
-  pointer = createPointer(canvas, stage, hands, { may, refused: (limb) => holding.refused(limb), smoothing: () => mapping.pointerSmoothing });
+  pointer = createPointer(canvas, stage, hands, { may, refused: (limb) => holding.refused(limb), smoothing: () => mapping.pointerSmoothing, nearer: (limb) => velocity?.nearer(limb) ?? 0 });
   velocity = new VelocityInputs(hands, { take: (limb) => holding.take(limb, "velocity"), free: may });
   commands = new Commands(hands, velocity, {
     ask: () => holding.ask(),
@@ -249,6 +249,7 @@ async function openStage(): Promise<void> {
     line: () => page.panels.toggle("line"),
   });
   listenToKeyboard(window, commands, velocity, () => mapping, { keys: () => page.keys.show(), escape: () => page.panels.closeLast() });
+  listenToMouse(canvas, window, commands, () => mapping);
   pad = createGamepad(commands, () => mapping, () => navigator.getGamepads());
   holding.theatre = { hands, velocity, shake: (limb) => stage?.strings.refuse(limb) };
   if (room) {
