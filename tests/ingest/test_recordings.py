@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+import multiprocessing
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -126,6 +127,14 @@ async def test_one_that_takes_too_long_is_ended(backing: Backing, dance: str, mo
     problem = (await ask(backing, order()))["problem"]
     assert (problem["status"], problem["title"]) == (503, "Busy")
     assert [e.id for e in (await backing.catalogue.page(9))[0]] == [dance]
+
+
+async def test_one_who_no_longer_waits_leaves_nothing_behind(backing: Backing, dance: str) -> None:
+    with pytest.raises(NobodyAnswers):
+        await backing.bus.ask(SUBJECT, order(), seconds=0.1)
+    assert not multiprocessing.active_children()
+    assert [e.id for e in (await backing.catalogue.page(9))[0]] == [dance]
+    assert "motion" in await ask(backing, order())
 
 
 async def test_nobody_answers_when_the_service_has_ended(tmp_path: Path) -> None:

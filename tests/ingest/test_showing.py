@@ -107,6 +107,30 @@ def test_it_shows_again_what_a_viewer_saw_from_any_instant_on() -> None:
         assert moved > 0.1
 
 
+def test_it_shows_again_what_was_pulled_through_a_pause_a_seek_and_another_dance() -> None:
+    stage = Stage("one")
+    grant = stage.puppet.claim(1, "ada", stage.now)
+    assert isinstance(grant, Grant)
+    changed = 0
+    for number, now in enumerate(stage.run(4.0)):
+        values = (0.5 + 0.3 * np.sin(number / 9), 0.2, 0.4)
+        stage.puppet.input("ada", Input(1, 1, grant.epoch, number + 1, now, values), now)
+        if number == 40:
+            stage.edit(timeline.edit(stage.state, now + LEAD, playing=False))
+        elif number == 70:
+            stage.edit(timeline.edit(stage.state, now + LEAD, playing=True, position=SECOND // 3))
+        elif number == 130:
+            stage.puppet.set_figure(DANCES["two"].track.figure, "two", now)
+            stage.edit(timeline.change(stage.state, now + LEAD, "two", DANCES["two"].track.duration_us))
+            changed = now + LEAD
+    for part in (stage.seen, [(clock, pose) for clock, pose in stage.seen if clock >= changed]):
+        shown = Showing(Log.unpack(stage.log.pack()), DANCES).poses([clock for clock, _ in part])
+        for (_, seen), again in zip(part, shown, strict=True):
+            assert again is not None
+            np.testing.assert_allclose(again[0], seen[0], atol=1e-12)
+            np.testing.assert_allclose(again[1], seen[1], atol=1e-9)
+
+
 def test_timelines_hold_from_when_they_are_due() -> None:
     one = timeline.start("one", 3 * SECOND, BEGAN)
     sought = timeline.edit(one, BEGAN + SECOND, position=2 * SECOND)

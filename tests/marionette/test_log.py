@@ -66,6 +66,22 @@ def test_a_log_replays_to_the_last_bit() -> None:
     assert all(shown[due] is None for due in shown if due not in replayed)
 
 
+def test_passages_that_were_over_are_left_out_and_change_nothing() -> None:
+    log = Log()
+    pulled(log, 400)
+    whole = list(log.replay(lambda _: FIGURE, pose_at))
+    begins = (2 * FRAME, 122 * FRAME, 242 * FRAME)
+    for begin in (0, begins[0], begins[1] - 1, begins[1], begins[2], 399 * FRAME):
+        part = list(log.replay(lambda _: FIGURE, pose_at, begin))
+        assert len(part) <= len(whole)
+        for (due, over), (wanted_due, wanted) in zip(part, whole[len(whole) - len(part) :], strict=True):
+            assert due == wanted_due
+            assert (over and over.rotations.tobytes()) == (wanted and wanted.rotations.tobytes())
+        # what is left out was over before
+        assert all(due < begin or over is None for due, over in whole[: len(whole) - len(part)])
+    assert len(list(log.replay(lambda _: FIGURE, pose_at, begins[2]))) < len(whole) / 2
+
+
 def test_a_log_is_bounded_and_what_is_left_still_replays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(logs, "MOST_BYTES", 8_000)
     log = Log()

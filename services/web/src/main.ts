@@ -48,6 +48,7 @@ const page = createPage(document.body, {
   play,
   loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
   seek: (seconds) => room?.seek(seconds, performance.now()),
+  camera: () => stage?.follow(!stage.following),
   keep: keepThis({
     keep: (session, called) => keep(session, { name: called, camera: cameraMoves() }),
     toast: (message, action) => page.toast(message, action),
@@ -285,6 +286,7 @@ function frame(): void {
   stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.clockTime(now));
   page.tags.render(limbs, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
   if (pose) invite(now);
+  page.transport.camera(stage.hasShow, stage.following);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);
   if (viewer && now - sampled >= SAMPLE_EVERY) {
     sampled = now;

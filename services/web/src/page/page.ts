@@ -19,6 +19,8 @@ export interface PageActions extends StringsActions {
   play(): void;
   loop(): void;
   seek(seconds: number): void;
+  /** Follows the show's camera, or no longer. */
+  camera(): void;
   /** Keeps the performance as a new motion; left out, it cannot be kept here. */
   keep?(): Promise<void>;
   files(files: readonly File[]): void;
