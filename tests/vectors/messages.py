@@ -78,6 +78,15 @@ def make() -> dict[str, Any]:
         Alive([0, 3]),
         Ask(0, True),
         Ask(3, False),
+        Overlay(
+            7,
+            NOW,
+            {1: (3, 6, 9, -3, -6, -9, 32_767, 0, 1), 2: (0, 0, 30, 0, 0, 60, 0, 0, 90)},
+            (
+                {1: (1, 2, 3, -1, -2, -3, 32_765, 0, -1), 2: (0, 0, 10, 0, 0, 20, 0, 0, 30)},
+                {1: (2, 4, 6, -2, -4, -6, 32_766, 0, 0), 2: (0, 0, 20, 0, 0, 40, 0, 0, 60)},
+            ),
+        ),
         Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)),
         Input(2, Input.VELOCITY, 9, 13, NOW, (-1.0, 0.0, 0.0)),
     ]
@@ -93,7 +102,7 @@ def make() -> dict[str, Any]:
         "input infinite": target[:20] + b"\x00\x00\x80\x7f" + target[24:],
         "input of a fifth limb": target[:1] + b"\x04" + target[2:],
         "overlay shorter than its mask": bytes([5, 1]) + bytes(10),
-        "overlay with a fifth limb": bytes([5, 16]) + bytes(10),
+        "overlay shorter than its frames": bytes([5, 17]) + bytes(10 + 18),
         "data without an index": bytes([3, 0]),
         "data with an index too long": bytes([3, 0, 128, 128, 128, 1]),
         "pong too long": examples[9].pack() + b"\0",

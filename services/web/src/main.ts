@@ -1,7 +1,7 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
-import { createSession, keep, ProblemError, type Motion } from "./client/library";
+import { createSession, keep, ProblemError, type CameraKeyframe, type Motion } from "./client/library";
 import { Holding } from "./holding";
 import type { Commands } from "./input/commands";
 import type { GamepadInput } from "./input/gamepad";
@@ -49,7 +49,7 @@ const page = createPage(document.body, {
   loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
   seek: (seconds) => room?.seek(seconds, performance.now()),
   keep: keepThis({
-    keep: (session, called) => keep(session, { name: called, camera: stage?.trail.keyframes() ?? [] }),
+    keep: (session, called) => keep(session, { name: called, camera: cameraMoves() }),
     toast: (message, action) => page.toast(message, action),
     session: () => room && { id: room.id, piece: pieces.find(room.viewer.motion)?.name ?? "" },
     puppeteer: name,
@@ -90,6 +90,12 @@ theme = createTheme((now) => {
   page.header.theme(now);
   stage?.setTheme(now);
 });
+
+/** What the camera did during the last round of the dance, which is what is kept; nothing where it was not moved. */
+function cameraMoves(): CameraKeyframe[] {
+  const clock = room?.viewer.clockTime(performance.now()) ?? null;
+  return room && clock !== null ? (stage?.trail.moves(clock - room.viewer.duration * 1e6) ?? []) : [];
+}
 
 function play(): void {
   if (room?.viewer.timeline) room.edit({ playing: !room.viewer.timeline.playing });

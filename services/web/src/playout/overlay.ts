@@ -2,7 +2,7 @@
 
 import { fromRotationVector, slerp } from "../motion/rotation";
 import { LIMB_JOINTS, LIMBS, type Pose } from "../motion/skeleton";
-import type { Overlay } from "../wire/messages";
+import { OVERLAY_FRAME, type Overlay } from "../wire/messages";
 
 /** With no overlay for so long, microseconds, the dance is alone. */
 export const SILENCE = 250_000;
@@ -22,9 +22,9 @@ interface Laid {
   rotations: Float64Array;
 }
 
-function read(message: Overlay): Laid {
-  const laid = { due: message.due, mask: 0, rotations: new Float64Array(LIMBS.length * LIMB_SIZE) };
-  for (const [limb, numbers] of message.limbs) {
+function read(limbs: Overlay["limbs"], due: number): Laid {
+  const laid = { due, mask: 0, rotations: new Float64Array(LIMBS.length * LIMB_SIZE) };
+  for (const [limb, numbers] of limbs) {
     laid.mask |= 1 << limb;
     for (let joint = 0; joint < 3; joint++) {
       const [x, y, z] = [0, 1, 2].map((axis) => numbers[joint * 3 + axis] * UNIT);
@@ -38,13 +38,10 @@ function read(message: Overlay): Laid {
 export class Overlays {
   private laid: Laid[] = [];
 
-  /** Takes in an overlay, late or not; a second one for the same time replaces the first. */
-  put(message: Overlay): void {
-    const { laid } = this;
-    let at = laid.length;
-    while (at > 0 && laid[at - 1].due >= message.due) at--;
-    laid.splice(at, laid[at]?.due === message.due ? 1 : 0, read(message));
-    if (laid.length > MOST) laid.shift();
+  /** Takes in an overlay, late or not, frame by frame; a second frame for the same time replaces the first. */
+  put({ due, limbs, earlier }: Overlay): void {
+    earlier.forEach((frame, nth) => this.insert(read(frame, due - (earlier.length - nth) * OVERLAY_FRAME)));
+    this.insert(read(limbs, due));
   }
 
   /** Forgets all: the stage shows another motion. */
@@ -79,5 +76,13 @@ export class Overlays {
       }
     }
     return goal.mask;
+  }
+
+  private insert(frame: Laid): void {
+    const { laid } = this;
+    let at = laid.length;
+    while (at > 0 && laid[at - 1].due >= frame.due) at--;
+    laid.splice(at, laid[at]?.due === frame.due ? 1 : 0, frame);
+    if (laid.length > MOST) laid.shift();
   }
 }

@@ -67,32 +67,36 @@ export function unpackData(bytes: Uint8Array): Data {
 }
 
 export function packOverlay(message: Overlay): Uint8Array<ArrayBuffer> {
-  const limbs = [...message.limbs].sort(([a], [b]) => a - b);
-  const [bytes, view] = empty("Overlay", OVERLAY_HEADER + limbs.length * LIMB_NUMBERS * 2);
-  bytes[1] = limbs.reduce((mask, [limb]) => mask | (1 << limb), 0);
+  const limbs = [...message.limbs.keys()].sort((a, b) => a - b);
+  const frames = [...message.earlier, message.limbs];
+  const [bytes, view] = empty("Overlay", OVERLAY_HEADER + frames.length * limbs.length * LIMB_NUMBERS * 2);
+  bytes[1] = limbs.reduce((mask, limb) => mask | (1 << limb), 0) | (message.earlier.length << 4);
   view.setUint16(2, message.sequence, true);
   setU64(view, 4, message.due);
-  const numbers = limbs.flatMap(([, values]) => [...values]);
+  const numbers = frames.flatMap((frame) => limbs.flatMap((limb) => [...frame.get(limb)!]));
   numbers.forEach((number, i) => view.setInt16(OVERLAY_HEADER + 2 * i, number, true));
   return bytes;
 }
 
 export function unpackOverlay(bytes: Uint8Array): Overlay {
-  if (bytes.length < OVERLAY_HEADER || bytes[1] >= 1 << LIMBS.length) {
-    throw new MalformedMessage("Overlay has 12 bytes at least and a mask of 4 limbs");
-  }
+  if (bytes.length < OVERLAY_HEADER) throw new MalformedMessage("Overlay has 12 bytes at least");
   const held = LIMBS.map((_, limb) => limb).filter((limb) => (bytes[1] >> limb) & 1);
-  const size = OVERLAY_HEADER + held.length * LIMB_NUMBERS * 2;
+  const frames = (bytes[1] >> 4) + 1;
+  const size = OVERLAY_HEADER + frames * held.length * LIMB_NUMBERS * 2;
   if (bytes.length !== size) {
-    throw new MalformedMessage(`Overlay of ${held.length} limbs has ${size} bytes, not ${bytes.length}`);
+    throw new MalformedMessage(`Overlay of ${frames} frames of ${held.length} limbs has ${size} bytes, not ${bytes.length}`);
   }
   const view = viewOf(bytes);
-  const limbs = new Map<number, Int16Array>();
-  held.forEach((limb, nth) => {
-    const at = OVERLAY_HEADER + nth * LIMB_NUMBERS * 2;
-    limbs.set(limb, Int16Array.from({ length: LIMB_NUMBERS }, (_, i) => view.getInt16(at + 2 * i, true)));
+  const earlier = Array.from({ length: frames }, (_, frame) => {
+    const limbs = new Map<number, Int16Array>();
+    held.forEach((limb, nth) => {
+      const at = OVERLAY_HEADER + (frame * held.length + nth) * LIMB_NUMBERS * 2;
+      limbs.set(limb, Int16Array.from({ length: LIMB_NUMBERS }, (_, i) => view.getInt16(at + 2 * i, true)));
+    });
+    return limbs;
   });
-  return { name: "Overlay", sequence: view.getUint16(2, true), due: getU64(view, 4, "Overlay's due time"), limbs };
+  const limbs = earlier.pop()!;
+  return { name: "Overlay", sequence: view.getUint16(2, true), due: getU64(view, 4, "Overlay's due time"), limbs, earlier };
 }
 
 export function packPing(message: Ping): Uint8Array<ArrayBuffer> {

@@ -52,9 +52,15 @@ export interface TimelineState {
 export interface Overlay {
   name: "Overlay";
   sequence: number;
+  /** When the last frame is due. */
   due: number;
   limbs: Map<number, Int16Array>;
+  /** The same limbs in the frames before, oldest first, `OVERLAY_FRAME` apart. */
+  earlier: Map<number, Int16Array>[];
 }
+
+/** Microseconds from one frame of an overlay to the next. */
+export const OVERLAY_FRAME = 16_667;
 
 /** Who pulls: `colour` 0-4 in the order of joining. */
 export interface PuppeteerPresence {

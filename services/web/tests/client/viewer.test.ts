@@ -134,7 +134,7 @@ test("overlays lie over the dance on clock time, and their lateness is measured"
   watching();
   Line.last.say(data(0, 1, best));
   const overlay = (due: number, x: number): Overlay => ({
-    name: "Overlay", sequence: 0, due: UNIX + due, limbs: new Map([[0, Int16Array.of(x, 0, 0, 0, 0, 0, 0, 0, 0)]]),
+    name: "Overlay", sequence: 0, due: UNIX + due, limbs: new Map([[0, Int16Array.of(x, 0, 0, 0, 0, 0, 0, 0, 0)]]), earlier: [],
   });
   Line.last.say(overlay(100_000, 0), overlay(200_000, 16384));
   expect(viewer.line().latencyMs).toBeLessThan(-100);

@@ -9,7 +9,7 @@ const QUARTER = Math.round(32767 / 4);
 /** An overlay that turns the first joint of each of `limbs` about x by `units`. */
 function overlay(due: number, units: number, ...limbs: number[]): Overlay {
   const numbers = () => Int16Array.of(units, 0, 0, 0, 0, 0, 0, 0, 0);
-  return { name: "Overlay", sequence: 0, due, limbs: new Map(limbs.map((limb) => [limb, numbers()])) };
+  return { name: "Overlay", sequence: 0, due, limbs: new Map(limbs.map((limb) => [limb, numbers()])), earlier: [] };
 }
 
 /** The angle about x of `joint` at `clock`. */
@@ -66,6 +66,17 @@ test("late and doubled overlays are put in their places", () => {
   expect(angle(overlays, 1_150_000)).toBeCloseTo(Math.PI / 8, 3);
 });
 
+test("an overlay of several frames is each of them at its time", () => {
+  const overlays = new Overlays();
+  const [first, second, third] = [0, 4_000, 10_000].map((units) => overlay(0, units, 0).limbs);
+  overlays.put({ name: "Overlay", sequence: 0, due: 1_033_334, limbs: third, earlier: [first, second] });
+  const unit = Math.PI / 32767;
+  expect(overlays.lay(999_999, restPose())).toBe(0);
+  [[1_000_000, 0], [1_008_333.5, 2_000], [1_016_667, 4_000], [1_025_000.5, 7_000], [1_033_334, 10_000]].forEach(([clock, units]) =>
+    expect(angle(overlays, clock)).toBeCloseTo(units * unit, 9),
+  );
+});
+
 test("only the pulled limbs change, and rotations stay of unit length", () => {
   const number = fc.integer({ min: -32767, max: 32767 });
   const limbs = fc.uniqueArray(fc.nat(3));
@@ -75,7 +86,7 @@ test("only the pulled limbs change, and rotations stay of unit length", () => {
       const overlays = new Overlays();
       for (const [due, which, numbers] of all) {
         const held = new Map(which.map((limb) => [limb, Int16Array.from(numbers)]));
-        overlays.put({ name: "Overlay", sequence: 0, due, limbs: held });
+        overlays.put({ name: "Overlay", sequence: 0, due, limbs: held, earlier: [] });
       }
       const pose = restPose(), rest = restPose();
       const mask = overlays.lay(clock, pose);

@@ -26,9 +26,10 @@ function held(value: unknown): unknown {
 function message({ name, fields }: Vectors["valid"][number]): Message {
   const read = held(fields) as Record<string, unknown>;
   if (name === "Overlay") {
-    read.limbs = new Map(
-      Object.entries(read.limbs as Record<string, number[]>).map(([limb, v]) => [Number(limb), Int16Array.from(v)]),
-    );
+    const frame = (limbs: Record<string, number[]>) =>
+      new Map(Object.entries(limbs).map(([limb, v]) => [Number(limb), Int16Array.from(v)]));
+    read.limbs = frame(read.limbs as Record<string, number[]>);
+    read.earlier = (read.earlier as Record<string, number[]>[]).map(frame);
   }
   return { name, ...read } as unknown as Message;
 }
