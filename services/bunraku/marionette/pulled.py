@@ -45,6 +45,11 @@ class _Pulled:
         return self._own or STILL
 
     @property
+    def pulled(self) -> bool:
+        """Whether it is not wholly the dance's."""
+        return self._follower is not None
+
+    @property
     def place(self) -> Vector:
         """Where the limb is."""
         return self.own if self._follower is None else self._follower.place
