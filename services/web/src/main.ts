@@ -72,7 +72,7 @@ const page = createPage(document.body, {
   ask: (limb) => holding.ask(limb),
   withdraw: (limb) => holding.withdraw(limb),
   give: (limb) => holding.give(limb),
-  select: (limb) => velocity?.hold(limb) && holding.render(),
+  select: (limb) => velocity?.hold(limb),
   press: (input, down) => {
     if (down) commands?.press(`page ${input}`, [input], 1, performance.now());
     else commands?.release(`page ${input}`, performance.now());
@@ -259,6 +259,12 @@ async function openStage(): Promise<void> {
   expose();
   resize();
   addEventListener("resize", resize);
+  // hidden, no frame comes that would let up what was pressed
+  document.addEventListener("visibilitychange", () => {
+    if (!document.hidden) return;
+    commands?.forget();
+    velocity?.update(performance.now());
+  });
   requestAnimationFrame(frame);
 }
 

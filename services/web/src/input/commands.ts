@@ -59,7 +59,7 @@ export class Commands {
   }
 
   /** Lets all controls up whose names pass, without a tap's meaning. */
-  forget(which: (control: Control) => boolean): void {
+  forget(which: (control: Control) => boolean = () => true): void {
     for (const [control, press] of this.#pressed) {
       if (!which(control)) continue;
       this.#pressed.delete(control);

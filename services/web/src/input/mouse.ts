@@ -8,8 +8,9 @@ const NOTCH = 120;
 /** The control of a mouse event, or null: the first button is none. */
 export function mouseControl(event: MouseEvent): Control | null {
   if (event.type === "wheel") {
+    // with Ctrl it is the browser's, and a pinch of a touchpad
     const { deltaY } = event as WheelEvent;
-    return deltaY === 0 ? null : `wheel:${deltaY > 0 ? "+" : "-"}`;
+    return deltaY === 0 || event.ctrlKey ? null : `wheel:${deltaY > 0 ? "+" : "-"}`;
   }
   return event.button > 0 && event.button <= 4 ? `mouse:${event.button}` : null;
 }

@@ -74,6 +74,7 @@ export class VelocityInputs {
     if (this.#hands.source(limb) !== "velocity" && !this.#actions.take(limb)) return false;
     this.#motions[limb].momentary = false;
     this.#selected = limb;
+    this.#hands.changed();
     return true;
   }
 

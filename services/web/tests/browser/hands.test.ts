@@ -9,7 +9,7 @@ import { chromium, startServer, type RunningServer } from "./server";
 
 type Inside = { bunraku: { stage: Stage; hands: Hands; puppeteer: Puppeteer } };
 
-const LEFT_HAND = 0;
+const [LEFT_HAND, RIGHT_LEG] = [0, 3];
 const PATIENCE = 90_000;
 
 const path = chromium();
@@ -113,6 +113,35 @@ describe.skipIf(!path)("a puppeteer's hands", { timeout: 2 * PATIENCE }, () => {
     await page.close();
   });
 
+  test("a gamepad's stick takes its hand, and a button that was pressed for it moves a leg", async () => {
+    const page = await browser.newPage({ viewport: { width: 760, height: 560 }, reducedMotion: "reduce" });
+    page.setDefaultTimeout(PATIENCE);
+    await page.addInitScript(() => {
+      const buttons = Array.from({ length: 17 }, () => ({ pressed: false, touched: false, value: 0 }));
+      Object.assign(window, { pad: { connected: true, mapping: "standard", id: "A pad (made for this)", axes: [0, 0, 0, 0], buttons } });
+      navigator.getGamepads = () => [(window as unknown as { pad: Gamepad }).pad];
+    });
+    await page.goto(`${server.url}?name=Kiku`);
+    await ready(page);
+    await pad(page, { axis: [1, -0.9] });
+    await page.waitForFunction((limb) => (window as unknown as Inside).bunraku.puppeteer.holds(limb), LEFT_HAND);
+    await pad(page, { axis: [1, 0] });
+    await page.waitForFunction((limb) => (window as unknown as Inside).bunraku.hands.source(limb) === null, LEFT_HAND);
+
+    await page.keyboard.press("Shift+Slash");
+    await page.getByText("A pad is connected").waitFor();
+    await page.getByText("The 14 inputs, each by itself").click();
+    await page.getByRole("button", { name: "Bind a key or button: right leg up" }).click();
+    await pad(page, {}); // What is down as the listening begins does not count.
+    await pad(page, { button: [1, 1] });
+    await pad(page, { button: [1, 0] });
+    await page.getByRole("button", { name: "B: right leg up. Take away" }).waitFor();
+    await page.keyboard.press("Escape");
+    await pad(page, { button: [1, 1] });
+    await page.waitForFunction((limb) => (window as unknown as Inside).bunraku.puppeteer.holds(limb), RIGHT_LEG);
+    await page.close();
+  });
+
   test("a held limb is asked for, shown to its holder, and given; and what was done is kept", async () => {
     const [aiko, mateo] = [await open("Aiko"), await open("Mateo")];
     await aiko.keyboard.press("Digit2");
@@ -158,6 +187,16 @@ async function ready(page: Page): Promise<void> {
 /** What holds the left hand on a page. */
 function source(page: Page): Promise<string | null> {
   return page.evaluate((limb) => (window as unknown as Inside).bunraku.hands.source(limb), LEFT_HAND);
+}
+
+/** Puts an axis or a button of the page's gamepad, and waits until it was looked at. */
+function pad(page: Page, to: { axis?: [number, number]; button?: [number, number] }): Promise<unknown> {
+  return page.evaluate(({ axis, button }) => {
+    const { pad } = window as unknown as { pad: { axes: number[]; buttons: { pressed: boolean; value: number }[] } };
+    if (axis) pad.axes[axis[0]] = axis[1];
+    if (button) Object.assign(pad.buttons[button[0]], { value: button[1], pressed: button[1] > 0.5 });
+    return new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
+  }, to);
 }
 
 /** What the slider of the dead zone says; it is there once the page of keys is open. */
