@@ -120,10 +120,8 @@ class Elbow:
         if was is not None and _apart(self._was, was) > most:
             # the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow
             upper_arm = self._was = self._shoulder.toward(was, self._was, most)
-            direction, r, normal, lift = self._reach_out(upper_arm, vector.scale(direction, reach), normal)
-            low, high = self._arm.limits(r)
-        bend = self._bend_of(r, lift)
-        return Hanging(vector.scale(direction, r), normal, min(max(bend, low), high))
+            return self._reach_out(upper_arm, vector.scale(direction, reach), normal)
+        return Hanging(vector.scale(direction, r), normal, self._bend_of(r, lift, low, high))
 
     def _upper_arm(self, direction: Vector, normal: Vector, lift: float) -> Vector:
         """The unit vector from the shoulder to the elbow."""
@@ -167,15 +165,16 @@ class Elbow:
             turn = self._shoulder.turn(direction, normal, lift) or 0.0
         return r, _turned(direction, normal, turn), lift, low, high
 
-    def _reach_out(self, upper_arm: Vector, target: Vector, normal: Vector) -> tuple[Vector, float, Vector, float]:
-        """Direction and distance of the tip, the normal and the lift, where forearm and hand come nearest to `target`
-        from an upper arm that is on its way."""
+    def _reach_out(self, upper_arm: Vector, target: Vector, normal: Vector) -> Hanging:
+        """What hangs from an upper arm that is on its way, forearm and hand as near to `target` as they come."""
         upper, fore, hand = self._arm.proportions.lengths
         elbow = vector.scale(upper_arm, upper)
         way = vector.subtract(target, elbow)
         shortest = sqrt(fore * fore + hand * hand + 2.0 * fore * hand * cos(WRIST_LIMIT))
         length = min(max(vector.length(way), shortest), fore + hand)
-        bend = acos(min(max((length * length - fore * fore - hand * hand) / (2.0 * fore * hand), -1.0), 1.0))
+        # where forearm and hand are straight, the cosine has lost the digits that tell the bend
+        cosine = (length * length - fore * fore - hand * hand) / (2.0 * fore * hand)
+        bend = acos(min(max(cosine, -1.0), 1.0)) if length < fore + hand else 0.0
         lean = atan2(hand * sin(bend), fore + hand * cos(bend))
         side = vector.square_to(way, upper_arm)
         off = vector.unit(side, vector.cross(normal, upper_arm))
@@ -185,9 +184,9 @@ class Elbow:
         tip = vector.add(elbow, vector.scale(along, length))
         r = min(vector.length(tip), OUTER_RADIUS)
         direction = vector.unit(tip, upper_arm)
-        lift = lift_between(upper_arm, direction)
+        low, high = self._arm.limits(r)
         down = vector.unit(vector.square_to(upper_arm, direction), vector.cross(direction, normal))
-        return direction, r, vector.cross(down, direction), lift
+        return Hanging(vector.scale(direction, r), vector.cross(down, direction), min(max(bend, low), high))
 
     def _nearer(self, r: float, away: float) -> float:
         """The farthest tip, no farther than `r`, whose upper arm is lifted `away` radians off the chord."""
@@ -202,10 +201,14 @@ class Elbow:
         square = fore * fore + hand * hand + 2.0 * fore * hand * cos(bend)
         return acos(min(max((upper * upper + r * r - square) / (2.0 * upper * r), -1.0), 1.0))
 
-    def _bend_of(self, r: float, lift: float) -> float:
+    def _bend_of(self, r: float, lift: float, low: float, high: float) -> float:
         upper, fore, hand = self._arm.proportions.lengths
+        # at a limit the cosine has lost the digits that tell the bend
+        if lift >= self._lift_of(r, low):
+            return low
         square = upper * upper + r * r - 2.0 * upper * r * cos(lift)
-        return acos(min(max((square - fore * fore - hand * hand) / (2.0 * fore * hand), -1.0), 1.0))
+        bend = acos(min(max((square - fore * fore - hand * hand) / (2.0 * fore * hand), -1.0), 1.0))
+        return min(max(bend, low), high)
 
 
 def lift_between(elbow: Vector, direction: Vector) -> float:

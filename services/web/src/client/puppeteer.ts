@@ -3,7 +3,8 @@
 import { LIMBS, type Pose } from "../motion/skeleton";
 import { type Grant, type Message, type Notice, type Presence, type Refusal, TARGET, VELOCITY } from "../wire/messages";
 import { Connection } from "./connection";
-import { HAND_SPEED, LEG_SPEED, Pull, REACH, THIGH } from "./pull";
+import { OwnLimb } from "./own-limb";
+import { HAND_SPEED, LEG_SPEED, REACH, THIGH } from "./pull";
 import type { Solver } from "./solver";
 import type { Viewer } from "./viewer";
 
@@ -18,7 +19,9 @@ export const ASK_LASTS = 20_000;
 
 /** One limb as the session knows it. */
 interface Hold {
-  pull: Pull;
+  limb: OwnLimb;
+  /** Who holds it, as the session said last. */
+  holder: string | null;
   wanted: boolean;
   /** Of the grant; null while not granted. */
   epoch: number | null;
@@ -69,7 +72,7 @@ export class Puppeteer extends EventTarget {
     this.viewer = options.viewer;
     this.now = options.now ?? (() => performance.now());
     this.holdings = LIMBS.map((_, limb) => ({
-      pull: new Pull(limb), wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], anchored: false, inputAt: 0, heardAt: 0,
+      limb: new OwnLimb(limb), holder: null, wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], anchored: false, inputAt: 0, heardAt: 0,
       ask: "none", askedAt: 0,
     }));
     this.connection = new Connection({
@@ -128,7 +131,7 @@ export class Puppeteer extends EventTarget {
   target(limb: number, x: number, y: number, z: number): void {
     const hold = this.holdings[limb];
     if (!hold.wanted) return;
-    hold.pull.target(finite(x), finite(y), finite(z), this.now());
+    hold.limb.pull.target(finite(x), finite(y), finite(z), this.now());
     hold.speed = [0, 0, 0];
     hold.news = "target";
     this.say(hold, this.now());
@@ -139,15 +142,17 @@ export class Puppeteer extends EventTarget {
     const hold = this.holdings[limb];
     const speed: [number, number, number] = [unit(x), unit(y), unit(z)];
     if (!hold.wanted || speed.every((part, axis) => part === hold.speed[axis])) return;
-    hold.pull.speed(...speed, this.now());
+    hold.limb.pull.speed(...speed, this.now());
     hold.speed = speed;
     hold.news = "velocity";
     this.say(hold, this.now());
   }
 
-  /** Lays one's own limbs over `pose`; for the viewer. */
-  lay(pose: Pose, nowMs: number, solver: Solver): void {
-    for (const { pull } of this.holdings) pull.lay(pose, nowMs, solver);
+  /** Lays one's own limbs over `pose`, in which those of the mask `laid` are pulled already over the `dance`; for the viewer. */
+  lay(pose: Pose, dance: Pose, laid: number, nowMs: number, solver: Solver): void {
+    this.holdings.forEach(({ limb, holder }, nth) => {
+      limb.lay(pose, dance, ((laid >> nth) & 1) !== 0, holder !== null && holder !== this.id, nowMs, solver);
+    });
   }
 
   /** Lets all go and ends it. */
@@ -169,6 +174,7 @@ export class Puppeteer extends EventTarget {
         break;
       case "Presence":
         this.presence = message;
+        this.holdings.forEach((hold, limb) => (hold.holder = message.limbs[limb]));
         this.listed(message);
         this.dispatchEvent(new Event("presence"));
         break;
@@ -197,11 +203,12 @@ export class Puppeteer extends EventTarget {
       return;
     }
     hold.epoch = epoch;
+    hold.holder = this.id;
     hold.sequence = 0;
     hold.anchored = false;
     // the session starts from where it has the limb: tell it where it is held here
     if (hold.speed.some((part) => part !== 0)) hold.news = "velocity";
-    else if (hold.pull.placed) hold.news = "target";
+    else if (hold.limb.pull.placed) hold.news = "target";
     hold.inputAt = -Infinity;
     hold.heardAt = this.now();
     this.say(hold, this.now());
@@ -211,7 +218,7 @@ export class Puppeteer extends EventTarget {
   private claimed(hold: Hold): void {
     hold.wanted = true;
     hold.news = "none";
-    hold.pull.take(this.now());
+    hold.limb.pull.take(this.now());
   }
 
   private listed({ asks, limbs }: Presence): void {
@@ -226,7 +233,7 @@ export class Puppeteer extends EventTarget {
 
   private lapse(hold: Hold, free = false): void {
     hold.ask = "none";
-    this.dispatchEvent(new CustomEvent("lapsed", { detail: { limb: hold.pull.limb, free } }));
+    this.dispatchEvent(new CustomEvent("lapsed", { detail: { limb: hold.limb.limb, free } }));
   }
 
   private noticed({ limb, reason, detail }: Notice): void {
@@ -241,6 +248,7 @@ export class Puppeteer extends EventTarget {
       if (hold.wanted) this.connection.send({ name: "Claim", limb });
       return;
     }
+    hold.holder = holder;
     this.drop(hold);
     this.dispatchEvent(new CustomEvent("refusal", { detail: { limb, reason, holder } }));
   }
@@ -250,14 +258,14 @@ export class Puppeteer extends EventTarget {
     hold.epoch = null;
     hold.news = "none";
     hold.speed = [0, 0, 0];
-    hold.pull.letGo(this.now());
+    hold.limb.pull.letGo();
   }
 
   private lost(reason: string, final: boolean): void {
     this.id = null;
     this.ended = final;
     for (const hold of this.holdings) {
-      hold.epoch = null;
+      hold.epoch = hold.holder = null;
       // whoever goes asks no longer
       hold.ask = "none";
       if (final) this.drop(hold);
@@ -275,7 +283,7 @@ export class Puppeteer extends EventTarget {
     }
     const quiet = this.holdings.filter(({ epoch, heardAt }) => epoch !== null && now - heardAt >= ALIVE_EVERY);
     if (quiet.length === 0) return;
-    const limbs = quiet.map(({ pull }) => pull.limb);
+    const limbs = quiet.map(({ limb }) => limb.limb);
     if (!this.connection.send({ name: "Alive", limbs })) return;
     for (const hold of quiet) hold.heardAt = now;
   }
@@ -287,7 +295,8 @@ export class Puppeteer extends EventTarget {
     const clock = this.viewer.clockTime(now);
     if (clock === null) return;
     const sampled = Math.round(clock);
-    const { pull, speed, epoch } = hold;
+    const { speed, epoch } = hold;
+    const { pull } = hold.limb;
     pull.move(now);
     const input = (kind: number, values: [number, number, number]) =>
       this.connection.send({

@@ -165,8 +165,8 @@ export class Viewer extends EventTarget {
     }
     if (!this.shown) return null;
     copyPose(dance, merged);
-    this.overlays.lay(clock, merged);
-    if (this.solver) this.puppeteer?.lay(merged, nowMs, this.solver);
+    const laid = this.overlays.lay(clock, merged);
+    if (this.solver) this.puppeteer?.lay(merged, dance, laid, nowMs, this.solver);
     return merged;
   }
 

@@ -7,10 +7,11 @@
 import { conjugate, multiply, rotate, type Numbers } from "../motion/rotation";
 import type { Figure } from "../motion/skeleton";
 import { Arm } from "./arm";
+import { elevation, verticalNormal } from "./elbow";
 import { clampThigh, kneeBend } from "./leg";
-import { verticalNormal } from "./plane";
 import { WRIST_LIMIT, proportionsOf, type Proportions } from "./proportions";
-import { aboutAxis, across, cross, dot, fromColumns, length, normalise, put, squareTo, unit } from "../motion/vector";
+import { Shoulder } from "./shoulder";
+import { aboutAxis, across, combine, cross, dot, fromColumns, length, normalise, put, squareTo, unit } from "../motion/vector";
 
 const SACROILIAC = 1;
 const VL5 = 10;
@@ -46,14 +47,15 @@ export function armProportions(figure: Figure, limb: 0 | 1): Proportions {
   return proportionsOf(length(links, 0), length(links, 3), length(links, 6));
 }
 
-/** One arm of a figure. */
+/** One arm of a figure. Its joints are always twelve numbers: the local rotations of shoulder, elbow and wrist. */
 export class ArmRig {
-  /** Index of the shoulder; elbow and wrist follow it. */
-  readonly shoulder: number;
-  /** The arm's length in metres. */
+  /** Index of the first joint, the shoulder; elbow and wrist follow it. */
+  readonly first: number;
+  /** The arm's length in metres, and its three bones at rest (9). */
   readonly scale: number;
+  readonly links: Float64Array;
   readonly arm: Arm;
-  private readonly links: Float64Array;
+  readonly shoulder: Shoulder;
   private readonly frames = new Float64Array(12);
   private readonly palmDown: number;
   private readonly angles = new Float64Array(3);
@@ -61,13 +63,15 @@ export class ArmRig {
   private readonly turn = new Float64Array(4);
   private readonly palm = new Float64Array(4);
   private readonly place = new Float64Array(3);
+  private readonly found = new Float64Array(9);
 
   /** `limb` is 0 (left hand) or 1 (right hand), `table` what `readTable` gave for `armProportions(figure, limb)`. */
   constructor(figure: Figure, limb: 0 | 1, table: Float64Array) {
-    this.shoulder = FIRST_JOINT[limb];
+    this.first = FIRST_JOINT[limb];
     this.links = armLinks(figure, limb);
     this.scale = length(this.links, 0) + length(this.links, 3) + length(this.links, 6);
     this.arm = new Arm(armProportions(figure, limb), table);
+    this.shoulder = new Shoulder(limb === 1);
     for (let link = 0; link < 3; link++) linkFrame(this.frames, 4 * link, this.links, 3 * link);
     this.palmDown = limb === 0 ? Math.PI / 2 : -Math.PI / 2;
   }
@@ -79,20 +83,32 @@ export class ArmRig {
     rotate(out, outAt, this.turn, 0, UP, 0);
   }
 
-  /** Where the pose has the hand tip (3): the target that asks for this place. */
-  target(out: Numbers, outAt: number, rotations: Numbers): void {
+  /** Elbow, wrist and tip (9) from the shoulder, in metres on the axes of vl5. */
+  places(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
     const { turn, place, links } = this;
-    let x = 0, y = 0, z = 0;
     for (let link = 0; link < 3; link++) {
-      const at = 4 * (this.shoulder + link);
-      if (link === 0) for (let i = 0; i < 4; i++) turn[i] = rotations[at + i];
-      else multiply(turn, 0, turn, 0, rotations, at);
+      const at = outAt + 3 * link;
+      if (link === 0) for (let i = 0; i < 4; i++) turn[i] = joints[jointsAt + i];
+      else multiply(turn, 0, turn, 0, joints, jointsAt + 4 * link);
       rotate(place, 0, turn, 0, links, 3 * link);
-      x += place[0];
-      y += place[1];
-      z += place[2];
+      for (let i = 0; i < 3; i++) out[at + i] = link === 0 ? place[i] : out[at - 3 + i] + place[i];
     }
-    put(out, outAt, x / this.scale, y / this.scale, z / this.scale);
+  }
+
+  /** Where the hand tip is (3), in arm lengths: the target that asks for this place. */
+  target(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
+    const { found, scale } = this;
+    this.places(found, 0, joints, jointsAt);
+    put(out, outAt, found[6] / scale, found[7] / scale, found[8] / scale);
+  }
+
+  /** The normal (3) of the plane the arm lies in, not of unit length: from its bend, and where it is straight from the elbow's axis. */
+  bendAxis(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
+    const { found, place, scale } = this;
+    this.places(found, 0, joints, jointsAt);
+    cross(found, 0, found, 0, found, 6);
+    rotate(place, 0, joints, jointsAt, BEND_AXIS, 0);
+    combine(out, outAt, found, 0, 1 / (scale * scale), place, 0, 0.1);
   }
 
   /** The unit vector (3) to a target; straight down for the shoulder itself. */
@@ -100,40 +116,27 @@ export class ArmRig {
     if (!unit(out, outAt, target, targetAt)) put(out, outAt, 0, -1, 0);
   }
 
-  /** The normal (3) of the vertical plane through a target; on the axis of the one that faces forwards. */
-  restingNormal(out: Numbers, outAt: number, target: Numbers, targetAt: number, up: Numbers, upAt: number): void {
-    const { place } = this;
-    this.direction(place, 0, target, targetAt);
-    if (verticalNormal(out, outAt, place, 0, up, upAt)) return;
-    squareTo(out, outAt, FORWARDS, 0, up, upAt);
-    if (!unit(out, outAt, out, outAt)) out.set(UP, outAt);
-    cross(out, outAt, out, outAt, up, upAt);
-    squareTo(out, outAt, out, outAt, place, 0);
-    if (!unit(out, outAt, out, outAt)) across(out, outAt, place, 0);
+  /** The frame (4) of an arm's plane: x the unit `direction` to the tip, z the unit `normal`, square to it. */
+  chord(out: Numbers, outAt: number, direction: Numbers, normal: Numbers): void {
+    const { columns } = this;
+    columns.set(direction, 0);
+    columns.set(normal, 6);
+    cross(columns, 3, normal, 0, direction, 0);
+    fromColumns(out, outAt, columns, 0);
   }
 
   /**
-   * Rotations of shoulder, elbow and wrist (12) that bring the tip to `target` in the plane of `normal`. `up` is the
-   * world's; `normal` is a unit vector square to the target, from `restingNormal` or a `Plane`.
+   * The joints of an arm that reaches as far as `reach` (arm lengths) with its wrist bent by `bend` radians, in the frame of its
+   * chord: that frame times the first is the shoulder's rotation.
    */
-  hang(
-    out: Numbers, outAt: number, target: Numbers, targetAt: number, up: Numbers, upAt: number,
-    normal: Numbers, normalAt: number,
-  ): void {
-    const { columns, frames, angles, turn, palm, place } = this;
-    this.direction(columns, 0, target, targetAt);
-    squareTo(place, 0, columns, 0, up, upAt);
-    const beta = Math.atan2(dot(columns, 0, up, upAt), length(place, 0));
-    this.arm.angles(angles, 0, this.arm.clamp(length(target, targetAt)), beta);
-    columns.set(normal.subarray(normalAt, normalAt + 3), 6);
-    cross(columns, 3, columns, 6, columns, 0);
+  bend(out: Numbers, outAt: number, reach: number, bend: number): void {
+    const { frames, angles, turn, palm } = this;
+    this.arm.close(angles, 0, reach, 0, bend);
     // the more the wrist bends, the more the palm turns down: to the side a wrist bends little
     const share = (angles[2] - angles[1]) / WRIST_LIMIT;
     aboutAxis(palm, 0, 0, this.palmDown * share * share * (3 - 2 * share));
     const shoulder = outAt, elbow = outAt + 4, wrist = outAt + 8;
-    fromColumns(out, shoulder, columns, 0);
-    aboutAxis(turn, 0, 2, angles[0] - beta);
-    multiply(out, shoulder, out, shoulder, turn, 0);
+    aboutAxis(out, shoulder, 2, angles[0]);
     conjugate(turn, 0, frames, 0);
     multiply(out, shoulder, out, shoulder, turn, 0);
     aboutAxis(turn, 0, 2, angles[1] - angles[0]);
@@ -148,16 +151,41 @@ export class ArmRig {
     multiply(out, wrist, out, wrist, palm, 0);
     conjugate(turn, 0, frames, 8);
     multiply(out, wrist, out, wrist, turn, 0);
-    normalise(out, shoulder);
     normalise(out, elbow);
     normalise(out, wrist);
+  }
+
+  /**
+   * The joints that bring the tip to `target` (3) as gravity alone has it, in the plane of `normal` (by default the vertical one,
+   * straight above and below the shoulder the one that faces forwards).
+   *
+   * `up` is the world's up and `normal` the axis of the elbow's bend, unit vectors (3) on the axes of vl5; `normal` is square to
+   * the target. A target out of reach is brought in, its direction kept.
+   */
+  hang(out: Numbers, outAt: number, target: Numbers, up: Numbers, normal: Numbers | null = null): void {
+    const { turn } = this;
+    const direction = new Float64Array(3), plane = new Float64Array(3);
+    this.direction(direction, 0, target, 0);
+    if (normal) plane.set(normal);
+    else if (!verticalNormal(plane, direction, up)) {
+      squareTo(plane, 0, FORWARDS, 0, up, 0);
+      if (!unit(plane, 0, plane, 0)) plane.set(UP);
+      cross(plane, 0, plane, 0, up, 0);
+      squareTo(plane, 0, plane, 0, direction, 0);
+      if (!unit(plane, 0, plane, 0)) across(plane, 0, direction, 0);
+    }
+    const reach = this.arm.clamp(length(target, 0));
+    this.bend(out, outAt, reach, this.arm.bend(reach, elevation(direction, up)));
+    this.chord(turn, 0, direction, plane);
+    multiply(out, outAt, turn, 0, out, outAt);
+    normalise(out, outAt);
   }
 }
 
 /** One leg of a figure. */
 export class LegRig {
-  /** Index of the hip; knee and ankle follow it. */
-  readonly hip: number;
+  /** Index of the first joint, the hip; knee and ankle follow it. */
+  readonly first: number;
   private readonly thigh: Float64Array;
   private readonly thighFrame = new Float64Array(4);
   private readonly shankFrame = new Float64Array(4);
@@ -169,10 +197,10 @@ export class LegRig {
 
   /** `limb` is 2 (left leg) or 3 (right leg). */
   constructor(figure: Figure, limb: 2 | 3) {
-    this.hip = FIRST_JOINT[limb];
-    this.thigh = figure.offsets.slice(3 * this.hip + 3, 3 * this.hip + 6);
+    this.first = FIRST_JOINT[limb];
+    this.thigh = figure.offsets.slice(3 * this.first + 3, 3 * this.first + 6);
     linkFrame(this.thighFrame, 0, this.thigh, 0);
-    linkFrame(this.shankFrame, 0, figure.offsets, 3 * this.hip + 6);
+    linkFrame(this.shankFrame, 0, figure.offsets, 3 * this.first + 6);
     // the foot is level when the shank hangs plumb: fixed to the shank as standing has it
     fromColumns(this.turn, 0, Float64Array.of(0, -1, 0, 0, 0, 1, -1, 0, 0), 0);
     conjugate(this.turn, 0, this.turn, 0);
@@ -196,7 +224,7 @@ export class LegRig {
   /** The thigh's angle in a pose (18 rotations), within its limits. */
   angle(rotations: Numbers): number {
     this.face(rotations);
-    multiply(this.turn, 0, this.hips, 0, rotations, 4 * this.hip);
+    multiply(this.turn, 0, this.hips, 0, rotations, 4 * this.first);
     rotate(this.place, 0, this.turn, 0, this.thigh, 0);
     return clampThigh(Math.atan2(dot(this.place, 0, this.columns, 0), -this.place[1]));
   }

@@ -15,6 +15,26 @@ export function length(a: Numbers, aAt: number): number {
   return Math.sqrt(dot(a, aAt, a, aAt));
 }
 
+/** The distance of two places (3). */
+export function apart(a: Numbers, aAt: number, b: Numbers, bAt: number): number {
+  const x = a[aAt] - b[bAt], y = a[aAt + 1] - b[bAt + 1], z = a[aAt + 2] - b[bAt + 2];
+  return Math.sqrt(x * x + y * y + z * z);
+}
+
+/** `a` and `factor` times `b` (3). */
+export function addScaled(
+  out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number, factor: number,
+): void {
+  for (let i = 0; i < 3; i++) out[outAt + i] = a[aAt + i] + b[bAt + i] * factor;
+}
+
+/** `a` times `factor` and `b` times `other` (3). */
+export function combine(
+  out: Numbers, outAt: number, a: Numbers, aAt: number, factor: number, b: Numbers, bAt: number, other: number,
+): void {
+  for (let i = 0; i < 3; i++) out[outAt + i] = a[aAt + i] * factor + b[bAt + i] * other;
+}
+
 /** A vector from its parts. */
 export function put(out: Numbers, outAt: number, x: number, y: number, z: number): void {
   out[outAt] = x;
@@ -65,6 +85,14 @@ export function aboutAxis(out: Numbers, outAt: number, axis: 0 | 1 | 2, angle: n
   out[outAt] = Math.cos(0.5 * angle);
   put(out, outAt + 1, 0, 0, 0);
   out[outAt + 1 + axis] = Math.sin(0.5 * angle);
+}
+
+/** A turn (4) by `angle` radians about the unit vector `axis` (3). */
+export function about(out: Numbers, outAt: number, axis: Numbers, axisAt: number, angle: number): void {
+  const s = Math.sin(0.5 * angle);
+  const x = axis[axisAt] * s, y = axis[axisAt + 1] * s, z = axis[axisAt + 2] * s;
+  out[outAt] = Math.cos(0.5 * angle);
+  put(out, outAt + 1, x, y, z);
 }
 
 /** The shortest rotation (4) from the unit vector `a` to the unit vector `b`; opposite ones turn about `across(a)`. */

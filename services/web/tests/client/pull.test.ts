@@ -1,105 +1,84 @@
+import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import { Pull } from "../../src/client/pull";
-import type { Solver } from "../../src/client/solver";
-import { type Pose, restPose } from "../../src/motion/skeleton";
 
-/** A figure whose limb's target stands in the root's position: what is laid can be read there. */
-class Plain implements Solver {
-  rested: number[] = [];
-  target(pose: Pose, _limb: number, out: Float64Array): void {
-    out.set(pose.root);
-  }
-  solve(pose: Pose, _limb: number, target: Float64Array): void {
-    pose.root.set(target);
-  }
-  rest(limb: number): void {
-    this.rested.push(limb);
-  }
+function near(got: Float64Array, wanted: number[]): void {
+  wanted.forEach((value, axis) => expect(got[axis]).toBeCloseTo(value, 12));
 }
 
-/** Where `pull` is drawn at `now` over a dance that has it at `dance`. */
-function drawn(pull: Pull, now: number, dance: [number, number, number], solver = new Plain()): number[] {
-  const pose = restPose();
-  pose.root.set(dance);
-  pull.lay(pose, now, solver);
-  return [...pose.root];
-}
-
-const DANCE: [number, number, number] = [0.1, -0.8, 0.2];
-
-test("a limb nobody holds is left alone", () => {
-  const pose = restPose();
-  expect(new Pull(0).lay(pose, 0, new Plain())).toBe(false);
-  expect(pose).toEqual(restPose());
-});
-
-test("taken, it stays where it was when it was taken, whatever the dance does", () => {
+test("taken, it stays where it was when it was taken, unless an input came before", () => {
   const pull = new Pull(0);
   pull.take(0);
-  drawn(pull, 0, DANCE);
-  drawn(pull, 200, [0.5, 0, 0]);
-  const held = drawn(pull, 1_000, [0, 0.5, 0]);
-  held.forEach((value, axis) => expect(value).toBeCloseTo(DANCE[axis], 12));
+  pull.begin(Float64Array.of(0.1, -0.8, 0.2), 10);
+  pull.begin(Float64Array.of(0.5, 0, 0), 20);
+  near(pull.wanted(1_000), [0.1, -0.8, 0.2]);
+  const told = new Pull(0);
+  told.take(0);
+  told.target(0.3, 0, 0, 5);
+  told.begin(Float64Array.of(0.5, 0, 0), 10);
+  near(told.wanted(1_000), [0.3, 0, 0]);
 });
 
-describe("handing over", () => {
-  test("is whole after 150 ms and never steps", () => {
-    const pull = new Pull(0);
-    drawn(pull, 0, [0.1, 0, 0]);
-    pull.take(0);
-    pull.target(0.6, 0, 0, 0);
-    let before = 0.1;
-    for (let now = 1; now <= 150; now++) {
-      const [x] = drawn(pull, now, [0.1, 0, 0]);
-      expect(x).toBeGreaterThanOrEqual(before);
-      expect(x - before).toBeLessThan(0.5 * 0.0126);
-      before = x;
-    }
-    expect(before).toBeCloseTo(0.6, 12);
-  });
+test("taken anew it starts anew", () => {
+  const pull = new Pull(0);
+  pull.take(0);
+  pull.target(0.3, 0, 0, 5);
+  pull.letGo();
+  pull.take(100);
+  expect(pull.placed).toBe(false);
+  pull.begin(Float64Array.of(0, -0.5, 0), 110);
+  near(pull.wanted(120), [0, -0.5, 0]);
+});
 
-  test("goes round the shoulder, not through it", () => {
-    for (const [from, to] of [[[0.5, 0, 0], [-0.7, 0, 0]], [[0, 0, 0.5], [0, 0, -0.7]], [[0.3, -0.4, 0], [-0.4, 0.5, 0.1]]]) {
-      const pull = new Pull(1);
-      const [a, b, c] = from, [x, y, z] = to;
-      pull.take(0);
-      pull.target(x, y, z, 0);
-      let before = drawn(pull, 0, [a, b, c]);
-      for (let now = 1; now <= 150; now++) {
-        const here = drawn(pull, now, [a, b, c]);
-        expect(Math.hypot(...here)).toBeGreaterThan(0.49);
-        expect(Math.hypot(...here.map((value, axis) => value - before[axis]))).toBeLessThan(0.04);
-        before = here;
-      }
-      to.forEach((value, axis) => expect(before[axis]).toBeCloseTo(value, 12));
-    }
-  });
-
-  test("back takes 300 ms and ends with the dance untouched", () => {
-    const pull = new Pull(2), solver = new Plain();
-    pull.take(0);
-    drawn(pull, 0, [0, 0, 0], solver);
-    pull.target(1, 0, 0, 0);
-    expect(drawn(pull, 200, [0, 0, 0], solver)[0]).toBeCloseTo(1, 12);
-    pull.letGo(200);
-    expect(drawn(pull, 350, [0, 0, 0], solver)[0]).toBeCloseTo(0.5, 9);
-    expect(drawn(pull, 500, [0.25, 0, 0], solver)[0]).toBe(0.25);
-    expect(solver.rested).toEqual([2]);
-    expect(pull.lay(restPose(), 600, solver)).toBe(false);
-  });
-
-  test("taken again on the way back it goes on from there", () => {
+describe("a target", () => {
+  test("is gone to evenly, in the time between the last two inputs", () => {
     const pull = new Pull(0);
     pull.take(0);
-    drawn(pull, 0, [0.1, 0, 0]);
-    pull.target(0.8, 0, 0, 0);
-    drawn(pull, 200, [0.1, 0, 0]);
-    pull.letGo(200);
-    const [x] = drawn(pull, 300, [0.1, 0, 0]);
-    pull.take(300);
-    const [y] = drawn(pull, 301, [0.1, 0, 0]);
-    expect(Math.abs(y - x)).toBeLessThan(0.02);
-    expect(drawn(pull, 500, [0.1, 0, 0])[0]).toBeCloseTo(0.8, 12);
+    pull.target(0, 0, 0, 0);
+    pull.target(0.4, -0.2, 0, 20);
+    near(pull.wanted(20), [0, 0, 0]);
+    near(pull.wanted(25), [0.1, -0.05, 0]);
+    near(pull.wanted(40), [0.4, -0.2, 0]);
+    near(pull.wanted(4_000), [0.4, -0.2, 0]);
+    // what the session is told is the target itself
+    pull.target(0.8, 0, 0, 4_020);
+    near(pull.value, [0.8, 0, 0]);
+    near(pull.wanted(4_053), [0.8, 0, 0]);
+  });
+
+  test("that comes on the way to another starts from there", () => {
+    const pull = new Pull(0);
+    pull.take(0);
+    pull.target(0, 0, 0, 0);
+    pull.target(0.4, 0, 0, 20);
+    pull.target(0, 0, 0.4, 30);
+    near(pull.wanted(30), [0.2, 0, 0]);
+    near(pull.wanted(35), [0.1, 0, 0.2]);
+  });
+
+  test("is no farther than the arm is long, keeping the direction", () => {
+    const pull = new Pull(0);
+    pull.target(3, 0, 4, 0);
+    expect([...pull.value]).toEqual([0.6000000000000001, 0, 0.8]);
+  });
+
+  test("is gone to without a jump however inputs come", () => {
+    const input = fc.tuple(fc.integer({ min: 1, max: 60 }), fc.float({ min: -1, max: 1, noNaN: true }), fc.boolean());
+    fc.assert(
+      fc.property(fc.array(input, { minLength: 1, maxLength: 20 }), (inputs) => {
+        const pull = new Pull(3);
+        pull.take(0);
+        pull.begin(Float64Array.of(0.2, 0, 0), 0);
+        let now = 0, before = pull.wanted(0)[0];
+        for (const [after, value, moves] of inputs) {
+          now += after;
+          before = pull.wanted(now)[0];
+          if (moves) pull.speed(value, 0, 0, now);
+          else pull.target(value, 0, 0, now);
+          expect(pull.wanted(now)[0]).toBeCloseTo(before, 12);
+        }
+      }),
+    );
   });
 });
 
@@ -109,17 +88,9 @@ describe("moving", () => {
     pull.take(0);
     pull.target(0, 0, 0, 0);
     pull.speed(1, -0.5, 2, 0);
-    pull.move(400);
-    [0.4, -0.2, 0.4].forEach((value, axis) => expect(pull.value[axis]).toBeCloseTo(value, 12));
+    near(pull.wanted(400), [0.4, -0.2, 0.4]);
     pull.speed(0, 0, 0, 400);
-    pull.move(5_000);
-    expect(pull.value[0]).toBeCloseTo(0.4, 12);
-  });
-
-  test("no farther than the arm is long, keeping the direction", () => {
-    const pull = new Pull(0);
-    pull.target(3, 0, 4, 0);
-    expect([...pull.value]).toEqual([0.6000000000000001, 0, 0.8]);
+    near(pull.wanted(5_000), [0.4, -0.2, 0.4]);
   });
 
   test("a leg swings at 2 rad/s within its limits, and only by its angle", () => {
@@ -127,21 +98,17 @@ describe("moving", () => {
     pull.take(0);
     pull.target(0, 9, 9, 0);
     pull.speed(1, 1, 1, 0);
-    pull.move(500);
-    expect([...pull.value]).toEqual([1, 0, 0]);
-    pull.move(60_000);
-    expect(pull.value[0]).toBeCloseTo((2 * Math.PI) / 3, 12);
+    expect([...pull.wanted(500)]).toEqual([1, 0, 0]);
+    expect(pull.wanted(60_000)[0]).toBeCloseTo((2 * Math.PI) / 3, 12);
     pull.speed(-1, 0, 0, 60_000);
-    pull.move(120_000);
-    expect(pull.value[0]).toBeCloseTo(-Math.PI / 4, 12);
+    expect(pull.wanted(120_000)[0]).toBeCloseTo(-Math.PI / 4, 12);
   });
 
   test("before it is placed a speed waits for the place", () => {
     const pull = new Pull(0);
     pull.take(0);
     pull.speed(1, 0, 0, 0);
-    drawn(pull, 100, [0, 0, 0]);
-    pull.move(200);
-    expect(pull.value[0]).toBeCloseTo(0.1, 12);
+    pull.begin(new Float64Array(3), 100);
+    near(pull.wanted(200), [0.1, 0, 0]);
   });
 });

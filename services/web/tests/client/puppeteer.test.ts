@@ -1,25 +1,14 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { marionette } from "../../src/client/marionette";
 import { Puppeteer } from "../../src/client/puppeteer";
-import type { Solver } from "../../src/client/solver";
 import { Viewer } from "../../src/client/viewer";
-import { LIMB_JOINTS, type Pose } from "../../src/motion/skeleton";
 import { type BlockVectors, goldenDescription } from "../golden";
+import { table } from "../marionette/figure";
 import { bytes, vectors } from "../vectors";
 import { Line } from "./line";
 
 const UNIX = 1_774_000_000_000_000;
 const [block] = vectors<BlockVectors>("blocks").valid.map((vector) => bytes(vector.block));
-
-/** A solver whose target is the x, y, z of the limb's first joint: what was solved can be read in the pose. */
-const plain: Solver = {
-  target: (pose: Pose, limb: number, out: Float64Array) => {
-    for (let axis = 0; axis < 3; axis++) out[axis] = pose.rotations[LIMB_JOINTS[limb] * 4 + 1 + axis];
-  },
-  solve: (pose: Pose, limb: number, target: Float64Array) => {
-    for (let axis = 0; axis < 3; axis++) pose.rotations[LIMB_JOINTS[limb] * 4 + 1 + axis] = target[axis];
-  },
-  rest: () => undefined,
-};
 
 let now = 0;
 let viewer: Viewer;
@@ -30,7 +19,7 @@ let line: Line;
 beforeEach(async () => {
   Line.install();
   now = 0;
-  viewer = new Viewer({ url: "ws://stage/v1/sessions/s/stream", now: () => now, solver: () => plain });
+  viewer = new Viewer({ url: "ws://stage/v1/sessions/s/stream", now: () => now, solver: (figure) => marionette(figure, [table, table]) });
   stream = Line.last;
   stream.accept();
   stream.say(
@@ -59,9 +48,23 @@ function pass(ms: number): void {
   vi.advanceTimersByTime(ms);
 }
 
-/** The x of a limb's first joint as drawn now. */
-function drawn(limb: number): number {
-  return viewer.poseAt(now)!.rotations[LIMB_JOINTS[limb] * 4 + 1];
+/** Where the left hand is as drawn now. */
+function drawn(): number[] {
+  const [hand] = marionette(viewer.figure!, [table, table]).limbs;
+  hand.see(viewer.poseAt(now)!.rotations, 0);
+  return [...hand.place];
+}
+
+/** Draws `ms` milliseconds, 60 frames a second. */
+function draw(ms: number): void {
+  for (let passed = 0; passed < ms; passed += 1000 / 60) {
+    pass(1000 / 60);
+    viewer.poseAt(now);
+  }
+}
+
+function far(a: number[], b: number[]): number {
+  return Math.hypot(...a.map((value, axis) => value - b[axis]));
 }
 
 test("is welcomed", () => {
@@ -320,25 +323,40 @@ test("a limb held still is kept alive at 10 Hz, one that moves is not mentioned"
 
 describe("one's own limb", () => {
   test("is shown at once, before the session has answered", () => {
-    const before = drawn(0);
+    const before = drawn();
     puppeteer.claim(0);
-    puppeteer.target(0, 0.75, 0, 0);
-    expect(drawn(0)).toBeCloseTo(before, 9);
-    pass(75);
-    expect(drawn(0)).not.toBeCloseTo(before, 2);
-    pass(75);
-    expect(drawn(0)).toBeCloseTo(0.75, 9);
+    puppeteer.target(0, 0.5, -0.3, 0.4);
+    expect(far(drawn(), before)).toBeLessThan(1e-9);
+    draw(50);
+    expect(far(drawn(), before)).toBeGreaterThan(0.02);
+    draw(500);
+    expect(far(drawn(), [0.5, -0.3, 0.4])).toBeLessThan(1e-6);
   });
 
   test("goes back to the dance when it is refused", () => {
-    const before = drawn(0);
+    const before = drawn();
     puppeteer.claim(0);
-    puppeteer.target(0, 0.75, 0, 0);
-    pass(200);
-    drawn(0);
+    puppeteer.target(0, 0.5, -0.3, 0.4);
+    draw(200);
+    const held = drawn();
     line.say({ name: "Refusal", limb: 0, reason: "held", holder: "b2" });
-    pass(300);
-    expect(drawn(0)).toBe(before);
+    expect(far(drawn(), held)).toBeLessThan(1e-9);
+    draw(50);
+    expect(far(drawn(), held)).toBeLessThan(0.3);
+    draw(600);
+    expect(far(drawn(), before)).toBeLessThan(1e-9);
+  });
+
+  test("is what everyone sees while Presence has it in another's hands", () => {
+    const before = drawn();
+    line.say({ name: "Presence", viewers: 2, puppeteers: [], limbs: ["b2", null, null, null], asks: [[], [], [], []] });
+    puppeteer.claim(0);
+    puppeteer.target(0, 0.5, -0.3, 0.4);
+    draw(200);
+    expect(far(drawn(), before)).toBeLessThan(1e-9);
+    line.say({ name: "Grant", limb: 0, epoch: 3 });
+    draw(600);
+    expect(far(drawn(), [0.5, -0.3, 0.4])).toBeLessThan(1e-6);
   });
 });
 

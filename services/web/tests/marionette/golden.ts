@@ -21,7 +21,6 @@ export interface GoldenLimb {
 
 export interface Golden {
   arms: GoldenArm[];
-  plane: { start: number[]; up: number[]; seconds: number; steps: { target: number[]; normal: number[] }[] };
   identities: { lengths: [number, number, number]; masses: [number, number, number] | null; identity: string }[];
   limbs: { offsets: number[][]; tips: number[][]; cases: GoldenLimb[] };
 }

@@ -1,0 +1,120 @@
+/**
+ * An arm between the dance's way of reaching its hand tip and the marionette's. Both arms are seen in the frame of their chord,
+ * the line from shoulder to tip with the plane of the elbow about it. There they differ by little, and mixing their joints moves
+ * the tip by little; the arm is then closed on the target again, so that the tip is exact all the way. As `marionette/blend.py`.
+ */
+
+import { conjugate, multiply, rotate, slerp, type Numbers } from "../motion/rotation";
+import { about, across, addScaled, between, cross, dot, length, normalise, put, squareTo, unit } from "../motion/vector";
+import type { ArmRig } from "./limbs";
+
+/** How far the elbow of a straight arm is drawn to the marionette's side, in parts of the upper arm at weight 1. */
+const BELOW = 0.5;
+const ROUND = 2 * Math.PI;
+
+/** One arm on its way. It remembers which way round the elbow swings, so that it never changes its mind halfway. */
+export class ArmBlend {
+  private swivel: number | null = null;
+  private readonly direction = new Float64Array(3);
+  private readonly own = new Float64Array(3);
+  private readonly ownNormal = new Float64Array(3);
+  private readonly carried = new Float64Array(3);
+  private readonly side = new Float64Array(3);
+  private readonly rest = new Float64Array(3);
+  private readonly place = new Float64Array(3);
+  private readonly goal = new Float64Array(3);
+  private readonly frame = new Float64Array(4);
+  private readonly turn = new Float64Array(4);
+  private readonly before = new Float64Array(4);
+
+  constructor(private readonly rig: ArmRig) {}
+
+  /** Forgets the way it went. */
+  forget(): void {
+    this.swivel = null;
+  }
+
+  /**
+   * The joints (12) at `weight`: 0 gives back the dance's, 1 the bent arm's in the plane of `normal`.
+   *
+   * `dance` (12 at `danceAt`) are the pose's joints, `bent` (12) those of `ArmRig.bend` for the `target` (3, arm lengths, axes of
+   * vl5); `turn` (4) brings the direction of the dance's own hand to the target's, and `normal` is a unit vector (3) square to
+   * that. Between, the elbow goes to the nearest place from which forearm and hand reach the target; where the mixed wrist
+   * leaves none, the tip comes as near as it can.
+   */
+  joints(
+    out: Numbers, outAt: number, dance: Numbers, danceAt: number, bent: Numbers,
+    target: Numbers, turn: Numbers, normal: Numbers, weight: number,
+  ): void {
+    const { rig, direction, own, ownNormal, carried, side, frame } = this;
+    rig.direction(direction, 0, target, 0);
+    if (weight >= 1) {
+      this.swivel = null;
+      rig.chord(frame, 0, direction, normal);
+      multiply(out, outAt, frame, 0, bent, 0);
+      normalise(out, outAt);
+      for (let i = 4; i < 12; i++) out[outAt + i] = bent[i];
+      return;
+    }
+    rig.target(own, 0, dance, danceAt);
+    rig.direction(own, 0, own, 0);
+    rig.bendAxis(ownNormal, 0, dance, danceAt);
+    squareTo(ownNormal, 0, ownNormal, 0, own, 0);
+    if (!unit(ownNormal, 0, ownNormal, 0)) across(ownNormal, 0, own, 0);
+    rotate(carried, 0, turn, 0, ownNormal, 0);
+    cross(side, 0, carried, 0, normal, 0);
+    let swivel = Math.atan2(dot(side, 0, direction, 0), dot(carried, 0, normal, 0));
+    if (this.swivel !== null) swivel += ROUND * Math.round((this.swivel - swivel) / ROUND);
+    this.swivel = swivel;
+    if (weight <= 0) {
+      for (let i = 0; i < 12; i++) out[outAt + i] = dance[danceAt + i];
+      return;
+    }
+    rig.chord(frame, 0, own, ownNormal);
+    conjugate(frame, 0, frame, 0);
+    multiply(out, outAt, frame, 0, dance, danceAt);
+    for (let i = 4; i < 12; i++) out[outAt + i] = dance[danceAt + i];
+    for (let i = 0; i < 12; i += 4) {
+      slerp(out, outAt + i, out, outAt + i, bent, i, weight);
+      normalise(out, outAt + i);
+    }
+    this.close(out, outAt, length(target, 0), weight);
+    about(frame, 0, direction, 0, swivel * weight);
+    rotate(carried, 0, frame, 0, carried, 0);
+    rig.chord(frame, 0, direction, carried);
+    multiply(out, outAt, frame, 0, out, outAt);
+    normalise(out, outAt);
+  }
+
+  /** Turns shoulder and elbow by as little as brings the tip to `reach` arm lengths along the chord. */
+  private close(joints: Numbers, at: number, reach: number, weight: number): void {
+    const { rig, rest, place, goal, turn, before, side: mixed } = this;
+    const { links } = rig;
+    rotate(rest, 0, joints, at + 8, links, 6);
+    addScaled(rest, 0, links, 3, rest, 0, 1);
+    const near = length(links, 0), far = length(rest, 0);
+    const chord = Math.max(reach * rig.scale, 1e-9);
+    const along = Math.min(Math.max((near * near + chord * chord - far * far) / (2 * chord), -near), near);
+    const off = Math.sqrt(Math.max(near * near - along * along, 0));
+    rotate(mixed, 0, joints, at, links, 0);
+    // a straight arm leaves open to which side its elbow goes; that of the bent one is on the side of -y
+    put(place, 0, 0, mixed[1] - BELOW * weight * near, mixed[2]);
+    if (!unit(place, 0, place, 0)) put(place, 0, 0, -1, 0);
+    put(place, 0, along, off * place[1], off * place[2]);
+    multiply(before, 0, joints, at, joints, at + 4);
+    put(goal, 0, place[0] / near, place[1] / near, place[2] / near);
+    for (let i = 0; i < 3; i++) mixed[i] /= near;
+    between(turn, 0, mixed, 0, goal, 0);
+    multiply(joints, at, turn, 0, joints, at);
+    // what is below the elbow, as it lies and as it should
+    rotate(rest, 0, before, 0, rest, 0);
+    if (!unit(rest, 0, rest, 0)) put(rest, 0, 1, 0, 0);
+    put(goal, 0, chord - place[0], -place[1], -place[2]);
+    if (!unit(goal, 0, goal, 0)) put(goal, 0, 1, 0, 0);
+    between(turn, 0, rest, 0, goal, 0);
+    multiply(before, 0, turn, 0, before, 0);
+    conjugate(turn, 0, joints, at);
+    multiply(joints, at + 4, turn, 0, before, 0);
+    normalise(joints, at + 4);
+  }
+}

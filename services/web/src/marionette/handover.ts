@@ -1,0 +1,108 @@
+/**
+ * Between the dance and a puppeteer's hand: what keeps a limb from jumping when it is taken and let go. The *place* of the limb
+ * goes over at a bounded acceleration (`follow`), then the limb is solved; over the same time the joints are brought from the
+ * dance's way of reaching a place to the marionette's (`blend`), by the weight given here. As `marionette/handover.py`.
+ */
+
+import { multiply, rotate, slerp, type Numbers } from "../motion/rotation";
+import { between, normalise, put, unit } from "../motion/vector";
+
+/** Seconds from the dance's way of holding a limb to the marionette's. */
+export const TAKE = 0.15;
+/** Seconds from the marionette's way to the dance's. */
+export const GIVE_BACK = 0.35;
+/** Arm lengths per second squared: a quarter of an arm is crossed in 0.12 s. */
+export const HAND_ACCELERATION = 75;
+/** Radians per second squared. */
+export const THIGH_ACCELERATION = 60;
+/** Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds. */
+const RETURN = 0.3;
+const LEAST_ACCELERATION = 6;
+
+/**
+ * What brings a limb back in `RETURN` that is `distance` away and goes away at `speed`, by braking, speeding up and braking
+ * again; within `LEAST_ACCELERATION` and `most`.
+ */
+export function accelerationHome(distance: number, speed: number, most: number): number {
+  let low = LEAST_ACCELERATION, high = most;
+  for (let i = 0; i < 20; i++) {
+    const middle = 0.5 * (low + high);
+    const turned = distance + (speed * speed) / (2 * middle);
+    if (speed / middle + 2 * Math.sqrt(turned / middle) > RETURN) low = middle;
+    else high = middle;
+  }
+  return high;
+}
+
+/** 0 to 1 for x from 0 to 1, with no speed and no acceleration at either end (Flash and Hogan 1985). */
+export function minimumJerk(x: number): number {
+  return x * x * x * (10 + x * (6 * x - 15));
+}
+
+/** How far a limb is in its puppeteer's hands: `progress` 0 (the dance's) to 1, even in time. */
+export class Handover {
+  progress = 0;
+
+  /** Of the marionette's way of holding the limb, 0..1. */
+  get weight(): number {
+    return minimumJerk(this.progress);
+  }
+
+  /** `seconds` later, with the limb held or not. */
+  advance(held: boolean, seconds: number): void {
+    const step = held ? seconds / TAKE : -seconds / GIVE_BACK;
+    this.progress = Math.min(Math.max(this.progress + step, 0), 1);
+  }
+}
+
+/**
+ * The turn that brings the direction of the dance's hand to that of the pulled one, on a way round the shoulder. It is carried
+ * on from call to call, so that two hands that pass opposite each other do not make it change sides.
+ */
+export class Turn {
+  private readonly turn = new Float64Array(4);
+  private known = false;
+  private readonly here = new Float64Array(3);
+  private readonly there = new Float64Array(3);
+  private readonly onwards = new Float64Array(4);
+
+  /** Forgets the way it went. */
+  rest(): void {
+    this.known = false;
+  }
+
+  /**
+   * The turn (4) from the direction of `dance` (3) to that of `pulled` (3); all the way there, at `weight` 1, it starts afresh
+   * from the shortest.
+   */
+  follow(out: Numbers, outAt: number, dance: Numbers, pulled: Numbers, weight: number): void {
+    const { turn, here, there, onwards } = this;
+    if (!unit(here, 0, dance, 0)) put(here, 0, 0, -1, 0);
+    if (!unit(there, 0, pulled, 0)) put(there, 0, 0, -1, 0);
+    if (this.known) {
+      rotate(here, 0, turn, 0, here, 0);
+      between(onwards, 0, here, 0, there, 0);
+      multiply(turn, 0, onwards, 0, turn, 0);
+      normalise(turn, 0);
+    } else {
+      between(turn, 0, here, 0, there, 0);
+    }
+    this.known = weight < 1;
+    for (let i = 0; i < 4; i++) out[outAt + i] = turn[i];
+  }
+}
+
+/** The joints (12) between; exactly either at weight 0 and 1. */
+export function mixJoints(
+  out: Numbers, outAt: number, dance: Numbers, danceAt: number, hung: Numbers, hungAt: number, weight: number,
+): void {
+  if (weight <= 0 || weight >= 1) {
+    const from = weight >= 1 ? hung : dance, at = weight >= 1 ? hungAt : danceAt;
+    for (let i = 0; i < 12; i++) out[outAt + i] = from[at + i];
+    return;
+  }
+  for (let i = 0; i < 12; i += 4) {
+    slerp(out, outAt + i, dance, danceAt + i, hung, hungAt + i, weight);
+    normalise(out, outAt + i);
+  }
+}

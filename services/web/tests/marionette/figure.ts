@@ -1,0 +1,23 @@
+/** The figure of the golden vectors, and its arms' table. */
+
+import { readTable } from "../../src/marionette/arm";
+import { armProportions } from "../../src/marionette/limbs";
+import { bytes } from "../vectors";
+import { golden } from "./golden";
+
+export const figure = {
+  offsets: Float64Array.from(golden.limbs.offsets.flat()),
+  tips: Float64Array.from(golden.limbs.tips.flat()),
+};
+export const { identity } = armProportions(figure, 0);
+export const packed = bytes(golden.arms.find((arm) => arm.proportions === identity)!.table);
+export const table = readTable(packed);
+
+/** The angle between two rotations (4 each), radians. */
+export function turned(a: Float64Array, aAt: number, b: Float64Array, bAt: number): number {
+  let dot = 0, square = 0;
+  for (let i = 0; i < 4; i++) dot += a[aAt + i] * b[bAt + i];
+  const sign = Math.sign(dot);
+  for (let i = 0; i < 4; i++) square += (a[aAt + i] * sign - b[bAt + i]) ** 2;
+  return 4 * Math.asin(Math.min(Math.sqrt(square) / 2, 1));
+}
