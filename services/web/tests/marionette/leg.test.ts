@@ -48,10 +48,10 @@ test("a figure's shank hangs plumb, its knee never bends backwards, its ankle ke
       rig.hang(joints, 0, theta, rotations);
       multiply(q, 0, rotations, 0, rotations, 4);
       multiply(q, 0, q, 0, joints, 0);
-      rotate(link, 0, q, 0, figure.offsets, 3 * rig.hip + 3);
+      rotate(link, 0, q, 0, figure.offsets, 3 * rig.first + 3);
       const thigh = Array.from(link, (part) => part / Math.hypot(...link));
       multiply(q, 0, q, 0, joints, 4);
-      rotate(link, 0, q, 0, figure.offsets, 3 * rig.hip + 6);
+      rotate(link, 0, q, 0, figure.offsets, 3 * rig.first + 6);
       const shank = Array.from(link, (part) => part / Math.hypot(...link)), lifted = clampThigh(theta);
       expect(Math.abs(Math.cos(lifted) + thigh[1])).toBeLessThan(1e-9);
       const plumb = lifted >= 0 ? [0, -1, 0] : thigh;
