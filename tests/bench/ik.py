@@ -47,7 +47,7 @@ def path(proportions: Proportions, count: int) -> Array:
 
 
 def accuracy(random: np.random.Generator) -> dict[str, float]:
-    """The worst of the bodies, each told on a line of its own: as their tables have them, in whole thousandths, and
+    """The worst of the bodies, each told on a line of its own: as their tables have them, in ten-thousandths, and
     once more as they are, their bends from that nearest table."""
     print(f"{'body':<22}{'tip max':>10}{'angles mean':>13}{'p99':>8}{'max':>7} deg{'paper: mean':>14}{'max':>7} %")
     figures: dict[str, float] = {}
