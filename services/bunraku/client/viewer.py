@@ -23,6 +23,7 @@ from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore, Pose, SceneStore
 from bunraku.playout.clock import ReferenceClock
+from bunraku.playout.delay import PlayoutDelay
 from bunraku.playout.overlays import Overlays
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
@@ -98,12 +99,14 @@ class Viewer:
         self._track_number = 0
         self._scene_stores: dict[int, SceneStore] = {}
         self._overlays = Overlays()
+        self._delay = PlayoutDelay()
         self._early: list[float] = []
         self._decode = 0.0
         self._began = 0.0
 
     async def watch(self, seconds: float, on_frame: Callable[[int, Pose], None] | None = None) -> Figures:
-        """Watch for `seconds` at 60 frames a second; `on_frame` is told reference time and merged pose of each.
+        """Watch for `seconds` at 60 frames a second; `on_frame` is told reference time (of what is shown: the
+        play-out delay behind the clock) and merged pose of each.
 
         Raises `StreamEnded` where the server closes the stream, OSError where there is none.
         """
@@ -170,9 +173,12 @@ class Viewer:
             self._keep(message)
         elif isinstance(message, Overlay):
             self.figures.overlays += 1
-            now = self.clock.at(_local())
+            local = _local()
+            late = self.clock.at(local) - message.due
             if self.clock.ready:
-                self._early.append((message.due - now) / 1e3)
+                self._early.append(-late / 1e3)
+                # its first frame is gone to from the last one of the message before
+                self._delay.heard(late + (len(message.earlier) + 1) * Overlay.FRAME, local)
             self._overlays.put(message)
         elif isinstance(message, Pong):
             self.clock.pong(message.sent, message.received, message.answered, _local())
@@ -237,7 +243,8 @@ class Viewer:
         loop = asyncio.get_running_loop()
         due, end, dark = loop.time(), loop.time() + seconds, False
         while loop.time() < end:
-            reference = self.clock.at(_local())
+            local = _local()
+            reference = self.clock.at(local) - round(self._delay.at(local))
             pose = self.pose_at(reference)
             if (camera := self.camera_at(reference)) is not None:
                 x = camera.tolist()

@@ -16,11 +16,11 @@ TAKE = 0.150
 """Seconds from the dance's way of holding a limb to the marionette's."""
 GIVE_BACK = 0.350
 """Seconds from the marionette's way to the dance's."""
-HAND_ACCELERATION = 75.0
-"""Arm lengths per second squared: a quarter of an arm is crossed in 0.12 s."""
+HAND_ACCELERATION = 79.0
+"""Arm lengths per second squared: a quarter of an arm is crossed in 0.11 s."""
 THIGH_ACCELERATION = 60.0
 """Radians per second squared."""
-RETURN = 0.300
+RETURN = 0.280
 """Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds."""
 LEAST_ACCELERATION = 6.0
 

@@ -12,6 +12,8 @@ export interface LineFigures {
   clockErrorMs: number | null;
   /** How late overlays come after they are due; below zero, how early. */
   latencyMs: number | null;
+  /** How much later than the reference clock the stage is shown, so that overlays have come when they are due. */
+  playoutDelayMs: number;
   /** From the making of this viewer to its first pose. */
   firstPoseMs: number | null;
   /** How often the block needed was missing while playing. */

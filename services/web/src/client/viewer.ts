@@ -6,10 +6,11 @@ import type { Rate } from "../codec/timing";
 import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
 import type { BlockStore } from "../playout/blocks";
 import { ReferenceClock } from "../playout/clock";
+import { PlayoutDelay } from "../playout/delay";
 import { Overlays } from "../playout/overlay";
 import { positionAt, Timelines } from "../playout/timeline";
 import { Tracks } from "../playout/tracks";
-import type { Data, Description, Edit, Message, Overlay, Presence, TimelineState } from "../wire/messages";
+import { type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState } from "../wire/messages";
 import { Connection } from "./connection";
 import type { LineFigures } from "./line-figures";
 import { fetchMarionette } from "./marionette";
@@ -61,6 +62,7 @@ export class Viewer extends EventTarget {
   private readonly started: number;
   private readonly timelines = new Timelines();
   private readonly overlays = new Overlays();
+  private readonly delay = new PlayoutDelay();
   private readonly meter = new Meter();
   private readonly reporting: ReturnType<typeof setInterval>;
   private pinging: ReturnType<typeof setTimeout> | undefined;
@@ -136,9 +138,14 @@ export class Viewer extends EventTarget {
     return this.clock.ready ? this.clock.at(nowMs * 1000) : null;
   }
 
+  /** The reference time that the stage shows at local `nowMs`, microseconds: earlier by the play-out delay. */
+  shownTime(nowMs: number): number {
+    return this.clock.at(nowMs * 1000) - this.delay.at(nowMs * 1000);
+  }
+
   /** Seconds in the motion at local `nowMs`. */
   positionAt(nowMs: number): number {
-    const clock = this.clock.at(nowMs * 1000);
+    const clock = this.shownTime(nowMs);
     const timeline = this.timelines.at(clock);
     return timeline ? positionAt(timeline, clock) / 1e6 : 0;
   }
@@ -149,7 +156,7 @@ export class Viewer extends EventTarget {
    */
   poseAt(nowMs: number): Pose | null {
     const { store, dance, merged } = this;
-    const clock = this.clock.at(nowMs * 1000);
+    const clock = this.shownTime(nowMs);
     const timeline = this.timelines.at(clock);
     if (!store || !timeline || timeline.motion !== this.motion) return null;
     const position = positionAt(timeline, clock);
@@ -180,7 +187,7 @@ export class Viewer extends EventTarget {
    * are any; where the block needed is missing they stand still. The storage is used again by the next call.
    */
   sceneAt(nowMs: number, scene = 0): Float64Array | null {
-    const clock = this.clock.at(nowMs * 1000);
+    const clock = this.shownTime(nowMs);
     const timeline = this.timelines.at(clock);
     if (!timeline || timeline.motion !== this.motion) return null;
     return this.tracks?.scenes[scene]?.sceneAt(positionAt(timeline, clock), timeline.loop, timeline.duration) ?? null;
@@ -218,6 +225,7 @@ export class Viewer extends EventTarget {
       clockOffsetMs: known ? clock.offset / 1000 - performance.timeOrigin : null,
       clockErrorMs: known ? clock.error / 1000 : null,
       latencyMs: this.latency,
+      playoutDelayMs: this.delay.at(now * 1000) / 1000,
       firstPoseMs: this.firstPoseMs,
       gaps: this.gaps,
       reason: this.reason(),
@@ -386,8 +394,10 @@ export class Viewer extends EventTarget {
 
   private overlay(message: Overlay, now: number): void {
     this.overlays.put(message);
-    const late = (this.clock.at(now * 1000) - message.due) / 1000;
-    this.latency = this.latency === null ? late : this.latency + NEWEST * (late - this.latency);
+    const late = this.clock.at(now * 1000) - message.due;
+    this.latency = this.latency === null ? late / 1000 : this.latency + NEWEST * (late / 1000 - this.latency);
+    // its first frame is gone to from the last one of the message before
+    if (Number.isFinite(this.clock.error)) this.delay.heard(late + (message.earlier.length + 1) * OVERLAY_FRAME, now * 1000);
   }
 
   private tell(event: string): void {

@@ -149,6 +149,23 @@ test("overlays lie over the dance on clock time, and their lateness is measured"
   expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);
 });
 
+test("overlays that come late are shown as much later, and the dance with them", () => {
+  watching();
+  Line.last.say(data(0, 1, best));
+  Line.last.say({ name: "Pong", sequence: 0, sent: 0, received: UNIX, answered: UNIX });
+  const limbs = new Map([[0, new Int16Array(9)]]);
+  for (let nth = 0; nth < 150; nth++) {
+    // the first of two frames is needed 33 ms before the last is due: both come 50 ms too late
+    const due = UNIX + now * 1000 - 50_000 + 2 * 16_667;
+    Line.last.say({ name: "Overlay", sequence: nth, due, limbs, earlier: [limbs] });
+    pass(100 / 3);
+    expect((viewer.shownTime(now) - UNIX) / 1e6 + viewer.line().playoutDelayMs / 1000).toBeCloseTo(now / 1000, 6);
+    expect(viewer.positionAt(now)).toBeCloseTo(((viewer.shownTime(now) - UNIX) / 1e6) % 2.6, 6);
+  }
+  expect(viewer.line().playoutDelayMs).toBeCloseTo(60, 6);
+  expect(viewer.shownTime(now)).toBeCloseTo(viewer.clockTime(now)! - 60_000, -1);
+});
+
 test("pings in a burst, then every two seconds, and takes the smallest round trip", () => {
   watching();
   pass(60 * 7);
