@@ -25,7 +25,7 @@ from bunraku.marionette.bodies import BODIES
 from bunraku.marionette.paper import PAPER_BYTES
 from bunraku.marionette.proportions import OUTER_RADIUS, Proportions
 from bunraku.motion.rotation import Array
-from tests.bench import ik_accuracy
+from tests.bench import ik_accuracy, smoothness
 from tests.bench.ik_peers import Node, Slsqp, processor_rate
 
 ROUNDS = 5
@@ -137,6 +137,7 @@ def main() -> None:
     figures = accuracy(random)
     figures |= {"table_bytes": table.TABLE_BYTES, "paper_table_bytes": PAPER_BYTES}
     figures |= speeds(random)
+    figures |= smoothness.measure()
     print()
     print(
         json.dumps(

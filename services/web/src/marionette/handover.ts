@@ -11,12 +11,12 @@ import { between, dot, normalise, put, unit } from "../motion/vector";
 export const TAKE = 0.15;
 /** Seconds from the marionette's way to the dance's. */
 export const GIVE_BACK = 0.35;
-/** Arm lengths per second squared: a quarter of an arm is crossed in 0.12 s. */
-export const HAND_ACCELERATION = 75;
+/** Arm lengths per second squared: a quarter of an arm is crossed in 0.11 s. */
+export const HAND_ACCELERATION = 79;
 /** Radians per second squared. */
 export const THIGH_ACCELERATION = 60;
 /** Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds. */
-const RETURN = 0.3;
+const RETURN = 0.28;
 const LEAST_ACCELERATION = 6;
 
 /**
