@@ -60,6 +60,7 @@ def test_a_log_replays_to_the_last_bit() -> None:
     again = Log.unpack(log.pack())
     replayed = dict(again.replay(lambda _: FIGURE, pose_at))
     assert any(shown.values())
+    assert again.known_from == 0
     assert {due: over.rotations.tobytes() if over else None for due, over in replayed.items()} == {
         due: data for due, data in shown.items() if due in replayed
     }
@@ -90,14 +91,20 @@ def test_a_log_is_bounded_and_what_is_left_still_replays(monkeypatch: pytest.Mon
     replayed = dict(log.replay(lambda _: FIGURE, pose_at))
     assert replayed
     assert min(replayed) > 0
+    assert 0 < log.known_from <= min(replayed)
+    assert Log.unpack(log.pack()).known_from == log.known_from
     assert all((over.rotations.tobytes() if over else None) == shown[due] for due, over in replayed.items())
 
 
 def test_a_passage_that_is_too_long_replays_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(logs, "MOST_BYTES", 200)
     log = Log()
-    pulled(log, 40)
+    shown = pulled(log, 40)
     assert all(over is None for _, over in log.replay(lambda _: FIGURE, pose_at))
+    assert log.known_from == max(shown) + 1
+    # once the dance was alone again, all is known from there
+    pulled(log, 100, 40)
+    assert log.known_from < 140 * FRAME
 
 
 def test_the_dancer_may_change_while_limbs_are_held() -> None:
