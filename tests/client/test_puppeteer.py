@@ -65,3 +65,26 @@ async def test_what_a_noisy_source_says_is_steadied_before_it_is_sent() -> None:
     # the first as it is, those close after it hardly elsewhere; without the filter as it is
     np.testing.assert_allclose([m.values for m in said[:5]], [[0.3, 0.5, 0.4]] * 5, atol=0.02)
     np.testing.assert_allclose(said[5].values, [0.9, 0, 0], atol=1e-6)
+
+
+async def test_a_held_limb_is_asked_for_and_given(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+        async with Puppeteer(client, session, "Aiko") as aiko, Puppeteer(client, session, "Ben") as ben:
+            await ben.ask("right_leg")
+            await aiko.claim("left_hand")
+            asking = asyncio.create_task(ben.ask("left_hand"))
+            async with asyncio.timeout(10):
+                while aiko.presence is None or not aiko.presence.asks[0]:  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            assert aiko.presence.asks[0] == [ben.id]
+            await aiko.release("left_hand")
+            await asking
+            await ben.target("left_hand", 0.3, 0.2, 0.4)
+            with pytest.raises(Refused, match="not given"):
+                await aiko.ask("left_hand", seconds=0.2)
+            await ben.target("left_hand", 50.0, 0.2, 0.4)
+            async with asyncio.timeout(10):
+                while ben.notice is None:  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            assert (ben.notice.limb, ben.notice.reason) == (0, "reach")
