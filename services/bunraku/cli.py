@@ -56,7 +56,13 @@ def up(
             webbrowser.open(url)
 
     out.print("Setting the stage ..." if demo else "Starting ...")
-    asyncio.run(serve(settings, listening, demo=demo, ready=ready))
+    serving = serve(settings, listening, demo=demo, ready=ready)
+    if sys.platform == "win32":
+        asyncio.run(serving)
+    else:
+        import uvloop
+
+        uvloop.run(serving)
     out.print("The curtain falls.")
 
 

@@ -25,6 +25,7 @@ import bunraku.stream.app
 from bunraku import __version__
 from bunraku.backing import problems
 from bunraku.backing.backing import Backing, open_backing
+from bunraku.backing.direct import DirectProtocol
 from bunraku.backing.settings import Settings
 from bunraku.codec import decode
 from bunraku.demo import add_demo
@@ -101,7 +102,7 @@ async def serve(settings: Settings, listening: socket.socket, *, demo: bool, rea
         async with compose(settings, demo=demo) as app:
             config = uvicorn.Config(
                 app,
-                ws="websockets-sansio",
+                ws=DirectProtocol,
                 ws_max_size=LARGEST_FROM_CLIENT,
                 ws_per_message_deflate=False,
                 lifespan="off",

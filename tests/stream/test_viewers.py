@@ -5,6 +5,7 @@ import asyncio
 import pytest
 
 from bunraku.backing.backing import clock
+from bunraku.backing.direct import frame
 from bunraku.backing.library import Library, pack
 from bunraku.backing.sockets import TOO_SLOW, Refusal
 from bunraku.codec.encode import encode_motion
@@ -74,7 +75,8 @@ async def test_only_the_newest_overlay_waits(library: Library) -> None:
     sending = asyncio.create_task(viewer.send(line.put))
     await asyncio.sleep(0)
     for number in range(100):
-        viewer.overlay(Overlay(number, 5, {}).pack())
+        message = Overlay(number, 5, {}).pack()
+        viewer.overlay(message, frame(message))
     line.open.set()
     overlays = await line.count(Overlay, 1)
     await line.count(Data, 5)
@@ -138,3 +140,41 @@ async def test_only_the_tracks_that_are_wanted_are_sent(library: Library) -> Non
     await line.count(Pong, 1)
     sending.cancel()
     assert [(d.track, d.index) for d in data if isinstance(d, Data)] == [(2, 0), (2, 1)]
+
+
+async def test_an_overlay_goes_past_the_queue_only_where_nothing_else_waits(library: Library) -> None:
+    written: list[bytes] = []
+    ready = [True]
+
+    def write(framed: bytes) -> bool:
+        if ready[0]:
+            written.append(framed)
+        return ready[0]
+
+    viewer, line = Viewer(library, None, write=write), Line()
+    message = Overlay(1, 5, {}).pack()
+    # nothing was said yet: the Description must come first
+    viewer.overlay(message, frame(message))
+    assert written == []
+    viewer.timeline(timeline.start("two", 2_000_000, clock()))
+    sending = asyncio.create_task(viewer.send(line.put))
+    await line.count(Overlay, 1)
+    await line.count(Data, 4)
+    async with asyncio.timeout(10):
+        while not viewer._resting:  # noqa: ASYNC110
+            await asyncio.sleep(0)
+    viewer.overlay(message, frame(message))
+    assert written == [frame(message)]
+    # a presence that waits goes before it
+    viewer.control(Presence(1, [], [None] * 4).pack())
+    viewer.overlay(message, frame(message))
+    assert len(written) == 1
+    before = len(line.sent)
+    await line.count(Presence, 1)
+    await line.count(Overlay, 2)
+    assert [type(unpack(m)) for m in line.sent[before:]][:2] == [Presence, Overlay]
+    ready[0] = False
+    viewer.overlay(message, frame(message))
+    await line.count(Overlay, 3)
+    sending.cancel()
+    await asyncio.gather(sending, return_exceptions=True)

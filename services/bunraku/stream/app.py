@@ -9,6 +9,7 @@ from fastapi import FastAPI, Query, Response, WebSocket
 from bunraku.backing import problems, sockets
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.bus import NobodyAnswers
+from bunraku.backing.direct import writer
 from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
@@ -60,7 +61,7 @@ def create_app(backing: Backing) -> FastAPI:
     ) -> None:
         try:
             await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wanted(tracks))
+            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket))
             found = await backing.library.get(motion)
             if found is None:
                 raise Refusal(sockets.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
@@ -75,7 +76,7 @@ def create_app(backing: Backing) -> FastAPI:
     async def watch_session(socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "") -> None:
         try:
             await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wanted(tracks))
+            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket))
             try:
                 await sessions.join(session, viewer)
             except NobodyAnswers:

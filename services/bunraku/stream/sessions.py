@@ -7,6 +7,7 @@ import secrets
 import msgpack
 
 from bunraku.backing.bus import Bus, Subscription
+from bunraku.backing.direct import frame
 from bunraku.stream.viewers import Viewer
 from bunraku.wire.messages import MalformedMessage, Presence, TimelineState, unpack
 
@@ -35,7 +36,7 @@ class WatchedSession:
         viewer.timeline(_timeline(self._timeline))
         viewer.control(self._presence)
         if self._overlay is not None:
-            viewer.overlay(self._overlay)
+            viewer.overlay(self._overlay, frame(self._overlay))
         self._count()
 
     def leave(self, viewer: Viewer) -> bool:
@@ -68,8 +69,9 @@ class WatchedSession:
     def _on_overlay(self, message: bytes) -> None:
         # who joins while a limb is pulled starts from here; an empty mask says that none is
         self._overlay = message if message[1] else None
+        framed = frame(message)
         for viewer in self._viewers:
-            viewer.overlay(message)
+            viewer.overlay(message, framed)
 
 
 class WatchedSessions:

@@ -15,6 +15,7 @@ from starlette.websockets import WebSocket
 
 from bunraku import __version__
 from bunraku.backing.backing import clock
+from bunraku.backing.direct import Write
 from bunraku.backing.library import Library, StoredMotion
 from bunraku.backing.sockets import BROKEN, NOT_FOUND, TOO_SLOW, Refusal, converse, receive
 from bunraku.codec.coefficients import SCENE_CHANNELS
@@ -43,8 +44,13 @@ TRACKS = ("motion", "audio", "camera", "light")
 class Viewer:
     """What one viewer has been sent and is still to be sent."""
 
-    def __init__(self, library: Library, pinned: int | None, wanted: Container[str] = TRACKS) -> None:
-        """`pinned` is the rate to keep to, if any; `wanted` the types of tracks whose blocks are sent."""
+    def __init__(
+        self, library: Library, pinned: int | None, wanted: Container[str] = TRACKS, write: Write | None = None
+    ) -> None:
+        """`pinned` is the rate to keep to, if any; `wanted` the types of tracks whose blocks are sent; `write` writes a
+        frame past the queue, where the server can."""
+        self._write = write
+        self._resting = False
         self._library = library
         self._pinned = pinned
         self._wanted = wanted
@@ -66,8 +72,11 @@ class Viewer:
             self._control.append(message)
         self._wake.set()
 
-    def overlay(self, message: bytes) -> None:
-        """The newest overlay; one that was not sent yet is replaced."""
+    def overlay(self, message: bytes, framed: bytes) -> None:
+        """The newest overlay, and its frame: written at once where nothing else waits, else one that was not sent yet
+        is replaced."""
+        if self._resting and not self._wake.is_set() and self._write is not None and self._write(framed):
+            return
         self._overlay = message
         self._wake.set()
 
@@ -142,9 +151,13 @@ class Viewer:
         """Until something is to be sent again."""
         state = self._timelines.at(clock())
         wait = self._pacer.wait(state, clock()) if state is not None and self._pacer is not None else None
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(None if wait is None else wait / 1e6):
-                await self._wake.wait()
+        self._resting = True
+        try:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(None if wait is None else wait / 1e6):
+                    await self._wake.wait()
+        finally:
+            self._resting = False
 
 
 def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
