@@ -24,7 +24,7 @@ export const SPEED = 1.68;
 /** Arm lengths that the elbow is off the chord at most, for each arm length that the tip is short of full stretch. */
 const SLOPE = 2.4;
 /** Arm lengths per second that are there for the swing in any case. */
-export const LEAST_SPEED = 0.1;
+const LEAST_SPEED = 0.1;
 /** Radians that an upper arm keeps from where no shoulder goes. */
 const CLEAR = 1e-7;
 /** Arm lengths per second that the elbow leaves or nears the chord beyond what the tip asks for. */
