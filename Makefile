@@ -14,7 +14,7 @@ UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/index.html services/web/vite.config.ts services/bunraku/codec/prior.json -type f 2>/dev/null)
 
-.PHONY: help setup demo test lint test-python test-web vectors prior clean
+.PHONY: test-nightly help setup demo test lint test-python test-web vectors prior clean
 
 help:
 	@echo "make demo    set everything up and open the dancing puppet   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
@@ -72,6 +72,10 @@ lint: .setup/python
 
 test-python: setup
 	$(BIN)/pytest
+
+# the merge beside its model for a million steps, some fifteen minutes
+test-nightly: setup
+	BUNRAKU_MERGE_STEPS=1000000 $(BIN)/pytest --timeout=7200 tests/marionette/test_merge_model.py
 
 test-web: .setup/page
 	cd services/web && npm run --silent check && npm test --silent

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bunraku.client import Client, Puppeteer, Refused, Viewer
+from bunraku.client import Client, OneEuro, Puppeteer, Refused, Viewer
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import INDEX, world
 from bunraku.playout.blocks import Pose
+from bunraku.wire.messages import Input, unpack
 
 
 async def test_a_pulled_hand_is_seen_where_it_was_pulled_by_others(server: str, clip_file: Path) -> None:
@@ -43,3 +44,47 @@ async def test_pulling_what_one_does_not_hold_is_refused(server: str, clip_file:
         async with Puppeteer(client, session) as puppeteer:
             with pytest.raises(Refused, match="not held"):
                 await puppeteer.velocity("right_hand", 1)
+
+
+async def test_what_a_noisy_source_says_is_steadied_before_it_is_sent() -> None:
+    said: list[Input] = []
+
+    class Overheard(Puppeteer):
+        async def _send(self, data: bytes) -> None:
+            message = unpack(data)
+            assert isinstance(message, Input)
+            said.append(message)
+
+    async with Client("http://127.0.0.1:1") as client:
+        puppeteer = Overheard(client, "nowhere")
+        puppeteer._epochs[0] = 1
+        smooth = OneEuro(min_cutoff=0.01, beta=0.0)
+        for way in (0, 1, -1, 1, -1):
+            await puppeteer.target("left_hand", 0.3 + 0.1 * way, 0.5, 0.4, smooth=smooth)
+        await puppeteer.target("left_hand", 0.9)
+    # the first as it is, those close after it hardly elsewhere; without the filter as it is
+    np.testing.assert_allclose([m.values for m in said[:5]], [[0.3, 0.5, 0.4]] * 5, atol=0.02)
+    np.testing.assert_allclose(said[5].values, [0.9, 0, 0], atol=1e-6)
+
+
+async def test_a_held_limb_is_asked_for_and_given(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+        async with Puppeteer(client, session, "Aiko") as aiko, Puppeteer(client, session, "Ben") as ben:
+            await ben.ask("right_leg")
+            await aiko.claim("left_hand")
+            asking = asyncio.create_task(ben.ask("left_hand"))
+            async with asyncio.timeout(10):
+                while aiko.presence is None or not aiko.presence.asks[0]:  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            assert aiko.presence.asks[0] == [ben.id]
+            await aiko.release("left_hand")
+            await asking
+            await ben.target("left_hand", 0.3, 0.2, 0.4)
+            with pytest.raises(Refused, match="not given"):
+                await aiko.ask("left_hand", seconds=0.2)
+            await ben.target("left_hand", 50.0, 0.2, 0.4)
+            async with asyncio.timeout(10):
+                while ben.notice is None:  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            assert (ben.notice.limb, ben.notice.reason) == (0, "reach")

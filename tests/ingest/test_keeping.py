@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from bunraku.backing import library
 from bunraku.backing.library import StoredMotion
@@ -11,7 +12,8 @@ from bunraku.ingest.keeping import film, keep
 from bunraku.ingest.order import Order
 from bunraku.ingest.results import Made, Refused
 from bunraku.ingest.showing import Showing
-from bunraku.marionette.log import Log
+from bunraku.marionette.log import Log, LoggedMarionette
+from bunraku.marionette.merge import Marionette
 from bunraku.motion.skeleton import points
 from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore, SceneStore
@@ -129,6 +131,23 @@ def test_a_dance_that_began_within_the_interval_is_kept_from_there() -> None:
     one = timeline.start("one", 3 * SECOND, BEGAN)
     order = Order(log="l", begin=BEGAN - SECOND, end=BEGAN + SECOND)
     assert kept_of(keep("kept", order, log_of(one), DANCES))[0].track.frames == 60
+
+
+def test_what_is_no_longer_remembered_is_not_kept_as_if_nothing_had_been_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bunraku.marionette.log.MOST_BYTES", 100)
+    log = Log()
+    log.timeline(timeline.start("one", 3 * SECOND, BEGAN))
+    puppet = LoggedMarionette(Marionette(DANCES["one"].track.figure), "one", log)
+    puppet.claim(0, "ada", BEGAN)
+    for later in range(1, 30):
+        puppet.alive("ada", [0], BEGAN + later * SECOND // 10)
+    order = Order(log="l", begin=BEGAN + SECOND, end=BEGAN + 5 * SECOND)
+    refused = keep("kept", order, log.pack(), DANCES)
+    assert isinstance(refused, Refused)
+    assert (refused.title, refused.field) == ("Too long ago", "seconds")
+    assert "the last 2 s" in refused.detail
+    later_on = Order(log="l", begin=BEGAN + 3 * SECOND, end=BEGAN + 4 * SECOND)
+    assert kept_of(keep("kept", later_on, log.pack(), DANCES))[0].track.frames == 60
 
 
 def test_a_camera_that_is_none_is_refused() -> None:

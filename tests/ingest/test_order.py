@@ -1,48 +1,30 @@
 from __future__ import annotations
 
-from typing import Any
+import pickle
 
-import msgpack
 import pytest
+from pydantic import ValidationError
 
-from bunraku.backing.problems import ProblemError
-from bunraku.ingest.order import MOST_SECONDS, Order
-
-GOOD: dict[str, Any] = {"log": "l", "name": "Mine", "begin": 1_000_000, "end": 3_000_000, "camera": [[1, *range(7)]]}
-
-
-def test_an_order_is_read_as_it_was_sent() -> None:
-    order = Order.unpack(msgpack.packb(GOOD | {"later": "more"}))
-    assert (order.log, order.name, order.begin, order.end) == ("l", "Mine", 1_000_000, 3_000_000)
-    assert order.camera == [[1, 0, 1, 2, 3, 4, 5, 6]]
-    assert order.frames == 120
-    short = Order.unpack(msgpack.packb({key: GOOD[key] for key in ("log", "begin", "end")}))
-    assert (short.name, short.camera) == (None, [])
+from bunraku.ingest.order import FPS, Order
 
 
 @pytest.mark.parametrize(
-    ("change", "field"),
-    [
-        ({"log": None}, "log"),
-        ({"begin": -1}, "begin"),
-        ({"end": "late"}, "end"),
-        ({"end": 1_000_000}, "seconds"),
-        ({"end": 999}, "seconds"),
-        ({"end": 2_000_000 + MOST_SECONDS * 1_000_000}, "seconds"),
-        ({"name": "n" * 201}, "name"),
-        ({"camera": [[1, 2]]}, "camera[0]"),
-        ({"camera": [[1, *range(7)], [2, *range(6), float("nan")]]}, "camera[1][7]"),
-        ({"camera": [[2, *range(7)], [2, *range(7)]]}, "camera"),
-    ],
+    ("length", "frames"), [(0, 0), (8_000, 0), (9_000, 1), (1_000_000, FPS), (600_000_000, 36_000)]
 )
-def test_what_is_wrong_is_said_with_its_field(change: dict[str, Any], field: str) -> None:
-    with pytest.raises(ProblemError) as refused:
-        Order.unpack(msgpack.packb(GOOD | change))
-    assert refused.value.status == 422
-    assert refused.value.extra["field"] == field
+def test_frames_are_counted_by_the_clock(length: int, frames: int) -> None:
+    assert Order(log="l", begin=5, end=5 + length).frames == frames
 
 
-@pytest.mark.parametrize("data", [b"", b"\xc1", b"\x01", b"\x81\x01", msgpack.packb([1])])
-def test_what_is_no_order_is_refused(data: bytes) -> None:
-    with pytest.raises(ProblemError):
-        Order.unpack(data)
+def test_an_interval_that_runs_back_has_no_frames() -> None:
+    assert Order(log="l", begin=9_000_000, end=1).frames == 0
+
+
+def test_what_is_not_known_is_skipped_and_what_is_wrong_refused() -> None:
+    assert Order.model_validate({"log": "l", "begin": 1, "end": 2, "later": 3}).camera == []
+    with pytest.raises(ValidationError, match="begin"):
+        Order.model_validate({"log": "l", "end": 2})
+
+
+def test_it_goes_to_another_process_and_back() -> None:
+    order = Order(log="l", name="n", begin=1, end=2, camera=[[1.0] * 8])
+    assert pickle.loads(pickle.dumps(order)) == order

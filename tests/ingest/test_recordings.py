@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+import multiprocessing
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -10,10 +11,12 @@ import pytest
 
 from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.bus import NobodyAnswers
+from bunraku.backing.problems import ProblemError
 from bunraku.backing.settings import Settings
 from bunraku.ingest import recordings
 from bunraku.ingest.app import create_app
-from bunraku.ingest.recordings import SUBJECT
+from bunraku.ingest.order import MOST_SECONDS
+from bunraku.ingest.recordings import SUBJECT, read_order
 from bunraku.ingest.uploads import Uploads
 from bunraku.marionette.log import Log
 from bunraku.playout import timeline
@@ -126,6 +129,14 @@ async def test_one_that_takes_too_long_is_ended(backing: Backing, dance: str, mo
     assert [e.id for e in (await backing.catalogue.page(9))[0]] == [dance]
 
 
+async def test_one_who_no_longer_waits_leaves_nothing_behind(backing: Backing, dance: str) -> None:
+    with pytest.raises(NobodyAnswers):
+        await backing.bus.ask(SUBJECT, order(), seconds=0.1)
+    assert not multiprocessing.active_children()
+    assert [e.id for e in (await backing.catalogue.page(9))[0]] == [dance]
+    assert "motion" in await ask(backing, order())
+
+
 async def test_nobody_answers_when_the_service_has_ended(tmp_path: Path) -> None:
     async with open_backing(Settings(data=tmp_path)) as opened:
         app = create_app(opened)
@@ -133,3 +144,43 @@ async def test_nobody_answers_when_the_service_has_ended(tmp_path: Path) -> None
             pass
         with pytest.raises(NobodyAnswers):
             await opened.bus.ask(SUBJECT, order())
+
+
+GOOD: dict[str, Any] = {"log": "l", "name": "Mine", "begin": 1_000_000, "end": 3_000_000, "camera": [[1, *range(7)]]}
+
+
+def test_an_order_is_read_as_it_was_sent() -> None:
+    order = read_order(msgpack.packb(GOOD | {"later": "more"}))
+    assert (order.log, order.name, order.begin, order.end) == ("l", "Mine", 1_000_000, 3_000_000)
+    assert order.camera == [[1, 0, 1, 2, 3, 4, 5, 6]]
+    assert order.frames == 120
+    short = read_order(msgpack.packb({key: GOOD[key] for key in ("log", "begin", "end")}))
+    assert (short.name, short.camera) == (None, [])
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"log": None}, "log"),
+        ({"begin": -1}, "begin"),
+        ({"end": "late"}, "end"),
+        ({"end": 1_000_000}, "seconds"),
+        ({"end": 999}, "seconds"),
+        ({"end": 2_000_000 + MOST_SECONDS * 1_000_000}, "seconds"),
+        ({"name": "n" * 201}, "name"),
+        ({"camera": [[1, 2]]}, "camera[0]"),
+        ({"camera": [[1, *range(7)], [2, *range(6), float("nan")]]}, "camera[1][7]"),
+        ({"camera": [[2, *range(7)], [2, *range(7)]]}, "camera"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_field(change: dict[str, Any], field: str) -> None:
+    with pytest.raises(ProblemError) as refused:
+        read_order(msgpack.packb(GOOD | change))
+    assert refused.value.status == 422
+    assert refused.value.extra["field"] == field
+
+
+@pytest.mark.parametrize("data", [b"", b"\xc1", b"\x01", b"\x81\x01", msgpack.packb([1])])
+def test_what_is_no_order_is_refused(data: bytes) -> None:
+    with pytest.raises(ProblemError):
+        read_order(data)

@@ -93,7 +93,7 @@ def test_it_shows_again_what_a_viewer_saw_from_any_instant_on() -> None:
     stage = pulled_twice("one")
     log = Log.unpack(stage.log.pack())
     plain = Showing(log, DANCES)
-    for first in (0, 31, 60, 150, 200, 260):
+    for first in (0, 31, 60, 150, 200, 230):
         part = stage.seen[first:]
         shown = list(Showing(log, DANCES).poses([clock for clock, _ in part]))
         moved = 0.0
@@ -105,6 +105,30 @@ def test_it_shows_again_what_a_viewer_saw_from_any_instant_on() -> None:
             np.testing.assert_allclose(again[1], seen[1], atol=1e-9)
             moved = max(moved, float(np.abs(again[1] - dance[1]).max()))
         assert moved > 0.1
+
+
+def test_it_shows_again_what_was_pulled_through_a_pause_a_seek_and_another_dance() -> None:
+    stage = Stage("one")
+    grant = stage.puppet.claim(1, "ada", stage.now)
+    assert isinstance(grant, Grant)
+    changed = 0
+    for number, now in enumerate(stage.run(4.0)):
+        values = (0.5 + 0.3 * np.sin(number / 9), 0.2, 0.4)
+        stage.puppet.input("ada", Input(1, 1, grant.epoch, number + 1, now, values), now)
+        if number == 40:
+            stage.edit(timeline.edit(stage.state, now + LEAD, playing=False))
+        elif number == 70:
+            stage.edit(timeline.edit(stage.state, now + LEAD, playing=True, position=SECOND // 3))
+        elif number == 130:
+            stage.puppet.set_figure(DANCES["two"].track.figure, "two", now)
+            stage.edit(timeline.change(stage.state, now + LEAD, "two", DANCES["two"].track.duration_us))
+            changed = now + LEAD
+    for part in (stage.seen, [(clock, pose) for clock, pose in stage.seen if clock >= changed]):
+        shown = Showing(Log.unpack(stage.log.pack()), DANCES).poses([clock for clock, _ in part])
+        for (_, seen), again in zip(part, shown, strict=True):
+            assert again is not None
+            np.testing.assert_allclose(again[0], seen[0], atol=1e-12)
+            np.testing.assert_allclose(again[1], seen[1], atol=1e-9)
 
 
 def test_timelines_hold_from_when_they_are_due() -> None:

@@ -10,7 +10,7 @@ from bunraku.motion.rotation import Array
 
 ARMS = tuple(
     Proportions.parse(identity)
-    for identity in ("396-352-252-532-344-124", "400-400-200-334-333-333", "300-300-400-560-320-120")
+    for identity in ("3963-3523-2514-5316-3440-1244", "400-400-200-334-333-333", "300-300-400-560-320-120")
 )
 
 

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bunraku.marionette import arms, table
-from bunraku.marionette.arm import Arm, bend_limits
+from bunraku.marionette.arm import Arm, Table, bend_limits
 from bunraku.marionette.proportions import ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, Proportions
 from tests.marionette.arms import ARMS, reachable
 
@@ -94,3 +94,58 @@ def test_straight_below_faces_forwards() -> None:
     assert solved.azimuth.tolist() == [0.0, 0.0]
     assert solved.elbow[0, 2] < 0.0  # the elbow points back as a forearm is lifted forwards
     np.testing.assert_allclose(solved.tip[1], [0.0, -proportions.inner_radius, 0.0], atol=1e-12)
+
+
+def by_the_contract(proportions: Proportions, stored: Table, x: float, y: float) -> list[complex]:
+    """Elbow, wrist and tip as `proto/SPEC.md` says it ("Arm table"), word by word."""
+    a, b, c = proportions.lengths
+    inner = min(
+        abs(a + rest * np.exp(1j * min(np.radians(150.0), np.pi - np.angle(rest))))
+        for rest in (b + c * np.exp(1j * np.radians(degrees)) for degrees in range(81))
+    )
+    inner = max(0.1, 1.25 * inner)
+    size = np.hypot(x, y)
+    r = min(max(size, inner), 1.0 - 1e-6)
+    p = (x + 1j * y) * r / size
+    q = np.sqrt((1.0 - r) / (1.0 - inner))
+    row, column = 63.0 * (1.0 - q) * (1.0 + 3.0 * q / 4.0), 63.0 * (1.0 + y / (x + abs(y))) / 2.0
+    i, j = min(int(row), 62), min(int(column), 62)
+    near = np.array([1.0 - (row - i), row - i])
+    s = near @ stored[i : i + 2, j : j + 2].astype(np.float64) @ np.array([1.0 - (column - j), column - j])
+    h = min(np.sin(np.radians(40.0)), np.sqrt((1.0 - r * r) / (4.0 * (a + b) * c)))
+    f = a + b * np.exp(1j * np.radians(150.0))
+    cosine = min(max((r * r - abs(f) ** 2 - c * c) / (2.0 * abs(f) * c), -1.0), 1.0)
+    least = max(0.0, np.sin((np.angle(f) - np.radians(150.0) + np.arccos(cosine)) / 2.0))
+    least = min(least, h)
+    d = 2.0 * np.arcsin(least + s * (h - least))
+    w = b + c * np.exp(1j * d)
+    m = (a * a + r * r - abs(w) ** 2) / (2.0 * r * r)
+    elbow = p * (m - 1j * np.sqrt(a * a / r**2 - m * m))
+    forearm = (p - elbow) / w
+    wrist = elbow + b * forearm
+    return [elbow, wrist, wrist + c * forearm * np.exp(1j * d)]
+
+
+@given(st.sampled_from(ARMS), st.floats(0.001, 1.3), st.floats(-1.3, 1.3))
+def test_arms_are_as_the_contract_says(proportions: Proportions, x: float, y: float) -> None:
+    stored = table.table_of(proportions.identity)
+    solved = arms.solve(proportions, stored, np.array([[0.0, y, x]]))
+    wanted = by_the_contract(proportions, stored, x, y)
+    for joint, place in zip((solved.elbow, solved.wrist, solved.tip), wanted, strict=True):
+        assert abs(joint[0, 2] + 1j * joint[0, 1] - place) < 1e-9
+
+
+@settings(max_examples=25)
+@given(st.integers(100, 780), st.data())
+def test_any_arm_there_is_a_table_for_is_exact(upper: int, data: st.DataObject) -> None:
+    fore = data.draw(st.integers(100, 980 - upper))
+    heavy = data.draw(st.integers(1, 998))
+    middle = data.draw(st.integers(1, 999 - heavy))
+    identity = f"{upper}-{fore}-{1000 - upper - fore}-{heavy}-{middle}-{1000 - heavy - middle}"
+    proportions = Proportions.parse(identity)
+    targets = reachable(proportions, 2_000, seed=upper)
+    solved = arms.solve(proportions, table.table_of(identity), targets)
+    assert float(np.abs(solved.tip - targets).max()) < 1e-14
+    t0, t1, t2 = solved.angles()
+    assert -1e-9 <= (t1 - t0).min() <= (t1 - t0).max() <= ELBOW_LIMIT + 1e-9
+    assert -1e-9 <= (t2 - t1).min() <= (t2 - t1).max() <= WRIST_LIMIT + 1e-9

@@ -1,13 +1,27 @@
 from __future__ import annotations
 
+from math import atan2, cos, sin
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import leg
+from bunraku.marionette import leg, vector
+from bunraku.marionette.limbs import Joints, LegRig, Limb
+from bunraku.marionette.vector import Vector
+from bunraku.motion.skeleton import standard_figure
+from tests.marionette.arms import dance
+
+FIGURE = standard_figure()
+POSES = [rotations.tolist() for rotations in dance(12, seed=3)]
+LEGS = {limb: LegRig(FIGURE, limb) for limb in (Limb.LEFT_LEG, Limb.RIGHT_LEG)}
+legs = st.sampled_from(sorted(LEGS))
+poses = st.integers(0, len(POSES) - 1)
+angles = st.floats(-10.0, 10.0)
 
 
-@given(st.floats(-10.0, 10.0))
+@given(angles)
 def test_the_knee_bends_one_way_and_lets_the_shank_hang(theta: float) -> None:
     hip, knee = leg.solve(np.array([theta]))
     assert leg.THIGH_LEAST <= hip[0] <= leg.THIGH_GREATEST
@@ -15,3 +29,56 @@ def test_the_knee_bends_one_way_and_lets_the_shank_hang(theta: float) -> None:
     assert knee[0] == leg.knee_bend(leg.clamp_thigh(theta)) >= 0.0
     # the shank's own angle from straight down
     assert hip[0] - knee[0] == min(hip[0], 0.0)
+
+
+@given(angles, st.floats(0.0, 1.0))
+def test_the_leg_follows_its_input_without_jumps(theta: float, step: float) -> None:
+    hip, knee = leg.solve(np.array([theta, theta + step]))
+    for angle in (hip, knee):
+        assert 0.0 <= angle[1] - angle[0] <= step + 1e-12
+
+
+def in_the_plane(rig: LegRig, index: int, joints: Joints) -> tuple[float, float, Vector, Vector]:
+    """Angles of thigh and shank from straight down, forwards, and both as unit vectors in the world."""
+    hips, level = rig.facing(POSES[index])
+    hip, knee, _ = joints
+    thigh = vector.unit(vector.rotate(vector.multiply(hips, hip), rig.thigh), (0.0, 0.0, 0.0))
+    x, y, z = FIGURE.offsets[rig.joints[2]].tolist()
+    shank = vector.unit(vector.rotate(vector.multiply(vector.multiply(hips, hip), knee), (x, y, z)), (0.0, 0.0, 0.0))
+    return (
+        atan2(vector.dot(thigh, level), -thigh[1]),
+        atan2(vector.dot(shank, level), -shank[1]),
+        thigh,
+        shank,
+    )
+
+
+@given(legs, poses, angles)
+def test_a_figures_shank_hangs_plumb_and_its_knee_never_bends_backwards(limb: Limb, index: int, theta: float) -> None:
+    rig = LEGS[limb]
+    thigh_angle, shank_angle, thigh, shank = in_the_plane(rig, index, rig.hang(theta, POSES[index]))
+    lifted = leg.clamp_thigh(theta)
+    assert thigh_angle == pytest.approx(lifted, abs=1e-9)
+    if lifted >= 0.0:
+        assert shank == pytest.approx((0.0, -1.0, 0.0), abs=1e-9)
+    else:
+        assert shank == pytest.approx(thigh, abs=1e-9)
+    assert shank_angle <= thigh_angle + 1e-9
+    _, level = rig.facing(POSES[index])
+    assert thigh == pytest.approx((level[0] * sin(lifted), -cos(lifted), level[2] * sin(lifted)), abs=1e-9)
+
+
+@given(legs, poses, poses, angles, angles)
+def test_the_ankle_keeps_its_angle(limb: Limb, index: int, other: int, theta: float, another: float) -> None:
+    rig = LEGS[limb]
+    assert rig.hang(theta, POSES[index])[2] == rig.hang(another, POSES[other])[2]
+
+
+@given(legs, poses, angles, st.floats(0.0, 0.1))
+def test_a_figures_joints_turn_no_more_than_the_input(limb: Limb, index: int, theta: float, step: float) -> None:
+    rig = LEGS[limb]
+    before, after = rig.hang(theta, POSES[index]), rig.hang(theta + step, POSES[index])
+    for one, other in zip(before, after, strict=True):
+        turn = vector.multiply(vector.conjugate(one), other)
+        angle = 2.0 * atan2(vector.length((turn[1], turn[2], turn[3])), abs(turn[0]))
+        assert angle <= step + 1e-7

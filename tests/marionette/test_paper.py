@@ -14,6 +14,7 @@ from bunraku.marionette.paper import (
     places,
     tip_error,
 )
+from bunraku.marionette.proportions import Proportions
 from bunraku.motion.rotation import Array
 
 TABLES = {body.name: build_paper_table(body.proportions) for body in BODIES}
@@ -72,6 +73,19 @@ def test_neighbouring_nodes_are_near_so_that_no_angle_jumps(body: Body) -> None:
     bends = np.diff(table, axis=0)
     assert bends.min() >= -1e-6
     assert bends.max() <= np.pi + 1e-6
+
+
+@pytest.mark.parametrize(
+    "identity", ["600-200-200-900-50-50", "200-600-200-100-100-800", "150-150-700-333-333-334", "780-200-20-998-1-1"]
+)
+def test_an_arm_that_cannot_fold_to_the_shoulder_has_angles_there_too(identity: str) -> None:
+    proportions = Proportions.parse(identity)
+    table = build_paper_table(proportions)
+    assert np.isfinite(table).all()
+    # such arms may have two valleys, and the mix of one pose from each is neither
+    random = np.random.default_rng(6)
+    r, beta = random.uniform(2.0 * max(proportions.lengths) - 1.0, 1.0, 5000), random.uniform(-1.5, 1.5, 5000)
+    assert tip_error(proportions, table, r, beta).mean() < 0.005
 
 
 def test_a_lookup_at_a_node_is_the_node() -> None:

@@ -15,9 +15,10 @@ def test_identity_is_the_shape_whatever_the_size(
     lengths: tuple[float, float, float], heavy: tuple[float, float, float], size: float
 ) -> None:
     arm = Proportions.of(lengths, heavy)
-    assert sum(arm.thousandths[:3]) == sum(arm.thousandths[3:]) == 1000
-    for exact, rounded in zip((*arm.lengths, *arm.masses), arm.thousandths, strict=True):
-        assert abs(exact * 1000.0 - rounded) <= 1.0
+    assert sum(arm.parts[:3]) == sum(arm.parts[3:]) == 10_000
+    for exact, rounded in zip((*arm.lengths, *arm.masses), arm.parts, strict=True):
+        assert abs(exact * 10_000.0 - rounded) <= 1.0
+    assert Proportions.parse(arm.identity) == arm.rounded()
     a, b, c = (length * size for length in lengths)
     assert max(abs(x - y) for x, y in zip(Proportions.of((a, b, c), heavy).lengths, arm.lengths, strict=True)) < 1e-12
 
@@ -45,6 +46,9 @@ def test_parse_and_identity_are_inverse(upper: int, data: st.DataObject) -> None
         ("393-351-256-560-320-121", "M0"),
         ("990-5-5-560-320-120", "L1"),
         ("393-351-256-1000-0-0", "M1"),
+        ("393-351-256-5600-3200-1200", "M0"),
+        ("3930-3510-2561-5600-3200-1200", "L0"),
+        ("3930-5880-190-5600-3200-1200", "L2"),
     ],
 )
 def test_refusals_name_the_field(identity: str, field: str) -> None:
@@ -66,7 +70,13 @@ def test_a_link_weighs_by_its_own_length(lengths: tuple[float, float, float]) ->
 
 
 def test_masses_that_are_given_win() -> None:
-    assert Proportions.of((1.0, 1.0, 1.0), (2.0, 1.0, 1.0)).identity == "334-333-333-500-250-250"
+    assert Proportions.of((1.0, 1.0, 1.0), (2.0, 1.0, 1.0)).identity == "3334-3333-3333-5000-2500-2500"
+
+
+def test_a_name_is_in_thousandths_where_they_say_the_same() -> None:
+    assert Proportions.of((0.4, 0.35, 0.25), (0.5, 0.3, 0.2)).identity == "400-350-250-500-300-200"
+    assert Proportions.parse("4000-3500-2500-5000-3000-2000").identity == "400-350-250-500-300-200"
+    assert Proportions.parse("4001-3500-2499-5000-3000-2000").identity == "4001-3500-2499-5000-3000-2000"
 
 
 def test_an_arm_without_a_hand_is_refused() -> None:

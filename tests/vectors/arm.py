@@ -21,7 +21,7 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import standard_figure
 
 FILE = Path(__file__).resolve().parents[2] / "proto" / "vectors" / "arm.json"
-IDENTITIES = ("396-352-252-532-344-124", "400-400-200-334-333-333", "300-300-400-560-320-120")
+IDENTITIES = ("3963-3523-2514-5316-3440-1244", "400-400-200-334-333-333", "300-300-400-560-320-120")
 AWKWARD = [
     [0.0, -0.7, 0.0],
     [0.0, 0.7, 0.0],

@@ -18,9 +18,11 @@ from bunraku.wire.messages import (
     LIMBS,
     SUBPROTOCOL,
     Alive,
+    Ask,
     Claim,
     Grant,
     Input,
+    Notice,
     Presence,
     Problem,
     Refusal,
@@ -30,6 +32,8 @@ from bunraku.wire.messages import (
 )
 
 ALIVE_EVERY = 0.1
+ASKED = 20.0
+"""Seconds after which an ask is forgotten."""
 ANSWER = 5.0
 """Seconds to wait for the server's word."""
 
@@ -48,6 +52,8 @@ class Puppeteer:
         self._url = client.socket_url(f"/v1/sessions/{quote(session, safe='')}/control") + f"?name={quote(name)}"
         self.id: str | None = None
         self.presence: Presence | None = None
+        self.notice: Notice | None = None
+        """What became of an input that was not taken as it came, last."""
         self._epochs: dict[int, int] = {}
         self._sequence = 0
         self._answers: asyncio.Queue[Grant | Refusal] = asyncio.Queue(64)
@@ -98,6 +104,24 @@ class Puppeteer:
             raise Refused(
                 f"{limb} is {answer.reason} by {answer.holder}" if answer.holder else f"{limb}: {answer.reason}"
             )
+
+    async def ask(self, limb: str, seconds: float = ASKED) -> None:
+        """Ask the holder of a limb for it, and wait until it is one's own; raises `Refused` where it was not given in
+        `seconds`. A free limb is taken."""
+        number = LIMBS.index(limb)
+        try:
+            await self.claim(limb)
+        except Refused:
+            await self._send(Ask(number, True).pack())
+        else:
+            return
+        try:
+            async with asyncio.timeout(seconds):
+                while not isinstance(answer := await self._answers.get(), Grant) or answer.limb != number:
+                    continue
+        except TimeoutError:
+            await self._send(Ask(number, False).pack())
+            raise Refused(f"{limb} was asked for and not given") from None
 
     async def release(self, limb: str) -> None:
         """Let a limb go."""
@@ -151,6 +175,8 @@ class Puppeteer:
                     self._epochs.pop(message.limb, None)
                     if message.reason != "lost":
                         self._answers.put_nowait(message)
+                elif isinstance(message, Notice):
+                    self.notice = message
                 elif isinstance(message, Presence):
                     self.presence = message
                 elif isinstance(message, Problem):

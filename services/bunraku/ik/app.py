@@ -78,7 +78,8 @@ def create_app() -> FastAPI:
         },
     )
     async def arm_table(proportions: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
-        """The table of bends of an arm with these proportions: `L0-L1-L2-M0-M1-M2` in thousandths."""
+        """The table of bends of an arm with these proportions: `L0-L1-L2-M0-M1-M2` in thousandths or
+        ten-thousandths."""
         stored = await table_for(parse_proportions(proportions))
         return _resource(stored, "application/octet-stream", if_none_match)
 

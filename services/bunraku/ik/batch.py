@@ -30,7 +30,9 @@ class SolveRequest(BaseModel):
 
     model_config = ConfigDict(extra="ignore")
 
-    proportions: str = Field(description="L0-L1-L2-M0-M1-M2 in thousandths", examples=["393-351-256-560-320-120"])
+    proportions: str = Field(
+        description="L0-L1-L2-M0-M1-M2 in thousandths or ten-thousandths", examples=["393-351-256-560-320-120"]
+    )
     targets: list[Triple] = Field(
         default=[], max_length=MOST_TARGETS, description="hand tips from the shoulder, y up, in arm lengths"
     )

@@ -34,13 +34,22 @@ def keep(
 
     `progress` is told the share encoded, 0..1.
     """
-    showing = Showing(Log.unpack(log), dances)
+    replayed = Log.unpack(log)
+    showing = Showing(replayed, dances)
     times = [order.begin + round(number * 1e6 / FPS) for number in range(order.frames)]
     states = [showing.timeline_at(time) for time in times]
     last = states[-1]
     if last is None:
         return Refused("Nothing to keep", "no dance was on the stage in this interval", field="seconds")
     times = times[1 + max((n for n, s in enumerate(states) if s is None or s.motion != last.motion), default=-1) :]
+    if replayed.known_from > times[0]:
+        seconds = max(order.end - replayed.known_from, 0) * 1e-6
+        return Refused(
+            "Too long ago",
+            f"limbs were held for so long that only the last {seconds:.0f} s of this session can be kept",
+            field="seconds",
+            hint="let all limbs go for a moment: from there on it is remembered",
+        )
     try:
         poses = list(showing.poses(times))
     except (MissingDance, DamagedLog) as error:

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import msgpack
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
-
-from bunraku.backing.problems import ProblemError, invalid_field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 FPS = 60
 """Frames a second of a kept motion: as many as viewers are shown."""
@@ -38,23 +35,3 @@ class Order(BaseModel):
     def frames(self) -> int:
         """Frames of the motion, should all of it be kept."""
         return max(round((self.end - self.begin) * FPS / 1e6), 0)
-
-    @classmethod
-    def unpack(cls, data: bytes) -> Order:
-        """The order in a message of the bus; raises `ProblemError` with the field that is wrong."""
-        try:
-            order = cls.model_validate(msgpack.unpackb(data))
-        except ValidationError as error:
-            first = error.errors()[0]
-            raise invalid_field(first["loc"], first["msg"]) from None
-        except (ValueError, msgpack.UnpackException) as error:
-            raise ProblemError(422, "Invalid request", f"not an order to keep a session: {error}") from None
-        if order.frames < 1:
-            raise ProblemError(422, "Nothing to keep", "the interval has no frame in it", field="seconds")
-        if order.frames > MOST_SECONDS * FPS:
-            raise ProblemError(
-                422, "Too long", f"at most {MOST_SECONDS} seconds are kept", field="seconds", hint="keep a shorter part"
-            )
-        if any(after[0] <= before[0] for before, after in zip(order.camera, order.camera[1:], strict=False)):
-            raise ProblemError(422, "Invalid request", "camera: its keyframes' times do not ascend", field="camera")
-        return order

@@ -7,14 +7,15 @@ import secrets
 from typing import Any
 
 import msgpack
+from pydantic import ValidationError
 
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.catalogue import Entry
 from bunraku.backing.library import StoredMotion
-from bunraku.backing.problems import ProblemError
+from bunraku.backing.problems import ProblemError, invalid_field
 from bunraku.ingest import jobs
 from bunraku.ingest.entry import entry_json
-from bunraku.ingest.order import Order
+from bunraku.ingest.order import FPS, MOST_SECONDS, Order
 from bunraku.ingest.results import Made, Refused
 from bunraku.ingest.uploads import motion_id
 
@@ -39,7 +40,7 @@ class Recordings:
         """The answer to a question on the bus: MessagePack of `{"motion": ...}` as `POST /v1/motions` gives it, or of
         `{"problem": ...}`, the arguments of `ProblemError`."""
         try:
-            said: dict[str, Any] = {"motion": entry_json(await self.keep(Order.unpack(message)))}
+            said: dict[str, Any] = {"motion": entry_json(await self.keep(read_order(message)))}
         except ProblemError as error:
             extra = {name: value for name, value in error.extra.items() if value is not None}
             said = {"problem": {"status": error.status, "title": error.title, "detail": error.detail, **extra}}
@@ -98,10 +99,30 @@ class Recordings:
         known = dance.description if dance is not None else {}
         title = known.get("name") or "A dance"
         return {
-            "name": (order.name or "").strip() or f"{title}, kept",
+            "name": (order.name or "").strip() or f"{title.removesuffix(', kept')}, kept",
             "filename": "",
             "bytes": size,
             "source": f"kept from a session of {title} ({made.described['kept_from']})",
             **{key: known[key] for key in INHERITED if key in known},
             **made.described,
         }
+
+
+def read_order(message: bytes) -> Order:
+    """The order in a message of the bus; raises `ProblemError` with the field that is wrong."""
+    try:
+        order = Order.model_validate(msgpack.unpackb(message))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise invalid_field(first["loc"], first["msg"]) from None
+    except (ValueError, msgpack.UnpackException) as error:
+        raise ProblemError(422, "Invalid request", f"not an order to keep a session: {error}") from None
+    if order.frames < 1:
+        raise ProblemError(422, "Nothing to keep", "the interval has no frame in it", field="seconds")
+    if order.frames > MOST_SECONDS * FPS:
+        raise ProblemError(
+            422, "Too long", f"at most {MOST_SECONDS} seconds are kept", field="seconds", hint="keep a shorter part"
+        )
+    if any(after[0] <= before[0] for before, after in zip(order.camera, order.camera[1:], strict=False)):
+        raise ProblemError(422, "Invalid request", "camera: its keyframes' times do not ascend", field="camera")
+    return order

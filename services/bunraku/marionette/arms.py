@@ -109,12 +109,12 @@ def place(shape: Shape, nodes: Array, x: Any, y: Any, z: Any) -> Any:
     cos_bend, sin_bend = 1.0 - 2.0 * half * half, 2.0 * half * np.sqrt(1.0 - half * half)
     # the rest of the arm, seen along the forearm, and the triangle it makes with the upper arm
     rest_x, rest_y = shape.fore + shape.hand * cos_bend, shape.hand * sin_bend
-    rest = rest_x * rest_x + rest_y * rest_y
+    rest = (shape.fore + shape.hand) ** 2 - 4.0 * shape.fore * shape.hand * half * half
     along = (shape.upper * shape.upper + square - rest) * 0.5 / square
     below = np.sqrt(np.maximum(shape.upper * shape.upper / square - along * along, 0.0))
     level, y = level * (r / reach), y * (r / reach)
     elbow_x, elbow_y = level * along + y * below, y * along - level * below
-    chord_x, chord_y = (level - elbow_x) / rest, (y - elbow_y) / rest
+    rest_x, rest_y, chord_x, chord_y = rest_x / rest, rest_y / rest, level - elbow_x, y - elbow_y
     fore_x, fore_y = chord_x * rest_x + chord_y * rest_y, chord_y * rest_x - chord_x * rest_y
     wrist_x, wrist_y = elbow_x + shape.fore * fore_x, elbow_y + shape.fore * fore_y
     tip_x = wrist_x + shape.hand * (fore_x * cos_bend - fore_y * sin_bend)

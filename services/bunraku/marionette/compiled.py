@@ -1,8 +1,8 @@
 """`arms.solve`, compiled: for hundreds of thousands of arms at once.
 
-A module of its own because importing numba takes seconds, and compiling a few more the first time: who serves others
-meanwhile uses `arms.solve`, which gives the same numbers. The formulae are those of `arms.place`; numba's cache looks
-at the date of this file alone, so touch it when they change.
+A module of its own because importing numba takes seconds, and compiling a few more: who serves others
+meanwhile uses `arms.solve`, which gives the same numbers. The formulae are those of `arms.place`. Nothing is kept from
+run to run: numba's cache looks at the date of one file alone, and would miss a change in that one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from bunraku.motion.rotation import Array
 _place = njit(error_model="numpy", inline="always")(arms.place)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _solve(shape: Shape, nodes: Array, targets: Array, solved: Array) -> None:
     for n in range(len(targets)):
         placed = _place(shape, nodes, targets[n, 0], targets[n, 1], targets[n, 2])

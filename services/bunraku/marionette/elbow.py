@@ -101,7 +101,8 @@ class Elbow:
         before = self._upper_arm(self._direction or direction, self._normal, self._lift)
         normal = self._carry(direction)
         r = self._arm.clamp(reach)
-        least, greatest = self._lifts(r)
+        low, high = self._arm.limits(r)
+        least, greatest = self._lift_of(r, high), self._lift_of(r, low)
         wanted = self._lift_of(r, self._arm.bend(r, elevation(direction, up)))
         # towards full stretch the lift ends anyhow: evenly, and not within the last frames
         wanted = min(wanted, SLOPE * (OUTER_RADIUS - r) / self._upper)
@@ -112,7 +113,7 @@ class Elbow:
         left = max(SPEED * seconds - moved, LEAST_SPEED * seconds)
         normal = self._swing(direction, normal, up, r, lift, seconds, left)
         self._lift = lift
-        r, normal, lift = self._shoulder_allows(direction, normal, r, lift)
+        r, normal, lift, low, high = self._shoulder_allows(direction, normal, r, lift, low, high)
         self._direction, self._normal = direction, normal
         was, self._was = self._was, self._upper_arm(direction, normal, lift)
         most = (moved + left) / self._upper
@@ -120,7 +121,7 @@ class Elbow:
             # the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow
             upper_arm = self._was = self._shoulder.toward(was, self._was, most)
             return self._reach_out(upper_arm, vector.scale(direction, reach), normal)
-        return Hanging(vector.scale(direction, r), normal, self._bend_of(r, lift))
+        return Hanging(vector.scale(direction, r), normal, self._bend_of(r, lift, low, high))
 
     def _upper_arm(self, direction: Vector, normal: Vector, lift: float) -> Vector:
         """The unit vector from the shoulder to the elbow."""
@@ -147,19 +148,22 @@ class Elbow:
         turn = min(max(swing * (1.0 - 2.0 ** (-seconds * pull / HALF_LIFE)), -most), most)
         return _turned(direction, normal, turn)
 
-    def _shoulder_allows(self, direction: Vector, normal: Vector, r: float, lift: float) -> tuple[float, Vector, float]:
-        """Distance, normal and lift nearest to these that the shoulder lets be."""
+    def _shoulder_allows(
+        self, direction: Vector, normal: Vector, r: float, lift: float, low: float, high: float
+    ) -> tuple[float, Vector, float, float, float]:
+        """Distance, normal, lift, and least and greatest wrist bend nearest to these that the shoulder lets be."""
         turn = self._shoulder.turn(direction, normal, lift)
         if turn == 0.0:
-            return r, normal, lift
+            return r, normal, lift, low, high
         if turn is None:
             # no turn helps: more bend of the elbow may, and where it does not, a hand that is nearer
             away = self._shoulder.away(direction) + CLEAR
-            if away > self._lifts(r)[1]:
+            if away > self._lift_of(r, low):
                 r = self._nearer(r, away)
-            lift = min(max(lift, away), self._lifts(r)[1])
+                low, high = self._arm.limits(r)
+            lift = min(max(lift, away), self._lift_of(r, low))
             turn = self._shoulder.turn(direction, normal, lift) or 0.0
-        return r, _turned(direction, normal, turn), lift
+        return r, _turned(direction, normal, turn), lift, low, high
 
     def _reach_out(self, upper_arm: Vector, target: Vector, normal: Vector) -> Hanging:
         """What hangs from an upper arm that is on its way, forearm and hand as near to `target` as they come."""
@@ -189,22 +193,16 @@ class Elbow:
         near, far = self._arm.inner, r
         for _ in range(40):
             middle = 0.5 * (near + far)
-            near, far = (middle, far) if self._lifts(middle)[1] >= away else (near, middle)
+            near, far = (middle, far) if self._lift_of(middle, self._arm.limits(middle)[0]) >= away else (near, middle)
         return near
-
-    def _lifts(self, r: float) -> tuple[float, float]:
-        """Least and greatest lift that reach `r` with elbow and wrist within their limits."""
-        low, high = self._arm.limits(r)
-        return self._lift_of(r, high), self._lift_of(r, low)
 
     def _lift_of(self, r: float, bend: float) -> float:
         upper, fore, hand = self._arm.proportions.lengths
         square = fore * fore + hand * hand + 2.0 * fore * hand * cos(bend)
         return acos(min(max((upper * upper + r * r - square) / (2.0 * upper * r), -1.0), 1.0))
 
-    def _bend_of(self, r: float, lift: float) -> float:
+    def _bend_of(self, r: float, lift: float, low: float, high: float) -> float:
         upper, fore, hand = self._arm.proportions.lengths
-        low, high = self._arm.limits(r)
         # at a limit the cosine has lost the digits that tell the bend
         if lift >= self._lift_of(r, low):
             return low

@@ -119,6 +119,8 @@ def _legend(proportions: Proportions) -> list[str]:
         parts.append(f'<line x1="{x}" y1="512" x2="{x + 24}" y2="512" stroke="{colour}" stroke-width="2.6"/>')
         parts.append(f'<text x="{x + 32}" y="516.5" fill="{_INK}">{words}</text>')
         x += 96.0
-    lengths, masses = proportions.thousandths[:3], proportions.thousandths[3:]
-    words = f"links {' : '.join(map(str, lengths))}, masses {' : '.join(map(str, masses))}"
+    lengths, masses = (
+        " : ".join(f"{100.0 * part:.1f}" for part in of) for of in (proportions.lengths, proportions.masses)
+    )
+    words = f"links {lengths} %, masses {masses} %"
     return [*parts, f'<text x="{WIDTH - 48}" y="516.5" text-anchor="end" font-size="12.5">{words}</text>']

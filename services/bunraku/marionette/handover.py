@@ -6,7 +6,7 @@ joints are brought from the dance's way of reaching a place to the marionette's 
 
 from __future__ import annotations
 
-from math import sqrt
+from math import atan2, pi, sqrt
 
 from bunraku.marionette import vector
 from bunraku.marionette.limbs import Joints
@@ -16,11 +16,11 @@ TAKE = 0.150
 """Seconds from the dance's way of holding a limb to the marionette's."""
 GIVE_BACK = 0.350
 """Seconds from the marionette's way to the dance's."""
-HAND_ACCELERATION = 75.0
-"""Arm lengths per second squared: a quarter of an arm is crossed in 0.12 s."""
+HAND_ACCELERATION = 79.0
+"""Arm lengths per second squared: a quarter of an arm is crossed in 0.11 s."""
 THIGH_ACCELERATION = 60.0
 """Radians per second squared."""
-RETURN = 0.300
+RETURN = 0.280
 """Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds."""
 LEAST_ACCELERATION = 6.0
 
@@ -69,14 +69,23 @@ class Turn:
         self._turn: Quaternion | None = None
 
     def follow(self, dance: Vector, pulled: Vector, weight: float) -> Quaternion:
-        """The turn from the direction of `dance` to that of `pulled`; all the way there, at `weight` 1, it starts
-        afresh from the shortest."""
+        """The turn from the direction of `dance` to that of `pulled`.
+
+        What it turns about the arm itself, having gone round, is at most half a circle times `weight`: so it is the
+        shortest turn when the hand is back. All the way there, at `weight` 1, it starts afresh from the shortest.
+        """
         down = (0.0, -1.0, 0.0)
         here, there = vector.unit(dance, down), vector.unit(pulled, down)
-        if self._turn is None:
-            turn = vector.between(here, there)
-        else:
+        shortest = vector.between(here, there)
+        turn = shortest
+        if self._turn is not None:
             turn = vector.multiply(vector.between(vector.rotate(self._turn, here), there), self._turn)
+            w, x, y, z = vector.multiply(turn, vector.conjugate(shortest))
+            twist = 2.0 * atan2(vector.dot((x, y, z), there), w)
+            twist -= 2.0 * pi * round(twist / (2.0 * pi))
+            most = pi * weight
+            if abs(twist) > most:
+                turn = vector.multiply(vector.about(there, min(max(twist, -most), most)), shortest)
         self._turn = None if weight >= 1.0 else vector.normalise(turn)
         return turn
 

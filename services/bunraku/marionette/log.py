@@ -32,6 +32,9 @@ MOST_TIMELINES = 10_000
 PoseAt = Callable[[int], Array | None]
 """The dance's rotations (18, 4) at a clock time in µs, None where there is none."""
 
+_UNKNOWN = 1 << 63
+"""The beginning of a passage whose own was dropped: later than all clock times."""
+
 _CLAIM, _RELEASE, _LEAVE, _ALIVE, _INPUT, _ASK, _SETTLE, _EXPIRE, _SEE, _OVERLAY, _DANCE = range(11)
 _RECORDS = {
     _CLAIM: struct.Struct("<QHB"),
@@ -71,6 +74,7 @@ class Log:
         self._numbers: dict[str, int] = {}
         self._passages: deque[Passage] = deque()
         self._size = 0
+        self._known_from = 0
 
     @property
     def motions(self) -> tuple[str, ...]:
@@ -82,6 +86,11 @@ class Log:
         """The clock time, µs, from which it knows all; None where nothing was done."""
         return self._passages[0].begin if self._passages else None
 
+    @property
+    def known_from(self) -> int:
+        """The clock time, µs, from which it knows all that was done; 0 where nothing was dropped yet."""
+        return self._known_from
+
     def timeline(self, state: TimelineState) -> None:
         """The stage has a new timeline."""
         self.timelines.append(state)
@@ -90,10 +99,12 @@ class Log:
         """The dance is alone, and something is about to be done."""
         self._passages.append(Passage(epochs, self._number(motion), now))
 
-    def note(self, kind: int, *values: object) -> None:
-        """Something was done; texts among `values` are names."""
+    def note(self, kind: int, now: int, *values: object) -> None:
+        """Something was done at clock time `now`; texts among `values` are names."""
         numbers = (self._number(value) if isinstance(value, str) else value for value in values)
-        record = bytes((kind,)) + _RECORDS[kind].pack(*numbers)
+        record = bytes((kind,)) + _RECORDS[kind].pack(now, *numbers)
+        if self._passages[-1].begin == _UNKNOWN:
+            self._known_from = now + 1
         self._passages[-1].records += record
         self._size += len(record)
         while self._size > MOST_BYTES:
@@ -101,14 +112,17 @@ class Log:
             dropped = self._passages.popleft()
             self._size -= len(dropped.records)
             if not self._passages:
-                self._passages.append(Passage((0,) * 4, dropped.motion, 1 << 63))
+                self._known_from = now + 1
+                self._passages.append(Passage((0,) * 4, dropped.motion, _UNKNOWN))
                 break
+            self._known_from = max(self._known_from, min(self._passages[0].begin, now))
 
     def pack(self) -> bytes:
         """The log as bytes."""
         passages = [[list(p.epochs), p.motion, p.begin, bytes(p.records)] for p in self._passages]
         timelines = [state.pack() for state in self.timelines]
-        packed: bytes = msgpack.packb({"names": self._names, "timelines": timelines, "passages": passages})
+        values = {"names": self._names, "timelines": timelines, "passages": passages, "known_from": self._known_from}
+        packed: bytes = msgpack.packb(values)
         return MAGIC + packed
 
     @classmethod
@@ -127,6 +141,7 @@ class Log:
                 log.timelines.append(state)
             for epochs, motion, begin, records in values["passages"]:
                 log._passages.append(Passage(tuple(epochs), int(motion), int(begin), bytearray(records)))
+            log._known_from = int(values.get("known_from", 0))
         except (ValueError, KeyError, TypeError, msgpack.UnpackException) as error:
             raise DamagedLog(f"a damaged log: {error}") from error
         return log

@@ -6,6 +6,7 @@ it. It reads no clock: `now` is clock time in integer µs, and must not run back
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -52,6 +53,7 @@ class Marionette:
         self._ownership = Ownership(epochs)
         self._handovers = {limb: Handover() for limb in Limb}
         self._last: int | None = None
+        self._recent: deque[tuple[Array, float]] = deque(maxlen=2)
         self.set_figure(figure)
 
     def set_figure(self, figure: Figure) -> None:
@@ -121,10 +123,7 @@ class Marionette:
     def see(self, rotations: Array, now: int) -> None:
         """The dance's pose before the first that `overlay` is asked for after a rest. Two of them, a frame apart, let a
         limb that is taken in motion go on from there at the speed it has."""
-        seconds = self._step(now)
-        pose: Pose = rotations.tolist()
-        for limb in self._limbs.values():
-            limb.see(pose, seconds)
+        self._recent.append((rotations, self._step(now)))
 
     def _step(self, now: int) -> float:
         seconds = 0.0 if self._last is None else min(max(now - self._last, 0) * 1e-6, LONGEST_STEP)
@@ -143,10 +142,13 @@ class Marionette:
         for limb, holder in zip(Limb, self._ownership.holders(), strict=True):
             hand, puppet = self._handovers[limb], self._limbs[limb]
             hand.advance(holder is not None, seconds)
-            puppet.see(pose, seconds)
             steering = self._ownership.steering(limb)
             if steering is None:
                 continue
+            if not puppet.pulled:
+                for earlier, step in self._recent:
+                    puppet.see(earlier.tolist(), step)
+            puppet.see(pose, seconds)
             steering.begin(puppet.place)
             wanted = steering.value(now) if holder is not None else None
             joints = puppet.pull(pose, wanted, hand.weight, seconds)
@@ -156,4 +158,5 @@ class Marionette:
                 continue
             pulled.append(limb)
             turned.append(joints)
+        self._recent.append((rotations, seconds))
         return Overlay(tuple(pulled), np.array(turned)) if pulled else None

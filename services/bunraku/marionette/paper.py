@@ -24,7 +24,7 @@ PAPER_BYTES = DISTANCES * ELEVATIONS * 3 * 4
 """Of a table: 23,028. The paper says "within 8 kB", which one of the three angles takes."""
 
 PaperTable = npt.NDArray[np.float32]
-_SCAN = 721
+_SCAN = 181
 _HALVINGS = 40
 _ASIDE = 1e-6
 """Straight up and down an arm may bow to either side. A node there is taken this little from it, radians, so that the
@@ -32,8 +32,12 @@ arm bows to the side it does beside it."""
 
 
 def build_paper_table(proportions: Proportions) -> PaperTable:
-    """The angles (3, DISTANCES, ELEVATIONS) of least potential, by a search of all poses and halving."""
+    """The angles (3, DISTANCES, ELEVATIONS) of least potential, by a search of all poses and halving.
+
+    A node nearer than an arm with one long link can fold has the angles of the nearest place that it does reach.
+    """
     r, beta = np.meshgrid(np.linspace(0.0, 1.0, DISTANCES), np.linspace(-0.5, 0.5, ELEVATIONS) * pi, indexing="ij")
+    r = np.maximum(r, 2.0 * max(proportions.lengths) - 1.0 + 1e-9)
     beta = np.clip(beta, -0.5 * pi + _ASIDE, 0.5 * pi - _ASIDE)
     step = 2.0 * pi / (_SCAN - 1)
     best, lowest = np.zeros(r.shape), np.full(r.shape, np.inf)

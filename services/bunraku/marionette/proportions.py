@@ -24,6 +24,8 @@ WINTER_LENGTHS = (0.186, 0.146, 0.108)
 
 _NAMES = ("L0", "L1", "L2", "M0", "M1", "M2")
 _LEAST = (100, 100, 20, 1, 1, 1)
+"""Of a thousand."""
+_WHOLE = 10_000
 
 
 class ProportionsError(ValueError):
@@ -67,7 +69,7 @@ class Proportions:
 
     @classmethod
     def parse(cls, identity: str) -> Proportions:
-        """From `L0-L1-L2-M0-M1-M2`, integers in thousandths. Raises `ProportionsError`."""
+        """From `L0-L1-L2-M0-M1-M2`, integers in thousandths or all in ten-thousandths. Raises `ProportionsError`."""
         if not re.fullmatch(r"[0-9]{1,4}(-[0-9]{1,4}){5}", identity):
             raise ProportionsError(
                 f"proportions {identity[:60]!r} are not six integers",
@@ -77,18 +79,21 @@ class Proportions:
         return _checked(tuple(int(part) for part in identity.split("-")))
 
     @property
-    def thousandths(self) -> tuple[int, ...]:
-        """The six numbers rounded so that the lengths, and the masses, sum to 1000 (largest remainder)."""
+    def parts(self) -> tuple[int, ...]:
+        """The six numbers in ten-thousandths, rounded so that lengths and masses sum to 10,000 (largest remainder)."""
         return (*_apportion(self.lengths), *_apportion(self.masses))
 
     @property
     def identity(self) -> str:
-        """`L0-L1-L2-M0-M1-M2` in thousandths: the name of the arm's table."""
-        return "-".join(str(part) for part in self.thousandths)
+        """`L0-L1-L2-M0-M1-M2`: the name of the arm's table, in thousandths where they say the same."""
+        parts = self.parts
+        if all(part % 10 == 0 for part in parts):
+            parts = tuple(part // 10 for part in parts)
+        return "-".join(str(part) for part in parts)
 
     def rounded(self) -> Proportions:
         """These proportions as their identity has them. Raises `ProportionsError` as `parse` does."""
-        return _checked(self.thousandths)
+        return _checked(self.parts)
 
     @property
     def inner_radius(self) -> float:
@@ -110,24 +115,27 @@ class Proportions:
 
 
 def _checked(parts: tuple[int, ...]) -> Proportions:
+    whole = 1000 if sum(parts[:3]) < 5000 else _WHOLE
     for name, part, least in zip(_NAMES, parts, _LEAST, strict=True):
-        if part < least:
-            raise ProportionsError(f"{name} is {part} thousandths", name, f"at least {least}: the link is too short")
-    for kind, numbers in (("L", parts[:3]), ("M", parts[3:])):
-        if sum(numbers) != 1000:
+        if part * 1000 < least * whole:
             raise ProportionsError(
-                f"{kind}0 + {kind}1 + {kind}2 is {sum(numbers)}", f"{kind}0", "the three must sum to 1000 exactly"
+                f"{name} is {part} of {whole}", name, f"at least {least * whole // 1000}: the link is too short"
             )
-    a, b, c, d, e, f = (part / 1000.0 for part in parts)
+    for kind, numbers in (("L", parts[:3]), ("M", parts[3:])):
+        if sum(numbers) != whole:
+            raise ProportionsError(
+                f"{kind}0 + {kind}1 + {kind}2 is {sum(numbers)}", f"{kind}0", f"the three must sum to {whole} exactly"
+            )
+    a, b, c, d, e, f = (part / whole for part in parts)
     return Proportions((a, b, c), (d, e, f))
 
 
 def _apportion(shares: tuple[float, float, float]) -> list[int]:
-    floors = [int(share * 1000.0) for share in shares]
-    remainders = [share * 1000.0 - floor for share, floor in zip(shares, floors, strict=True)]
-    # 1e-6 keeps 0.393 * 1000 = 392.99999999999994 from losing its thousandth to another
+    floors = [int(share * _WHOLE) for share in shares]
+    remainders = [share * _WHOLE - floor for share, floor in zip(shares, floors, strict=True)]
+    # 1e-6 keeps 0.393 * 10000 = 3929.9999999999995 from losing its part to another
     whole = [floor + (remainder > 1.0 - 1e-6) for floor, remainder in zip(floors, remainders, strict=True)]
     order = sorted(range(3), key=lambda i: (-(remainders[i] % (1.0 - 1e-6)), i))
-    for i in order[: 1000 - sum(whole)]:
+    for i in order[: _WHOLE - sum(whole)]:
         whole[i] += 1
     return whole

@@ -21,7 +21,7 @@ MOST_REACH = 0.9995
 """Arm lengths: a pulled arm is never quite locked, so that its elbow leaves the line at a bounded speed."""
 LEAST_REACH = 0.15
 """Arm lengths from the shoulder that a hand is pulled to at least: nearer in, the elbow would have to whirl."""
-HAND_HOME = 60.0
+HAND_HOME = 79.0
 """Arm lengths per second squared, against the dance, that a hand let go comes back with at most."""
 ARRIVED = 1e-6
 """Arm lengths, or radians, within which a limb is the dance's again."""
@@ -43,6 +43,11 @@ class _Pulled:
     def own(self) -> Vector:
         """Where the dance has the limb, as last seen."""
         return self._own or STILL
+
+    @property
+    def pulled(self) -> bool:
+        """Whether it is not wholly the dance's."""
+        return self._follower is not None
 
     @property
     def place(self) -> Vector:

@@ -15,7 +15,7 @@ QUEUE = 64
 COLOURS = 5
 MOST = 32
 """Puppeteers of one session."""
-RATE = 250
+RATE = 320
 """Messages a second that a puppeteer may send: four limbs at the rate of a screen, and what goes with them."""
 NOTICE_EVERY = 1_000_000
 """Microseconds between two notices of one kind about one limb."""

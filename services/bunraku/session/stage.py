@@ -47,6 +47,8 @@ EDIT_LEAD = 100_000
 FRAME = Overlay.FRAME
 FRAMES = 2
 """Frames in one message: on a narrow line packets count, not bytes."""
+BUSY = 10_000
+"""Microseconds that messages are late by, of late: then only every second frame is worked out."""
 LONGEST_PAUSE = 6
 """Frames: a stage that was kept from working for longer leaves them out."""
 
@@ -210,10 +212,12 @@ class Stage:
                 due = before * FRAME + LEAD
                 if (pose := self._poses.at(due, FRAME)) is not None:
                     self._marionette.see(pose, due, before * FRAME)
-            while self._frames(range(frame, frame + FRAMES)):
+            late = 0.0
+            while self._frames(range(frame if late < BUSY else frame + FRAMES - 1, frame + FRAMES)):
                 # a stage that was kept from working goes on from where it should be, in step with the others
                 frame = max(frame + FRAMES, clock() // FRAME - LONGEST_PAUSE)
                 await asyncio.sleep(((frame + FRAMES - 1) * FRAME - clock()) * 1e-6)
+                late += 0.1 * (clock() - (frame + FRAMES - 1) * FRAME - late)
                 await self._poses.prepare(frame * FRAME + LEAD)
 
     def _frames(self, frames: range) -> bool:

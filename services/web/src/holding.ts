@@ -58,7 +58,7 @@ export class Holding {
     return told.map((one, limb) => {
       const mine = Boolean(hands?.source(limb));
       const holder = mine ? { id: puppeteer?.id ?? "", name: "You", colour: puppeteer?.colour ?? 0, mine } : one?.mine ? null : one;
-      return { holder, askers: asking[limb], asked: puppeteer?.asks(limb) ?? false, selected: velocity?.selected === limb };
+      return { holder, askers: asking[limb], asked: puppeteer?.asks(limb) ?? false, selected: velocity?.selected === limb && velocity.holds(limb) };
     });
   }
 

@@ -1,7 +1,7 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
-import { createSession, keep, ProblemError, type Motion } from "./client/library";
+import { createSession, keep, ProblemError, type CameraKeyframe, type Motion } from "./client/library";
 import { Holding } from "./holding";
 import type { Commands } from "./input/commands";
 import type { GamepadInput } from "./input/gamepad";
@@ -48,8 +48,9 @@ const page = createPage(document.body, {
   play,
   loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
   seek: (seconds) => room?.seek(seconds, performance.now()),
+  camera: () => stage?.follow(!stage.following),
   keep: keepThis({
-    keep: (session, called) => keep(session, { name: called, camera: stage?.trail.keyframes() ?? [] }),
+    keep: (session, called) => keep(session, { name: called, camera: cameraMoves() }),
     toast: (message, action) => page.toast(message, action),
     session: () => room && { id: room.id, piece: pieces.find(room.viewer.motion)?.name ?? "" },
     puppeteer: name,
@@ -71,7 +72,7 @@ const page = createPage(document.body, {
   ask: (limb) => holding.ask(limb),
   withdraw: (limb) => holding.withdraw(limb),
   give: (limb) => holding.give(limb),
-  select: (limb) => velocity?.hold(limb) && holding.render(),
+  select: (limb) => velocity?.hold(limb),
   press: (input, down) => {
     if (down) commands?.press(`page ${input}`, [input], 1, performance.now());
     else commands?.release(`page ${input}`, performance.now());
@@ -90,6 +91,12 @@ theme = createTheme((now) => {
   page.header.theme(now);
   stage?.setTheme(now);
 });
+
+/** What the camera did during the last round of the dance, which is what is kept; nothing where it was not moved. */
+function cameraMoves(): CameraKeyframe[] {
+  const clock = room?.viewer.clockTime(performance.now()) ?? null;
+  return room && clock !== null ? (stage?.trail.moves(clock - room.viewer.duration * 1e6) ?? []) : [];
+}
 
 function play(): void {
   if (room?.viewer.timeline) room.edit({ playing: !room.viewer.timeline.playing });
@@ -212,7 +219,7 @@ function expose(): void {
 }
 
 async function openStage(): Promise<void> {
-  const { Commands, createGamepad, createPointer, Hands, listenToKeyboard, Stage, VelocityInputs } = await import("./theatre");
+  const { Commands, createGamepad, createPointer, Hands, listenToKeyboard, listenToMouse, Stage, VelocityInputs } = await import("./theatre");
   try {
     stage = new Stage(canvas, query.get("quality") === "best");
   } catch {
@@ -228,7 +235,7 @@ async function openStage(): Promise<void> {
     holding.render();
   };
   const may = (limb: number) => holding.free(limb);
-  pointer = createPointer(canvas, stage, hands, { may, refused: (limb) => holding.refused(limb), smoothing: () => mapping.pointerSmoothing });
+  pointer = createPointer(canvas, stage, hands, { may, refused: (limb) => holding.refused(limb), smoothing: () => mapping.pointerSmoothing, nearer: (limb) => velocity?.nearer(limb) ?? 0 });
   velocity = new VelocityInputs(hands, { take: (limb) => holding.take(limb, "velocity"), free: may });
   commands = new Commands(hands, velocity, {
     ask: () => holding.ask(),
@@ -242,6 +249,7 @@ async function openStage(): Promise<void> {
     line: () => page.panels.toggle("line"),
   });
   listenToKeyboard(window, commands, velocity, () => mapping, { keys: () => page.keys.show(), escape: () => page.panels.closeLast() });
+  listenToMouse(canvas, window, commands, () => mapping);
   pad = createGamepad(commands, () => mapping, () => navigator.getGamepads());
   holding.theatre = { hands, velocity, shake: (limb) => stage?.strings.refuse(limb) };
   if (room) {
@@ -251,6 +259,12 @@ async function openStage(): Promise<void> {
   expose();
   resize();
   addEventListener("resize", resize);
+  // hidden, no frame comes that would let up what was pressed
+  document.addEventListener("visibilitychange", () => {
+    if (!document.hidden) return;
+    commands?.forget();
+    velocity?.update(performance.now());
+  });
   requestAnimationFrame(frame);
 }
 
@@ -278,6 +292,7 @@ function frame(): void {
   stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.shownTime(now));
   page.tags.render(limbs, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
   if (pose) invite(now);
+  page.transport.camera(stage.hasShow, stage.following);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);
   if (viewer && now - sampled >= SAMPLE_EVERY) {
     sampled = now;

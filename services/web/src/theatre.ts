@@ -3,6 +3,7 @@ export { Commands } from "./input/commands";
 export { createGamepad } from "./input/gamepad";
 export { Hands } from "./input/hands";
 export { listenToKeyboard } from "./input/keyboard";
+export { listenToMouse } from "./input/mouse";
 export { createPointer } from "./input/pointer";
 export { VelocityInputs } from "./input/velocity";
 export { Stage } from "./stage/stage";

@@ -9,6 +9,10 @@ export interface Motion {
   /** Seconds. */
   duration: number;
   fps: number;
+  /** Of a motion that was kept from a session: the types of its tracks, words of where it is from, and its dance's id. */
+  tracks?: string[];
+  source?: string;
+  kept_from?: string;
   [key: string]: unknown;
 }
 

@@ -13,7 +13,6 @@ import { Tracks } from "../playout/tracks";
 import { type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState } from "../wire/messages";
 import { Connection } from "./connection";
 import type { LineFigures } from "./line-figures";
-import { fetchMarionette } from "./marionette";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
 import type { Solver, SolverOf } from "./solver";
@@ -40,6 +39,9 @@ const REPORT_EVERY = 1_000;
 
 /** Weight of the newest in running means. */
 const NEWEST = 1 / 8;
+
+/** The marionette comes after the first picture: nobody pulls before. */
+const marionette: SolverOf = async (figure, origin) => (await import("./marionette")).fetchMarionette(figure, origin);
 
 const NO_BLOCKS = new Int8Array(0);
 
@@ -87,7 +89,7 @@ export class Viewer extends EventTarget {
     super();
     this.url = new URL(options.url);
     this.now = options.now ?? (() => performance.now());
-    this.solverOf = options.solver === undefined ? fetchMarionette : options.solver;
+    this.solverOf = options.solver === undefined ? marionette : options.solver;
     this.started = this.now();
     this.connection = new Connection({
       url: () => this.address(),

@@ -1,7 +1,7 @@
 /** Carries out what a control is bound to, whichever device it is of. */
 import type { Hands } from "./hands";
 import { isInput } from "./inputs";
-import { limbTaken, type Action, type Command, type Control } from "./mapping";
+import { limbTaken, meant, type Action, type Command, type Control } from "./mapping";
 import type { VelocityInputs } from "./velocity";
 
 /** A control held longer than this lets its limb go when it comes up; a shorter press leaves the limb held. Milliseconds. */
@@ -27,14 +27,17 @@ export class Commands {
     return this.#pressed.has(control);
   }
 
-  /** A control goes down, or is pressed more or less than before; `now` in milliseconds. */
-  press(control: Control, commands: readonly Command[], strength: number, now: number): void {
+  /** A control goes down, or is pressed more or less than before; `now` in milliseconds. Whether it means anything now, of what it is `bound` to. */
+  press(control: Control, bound: readonly Command[], strength: number, now: number): boolean {
+    const pressed = this.#pressed.get(control);
+    const commands = pressed?.commands ?? meant(bound, this.velocity.selected !== null);
     for (const command of commands) if (isInput(command)) this.velocity.set(control, command, strength);
-    if (this.#pressed.has(control)) return;
+    if (pressed || commands.length === 0) return commands.length > 0;
     const limbs = commands.map(limbTaken).filter((limb) => limb !== null);
     const took = limbs.filter((limb) => this.hands.source(limb) !== "pointer" && !this.velocity.holds(limb) && this.velocity.hold(limb));
     this.#pressed.set(control, { commands, at: now, took });
     for (const command of commands) if (!isInput(command) && limbTaken(command) === null) this.actions[command as keyof PageActions]();
+    return true;
   }
 
   /** A control that is down repeats by itself: seeking goes on, the rest is done once. */
@@ -56,7 +59,7 @@ export class Commands {
   }
 
   /** Lets all controls up whose names pass, without a tap's meaning. */
-  forget(which: (control: Control) => boolean): void {
+  forget(which: (control: Control) => boolean = () => true): void {
     for (const [control, press] of this.#pressed) {
       if (!which(control)) continue;
       this.#pressed.delete(control);

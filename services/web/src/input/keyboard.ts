@@ -1,6 +1,6 @@
 /** Everything by keyboard alone: what keys are bound to, and Escape and ? that are fixed. */
 import type { Commands } from "./commands";
-import { isHeld, isPadControl, type Mapping } from "./mapping";
+import { isPadControl, type Mapping } from "./mapping";
 import type { VelocityInputs } from "./velocity";
 
 export interface KeyboardActions {
@@ -31,14 +31,10 @@ export function listenToKeyboard(target: Window, commands: Commands, velocity: V
       actions.keys();
       return true;
     }
-    const bound = mapping().bindings[code] ?? [];
-    const held = bound.filter(isHeld);
-    const meant = velocity.selected !== null && held.length > 0 ? held : bound.filter((command) => !isHeld(command));
     // a button or link that has the focus is pressed by these two
     const onControl = event.target instanceof Element && event.target.closest("button, a, [role=slider]") !== null;
-    if (meant.length === 0 || (onControl && (code === "Space" || code === "Enter"))) return false;
-    commands.press(code, meant, 1, event.timeStamp);
-    return true;
+    if (onControl && (code === "Space" || code === "Enter")) return false;
+    return commands.press(code, mapping().bindings[code] ?? [], 1, event.timeStamp);
   };
   target.addEventListener("keyup", (event) => commands.release(event.code, event.timeStamp));
   target.addEventListener("blur", () => commands.forget((control) => !isPadControl(control)));

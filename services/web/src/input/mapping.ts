@@ -1,8 +1,9 @@
 /**
  * Which physical control does what, as data. Pure.
  *
- * A control is a key's place (`KeyboardEvent.code`), or of a gamepad of the W3C standard layout a button (`button:7`) or half an axis (`axis:0+`). Two words are a
- * control while a button is held (`button:4 axis:1-`): then what the control does alone does not count, and with an empty list it does nothing.
+ * A control is a key's place (`KeyboardEvent.code`), a further button of the mouse (`mouse:1`, as `MouseEvent.button`) or its wheel (`wheel:+`, towards oneself), or
+ * of a gamepad of the W3C standard layout a button (`button:7`) or half an axis (`axis:0+`). Two words are a control while a button is held (`button:4 axis:1-`):
+ * then what the control does alone does not count, and with an empty list it does nothing.
  */
 import { LIMBS } from "../motion/skeleton";
 import { DIGITAL_INPUTS, HELD_INPUTS, type DigitalInput, type HeldInput } from "./inputs";
@@ -27,7 +28,7 @@ export interface Mapping {
 export const DEAD_ZONE_MOST = 0.5;
 const MOST_CONTROLS = 400;
 const COMMANDS: ReadonlySet<unknown> = new Set<Command>([...DIGITAL_INPUTS, ...HELD_INPUTS, ...ACTIONS]);
-const CONTROL = /^(button:\d{1,2} )?(button:\d{1,2}|axis:\d{1,2}[+-])$|^[A-Z][A-Za-z0-9]{0,31}$/;
+const CONTROL = /^(button:\d{1,2} )?(button:\d{1,2}|axis:\d{1,2}[+-])$|^(mouse:[1-4]|wheel:[+-])$|^[A-Z][A-Za-z0-9]{0,31}$/;
 
 /** A key takes a limb and six move it; a stick moves a hand, and with its shoulder button held a leg. */
 export const DEFAULT_MAPPING: Mapping = {
@@ -37,6 +38,7 @@ export const DEFAULT_MAPPING: Mapping = {
     KeyD: ["held_x+"], KeyA: ["held_x-"], KeyW: ["held_y+"], KeyS: ["held_y-", "strings"], KeyQ: ["held_z+"], KeyE: ["held_z-"],
     ArrowRight: ["held_x+", "forward"], ArrowLeft: ["held_x-", "back"], ArrowUp: ["held_y+"], ArrowDown: ["held_y-"],
     PageDown: ["held_z+"], PageUp: ["held_z-"],
+    "wheel:+": ["held_z+"], "wheel:-": ["held_z-"],
     KeyR: ["ask"], KeyG: ["give"], KeyK: ["keep"], Space: ["play"], KeyL: ["library"], KeyN: ["line"],
     "axis:0+": ["left_hand_x+"], "axis:0-": ["left_hand_x-"], "axis:1-": ["left_hand_y+"], "axis:1+": ["left_hand_y-"],
     "axis:2+": ["right_hand_x+"], "axis:2-": ["right_hand_x-"], "axis:3-": ["right_hand_y+"], "axis:3+": ["right_hand_y-"],
@@ -62,7 +64,13 @@ export function isHeld(command: Command): command is HeldInput {
 }
 
 export function isPadControl(control: Control): boolean {
-  return control.includes(":");
+  return /^(button|axis):/.test(control);
+}
+
+/** What a control means just now: while a string is held what it does with that, if anything; else the rest. */
+export function meant(bound: readonly Command[], holding: boolean): readonly Command[] {
+  const held = bound.filter(isHeld);
+  return holding && held.length > 0 ? held : bound.filter((command) => !isHeld(command));
 }
 
 /** The controls of a command, in the mapping's order. */

@@ -9,6 +9,9 @@ export const GRAB = 44;
 const ORBIT = 0.005;
 /** Of the smoothing of what is pulled, Hz for each metre a second. */
 const BETA = 12;
+/** Full speed nearer and further, metres a second, and how far the limb may lag behind it, metres. */
+const DEPTH_SPEED = 0.7;
+const DEPTH_LAG = 0.15;
 
 export interface PointerInput {
   /** The limb under the pointer, lit; null for none. */
@@ -26,16 +29,24 @@ interface Drag {
   dy: number;
   /** Of the place it is pulled to. */
   filter: OneEuro;
+  /** How much nearer to the audience than the handle it is pulled, metres, and when that was, milliseconds. */
+  ahead: number;
+  /** How near that is, metres towards the audience. */
+  depth: number;
+  at: number;
 }
 
-/** Whether a limb can be taken, and who is told when not; and how much a pull is smoothed, 0 to 1. */
+/**
+ * Whether a limb can be taken, and who is told when not; how much a pull is smoothed, 0 to 1; how fast a limb goes nearer meanwhile, -1 to 1, by keys or wheel.
+ */
 export interface PointerOptions {
   may(limb: number): boolean;
   refused(limb: number): void;
   smoothing(): number;
+  nearer(limb: number): number;
 }
 
-export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Hands, { may, refused, smoothing }: PointerOptions): PointerInput {
+export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Hands, { may, refused, smoothing, nearer }: PointerOptions): PointerInput {
   const drags = new Map<number, Drag>();
   let near: number | null = null;
   let orbiting: { id: number; x: number; y: number } | null = null;
@@ -57,9 +68,12 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
     if (limb === null) delete canvas.dataset.near;
     else canvas.dataset.near = "";
   };
-  const pull = ({ limb, x, y, dx, dy, filter }: Drag, now: number) => {
+  const pull = (drag: Drag, now: number) => {
     if (!stage.puppet) return;
-    const place = stage.fromScreen(x + dx, y + dy, stage.puppet.handle(limb, handle));
+    const { limb, x, y, dx, dy, filter } = drag;
+    stage.puppet.handle(limb, handle);
+    deepen(drag, now);
+    const place = stage.fromScreen(x + dx, y + dy, handle.addScaledVector(stage.back(), drag.ahead));
     if (!place) return;
     const settings = smoothness(smoothing(), BETA);
     if (settings) {
@@ -67,6 +81,17 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
       place.fromArray(filter.filter(place.toArray(), now / 1000));
     }
     hands.pullTo(limb, place);
+  };
+
+  /** Goes nearer or further at a speed, whose start is where the handle is; at rest the handle's own depth is kept. */
+  const deepen = (drag: Drag, now: number) => {
+    const speed = nearer(drag.limb) * DEPTH_SPEED;
+    const depth = handle.dot(stage.back());
+    const from = drag.ahead === 0 ? depth : drag.depth;
+    drag.depth = from + (speed * Math.max(now - drag.at, 0)) / 1000;
+    drag.ahead = speed === 0 ? 0 : Math.min(DEPTH_LAG, Math.max(-DEPTH_LAG, drag.depth - depth));
+    drag.depth = depth + drag.ahead;
+    drag.at = now;
   };
 
   canvas.addEventListener("pointerdown", (event) => {
@@ -84,7 +109,7 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
     }
     if (!stage.puppet || !hands.take(limb, "pointer")) return;
     const at = stage.toScreen(stage.puppet.handle(limb, handle));
-    drags.set(pointerId, { limb, x, y, dx: at.x - x, dy: at.y - y, filter: new OneEuro(3, { minCutoff: 1, beta: BETA, derivativeCutoff: 1 }) });
+    drags.set(pointerId, { limb, x, y, dx: at.x - x, dy: at.y - y, filter: new OneEuro(3, { minCutoff: 1, beta: BETA, derivativeCutoff: 1 }), ahead: 0, depth: 0, at: event.timeStamp });
     canvas.dataset.pulling = "";
   });
   canvas.addEventListener("pointermove", (event) => {

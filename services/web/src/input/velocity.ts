@@ -9,6 +9,8 @@ import { directionOf, effectOf, type DigitalInput, type HeldInput } from "./inpu
 const REST = 700;
 /** A limb that another held is tried again no sooner than this after it came free. Milliseconds. */
 const PATIENCE = 300;
+/** The first of these that is held is selected. */
+const ORDER = [1, 0, 3, 2];
 
 export interface VelocityActions {
   /** Takes a limb for these inputs; false, and the person is told why, when it cannot be had. */
@@ -16,6 +18,9 @@ export interface VelocityActions {
   /** Whether nobody holds a limb. */
   free(limb: number): boolean;
 }
+
+/** Inputs of one limb, and how strongly each is pressed. */
+type Held = [DigitalInput | HeldInput, number][];
 
 interface Motion {
   active: boolean;
@@ -34,16 +39,23 @@ export class VelocityInputs {
   readonly #down = new Map<string, { input: DigitalInput | HeldInput; strength: number }>();
   readonly #motions: Motion[] = [0, 1, 2, 3].map(() => ({ active: false, movedAt: -Infinity, triedAt: -Infinity, momentary: false, spent: false }));
   #selected: number | null = null;
+  /** What is held of each limb since the last frame. */
+  #held: Held[] = [[], [], [], []];
 
   constructor(hands: Hands, actions: VelocityActions) {
     this.#hands = hands;
     this.#actions = actions;
   }
 
-  /** The limb that the inputs of "whichever is held" move; null for none. */
+  /** The limb that the inputs of "whichever is held" move: one that a pointer pulls before the one taken last; null for none. */
   get selected(): number | null {
-    if (this.#selected === null || !this.holds(this.#selected)) this.#selected = [1, 0, 3, 2].find((limb) => this.holds(limb)) ?? null;
-    return this.#selected;
+    if (this.#selected === null || !this.holds(this.#selected)) this.#selected = ORDER.find((limb) => this.holds(limb)) ?? null;
+    return ORDER.find((limb) => this.#hands.source(limb) === "pointer") ?? this.#selected;
+  }
+
+  /** How fast a limb that a pointer pulls over the screen is moved nearer to the audience, -1 to 1: what a pointer cannot say. */
+  nearer(limb: number): number {
+    return directionOf(this.#held[limb])[2];
   }
 
   /** Presses an input by a control (any name), or changes how strongly; 0 lets it up. */
@@ -62,6 +74,7 @@ export class VelocityInputs {
     if (this.#hands.source(limb) !== "velocity" && !this.#actions.take(limb)) return false;
     this.#motions[limb].momentary = false;
     this.#selected = limb;
+    this.#hands.changed();
     return true;
   }
 
@@ -74,15 +87,16 @@ export class VelocityInputs {
   /** Takes, moves and lets go as the inputs say. Once a frame, with a time that never runs backwards, milliseconds. */
   update(now: number): void {
     const selected = this.selected;
-    const held: [DigitalInput | HeldInput, number][][] = [[], [], [], []];
+    const held: Held[] = [[], [], [], []];
     for (const { input, strength } of this.#down.values()) {
       const limb = effectOf(input).limb ?? selected;
       if (limb !== null) held[limb].push([input, strength]);
     }
+    this.#held = held;
     held.forEach((inputs, limb) => this.#move(limb, inputs, now));
   }
 
-  #move(limb: number, inputs: [DigitalInput | HeldInput, number][], now: number): void {
+  #move(limb: number, inputs: Held, now: number): void {
     const motion = this.#motions[limb];
     const fresh = inputs.length > 0 && !motion.active;
     if (motion.momentary && this.#hands.source(limb) !== "velocity") {

@@ -81,7 +81,7 @@ export class Arm {
 
   /** The nearest distance that is solved for. */
   clamp(r: number): number {
-    return Math.min(Math.max(r, this.inner), OUTER_RADIUS);
+    return clamp(r, this.inner);
   }
 
   /** Least and greatest wrist bend (2), radians, that reach `r` (clamped) with elbow and wrist within their limits. */
@@ -99,7 +99,8 @@ export class Arm {
     const { limit } = this;
     this.limits(limit, 0, r);
     const least = Math.sin(limit[0] / 2), greatest = Math.sin(limit[1] / 2);
-    return 2 * Math.asin(least + this.share(r, Math.cos(beta), Math.sin(beta)) * (greatest - least));
+    const share = lookUp(this.table, Math.sqrt((1 - r) * this.rows), Math.cos(beta), Math.sin(beta));
+    return 2 * Math.asin(least + share * (greatest - least));
   }
 
   /**
@@ -123,68 +124,100 @@ export class Arm {
   }
 
   /**
-   * The arm whose tip is at (x, y, z), in the vertical plane: `SOLVED` numbers into `out`. A target out of reach is
-   * brought in with its direction kept; the shoulder's own place counts as straight below.
+   * The arms whose tips are at `count` targets (x, y, z each, from `targetsAt` on), in the vertical plane: `SOLVED` numbers
+   * each into `out`. A target out of reach is brought in with its direction kept; the shoulder's own place counts as
+   * straight below.
    *
-   * Square roots alone: a place in the plane is a complex number, and joints turn by multiplying.
+   * Square roots alone: a place in the plane is a complex number, and joints turn by multiplying. First all bends, then all
+   * arms: one arm's numbers wait for each other, and shorter chains let the processor work at more arms at once.
    */
-  solve(out: Numbers, outAt: number, x: number, y: number, z: number): void {
+  solve(out: Numbers, outAt: number, targets: Numbers, targetsAt: number, count = 1): void {
     const { upper, fore, hand } = this.proportions;
-    const flat = x * x + z * z;
-    let level = Math.sqrt(flat), up = y, reach = Math.sqrt(flat + y * y);
-    if (reach < NOWHERE) {
-      level = 0;
-      up = -NOWHERE;
-      reach = NOWHERE;
+    const { inner, straight, folded, fold, near, far, leanSine, leanCosine, rows, table } = this;
+    const upperSquare = upper * upper, whole = (fore + hand) * (fore + hand), part = 4 * fore * hand;
+    for (let from = targetsAt, to = outAt; from < targetsAt + 3 * count; from += 3, to += SOLVED) {
+      const x = targets[from], z = targets[from + 2], flat = x * x + z * z;
+      let up = targets[from + 1], level = Math.sqrt(flat), reach = Math.sqrt(flat + up * up);
+      if (!(reach >= NOWHERE)) {
+        level = 0;
+        up = -NOWHERE;
+        reach = NOWHERE;
+      }
+      let sine = 0, cosine = 1;
+      if (level >= ON_AXIS) {
+        const scale = 1 / level;
+        sine = x * scale;
+        cosine = z * scale;
+      }
+      const share = lookUp(table, Math.sqrt((1 - clamp(reach, inner)) * rows), level, up);
+      if (reach < inner || reach > OUTER_RADIUS) {
+        const r = clamp(reach, inner), scale = r / reach;
+        level *= scale;
+        up *= scale;
+        reach = r;
+      }
+      const square = reach * reach, inverse = 1 / square;
+      let greatest = Math.sqrt((1 - square) * straight);
+      if (greatest > WIDEST) greatest = WIDEST;
+      let least = 0;
+      if (square < fold) {
+        // half of an angle sum: the folded elbow's lean, and the bend that reaches so far from there
+        const bendSine = Math.sqrt(Math.min((far - square) * folded, 1));
+        const bendCosine = Math.sqrt(Math.max((square - near) * folded, 0));
+        least = Math.min(Math.max(leanSine * bendCosine + leanCosine * bendSine, 0), greatest);
+      }
+      out[to] = sine;
+      out[to + 1] = cosine;
+      out[to + 2] = level;
+      out[to + 3] = up;
+      out[to + 4] = inverse;
+      out[to + 5] = least + share * (greatest - least);
     }
-    const off = level >= ON_AXIS, sine = off ? x / level : 0, cosine = off ? z / level : 1;
-    const r = Math.min(Math.max(reach, this.inner), OUTER_RADIUS), square = r * r;
-    const share = this.share(r, level, up);
-    const greatest = Math.min(WIDEST, Math.sqrt((1 - square) * this.straight));
-    let least = 0;
-    if (square < this.fold) {
-      // half of an angle sum: the folded elbow's lean, and the bend that reaches r from there
-      const bendSine = Math.sqrt(Math.min((this.far - square) * this.folded, 1));
-      const bendCosine = Math.sqrt(Math.max((square - this.near) * this.folded, 0));
-      least = Math.min(Math.max(this.leanSine * bendCosine + this.leanCosine * bendSine, 0), greatest);
+    for (let to = outAt; to < outAt + SOLVED * count; to += SOLVED) {
+      const sine = out[to], cosine = out[to + 1], level = out[to + 2], up = out[to + 3], inverse = out[to + 4];
+      const half = out[to + 5], halfSquare = half * half;
+      const cosBend = 1 - 2 * halfSquare, sinBend = 2 * half * Math.sqrt(1 - halfSquare);
+      // the rest of the arm, seen along the forearm, and the triangle it makes with the upper arm
+      const restX = fore + hand * cosBend, restY = hand * sinBend, rest = whole - part * halfSquare;
+      const along = 0.5 + (upperSquare - rest) * 0.5 * inverse;
+      const belowSquare = upperSquare * inverse - along * along;
+      const below = belowSquare > 0 ? Math.sqrt(belowSquare) : 0;
+      const elbowX = level * along + up * below, elbowY = up * along - level * below;
+      const turn = 1 / rest, turnX = restX * turn, turnY = restY * turn, chordX = level - elbowX, chordY = up - elbowY;
+      const foreX = chordX * turnX + chordY * turnY, foreY = chordY * turnX - chordX * turnY;
+      const wristX = elbowX + fore * foreX, wristY = elbowY + fore * foreY;
+      const tipX = wristX + hand * (foreX * cosBend - foreY * sinBend);
+      const tipY = wristY + hand * (foreY * cosBend + foreX * sinBend);
+      out[to + 2] = elbowX * sine;
+      out[to + 3] = elbowY;
+      out[to + 4] = elbowX * cosine;
+      out[to + 5] = wristX * sine;
+      out[to + 6] = wristY;
+      out[to + 7] = wristX * cosine;
+      out[to + 8] = tipX * sine;
+      out[to + 9] = tipY;
+      out[to + 10] = tipX * cosine;
     }
-    const half = least + share * (greatest - least);
-    const cosBend = 1 - 2 * half * half, sinBend = 2 * half * Math.sqrt(1 - half * half);
-    // the rest of the arm, seen along the forearm, and the triangle it makes with the upper arm
-    const restX = fore + hand * cosBend, restY = hand * sinBend, rest = restX * restX + restY * restY;
-    const along = ((upper * upper + square - rest) * 0.5) / square;
-    const below = Math.sqrt(Math.max((upper * upper) / square - along * along, 0));
-    const scale = r / reach;
-    level *= scale;
-    up *= scale;
-    const elbowX = level * along + up * below, elbowY = up * along - level * below;
-    const chordX = (level - elbowX) / rest, chordY = (up - elbowY) / rest;
-    const foreX = chordX * restX + chordY * restY, foreY = chordY * restX - chordX * restY;
-    const wristX = elbowX + fore * foreX, wristY = elbowY + fore * foreY;
-    const tipX = wristX + hand * (foreX * cosBend - foreY * sinBend);
-    const tipY = wristY + hand * (foreY * cosBend + foreX * sinBend);
-    out[outAt] = sine;
-    out[outAt + 1] = cosine;
-    out[outAt + 2] = elbowX * sine;
-    out[outAt + 3] = elbowY;
-    out[outAt + 4] = elbowX * cosine;
-    out[outAt + 5] = wristX * sine;
-    out[outAt + 6] = wristY;
-    out[outAt + 7] = wristX * cosine;
-    out[outAt + 8] = tipX * sine;
-    out[outAt + 9] = tipY;
-    out[outAt + 10] = tipX * cosine;
   }
+}
 
-  /** The table's value for a tip at distance `r` whose direction has these `level` (not below zero) and `up` parts. */
-  private share(r: number, level: number, up: number): number {
-    const q = Math.sqrt((1 - r) * this.rows);
-    const u = (1 - q) * (1 + 0.75 * q) * (SIDE - 1);
-    const v = (0.5 + (0.5 * up) / (level + Math.abs(up))) * (SIDE - 1);
-    const i = Math.min(Math.trunc(u), SIDE - 2), j = Math.min(Math.trunc(v), SIDE - 2);
-    const p = u - i, w = v - j, at = i * SIDE + j, node = this.table;
-    const inside = node[at] + (node[at + 1] - node[at]) * w;
-    const outside = node[at + SIDE] + (node[at + SIDE + 1] - node[at + SIDE]) * w;
-    return inside + (outside - inside) * p;
-  }
+/** `reach` within what is solved for. */
+function clamp(reach: number, inner: number): number {
+  return reach < inner ? inner : reach > OUTER_RADIUS ? OUTER_RADIUS : reach;
+}
+
+/**
+ * The table's value, `slack` being the root of the share of its reach that an arm has left, for a tip in the direction of `level`
+ * (not below zero) and `up`.
+ */
+function lookUp(table: Float64Array, slack: number, level: number, up: number): number {
+  const u = (1 - slack) * (1 + 0.75 * slack) * (SIDE - 1);
+  const v = (0.5 + (0.5 * up) / (level + Math.abs(up))) * (SIDE - 1);
+  let i = u | 0, j = v | 0;
+  if (i > SIDE - 2) i = SIDE - 2;
+  if (j > SIDE - 2) j = SIDE - 2;
+  const p = u - i, q = v - j, at = i * SIDE + j;
+  const inside = table[at] + (table[at + 1] - table[at]) * q;
+  const outside = table[at + SIDE] + (table[at + SIDE + 1] - table[at + SIDE]) * q;
+  return inside + (outside - inside) * p;
 }

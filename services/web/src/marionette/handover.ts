@@ -4,19 +4,19 @@
  * dance's way of reaching a place to the marionette's (`blend`), by the weight given here. As `marionette/handover.py`.
  */
 
-import { multiply, rotate, slerp, type Numbers } from "../motion/rotation";
-import { between, normalise, put, unit } from "../motion/vector";
+import { conjugate, multiply, rotate, slerp, type Numbers } from "../motion/rotation";
+import { between, dot, normalise, put, unit } from "../motion/vector";
 
 /** Seconds from the dance's way of holding a limb to the marionette's. */
 export const TAKE = 0.15;
 /** Seconds from the marionette's way to the dance's. */
 export const GIVE_BACK = 0.35;
-/** Arm lengths per second squared: a quarter of an arm is crossed in 0.12 s. */
-export const HAND_ACCELERATION = 75;
+/** Arm lengths per second squared: a quarter of an arm is crossed in 0.11 s. */
+export const HAND_ACCELERATION = 79;
 /** Radians per second squared. */
 export const THIGH_ACCELERATION = 60;
 /** Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds. */
-const RETURN = 0.3;
+const RETURN = 0.28;
 const LEAST_ACCELERATION = 6;
 
 /**
@@ -65,6 +65,7 @@ export class Turn {
   private readonly here = new Float64Array(3);
   private readonly there = new Float64Array(3);
   private readonly onwards = new Float64Array(4);
+  private readonly shortest = new Float64Array(4);
 
   /** Forgets the way it went. */
   rest(): void {
@@ -72,20 +73,33 @@ export class Turn {
   }
 
   /**
-   * The turn (4) from the direction of `dance` (3) to that of `pulled` (3); all the way there, at `weight` 1, it starts afresh
-   * from the shortest.
+   * The turn (4) from the direction of `dance` (3) to that of `pulled` (3). What it turns about the arm itself, having gone
+   * round, is at most half a circle times `weight`: so it is the shortest turn when the hand is back. All the way there, at
+   * `weight` 1, it starts afresh from the shortest.
    */
   follow(out: Numbers, outAt: number, dance: Numbers, pulled: Numbers, weight: number): void {
-    const { turn, here, there, onwards } = this;
+    const { turn, here, there, onwards, shortest } = this;
     if (!unit(here, 0, dance, 0)) put(here, 0, 0, -1, 0);
     if (!unit(there, 0, pulled, 0)) put(there, 0, 0, -1, 0);
+    between(shortest, 0, here, 0, there, 0);
     if (this.known) {
       rotate(here, 0, turn, 0, here, 0);
       between(onwards, 0, here, 0, there, 0);
       multiply(turn, 0, onwards, 0, turn, 0);
+      conjugate(onwards, 0, shortest, 0);
+      multiply(onwards, 0, turn, 0, onwards, 0);
+      const whole = 2 * Math.PI, most = Math.PI * weight;
+      let twist = 2 * Math.atan2(dot(onwards, 1, there, 0), onwards[0]);
+      twist -= whole * Math.round(twist / whole);
+      if (Math.abs(twist) > most) {
+        const sine = Math.sin(0.5 * Math.min(Math.max(twist, -most), most));
+        onwards[0] = Math.sqrt(1 - sine * sine);
+        for (let i = 0; i < 3; i++) onwards[i + 1] = there[i] * sine;
+        multiply(turn, 0, onwards, 0, shortest, 0);
+      }
       normalise(turn, 0);
     } else {
-      between(turn, 0, here, 0, there, 0);
+      turn.set(shortest);
     }
     this.known = weight < 1;
     for (let i = 0; i < 4; i++) out[outAt + i] = turn[i];

@@ -7,6 +7,7 @@ export const WRIST_LIMIT = (80 * Math.PI) / 180;
 /** The farthest a hand tip is solved for, in arm lengths. */
 export const OUTER_RADIUS = 1 - 1e-6;
 
+const WHOLE = 10_000;
 /** Masses of upper arm, forearm and hand as parts of the body's (Winter), over their lengths as parts of its height. */
 const MASS_PER_LENGTH = [0.028 / 0.186, 0.016 / 0.146, 0.006 / 0.108];
 
@@ -32,17 +33,20 @@ export function proportionsOf(
   const heavy = weights[0] + weights[1] + weights[2];
   if (!(heavy > 0)) throw new RangeError("an arm's three links need masses above zero");
   const lengths = links.map((length) => length / whole);
-  const identity = [...apportion(lengths), ...apportion(weights.map((mass) => mass / heavy))].join("-");
+  const parts = [...apportion(lengths), ...apportion(weights.map((mass) => mass / heavy))];
+  // in thousandths where they say the same
+  const identity = (parts.every((part) => part % 10 === 0) ? parts.map((part) => part / 10) : parts).join("-");
   return { upper: lengths[0], fore: lengths[1], hand: lengths[2], identity };
 }
 
 /** From an identity, as the service knows it. Throws `RangeError` for text that is not one. */
 export function parseProportions(identity: string): Proportions {
   const parts = /^\d{1,4}(-\d{1,4}){5}$/.test(identity) ? identity.split("-").map(Number) : [];
-  if (parts.length !== 6 || parts[0] + parts[1] + parts[2] !== 1000) {
-    throw new RangeError(`proportions ${identity} are not L0-L1-L2-M0-M1-M2 in thousandths`);
+  const whole = parts[0] + parts[1] + parts[2];
+  if (whole !== 1000 && whole !== WHOLE) {
+    throw new RangeError(`proportions ${identity} are not L0-L1-L2-M0-M1-M2 in thousandths or ten-thousandths`);
   }
-  return { upper: parts[0] / 1000, fore: parts[1] / 1000, hand: parts[2] / 1000, identity };
+  return { upper: parts[0] / whole, fore: parts[1] / whole, hand: parts[2] / whole, identity };
 }
 
 /** The nearest to the shoulder that a tip is solved for: a quarter beyond what the joints allow, at least 0.1. */
@@ -58,11 +62,11 @@ export function innerRadius({ upper, fore, hand }: Proportions): number {
   return Math.max(0.1, 1.25 * nearest);
 }
 
-/** Thousandths that sum to 1000, by the largest remainder. */
+/** Ten-thousandths that sum to 10,000, by the largest remainder. */
 function apportion(shares: readonly number[]): number[] {
-  const whole = shares.map((share) => Math.floor(share * 1000 + 1e-6));
-  const order = [0, 1, 2].sort((i, j) => shares[j] * 1000 - whole[j] - (shares[i] * 1000 - whole[i]) || i - j);
-  const left = 1000 - whole[0] - whole[1] - whole[2];
+  const whole = shares.map((share) => Math.floor(share * WHOLE + 1e-6));
+  const order = [0, 1, 2].sort((i, j) => shares[j] * WHOLE - whole[j] - (shares[i] * WHOLE - whole[i]) || i - j);
+  const left = WHOLE - whole[0] - whole[1] - whole[2];
   for (let k = 0; k < left; k++) whole[order[k]] += 1;
   return whole;
 }

@@ -20,7 +20,7 @@ export const MOST_REACH = 0.9995;
 /** Arm lengths from the shoulder that a hand is pulled to at least: nearer in, the elbow would have to whirl. */
 export const LEAST_REACH = 0.15;
 /** Arm lengths per second squared, against the dance, that a hand let go comes back with at most. */
-const HAND_HOME = 60;
+const HAND_HOME = 79;
 /** Arm lengths, or radians, within which a limb is the dance's again. */
 const ARRIVED = 1e-6;
 /** A limb on its last way home is still solved for. */

@@ -45,6 +45,11 @@ export function createKeysModal(root: HTMLElement, change: (mapping: Mapping) =>
   dialog.addEventListener("keydown", (event) => {
     if (editor.key(event)) event.preventDefault();
   }, true);
+  for (const kind of ["mousedown", "wheel"] as const) {
+    dialog.addEventListener(kind, (event) => {
+      if (editor.mouse(event)) event.preventDefault();
+    }, { passive: false });
+  }
   dialog.addEventListener("cancel", (event) => {
     if (editor.listening) event.preventDefault();
   });

@@ -1,5 +1,6 @@
 /** The list of what can be done and the controls that do it: each can be taken away, and another bound by pressing it. */
 import { PadCapture } from "../input/capture";
+import { mouseControl } from "../input/mouse";
 import { bind, conflictsOf, controlsOf, DEFAULT_MAPPING, isPadControl, unbind, type Command, type Control, type Mapping } from "../input/mapping";
 import { commandName, GROUPS } from "./command-names";
 import { controlName } from "./control-names";
@@ -15,6 +16,8 @@ export interface MappingEditor {
   see(pressed: ReadonlyMap<Control, number>): void;
   /** A key while a press is awaited; true where it was taken. */
   key(event: KeyboardEvent): boolean;
+  /** A further button of the mouse, or its wheel, while a press is awaited; true where it was taken. */
+  mouse(event: MouseEvent): boolean;
   /** Awaits nothing any more. */
   stop(): void;
 }
@@ -106,6 +109,11 @@ export function createMappingEditor(change: (mapping: Mapping) => void): Mapping
       else if (event.code === "" || RESERVED.has(event.code)) return event.code !== "Tab";
       else if (!event.repeat) found(event.code);
       return true;
+    },
+    mouse(event) {
+      const control = awaited && mouseControl(event);
+      if (control) found(control);
+      return Boolean(control);
     },
     stop,
   };

@@ -2,7 +2,8 @@
 import type { Mapping } from "../input/mapping";
 import { createAsks, type Asks } from "./asks";
 import { createHeader, type Header } from "./header";
-import { createKeysModal, type KeysModal } from "./keys-modal";
+import { createKeys } from "./keys";
+import type { KeysModal } from "./keys-modal";
 import { acceptDrops, createLibrary, type Library, type Piece } from "./library";
 import { createLineCard, type LineCard } from "./line-card";
 import { element } from "./dom";
@@ -18,6 +19,8 @@ export interface PageActions extends StringsActions {
   play(): void;
   loop(): void;
   seek(seconds: number): void;
+  /** Follows the show's camera, or no longer. */
+  camera(): void;
   /** Keeps the performance as a new motion; left out, it cannot be kept here. */
   keep?(): Promise<void>;
   files(files: readonly File[]): void;
@@ -47,10 +50,12 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   const tags = createTags(root, on.ask);
   const notice = element("div", { class: "notice", role: "status", hidden: true });
   root.append(notice);
-  const keys = createKeysModal(root, on.mapping);
+  const keys = createKeys(root, on.mapping, () => toast("The list of keys could not be fetched; try again when the line is back"));
   const header = createHeader(root, { share: on.share, theme: on.theme, keys: () => keys.show() });
   const messages = element("div", { class: "messages" });
   root.append(messages);
+  const asks = createAsks(messages, on.give);
+  const toast = createToast(messages);
   const library = createLibrary(root, { files: on.files, choose: on.choose, remove: on.remove, close: () => panels.close("library") });
   const strings = createStringsCard(root, { ...on, close: () => panels.close("strings"), keys: () => keys.show() });
   const line = createLineCard(root, () => panels.close("line"));
@@ -71,9 +76,7 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   });
   acceptDrops(root, on.files);
   return {
-    header, transport, library, strings, line, keys, tags, panels,
-    asks: createAsks(messages, on.give),
-    toast: createToast(messages),
+    header, transport, library, strings, line, keys, tags, asks, panels, toast,
     notice(title, text = "") {
       notice.hidden = title === null;
       if (title !== null) notice.replaceChildren(element("b", {}, title), text);

@@ -15,6 +15,8 @@ export interface Transport {
   health(health: Health): void;
   /** Keeps what is on the stage, as its button does. */
   keep(): void;
+  /** Whether the dance has a camera of its own, the show's, and whether that is followed. */
+  camera(there: boolean, followed: boolean): void;
 }
 
 const PANELS: readonly { name: PanelName; label: string; icon: IconName }[] = [
@@ -31,6 +33,8 @@ export interface TransportActions {
   loop(): void;
   seek(seconds: number): void;
   panel(panel: PanelName): void;
+  /** Follows the show's camera, or no longer. */
+  camera(): void;
   /** Keeps the performance as a new motion; done, or given up and told why, when it resolves. Left out, it cannot be kept here. */
   keep?(): Promise<void>;
 }
@@ -40,6 +44,7 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
   const [now, end] = [element("span"), element("span")];
   const seek = createSeek(on.seek);
   const loop = element("button", { class: "round-button loop", type: "button", "aria-label": "Loop", onClick: on.loop }, icon("loop"));
+  const camera = element("button", { class: "round-button camera", type: "button", "aria-label": "Show's camera", hidden: true, onClick: on.camera }, icon("camera"));
   const keepName = element("span", {}, KEEP);
   const keep = element("button", { class: "pill keep", type: "button", "aria-label": KEEP, disabled: true, hidden: !on.keep, onClick: () => void keepNow() }, icon("keep"), keepName);
   let ready = false;
@@ -70,7 +75,7 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
       return [name, pill] as const;
     }),
   );
-  const tools = element("div", { class: "tools" }, loop, keep, element("span", { class: "tools-rule" }), ...pills.values());
+  const tools = element("div", { class: "tools" }, loop, camera, keep, element("span", { class: "tools-rule" }), ...pills.values());
   const area = element("div", { class: "seek-area" }, element("div", { class: "times" }, now, end), seek.element);
   root.append(element("section", { class: "transport", "aria-label": "Transport" }, play, area, tools));
   let shown = "";
@@ -96,6 +101,10 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
       pills.get(panel)?.setAttribute("aria-expanded", String(open));
     },
     keep: () => void keepNow(),
+    camera(there, followed) {
+      if (camera.hidden === there) camera.hidden = !there;
+      if (camera.ariaPressed !== String(followed)) camera.ariaPressed = String(followed);
+    },
     health(health) {
       dot.dataset.state = health;
       dot.setAttribute("aria-label", HEALTH[health]);

@@ -25,6 +25,8 @@ const EASE = 0.6;
 const REST = 4;
 /** Seconds that going over between one's own seat and the show's camera takes. */
 const OVER = 0.9;
+/** A view turned by less than this is not turned, radians. */
+const UNTURNED = 1e-3;
 
 export class AudienceCamera {
   readonly camera = new PerspectiveCamera(26, 1, 0.1, 40);
@@ -37,6 +39,8 @@ export class AudienceCamera {
   #hasShow = false;
   /** What was chosen; null while nothing was. */
   #choice: boolean | null = null;
+  /** Whether the view was dragged away from the show's camera. */
+  #dragged = false;
   /** Of the way over to the show's camera, 0..1. */
   #over = 0;
   /** Whether this motion's camera was seen yet: at first there is a cut to it. */
@@ -68,24 +72,36 @@ export class AudienceCamera {
 
   /** Whether the show's camera is followed: where there is one, unless told otherwise or less motion is asked for. */
   get following(): boolean {
-    return this.#hasShow && (this.#choice ?? !this.still);
+    return this.#hasShow && !this.#dragged && (this.#choice ?? !this.still);
+  }
+
+  /** Whether the view is all from one's own seat. */
+  get seated(): boolean {
+    return this.#over === 0;
+  }
+
+  /** Whether the view is another than one has who touches nothing: turned, or the show's camera's. */
+  get moved(): boolean {
+    return !this.seated || Math.abs(this.#yaw) > UNTURNED || Math.abs(this.#pitch) > UNTURNED;
   }
 
   /** Follows the show's camera, or returns to one's own seat; kept until told otherwise. */
   follow(on: boolean): void {
     this.#choice = on;
+    this.#dragged = false;
   }
 
-  /** Another motion: its camera is met with a cut. */
+  /** Another motion: its camera is met with a cut, and followed though the one before was dragged away from. */
   cut(): void {
+    this.#dragged = false;
     this.#met = false;
     this.#hasShow = false;
     this.#over = 0;
   }
 
-  /** Turns the view by a drag, radians, in one's own seat; it springs back after 4 s untouched. */
+  /** Turns the view by a drag, radians, in one's own seat; it springs back after 4 s untouched. Leaves the show's camera. */
   orbit(yaw: number, pitch: number): void {
-    if (this.following) this.follow(false);
+    this.#dragged ||= this.following;
     this.#yaw = Math.min(YAW, Math.max(-YAW, this.#yaw + yaw));
     this.#pitch = Math.min(PITCH_HIGH, Math.max(PITCH_LOW, this.#pitch + pitch));
     this.#untouched = 0;
@@ -96,7 +112,7 @@ export class AudienceCamera {
    * numbers of the show's camera, null where there is none.
    */
   update(seconds: number, reach: number, show: ArrayLike<number> | null = null): void {
-    this.#seat(seconds, this.#over === 0 ? reach : 0);
+    this.#seat(seconds, this.seated ? reach : 0);
     this.#hasShow = show !== null;
     if (show) readView(show, this.#show);
     const goal = this.following ? 1 : 0;

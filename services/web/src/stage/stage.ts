@@ -11,6 +11,7 @@ import { asanohaTexture, faceTexture } from "./paint";
 import { Puppet } from "./puppet";
 import { QualityChoice } from "./quality";
 import { Rig } from "./rig";
+import { Scenery } from "./scenery";
 import type { Paint } from "./shading";
 import { Strings, type StringState } from "./strings";
 import { CameraTrail } from "./trail";
@@ -34,6 +35,7 @@ export class Stage {
   readonly trail = new CameraTrail();
   readonly renderer: WebGLRenderer;
   puppet: Puppet | null = null;
+  readonly #scenery = new Scenery();
   readonly #backdrop = backdropUniforms();
   readonly #floor: Floor;
   readonly #lights = createLights();
@@ -55,13 +57,14 @@ export class Stage {
   constructor(canvas: HTMLCanvasElement, pinned = false) {
     this.#quality = new QualityChoice(driverName(), pinned);
     const { plain } = this.#quality.quality;
-    this.#floor = createFloor(this.#backdrop, this.rig.group, this.rig.travelled, plain);
+    this.#floor = createFloor(this.#backdrop, this.#scenery.group, this.rig.travelled, plain);
     this.renderer = new WebGLRenderer({ canvas, antialias: !plain, powerPreference: "high-performance" });
     this.#gate = new FrameGate(this.renderer.getContext() as WebGL2RenderingContext);
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
-    this.rig.group.add(this.audience.camera, this.#lights.group, createBackdrop(this.#backdrop), this.#floor.mesh);
+    this.#scenery.group.add(createBackdrop(this.#backdrop), this.#floor.mesh);
+    this.rig.group.add(this.audience.camera, this.#lights.group, this.#scenery.group);
     this.scene.add(this.rig.group, this.strings.group);
     this.#furnish();
   }
@@ -147,7 +150,8 @@ export class Stage {
     }
     this.rig.group.updateMatrixWorld(true);
     this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0, show);
-    if (pose && clock !== null) this.trail.add(clock, this.audience.view);
+    this.#scenery.turn(this.audience.view, this.audience.seated, seconds);
+    if (pose && clock !== null) this.trail.add(clock, this.audience.view, this.audience.moved);
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());
     this.#sinceDrawn += interval;
     if (!this.#gate.open) return;

@@ -26,15 +26,21 @@ export class CameraTrail {
   #keys: Sample[] = [];
   /** The newest sample, where a line from the last keyframe may end. */
   #newest: Sample | null = null;
+  /** When the view was moved last. */
+  #moved = -Infinity;
   readonly #lowest = new Float64Array(NUMBERS);
   readonly #highest = new Float64Array(NUMBERS);
 
-  /** Notes the view at clock time `time`, microseconds. A time that is not after the last is passed over. */
-  add(time: number, { position, gaze, fov }: View): void {
+  /**
+   * Notes the view at clock time `time`, microseconds, and whether it is `moved`: other than what everyone sees who touches
+   * nothing. A time that is not after the last is passed over.
+   */
+  add(time: number, { position, gaze, fov }: View, moved = true): void {
     const sample = Float64Array.of(time, position.x, position.y, position.z, gaze.x, gaze.y, gaze.z, fov);
     if (!sample.every(Number.isFinite)) return;
     const last = this.#newest ?? this.#keys.at(-1);
     if (last && time <= last[0]) return;
+    if (moved) this.#moved = time;
     if (this.#keys.length === 0) {
       this.#begin(sample);
       return;
@@ -54,9 +60,15 @@ export class CameraTrail {
     return all.slice(first, after < 0 ? all.length : after + 1).map(keyframe);
   }
 
+  /** As `keyframes`, but none where the camera was not moved since `begin`: then there is nothing to keep of it. */
+  moves(begin = -Infinity, end = Infinity): CameraKeyframe[] {
+    return this.#moved > begin ? this.keyframes(begin, end) : [];
+  }
+
   clear(): void {
     this.#keys = [];
     this.#newest = null;
+    this.#moved = -Infinity;
   }
 
   /** A line starts here. */

@@ -1,4 +1,4 @@
-/** What a puppeteer has in the hand, in a real browser: keys bound anew and remembered, arrows pressed and held, a held limb asked for and given. */
+/** What a puppeteer has in the hand, in a real browser: keys bound anew and remembered, arrows pressed and held, a held limb asked for and given, a performance kept. */
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import type { Puppeteer } from "../../src/client/puppeteer";
@@ -9,7 +9,7 @@ import { chromium, startServer, type RunningServer } from "./server";
 
 type Inside = { bunraku: { stage: Stage; hands: Hands; puppeteer: Puppeteer } };
 
-const LEFT_HAND = 0;
+const [LEFT_HAND, RIGHT_LEG] = [0, 3];
 const PATIENCE = 90_000;
 
 const path = chromium();
@@ -71,7 +71,7 @@ describe.skipIf(!path)("a puppeteer's hands", { timeout: 2 * PATIENCE }, () => {
     await page.keyboard.up("KeyU");
     // Let go by itself after a rest: a push is no hold.
     await page.waitForFunction((limb) => (window as unknown as Inside).bunraku.hands.source(limb) === null, LEFT_HAND);
-    expect(await page.getByRole("slider", { name: "Dead zone", includeHidden: true }).inputValue()).toBe("0.3");
+    expect(await deadZone(page)).toBe("0.3");
 
     for (const broken of ["{", JSON.stringify({ version: 1, mapping: { bindings: { KeyU: ["fly"] } } })]) {
       await page.evaluate((content) => localStorage.setItem("bunraku.mapping", content), broken);
@@ -79,7 +79,7 @@ describe.skipIf(!path)("a puppeteer's hands", { timeout: 2 * PATIENCE }, () => {
       await ready(page);
       await page.keyboard.press("KeyU");
       expect(await source(page)).toBe(null);
-      expect(await page.getByRole("slider", { name: "Dead zone", includeHidden: true }).inputValue()).toBe("0.16");
+      expect(await deadZone(page)).toBe("0.16");
     }
     await page.close();
   });
@@ -113,7 +113,36 @@ describe.skipIf(!path)("a puppeteer's hands", { timeout: 2 * PATIENCE }, () => {
     await page.close();
   });
 
-  test("a held limb is asked for, shown to its holder, and given", async () => {
+  test("a gamepad's stick takes its hand, and a button that was pressed for it moves a leg", async () => {
+    const page = await browser.newPage({ viewport: { width: 760, height: 560 }, reducedMotion: "reduce" });
+    page.setDefaultTimeout(PATIENCE);
+    await page.addInitScript(() => {
+      const buttons = Array.from({ length: 17 }, () => ({ pressed: false, touched: false, value: 0 }));
+      Object.assign(window, { pad: { connected: true, mapping: "standard", id: "A pad (made for this)", axes: [0, 0, 0, 0], buttons } });
+      navigator.getGamepads = () => [(window as unknown as { pad: Gamepad }).pad];
+    });
+    await page.goto(`${server.url}?name=Kiku`);
+    await ready(page);
+    await pad(page, { axis: [1, -0.9] });
+    await page.waitForFunction((limb) => (window as unknown as Inside).bunraku.puppeteer.holds(limb), LEFT_HAND);
+    await pad(page, { axis: [1, 0] });
+    await page.waitForFunction((limb) => (window as unknown as Inside).bunraku.hands.source(limb) === null, LEFT_HAND);
+
+    await page.keyboard.press("Shift+Slash");
+    await page.getByText("A pad is connected").waitFor();
+    await page.getByText("The 14 inputs, each by itself").click();
+    await page.getByRole("button", { name: "Bind a key or button: right leg up" }).click();
+    await pad(page, {}); // What is down as the listening begins does not count.
+    await pad(page, { button: [1, 1] });
+    await pad(page, { button: [1, 0] });
+    await page.getByRole("button", { name: "B: right leg up. Take away" }).waitFor();
+    await page.keyboard.press("Escape");
+    await pad(page, { button: [1, 1] });
+    await page.waitForFunction((limb) => (window as unknown as Inside).bunraku.puppeteer.holds(limb), RIGHT_LEG);
+    await page.close();
+  });
+
+  test("a held limb is asked for, shown to its holder, and given; and what was done is kept", async () => {
     const [aiko, mateo] = [await open("Aiko"), await open("Mateo")];
     await aiko.keyboard.press("Digit2");
     await mateo.getByRole("button", { name: "Left hand, held by Aiko" }).waitFor();
@@ -136,6 +165,11 @@ describe.skipIf(!path)("a puppeteer's hands", { timeout: 2 * PATIENCE }, () => {
     await aiko.getByRole("button", { name: "Left hand, held by Mateo" }).waitFor();
     expect([await source(aiko), await source(mateo)]).toEqual([null, "velocity"]);
     await asked.waitFor({ state: "detached" });
+    // What they did is kept by one key, and danced from the toast.
+    await aiko.keyboard.press("KeyK");
+    await aiko.getByRole("button", { name: "Dance it" }).click();
+    await aiko.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
+    await mateo.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
     await aiko.close();
     await mateo.close();
   });
@@ -153,6 +187,24 @@ async function ready(page: Page): Promise<void> {
 /** What holds the left hand on a page. */
 function source(page: Page): Promise<string | null> {
   return page.evaluate((limb) => (window as unknown as Inside).bunraku.hands.source(limb), LEFT_HAND);
+}
+
+/** Puts an axis or a button of the page's gamepad, and waits until it was looked at. */
+function pad(page: Page, to: { axis?: [number, number]; button?: [number, number] }): Promise<unknown> {
+  return page.evaluate(({ axis, button }) => {
+    const { pad } = window as unknown as { pad: { axes: number[]; buttons: { pressed: boolean; value: number }[] } };
+    if (axis) pad.axes[axis[0]] = axis[1];
+    if (button) Object.assign(pad.buttons[button[0]], { value: button[1], pressed: button[1] > 0.5 });
+    return new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
+  }, to);
+}
+
+/** What the slider of the dead zone says; it is there once the page of keys is open. */
+async function deadZone(page: Page): Promise<string> {
+  await page.keyboard.press("Shift+Slash");
+  const value = await page.getByRole("slider", { name: "Dead zone" }).inputValue();
+  await page.keyboard.press("Escape");
+  return value;
 }
 
 function height(page: Page, joint: string): Promise<number> {

@@ -61,9 +61,14 @@ describe("the held string", () => {
     velocity.set("KeyW", "held_y+", 1);
     velocity.update(0);
     expect(session.said).toEqual([]);
+    let seen: number | null = null;
+    hands.changed = () => (seen = velocity.selected);
     velocity.hold(LEFT_HAND);
     velocity.hold(RIGHT_HAND);
-    expect(velocity.selected).toBe(RIGHT_HAND);
+    expect([velocity.selected, seen]).toEqual([RIGHT_HAND, RIGHT_HAND]);
+    velocity.hold(LEFT_HAND);
+    velocity.hold(RIGHT_HAND);
+    expect(seen).toBe(RIGHT_HAND);
     session.take();
     velocity.update(16);
     expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 0, 0], ["velocity", RIGHT_HAND, 0, 1, 0]]);

@@ -30,7 +30,7 @@ describe.each(golden.arms)("the arm $proportions", ({ proportions, table, sha256
   test("it hangs as the golden vectors say", () => {
     const out = new Float64Array(SOLVED), angle = new Float64Array(3);
     for (const { target, azimuth, angles, elbow, wrist, tip } of solves) {
-      arm.solve(out, 0, target[0], target[1], target[2]);
+      arm.solve(out, 0, Float64Array.from(target), 0);
       near(out, 0, [Math.sin(azimuth), Math.cos(azimuth), ...elbow, ...wrist, ...tip]);
       const level = Math.hypot(tip[0], tip[2]);
       arm.angles(angle, 0, arm.clamp(Math.hypot(level, tip[1])), Math.atan2(tip[1], level));
@@ -42,7 +42,7 @@ describe.each(golden.arms)("the arm $proportions", ({ proportions, table, sha256
     const out = new Float64Array(SOLVED);
     fc.assert(
       fc.property(place, place, place, (x, y, z) => {
-        arm.solve(out, 0, x, y, z);
+        arm.solve(out, 0, Float64Array.of(x, y, z), 0);
         const size = Math.hypot(x, y, z), reach = arm.clamp(size);
         // a target out of reach keeps its direction; the shoulder's own place is straight below
         const [right, up, ahead] = size < 1e-12 ? [0, -reach, 0] : [x, y, z].map((part) => (part / size) * reach);
@@ -62,6 +62,19 @@ describe.each(golden.arms)("the arm $proportions", ({ proportions, table, sha256
       { numRuns: 2000 },
     );
   });
+});
+
+test("many arms at once are the same as one by one", () => {
+  const { proportions, table, solves } = golden.arms[1];
+  const arm = new Arm(parseProportions(proportions), readTable(bytes(table)));
+  const targets = Float64Array.from([9, 9, ...solves.flatMap(({ target }) => target)]);
+  const all = new Float64Array(1 + SOLVED * solves.length), one = new Float64Array(SOLVED);
+  arm.solve(all, 1, targets, 2, solves.length);
+  solves.forEach((_, nth) => {
+    arm.solve(one, 0, targets, 2 + 3 * nth);
+    expect(all.subarray(1 + SOLVED * nth, 1 + SOLVED * (nth + 1))).toEqual(one);
+  });
+  expect(all[0]).toBe(0);
 });
 
 test("every bend within the limits closes on the tip", () => {

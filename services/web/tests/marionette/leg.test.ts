@@ -1,12 +1,78 @@
+import * as fc from "fast-check";
 import { expect, test } from "vitest";
 import { THIGH_GREATEST, THIGH_LEAST, clampThigh, kneeBend } from "../../src/marionette/leg";
+import { LegRig } from "../../src/marionette/limbs";
+import { conjugate, multiply, rotate } from "../../src/motion/rotation";
+import { golden } from "./golden";
+
+const angle = fc.double({ min: -10, max: 10, noNaN: true });
+const step = fc.double({ min: 0, max: 0.1, noNaN: true });
+const figure = {
+  offsets: Float64Array.from(golden.limbs.offsets.flat()),
+  tips: Float64Array.from(golden.limbs.tips.flat()),
+};
+const poses = golden.limbs.cases.map(({ rotations }) => Float64Array.from(rotations.flat()));
+const pose = fc.constantFrom(...poses);
+const limb = fc.constantFrom<2 | 3>(2, 3);
 
 test("the knee bends one way and lets the shank hang", () => {
-  for (let theta = -4; theta <= 4; theta += 0.125) {
-    const thigh = clampThigh(theta);
-    expect(thigh).toBeGreaterThanOrEqual(THIGH_LEAST);
-    expect(thigh).toBeLessThanOrEqual(THIGH_GREATEST);
-    // the shank's own angle from straight down
-    expect(thigh - kneeBend(thigh)).toBe(Math.min(thigh, 0));
-  }
+  fc.assert(
+    fc.property(angle, (theta) => {
+      const thigh = clampThigh(theta);
+      expect(thigh).toBeGreaterThanOrEqual(THIGH_LEAST);
+      expect(thigh).toBeLessThanOrEqual(THIGH_GREATEST);
+      expect(kneeBend(thigh)).toBeGreaterThanOrEqual(0);
+      // the shank's own angle from straight down
+      expect(thigh - kneeBend(thigh)).toBe(Math.min(thigh, 0));
+    }),
+  );
+});
+
+test("the leg follows its input without jumps", () => {
+  fc.assert(
+    fc.property(angle, step, (theta, more) => {
+      for (const of of [clampThigh, (value: number) => kneeBend(clampThigh(value))]) {
+        const moved = of(theta + more) - of(theta);
+        expect(moved).toBeGreaterThanOrEqual(0);
+        expect(moved).toBeLessThanOrEqual(more + 1e-12);
+      }
+    }),
+  );
+});
+
+test("a figure's shank hangs plumb, its knee never bends backwards, its ankle keeps its angle", () => {
+  const plain = new Float64Array(12);
+  fc.assert(
+    fc.property(limb, pose, angle, (which, rotations, theta) => {
+      const rig = new LegRig(figure, which), joints = new Float64Array(12), q = new Float64Array(4), link = new Float64Array(3);
+      rig.hang(joints, 0, theta, rotations);
+      multiply(q, 0, rotations, 0, rotations, 4);
+      multiply(q, 0, q, 0, joints, 0);
+      rotate(link, 0, q, 0, figure.offsets, 3 * rig.first + 3);
+      const thigh = Array.from(link, (part) => part / Math.hypot(...link));
+      multiply(q, 0, q, 0, joints, 4);
+      rotate(link, 0, q, 0, figure.offsets, 3 * rig.first + 6);
+      const shank = Array.from(link, (part) => part / Math.hypot(...link)), lifted = clampThigh(theta);
+      expect(Math.abs(Math.cos(lifted) + thigh[1])).toBeLessThan(1e-9);
+      const plumb = lifted >= 0 ? [0, -1, 0] : thigh;
+      plumb.forEach((part, axis) => expect(Math.abs(part - shank[axis])).toBeLessThan(1e-9));
+      rig.hang(plain, 0, 0, poses[0]);
+      expect(joints.subarray(8)).toEqual(plain.subarray(8));
+    }),
+  );
+});
+
+test("a figure's joints turn no more than the input", () => {
+  fc.assert(
+    fc.property(limb, pose, angle, step, (which, rotations, theta, more) => {
+      const rig = new LegRig(figure, which), before = new Float64Array(12), after = new Float64Array(12), turn = new Float64Array(4);
+      rig.hang(before, 0, theta, rotations);
+      rig.hang(after, 0, theta + more, rotations);
+      for (let joint = 0; joint < 12; joint += 4) {
+        conjugate(turn, 0, before.slice(joint, joint + 4), 0);
+        multiply(turn, 0, turn, 0, after, joint);
+        expect(2 * Math.atan2(Math.hypot(turn[1], turn[2], turn[3]), Math.abs(turn[0]))).toBeLessThanOrEqual(more + 1e-7);
+      }
+    }),
+  );
 });

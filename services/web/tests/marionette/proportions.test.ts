@@ -10,18 +10,24 @@ test("identities are as the golden vectors say", () => {
 });
 
 test("an identity is the shape, whatever the size, its masses those of its own links", () => {
-  expect(proportionsOf(0.396, 0.352, 0.252).identity).toBe("396-352-252-531-344-125");
-  expect(proportionsOf(39.6, 35.2, 25.2).identity).toBe("396-352-252-531-344-125");
+  expect(proportionsOf(0.396, 0.352, 0.252).identity).toBe("3960-3520-2520-5314-3438-1248");
+  expect(proportionsOf(39.6, 35.2, 25.2).identity).toBe("3960-3520-2520-5314-3438-1248");
   // the body whose masses they are has them
-  expect(proportionsOf(0.186, 0.146, 0.108).identity).toBe("423-332-245-560-320-120");
-  expect(proportionsOf(1, 1, 1).identity).toBe("334-333-333-477-347-176");
-  expect(proportionsOf(1, 1, 1, [2, 1, 1]).identity).toBe("334-333-333-500-250-250");
+  expect(proportionsOf(0.186, 0.146, 0.108).identity).toBe("4227-3318-2455-5600-3200-1200");
+  expect(proportionsOf(1, 1, 1).identity).toBe("3334-3333-3333-4769-3471-1760");
+  expect(proportionsOf(1, 1, 1, [2, 1, 1]).identity).toBe("3334-3333-3333-5000-2500-2500");
   for (let i = 1; i < 400; i++) {
     const { identity } = proportionsOf(0.3 + ((i * 0.618034) % 0.2), 0.3 + ((i * 0.754878) % 0.2), 0.15);
     const parts = identity.split("-").map(Number);
-    expect(parts[0] + parts[1] + parts[2]).toBe(1000);
+    expect([1_000, 10_000]).toContain(parts[0] + parts[1] + parts[2]);
     expect(parseProportions(identity).identity).toBe(identity);
   }
+});
+
+test("a name is in thousandths where they say the same", () => {
+  expect(proportionsOf(0.4, 0.35, 0.25, [0.5, 0.3, 0.2]).identity).toBe("400-350-250-500-300-200");
+  const { upper, fore, hand } = parseProportions("4001-3500-2499-5000-3000-2000");
+  expect([upper, fore, hand]).toEqual([0.4001, 0.35, 0.2499]);
 });
 
 test("the standard figure's arms have one identity", () => {
@@ -29,8 +35,8 @@ test("the standard figure's arms have one identity", () => {
     offsets: Float64Array.from(golden.limbs.offsets.flat()),
     tips: Float64Array.from(golden.limbs.tips.flat()),
   };
-  expect(armProportions(figure, 0).identity).toBe("396-352-252-532-344-124");
-  expect(armProportions(figure, 1).identity).toBe("396-352-252-532-344-124");
+  expect(armProportions(figure, 0).identity).toBe("3963-3523-2514-5316-3440-1244");
+  expect(armProportions(figure, 1).identity).toBe("3963-3523-2514-5316-3440-1244");
 });
 
 test("what is no arm is refused", () => {

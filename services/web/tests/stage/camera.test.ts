@@ -78,6 +78,19 @@ describe("turning the view", () => {
     expect(audience.camera.position.y).toBeGreaterThan(0.2);
   });
 
+  test("is told from a seat that nobody touched, until it has sprung back", () => {
+    const audience = seat("desktop", 800, 900);
+    audience.still = false;
+    expect(audience.moved).toBe(false);
+    audience.orbit(0.1, 0);
+    run(audience, 3.9);
+    expect(audience.moved).toBe(true);
+    run(audience, 5);
+    expect(audience.moved).toBe(false);
+    audience.update(1 / 60, 0, [2, 1.6, 1, 0, 1.1, 0.2, 0.8]);
+    expect([audience.following, audience.moved]).toEqual([true, true]);
+  });
+
   test("stays while it is touched, and springs back when left for four seconds", () => {
     const audience = seat("desktop", 800, 900);
     audience.still = false;
@@ -155,13 +168,24 @@ describe("the show's camera", () => {
     }
   });
 
-  test("is left by dragging the view, and what was chosen holds for the next motion", () => {
+  test("is left by dragging the view, until it is chosen again or another motion comes", () => {
     const audience = shown();
-    audience.orbit(0.1, 0);
-    expect([audience.hasShow, audience.following]).toEqual([true, false]);
+    for (const back of [() => audience.follow(true), () => audience.cut()]) {
+      audience.orbit(0.1, 0);
+      audience.update(1 / 60, 0, SHOW);
+      expect([audience.hasShow, audience.following]).toEqual([true, false]);
+      back();
+      audience.update(1 / 60, 0, SHOW);
+      expect(audience.following).toBe(true);
+    }
+  });
+
+  test("that was chosen against is not followed in the next motion either", () => {
+    const audience = shown();
+    audience.follow(false);
     audience.cut();
     audience.update(1 / 60, 0, SHOW);
-    expect(audience.following).toBe(false);
+    expect([audience.hasShow, audience.following]).toEqual([true, false]);
     expect(audience.camera.position.distanceTo(new Vector3(...SHOW.slice(0, 3)))).toBeGreaterThan(1);
   });
 

@@ -112,6 +112,18 @@ describe("a part of it", () => {
   });
 });
 
+test("a camera that was not moved has nothing to keep", () => {
+  const trail = new CameraTrail();
+  const view = createView();
+  for (let second = 0; second < 20; second++) trail.add(BEGAN + second * 1e6, view, second === 7);
+  expect(trail.moves()).toEqual(trail.keyframes());
+  expect(trail.moves(BEGAN + 5e6)).toEqual(trail.keyframes(BEGAN + 5e6));
+  expect(trail.moves(BEGAN + 8e6)).toEqual([]);
+  trail.clear();
+  trail.add(BEGAN + 30e6, view, false);
+  expect(trail.moves()).toEqual([]);
+});
+
 test("ten minutes are remembered and no more, and never more keyframes than may be kept", () => {
   const restless = (t: number): Numbers => [Math.sin(t * 97), 1, 4, 0, 1, 0, 0.45];
   const [trail, seen] = recorded(4_000, restless, 200_000);

@@ -1,0 +1,171 @@
+/**
+ * One round of `make bench-ik` in Node: JSON on standard input. Ours, three.js's `CCDIKSolver` and `closed-chain-ik` take turns on the
+ * same targets, all warm. The last line printed is one JSON object.
+ */
+import { readFileSync } from "node:fs";
+import { Goal, Joint, Link, Solver } from "closed-chain-ik/src/core/index.js";
+import { Bone, BufferGeometry, MeshBasicMaterial, Skeleton, SkinnedMesh, Vector3 } from "three";
+import { CCDIKSolver } from "three/examples/jsm/animation/CCDIKSolver.js";
+import { Arm, SOLVED, readTable } from "../../src/marionette/arm";
+import { ELBOW_LIMIT, WRIST_LIMIT, parseProportions, type Proportions } from "../../src/marionette/proportions";
+
+interface Asked {
+  /** Arms, and hand tips (x y z each) for which the other language solves too. */
+  bodies: { proportions: string; table: string; checked: number[] }[];
+  /** Hand tips for the last body, by the order they come in; arm lengths from the shoulder, y up. A multiple of `BATCH`. */
+  orders: Record<string, number[]>;
+}
+
+/** How many targets are handed over at once. */
+const BATCH = 500;
+const TURNS = 9;
+
+interface Contender {
+  /** Solves for `count` targets, from the `from`th number of `targets` on. */
+  solve(targets: Float64Array, from: number, count: number): void;
+  /** Where the tip is now. */
+  tip(): ArrayLike<number>;
+}
+
+function ours(proportions: Proportions, table: Float64Array): Contender {
+  const arm = new Arm(proportions, table), out = new Float64Array(BATCH * SOLVED);
+  return { solve: (targets, from, count) => arm.solve(out, 0, targets, from, count), tip: () => out.subarray(8, 11) };
+}
+
+/** One that solves for a target at a time. */
+function oneByOne(solve: (x: number, y: number, z: number) => void, tip: () => ArrayLike<number>): Contender {
+  return {
+    solve: (targets, from, count) => {
+      for (let at = from; at < from + 3 * count; at += 3) solve(targets[at], targets[at + 1], targets[at + 2]);
+    },
+    tip,
+  };
+}
+
+/** A skinned mesh of three links hanging from the shoulder, and a bone for the target; it goes on from the pose before. */
+function ccdik({ upper, fore, hand }: Proportions, limited: boolean): Contender {
+  const [root, shoulder, elbow, wrist, tip, target] = Array.from({ length: 6 }, () => new Bone());
+  root.add(shoulder, target);
+  shoulder.add(elbow);
+  elbow.add(wrist);
+  wrist.add(tip);
+  elbow.position.set(0, -upper, 0);
+  wrist.position.set(0, -fore, 0);
+  tip.position.set(0, -hand, 0);
+  const mesh = new SkinnedMesh(new BufferGeometry(), new MeshBasicMaterial());
+  mesh.add(root);
+  mesh.bind(new Skeleton([root, shoulder, elbow, wrist, tip, target]));
+  mesh.updateMatrixWorld(true);
+  const hinge = (limit: number) =>
+    limited ? { rotationMin: new Vector3(-limit, 0, 0), rotationMax: new Vector3(0, 0, 0) } : {};
+  const links = [{ index: 3, ...hinge(WRIST_LIMIT) }, { index: 2, ...hinge(ELBOW_LIMIT) }, { index: 1 }];
+  const solver = new CCDIKSolver(mesh, [{ target: 5, effector: 4, links, iteration: 10 }]);
+  return oneByOne(
+    (x, y, z) => {
+      target.position.set(x, y, z);
+      target.updateMatrixWorld();
+      solver.update();
+    },
+    () => tip.matrixWorld.elements.slice(12, 15),
+  );
+}
+
+/** Freedoms as closed-chain-ik numbers them: places, then turns. */
+const [X, Y, Z, EX, EY, EZ] = [0, 1, 2, 3, 4, 5];
+
+/**
+ * A shoulder that turns freely, elbow and wrist that bend without limits, as it hardly ever gets past those. As it comes it stops
+ * after five iterations, and wherever the way is not straight; here it may go on until it is within its thousandth.
+ */
+function closedChain({ upper, fore, hand }: Proportions): Contender {
+  const base = new Link(), end = new Link(), goal = new Goal();
+  let last = base;
+  [[0, EX, EY, EZ], [upper, EX], [fore, EX]].forEach(([at, ...freedoms], nth) => {
+    const joint = new Joint(), link = nth === 2 ? end : new Link();
+    joint.setDoF(...freedoms);
+    joint.setPosition(0, -at, 0);
+    if (nth > 0) joint.setDoFValues(-0.5);
+    last.addChild(joint);
+    joint.addChild(link);
+    last = link;
+  });
+  end.setPosition(0, -hand, 0);
+  goal.setGoalDoF(X, Y, Z);
+  goal.makeClosure(end);
+  const solver = new Solver(base), place: number[] = [0, 0, 0];
+  solver.maxIterations = 50;
+  solver.stallThreshold = 1e-6;
+  solver.divergeThreshold = 1;
+  return oneByOne(
+    (x, y, z) => {
+      goal.setPosition(x, y, z);
+      solver.solve();
+    },
+    () => {
+      end.updateMatrixWorld();
+      end.getWorldPosition(place);
+      return place;
+    },
+  );
+}
+
+const asked = JSON.parse(readFileSync(0, "utf8")) as Asked;
+
+/** Solves for so many targets, a batch after the other; milliseconds of the processor, as others share the machine. */
+function run(contender: Contender, targets: Float64Array, count: number): number {
+  const began = process.cpuUsage();
+  for (let done = 0, from = 0; done < count; done += BATCH, from = (from + 3 * BATCH) % targets.length) {
+    contender.solve(targets, from, BATCH);
+  }
+  const { user, system } = process.cpuUsage(began);
+  return (user + system) / 1e3;
+}
+
+/** How far the tip is from its target on average, over the first targets, in arm lengths. */
+function tipError(contender: Contender, targets: Float64Array, count: number): number {
+  let sum = 0;
+  for (let at = 0; at < 3 * count; at += 3) {
+    contender.solve(targets, at, 1);
+    const tip = contender.tip();
+    sum += Math.hypot(tip[0] - targets[at], tip[1] - targets[at + 1], tip[2] - targets[at + 2]);
+  }
+  return sum / count;
+}
+
+const body = asked.bodies[asked.bodies.length - 1];
+const shape = parseProportions(body.proportions), table = readTable(Buffer.from(body.table, "base64"));
+// how many solves a turn has: a few hundredths of a second of each
+const contenders: Record<string, { contender: Contender; count: number }> = {
+  ours: { contender: ours(shape, table), count: 500_000 },
+  ccdik_10: { contender: ccdik(shape, false), count: 2_500 },
+  ccdik_10_with_limits: { contender: ccdik(shape, true), count: 2_500 },
+  closed_chain_ik: { contender: closedChain(shape), count: 500 },
+};
+const measured = Object.entries(asked.orders).map(([order, list]) => {
+  const targets = Float64Array.from(list);
+  const errors: Record<string, number> = {}, rates: Record<string, number[]> = {};
+  for (const [name, { contender, count }] of Object.entries(contenders)) {
+    errors[name] = tipError(contender, targets, 1_000);
+    run(contender, targets, 2 * count);
+    rates[name] = [];
+  }
+  for (let turn = 0; turn < TURNS; turn++) {
+    for (const [name, { contender, count }] of Object.entries(contenders)) {
+      rates[name].push((count / run(contender, targets, count)) * 1e3);
+    }
+  }
+  return [order, { rates, errors }];
+});
+
+// what we make of the targets that the other language solves too
+const solved = asked.bodies.map(({ proportions, table, checked }) => {
+  const arm = new Arm(parseProportions(proportions), readTable(Buffer.from(table, "base64")));
+  const out = new Float64Array(SOLVED), angles = new Float64Array(3), targets = Float64Array.from(checked);
+  return Array.from({ length: checked.length / 3 }, (_, nth) => {
+    arm.solve(out, 0, targets, 3 * nth);
+    const level = Math.hypot(out[8], out[10]);
+    arm.angles(angles, 0, arm.clamp(Math.hypot(level, out[9])), Math.atan2(out[9], level));
+    return [...out, ...angles];
+  });
+});
+console.log(JSON.stringify({ orders: Object.fromEntries(measured) as object, solved }));

@@ -1,0 +1,150 @@
+import { afterEach, beforeEach, describe, expect, test } from "vitest";
+import { Puppeteer } from "../src/client/puppeteer";
+import { Viewer } from "../src/client/viewer";
+import { Holding } from "../src/holding";
+import type { Hands } from "../src/input/hands";
+import { DEFAULT_MAPPING } from "../src/input/mapping";
+import { VelocityInputs } from "../src/input/velocity";
+import type { LimbState } from "../src/page/model";
+import type { Page } from "../src/page/page";
+import type { ToastAction } from "../src/page/toast";
+import type { Room } from "../src/room";
+import { Line } from "./client/line";
+import { handsBefore, type Session } from "./input/session";
+import { standingPuppet } from "./stage/standard-figure";
+
+const [LEFT_HAND, RIGHT_HAND] = [0, 1];
+const PEOPLE = [{ id: "a", name: "Aiko", colour: 0 }, { id: "m", name: "Mateo", colour: 1 }];
+
+let holding: Holding;
+let hands: Hands;
+let velocity: VelocityInputs;
+let viewer: Viewer;
+let puppeteer: Puppeteer;
+let stream: Line;
+let control: Line;
+let toasts: [string, ToastAction | undefined][];
+let notices: string[];
+let shaken: number[];
+let shown: readonly LimbState[];
+let key: string | null;
+
+beforeEach(() => {
+  Line.install();
+  [toasts, notices, shaken, key] = [[], [], [], null];
+  viewer = new Viewer({ url: "ws://stage/stream", now: () => 0, solver: () => new Promise(() => undefined) });
+  stream = Line.last;
+  stream.accept();
+  puppeteer = new Puppeteer({ url: "ws://stage/control", viewer, now: () => 0 });
+  control = Line.last;
+  control.accept();
+  const page = {
+    strings: { render: (limbs: readonly LimbState[]) => (shown = limbs), notice: (text: string) => notices.push(text) },
+    asks: { render: (_: unknown, gives: string | null) => (key = gives) },
+    toast: (message: string, action?: ToastAction) => toasts.push([message, action]),
+  };
+  holding = new Holding(page as unknown as Page, () => DEFAULT_MAPPING);
+  hands = handsBefore(standingPuppet(), puppeteer as unknown as Session);
+  velocity = new VelocityInputs(hands, { take: (limb) => holding.take(limb, "velocity"), free: (limb) => holding.free(limb) });
+  hands.changed = () => holding.render();
+  holding.theatre = { hands, velocity, shake: (limb) => shaken.push(limb) };
+  holding.enter({ viewer, puppeteer } as unknown as Room);
+  holding.connected = true;
+  control.say({ name: "Welcome", id: "a", colour: 0, lead: 100_000 });
+});
+afterEach(() => {
+  puppeteer.close();
+  viewer.close();
+  Line.remove();
+});
+
+/** What everyone is told. */
+function presence(limbs: (string | null)[], asks: string[][] = [[], [], [], []]): void {
+  for (const line of [stream, control]) line.say({ name: "Presence", viewers: 2, puppeteers: PEOPLE, limbs, asks });
+}
+
+describe("a limb that another holds", () => {
+  beforeEach(() => presence(["m", null, null, null]));
+
+  test("is not taken by reaching for it: the ring shakes, its holder is named, and asking is offered", () => {
+    expect(velocity.hold(LEFT_HAND)).toBe(false);
+    expect([hands.source(LEFT_HAND), shaken, control.of("Claim")]).toEqual([null, [LEFT_HAND], []]);
+    expect(toasts.map(([message, action]) => [message, action?.label, action?.key])).toEqual([["Mateo holds the left hand", "Ask", "R"]]);
+    toasts[0][1]?.act();
+    expect(control.of("Ask")).toEqual([{ name: "Ask", limb: LEFT_HAND, wanted: true }]);
+    expect([shown[LEFT_HAND].asked, shown[RIGHT_HAND].asked]).toEqual([true, false]);
+    velocity.hold(LEFT_HAND);
+    expect(toasts.at(-1)).toEqual(["You ask Mateo for the left hand", undefined]);
+  });
+
+  test("is asked for by one key after reaching for it, and by none before", () => {
+    holding.ask();
+    expect([toasts.at(-1)?.[0], control.of("Ask")]).toEqual(["Reach for a string that another holds, then ask for it", []]);
+    holding.toggle(LEFT_HAND);
+    holding.ask();
+    expect(control.of("Ask")).toHaveLength(1);
+    holding.withdraw(LEFT_HAND);
+    expect([control.of("Ask")[1].wanted, shown[LEFT_HAND].asked]).toEqual([false, false]);
+  });
+
+  test("once given is held and selected here", () => {
+    holding.ask(LEFT_HAND);
+    presence(["m", null, null, null], [["a"], [], [], []]);
+    control.say({ name: "Grant", limb: LEFT_HAND, epoch: 4 });
+    expect([velocity.holds(LEFT_HAND), velocity.selected]).toEqual([true, LEFT_HAND]);
+    presence(["a", null, null, null]);
+    expect(shown[LEFT_HAND]).toMatchObject({ holder: { name: "You", mine: true }, asked: false, selected: true });
+    expect([toasts.at(-1)?.[0], control.of("Claim"), control.of("Release")]).toEqual(["The left hand is yours", [], []]);
+  });
+
+  test("not given, or free, is said so", () => {
+    holding.ask(LEFT_HAND);
+    presence(["m", null, null, null], [["a"], [], [], []]);
+    presence(["m", null, null, null]);
+    holding.ask(LEFT_HAND);
+    presence([null, null, null, null]);
+    expect(toasts.map(([message]) => message)).toEqual([
+      "You ask Mateo for the left hand", "The left hand was not given", "You ask Mateo for the left hand", "The left hand is free now",
+    ]);
+  });
+});
+
+describe("one's own limb that another asks for", () => {
+  beforeEach(() => {
+    for (const limb of [RIGHT_HAND, LEFT_HAND]) {
+      velocity.hold(limb);
+      control.say({ name: "Grant", limb, epoch: 7 + limb });
+    }
+  });
+
+  test("stays until it is given, by one key", () => {
+    presence(["a", "a", null, null], [[], ["m"], [], []]);
+    expect([shown[RIGHT_HAND].askers.map(({ name }) => name), shown[LEFT_HAND].askers, key]).toEqual([["Mateo"], [], "G"]);
+    expect(velocity.holds(RIGHT_HAND)).toBe(true);
+    holding.give();
+    expect(control.of("Release")).toEqual([{ name: "Release", limb: RIGHT_HAND, epoch: 8 }]);
+    expect([hands.source(RIGHT_HAND), hands.source(LEFT_HAND)]).toEqual([null, "velocity"]);
+  });
+
+  test("of several the selected one is given first, and of none nothing", () => {
+    holding.give();
+    expect([toasts.at(-1)?.[0], control.of("Release")]).toEqual(["Nobody asks for a string of yours", []]);
+    presence(["a", "a", null, null], [["m"], ["m"], [], []]);
+    expect(velocity.selected).toBe(LEFT_HAND);
+    holding.give();
+    expect(control.of("Release").map(({ limb }) => limb)).toEqual([LEFT_HAND]);
+  });
+});
+
+test("a limb claimed in the same moment by another is said to be theirs when the session refuses it", () => {
+  presence([null, null, null, null]);
+  velocity.hold(LEFT_HAND);
+  presence(["m", null, null, null]);
+  control.say({ name: "Refusal", limb: LEFT_HAND, reason: "held", holder: "m" });
+  expect([hands.source(LEFT_HAND), toasts.at(-1)?.[0]]).toEqual([null, "Mateo holds the left hand"]);
+});
+
+test("notices become a line in the card, and no toast", () => {
+  control.say({ name: "Notice", limb: 0, reason: "reach", detail: "out of reach" });
+  expect([notices, toasts]).toEqual([["out of reach"], []]);
+});

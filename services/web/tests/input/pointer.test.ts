@@ -1,0 +1,115 @@
+import { beforeEach, expect, test } from "vitest";
+import { Vector3 } from "three";
+import type { Hands } from "../../src/input/hands";
+import { createPointer, type PointerInput } from "../../src/input/pointer";
+import type { Puppet } from "../../src/stage/puppet";
+import type { Stage } from "../../src/stage/stage";
+import { standingPuppet } from "../stage/standard-figure";
+import { handsBefore, Session } from "./session";
+
+const LEFT_HAND = 0;
+/** Pixels of a metre: the stage is seen from far away along z. */
+const SCALE = 200;
+
+/** A canvas as far as a pointer needs one. */
+class Canvas extends EventTarget {
+  dataset: Record<string, string> = {};
+  setPointerCapture(): void {}
+}
+
+let canvas: Canvas;
+let hands: Hands;
+let session: Session;
+let pointer: PointerInput;
+let puppet: Puppet;
+let free: boolean;
+let refused: number[];
+let smoothing: number;
+let nearer: number;
+
+beforeEach(() => {
+  [canvas, session, puppet, free, refused, smoothing, nearer] = [new Canvas(), new Session(), standingPuppet(), true, [], 0, 0];
+  const stage = {
+    puppet,
+    toScreen: (at: Vector3) => ({ x: at.x * SCALE, y: -at.y * SCALE }),
+    fromScreen: (x: number, y: number, through: Vector3) => new Vector3(x / SCALE, -y / SCALE, through.z),
+    back: () => new Vector3(0, 0, 1),
+    audience: { orbit: () => undefined },
+  };
+  hands = handsBefore(puppet, session);
+  pointer = createPointer(canvas as unknown as HTMLCanvasElement, stage as unknown as Stage, hands, {
+    may: () => free, refused: (limb) => refused.push(limb), smoothing: () => smoothing, nearer: () => nearer,
+  });
+});
+
+function send(type: string, x: number, y: number, timeStamp: number): void {
+  const event = Object.assign(new Event(type), { pointerId: 1, pointerType: "mouse", button: 0, clientX: x, clientY: y });
+  Object.defineProperty(event, "timeStamp", { value: timeStamp });
+  canvas.dispatchEvent(event);
+}
+
+const ring = () => puppet.handle(LEFT_HAND, new Vector3());
+const pulled = () => hands.pull(LEFT_HAND) as Vector3;
+
+function grab(): { x: number; y: number } {
+  const at = { x: ring().x * SCALE + 3, y: -ring().y * SCALE - 2 };
+  send("pointerdown", at.x, at.y, 0);
+  return at;
+}
+
+test("a ring follows the pointer that took it, from where it was taken, and is let go with it", () => {
+  const at = grab();
+  expect(hands.source(LEFT_HAND)).toBe("pointer");
+  send("pointermove", at.x + 20, at.y - 40, 16);
+  const wanted = ring().add(new Vector3(0.1, 0.2, 0));
+  expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
+  pointer.update(32);
+  expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
+  send("pointerup", at.x + 20, at.y - 40, 48);
+  expect(hands.source(LEFT_HAND)).toBe(null);
+});
+
+test("a ring that another holds is refused, and so is nothing far from any ring", () => {
+  free = false;
+  grab();
+  expect([refused, hands.source(LEFT_HAND)]).toEqual([[LEFT_HAND], null]);
+  send("pointerdown", 5000, 5000, 10);
+  expect(refused).toEqual([LEFT_HAND]);
+});
+
+test("a trembling hand is steadied when that is wished, and still arrives", () => {
+  const spread = (wish: number) => {
+    smoothing = wish;
+    const at = grab();
+    const seen: number[] = [];
+    for (let i = 1; i <= 120; i++) {
+      send("pointermove", at.x + (i % 2) * 4, at.y, i * 16);
+      seen.push(pulled().x);
+    }
+    for (let i = 121; i <= 240; i++) {
+      send("pointermove", at.x + 60, at.y, i * 16);
+      pointer.update(i * 16 + 8);
+    }
+    expect(pulled().x).toBeCloseTo(ring().x + 60 / SCALE, 4);
+    send("pointerup", at.x, at.y, 4000);
+    const steady = seen.slice(60);
+    return Math.max(...steady) - Math.min(...steady);
+  };
+  expect(spread(0)).toBeCloseTo(4 / SCALE, 9);
+  expect(spread(1)).toBeLessThan(1 / SCALE);
+});
+
+test("keys and wheel bring nearer what is dragged, no further ahead than the limb can follow", () => {
+  grab();
+  const depth = ring().z;
+  nearer = 1;
+  pointer.update(100);
+  expect(pulled().z - depth).toBeCloseTo(0.07, 9);
+  pointer.update(150);
+  expect(pulled().z - depth).toBeCloseTo(0.105, 9);
+  for (let now = 150; now < 2000; now += 16) pointer.update(now);
+  expect(pulled().z - depth).toBeCloseTo(0.15, 9);
+  nearer = 0;
+  pointer.update(2016);
+  expect(pulled().z).toBeCloseTo(depth, 9);
+});

@@ -1,0 +1,150 @@
+"""How exact and how fast an arm is solved, beside what is used otherwise: `make bench-ik`. The last line printed is one
+JSON object.
+
+Rates are arms a second of the processor, on one core. Ours and its peers take turns, and how many times faster we are
+is told of the same language and the same round: TypeScript beside three.js's CCDIKSolver and closed-chain-ik, Python
+beside scipy's SLSQP. Targets come in two orders: `jumps`, even over all that the arm reaches, each far from the one
+before; and `path`, a hand that wanders at half an arm's length a second at 60 Hz, which spares solvers that go on from
+the pose before most of their work. Figures whose names do not say `path` are of the jumps.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from math import pi
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from bunraku.marionette import arms, compiled, table
+from bunraku.marionette.arm import Table
+from bunraku.marionette.arms import Arms
+from bunraku.marionette.bodies import BODIES
+from bunraku.marionette.paper import PAPER_BYTES
+from bunraku.marionette.proportions import OUTER_RADIUS, Proportions
+from bunraku.motion.rotation import Array
+from tests.bench import ik_accuracy, smoothness
+from tests.bench.ik_peers import Node, Slsqp, processor_rate
+
+ROUNDS = 5
+TARGETS = 20_000
+ACCURACY_TARGETS = 20_000
+SLSQP_TARGETS = 300
+AWKWARD = ((0.0, -0.7, 0.0), (0.0, 0.7, 0.0), (0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.01, 0.0, -0.01), (-0.3, -1.4, -0.2))
+"""Straight below and above, at the shoulder, out of reach, too near, beyond."""
+
+
+def path(proportions: Proportions, count: int) -> Array:
+    """Places (count, 3) of a wandering hand at 60 Hz, on average half an arm's length a second."""
+    t = np.arange(count) / 60.0
+    inner = proportions.inner_radius
+    r = 0.5 * (inner + OUTER_RADIUS) + 0.48 * (OUTER_RADIUS - inner) * np.sin(0.83 * t) * np.cos(0.11 * t)
+    beta, azimuth = 0.45 * pi * np.sin(0.57 * t + 2.0) * np.cos(0.05 * t), 2.2 * np.sin(0.36 * t) + np.sin(0.97 * t)
+    level = r * np.cos(beta)
+    return np.stack([level * np.sin(azimuth), r * np.sin(beta), level * np.cos(azimuth)], axis=-1)
+
+
+def accuracy(random: np.random.Generator) -> dict[str, float]:
+    """The worst of the bodies, each told on a line of its own: as their tables have them, in ten-thousandths, and
+    once more as they are, their bends from that nearest table."""
+    print(f"{'body':<22}{'tip max':>10}{'angles mean':>13}{'p99':>8}{'max':>7} deg{'paper: mean':>14}{'max':>7} %")
+    figures: dict[str, float] = {}
+    for after, shape in (("", Proportions.rounded), ("_nearest_table", lambda proportions: proportions)):
+        for body in BODIES:
+            proportions = shape(body.proportions)
+            stored = table.table_of(proportions.identity)
+            found = ik_accuracy.measure(proportions, stored, ACCURACY_TARGETS, random)
+            paper = f"{100.0 * found.paper_tip_mean:18.4f}{100.0 * found.paper_tip_max:7.3f}"
+            print(
+                f"{body.name + after.replace('_', ' '):<22}{found.tip_error_max:10.1e}"
+                f"{found.angle_error_mean_deg:13.4f}{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}{paper}",
+                flush=True,
+            )
+            for name, value in found._asdict().items():
+                # the tips and the paper's own are the same either way
+                if not after or name.startswith("angle"):
+                    figures[name + after] = max(figures.get(name + after, 0.0), value)
+    return figures
+
+
+def languages_differ(bodies: list[tuple[Proportions, Array]], solved: list[Any]) -> float:
+    """How far places and angles of the two languages are apart at most."""
+    most = 0.0
+    for (proportions, targets), rows in zip(bodies, solved, strict=True):
+        ours = arms.solve(proportions, table.table_of(proportions.identity), targets)
+        most = max(most, float(np.abs(np.concatenate([ours.solved, np.array(ours.angles())]).T - np.array(rows)).max()))
+    return most
+
+
+def speeds(random: np.random.Generator) -> dict[str, float]:
+    """Rates of all solvers in both orders, and how the languages differ."""
+    # as their identities have them: TypeScript knows no others
+    shapes = [body.proportions.rounded() for body in BODIES]
+    proportions = shapes[-1]
+    stored = table.table_of(proportions.identity)
+    orders = {"jumps": ik_accuracy.reachable(proportions, TARGETS, random), "path": path(proportions, TARGETS)}
+    bodies = [(shape, np.concatenate([AWKWARD, ik_accuracy.reachable(shape, 1000, random)])) for shape in shapes]
+    slsqp = Slsqp(proportions)
+
+    def batches(solve: Callable[[Proportions, Table, Array], Arms], targets: Array) -> float:
+        return processor_rate(lambda: sum(len(solve(proportions, stored, targets).tip) for _ in range(20)))
+
+    compiled.solve(proportions, stored, orders["jumps"])
+    rates: dict[str, dict[str, list[float]]] = {order: {} for order in orders}
+    errors: dict[str, dict[str, float]] = {}
+    with Node() as node:
+        for nth in range(ROUNDS):
+            answer = node.round(bodies, orders)
+            for order, targets in orders.items():
+                errors[order] = answer["orders"][order]["errors"] | {"slsqp": slsqp.error(targets[:SLSQP_TARGETS])}
+                found = {name: median(turns) for name, turns in answer["orders"][order]["rates"].items()}
+                found["numpy"], found["compiled"] = batches(arms.solve, targets), batches(compiled.solve, targets)
+                few = targets[nth * SLSQP_TARGETS : (nth + 1) * SLSQP_TARGETS]
+                found["slsqp"] = processor_rate(lambda few=few: slsqp.solve(few))  # type: ignore[misc]
+                for name, rate in found.items():
+                    rates[order].setdefault(name, []).append(rate)
+    return tell(rates, errors) | {"languages_differ_max": languages_differ(bodies, answer["solved"])}
+
+
+def tell(rates: dict[str, dict[str, list[float]]], errors: dict[str, dict[str, float]]) -> dict[str, float]:
+    """Prints the table of solvers, and gives its figures."""
+    figures = {}
+    for order, found in rates.items():
+        print(f"\n{order:<26}{'solves/s':>12}{'ours is':>10}{'tip off by':>12}")
+        after = "" if order == "jumps" else f"_{order}"
+        for name, base, key in (
+            ("ours", "ours", "typescript"),
+            ("ccdik_10", "ours", "ccdik_10"),
+            ("ccdik_10_with_limits", "ours", "ccdik_10_with_limits"),
+            ("closed_chain_ik", "ours", "closed_chain_ik"),
+            ("compiled", "compiled", "python"),
+            ("numpy", "compiled", "numpy"),
+            ("slsqp", "compiled", "slsqp"),
+        ):
+            times = median(ours / theirs for ours, theirs in zip(found[base], found[name], strict=True))
+            figures[f"solves_per_s_{key}{after}"] = median(found[name])
+            if name != base and name != "numpy":
+                figures[f"times_{key}{after}"] = times
+            off = f"{errors[order][name]:12.0e}" if name in errors[order] else ""
+            print(f"{key:<26}{median(found[name]):12,.0f}{times:10,.0f}{off}", flush=True)
+    return figures
+
+
+def main() -> None:
+    random = np.random.default_rng(18)
+    figures = accuracy(random)
+    figures |= {"table_bytes": table.TABLE_BYTES, "paper_table_bytes": PAPER_BYTES}
+    figures |= speeds(random)
+    figures |= smoothness.measure()
+    print()
+    print(
+        json.dumps(
+            {name: value if isinstance(value, int) else float(f"{value:.4g}") for name, value in figures.items()}
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

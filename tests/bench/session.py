@@ -1,0 +1,274 @@
+"""How soon a pull is on the others' screens: `make bench-session`. The last line printed is one JSON object.
+
+A real server in a process of its own, on loopback: some sessions, each of one puppeteer and some viewers, for some
+seconds. Each puppeteer asks its hand from one place to another, a fifth of an arm away, twice a second, through the
+session's control socket. Each viewer takes in what comes, and is taken to have a screen of 60 frames a second, in a
+phase of its own: a frame shows the overlays between which its time lies, of those that had come by then. A pull is on
+the screen with the first frame that shows the hand a hundredth of an arm from where it stood.
+
+What the viewers receive is kept, and looked at when all is over, so that looking costs the server nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import base64
+import json
+import os
+import re
+import secrets
+import subprocess
+import sys
+import tempfile
+import time
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx2
+import numpy as np
+
+from bunraku.backing.backing import clock
+from bunraku.client.api import Client
+from bunraku.client.puppeteer import Puppeteer
+from bunraku.codec.track import read_track
+from bunraku.marionette import vector
+from bunraku.marionette.limbs import ArmRig, Limb
+from bunraku.marionette.vector import Quaternion, Vector
+from bunraku.motion.skeleton import Figure
+from bunraku.playout.overlays import UNIT
+from bunraku.wire.messages import SUBPROTOCOL, Description, Overlay, unpack
+
+FRAME = 1e6 / 60.0
+EVERY = 0.5
+"""Seconds between two pulls of a puppeteer."""
+PLACES = ((0.45, -0.2, 0.5), (0.45, 0.0, 0.5))
+"""Where a left hand is asked to be, arm lengths on the axes of vl5."""
+MOVED = 0.01
+"""Arm lengths from where it stood: the hand is seen to move."""
+LOST = 1_000_000
+"""Microseconds: a pull that nobody saw by then is lost."""
+
+
+class Screen(asyncio.Protocol):
+    """One viewer's socket: messages are kept with the clock time at which they came."""
+
+    def __init__(self, path: str, host: str) -> None:
+        self.messages: list[tuple[int, bytes]] = []
+        self.open = asyncio.get_running_loop().create_future()
+        self.closed = False
+        self._path, self._host = path, host
+        self._buffer = b""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        key = base64.b64encode(secrets.token_bytes(16)).decode()
+        lines = (
+            f"GET {self._path} HTTP/1.1", f"Host: {self._host}", "Upgrade: websocket", "Connection: Upgrade",
+            f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Protocol: {SUBPROTOCOL}", "", "",
+        )  # fmt: skip
+        transport.write("\r\n".join(lines).encode())
+
+    def data_received(self, data: bytes) -> None:
+        now = clock()
+        self._buffer += data
+        if not self.open.done():
+            head, found, rest = self._buffer.partition(b"\r\n\r\n")
+            if not found:
+                return
+            if b" 101 " not in head.split(b"\r\n", 1)[0]:
+                self.open.set_exception(ConnectionError(head.decode(errors="replace")))
+                return
+            self.open.set_result(None)
+            self._buffer = rest
+        buffer, at = self._buffer, 0
+        while len(buffer) - at >= 2:
+            size, body = buffer[at + 1], at + 2
+            if size == 126:
+                size, body = int.from_bytes(buffer[at + 2 : at + 4], "big"), at + 4
+            elif size == 127:
+                size, body = int.from_bytes(buffer[at + 2 : at + 10], "big"), at + 10
+            if body + size > len(buffer):
+                break
+            self.messages.append((now, buffer[body : body + size]))
+            at = body + size
+        self._buffer = buffer[at:]
+
+    def connection_lost(self, _: Exception | None) -> None:
+        self.closed = True
+
+
+@dataclass
+class Played:
+    """One session of the run: when its puppeteer pulled (clock times, µs), and what its viewers received."""
+
+    screens: list[Screen]
+    pulls: list[int] = field(default_factory=list)
+
+
+async def watch(client: Client, motion: str, viewers: int) -> tuple[str, Played]:
+    """One session with its viewers."""
+    session = (await client.open_session(motion))["id"]
+    parts = urlsplit(client.socket_url(f"/v1/sessions/{session}/stream"))
+    loop = asyncio.get_running_loop()
+    screens: list[Screen] = []
+    for _ in range(viewers):
+        _, screen = await loop.create_connection(
+            lambda: Screen(f"{parts.path}?rate=0", parts.netloc), parts.hostname or "", parts.port or 0
+        )
+        await asyncio.wait_for(screen.open, 30)
+        screens.append(screen)
+    return session, Played(screens)
+
+
+async def pull(client: Client, session: str, played: Played, seconds: float, nth: int, share: float) -> None:
+    """The puppeteer of a session, from its coming to its going; `share` of a beat after the others."""
+    loop = asyncio.get_running_loop()
+    async with Puppeteer(client, session, f"puppeteer {nth}") as puppeteer:
+        await puppeteer.claim("left_hand")
+        await puppeteer.target("left_hand", *PLACES[1])
+        # each in its own beat
+        await asyncio.sleep(1.0 + share * EVERY)
+        begin = loop.time()
+        for number in range(int(seconds / EVERY)):
+            await asyncio.sleep(max(begin + number * EVERY - loop.time(), 0.0))
+            played.pulls.append(clock())
+            await puppeteer.target("left_hand", *PLACES[number % 2])
+        await asyncio.sleep(LOST * 1e-6)
+
+
+def hand_places(rig: ArmRig, messages: list[tuple[int, bytes]]) -> list[tuple[int, int, Vector]]:
+    """Each overlay frame that came: when it came, when it was due, and where it has the left hand, arm lengths."""
+    found: list[tuple[int, int, Vector]] = []
+    for came, data in messages:
+        if data[0] != Overlay.TYPE:
+            continue
+        overlay = Overlay.unpack(data)
+        frames = (*overlay.earlier, overlay.limbs)
+        for nth, limbs in enumerate(frames):
+            if 0 in limbs:
+                due = overlay.due - (len(frames) - 1 - nth) * Overlay.FRAME
+                joints = [_quaternion(limbs[0][3 * joint : 3 * joint + 3]) for joint in range(3)]
+                found.append((came, due, rig.target((joints[0], joints[1], joints[2]))))
+    return found
+
+
+def _quaternion(numbers: tuple[int, ...]) -> Quaternion:
+    x, y, z = (number * UNIT for number in numbers)
+    return vector.about(vector.unit((x, y, z), (1.0, 0.0, 0.0)), vector.length((x, y, z)))
+
+
+def seen(frames: list[tuple[int, int, Vector]], pull: int, phase: float) -> float:
+    """Milliseconds from a pull to the first frame of a screen that shows the hand moving; NaN where none does."""
+    dues = [due for _, due, _ in frames]
+    at = bisect_right(dues, pull)
+    if at == 0:
+        return float("nan")
+    stood = frames[at - 1][2]
+    shown = pull + phase * FRAME
+    while shown - pull < LOST:
+        place = _place(frames, dues, shown)
+        if vector.length(vector.subtract(place, stood)) > MOVED:
+            return (shown - pull) / 1e3
+        shown += FRAME
+    return float("nan")
+
+
+def _place(frames: list[tuple[int, int, Vector]], dues: list[int], shown: float) -> Vector:
+    """Where a screen has the hand at a time: between the two frames that lie about it, or at the last that came."""
+    after = bisect_right(dues, shown)
+    # what has not come yet is not shown
+    while after > 0 and after < len(frames) and frames[after][0] > shown:
+        after -= 1
+        if frames[after][0] <= shown:
+            return frames[after][2]
+    if after == 0 or after == len(frames):
+        return frames[max(after - 1, 0)][2]
+    (_, begin, one), (_, end, other) = frames[after - 1], frames[after]
+    share = (shown - begin) / (end - begin)
+    return vector.add(one, vector.scale(vector.subtract(other, one), share))
+
+
+def processor_seconds(pid: int) -> float:
+    """Of a process and all it waited for."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -> dict[str, float]:
+    """The run, and its figures."""
+    async with Client(url) as client:
+        motion = (await client.motions())[0]["id"]
+        async with httpx2.AsyncClient(base_url=url) as plain:
+            description = unpack((await plain.get(f"/v1/motions/{motion}/description")).content)
+        assert isinstance(description, Description)
+        figure: Figure = read_track(description.tracks[0]).figure
+        stages = [await watch(client, motion, viewers) for _ in range(sessions)]
+        before, begun = processor_seconds(pid), time.perf_counter()
+        async with asyncio.TaskGroup() as pulling:
+            for nth, (session, one) in enumerate(stages):
+                pulling.create_task(pull(client, session, one, seconds, nth, nth / sessions))
+        played = [one for _, one in stages]
+        busy = (processor_seconds(pid) - before) / (time.perf_counter() - begun)
+    rig = ArmRig(figure, Limb.LEFT_HAND)
+    random = np.random.default_rng(1)
+    delays: list[float] = []
+    late: list[float] = []
+    gaps: list[float] = []
+    messages = 0
+    for one in played:
+        for screen in one.screens:
+            assert not screen.closed, "a viewer was dropped"
+            frames = hand_places(rig, screen.messages)
+            messages += sum(data[0] == Overlay.TYPE for _, data in screen.messages)
+            late += [(came - due) / 1e3 for came, due, _ in frames]
+            gaps += [(b[1] - a[1]) / 1e3 for a, b in pairwise(frames)]
+            delays += [seen(frames, pull, float(random.random())) for pull in one.pulls]
+    known = np.array([delay for delay in delays if delay == delay])
+    return {
+        "sessions": sessions,
+        "viewers": sessions * viewers,
+        "pulls": len(delays),
+        "lost": len(delays) - len(known),
+        "input_to_screen_ms_p50": round(float(np.percentile(known, 50)), 1),
+        "input_to_screen_ms_p95": round(float(np.percentile(known, 95)), 1),
+        "input_to_screen_ms_p99": round(float(np.percentile(known, 99)), 1),
+        "overlays_late_share": round(float(np.mean(np.array(late) > 0.0)), 4),
+        "overlay_frame_ms_p99": round(float(np.percentile(gaps, 99)), 1),
+        "messages_per_s": round(messages / seconds),
+        "server_cores": round(busy, 2),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--sessions", type=int, default=50)
+    parser.add_argument("--viewers", type=int, default=10, help="of each session")
+    parser.add_argument("--seconds", type=float, default=20.0)
+    given = parser.parse_args()
+    bunraku = Path(sys.executable).parent / "bunraku"
+    with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
+        server = subprocess.Popen(
+            [bunraku, "up", "--demo", "--port", "0", "--data", folder],
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200"},
+        )
+        assert server.stdout is not None
+        try:
+            url = next(found[1] for line in server.stdout if (found := re.search(r"is at (http://\S+)/", line)))
+            print(f"{given.sessions} sessions of one puppeteer and {given.viewers} viewers, {given.seconds:g} s")
+            figures = asyncio.run(run(url, server.pid, given.sessions, given.viewers, given.seconds))
+        finally:
+            server.terminate()
+            server.wait(20)
+    for name, value in figures.items():
+        print(f"{name:<26}{value:>10}")
+    print(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()
