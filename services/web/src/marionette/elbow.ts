@@ -109,7 +109,10 @@ export class Elbow {
     return this.begun;
   }
 
-  /** Starts with the tip in the unit `direction`, the plane as near to `normal` as square to it allows, and the upper arm `lift` radians off the chord. */
+  /**
+   * Starts with the tip in the unit `direction`, the plane as near to `normal` as square to it allows, and the upper arm `lift`
+   * radians off the chord.
+   */
   begin(direction: Numbers, normal: Numbers, lift: number): void {
     this.direction.set(direction);
     this.makeSquare(normal, direction);

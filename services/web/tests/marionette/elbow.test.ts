@@ -13,7 +13,7 @@ const place = fc.tuple(part, part, part).map((parts) => Float64Array.from(parts)
 const rest = restPose().rotations;
 
 describe("a pulled hand, wherever it is asked to be", () => {
-  test.each([0, 1] as const)("%i: no upper arm goes where its shoulder does not, and the tip is where it should be where it may", (limb) => {
+  test.each([0, 1] as const)("%i: no upper arm goes where its shoulder does not, and the tip follows", (limb) => {
     let exact = 0, frames = 0;
     fc.assert(
       fc.property(fc.array(place, { minLength: 1, maxLength: 5 }), fc.constantFrom(20, 60, 144), (targets, fps) => {
