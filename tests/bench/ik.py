@@ -30,7 +30,7 @@ from tests.bench.ik_peers import Node, Slsqp, processor_rate
 
 ROUNDS = 5
 TARGETS = 20_000
-ACCURACY_TARGETS = 20_000
+ACCURACY_TARGETS = 10_000
 SLSQP_TARGETS = 300
 AWKWARD = ((0.0, -0.7, 0.0), (0.0, 0.7, 0.0), (0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.01, 0.0, -0.01), (-0.3, -1.4, -0.2))
 """Straight below and above, at the shoulder, out of reach, too near, beyond."""

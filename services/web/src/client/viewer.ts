@@ -18,21 +18,10 @@ import type { LineFigures } from "./line-figures";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
 import type { Solver, SolverOf } from "./solver";
+import type { ViewerOptions } from "./viewer-options";
 
 export type Timeline = TimelineState;
-export type { LineFigures, Presence };
-
-export interface ViewerOptions {
-  /** `ws(s)://.../stream` of a motion or a session. */
-  url: string;
-  /** Local milliseconds, never running backwards. */
-  now?: () => number;
-  /**
-   * Makes what a puppeteer's own limbs are solved with: the marionette, if nothing else is said. With null, and until it is
-   * there, they are seen as everyone sees them.
-   */
-  solver?: SolverOf | null;
-}
+export type { LineFigures, Presence, ViewerOptions };
 
 const PING_BURST = 8;
 const PING_BURST_EVERY = 60;

@@ -18,7 +18,7 @@ interface Asked {
 
 /** How many targets are handed over at once. */
 const BATCH = 500;
-const TURNS = 9;
+const TURNS = 5;
 
 interface Contender {
   /** Solves for `count` targets, from the `from`th number of `targets` on. */
