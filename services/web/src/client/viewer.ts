@@ -10,7 +10,9 @@ import { PlayoutDelay } from "../playout/delay";
 import { Overlays } from "../playout/overlay";
 import { positionAt, Timelines } from "../playout/timeline";
 import { Tracks } from "../playout/tracks";
-import { type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState } from "../wire/messages";
+import {
+  type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState,
+} from "../wire/messages";
 import { Connection } from "./connection";
 import type { LineFigures } from "./line-figures";
 import { Meter } from "./meter";

@@ -24,7 +24,7 @@ export const SPEED = 1.68;
 /** Arm lengths that the elbow is off the chord at most, for each arm length that the tip is short of full stretch. */
 const SLOPE = 2.4;
 /** Arm lengths per second that are there for the swing in any case. */
-export const LEAST_SPEED = 0.1;
+const LEAST_SPEED = 0.1;
 /** Radians that an upper arm keeps from where no shoulder goes. */
 const CLEAR = 1e-7;
 /** Arm lengths per second that the elbow leaves or nears the chord beyond what the tip asks for. */
@@ -109,7 +109,10 @@ export class Elbow {
     return this.begun;
   }
 
-  /** Starts with the tip in the unit `direction`, the plane as near to `normal` as square to it allows, and the upper arm `lift` radians off the chord. */
+  /**
+   * Starts with the tip in the unit `direction`, the plane as near to `normal` as square to it allows, and the upper arm `lift`
+   * radians off the chord.
+   */
   begin(direction: Numbers, normal: Numbers, lift: number): void {
     this.direction.set(direction);
     this.makeSquare(normal, direction);

@@ -102,7 +102,10 @@ export class ArmRig {
     put(out, outAt, found[6] / scale, found[7] / scale, found[8] / scale);
   }
 
-  /** The normal (3) of the plane the arm lies in, not of unit length: from its bend, and where it is straight from the elbow's axis. */
+  /**
+   * The normal (3) of the plane the arm lies in, not of unit length: from its bend, and where it is straight from the elbow's
+   * axis.
+   */
   bendAxis(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
     const { found, place, scale } = this;
     this.places(found, 0, joints, jointsAt);
