@@ -43,6 +43,8 @@ from bunraku.playout.overlays import UNIT
 from bunraku.wire.messages import SUBPROTOCOL, Description, Overlay, unpack
 
 FRAME = 1e6 / 60.0
+WARM = 4.0
+"""Seconds that limbs are held before the first pull that counts."""
 EVERY = 0.5
 """Seconds between two pulls of a puppeteer."""
 PLACES = ((0.45, -0.2, 0.5), (0.45, 0.0, 0.5))
@@ -131,7 +133,7 @@ async def pull(client: Client, session: str, played: Played, seconds: float, nth
         await puppeteer.claim("left_hand")
         await puppeteer.target("left_hand", *PLACES[1])
         # each in its own beat
-        await asyncio.sleep(1.0 + share * EVERY)
+        await asyncio.sleep(WARM + share * EVERY)
         begin = loop.time()
         for number in range(int(seconds / EVERY)):
             await asyncio.sleep(max(begin + number * EVERY - loop.time(), 0.0))

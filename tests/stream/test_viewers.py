@@ -159,7 +159,7 @@ async def test_an_overlay_goes_past_the_queue_only_where_nothing_else_waits(libr
     viewer.timeline(timeline.start("two", 2_000_000, clock()))
     sending = asyncio.create_task(viewer.send(line.put))
     await line.count(Overlay, 1)
-    await line.count(Data, 4)
+    await line.count(Data, 2)
     async with asyncio.timeout(10):
         while not viewer._resting:  # noqa: ASYNC110
             await asyncio.sleep(0)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import multiprocessing
+import os
 import resource
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -117,3 +118,5 @@ async def _readable(receiver: Connection) -> None:
     finally:
         with contextlib.suppress(ValueError, OSError):
             loop.remove_reader(number)
+            # a loop that polls for itself (uvloop's does) leaves the pipe unblocking; it is read whole in a thread
+            os.set_blocking(number, True)

@@ -51,7 +51,7 @@ class Marionette:
     def __init__(self, figure: Figure, epochs: tuple[int, ...] = (0, 0, 0, 0)) -> None:
         """As `set_figure`; `epochs` are those that a puppet at rest had, to go on from."""
         self._ownership = Ownership(epochs)
-        self._handovers = {limb: Handover() for limb in Limb}
+        self._handovers = [Handover() for _ in Limb]
         self._last: int | None = None
         self._recent: deque[tuple[Array, float]] = deque(maxlen=2)
         self.set_figure(figure)
@@ -62,9 +62,9 @@ class Marionette:
         The first arm of its proportions takes a tenth of a second, to build its table. Raises `ProportionsError` for a
         figure whose arms are too short to hang, and changes nothing.
         """
-        limbs: dict[Limb, PulledHand | PulledLeg] = {
-            limb: PulledHand(figure, limb) if limb.is_hand else PulledLeg(figure, limb) for limb in Limb
-        }
+        limbs: list[PulledHand | PulledLeg] = [
+            PulledHand(figure, limb) if limb.is_hand else PulledLeg(figure, limb) for limb in Limb
+        ]
         self._limbs = limbs
 
     def holders(self) -> tuple[str | None, ...]:
@@ -113,7 +113,7 @@ class Marionette:
     @property
     def at_rest(self) -> bool:
         """Whether the dance is alone: nobody holds a limb, and all are back."""
-        return all(steering is None for steering in map(self._ownership.steering, Limb))
+        return self._ownership.at_rest
 
     @property
     def epochs(self) -> tuple[int, ...]:

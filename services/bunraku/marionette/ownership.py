@@ -85,15 +85,21 @@ class Ownership:
     """The four limbs of one puppet and their holders."""
 
     def __init__(self, epochs: tuple[int, ...] = (0, 0, 0, 0)) -> None:
-        self._holds = {limb: _Hold(epoch=epoch) for limb, epoch in zip(Limb, epochs, strict=True)}
+        # by the limb's number: they are asked for at the stage's rate
+        self._holds = [_Hold(epoch=epoch) for epoch in epochs]
 
     def holders(self) -> tuple[str | None, ...]:
         """The holder's id of each limb, or None."""
-        return tuple(hold.holder for hold in self._holds.values())
+        return tuple([hold.holder for hold in self._holds])
 
     def asks(self) -> tuple[tuple[str, ...], ...]:
         """Of each limb the ids of those who ask for it, first come first."""
-        return tuple(tuple(hold.asks) for hold in self._holds.values())
+        return tuple(tuple(hold.asks) for hold in self._holds)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nobody holds a limb, and all are the dance's again."""
+        return all(hold.steering is None for hold in self._holds)
 
     def epoch(self, limb: Limb) -> int:
         """The epoch of the limb's last grant; 0 before the first."""
@@ -105,9 +111,9 @@ class Ownership:
 
     def claim(self, limb: int, puppeteer: str, now: int) -> Grant | Refusal:
         """Grants a free limb, or again the claimant's own with a new epoch."""
-        if limb not in Limb.__members__.values():
+        if not 0 <= limb < len(self._holds):
             return Refusal(limb, None, "unknown")
-        hold = self._holds[Limb(limb)]
+        hold = self._holds[limb]
         if hold.holder not in (None, puppeteer):
             return Refusal(limb, hold.holder, "held")
         hold.asks.pop(puppeteer, None)
@@ -118,9 +124,9 @@ class Ownership:
 
     def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
         """Asks for a limb that another holds, or no longer; whether the asks have changed."""
-        if limb not in Limb.__members__.values():
+        if not 0 <= limb < len(self._holds):
             return False
-        hold = self._holds[Limb(limb)]
+        hold = self._holds[limb]
         if not wanted:
             return hold.asks.pop(puppeteer, None) is not None
         if hold.holder in (None, puppeteer):
@@ -134,7 +140,7 @@ class Ownership:
         too old are forgotten."""
         grants: list[tuple[str, Grant]] = []
         changed = False
-        for limb, hold in self._holds.items():
+        for limb, hold in zip(Limb, self._holds, strict=True):
             for old in [who for who, until in hold.asks.items() if until <= now]:
                 del hold.asks[old]
                 changed = True
@@ -155,10 +161,10 @@ class Ownership:
 
     def leave(self, puppeteer: str, now: int) -> tuple[Limb, ...]:
         """Frees all that a puppeteer holds and forgets what it asked for; says which limbs became free."""
-        freed = tuple(limb for limb, hold in self._holds.items() if hold.holder == puppeteer)
+        freed = tuple(Limb(limb) for limb, hold in enumerate(self._holds) if hold.holder == puppeteer)
         for limb in freed:
             self._holds[limb].free(now)
-        for hold in self._holds.values():
+        for hold in self._holds:
             hold.asks.pop(puppeteer, None)
         return freed
 
@@ -186,7 +192,7 @@ class Ownership:
     def expire(self, now: int) -> list[tuple[Limb, str]]:
         """Frees the limbs whose holders have been silent for `LOST_AFTER`; says which, and whose they were."""
         lost: list[tuple[Limb, str]] = []
-        for limb, hold in self._holds.items():
+        for limb, hold in zip(Limb, self._holds, strict=True):
             if hold.holder is not None and hold.steering and now - hold.steering.heard >= LOST_AFTER:
                 lost.append((limb, hold.holder))
                 hold.free(now)
@@ -199,7 +205,7 @@ class Ownership:
             hold.steering = None
 
     def _held(self, limb: int, puppeteer: str) -> _Hold | None:
-        if limb not in Limb.__members__.values():
+        if not 0 <= limb < len(self._holds):
             return None
-        hold = self._holds[Limb(limb)]
+        hold = self._holds[limb]
         return hold if hold.holder == puppeteer else None

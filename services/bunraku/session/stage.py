@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import secrets
 
 import msgpack
 
@@ -23,6 +24,7 @@ from bunraku.marionette.ownership import Input as Given
 from bunraku.marionette.ownership import Outcome
 from bunraku.playout import timeline
 from bunraku.playout.overlays import pack_joints
+from bunraku.session.pace import Pace
 from bunraku.session.poses import Poses
 from bunraku.session.puppeteers import Puppeteer, Puppeteers
 from bunraku.wire import messages
@@ -47,8 +49,6 @@ EDIT_LEAD = 100_000
 FRAME = Overlay.FRAME
 FRAMES = 2
 """Frames in one message: on a narrow line packets count, not bytes."""
-BUSY = 10_000
-"""Microseconds that messages are late by, of late: then only every second frame is worked out."""
 LONGEST_PAUSE = 6
 """Frames: a stage that was kept from working for longer leaves them out."""
 
@@ -69,6 +69,7 @@ class Stage:
         self._viewers: dict[str, int] = {}
         self._engaged = asyncio.Event()
         self._sequence = 0
+        self._phase = secrets.randbelow(FRAMES * FRAME)
         self._overlay: bytes | None = None
         self.seen = clock()
         self.log = Log()
@@ -206,19 +207,27 @@ class Stage:
         while True:
             await self._engaged.wait()
             self._engaged.clear()
-            frame = clock() // FRAME + 1
-            await self._poses.prepare(frame * FRAME + LEAD)
+            frame = self._frame_at(clock()) + 1
+            await self._poses.prepare(self._time(frame) + LEAD)
             for before in (frame - 2, frame - 1):
-                due = before * FRAME + LEAD
+                due = self._time(before) + LEAD
                 if (pose := self._poses.at(due, FRAME)) is not None:
-                    self._marionette.see(pose, due, before * FRAME)
-            late = 0.0
-            while self._frames(range(frame if late < BUSY else frame + FRAMES - 1, frame + FRAMES)):
+                    self._marionette.see(pose, due, self._time(before))
+            pace = Pace()
+            while self._frames(range(frame if pace.full else frame + FRAMES - 1, frame + FRAMES)):
                 # a stage that was kept from working goes on from where it should be, in step with the others
-                frame = max(frame + FRAMES, clock() // FRAME - LONGEST_PAUSE)
-                await asyncio.sleep(((frame + FRAMES - 1) * FRAME - clock()) * 1e-6)
-                late += 0.1 * (clock() - (frame + FRAMES - 1) * FRAME - late)
-                await self._poses.prepare(frame * FRAME + LEAD)
+                frame = max(frame + FRAMES, self._frame_at(clock()) - LONGEST_PAUSE)
+                planned = self._time(frame + FRAMES - 1)
+                await asyncio.sleep((planned - clock()) * 1e-6)
+                pace.late(clock() - planned)
+                await self._poses.prepare(self._time(frame) + LEAD)
+
+    def _time(self, frame: int) -> int:
+        """The clock time of a frame: no two stages of a process work at the same instants."""
+        return frame * FRAME + self._phase
+
+    def _frame_at(self, now: int) -> int:
+        return (now - self._phase) // FRAME
 
     def _frames(self, frames: range) -> bool:
         """Publish what lies over the dance in some frames, each due `LEAD` after its time; whether any limb is
@@ -231,11 +240,11 @@ class Stage:
             self._announce()
         shown: list[Pulled | None] = []
         for frame in frames:
-            due = frame * FRAME + LEAD
+            due = self._time(frame) + LEAD
             pose = self._poses.at(due, FRAME)
-            shown.append(self._marionette.overlay(pose, due, frame * FRAME) if pose is not None else None)
+            shown.append(self._marionette.overlay(pose, due, self._time(frame)) if pose is not None else None)
         self._sequence += 1
-        message = _overlay(self._sequence, frames[-1] * FRAME + LEAD, shown)
+        message = _overlay(self._sequence, self._time(frames[-1]) + LEAD, shown)
         self._overlay = message if shown[-1] is not None else None
         self._bus.publish(f"session.{self.id}.overlay", message)
         return not self._marionette.puppet.at_rest
