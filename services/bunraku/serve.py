@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import socket
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -32,6 +33,8 @@ from bunraku.demo import add_demo
 from bunraku.wire.messages import LARGEST_FROM_CLIENT
 
 PAGE = Path(__file__).parent / "page"
+COLLECT = (20_000, 20, 50)
+"""When the collector looks for cycles: vectors are many and short-lived, cycles few."""
 LOAD_AFTER = 1.5
 """Seconds in which the first page has the process to itself."""
 
@@ -119,6 +122,10 @@ async def _load(backing: Backing) -> None:
     await asyncio.sleep(LOAD_AFTER)
     await backing.catalogue.open()
     await asyncio.to_thread(decode.warm)
+    # what is loaded by now stays: the collector need not walk through it again and again while limbs are solved
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*COLLECT)
 
 
 async def _ended(task: asyncio.Task[None]) -> None:

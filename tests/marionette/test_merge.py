@@ -187,3 +187,22 @@ def test_another_dancer_stays_in_the_hands_the_limbs_are_in() -> None:
     with pytest.raises(ProportionsError):
         puppet.set_figure(Figure(FIGURE.offsets, FIGURE.tips * 0.0))
     assert puppet.overlay(pose, 40 * FRAME) is not None
+
+
+def test_a_puppet_is_lively_while_a_limb_goes_over_or_fast() -> None:
+    pose = dance(1, seed=3)[0]
+    puppet = Marionette(FIGURE)
+    assert not puppet.lively
+    epoch = granted(puppet, 0, "ada", 0)
+    seen: list[bool] = []
+    for i in range(60):
+        if i in (1, 40):
+            target = (0.4, 0.2 if i == 1 else -0.4, 0.4)
+            puppet.input("ada", Input(0, 1, epoch, i, i * FRAME, target), i * FRAME)
+        puppet.alive("ada", [0], i * FRAME)
+        puppet.overlay(pose, i * FRAME)
+        seen.append(puppet.lively)
+    assert seen[2]
+    assert not any(seen[25:40])
+    assert any(seen[40:50])
+    assert not seen[59]

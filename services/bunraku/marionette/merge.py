@@ -19,6 +19,8 @@ from bunraku.marionette.pulled import PulledHand, PulledLeg
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 
+LIVELY = 1.0
+"""Arm lengths, or radians, per second."""
 LONGEST_STEP = 0.1
 """Seconds: after a longer pause between two poses the limbs move as if only this had passed."""
 
@@ -114,6 +116,14 @@ class Marionette:
     def at_rest(self) -> bool:
         """Whether the dance is alone: nobody holds a limb, and all are back."""
         return self._ownership.at_rest
+
+    @property
+    def lively(self) -> bool:
+        """Whether a limb goes over from hand to hand, or fast: then each frame says more than what is between two."""
+        return any(
+            puppet.pulled and (0.0 < hand.progress < 1.0 or puppet.speed > LIVELY)
+            for hand, puppet in zip(self._handovers, self._limbs, strict=True)
+        )
 
     @property
     def epochs(self) -> tuple[int, ...]:

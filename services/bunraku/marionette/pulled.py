@@ -54,6 +54,11 @@ class _Pulled:
         """Where the limb is."""
         return self.own if self._follower is None else self._follower.place
 
+    @property
+    def speed(self) -> float:
+        """Arm lengths, or radians, per second that it goes at."""
+        return 0.0 if self._follower is None else vector.length(self._follower.velocity)
+
     def _saw(self, own: Vector, seconds: float) -> None:
         self._before = self._own or own
         self._velocity_before = self._velocity

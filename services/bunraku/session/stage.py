@@ -214,13 +214,18 @@ class Stage:
                 if (pose := self._poses.at(due, FRAME)) is not None:
                     self._marionette.see(pose, due, self._time(before))
             pace = Pace()
-            while self._frames(range(frame if pace.full else frame + FRAMES - 1, frame + FRAMES)):
+            while self._frames(range(frame if self._every_frame(pace) else frame + FRAMES - 1, frame + FRAMES)):
                 # a stage that was kept from working goes on from where it should be, in step with the others
                 frame = max(frame + FRAMES, self._frame_at(clock()) - LONGEST_PAUSE)
                 planned = self._time(frame + FRAMES - 1)
                 await asyncio.sleep((planned - clock()) * 1e-6)
                 pace.late(clock() - planned)
                 await self._poses.prepare(self._time(frame) + LEAD)
+
+    def _every_frame(self, pace: Pace) -> bool:
+        """Whether the next message has all its frames: of a limb that is held, or moved as hands move, the last is
+        enough, as viewers show what lies between."""
+        return pace.full and self._marionette.puppet.lively
 
     def _time(self, frame: int) -> int:
         """The clock time of a frame: no two stages of a process work at the same instants."""
