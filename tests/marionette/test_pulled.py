@@ -72,3 +72,17 @@ def test_hand_overs_of_the_demos_dance_are_within_their_bounds() -> None:
     assert max(one.taking for one in found) <= 80.0
     assert sorted(one.taken_ms for one in found)[8] <= 120.0
     assert max(one.back_ms for one in found) <= 400.0
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples(*[st.floats(-0.5, 0.5)] * 3))
+def test_no_upper_arm_goes_where_no_shoulder_does_past_the_shoulder_too(one: Vector, other: Vector) -> None:
+    hand = PulledHand(FIGURE, Limb.RIGHT_HAND)
+    pose = [[1.0, 0.0, 0.0, 0.0]] * 18
+    hand.see(pose, FRAME)
+    for frame in range(140):
+        hand.see(pose, FRAME)
+        joints = hand.pull(pose, one if frame < 90 else other, 1.0, FRAME)
+        assert joints is not None
+        elbow = hand.rig.direction(hand.rig.places(joints)[0])
+        assert hand.rig.shoulder.depth(elbow) <= 1e-6

@@ -113,14 +113,15 @@ class Elbow:
         left = max(SPEED * seconds - moved, LEAST_SPEED * seconds)
         normal = self._swing(direction, normal, up, r, lift, seconds, left)
         self._lift = lift
-        r, normal, lift, low, high = self._shoulder_allows(direction, normal, r, lift, low, high)
+        r, normal, lift, low, high, allowed = self._shoulder_allows(direction, normal, r, lift, low, high)
         self._direction, self._normal = direction, normal
         was, self._was = self._was, self._upper_arm(direction, normal, lift)
         most = (moved + left) / self._upper
-        if was is not None and _apart(self._was, was) > most:
-            # the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow
-            upper_arm = self._was = self._shoulder.toward(was, self._was, most)
-            return self._reach_out(upper_arm, vector.scale(direction, reach), normal)
+        if was is not None and (not allowed or _apart(self._was, was) > most):
+            # the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow; where it
+            # leaves none, close to the shoulder, the elbow waits too
+            self._was = self._shoulder.toward(was, self._was, most) if allowed else was
+            return self._reach_out(self._was, vector.scale(direction, reach), normal)
         return Hanging(vector.scale(direction, r), normal, self._bend_of(r, lift, low, high))
 
     def _upper_arm(self, direction: Vector, normal: Vector, lift: float) -> Vector:
@@ -150,11 +151,12 @@ class Elbow:
 
     def _shoulder_allows(
         self, direction: Vector, normal: Vector, r: float, lift: float, low: float, high: float
-    ) -> tuple[float, Vector, float, float, float]:
-        """Distance, normal, lift, and least and greatest wrist bend nearest to these that the shoulder lets be."""
-        turn = self._shoulder.turn(direction, normal, lift)
+    ) -> tuple[float, Vector, float, float, float, bool]:
+        """Distance, normal, lift, and least and greatest wrist bend nearest to these that the shoulder lets be, and
+        whether it lets any."""
+        turn: float | None = self._shoulder.turn(direction, normal, lift)
         if turn == 0.0:
-            return r, normal, lift, low, high
+            return r, normal, lift, low, high, True
         if turn is None:
             # no turn helps: more bend of the elbow may, and where it does not, a hand that is nearer
             away = self._shoulder.away(direction) + CLEAR
@@ -162,8 +164,8 @@ class Elbow:
                 r = self._nearer(r, away)
                 low, high = self._arm.limits(r)
             lift = min(max(lift, away), self._lift_of(r, low))
-            turn = self._shoulder.turn(direction, normal, lift) or 0.0
-        return r, _turned(direction, normal, turn), lift, low, high
+            turn = self._shoulder.turn(direction, normal, lift)
+        return r, _turned(direction, normal, turn or 0.0), lift, low, high, turn is not None
 
     def _reach_out(self, upper_arm: Vector, target: Vector, normal: Vector) -> Hanging:
         """What hangs from an upper arm that is on its way, forearm and hand as near to `target` as they come."""

@@ -143,22 +143,24 @@ export class Elbow {
     const left = Math.max(SPEED * seconds - moved, LEAST_SPEED * seconds);
     this.swing(direction, up, r, lift, seconds, left);
     this.lift = lift;
-    const turn = shoulder.turn(direction, normal, lift);
+    let turn = shoulder.turn(direction, normal, lift);
     if (turn === null) {
       // no turn helps: more bend of the elbow may, and where it does not, a hand that is nearer
       const away = shoulder.away(direction) + CLEAR;
       if (away > this.greatestLift(r)) r = this.nearer(r, away);
       lift = Math.min(Math.max(lift, away), this.greatestLift(r));
-      this.turnBy(direction, shoulder.turn(direction, normal, lift) ?? 0);
+      turn = shoulder.turn(direction, normal, lift);
+      this.turnBy(direction, turn ?? 0);
     } else if (turn !== 0) {
       this.turnBy(direction, turn);
     }
     this.toUpperArm(upperArm, direction, normal, lift);
     const most = (moved + left) / upper;
     hanging.normal.set(normal);
-    if (this.shown && angleBetween(upperArm, this.was) > most) {
-      // the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow
-      shoulder.toward(this.was, this.was, upperArm, most);
+    if (this.shown && (turn === null || angleBetween(upperArm, this.was) > most)) {
+      // the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow; where it leaves none,
+      // close to the shoulder, the elbow waits too
+      if (turn !== null) shoulder.toward(this.was, this.was, upperArm, most);
       for (let i = 0; i < 3; i++) wanted[i] = direction[i] * reach;
       this.reachOut(this.was, wanted);
     } else {
