@@ -27,7 +27,7 @@ from bunraku.wire.messages import (
     unpack,
 )
 
-FLOOD = 20_000
+FLOOD = 5_000
 
 
 class Controller:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.marionette import handover, vector
-from bunraku.marionette.handover import RETURN, Handover, Turn, acceleration_home
+from bunraku.marionette.handover import RETURN, Handover, JointMix, Turn, acceleration_home
 from bunraku.marionette.vector import IDENTITY, Vector
 
 parts = st.floats(-1.0, 1.0)
@@ -84,7 +84,18 @@ def test_joints_mix_exactly_at_the_ends() -> None:
     dance = (IDENTITY, IDENTITY, IDENTITY)
     half = vector.about((1.0, 0.0, 0.0), pi / 2.0)
     hung = (half, half, half)
-    assert handover.mix_joints(dance, hung, 0.0) is dance
-    assert handover.mix_joints(dance, hung, 1.0) is hung
+    mix = JointMix()
+    assert mix.mix(dance, hung, 0.0) is dance
     quarter = vector.about((1.0, 0.0, 0.0), pi / 4.0)
-    np.testing.assert_allclose(handover.mix_joints(dance, hung, 0.5)[1], quarter, atol=1e-12)
+    np.testing.assert_allclose(mix.mix(dance, hung, 0.5)[1], quarter, atol=1e-12)
+    assert mix.mix(dance, hung, 1.0) is hung
+
+
+def test_joints_that_come_to_be_opposite_are_not_thrown_across() -> None:
+    mix, before = JointMix(), None
+    for step in range(60):
+        turned = vector.about((1.0, 0.0, 0.0), 2.4 + 0.03 * step)
+        joint = mix.mix((IDENTITY, IDENTITY, IDENTITY), (turned, turned, turned), 0.5)[0]
+        if before is not None:
+            assert abs(sum(a * b for a, b in zip(before, joint, strict=True))) > cos(0.02)
+        before = joint

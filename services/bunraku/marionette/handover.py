@@ -23,6 +23,8 @@ THIGH_ACCELERATION = 60.0
 RETURN = 0.280
 """Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds."""
 LEAST_ACCELERATION = 6.0
+LONGEST_WAY = -0.7
+"""Cosine of half the angle (of 270 degrees) that a joint goes round at most where the other way is shorter by now."""
 
 
 def acceleration_home(distance: float, speed: float, most: float) -> float:
@@ -90,9 +92,30 @@ class Turn:
         return turn
 
 
-def mix_joints(dance: Joints, hung: Joints, weight: float) -> Joints:
-    """The joints between; exactly either at weight 0 and 1."""
-    if weight <= 0.0 or weight >= 1.0:
-        return hung if weight >= 1.0 else dance
-    a, b, c = (vector.slerp(one, other, weight) for one, other in zip(dance, hung, strict=True))
-    return (a, b, c)
+class JointMix:
+    """The joints of a limb between the dance's and the marionette's.
+
+    Each turns on the way that it took first, as long as that is not much the longer: by the shortest way it would be
+    thrown across when the two come to be opposite each other.
+    """
+
+    def __init__(self) -> None:
+        self._ways: list[Quaternion | None] = [None, None, None]
+
+    def mix(self, dance: Joints, hung: Joints, weight: float) -> Joints:
+        """The joints at `weight`; exactly either at 0 and 1, and all the way there it starts afresh."""
+        if weight >= 1.0:
+            self._ways = [None, None, None]
+            return hung
+        a, b, c = (self._between(joint, dance[joint], hung[joint], weight) for joint in range(3))
+        return dance if weight <= 0.0 else (a, b, c)
+
+    def _between(self, joint: int, dance: Quaternion, hung: Quaternion, weight: float) -> Quaternion:
+        w, x, y, z = vector.multiply(vector.conjugate(dance), hung)
+        before = self._ways[joint]
+        onwards = w if before is None else before[0] * w + before[1] * x + before[2] * y + before[3] * z
+        sign = -1.0 if onwards < 0.0 else 1.0
+        if sign * w < LONGEST_WAY:
+            sign = -sign
+        self._ways[joint] = way = (sign * w, sign * x, sign * y, sign * z)
+        return vector.normalise(vector.multiply(dance, vector.part_of(way, weight)))

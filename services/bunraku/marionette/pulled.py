@@ -7,11 +7,11 @@ in the shoulder's frame in arm lengths; of a leg the thigh's angle, first of thr
 
 from __future__ import annotations
 
-from bunraku.marionette import handover, vector
+from bunraku.marionette import vector
 from bunraku.marionette.blend import ArmBlend
 from bunraku.marionette.elbow import Elbow, lift_between
 from bunraku.marionette.follow import STILL, Follower
-from bunraku.marionette.handover import HAND_ACCELERATION, THIGH_ACCELERATION, Turn, acceleration_home
+from bunraku.marionette.handover import HAND_ACCELERATION, THIGH_ACCELERATION, JointMix, Turn, acceleration_home
 from bunraku.marionette.limbs import ArmRig, Joints, LegRig, Limb, Pose
 from bunraku.marionette.proportions import OUTER_RADIUS
 from bunraku.marionette.vector import Vector
@@ -139,10 +139,12 @@ class PulledLeg(_Pulled):
     def __init__(self, figure: Figure, limb: Limb) -> None:
         super().__init__()
         self.rig = LegRig(figure, limb)
+        self.rest()
 
     def rest(self) -> None:
         """The limb is wholly the dance's."""
         self._follower = self._home = None
+        self._mix = JointMix()
 
     def see(self, pose: Pose, seconds: float) -> None:
         """The dance's pose, `seconds` after the last."""
@@ -159,4 +161,4 @@ class PulledLeg(_Pulled):
             theta = follower.step(own, seconds, home, carried=self._velocity)[0]
             if weight <= 0.0 and abs(theta - own[0]) < ARRIVED:
                 return None
-        return handover.mix_joints(self.rig.dance(pose), self.rig.hang(theta, pose), max(weight, LEAST_WEIGHT))
+        return self._mix.mix(self.rig.dance(pose), self.rig.hang(theta, pose), max(weight, LEAST_WEIGHT))

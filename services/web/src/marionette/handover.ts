@@ -4,7 +4,7 @@
  * dance's way of reaching a place to the marionette's (`blend`), by the weight given here. As `marionette/handover.py`.
  */
 
-import { conjugate, multiply, rotate, slerp, type Numbers } from "../motion/rotation";
+import { conjugate, multiply, rotate, type Numbers } from "../motion/rotation";
 import { between, dot, normalise, put, unit } from "../motion/vector";
 
 /** Seconds from the dance's way of holding a limb to the marionette's. */
@@ -17,6 +17,8 @@ export const HAND_ACCELERATION = 79;
 export const THIGH_ACCELERATION = 60;
 /** Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds. */
 const RETURN = 0.28;
+/** Cosine of half the angle (of 270 degrees) that a joint goes round at most where the other way is shorter by now. */
+const LONGEST_WAY = -0.7;
 const LEAST_ACCELERATION = 6;
 
 /**
@@ -106,17 +108,47 @@ export class Turn {
   }
 }
 
-/** The joints (12) between; exactly either at weight 0 and 1. */
-export function mixJoints(
-  out: Numbers, outAt: number, dance: Numbers, danceAt: number, hung: Numbers, hungAt: number, weight: number,
-): void {
-  if (weight <= 0 || weight >= 1) {
-    const from = weight >= 1 ? hung : dance, at = weight >= 1 ? hungAt : danceAt;
-    for (let i = 0; i < 12; i++) out[outAt + i] = from[at + i];
-    return;
+/**
+ * The joints of a limb between the dance's and the marionette's. Each turns on the way that it took first, as long as that is
+ * not much the longer: by the shortest way it would be thrown across when the two come to be opposite each other.
+ */
+export class JointMix {
+  private readonly ways = new Float64Array(12);
+  private readonly way = new Float64Array(4);
+  private known = false;
+
+  /** Forgets the ways that were taken. */
+  rest(): void {
+    this.known = false;
   }
-  for (let i = 0; i < 12; i += 4) {
-    slerp(out, outAt + i, dance, danceAt + i, hung, hungAt + i, weight);
-    normalise(out, outAt + i);
+
+  /** The joints (12) at `weight`; exactly either at 0 and 1, and all the way there it starts afresh. */
+  mix(out: Numbers, outAt: number, dance: Numbers, danceAt: number, hung: Numbers, hungAt: number, weight: number): void {
+    if (weight >= 1) {
+      this.known = false;
+      for (let i = 0; i < 12; i++) out[outAt + i] = hung[hungAt + i];
+      return;
+    }
+    const { ways, way } = this;
+    for (let at = 0; at < 12; at += 4) {
+      conjugate(way, 0, dance, danceAt + at);
+      multiply(way, 0, way, 0, hung, hungAt + at);
+      let onwards = way[0];
+      if (this.known) onwards = way.reduce((sum, part, i) => sum + part * ways[at + i], 0);
+      let sign = onwards < 0 ? -1 : 1;
+      if (sign * way[0] < LONGEST_WAY) sign = -sign;
+      for (let i = 0; i < 4; i++) ways[at + i] = way[i] *= sign;
+      const sine = Math.hypot(way[1], way[2], way[3]), half = Math.atan2(sine, way[0]) * weight;
+      const scale = sine > 1e-12 ? Math.sin(half) / sine : 0;
+      way[0] = Math.cos(half);
+      for (let i = 1; i < 4; i++) way[i] *= scale;
+      if (weight <= 0) {
+        for (let i = 0; i < 4; i++) out[outAt + at + i] = dance[danceAt + at + i];
+        continue;
+      }
+      multiply(out, outAt + at, dance, danceAt + at, way, 0);
+      normalise(out, outAt + at);
+    }
+    this.known = true;
   }
 }

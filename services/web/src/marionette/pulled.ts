@@ -11,7 +11,7 @@ import { addScaled, apart, length } from "../motion/vector";
 import { ArmBlend } from "./blend";
 import { Elbow, liftBetween } from "./elbow";
 import { Follower } from "./follow";
-import { accelerationHome, HAND_ACCELERATION, mixJoints, THIGH_ACCELERATION, Turn } from "./handover";
+import { accelerationHome, HAND_ACCELERATION, JointMix, THIGH_ACCELERATION, Turn } from "./handover";
 import { ArmRig, LegRig } from "./limbs";
 import { OUTER_RADIUS } from "./proportions";
 
@@ -164,11 +164,17 @@ export class PulledHand extends Pulled {
 export class PulledLeg extends Pulled {
   readonly rig: LegRig;
   private readonly hung = new Float64Array(12);
+  private readonly mix = new JointMix();
 
   /** `limb` is 2 (left leg) or 3 (right leg). */
   constructor(figure: Figure, limb: 2 | 3) {
     super();
     this.rig = new LegRig(figure, limb);
+  }
+
+  override rest(): void {
+    super.rest();
+    this.mix.rest();
   }
 
   override pull(
@@ -184,7 +190,7 @@ export class PulledLeg extends Pulled {
       if (weight <= 0 && Math.abs(thigh[0] - own[0]) < ARRIVED) return false;
     }
     rig.hang(hung, 0, thigh[0], rotations);
-    mixJoints(out, outAt, rotations, 4 * rig.first, hung, 0, Math.max(weight, LEAST_WEIGHT));
+    this.mix.mix(out, outAt, rotations, 4 * rig.first, hung, 0, Math.max(weight, LEAST_WEIGHT));
     return true;
   }
 

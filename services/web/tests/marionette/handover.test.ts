@@ -1,6 +1,6 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
-import { accelerationHome, GIVE_BACK, Handover, minimumJerk, mixJoints, TAKE, Turn } from "../../src/marionette/handover";
+import { accelerationHome, GIVE_BACK, Handover, JointMix, minimumJerk, TAKE, Turn } from "../../src/marionette/handover";
 import { rotate } from "../../src/motion/rotation";
 import { apart, normalise, unit } from "../../src/motion/vector";
 
@@ -66,11 +66,11 @@ test("the turn brings the one hand to the other all along, without changing side
 test("joints are exactly either at both ends", () => {
   const one = Float64Array.from({ length: 12 }, (_, i) => Math.sin(i + 1)), other = one.map((value, i) => value + Math.cos(i));
   for (const joints of [one, other]) for (const at of [0, 4, 8]) normalise(joints, at);
-  const out = new Float64Array(12);
-  mixJoints(out, 0, one, 0, other, 0, 0);
+  const out = new Float64Array(12), between = new JointMix();
+  between.mix(out, 0, one, 0, other, 0, 0);
   expect(out).toEqual(one);
-  mixJoints(out, 0, one, 0, other, 0, 1);
+  between.mix(out, 0, one, 0, other, 0, 1);
   expect(out).toEqual(other);
-  mixJoints(out, 0, one, 0, other, 0, 0.3);
+  between.mix(out, 0, one, 0, other, 0, 0.3);
   for (const at of [0, 4, 8]) expect(Math.hypot(...out.subarray(at, at + 4))).toBeCloseTo(1, 12);
 });
