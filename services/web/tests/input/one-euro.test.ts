@@ -9,7 +9,8 @@ interface Golden {
 }
 
 const SETTINGS = { minCutoff: 1.5, beta: 0.7, derivativeCutoff: 1 };
-const value = fc.double({ min: -100, max: 100, noNaN: true });
+// no negative zero: it is filtered to the other one
+const value = fc.double({ min: -100, max: 100, noNaN: true }).map((one) => one + 0);
 const step = fc.double({ min: 0, max: 0.5, noNaN: true });
 
 /** Numbers of mean 0 and variance 1, always the same. */
