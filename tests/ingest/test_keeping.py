@@ -5,11 +5,11 @@ import pytest
 
 from bunraku.backing import library
 from bunraku.backing.library import StoredMotion
+from bunraku.backing.order import Order
 from bunraku.codec.decode import decode_block
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decode import decode_scene
 from bunraku.ingest.keeping import film, keep
-from bunraku.ingest.order import Order
 from bunraku.ingest.results import Made, Refused
 from bunraku.ingest.showing import Showing
 from bunraku.marionette.log import Log, LoggedMarionette

@@ -11,11 +11,11 @@ import pytest
 
 from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.bus import NobodyAnswers
+from bunraku.backing.order import MOST_SECONDS
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.settings import Settings
 from bunraku.ingest import recordings
 from bunraku.ingest.app import create_app
-from bunraku.ingest.order import MOST_SECONDS
 from bunraku.ingest.recordings import SUBJECT, read_order
 from bunraku.ingest.uploads import Uploads
 from bunraku.marionette.log import Log

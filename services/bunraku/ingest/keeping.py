@@ -11,11 +11,11 @@ from threading import Lock
 import numpy as np
 
 from bunraku.backing.library import StoredMotion, pack
+from bunraku.backing.order import FPS, Keyframe, Order
 from bunraku.codec.encode import Grade, encode_motion
 from bunraku.codec.scene import Scene
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.making import FIRST_SECONDS, MOST_FRAMES_AT_BEST
-from bunraku.ingest.order import FPS, Keyframe, Order
 from bunraku.ingest.results import Made, Refused
 from bunraku.ingest.showing import MissingDance, Showing
 from bunraku.marionette.log import DamagedLog, Log

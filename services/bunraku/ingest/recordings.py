@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.catalogue import Entry
 from bunraku.backing.library import StoredMotion
+from bunraku.backing.order import FPS, MOST_SECONDS, Order
 from bunraku.backing.problems import ProblemError, invalid_field
 from bunraku.ingest import jobs
 from bunraku.ingest.entry import entry_json
-from bunraku.ingest.order import FPS, MOST_SECONDS, Order
 from bunraku.ingest.results import Made, Refused
 from bunraku.ingest.uploads import motion_id
 

@@ -17,6 +17,10 @@ BELOW = 0.5
 """How far the elbow of a straight arm is drawn to the marionette's side, in parts of the upper arm at weight 1."""
 
 
+FRESH = 0.05
+"""Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more."""
+
+
 class ArmBlend:
     """One arm on its way. It remembers which way round the elbow swings, so that it never changes its mind halfway."""
 
@@ -44,7 +48,7 @@ class ArmBlend:
         own_normal = vector.unit(vector.square_to(rig.bend_axis(dance), own), vector.across(own))
         carried = vector.rotate(turn, own_normal)
         swivel = atan2(vector.dot(vector.cross(carried, normal), direction), vector.dot(carried, normal))
-        if self._swivel is not None:
+        if self._swivel is not None and weight > FRESH:
             swivel += 2.0 * pi * round((self._swivel - swivel) / (2.0 * pi))
         self._swivel = swivel
         if weight <= 0.0:

@@ -10,12 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.bus import NobodyAnswers
+from bunraku.backing.order import MOST_KEYFRAMES, MOST_SECONDS
 from bunraku.backing.problems import ProblemError
 from bunraku.session.stage import Stage
 
-MOST_SECONDS = 600.0
-"""The longest that is kept in one motion."""
-MOST_KEYFRAMES = 36_001
 ANSWER = 120.0
 """Seconds to wait for the ingest service."""
 

@@ -232,7 +232,6 @@ class Overlay:
 
     TYPE: ClassVar[int] = 5
     FRAME: ClassVar[int] = 16_667
-    MOST: ClassVar[int] = 16
     sequence: int
     due: int
     limbs: dict[int, tuple[int, ...]]

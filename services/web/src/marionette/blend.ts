@@ -12,6 +12,9 @@ import type { ArmRig } from "./limbs";
 const BELOW = 0.5;
 const ROUND = 2 * Math.PI;
 
+/** Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more. */
+const FRESH = 0.05;
+
 /** One arm on its way. It remembers which way round the elbow swings, so that it never changes its mind halfway. */
 export class ArmBlend {
   private swivel: number | null = null;
@@ -64,7 +67,7 @@ export class ArmBlend {
     rotate(carried, 0, turn, 0, ownNormal, 0);
     cross(side, 0, carried, 0, normal, 0);
     let swivel = Math.atan2(dot(side, 0, direction, 0), dot(carried, 0, normal, 0));
-    if (this.swivel !== null) swivel += ROUND * Math.round((this.swivel - swivel) / ROUND);
+    if (this.swivel !== null && weight > FRESH) swivel += ROUND * Math.round((this.swivel - swivel) / ROUND);
     this.swivel = swivel;
     if (weight <= 0) {
       for (let i = 0; i < 12; i++) out[outAt + i] = dance[danceAt + i];

@@ -5,7 +5,7 @@ import pickle
 import pytest
 from pydantic import ValidationError
 
-from bunraku.ingest.order import FPS, Order
+from bunraku.backing.order import FPS, Order
 
 
 @pytest.mark.parametrize(
