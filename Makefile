@@ -54,8 +54,8 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python services/bunraku/codec/*.py services/bunraku/codec/prior.json services/bunraku/motion/bvh_numbers.py
-	@echo "setup: compiling reader and codec"
+.setup/warm: .setup/python services/bunraku/codec/*.py services/bunraku/codec/prior.json services/bunraku/motion/bvh_numbers.py services/bunraku/marionette/*.py
+	@echo "setup: compiling reader, codec and what moves limbs"
 	@$(BIN)/bunraku warm
 	@touch $@
 
