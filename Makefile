@@ -70,8 +70,9 @@ lint: .setup/python
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# on all processors, each file's tests in one process
 test-python: setup
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 # the merge beside its model for a million steps, some fifteen minutes
 test-nightly: setup
