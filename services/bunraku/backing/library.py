@@ -16,6 +16,7 @@ import msgpack
 import obstore
 from obstore.store import LocalStore, ObjectStore, from_url
 
+from bunraku.codec.audio import AudioTrack, EncodedAudio, read_audio
 from bunraku.codec.encode import EncodedMotion
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.scene import SceneTrack, read_scene
@@ -27,7 +28,7 @@ CACHE_BYTES = 64 << 20
 MOST_TRACKS = 16
 """Tracks that a Data message can number."""
 
-Track = MotionTrack | SceneTrack
+Track = MotionTrack | SceneTrack | AudioTrack
 _LOG_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
@@ -69,16 +70,35 @@ def pack(motion: str, encoded: EncodedMotion, scenes: Sequence[EncodedScene] = (
     tracks: list[EncodedMotion | EncodedScene] = [encoded, *scenes]
     if len(tracks) > MOST_TRACKS:
         raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, not {len(tracks)}")
-    packets = [
-        [
-            [Data(number, nth, index, block).pack() for index, block in enumerate(rate.blocks)]
-            for nth, rate in enumerate(track.rates)
-        ]
-        for number, track in enumerate(tracks)
-    ]
+    packets = [_messages(number, [rate.blocks for rate in track.rates]) for number, track in enumerate(tracks)]
     description = Description(motion, [track.describe() for track in tracks]).pack()
     packed: bytes = msgpack.packb({"description": description, "tracks": packets})
     return packed
+
+
+def with_audio(motion: str, stored: StoredMotion, audio: EncodedAudio) -> tuple[bytes, list[str]]:
+    """The object of the motion of this id: `stored` with its audio, which replaces what audio there was; and the types
+    of its tracks. All other blocks are the same bytes.
+
+    Raises ValueError where there are more tracks than a Data message can number.
+    """
+    described: list[dict[str, Any]] = msgpack.unpackb(stored.description[1:])["tracks"]
+    packets = list(stored.packets)
+    number = next((n for n, track in enumerate(described) if track["type"] == "audio"), len(described))
+    if number == MOST_TRACKS:
+        raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, and this one has them without audio")
+    described[number:] = [audio.describe(), *described[number + 1 :]]
+    packets[number:] = [_messages(number, [rate.blocks for rate in audio.rates]), *packets[number + 1 :]]
+    packed: bytes = msgpack.packb({"description": Description(motion, described).pack(), "tracks": packets})
+    return packed, [track["type"] for track in described]
+
+
+def _messages(track: int, rates: Sequence[Sequence[bytes]]) -> list[list[bytes]]:
+    """The Data messages of a track's blocks, by rate and index."""
+    return [
+        [Data(track, nth, index, block).pack() for index, block in enumerate(blocks)]
+        for nth, blocks in enumerate(rates)
+    ]
 
 
 def unpack(motion: str, packed: bytes) -> StoredMotion:
@@ -87,7 +107,9 @@ def unpack(motion: str, packed: bytes) -> StoredMotion:
     described: list[dict[str, Any]] = msgpack.unpackb(values["description"][1:])["tracks"]
     # objects from when a motion was one track have its packets alone
     packets = values["tracks"] if "tracks" in values else [values["packets"]]
-    tracks: tuple[Track, ...] = (read_track(described[0]), *map(read_scene, described[1:]))
+    dance = read_track(described[0])
+    beside = (read_audio(track, dance) if track["type"] == "audio" else read_scene(track) for track in described[1:])
+    tracks: tuple[Track, ...] = (dance, *beside)
     return StoredMotion(motion, values["description"], tracks, packets, float(described[0].get("front", 0.0)))
 
 

@@ -1,4 +1,4 @@
-"""An upload's bytes, or a session's log, to an encoded motion, in a process of its own.
+"""An upload's bytes, or a session's log, to an encoded motion or sound, in a process of its own.
 
 Reading strangers' files and encoding motions takes seconds of processor time and may go wrong in any way: a process
 apart keeps the service's loop free, and can be ended when it takes too long or too much. What a job needs is loaded in
@@ -23,26 +23,39 @@ MEMORY = 4 << 30
 SHARES = 100
 """Times that a job says how far it is, at most: few enough that its pipe never fills."""
 
-Job = Literal["make", "keep"]
-"""`making.make` or `keeping.keep`."""
+Job = Literal["make", "keep", "add"]
+"""`making.make`, `keeping.keep` or `adding.add`."""
 
 _context = multiprocessing.get_context("forkserver")
-_context.set_forkserver_preload(["bunraku.ingest.making", "bunraku.ingest.keeping"])
+_context.set_forkserver_preload(["bunraku.ingest.making", "bunraku.ingest.keeping", "bunraku.ingest.adding"])
 
 
-_SHORTER: dict[Job, str] = {"make": "cut the file into shorter ones", "keep": "keep a shorter part"}
+_TOO_MUCH: dict[Job, str] = {"make": "Too much motion", "keep": "Too much motion", "add": "Too much sound"}
+_UNREADABLE: dict[Job, str] = {"make": "Unreadable motion", "keep": "Unreadable motion", "add": "Unreadable sound"}
+_SHORTER: dict[Job, str] = {
+    "make": "cut the file into shorter ones",
+    "keep": "keep a shorter part",
+    "add": "send a file that is no longer than the motion",
+}
 _BROKEN_OFF: dict[Job, str] = {
     "make": "the reader broke off on this file",
     "keep": "the replay of this session broke off",
+    "add": "the reader broke off on this file",
 }
-_REPORT: dict[Job, str] = {"make": "please report it with the file", "keep": "please report it"}
+_REPORT: dict[Job, str] = {
+    "make": "please report it with the file",
+    "keep": "please report it",
+    "add": "please report it with the file",
+}
 
 
 def _work(answer: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
+    from bunraku.ingest.adding import add
     from bunraku.ingest.keeping import keep
     from bunraku.ingest.making import make
 
-    work: Callable[..., Made | Refused] = make if job == "make" else keep
+    works: dict[Job, Callable[..., Made | Refused]] = {"make": make, "keep": keep, "add": add}
+    work = works[job]
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     told = -1
 
@@ -55,7 +68,7 @@ def _work(answer: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
     try:
         answer.send(work(*arguments, tell))
     except MemoryError:
-        answer.send(Refused("Too much motion", "this takes more memory than one may have", hint=_SHORTER[job]))
+        answer.send(Refused(_TOO_MUCH[job], "this takes more memory than one may have", hint=_SHORTER[job]))
 
 
 async def run(
@@ -88,7 +101,7 @@ async def run(
         receiver.close()
     if isinstance(result, Made | Refused):
         return result
-    return Refused("Unreadable motion", _BROKEN_OFF[job], hint=_REPORT[job])
+    return Refused(_UNREADABLE[job], _BROKEN_OFF[job], hint=_REPORT[job])
 
 
 async def _to_its_end(work: Callable[[], Any]) -> Any:

@@ -16,10 +16,12 @@ from starlette.websockets import WebSocket
 from bunraku import __version__
 from bunraku.backing.backing import clock
 from bunraku.backing.direct import Write
-from bunraku.backing.library import Library, StoredMotion
+from bunraku.backing.library import Library, StoredMotion, Track
 from bunraku.backing.sockets import BROKEN, NOT_FOUND, TOO_SLOW, Refusal, converse, receive
+from bunraku.codec.audio import AudioTrack
 from bunraku.codec.coefficients import SCENE_CHANNELS
 from bunraku.codec.scene import SceneTrack
+from bunraku.codec.track import MotionTrack
 from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.playout import timeline
 from bunraku.playout.pacing import Paced, Pacer
@@ -135,7 +137,7 @@ class Viewer:
                 raise Refusal(NOT_FOUND, "No such motion", f"there is no motion {state.motion[:40]!r}")
             self._motion, self._pacer = motion, Pacer(_paced(motion, self._wanted))
             self._rate = RateChoice(len(motion.dance), self._pinned)
-            channels = sum(SCENE_CHANNELS if isinstance(t, SceneTrack) else CHANNEL_COUNT for t in motion.tracks)
+            channels = sum(map(_channels, motion.tracks))
             await put(ChannelHeader(motion.id, clock(), channels, __version__).pack())
             await put(motion.description)
         await put(state.pack())
@@ -160,9 +162,15 @@ class Viewer:
             self._resting = False
 
 
+def _channels(track: Track) -> int:
+    if isinstance(track, AudioTrack):
+        return track.channels
+    return SCENE_CHANNELS if isinstance(track, SceneTrack) else CHANNEL_COUNT
+
+
 def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
     """The tracks of a motion whose blocks a viewer wants."""
-    kinds = [track.kind if isinstance(track, SceneTrack) else "motion" for track in motion.tracks]
+    kinds = ["motion" if isinstance(track, MotionTrack) else track.kind for track in motion.tracks]
     return [
         Paced(number, track, len(motion.packets[number]), kind == "motion")
         for number, (track, kind) in enumerate(zip(motion.tracks, kinds, strict=True))
