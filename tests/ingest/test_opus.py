@@ -39,8 +39,8 @@ def test_rates_cost_what_they_are_called_and_low_ones_are_mono(channels: int) ->
     noise = np.random.default_rng(1).normal(0, 0.1, (240_000, channels))
     encoded = encode_audio([samples(noise)], TIMING, channels)
     for rate, (kbps, out) in zip(encoded.rates, LADDERS[channels], strict=True):
-        # a length before each packet, and a number a block
-        assert kbps * 0.9 < rate.kbps < kbps + 0.35
+        # with a length before each packet, and a number a block
+        assert kbps * 0.9 < rate.kbps < kbps + 0.8
         assert rate.kbps == pytest.approx(sum(map(len, rate.blocks)) * 8e-3 / 5)
         assert {packet[0] >> 2 & 1 for packet in packets(rate)} == {out - 1}
         assert {milliseconds(packet) for packet in packets(rate)} == {60}
@@ -89,7 +89,8 @@ def test_a_decoder_made_anew_in_the_middle_is_soon_right() -> None:
     whole, late = packets(rate), 40
     played, anew = decode(whole)[late * 2_880 :], decode(whole[late:])
     off = np.abs(anew - played).reshape(-1, 2_880, 2).max(axis=(1, 2))
-    assert off[1:].max() < 0.02, "after its first packet it is as if it had gone on"
+    assert off[2:].max() < 0.03, "after two packets it is as if it had gone on"
+    assert off[5:].max() < 0.001
 
 
 def test_no_sound_is_refused() -> None:

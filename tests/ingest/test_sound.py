@@ -147,10 +147,8 @@ def test_damage_in_the_middle_is_refused_or_heard_but_never_more(tmp_path: Path,
         path.write_bytes(hurt)
         try:
             sound = heard(path, 200_000)
-        except UnreadableSound as error:
-            assert error.title
-            assert error.hint
-        else:
-            assert 0 < len(sound) <= 200_000
-            assert np.isfinite(sound).all()
-            assert np.abs(sound).max() <= 1
+        except UnreadableSound:
+            continue
+        assert 0 < len(sound) <= 200_000
+        assert np.isfinite(sound).all()
+        assert np.abs(sound).max() <= 1

@@ -83,6 +83,10 @@ async def test_the_motion_that_a_sound_was_added_to_can_go(server: str, tmp_path
         assert (gone.status_code, gone.json()["title"]) == (404, "No such motion")
 
 
+def left_over() -> list[Path]:
+    return list(Path(tempfile.gettempdir()).glob("bunraku-upload-*/source"))
+
+
 HARM: dict[str, bytes] = {
     "nothing": b"",
     "a motion": clip(0.2),
@@ -107,7 +111,7 @@ async def test_what_is_no_sound_is_refused_in_words_and_leaves_nothing(server: s
         assert problem["hint"]
         assert tempfile.gettempdir() not in answer.text
         assert (await http.get("/v1/motions?limit=200")).json() == before
-    assert not list(Path(tempfile.gettempdir()).glob("bunraku-upload-*/source"))
+    assert not left_over()
 
 
 async def test_wrong_questions_get_problems(server: str) -> None:
@@ -123,7 +127,7 @@ async def test_limits_of_size_and_time_hold_for_sound_too(tmp_path: Path) -> Non
     with running(tmp_path / "small", upload_bytes=100_000) as url:
         async with httpx2.AsyncClient(base_url=url, timeout=60) as http:
             motion = await posted(http, seconds=0.5)
-            assert (await send(http, motion, sound)).status_code == 413
+            assert (await send(http, motion, bytes(100_001))).status_code == 413
     with running(tmp_path / "small", upload_seconds=0.001) as url:
         async with httpx2.AsyncClient(base_url=url, timeout=60) as http:
             answer = await send(http, motion, sound)
