@@ -35,7 +35,7 @@ def test_from_any_instant_on_there_is_the_packet_that_is_heard_and_all_after_it(
     found = store.packets_from(position)
     sample = position * SAMPLE_RATE // 1_000_000
     if sample >= store.track.samples:
-        assert not found
+        assert len(found) <= 1, "the silence that fills the last packet up, if any"
         return
     first = store.track.first_sample(found[0].number)
     assert first <= sample < first + PACKET
