@@ -111,6 +111,38 @@ def audio(
     out.print(said, markup=False, highlight=False, soft_wrap=True)
 
 
+@app.command()
+def scene(
+    motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="JSON: camera, lights.")],
+    server: Server = HERE,
+    as_json: Json = False,
+) -> None:
+    """Make a new motion of one with a camera and lights, from keyframes."""
+    import json
+
+    from bunraku.client.api import Client
+
+    base, kind, identity = _address(motion)
+    if kind == "sessions":
+        raise typer.BadParameter("a scene is added to a motion: give one", param_hint="MOTION")
+    try:
+        staging = json.loads(file.read_bytes())
+    except ValueError as error:
+        raise typer.BadParameter(f"{file.name} is no JSON: {error}", param_hint="FILE") from None
+
+    async def run() -> dict[str, Any]:
+        async with Client(base or server) as client:
+            return await client.add_scene(identity, staging)
+
+    made = _ask(run, base or server)
+    if as_json:
+        out.print_json(data=made)
+        return
+    said = f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}"
+    out.print(said, markup=False, highlight=False, soft_wrap=True)
+
+
 @app.command(name="list")
 def list_motions(server: Server = HERE, as_json: Json = False) -> None:
     """List the motions of a server."""
