@@ -12,7 +12,7 @@ from math import atan2, cbrt, copysign, hypot, pi, sqrt
 
 from bunraku.marionette import vector
 from bunraku.marionette.limbs import ArmRig, Joints
-from bunraku.marionette.spin import FARTHEST, FASTEST, Spin
+from bunraku.marionette.spin import FARTHEST, FASTEST, Spins
 from bunraku.marionette.vector import Quaternion, Vector
 
 FRESH = 0.05
@@ -29,7 +29,7 @@ class ArmBlend:
         self._swivel: float | None = None
         # radians about the chord that the elbow is shown ahead of its way, and goes back
         self._ahead = 0.0
-        self._spins = tuple(Spin(link) for link in rig.links)
+        self._spins = Spins(rig.links)
 
     def joints(
         self,
@@ -49,43 +49,34 @@ class ArmBlend:
         Between, the elbow goes to the nearest place from which forearm and hand reach the target; where the mixed wrist
         leaves none, the tip comes as near as it can.
         """
-        own = self._rig.target(dance)
+        direction = self._rig.direction(target)
+        own = self._rig.target(dance) if weight < 1.0 else target
         # nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
         share = min(cbrt(weight) + AWAY * vector.length(vector.subtract(target, own)), 1.0)
         most = min(abs(self._ahead), 2.0 * pi * share)
         self._ahead = copysign(max(most - FASTEST * seconds, 0.0), self._ahead)
-        mixed = self._mixed(dance, bent, target, self._rig.direction(own), turn, normal, weight)
-        return self._turned(mixed, share, seconds)
-
-    def _turned(self, joints: Joints, share: float, seconds: float) -> Joints:
-        """The joints with the same places of elbow, wrist and tip, and links that turn about themselves evenly."""
-        turn = above = vector.IDENTITY
-        shown = []
-        for joint, spin in zip(joints, self._spins, strict=True):
-            turn = vector.multiply(turn, joint)
-            link = spin.follow(turn, share, seconds)
-            shown.append(vector.normalise(vector.multiply(vector.conjugate(above), link)))
-            above = link
-        return (shown[0], shown[1], shown[2]) if any(spin.behind for spin in self._spins) else joints
+        if weight >= 1.0:
+            self._swivel = None
+            plane = vector.rotate(vector.about(direction, self._ahead), normal) if self._ahead else normal
+            shoulder = vector.multiply(self._rig.chord(direction, plane), bent[0])
+            joints = (vector.normalise(shoulder), bent[1], bent[2])
+        else:
+            joints = self._mixed(dance, self._rig.direction(own), bent, target, turn, normal, weight)
+        return self._spins.follow(joints, share, seconds)
 
     def _mixed(
         self,
         dance: Joints,
+        own: Vector,
         bent: Joints,
         target: Vector,
-        own: Vector,
         turn: Quaternion,
         normal: Vector,
         weight: float,
     ) -> Joints:
-        """The joints at `weight`, `own` being the direction of the dance's hand."""
+        """The joints below weight 1; `own` is the direction of the dance's hand."""
         rig = self._rig
         direction = rig.direction(target)
-        if weight >= 1.0:
-            self._swivel = None
-            plane = vector.rotate(vector.about(direction, self._ahead), normal) if self._ahead else normal
-            shoulder = vector.multiply(rig.chord(direction, plane), bent[0])
-            return (vector.normalise(shoulder), bent[1], bent[2])
         own_normal = vector.unit(vector.square_to(rig.bend_axis(dance), own), vector.across(own))
         carried = vector.rotate(turn, own_normal)
         swivel = atan2(vector.dot(vector.cross(carried, normal), direction), vector.dot(carried, normal))

@@ -9,7 +9,7 @@
 import { conjugate, multiply, rotate, slerp, type Numbers } from "../motion/rotation";
 import { about, across, addScaled, apart, between, cross, dot, length, normalise, put, squareTo, unit } from "../motion/vector";
 import type { ArmRig } from "./limbs";
-import { FARTHEST, FASTEST, ROUND, Spin } from "./spin";
+import { FARTHEST, FASTEST, ROUND, Spins } from "./spin";
 
 /** Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more. */
 const FRESH = 0.05;
@@ -21,9 +21,8 @@ export class ArmBlend {
   private swivel: number | null = null;
   /** Radians about the chord that the elbow is shown ahead of its way, and goes back. */
   private ahead = 0;
-  private readonly spins: Spin[];
+  private readonly spins: Spins;
   private readonly own = new Float64Array(3);
-  private readonly links = new Float64Array(12);
   private readonly direction = new Float64Array(3);
   private readonly ownNormal = new Float64Array(3);
   private readonly carried = new Float64Array(3);
@@ -36,14 +35,14 @@ export class ArmBlend {
   private readonly before = new Float64Array(4);
 
   constructor(private readonly rig: ArmRig) {
-    this.spins = [0, 3, 6].map((at) => new Spin(rig.links, at));
+    this.spins = new Spins(rig.links);
   }
 
   /** Forgets the way it went. */
   forget(): void {
     this.swivel = null;
     this.ahead = 0;
-    for (const spin of this.spins) spin.forget();
+    this.spins.forget();
   }
 
   /**
@@ -59,42 +58,13 @@ export class ArmBlend {
     out: Numbers, outAt: number, dance: Numbers, danceAt: number, bent: Numbers,
     target: Numbers, turn: Numbers, normal: Numbers, weight: number, seconds: number,
   ): void {
-    const { rig, own } = this;
+    const { rig, own, direction, frame, carried } = this;
+    rig.direction(direction, 0, target, 0);
     rig.target(own, 0, dance, danceAt);
     // nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
     const share = Math.min(Math.cbrt(weight) + AWAY * apart(target, 0, own, 0), 1);
     const most = Math.min(Math.abs(this.ahead), ROUND * share);
     this.ahead = Math.sign(this.ahead) * Math.max(most - FASTEST * seconds, 0);
-    rig.direction(own, 0, own, 0);
-    this.mixed(out, outAt, dance, danceAt, bent, target, turn, normal, weight);
-    this.turned(out, outAt, share, seconds);
-  }
-
-  /** Lets the links turn about themselves evenly; elbow, wrist and tip stay where they are. */
-  private turned(joints: Numbers, at: number, share: number, seconds: number): void {
-    const { links, spins, frame, turn } = this;
-    frame[0] = 1;
-    put(frame, 1, 0, 0, 0);
-    for (let i = 0; i < 3; i++) {
-      multiply(frame, 0, frame, 0, joints, at + 4 * i);
-      spins[i].follow(links, 4 * i, frame, share, seconds);
-    }
-    if (!spins.some((spin) => spin.behind !== 0)) return;
-    for (let i = 0; i < 4; i++) joints[at + i] = links[i];
-    for (let i = 4; i < 12; i += 4) {
-      conjugate(turn, 0, links, i - 4);
-      multiply(joints, at + i, turn, 0, links, i);
-      normalise(joints, at + i);
-    }
-  }
-
-  /** The joints (12) at `weight`, the direction of the dance's hand being known. */
-  private mixed(
-    out: Numbers, outAt: number, dance: Numbers, danceAt: number, bent: Numbers,
-    target: Numbers, turn: Numbers, normal: Numbers, weight: number,
-  ): void {
-    const { rig, direction, own, ownNormal, carried, side, frame } = this;
-    rig.direction(direction, 0, target, 0);
     if (weight >= 1) {
       this.swivel = null;
       about(frame, 0, direction, 0, this.ahead);
@@ -103,8 +73,19 @@ export class ArmBlend {
       multiply(out, outAt, frame, 0, bent, 0);
       normalise(out, outAt);
       for (let i = 4; i < 12; i++) out[outAt + i] = bent[i];
-      return;
+    } else {
+      rig.direction(own, 0, own, 0);
+      this.mixed(out, outAt, dance, danceAt, bent, target, turn, normal, weight);
     }
+    this.spins.follow(out, outAt, share, seconds);
+  }
+
+  /** The joints (12) below weight 1, the directions of the target and of the dance's own hand being known. */
+  private mixed(
+    out: Numbers, outAt: number, dance: Numbers, danceAt: number, bent: Numbers,
+    target: Numbers, turn: Numbers, normal: Numbers, weight: number,
+  ): void {
+    const { rig, direction, own, ownNormal, carried, side, frame } = this;
     rig.bendAxis(ownNormal, 0, dance, danceAt);
     squareTo(ownNormal, 0, ownNormal, 0, own, 0);
     if (!unit(ownNormal, 0, ownNormal, 0)) across(ownNormal, 0, own, 0);
