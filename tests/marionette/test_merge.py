@@ -102,20 +102,27 @@ def taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> tuple[Array, Arr
     return steps(np.array(merged)), steps(poses)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 120), st.integers(24, 60))
 def test_nothing_pops_when_a_limb_is_taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> None:
     """A hard switch turns joints by up to 180 degrees in one frame; the dance itself by up to ten."""
     turned, own = taken_dragged_and_let_go(seed, hold, gap)
-    assert float(turned.max()) < 80.0
-    assert float(np.abs(turned[1] - own[1]).max()) < 8.0
+    assert float(turned.max()) < 60.0
+    first = np.abs(turned[1] - own[1])
+    pose = dance(3, seed)[2].tolist()
+    for limb in Limb:
+        joints = list(limb.joints)
+        rig = ArmRig(FIGURE, limb) if limb.is_hand else None
+        # an arm that is all but straight bends by ten degrees where its hand comes a hundredth nearer
+        straight = rig is not None and float(np.linalg.norm(rig.target(rig.dance(pose)))) > 0.93
+        assert float(first[joints].max()) < (20.0 if straight else 4.0)
 
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 60), st.integers(1, 23))
 def test_nor_when_it_is_taken_again_before_it_is_back(seed: int, hold: int, gap: int) -> None:
     turned, _ = taken_dragged_and_let_go(seed, hold, gap)
-    assert float(turned.max()) < 90.0
+    assert float(turned.max()) < 60.0
 
 
 def test_a_jump_of_the_target_does_not_throw_the_limb() -> None:
@@ -131,7 +138,7 @@ def test_a_jump_of_the_target_does_not_throw_the_limb() -> None:
                 puppet.input("ada", Input(limb, 1, epoch, i + 1, i * FRAME, (x, y, z)), i * FRAME)
         puppet.alive("ada", list(Limb), i * FRAME)
         merged.append(apply(pose, puppet.overlay(pose, i * FRAME)))
-    assert float(steps(np.array(merged)).max()) < 75.0
+    assert float(steps(np.array(merged)).max()) < 60.0
 
 
 def test_a_silent_puppeteer_holds_still_then_loses_the_limb_which_goes_back_to_the_dance() -> None:

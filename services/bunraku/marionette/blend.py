@@ -18,7 +18,7 @@ from bunraku.marionette.vector import Quaternion, Vector
 FRESH = 0.05
 """Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more."""
 AWAY = 2.0
-"""An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned wholly otherwise."""
+"""An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned quite otherwise, at any weight."""
 
 
 class ArmBlend:
@@ -52,7 +52,7 @@ class ArmBlend:
         direction = self._rig.direction(target)
         own = self._rig.target(dance) if weight < 1.0 else target
         # nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
-        share = min(cbrt(weight) + AWAY * vector.length(vector.subtract(target, own)), 1.0)
+        share = min(max(cbrt(weight), AWAY * vector.length(vector.subtract(target, own))), 1.0)
         most = min(abs(self._ahead), 2.0 * pi * share)
         self._ahead = copysign(max(most - FASTEST * seconds, 0.0), self._ahead)
         if weight >= 1.0:

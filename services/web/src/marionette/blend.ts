@@ -13,7 +13,7 @@ import { FARTHEST, FASTEST, ROUND, Spins } from "./spin";
 
 /** Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more. */
 const FRESH = 0.05;
-/** An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned wholly otherwise. */
+/** An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned quite otherwise, at any weight. */
 const AWAY = 2;
 
 /** One arm on its way. It remembers which way round the elbow swings, and how far its links are turned. */
@@ -62,7 +62,7 @@ export class ArmBlend {
     rig.direction(direction, 0, target, 0);
     rig.target(own, 0, dance, danceAt);
     // nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
-    const share = Math.min(Math.cbrt(weight) + AWAY * apart(target, 0, own, 0), 1);
+    const share = Math.min(Math.max(Math.cbrt(weight), AWAY * apart(target, 0, own, 0)), 1);
     const most = Math.min(Math.abs(this.ahead), ROUND * share);
     this.ahead = Math.sign(this.ahead) * Math.max(most - FASTEST * seconds, 0);
     if (weight >= 1) {
