@@ -148,7 +148,7 @@ class PulledLeg(_Pulled):
 
     def see(self, pose: Pose, seconds: float) -> None:
         """The dance's pose, `seconds` after the last."""
-        self._saw((self.rig.angle(pose), 0.0, 0.0), seconds)
+        self._saw((self.rig.angle(pose, self.own[0]), 0.0, 0.0), seconds)
 
     def pull(self, pose: Pose, wanted: Vector | None, weight: float, seconds: float) -> Joints | None:
         """As `PulledHand.pull`, of the leg's joints."""

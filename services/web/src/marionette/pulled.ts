@@ -195,7 +195,7 @@ export class PulledLeg extends Pulled {
   }
 
   protected override whereIn(out: Numbers, rotations: Numbers): void {
-    out[0] = this.rig.angle(rotations);
+    out[0] = this.rig.angle(rotations, this.own[0]);
     out[1] = out[2] = 0;
   }
 }
