@@ -111,6 +111,38 @@ def audio(
     out.print(said, markup=False, highlight=False, soft_wrap=True)
 
 
+@app.command()
+def scene(
+    motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="JSON: camera, lights.")],
+    server: Server = HERE,
+    as_json: Json = False,
+) -> None:
+    """Make a new motion of one with a camera and lights, from keyframes."""
+    import json
+
+    from bunraku.client.api import Client
+
+    base, kind, identity = _address(motion)
+    if kind == "sessions":
+        raise typer.BadParameter("a scene is added to a motion: give one", param_hint="MOTION")
+    try:
+        staging = json.loads(file.read_bytes())
+    except ValueError as error:
+        raise typer.BadParameter(f"{file.name} is no JSON: {error}", param_hint="FILE") from None
+
+    async def run() -> dict[str, Any]:
+        async with Client(base or server) as client:
+            return await client.add_scene(identity, staging)
+
+    made = _ask(run, base or server)
+    if as_json:
+        out.print_json(data=made)
+        return
+    said = f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}"
+    out.print(said, markup=False, highlight=False, soft_wrap=True)
+
+
 @app.command(name="list")
 def list_motions(server: Server = HERE, as_json: Json = False) -> None:
     """List the motions of a server."""
@@ -202,8 +234,12 @@ def version(as_json: Json = False) -> None:
 
 @app.command()
 def warm() -> None:
-    """Compile reader and codec once, so that no upload waits for it (done by `make setup`)."""
+    """Compile reader, codec and what moves limbs once, so that nobody waits for it (done by `make setup`)."""
+    from bunraku.backing.cache import cache_of
     from bunraku.ingest import making  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
+    from bunraku.marionette import compiled
+
+    compiled.load(cache_of("marionette"))
 
 
 def _send(file: Path, server: str, quiet: bool, send: Callable[..., Awaitable[dict[str, Any]]]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The demo's own dance and its music, taken in like any upload the first time."""
+"""The demo's own dance with its music, camera and lights, taken in like any upload the first time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import tempfile
 from pathlib import Path
 
 from bunraku.backing.backing import Backing
+from bunraku.ingest.keyframes import Staging
 from bunraku.ingest.soundtracks import Soundtracks
+from bunraku.ingest.stagings import Stagings
 from bunraku.ingest.uploads import Uploads, motion_id
 
 _HERE = Path(__file__).parent
@@ -44,10 +46,11 @@ async def add_demo(backing: Backing) -> str:
         uploads = Uploads(backing)
         await uploads.add(motion, source, f"{title}.bvh")
         sung, _ = await Soundtracks(backing, uploads).add(motion, digest, song, f"{title}.wav")
-        # the dance without its music is only on the way
-        await backing.catalogue.remove(motion)
-        await backing.library.remove(motion)
-        motion = sung.id
+        staged, _ = await Stagings(backing, uploads).add(sung.id, await asyncio.to_thread(_stage))
+        for on_the_way in (motion, sung.id):
+            await backing.catalogue.remove(on_the_way)
+            await backing.library.remove(on_the_way)
+        motion = staged.id
     await asyncio.to_thread(note.write_text, json.dumps({"motion": motion, "made_by": made_by}))
     return motion
 
@@ -70,10 +73,17 @@ def _play(song: Path) -> bytes:
     return hashlib.sha256(data).digest()
 
 
+def _stage() -> Staging:
+    from bunraku.motion.choreography import SCORE
+    from bunraku.show.staging import camera, lights
+
+    return Staging.model_validate({"camera": camera(SCORE), "lights": lights(SCORE)})
+
+
 def _fingerprint() -> str:
     """Of all code on the dance's way into the library."""
     digest = hashlib.sha256()
-    for room in ("motion", "music", "codec", "ingest"):
+    for room in ("motion", "music", "show", "codec", "ingest"):
         for source in sorted([*(_HERE / room).glob("*.py"), *(_HERE / room).glob("*.json")]):
             digest.update(source.read_bytes())
     return digest.hexdigest()

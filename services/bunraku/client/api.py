@@ -68,6 +68,12 @@ class Client:
         watched; the rest as of `upload`."""
         return await self._send(path, f"/v1/motions/{quote(motion, safe='')}/audio", progress, made)
 
+    async def add_scene(self, motion: str, staging: dict[str, Any]) -> dict[str, Any]:
+        """Make a new motion that is `motion` with a camera and lights: keyframes as `POST /v1/motions/{id}/scene` takes
+        them."""
+        path = f"/v1/motions/{quote(motion, safe='')}/scene"
+        return await self._ask("POST", path, json=staging)
+
     async def motions(self) -> list[dict[str, Any]]:
         """All motions, newest first."""
         items: list[dict[str, Any]] = []

@@ -130,7 +130,7 @@ class PulledHand(_Pulled):
         # the dance may hold its arms where the marionette's shoulders do not go: that they do not comes with the weight
         target = vector.add(hand, vector.scale(vector.subtract(tip, hand), weight))
         turn = self._turn.follow(own, target, weight)
-        return self._blend.joints(dance, bent, target, turn, normal, max(weight, LEAST_WEIGHT))
+        return self._blend.joints(dance, bent, target, turn, normal, max(weight, LEAST_WEIGHT), seconds)
 
 
 class PulledLeg(_Pulled):
