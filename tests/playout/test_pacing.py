@@ -107,7 +107,7 @@ def sounding(*timings: Timing) -> Pacer:
 
 def all_of(pacer: Pacer, state: TimelineState, rate: int, audio: int | None) -> list[tuple[int, int, int]]:
     sent = []
-    while (due := pacer.next(state, 0, rate, audio)) is not None:
+    while (due := pacer.next(state, 0, rate, audio=audio)) is not None:
         sent.append((due.track, due.index, due.rate))
         assert len(sent) < 100
     return sent
@@ -127,7 +127,7 @@ def test_in_a_loop_sound_is_bettered_as_it_comes_near_again() -> None:
         pacer = Pacer([Paced(0, timing, 1, True), Paced(1, timing, 3, False, audio=True)])
         sent = []
         for clock in range(0, 3 * timing.duration_us, 100_000):
-            while (due := pacer.next(state, clock, 0, 0 if clock < timing.duration_us else 2)) is not None:
+            while (due := pacer.next(state, clock, 0, audio=0 if clock < timing.duration_us else 2)) is not None:
                 sent.append((due.track, due.index, due.rate))
         sound = [(index, rate) for track, index, rate in sent if track == 1]
         assert sorted(sound) == [(index, rate) for index in range(timing.blocks) for rate in (0, 2)]

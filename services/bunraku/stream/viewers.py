@@ -150,7 +150,7 @@ class Viewer:
         if state is None or self._pacer is None or self._motion is None or self._rate is None:
             return None
         step = self._steps[self._rate.rate]
-        due = self._pacer.next(state, clock(), step.motion, step.audio)
+        due = self._pacer.next(state, clock(), step.motion, audio=step.audio)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
     async def _rest(self) -> None:
