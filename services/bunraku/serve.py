@@ -80,6 +80,11 @@ async def compose(settings: Settings, *, demo: bool = False) -> AsyncIterator[Fa
         yield app
 
 
+def protocol() -> dict[str, Any]:
+    """uvicorn's options for sockets."""
+    return {"ws": DirectProtocol, "ws_max_size": LARGEST_FROM_CLIENT, "ws_per_message_deflate": False}
+
+
 async def serve(settings: Settings, listening: socket.socket, *, demo: bool, ready: Callable[[], None]) -> None:
     """Serve on a listening socket until SIGINT or SIGTERM; `ready` is called once requests are answered."""
 
@@ -105,9 +110,7 @@ async def serve(settings: Settings, listening: socket.socket, *, demo: bool, rea
         async with compose(settings, demo=demo) as app:
             config = uvicorn.Config(
                 app,
-                ws=DirectProtocol,
-                ws_max_size=LARGEST_FROM_CLIENT,
-                ws_per_message_deflate=False,
+                **protocol(),
                 lifespan="off",
                 log_level="warning",
                 access_log=False,
