@@ -120,7 +120,6 @@ async def test_who_does_not_read_pauses_the_outlet_and_resumes_it() -> None:
         for _ in range(count):
             assert await client.recv() == bytes(1 << 18)
         await heard.resumed.wait()
-        assert heard.outlet.clear
         assert heard.events == ["pause", "resume"]
         assert heard.outlet.waiting == 0
 
