@@ -3,17 +3,21 @@
 `python -m tests.bench.fanout_senders KIND BYTES HERTZ`: prints the port that it listens at, then for each line of
 standard input, a number of seconds, sends for that long and prints one JSON object: `messages` sent and `cpu`, seconds
 of this process in user and kernel mode. KIND is `bunraku` (the stream service as `bunraku up` serves it, an overlay
-published on its bus), `fastapi` (`send_bytes` in a loop), `websockets` (`broadcast`) or `socketio` (`emit`).
+published on its bus), `playing` (the same with a motion that plays), `fastapi` (`send_bytes` in a loop), `websockets`
+(`broadcast`) or `socketio` (`emit`). Of the first two, `waiting` asks for the most bytes that wait for a viewer.
 """
 
 from __future__ import annotations
 
 import asyncio
+import fcntl
 import json
 import resource
 import socket
+import struct
 import sys
 import tempfile
+import termios
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -26,6 +30,7 @@ from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 
 from bunraku.backing.backing import clock, open_backing
 from bunraku.backing.library import pack
+from bunraku.backing.outlet import Outlet
 from bunraku.backing.settings import Settings
 from bunraku.playout import timeline
 from bunraku.wire.messages import Overlay, Presence
@@ -42,14 +47,21 @@ def used() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-async def conduct(listening: socket.socket, send: Send, size: int, hertz: int) -> None:
+async def conduct(
+    listening: socket.socket, send: Send, size: int, hertz: int, waiting: Callable[[], int] = lambda: 0
+) -> None:
     """Do what standard input says until its end."""
     print(listening.getsockname()[1], flush=True)
+    number = 0
     while line := await asyncio.to_thread(sys.stdin.readline):
+        if line.strip() == "waiting":
+            print(json.dumps({"most": waiting(), "number": number}), flush=True)
+            continue
         messages, before, begun = 0, used(), time.monotonic()
         for tick in range(round(float(line) * hertz)):
             await asyncio.sleep(max(begun + tick / hertz - time.monotonic(), 0.0))
-            messages += await send(message(tick, size))
+            number += 1
+            messages += await send(message(number, size))
         print(json.dumps({"messages": messages, "cpu": round(used() - before, 6)}), flush=True)
 
 
@@ -60,16 +72,30 @@ def message(number: int, size: int) -> bytes:
     return Overlay(number, clock() + 60_000, one, (one,) * (frames - 1)).pack() if limbs else bytes(size)
 
 
-async def serving(app: Any, listening: socket.socket, **options: Any) -> asyncio.Task[None]:
-    """The task of a uvicorn server with its defaults, which listens when this returns."""
+async def serving(app: Any, listening: socket.socket, **options: Any) -> uvicorn.Server:
+    """A uvicorn server with its defaults, which listens when this returns."""
     server = uvicorn.Server(uvicorn.Config(app, log_level="warning", access_log=False, **options))
-    task = asyncio.create_task(server.serve(sockets=[listening]))
+    _tasks.append(asyncio.create_task(server.serve(sockets=[listening])))
     while not server.started:  # noqa: ASYNC110 - uvicorn has no event for it
         await asyncio.sleep(0.01)
-    return task
+    return server
 
 
-async def bunraku(listening: socket.socket, size: int, hertz: int) -> None:
+_tasks: list[asyncio.Task[None]] = []
+
+
+def most_waiting(server: uvicorn.Server) -> int:
+    """Bytes that wait for the viewer for whom most do: in the process, and in the kernel (SIOCOUTQ)."""
+    most = 0
+    for outlet in server.server_state.connections:
+        if isinstance(outlet, Outlet):
+            bare = outlet._transport.get_extra_info("socket")
+            held = struct.unpack("=i", fcntl.ioctl(bare.fileno(), termios.TIOCOUTQ, bytes(4)))[0]
+            most = max(most, outlet.waiting + held)
+    return most
+
+
+async def bunraku(listening: socket.socket, size: int, hertz: int, *, playing: bool = False) -> None:
     import bunraku.stream.app
     from bunraku.codec.encode import encode_motion
     from bunraku.serve import protocol
@@ -80,8 +106,8 @@ async def bunraku(listening: socket.socket, size: int, hertz: int) -> None:
             encoded = encode_motion(wandering_motion(DURATION / 1e6, 30.0, 9), ladder=(30.0, 5.0), grade="live")
             await backing.library.put(SESSION, pack(SESSION, encoded))
             state = timeline.start(SESSION, DURATION, clock())
-            # a stage that stands: what is measured is the overlay
-            state = timeline.edit(state, clock(), playing=False)
+            # on a stage that stands what is measured is the overlay
+            state = timeline.edit(state, clock(), playing=playing)
             viewers: dict[str, int] = {}
 
             async def answer(_: bytes) -> bytes:
@@ -96,8 +122,12 @@ async def bunraku(listening: socket.socket, size: int, hertz: int) -> None:
                 return sum(viewers.values())
 
             app = bunraku.stream.app.create_app(backing)
-            await serving(app, listening, lifespan="off", **protocol())
-            await conduct(listening, send, size, hertz)
+            server = await serving(app, listening, lifespan="off", **protocol())
+            await conduct(listening, send, size, hertz, lambda: most_waiting(server))
+
+
+async def bunraku_playing(listening: socket.socket, size: int, hertz: int) -> None:
+    await bunraku(listening, size, hertz, playing=True)
 
 
 async def fastapi(listening: socket.socket, size: int, hertz: int) -> None:
@@ -154,7 +184,13 @@ async def socketio(listening: socket.socket, size: int, hertz: int) -> None:
     await conduct(listening, send, size, hertz)
 
 
-KINDS = {"bunraku": bunraku, "fastapi": fastapi, "websockets": websockets, "socketio": socketio}
+KINDS = {
+    "bunraku": bunraku,
+    "playing": bunraku_playing,
+    "fastapi": fastapi,
+    "websockets": websockets,
+    "socketio": socketio,
+}
 
 
 def main() -> None:

@@ -65,7 +65,7 @@ class Crowd:
     """A crowd of viewers of the stream at `url` (a WebSocket's, `.../stream`)."""
 
     def __init__(self, url: str, *, quiet: bool = False) -> None:
-        """Those of a `quiet` crowd say nothing but what WebSockets ask of them."""
+        """Of a `quiet` crowd one alone speaks; the others answer what WebSockets ask of them."""
         self.url = url
         self.shared = Shared()
         self.viewers: list[CrowdViewer] = []
@@ -84,7 +84,7 @@ class Crowd:
         """
         _make_room(self._asked + viewers + SPARE)
         self._asked += viewers
-        if self._talking is None and not self._quiet:
+        if self._talking is None:
             self._talking = asyncio.create_task(self._talk(), name="what a crowd says")
         begun = time.monotonic()
         async with asyncio.TaskGroup() as group:
@@ -164,10 +164,10 @@ class Crowd:
             told(len(self.viewers))
 
     async def _talk(self) -> None:
-        """Let everyone speak once a second, for ever."""
+        """Let everyone speak once a second, for ever; of a quiet crowd one, who asks for the time."""
         beat, due = 0, time.monotonic()
         while True:
-            for viewer in self.viewers[beat % BEATS :: BEATS]:
+            for viewer in self.viewers[beat % BEATS : 1 if self._quiet else None : BEATS]:
                 viewer.speak(beat // BEATS)
             beat, due = beat + 1, due + 1 / BEATS
             await asyncio.sleep(max(due - time.monotonic(), 0.0))

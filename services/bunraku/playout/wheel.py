@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 from typing import Generic, TypeVar
 
-SPOKE = 10_000
+SPOKE = 20_000
 """Length of a spoke: nobody has a turn before the time asked for, nor more than this after it."""
 
 T = TypeVar("T")
