@@ -24,7 +24,7 @@ import bunraku.ingest.app
 import bunraku.session.app
 import bunraku.stream.app
 from bunraku import __version__
-from bunraku.backing import problems
+from bunraku.backing import problems, together
 from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.direct import DirectProtocol
 from bunraku.backing.settings import Settings
@@ -124,6 +124,7 @@ async def _load(backing: Backing) -> None:
     """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
     await asyncio.sleep(LOAD_AFTER)
     await backing.catalogue.open()
+    await asyncio.to_thread(together.warm)
     await asyncio.to_thread(decode.warm)
     # what is loaded by now stays: the collector need not walk through it again and again while limbs are solved
     gc.collect()

@@ -28,6 +28,7 @@ import uvicorn
 import uvloop
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 
+from bunraku.backing import together
 from bunraku.backing.backing import clock, open_backing
 from bunraku.backing.library import pack
 from bunraku.backing.outlet import Outlet
@@ -122,6 +123,7 @@ async def bunraku(listening: socket.socket, size: int, hertz: int, *, playing: b
                 return sum(viewers.values())
 
             app = bunraku.stream.app.create_app(backing)
+            await asyncio.to_thread(together.warm)
             server = await serving(app, listening, lifespan="off", **protocol())
             await conduct(listening, send, size, hertz, lambda: most_waiting(server))
 

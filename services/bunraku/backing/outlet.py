@@ -44,7 +44,7 @@ class Outlet(asyncio.Protocol):
     """One open socket; it is the transport's protocol. `clear` says that all that was written has left the process, and
     `heard`, clock time in microseconds, when the other end last said anything."""
 
-    __slots__ = ("_closing", "_connections", "_frames", "_listener", "_transport", "clear", "heard", "write")
+    __slots__ = ("_closing", "_connections", "_frames", "_listener", "_transport", "clear", "heard", "number", "write")
 
     def __init__(self, transport: asyncio.Transport, listener: Listener, connections: set[object]) -> None:
         """`connections` are the server's, which shuts them down when it ends."""
@@ -57,8 +57,12 @@ class Outlet(asyncio.Protocol):
         self.heard = clock()
         self.write = transport.write
         """Writes whole frames. Who writes only while `clear` keeps what waits to one write."""
+        self.number: int | None = None
+        """The socket's file descriptor, where what is written to it goes out as it is; valid until `gone`."""
         bare = transport.get_extra_info("socket")
         if bare is not None:
+            if transport.get_extra_info("sslcontext") is None:
+                self.number = bare.fileno()
             with contextlib.suppress(OSError):
                 bare.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KERNEL_BYTES)
         transport.set_protocol(self)

@@ -13,6 +13,7 @@ from bunraku.backing.bus import Bus, Subscription
 from bunraku.backing.frames import frame
 from bunraku.backing.library import Library, StoredMotion
 from bunraku.backing.sockets import FAULT, NOT_FOUND, Refusal
+from bunraku.backing.together import Together
 from bunraku.stream.viewers import Viewer
 from bunraku.wire.messages import MalformedMessage, Presence, TimelineState, unpack
 
@@ -37,7 +38,7 @@ class WatchedSession:
         self._replica = replica
         self._viewers: set[Viewer] = set()
         # to those whose line has room the same bytes are written, with nothing asked in between
-        self._ready: list[Callable[[bytes], None]] | None = []
+        self._ready: Together | None = None
         self._behind: list[Viewer] = []
         self._motion: StoredMotion | None = None
         self._refusal: Refusal | None = None
@@ -167,12 +168,11 @@ class WatchedSession:
         self._overlay = framed if message[1] else None
         ready = self._ready
         if ready is None:
-            ready = self._ready = [viewer.outlet.write for viewer in self._viewers if viewer.outlet.clear]
+            ready = self._ready = Together([viewer.outlet for viewer in self._viewers if viewer.outlet.clear])
             self._behind = [viewer for viewer in self._viewers if not viewer.outlet.clear]
         for viewer in self._behind:
             viewer.overlay(framed)
-        for write in ready:
-            write(framed)
+        ready.write(framed)
 
 
 class WatchedSessions:
