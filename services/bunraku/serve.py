@@ -58,9 +58,10 @@ async def compose(settings: Settings, *, demo: bool = False) -> AsyncIterator[Fa
         sessions = bunraku.session.app.create_app(backing)
         app = FastAPI(title="Bunraku", version=__version__, docs_url="/v1/docs", openapi_url="/v1/openapi.json")
         problems.install(app)
+        # paths are looked up in this order: viewers come by the thousand
         for service in (
-            bunraku.ingest.app.create_app(backing),
             bunraku.stream.app.create_app(backing),
+            bunraku.ingest.app.create_app(backing),
             bunraku.ik.app.create_app(),
             sessions,
         ):

@@ -35,7 +35,7 @@ from pathlib import Path
 from typing import Any
 
 from bunraku.client.api import Client
-from bunraku.client.puppeteer import Puppeteer
+from bunraku.client.puppeteer import Puppeteer, Refused
 from tests.bench.fanout_processes import Told, ceiling
 
 LEAD_MS = 60.0
@@ -207,22 +207,25 @@ async def _flash(server: Told, url: str, viewers: int, there: int) -> Figures:
 
         async def pull() -> None:
             async with Puppeteer(client, session, "bench") as puppeteer:
-                await puppeteer.claim("left_hand")
                 number = 0
                 while not ended.is_set():
-                    await puppeteer.target("left_hand", 0.45, -0.2 + 0.2 * (number // 30 % 2), 0.5)
+                    try:
+                        await puppeteer.target("left_hand", 0.45, -0.2 + 0.2 * (number // 30 % 2), 0.5)
+                    except Refused:
+                        # not yet, or lost while this process was kept from running
+                        await puppeteer.claim("left_hand")
                     number += 1
                     await asyncio.sleep(1 / 60)
 
-        with Told.module("fanout_crowd", stream, "talk") as stay, Told.module("fanout_crowd", stream, "talk") as come:
+        with Told.module("fanout_crowd", stream, "talk") as stay, Told.module("fanout_crowd", stream) as come:
 
             async def during(what: Callable[[], Any], rest: float) -> tuple[dict[str, Any], float]:
-                stay.ask("count")
+                await asyncio.to_thread(stay.ask, "count")
                 before, begun = server.processor_seconds(), time.monotonic()
                 await asyncio.to_thread(what)
                 await asyncio.sleep(rest)
                 cores = (server.processor_seconds() - before) / (time.monotonic() - begun)
-                return stay.ask("figures"), cores
+                return await asyncio.to_thread(stay.ask, "figures"), cores
 
             pulling = asyncio.create_task(pull())
             await asyncio.to_thread(stay.ask, f"join {there} 50")
@@ -230,7 +233,7 @@ async def _flash(server: Told, url: str, viewers: int, there: int) -> Figures:
             await asyncio.sleep(8)
             calm, _ = await during(lambda: None, 6)
             flash, cores = await during(lambda: come.ask(f"join {viewers} {viewers / 5}"), 1)
-            joined = come.ask("figures")
+            joined = await asyncio.to_thread(come.ask, "figures")
             many, many_cores = await during(lambda: None, 5)
             storm, _ = await during(lambda: come.ask(f"leave {viewers}"), 3)
             ended.set()

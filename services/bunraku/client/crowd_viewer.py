@@ -29,6 +29,8 @@ from bunraku.wire.messages import (
     unpack,
 )
 
+AHEAD = 6_000_000
+"""No server sends blocks further ahead than this, microseconds."""
 SETTLED = 0.2
 """Seconds in which the common clock moves too little to be asked again."""
 
@@ -59,6 +61,12 @@ class Shared:
             self._base, self._offset = local, self.clock.at(local) - local
         return local + self._offset
 
+    def heard(self, pong: Pong) -> None:
+        """Take in an answer that tells the time."""
+        if not self.clock.ready:
+            self._base = 0
+        self.clock.pong(pong.sent, pong.received, pong.answered, time.monotonic_ns() // 1000)
+
     def know(self, data: bytes) -> None:
         """Take in what is the same for everyone, once."""
         if data in self._known:
@@ -75,6 +83,7 @@ class Shared:
             self.timelines.put(message)
         elif isinstance(message, ChannelHeader):
             self.clock.guess(message.now, time.monotonic_ns() // 1000)
+            self._base = 0
         elif isinstance(message, Problem):
             self.why = f"{message.title}: {message.detail}"
         elif isinstance(message, Description):
@@ -126,8 +135,9 @@ class CrowdViewer(asyncio.Protocol):
 
     def close(self) -> None:
         """Go."""
-        self._transport.write(_masked(8, (1001).to_bytes(2, "big")))
-        self._transport.close()
+        if not self._transport.is_closing():
+            self._transport.write(_masked(8, (1001).to_bytes(2, "big")))
+            self._transport.close()
 
     def data_received(self, data: bytes) -> None:
         """As asyncio has it."""
@@ -157,9 +167,15 @@ class CrowdViewer(asyncio.Protocol):
             if body + size > end:
                 break
             if data[at] == 0x82 and size:
+                if data[body] == ChannelHeader.TYPE:
+                    shared.know(data[body : body + size])
+                    now = shared.now()
                 self._take(data[body : body + size], now)
             elif data[at] == 0x89:
                 self._transport.write(_masked(10, data[body : body + size]))
+            elif data[at] == 0x88 and not self.closed:
+                self.closed = True
+                self.close()
             at = body + size
         self._buffer = data[at:]
 
@@ -173,8 +189,7 @@ class CrowdViewer(asyncio.Protocol):
         elif kind == Data.TYPE:
             self._block(message, now)
         elif kind == Pong.TYPE:
-            pong = Pong.unpack(message)
-            shared.clock.pong(pong.sent, pong.received, pong.answered, time.monotonic_ns() // 1000)
+            shared.heard(Pong.unpack(message))
         else:
             shared.know(message)
 
@@ -185,10 +200,13 @@ class CrowdViewer(asyncio.Protocol):
         if state is None or timing is None or data.track or data.index in self._held:
             return
         self._held.add(data.index)
+        length = round(timing.frames_in(data.index) * 1e6 / timing.fps)
         ahead = timing.start_us(data.index) - position_at(state, now)
-        if state.loop and abs(ahead) > state.duration / 2:
-            ahead += state.duration if ahead < 0 else -state.duration
-        self._ready = max(self._ready, now + ahead + round(timing.frames_in(data.index) * 1e6 / timing.fps))
+        if state.loop:
+            # what comes round again is ahead by less than is sent ahead, or has begun
+            begun = min(state.duration // 2, max(length, state.duration - AHEAD))
+            ahead = (ahead + begun) % state.duration - begun
+        self._ready = max(self._ready, now + ahead + length)
         self._blocks += 1
         # the block on show when one joins has always begun
         if self._blocks > 1 and state.playing:
