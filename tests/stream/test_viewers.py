@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from bunraku.backing.backing import clock
 from bunraku.backing.frames import frame
-from bunraku.backing.library import StoredMotion, pack, unpack
+from bunraku.backing.library import StoredMotion, pack, unpack, with_audio
 from bunraku.backing.sockets import BROKEN, TOO_SLOW, Refusal
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
+from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.stream import viewers
 from bunraku.stream.turns import Turns
@@ -38,7 +40,10 @@ def motions() -> dict[str, StoredMotion]:
         encoded = encode_motion(wandering_motion(seconds, 30.0, 9), ladder=(30.0, 5.0), grade="live")
         scenes = [encode_scene(make(2.0, 30.0), ladder=(20.0, 4.0)) for make in (camera, light)]
         shelf[name] = unpack(name, pack(name, encoded, scenes if name == "filmed" else ()))
-    return shelf
+    # "sung", with noise beside it
+    noise = np.random.default_rng(2).normal(0, 0.2, (441_600, 1)).astype(np.float32)
+    packed, _ = with_audio("sung", shelf["one"], encode_audio([noise], shelf["one"].track, 1))
+    return {**shelf, "sung": unpack("sung", packed)}
 
 
 def watching(motion: StoredMotion, playing: bool = True, **options: object) -> tuple[Viewer, Line, TimelineState]:
@@ -217,3 +222,49 @@ async def test_a_failure_is_said_and_ends_it(
     assert isinstance(problem, Problem)
     assert problem.title == "Our fault"
     assert "a viewer's turn failed" in caplog.text
+
+
+def sent_of(line: Line) -> list[tuple[int, int, int]]:
+    header = line.messages[0]
+    assert isinstance(header, ChannelHeader)
+    assert header.channels == 20
+    return [(m.track, m.index, m.rate) for m in of(Data, line) if isinstance(m, Data)]
+
+
+async def test_sound_goes_with_the_dance_at_its_lowest_until_the_line_has_shown_itself(
+    motions: dict[str, StoredMotion],
+) -> None:
+    _, line, _ = watching(motions["sung"])
+    assert sent_of(line)[:8] == [
+        *((0, 0, 0), (1, 0, 0)),
+        *((track, index, 1 - track) for index in range(1, 4) for track in (0, 1)),
+    ]
+
+
+async def test_a_pinned_rate_pins_the_dance_and_the_best_sound_that_goes_with_it(
+    motions: dict[str, StoredMotion],
+) -> None:
+    for pinned, expected in ((1, [(0, 1, 1), (1, 1, 2)]), (0, [(0, 1, 0), (1, 1, 0)])):
+        _, line, _ = watching(motions["sung"], pinned=pinned)
+        assert sent_of(line)[2:4] == expected
+
+
+async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(motions: dict[str, StoredMotion]) -> None:
+    _, line, _ = watching(motions["sung"], wanted=("motion",))
+    assert {track for track, _, _ in sent_of(line)} == {0}
+    _, line, _ = watching(motions["sung"], wanted=("audio",))
+    assert sent_of(line)[:4] == [(1, index, 0) for index in range(4)]
+
+
+async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["sung"], private=True)
+    choice = viewer._rate
+    assert choice is not None
+    for second in range(1, 6):
+        choice.report(Report(buffer=0), clock() + second * 2_000_000)
+    before = len(sent_of(line))
+    viewer.hear(Edit(position=6_000_000).pack())
+    viewer.advance()
+    after = sent_of(line)[before:]
+    assert after
+    assert {(track, rate) for track, _, rate in after} == {(0, 0)}

@@ -16,13 +16,15 @@ from typing import Protocol, cast
 from bunraku import __version__
 from bunraku.backing.backing import clock
 from bunraku.backing.frames import frame
-from bunraku.backing.library import StoredMotion
+from bunraku.backing.library import StoredMotion, Track
 from bunraku.backing.outlet import Outlet
 from bunraku.backing.sockets import BROKEN, FAULT, TOO_SLOW, Refusal
+from bunraku.codec.audio import AudioTrack
 from bunraku.codec.coefficients import SCENE_CHANNELS
 from bunraku.codec.scene import SceneTrack
+from bunraku.codec.track import MotionTrack
 from bunraku.motion.skeleton import CHANNEL_COUNT
-from bunraku.playout import timeline
+from bunraku.playout import sharing, timeline
 from bunraku.playout.pacing import Paced, Pacer
 from bunraku.playout.rate import RateChoice
 from bunraku.stream.turns import Turns
@@ -80,7 +82,7 @@ class Viewer:
 
     __slots__ = (
         "_asked", "_control", "_motion", "_overlay", "_pacer", "_phase", "_pinned", "_pongs", "_private",
-        "_rate", "_shown", "_timelines", "_turns", "_wanted", "audience", "outlet",
+        "_rate", "_shown", "_steps", "_timelines", "_turns", "_wanted", "audience", "outlet",
     )  # fmt: skip
 
     def __init__(
@@ -107,6 +109,7 @@ class Viewer:
         self._motion: StoredMotion | None = None
         self._pacer: Pacer | None = None
         self._rate: RateChoice | None = None
+        self._steps: tuple[sharing.Step, ...] = ()
         self._asked = 0
         self.audience: Audience | None = None
         self.outlet: Outlet = _SHUT
@@ -138,7 +141,10 @@ class Viewer:
         self._timelines.put(state)
         if self._motion is not motion:
             self._motion, self._pacer = motion, Pacer(_paced(motion, self._wanted))
-            self._rate = RateChoice(len(motion.dance), self._pinned)
+            self._steps = _steps(motion, self._wanted)
+            pinned = sharing.pinned_step(self._steps, self._pinned)
+            first, safe = sharing.first_step(self._steps), sharing.safe_step(self._steps)
+            self._rate = RateChoice(len(self._steps), pinned, first, safe)
         if self.outlet.clear:
             self.outlet.write(b"".join(self._announced()))
         self._turns.put(self, 0)
@@ -223,7 +229,7 @@ class Viewer:
             return []
         messages = [state.pack()]
         if self._shown is None or self._shown[0] is not motion:
-            channels = sum(SCENE_CHANNELS if isinstance(t, SceneTrack) else CHANNEL_COUNT for t in motion.tracks)
+            channels = sum(map(_channels, motion.tracks))
             messages[:0] = [ChannelHeader(motion.id, clock(), channels, __version__).pack(), motion.description]
         self._shown = motion, state
         return [frame(message) for message in messages]
@@ -232,7 +238,8 @@ class Viewer:
         state = self._timelines.at(now)
         if state is None or self._pacer is None or self._motion is None or self._rate is None:
             return None
-        due = self._pacer.next(state, now, self._rate.rate)
+        step = self._steps[self._rate.rate]
+        due = self._pacer.next(state, now, step.motion, step.audio)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
     def _next_turn(self, now: int) -> int:
@@ -259,11 +266,27 @@ class Viewer:
         self.outlet.refuse(refusal)
 
 
+def _channels(track: Track) -> int:
+    if isinstance(track, AudioTrack):
+        return track.channels
+    return SCENE_CHANNELS if isinstance(track, SceneTrack) else CHANNEL_COUNT
+
+
 def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
     """The tracks of a motion whose blocks a viewer wants."""
-    kinds = [track.kind if isinstance(track, SceneTrack) else "motion" for track in motion.tracks]
     return [
-        Paced(number, track, len(motion.packets[number]), kind == "motion")
-        for number, (track, kind) in enumerate(zip(motion.tracks, kinds, strict=True))
-        if kind in wanted
+        Paced(number, track, len(motion.packets[number]), _kind(track) == "motion", _kind(track) == "audio")
+        for number, track in enumerate(motion.tracks)
+        if _kind(track) in wanted
     ]
+
+
+def _steps(motion: StoredMotion, wanted: Container[str]) -> tuple[sharing.Step, ...]:
+    """The ways in which the tracks that a viewer wants may share its line."""
+    kinds = list(map(_kind, motion.tracks))
+    audio = motion.kbps[kinds.index("audio")] if "audio" in kinds and "audio" in wanted else ()
+    return sharing.steps(motion.kbps[0] if "motion" in wanted or not audio else (), audio)
+
+
+def _kind(track: Track) -> str:
+    return "motion" if isinstance(track, MotionTrack) else track.kind
