@@ -41,8 +41,8 @@ class Drains:
     octets: int = 0
     frames: int = 0
 
-    def open(self, port: int, path: str) -> None:
-        """One more client, its handshake done."""
+    def open(self, port: int, path: str) -> int:
+        """One more client, its handshake done; its socket's number."""
         connection = socket.create_connection(("127.0.0.1", port), timeout=30)
         client = Drain(connection)
         if self.speech != "raw":
@@ -66,6 +66,7 @@ class Drains:
             self.walk(client, rest)
         connection.setblocking(False)
         self.clients[connection.fileno()] = client
+        return connection.fileno()
 
     def walk(self, client: Drain, data: bytes) -> None:
         """Count the frames in what came, and answer the pings."""
@@ -115,14 +116,15 @@ def main() -> None:
     port, viewers, speech = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
     path = sys.argv[4] if len(sys.argv) > 4 else "/"
     drains = Drains(speech)
-    for _ in range(viewers):
-        drains.open(port, path)
-    print("ready", flush=True)
     waiting = select.epoll()
-    for number in drains.clients:
-        waiting.register(number, select.EPOLLIN)
-    waiting.register(0, select.EPOLLIN)
     buffer = bytearray(1 << 16)
+    for _ in range(viewers):
+        waiting.register(drains.open(port, path), select.EPOLLIN)
+        # those who have joined are viewers already
+        for number, _ in waiting.poll(0):
+            drains.read(number, buffer)
+    print("ready", flush=True)
+    waiting.register(0, select.EPOLLIN)
     while True:
         for number, _ in waiting.poll():
             if number:

@@ -37,7 +37,7 @@ from bunraku.playout import timeline
 from bunraku.wire.messages import Overlay, Presence
 
 SESSION = "bench"
-DURATION = 60_000_000
+DURATION = 90_000_000
 Send = Callable[[bytes], Awaitable[int]]
 """Sends to every client, and says how many those were."""
 
