@@ -203,7 +203,7 @@ async def test_the_silent_are_asked_once_and_then_gone(
 async def test_turns_come_when_blocks_are_due_and_not_for_all_at_once(motions: dict[str, StoredMotion]) -> None:
     found = [watching(motions["one"]) for _ in range(50)]
     now = clock()
-    turns = [viewer._next_turn(now) - now for viewer, _, _ in found]
+    turns = [viewer._next_turn() - now for viewer, _, _ in found]
     assert all(0 < turn <= 2_000_000 for turn in turns)
     assert len({turn // 100_000 for turn in turns}) > 5
 

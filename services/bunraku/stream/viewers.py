@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import random
-from collections.abc import Container
+from collections.abc import Sequence
 from typing import Protocol, cast
 
 from bunraku import __version__
@@ -27,6 +27,7 @@ from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.playout import sharing, timeline
 from bunraku.playout.pacing import Paced, Pacer
 from bunraku.playout.rate import RateChoice
+from bunraku.stream.plans import Plans
 from bunraku.stream.turns import Turns
 from bunraku.wire.messages import (
     ChannelHeader,
@@ -61,6 +62,8 @@ _log = logging.getLogger(__name__)
 class Audience(Protocol):
     """Those who watch a session, as one of them sees it."""
 
+    plans: Plans
+
     def turned(self) -> None:
         """Of one of them the line has room again, or no more."""
 
@@ -81,15 +84,15 @@ class Viewer:
     """What one viewer has been sent and is still to be sent. Until `open` is called everything waits."""
 
     __slots__ = (
-        "_asked", "_control", "_motion", "_overlay", "_pacer", "_phase", "_pinned", "_pongs", "_private",
-        "_rate", "_shown", "_steps", "_timelines", "_turns", "_wanted", "audience", "outlet",
+        "_asked", "_control", "_following", "_motion", "_overlay", "_pacer", "_phase", "_pinned", "_planned", "_pongs",
+        "_private", "_rate", "_shown", "_steps", "_timelines", "_tracks", "_turns", "_wanted", "audience", "outlet",
     )  # fmt: skip
 
     def __init__(
         self,
         turns: Turns,
         pinned: int | None = None,
-        wanted: Container[str] = TRACKS,
+        wanted: tuple[str, ...] = TRACKS,
         *,
         private: bool = False,
     ) -> None:
@@ -110,6 +113,10 @@ class Viewer:
         self._pacer: Pacer | None = None
         self._rate: RateChoice | None = None
         self._steps: tuple[sharing.Step, ...] = ()
+        self._tracks: list[Paced] = []
+        # when the next block comes within reach, and of which timeline at which step; None while some are to be sent
+        self._following: int | None = None
+        self._planned: tuple[TimelineState, sharing.Step] | None = None
         self._asked = 0
         self.audience: Audience | None = None
         self.outlet: Outlet = _SHUT
@@ -140,7 +147,8 @@ class Viewer:
         """A new timeline of the stage, and the motion that it names. It is sent at once, blocks at the next turn."""
         self._timelines.put(state)
         if self._motion is not motion:
-            self._motion, self._pacer = motion, Pacer(_paced(motion, self._wanted))
+            self._tracks = _paced(motion, self._wanted)
+            self._motion, self._pacer = motion, Pacer(self._tracks)
             self._steps = _steps(motion, self._wanted)
             pinned = sharing.pinned_step(self._steps, self._pinned)
             first, safe = sharing.first_step(self._steps), sharing.safe_step(self._steps)
@@ -194,9 +202,10 @@ class Viewer:
             self._asked = outlet.heard
             outlet.ping()
         try:
-            if outlet.clear:
+            if outlet.clear and not self._follow(now):
                 self._send(now)
-            self._turns.put(self, self._next_turn(now))
+                self._look_ahead(now)
+            self._turns.put(self, self._next_turn())
         except Exception:
             _log.exception("a viewer's turn failed")
             self.refuse(Refusal(FAULT, "Our fault", "the server could not go on with this stream"))
@@ -242,16 +251,44 @@ class Viewer:
         due = self._pacer.next(state, now, step.motion, step.audio)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
-    def _next_turn(self, now: int) -> int:
+    def _follow(self, now: int) -> bool:
+        """Send what all who are in step are sent, where this one is, and nothing else waits; whether it is."""
+        if self.audience is None or self._planned is None or self._following is None or self._following > now:
+            return False
+        state, step = self._planned
+        if state is not self._timelines.at(now) or self._shown is None or self._shown[1] is not state:
+            return False
+        assert self._motion is not None
+        assert self._rate is not None
+        assert self._pacer is not None
+        if step != self._steps[self._rate.rate] or self._pongs or self._control or self._overlay is not None:
+            return False
+        plan = self.audience.plans.at(self._following, state, self._motion, step, self._wanted, self._tracks)
+        new = self._pacer.follow(plan.dues)
+        if new is None:
+            return False
+        self._following = plan.following
+        if new and plan.framed:
+            self.outlet.write(plan.framed)
+        return True
+
+    def _look_ahead(self, now: int) -> None:
+        """All that is within reach was sent: when more will be."""
+        self._planned = self._following = None
+        state = self._timelines.at(now)
+        if self.outlet.clear and state is not None and self._pacer is not None and self._rate is not None:
+            wait = self._pacer.wait(state, now)
+            if wait is not None:
+                self._following = now + wait
+                self._planned = state, self._steps[self._rate.rate]
+
+    def _next_turn(self) -> int:
         """Clock time of the next turn: for the next block, or to ask for a sign of life."""
         heard = self.outlet.heard
         due = heard + (GONE if heard == self._asked else SILENT) + 1
-        state = self._timelines.at(now)
-        if self.outlet.clear and state is not None and self._pacer is not None:
-            wait = self._pacer.wait(state, now)
-            if wait is not None:
-                due = min(due, now + wait + self._phase)
-        return due
+        if self._following is None or not self.outlet.clear:
+            return due
+        return min(due, self._following + self._phase)
 
     def _edit(self, edit: Edit) -> None:
         """Edit the viewer's own timeline."""
@@ -272,7 +309,7 @@ def _channels(track: Track) -> int:
     return SCENE_CHANNELS if isinstance(track, SceneTrack) else CHANNEL_COUNT
 
 
-def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
+def _paced(motion: StoredMotion, wanted: Sequence[str]) -> list[Paced]:
     """The tracks of a motion whose blocks a viewer wants."""
     return [
         Paced(number, track, len(motion.packets[number]), _kind(track) == "motion", _kind(track) == "audio")
@@ -281,7 +318,7 @@ def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
     ]
 
 
-def _steps(motion: StoredMotion, wanted: Container[str]) -> tuple[sharing.Step, ...]:
+def _steps(motion: StoredMotion, wanted: Sequence[str]) -> tuple[sharing.Step, ...]:
     """The ways in which the tracks that a viewer wants may share its line."""
     kinds = list(map(_kind, motion.tracks))
     audio = motion.kbps[kinds.index("audio")] if "audio" in kinds and "audio" in wanted else ()
