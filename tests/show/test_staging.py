@@ -3,15 +3,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bunraku.ingest.keyframes import Staging, check
 from bunraku.motion import skeleton
 from bunraku.motion.choreography import SCORE, dance
 from bunraku.show import staging
 
 
 def test_the_camera_closes_and_moves_calmly() -> None:
-    scene = staging.camera(SCORE)
-    assert len(scene.values) == round(SCORE.duration * staging.FPS)
-    steps = np.diff(scene.values[:, :3], axis=0, append=scene.values[:1, :3])
+    keyframes = staging.camera(SCORE)
+    assert len(keyframes) == round(SCORE.duration * staging.FPS)
+    places = np.array([key["position"] for key in keyframes])
+    steps = np.diff(places, axis=0, append=places[:1])
     assert np.linalg.norm(steps, axis=1).max() * staging.FPS < 4.0
     assert np.linalg.norm(steps[-1]) < 0.01
 
@@ -32,13 +34,18 @@ def test_the_dancer_is_in_the_picture_all_the_time() -> None:
 
 
 def test_three_lights_close_and_none_goes_out() -> None:
-    scenes = staging.lights(SCORE)
-    assert [scene.kind for scene in scenes] == ["light"] * 3
-    for scene in scenes:
-        intensity = scene.values[:, 6]
-        assert 0.3 < intensity.min() <= intensity.max() < 2.0
+    tracks = staging.lights(SCORE)
+    assert len(tracks) == 3
+    for keyframes in tracks:
+        intensity = [key["intensity"] for key in keyframes]
+        assert 0.3 < min(intensity) <= max(intensity) < 2.0
         assert intensity[0] == pytest.approx(intensity[-1], abs=0.02)
 
 
+def test_they_are_keyframes_as_the_service_takes_them() -> None:
+    asked = Staging.model_validate({"camera": staging.camera(SCORE), "lights": staging.lights(SCORE)})
+    check(asked)
+
+
 def _views() -> list[tuple[np.ndarray, np.ndarray, float]]:
-    return [(row[:3], row[3:6], float(row[6])) for row in staging.camera(SCORE).values]
+    return [(np.array(k["position"]), np.array(k["gaze"]), float(k["fov"])) for k in staging.camera(SCORE)]

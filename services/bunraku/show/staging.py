@@ -5,11 +5,11 @@ World frame, metres, the dancer facing z at the origin; the end leads on to the 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from math import radians
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from bunraku.codec.scene import Scene
 from bunraku.motion import easing
 from bunraku.motion.easing import Move
 from bunraku.motion.rotation import Array
@@ -31,7 +31,7 @@ class Shot(NamedTuple):
     y: float
 
 
-FIELD = np.radians(26.0)
+FIELD = radians(26.0)
 """Vertical field of view, the same as the audience's own."""
 OPENING = Shot(0.0, 0.0, 0.0, 3.0, 7.0, 0.0, 1.0)
 SHOTS = (
@@ -84,24 +84,29 @@ CUES = (
 )
 
 
-def camera(score: Score) -> Scene:
-    """The show's camera for a dance of this score."""
+def camera(score: Score) -> list[dict[str, Any]]:
+    """The show's camera for a dance of this score, a keyframe a frame, as `POST /v1/motions/{id}/scene` takes them."""
     time = _time(score)
     aside, above, away, x, y = _track(score, time, OPENING, SHOTS).T
     aside, above = np.radians(aside), np.radians(above)
     gaze = np.stack([x, y, np.zeros_like(x)], axis=1)
     level = away * np.cos(above)
     place = gaze + np.stack([level * np.sin(aside), away * np.sin(above), level * np.cos(aside)], axis=1)
-    return Scene("camera", FPS, np.concatenate([place, gaze, np.full((len(time), 1), FIELD)], axis=1))
-
-
-def lights(score: Score) -> list[Scene]:
-    """The key light, the warm and the cool one behind, for a dance of this score."""
-    time = _time(score)
-    intensities = _track(score, time, FIRST, CUES)
     return [
-        Scene("light", FPS, np.column_stack([np.tile((*PLACES[name], *COLOURS[name]), (len(time), 1)), intensity]))
-        for name, intensity in zip(PLACES, intensities.T, strict=True)
+        {"time": round(at * 1e6), "position": here.tolist(), "gaze": there.tolist(), "fov": FIELD}
+        for at, here, there in zip(time, place, gaze, strict=True)
+    ]
+
+
+def lights(score: Score) -> list[list[dict[str, Any]]]:
+    """The key light, the warm and the cool one behind, for a dance of this score; as `camera`."""
+    time = _time(score)
+    return [
+        [
+            {"time": round(at * 1e6), "position": PLACES[name], "colour": COLOURS[name], "intensity": intensity}
+            for at, intensity in zip(time, intensities.tolist(), strict=True)
+        ]
+        for name, intensities in zip(PLACES, _track(score, time, FIRST, CUES).T, strict=True)
     ]
 
 
