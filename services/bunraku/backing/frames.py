@@ -1,7 +1,7 @@
 """WebSocket frames (RFC 6455, section 5) as bytes: those of a server whole, those of a client as they come in pieces.
 
-uvicorn's own reading of them keeps 10 kB for each connection and takes 20 µs a message; viewers are many, and what they
-say is short.
+What viewers say is short, and mostly nothing: their reader is some bytes of state, where that of the `websockets`
+library, which serves the other sockets, keeps 1.7 kB for each connection.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A viewer's socket, once it is open: bytes go straight to the transport, and there is no task for what comes back.
 
-What goes to every viewer of a session thirty times a second is the same bytes. A task and a queue for each of them cost
-several times the writing, and uvicorn's protocol, its task and the scope of the request 60 kB. So a socket is accepted
-as any other (`bunraku.backing.direct`) and is then an `Outlet`, which is all that stays.
+What goes to every viewer of a session thirty times a second is the same bytes, and a task and a queue for each of them
+cost several times the writing. So a socket is accepted as any other (`bunraku.backing.direct`) and is then an `Outlet`,
+which is all that stays of it: uvicorn's protocol, its task and the scope of the request are let go.
 """
 
 from __future__ import annotations
