@@ -68,3 +68,16 @@ def test_failures_are_said_in_words(server: str, tmp_path: Path) -> None:
         assert result.exit_code != 0
         assert "Traceback" not in result.output
         assert not isinstance(result.exception, Exception) or isinstance(result.exception, SystemExit)
+
+
+def test_a_crowd_watches_and_its_figures_are_said(server: str, clip_file: Path) -> None:
+    motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
+    given = ["bench", "viewers", "--n", "5", "--seconds", "0.3", "--url", f"{server}/v1/motions/{motion}"]
+    figures = json.loads(RUN.invoke(app, [*given, "--json"]).stdout)
+    assert (figures["viewers"], figures["joined"], figures["dropped"], figures["stalls"]) == (5, 5, 0, 0)
+    table = RUN.invoke(app, given)
+    assert table.exit_code == 0
+    assert "block late ms p99" in table.stdout
+    refused = RUN.invoke(app, ["bench", "viewers", "--n", "2", "--url", "ws://127.0.0.1:9/v1/sessions/s/stream"])
+    assert refused.exit_code == 1
+    assert "Traceback" not in refused.output
