@@ -199,8 +199,12 @@ def version(as_json: Json = False) -> None:
 
 @app.command()
 def warm() -> None:
-    """Compile reader and codec once, so that no upload waits for it (done by `make setup`)."""
+    """Compile reader, codec and what moves limbs once, so that nobody waits for it (done by `make setup`)."""
+    from bunraku.backing.cache import cache_of
     from bunraku.ingest import making  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
+    from bunraku.marionette import compiled
+
+    compiled.load(cache_of("marionette"))
 
 
 async def _stream_url(client: Any, address: str) -> str:

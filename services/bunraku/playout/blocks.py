@@ -101,23 +101,28 @@ class BlockStore(_Store[MotionTrack, MotionBlock]):
     def rotations_at(self, positions: list[int], loop: bool = True) -> list[Array | None]:
         """The rotations (18, 4) of `pose_at` at some motion times at once, which costs little more than one."""
         found: list[Array | None] = [None] * len(positions)
-        together: dict[int, tuple[MotionBlock, list[int], list[float]]] = {}
+        together: dict[tuple[int, bool], tuple[MotionBlock, MotionBlock | None, list[int], list[float]]] = {}
         for nth, position in enumerate(positions):
             place = self._at(position, loop)
             if place is None:
                 continue
             block, instant, following = place
-            if following is not None:
-                pose = self.pose_at(position, loop)
-                found[nth] = None if pose is None else pose[1]
-            else:
-                _, members, instants = together.setdefault(id(block), (block, [], []))
-                members.append(nth)
-                instants.append(instant)
-        for block, members, instants in together.values():
-            for nth, rotations in zip(members, block.at(np.array(instants))[1], strict=True):
+            members = together.setdefault((id(block), following is None), (block, following, [], []))
+            members[2].append(nth)
+            members[3].append(instant)
+        for block, following, numbers, instants in together.values():
+            for nth, rotations in zip(numbers, _rotations(block, following, np.array(instants)), strict=True):
                 found[nth] = rotations
         return found
+
+
+def _rotations(block: MotionBlock, following: MotionBlock | None, instants: Array) -> Array:
+    """Rotations (m, 18, 4) at `instants` (m,) of a block, or between its last frame and the `following` one's first."""
+    if following is None:
+        return block.at(instants)[1]
+    last, first = block.at(block.frames - 1.0)[1][0], following.at(0.0)[1][0]
+    mix = np.minimum(instants - (block.frames - 1), 1.0)
+    return rotation.slerp(last, first, np.repeat(mix[:, None], len(last), axis=1))
 
 
 class SceneStore(_Store[SceneTrack, SceneBlock]):

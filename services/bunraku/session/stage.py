@@ -262,7 +262,7 @@ def _overlay(sequence: int, due: int, shown: list[Pulled | None]) -> bytes:
     for pulled in reversed(shown):
         if (pulled.limbs if pulled is not None else ()) != last:
             break
-        turned = pulled.rotations.tolist() if pulled is not None else []
+        turned = pulled.joints if pulled is not None else ()
         frames.append({int(limb): pack_joints(joints) for limb, joints in zip(last, turned, strict=True)})
     if not last:
         return Overlay(sequence, due, {}).pack()
