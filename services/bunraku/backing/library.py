@@ -35,13 +35,15 @@ _LOG_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 @dataclass(frozen=True, slots=True)
 class StoredMotion:
     """A motion as it is sent: the tracks of its Description, the motion first, and `packets[track][rate][index]`, whole
-    Data messages, lowest rate first; `front` is where the dance faces, radians about y from z towards x."""
+    Data messages, lowest rate first; `front` is where the dance faces, radians about y from z towards x; `kbps` what
+    each rate of each track costs."""
 
     id: str
     description: bytes
     tracks: tuple[Track, ...]
     packets: list[list[list[bytes]]]
     front: float = 0.0
+    kbps: tuple[tuple[float, ...], ...] = ()
 
     @property
     def track(self) -> MotionTrack:
@@ -110,7 +112,8 @@ def unpack(motion: str, packed: bytes) -> StoredMotion:
     dance = read_track(described[0])
     beside = (read_audio(track, dance) if track["type"] == "audio" else read_scene(track) for track in described[1:])
     tracks: tuple[Track, ...] = (dance, *beside)
-    return StoredMotion(motion, values["description"], tracks, packets, float(described[0].get("front", 0.0)))
+    kbps = tuple(tuple(float(rate["kbps"]) for rate in track["rates"]) for track in described)
+    return StoredMotion(motion, values["description"], tracks, packets, float(described[0].get("front", 0.0)), kbps)
 
 
 class Library:

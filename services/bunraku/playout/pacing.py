@@ -1,9 +1,9 @@
 """Which block goes to a viewer next, and when (design.md, The line).
 
 The server pushes ahead of the play position: the motion's first block at the lowest rate, so that something moves at
-once, then the camera and light that go with it, then what lies within `AHEAD` at the chosen rate, the soonest first and
-the motion first where several are due; last, better versions of what was sent. What a viewer already has is not sent
-again.
+once, then the sound at its lowest, the camera and light that go with it, then what lies within `AHEAD` at the chosen
+rates, the soonest first and where several are due the motion first, then the sound; last, better versions of what was
+sent. What a viewer already has is not sent again.
 """
 
 from __future__ import annotations
@@ -24,22 +24,24 @@ UPGRADE = 500_000
 @dataclass(frozen=True, slots=True)
 class Paced:
     """A track that is sent: its index in the Description, when its blocks are, and how many rates it has. The blocks of
-    a `base` track come first, and the first of them at the lowest rate: the motion's."""
+    a `base` track come first, and the first of them at the lowest rate: the motion's; next to them those of `audio`,
+    alike."""
 
     number: int
     timing: Timing
     rates: int
     base: bool
+    audio: bool = False
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Due:
     """A block to be sent, those to be sent first being the least: whether it only betters one that was sent, how long
-    until it is shown in microseconds, whether it can wait for others of the same instant, and which one it is."""
+    until it is shown in microseconds, its place among others of the same instant, and which one it is."""
 
     better: bool
     distance: int
-    beside: bool
+    place: int
     track: int
     index: int
     rate: int
@@ -55,13 +57,19 @@ class Pacer:
         self._tracks = tracks
         self._sent: dict[tuple[int, int], int] = {}
 
-    def next(self, state: TimelineState, clock: int, rate: int) -> Due | None:
+    def next(self, state: TimelineState, clock: int, rate: int, audio: int | None = None) -> Due | None:
         """The block to send now, None when enough is on its way.
 
-        A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has.
+        A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has, and
+        `audio` that of sound where it is another, -1 for none of it.
         """
         position = position_at(state, clock)
-        found = [due for track in self._tracks if (due := self._due(track, state, position, rate)) is not None]
+        rates = ((track, max(rate, 0) if audio is None or not track.audio else audio) for track in self._tracks)
+        found = [
+            due
+            for track, wanted in rates
+            if wanted >= 0 and (due := self._due(track, state, position, wanted)) is not None
+        ]
         if not found:
             return None
         due = min(found)
@@ -77,10 +85,11 @@ class Pacer:
 
     def _due(self, track: Paced, state: TimelineState, position: int, rate: int) -> Due | None:
         """What is to be sent first of one track."""
-        timing, rate = track.timing, min(max(rate, 0), track.rates - 1)
+        timing, rate = track.timing, min(rate, track.rates - 1)
         # a track may be shorter or longer than the motion, and turns with it
         blocks = timing.block_at(state.duration - 1) + 1
         first = min(timing.block_at(position), blocks - 1)
+        place = 0 if track.base else 1 if track.audio else 2
         better = None
         for count in range(blocks):
             turn, index = divmod(first + count, blocks)
@@ -89,10 +98,10 @@ class Pacer:
                 break
             sent = self._sent.get((track.number, index))
             if sent is None:
-                quick = track.base and count == 0
-                return Due(False, distance, not track.base, track.number, index, 0 if quick else rate)
+                quick = place < 2 and count == 0
+                return Due(False, distance, place, track.number, index, 0 if quick else rate)
             if sent < rate and distance > UPGRADE and better is None:
-                better = Due(True, distance, not track.base, track.number, index, rate)
+                better = Due(True, distance, place, track.number, index, rate)
         return better
 
 

@@ -17,10 +17,14 @@ SLOW_DECODE = 20_000
 class RateChoice:
     """The rate of one viewer, from the reports it sends each second; times are clock times in microseconds."""
 
-    def __init__(self, rates: int, pinned: int | None = None) -> None:
+    def __init__(self, rates: int, pinned: int | None = None, first: int | None = None, safe: int = 0) -> None:
+        """`first` is the rate to begin with, if not the highest; `safe` the one of who does not look or cannot keep up
+        with more: a line that does not carry it gets less."""
         self._highest = rates - 1
+        self._safe = safe
         self._pinned = pinned is not None
-        self.rate = min(max(self._highest if pinned is None else pinned, 0), self._highest)
+        begun = pinned if pinned is not None else first if first is not None else self._highest
+        self.rate = min(max(begun, 0), self._highest)
         self._since: int | None = None
         self._hidden = False
         self._shown = self.rate
@@ -33,7 +37,7 @@ class RateChoice:
             # a tab that nobody sees gets the safety rate, and its own again when it is seen
             self._hidden = report.hidden
             if report.hidden:
-                self._shown, self.rate = self.rate, 0
+                self._shown, self.rate = self.rate, min(self._safe, self.rate)
             else:
                 self.rate = self._shown
             self._since = clock
@@ -43,8 +47,11 @@ class RateChoice:
             self._since = clock
         settled = clock - self._since
         struggling = report.frame > SLOW_FRAME or report.decode > SLOW_DECODE
-        if (report.buffer < LOW or struggling) and settled >= 1_000_000:
+        if report.buffer < LOW and settled >= 1_000_000:
             self._move(-1, clock)
+        elif struggling and settled >= 1_000_000:
+            if self.rate > self._safe:
+                self._move(-1, clock)
         elif report.buffer >= HIGH and not struggling and settled >= PATIENCE:
             self._move(1, clock)
         return self.rate

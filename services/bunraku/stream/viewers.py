@@ -23,7 +23,7 @@ from bunraku.codec.coefficients import SCENE_CHANNELS
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.track import MotionTrack
 from bunraku.motion.skeleton import CHANNEL_COUNT
-from bunraku.playout import timeline
+from bunraku.playout import sharing, timeline
 from bunraku.playout.pacing import Paced, Pacer
 from bunraku.playout.rate import RateChoice
 from bunraku.wire.messages import (
@@ -63,6 +63,7 @@ class Viewer:
         self._motion: StoredMotion | None = None
         self._pacer: Pacer | None = None
         self._rate: RateChoice | None = None
+        self._steps: tuple[sharing.Step, ...] = ()
         self._wake = asyncio.Event()
         self.overrun = False
 
@@ -136,7 +137,10 @@ class Viewer:
             if motion is None:
                 raise Refusal(NOT_FOUND, "No such motion", f"there is no motion {state.motion[:40]!r}")
             self._motion, self._pacer = motion, Pacer(_paced(motion, self._wanted))
-            self._rate = RateChoice(len(motion.dance), self._pinned)
+            self._steps = _steps(motion, self._wanted)
+            pinned = sharing.pinned_step(self._steps, self._pinned)
+            first, safe = sharing.first_step(self._steps), sharing.safe_step(self._steps)
+            self._rate = RateChoice(len(self._steps), pinned, first, safe)
             channels = sum(map(_channels, motion.tracks))
             await put(ChannelHeader(motion.id, clock(), channels, __version__).pack())
             await put(motion.description)
@@ -146,7 +150,8 @@ class Viewer:
         state = self._timelines.at(clock())
         if state is None or self._pacer is None or self._motion is None or self._rate is None:
             return None
-        due = self._pacer.next(state, clock(), self._rate.rate)
+        step = self._steps[self._rate.rate]
+        due = self._pacer.next(state, clock(), step.motion, step.audio)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
     async def _rest(self) -> None:
@@ -170,12 +175,22 @@ def _channels(track: Track) -> int:
 
 def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
     """The tracks of a motion whose blocks a viewer wants."""
-    kinds = ["motion" if isinstance(track, MotionTrack) else track.kind for track in motion.tracks]
     return [
-        Paced(number, track, len(motion.packets[number]), kind == "motion")
-        for number, (track, kind) in enumerate(zip(motion.tracks, kinds, strict=True))
-        if kind in wanted
+        Paced(number, track, len(motion.packets[number]), _kind(track) == "motion", _kind(track) == "audio")
+        for number, track in enumerate(motion.tracks)
+        if _kind(track) in wanted
     ]
+
+
+def _steps(motion: StoredMotion, wanted: Container[str]) -> tuple[sharing.Step, ...]:
+    """The ways in which the tracks that a viewer wants may share its line."""
+    kinds = list(map(_kind, motion.tracks))
+    audio = motion.kbps[kinds.index("audio")] if "audio" in kinds and "audio" in wanted else ()
+    return sharing.steps(motion.kbps[0] if "motion" in wanted or not audio else (), audio)
+
+
+def _kind(track: Track) -> str:
+    return "motion" if isinstance(track, MotionTrack) else track.kind
 
 
 async def serve(socket: WebSocket, viewer: Viewer, private: bool) -> None:
