@@ -295,7 +295,7 @@ function frame(): void {
     lit: pointer?.near === limb || focused === limb || selected,
     pull: hands?.pull(limb) ?? null,
   }));
-  stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.shownTime(now));
+  stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.shownTime(now));
   page.tags.render(limbs, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
   if (pose) invite(now);
   page.transport.camera(stage.hasShow, stage.following);
