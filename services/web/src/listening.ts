@@ -101,7 +101,9 @@ export class Listening {
       if (store !== this.#store) return;
       this.#speaker ??= new Speaker(() => this.#show());
       const speaker = this.#speaker;
-      const player = new AudioPlayer(speaker.context, speaker.output, { store, timelines: viewer.timelines, ownTime: (now) => viewer.ownTime(now) }, decoder);
+      const player = new AudioPlayer(speaker.context, speaker.output, {
+        store, timelines: viewer.timelines, ownTime: (now) => viewer.ownTime(now), settled: () => viewer.clock.settled,
+      }, decoder);
       this.#player = player;
       viewer.lead = (now) => player.leadAt(now);
       speaker.volume = this.#preference.volume;

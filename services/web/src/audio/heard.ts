@@ -5,14 +5,19 @@
 
 import { Slew } from "../playout/slew";
 
-const REMEMBERED = 15;
+const REMEMBERED = 7;
+/** A telling this soon after another says nothing new. */
+const SOON = 12;
+/** Time constant with which a device that stood still is followed, microseconds. */
+const QUICK = 50e3;
 export const FRAMES_A_SECOND = 48_000;
 const FRAMES_A_MS = FRAMES_A_SECOND / 1000;
 
 export class HeardClock {
   private readonly told: number[] = [];
+  private last = -Infinity;
   /** The page's clock minus the device's, microseconds. */
-  private readonly offset = new Slew();
+  private readonly offset = new Slew(QUICK);
 
   /** Whether the device has told of anything yet. */
   get ready(): boolean {
@@ -21,6 +26,8 @@ export class HeardClock {
 
   /** At `pageMs` of the page's clock the device puts out what is at `contextSeconds` of its own; told at `nowMs`. */
   sample(contextSeconds: number, pageMs: number, nowMs: number): void {
+    if (nowMs - this.last < SOON) return;
+    this.last = nowMs;
     const first = !this.ready;
     this.told.push(pageMs * 1000 - contextSeconds * 1e6);
     if (this.told.length > REMEMBERED) this.told.shift();
@@ -43,5 +50,6 @@ export class HeardClock {
   /** The device was stopped: what it told says nothing about later. */
   clear(): void {
     this.told.length = 0;
+    this.last = -Infinity;
   }
 }

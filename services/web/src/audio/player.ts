@@ -18,6 +18,8 @@ const AHEAD = 1.5;
 const PATIENT = 0.12;
 /** Nearer than this nothing is put out any more, seconds. */
 const LEAST = 0.03;
+/** Seconds for which what was put out is remembered: no device is later with it. */
+const KEPT = 3;
 /** Microseconds that make no difference between two places. */
 const SAME = 10;
 /** Time constant with which a sound is cut, seconds. */
@@ -27,6 +29,8 @@ const CUT = 0.003;
 export interface Played {
   readonly store: AudioStore;
   readonly timelines: Timelines;
+  /** Whether the stage time is known well enough to begin by. */
+  settled(): boolean;
   /** The stage time that would be shown without sound at local `nowMs`, microseconds. */
   ownTime(nowMs: number): number;
 }
@@ -62,8 +66,9 @@ export class AudioPlayer {
 
   /** The stage time that is heard at `nowMs`; null while nothing is put out. */
   leadAt(nowMs: number): Lead | null {
-    if (this.context.state !== "running" || !this.heard.ready) return null;
-    return this.schedule.stageAt(this.heard.frameAt(nowMs));
+    if (this.context.state !== "running") return null;
+    this.listen();
+    return this.heard.ready ? this.schedule.stageAt(this.heard.frameAt(nowMs)) : null;
   }
 
   /** Puts out what has come, as far ahead as is needed. */
@@ -73,16 +78,14 @@ export class AudioPlayer {
       this.clear();
       return;
     }
-    const now = this.now();
-    const { contextTime = 0, performanceTime = 0 } = context.getOutputTimestamp();
-    if (contextTime > 0 && performanceTime > 0) heard.sample(contextTime, performanceTime, now);
-    if (!heard.ready) return;
+    this.listen();
+    if (!heard.ready || (!schedule.last && !this.played.settled())) return;
     // what comes too late for its slot is passed over
     this.next = Math.max(this.next, Math.ceil((context.currentTime + LEAST) * SLOTS_A_SECOND));
     const end = Math.floor((context.currentTime + AHEAD) * SLOTS_A_SECOND);
     this.decode(end);
     while (this.next < end && this.putOut(this.next)) this.next++;
-    const past = Math.floor(heard.frameAt(now) / SLOT) - SLOTS_A_SECOND;
+    const past = Math.floor((context.currentTime - KEPT) * SLOTS_A_SECOND);
     schedule.forget(past);
     for (const index of this.done.keys()) if (index < past) this.done.delete(index);
   }
@@ -115,6 +118,12 @@ export class AudioPlayer {
     this.clear();
     this.decoded.close();
     this.bus.disconnect();
+  }
+
+  /** Asks the device what it puts out now. */
+  private listen(): void {
+    const { contextTime = 0, performanceTime = 0 } = this.context.getOutputTimestamp();
+    if (contextTime > 0 && performanceTime > 0) this.heard.sample(contextTime, performanceTime, this.now());
   }
 
   /** Forgets all that was put out for later, as the device stands still. */

@@ -19,8 +19,8 @@ const GENTLE = 0.0005;
 const SETTLING = 5e6;
 /** Errors that are left alone, microseconds. */
 const CLOSE = 2e3;
-/** Further off than this the sound is taken up anew. */
-const LOST = 80e3;
+/** Further off than this the sound is taken up anew: a reference clock on a restless line is not known better. */
+const LOST = 150e3;
 
 export interface Slot {
   /** It starts at frame `SLOT` times this. */

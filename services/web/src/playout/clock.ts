@@ -29,6 +29,11 @@ export class ReferenceClock {
     return this.goal !== null;
   }
 
+  /** Whether as many answers came as are remembered: it will not change by much any more. */
+  get settled(): boolean {
+    return this.samples.length === SAMPLES;
+  }
+
   /** Reference minus local, by the sample that waited least; until there is one, by the greeting. */
   get offset(): number {
     return this.goal ?? 0;

@@ -11,11 +11,13 @@ export interface Lead {
   readonly run: number;
 }
 
+/** Time constant, microseconds: what is seen is with what is heard again within a quarter of a second. */
+const QUICK = 80e3;
 /** Further apart than this the two tell of different things, and nothing is gained by going over slowly. */
 const ANOTHER = 2e6;
 
 export class Following {
-  private readonly rest = new Slew();
+  private readonly rest = new Slew(QUICK);
   private run: number | null = null;
   private last: { time: number; local: number } | null = null;
 

@@ -3,8 +3,8 @@
  * slower than a tenth of its speed, so what is shown by it neither jumps nor runs backwards. All numbers are microseconds.
  */
 
-/** Time constant: a difference of 100 ms is made good to a frame within half a second. */
-const SLEW = 250e3;
+/** Time constant, unless another is asked for: a difference of 100 ms is made good to a frame within half a second. */
+const GENTLE = 250e3;
 
 /** How much slower than real the clock may run. */
 const SLOWEST = 0.9;
@@ -14,6 +14,8 @@ export class Slew {
   private from = 0;
   private since = 0;
   private goal = 0;
+
+  constructor(private readonly constant = GENTLE) {}
 
   /** At local time `local` the difference is `from`, at once, and goes to `goal`. */
   start(from: number, goal: number, local: number): void {
@@ -29,14 +31,15 @@ export class Slew {
 
   /** The difference at `local`. */
   at(local: number): number {
+    const { constant } = this;
     let away = this.from - this.goal;
     let elapsed = Math.max(local - this.since, 0);
-    if (away > SLOWEST * SLEW) {
+    if (away > SLOWEST * constant) {
       // far ahead: the exponential would run backwards, so go at the slowest speed until it no longer does
-      const until = Math.min((away - SLOWEST * SLEW) / SLOWEST, elapsed);
+      const until = Math.min((away - SLOWEST * constant) / SLOWEST, elapsed);
       away -= SLOWEST * until;
       elapsed -= until;
     }
-    return this.goal + away * Math.exp(-elapsed / SLEW);
+    return this.goal + away * Math.exp(-elapsed / constant);
   }
 }
