@@ -64,12 +64,15 @@ export class Listening {
   #prefer(preference: SoundPreference): void {
     this.#preference = preference;
     savePreference(preference);
-    const speaker = this.#speaker;
-    if (!speaker) return;
-    speaker.volume = preference.volume;
-    if (preference.on) speaker.resume();
-    else speaker.suspend();
+    if (this.#speaker) this.#apply(this.#speaker);
     this.#show();
+  }
+
+  #apply(speaker: Speaker): void {
+    speaker.volume = this.#preference.volume;
+    // a device that may be heard runs from its making on
+    if (this.#preference.on) speaker.resume();
+    else speaker.suspend();
   }
 
   #wake(): void {
@@ -106,8 +109,7 @@ export class Listening {
       }, decoder);
       this.#player = player;
       viewer.lead = (now) => player.leadAt(now);
-      speaker.volume = this.#preference.volume;
-      if (this.#preference.on) speaker.resume();
+      this.#apply(speaker);
     } catch (error) {
       console.warn("the sound of this motion cannot be heard here.", error);
     }

@@ -29,10 +29,9 @@ export function createSoundControl(on: SoundActions): SoundControl {
     render({ there, heard, volume: loud }) {
       control.hidden = !there;
       volume.value = String(Math.round(loud * STEPS));
-      volume.style.setProperty("--share", String(loud));
       if (heard === shown) return;
       shown = heard;
-      button.title = heard ? "Sound off (M)" : "Sound on (M)";
+      button.title = heard ? "Sound off" : "Sound on";
       setAttribute(button, "aria-pressed", String(heard));
       button.replaceChildren(icon(heard ? "sound" : "silent"));
     },
