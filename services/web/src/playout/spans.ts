@@ -23,7 +23,8 @@ export function spansBetween(timelines: Timelines, from: number, to: number): Sp
     const position = positionAt(state, at);
     const left = state.duration - position;
     const moving = state.playing && at >= state.clock && left > 0;
-    let end = at < newest.clock ? Math.min(to, newest.clock) : to;
+    let end = to;
+    for (const begin of [state.clock, newest.clock]) if (at < begin) end = Math.min(end, begin);
     // a step of a microsecond at least: finer ones are lost in numbers as large as clock times
     if (moving) end = Math.min(end, Math.max(at + left, at + 1));
     spans.push({ from: at, to: end, position, moving });
