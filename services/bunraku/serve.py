@@ -125,7 +125,6 @@ async def _load(backing: Backing) -> None:
     await asyncio.to_thread(decode.warm)
     await asyncio.to_thread(_load_solving)
     # what is loaded by now stays: the collector need not walk through it again and again while limbs are solved
-    gc.collect()
     gc.freeze()
     gc.set_threshold(*COLLECT)
 

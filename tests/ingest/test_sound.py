@@ -128,6 +128,24 @@ def test_files_that_cannot_be_heard_are_refused_with_the_reason(tmp_path: Path) 
         assert error.hint, name
 
 
+def test_tags_of_any_kind_are_passed_over(tmp_path: Path) -> None:
+    sound = struct.pack("<800h", *range(800))
+    whole = wav(sound, len(sound))
+    title = b"LIST" + struct.pack("<I", 4 + 8 + 6) + b"INFOINAM" + struct.pack("<I", 6) + b"\xc9t\xe9 \xff\0"
+    tagged = whole[:4] + struct.pack("<I", len(whole) + len(title) - 8) + whole[8:36] + title + whole[36:]
+    song = made(tmp_path, "mp3")
+    picture = (
+        b"ID3\x03\x00\x00" + bytes([0, 0, 8, 0]) + b"APIC\x00\x00\x03\xf0\x00\x00\x00image/png\0\3\0" + b"\x89PNG" * 249
+    )
+    picture = picture.ljust(10 + 1024, b"\0")
+    for name, plain, more in (("wav", whole, tagged), ("mp3", song, picture + song)):
+        path = tmp_path / name
+        path.write_bytes(plain)
+        bare = heard(path)
+        path.write_bytes(more)
+        np.testing.assert_array_equal(heard(path), bare)
+
+
 @pytest.mark.parametrize("kind", ["mp3", "opus.ogg", "vorbis.ogg"])
 def test_of_what_tells_no_length_the_part_that_is_there_is_heard(tmp_path: Path, kind: str) -> None:
     whole = made(tmp_path, kind, 8.0)

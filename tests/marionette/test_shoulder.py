@@ -64,7 +64,7 @@ def test_the_nearest_direction_is_that_far_away(direction: Vector) -> None:
         # a circle a little wider has a place where an arm goes, one a little narrower has none
         normal = vector.across(direction)
         assert not isnan(turn(SHOULDER, direction, normal, far + 1e-6))
-        grid = [upper_arm(direction, normal, far - 1e-3, step * pi / 90.0) for step in range(180)]
+        grid = [upper_arm(direction, normal, max(far - 1e-3, 0.5 * far), step * pi / 90.0) for step in range(180)]
         assert all(depth(SHOULDER, place) > 0.0 for place in grid)
 
 

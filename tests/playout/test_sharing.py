@@ -5,7 +5,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.playout.sharing import Step, first_step, pinned_step, safe_step, steps
+from bunraku.playout.sharing import Step, first_step, pinned, safe_step, steps
 
 MOTION = (1.5, 2.5, 4.0, 7.0, 15.0)
 AUDIO = (9.0, 24.0, 64.0)
@@ -42,8 +42,14 @@ def test_where_one_begins_what_is_safe_and_what_is_pinned() -> None:
     assert [first_step(motion), first_step(audio)] == [4, 0]
     assert both[safe_step(both)][:2] == (0, 0)
     assert [safe_step(motion), safe_step(audio)] == [0, 0]
-    assert pinned_step(both, None) is None
-    pinned = [both[pinned_step(both, rate) or 0][:2] for rate in (0, 3, 4, 9)]
-    assert pinned == [(0, 0), (3, 0), (4, 2), (4, 2)]
-    assert [pinned_step(motion, rate) for rate in (0, 3, 15)] == [0, 3, 4]
-    assert pinned_step(audio, 7) == 2
+
+
+def test_a_pinned_motion_leaves_what_the_sound_may_get() -> None:
+    both, motion, audio = steps(MOTION, AUDIO), steps(MOTION), steps((), AUDIO)
+    assert pinned(both, None) == both
+    assert [step[:2] for step in pinned(both, 0)] == [(0, -1), (0, 0)]
+    assert [step[:2] for step in pinned(both, 3)] == [(3, 0)]
+    assert [step[:2] for step in pinned(both, 15)] == [(4, 0), (4, 1), (4, 2)]
+    assert pinned(motion, 3) == motion[3:4]
+    assert pinned(motion, 15) == motion[4:]
+    assert pinned(audio, 7) == audio[2:]

@@ -221,8 +221,14 @@ async def test_sound_goes_with_the_dance_at_its_lowest_until_the_line_has_shown_
     assert sent == [(0, 0, 0), (1, 0, 0), *((track, index, 1 - track) for index in range(1, 5) for track in (0, 1))]
 
 
-async def test_a_pinned_rate_pins_the_dance_and_the_best_sound_that_goes_with_it(sounding: Library) -> None:
-    assert (await sent_of(Viewer(sounding, 1), 4))[2:] == [(0, 1, 1), (1, 1, 2)]
+async def test_a_pinned_rate_pins_the_dance_and_the_sound_goes_with_the_line(sounding: Library) -> None:
+    viewer = Viewer(sounding, 1)
+    assert (await sent_of(viewer, 4))[2:] == [(0, 1, 1), (1, 1, 0)]
+    choice = viewer._rate
+    assert choice is not None
+    for second in range(1, 9):
+        choice.report(Report(buffer=4_000_000), clock() + second * 2_000_000)
+    assert viewer._steps[choice.rate][:2] == (1, 2)
     assert (await sent_of(Viewer(sounding, 0), 4))[2:] == [(0, 1, 0), (1, 1, 0)]
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,6 +93,26 @@ def with_audio(motion: str, stored: StoredMotion, audio: EncodedAudio) -> tuple[
     packets[number:] = [_messages(number, [rate.blocks for rate in audio.rates]), *packets[number + 1 :]]
     packed: bytes = msgpack.packb({"description": Description(motion, described).pack(), "tracks": packets})
     return packed, [track["type"] for track in described]
+
+
+def with_scenes(
+    motion: str, stored: StoredMotion, scenes: Sequence[EncodedScene], replaced: Container[str]
+) -> tuple[bytes, list[str]]:
+    """The object of the motion of this id: `stored` with cameras and lights, in place of its tracks of the `replaced`
+    types; and the types of its tracks. All other blocks are the same but for the number of their track.
+
+    Raises ValueError where there are more tracks than a Data message can number.
+    """
+    described: list[dict[str, Any]] = msgpack.unpackb(stored.description[1:])["tracks"]
+    kept = [number for number, track in enumerate(described) if track["type"] not in replaced]
+    if len(kept) + len(scenes) > MOST_TRACKS:
+        raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, and this would have {len(kept) + len(scenes)}")
+    blocks = [[[Data.unpack(packet).block for packet in rate] for rate in stored.packets[number]] for number in kept]
+    blocks += [[rate.blocks for rate in scene.rates] for scene in scenes]
+    tracks = [*(described[number] for number in kept), *(scene.describe() for scene in scenes)]
+    packets = [_messages(number, rates) for number, rates in enumerate(blocks)]
+    packed: bytes = msgpack.packb({"description": Description(motion, tracks).pack(), "tracks": packets})
+    return packed, [track["type"] for track in tracks]
 
 
 def _messages(track: int, rates: Sequence[Sequence[bytes]]) -> list[list[bytes]]:

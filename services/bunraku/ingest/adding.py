@@ -25,7 +25,10 @@ def add(
             encoded = encode_audio(told, stored.track, sound.channels)
     except UnreadableSound as error:
         return Refused(error.title, error.detail, hint=error.hint)
-    packed, kinds = with_audio(motion, stored, encoded)
+    try:
+        packed, kinds = with_audio(motion, stored, encoded)
+    except ValueError as error:
+        return Refused("Too many tracks", str(error))
     described = encoded.describe()
     return Made(
         packed,

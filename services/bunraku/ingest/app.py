@@ -15,9 +15,11 @@ from bunraku.backing.backing import Backing
 from bunraku.backing.catalogue import BadCursor
 from bunraku.backing.problems import ProblemError
 from bunraku.ingest.entry import entry_json, no_such_motion
+from bunraku.ingest.keyframes import Staging
 from bunraku.ingest.progress import Progress
 from bunraku.ingest.recordings import SUBJECT, Recordings
 from bunraku.ingest.soundtracks import Soundtracks
+from bunraku.ingest.stagings import Stagings
 from bunraku.ingest.uploads import Uploads
 
 NAME = r"^[A-Za-z0-9_-]{8,64}$"
@@ -28,6 +30,7 @@ def create_app(backing: Backing) -> FastAPI:
     """The service upon `backing`."""
     uploads = Uploads(backing)
     soundtracks = Soundtracks(backing, uploads)
+    stagings = Stagings(backing, uploads)
     recordings = Recordings(backing, uploads.places)
 
     @asynccontextmanager
@@ -71,6 +74,14 @@ def create_app(backing: Backing) -> FastAPI:
         except ClientDisconnect:
             # nobody is there to read this
             return Response(status_code=400)
+        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+
+    @app.post("/v1/motions/{motion}/scene", status_code=201, tags=["motions"])
+    async def add_scene(motion: str, asked: Staging) -> Response:
+        """Make a motion that is another with a camera and lights, given as keyframes in motion time. What is left out
+        stays as that motion has it. The motion itself stays as it is; the same keyframes again give the same new
+        motion, with 200."""
+        entry, new = await stagings.add(motion, asked)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
     @app.get("/v1/uploads/{upload}", tags=["motions"])

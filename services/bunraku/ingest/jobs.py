@@ -14,7 +14,7 @@ import os
 import resource
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from bunraku.ingest.results import Made, Refused
 
@@ -23,29 +23,54 @@ MEMORY = 4 << 30
 SHARES = 100
 """Times that a job says how far it is, at most: few enough that its pipe never fills."""
 
-Job = Literal["make", "keep", "add"]
-"""`making.make`, `keeping.keep` or `adding.add`."""
+Job = Literal["make", "keep", "add", "dress"]
+"""`making.make`, `keeping.keep`, `adding.add` or `scenery.dress`."""
 
 _context = multiprocessing.get_context("forkserver")
-_context.set_forkserver_preload(["bunraku.ingest.making", "bunraku.ingest.keeping", "bunraku.ingest.adding"])
+_context.set_forkserver_preload(
+    ["bunraku.ingest.making", "bunraku.ingest.keeping", "bunraku.ingest.adding", "bunraku.ingest.scenery"]
+)
 
 
-_TOO_MUCH: dict[Job, str] = {"make": "Too much motion", "keep": "Too much motion", "add": "Too much sound"}
-_UNREADABLE: dict[Job, str] = {"make": "Unreadable motion", "keep": "Unreadable motion", "add": "Unreadable sound"}
-_SHORTER: dict[Job, str] = {
-    "make": "cut the file into shorter ones",
-    "keep": "keep a shorter part",
-    "add": "send a file that is no longer than the motion",
-}
-_BROKEN_OFF: dict[Job, str] = {
-    "make": "the reader broke off on this file",
-    "keep": "the replay of this session broke off",
-    "add": "the reader broke off on this file",
-}
-_REPORT: dict[Job, str] = {
-    "make": "please report it with the file",
-    "keep": "please report it",
-    "add": "please report it with the file",
+class _Words(NamedTuple):
+    """What is said of a kind of job that did not come to its end."""
+
+    too_much: str
+    shorter: str
+    unreadable: str
+    broken_off: str
+    report: str
+
+
+_WORDS: dict[Job, _Words] = {
+    "make": _Words(
+        "Too much motion",
+        "cut the file into shorter ones",
+        "Unreadable motion",
+        "the reader broke off on this file",
+        "please report it with the file",
+    ),
+    "keep": _Words(
+        "Too much motion",
+        "keep a shorter part",
+        "Unreadable motion",
+        "the replay of this session broke off",
+        "please report it",
+    ),
+    "add": _Words(
+        "Too much sound",
+        "send a file that is no longer than the motion",
+        "Unreadable sound",
+        "the reader broke off on this file",
+        "please report it with the file",
+    ),
+    "dress": _Words(
+        "Too many lights",
+        "ask for fewer at once",
+        "Unreadable keyframes",
+        "the encoder broke off on these keyframes",
+        "please report it with the keyframes",
+    ),
 }
 
 
@@ -53,9 +78,10 @@ def _work(answer: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
     from bunraku.ingest.adding import add
     from bunraku.ingest.keeping import keep
     from bunraku.ingest.making import make
+    from bunraku.ingest.scenery import dress
 
-    works: dict[Job, Callable[..., Made | Refused]] = {"make": make, "keep": keep, "add": add}
-    work = works[job]
+    works: dict[Job, Callable[..., Made | Refused]] = {"make": make, "keep": keep, "add": add, "dress": dress}
+    work, words = works[job], _WORDS[job]
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     told = -1
 
@@ -68,7 +94,7 @@ def _work(answer: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
     try:
         answer.send(work(*arguments, tell))
     except MemoryError:
-        answer.send(Refused(_TOO_MUCH[job], "this takes more memory than one may have", hint=_SHORTER[job]))
+        answer.send(Refused(words.too_much, "this takes more memory than one may have", hint=words.shorter))
 
 
 async def run(
@@ -89,7 +115,7 @@ async def run(
                 break
             progress(result)
     except TimeoutError:
-        return Refused("Takes too long", f"reading and encoding took more than {seconds:g} s", hint=_SHORTER[job])
+        return Refused("Takes too long", f"reading and encoding took more than {seconds:g} s", hint=_WORDS[job].shorter)
     except EOFError:
         result = None
     finally:
@@ -101,7 +127,8 @@ async def run(
         receiver.close()
     if isinstance(result, Made | Refused):
         return result
-    return Refused(_UNREADABLE[job], _BROKEN_OFF[job], hint=_REPORT[job])
+    words = _WORDS[job]
+    return Refused(words.unreadable, words.broken_off, hint=words.report)
 
 
 async def _to_its_end(work: Callable[[], Any]) -> Any:

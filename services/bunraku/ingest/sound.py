@@ -46,7 +46,9 @@ class SoundFile:
     def __init__(self, path: Path) -> None:
         form = _format(path)
         try:
-            self._container = av.open(str(path), format=form, options={"format_whitelist": form})
+            self._container = av.open(
+                str(path), format=form, options={"format_whitelist": form}, metadata_errors="ignore"
+            )
         except (av.FFmpegError, ValueError, EOFError) as error:
             raise UnreadableSound(
                 "Unreadable sound", f"this {form.upper()} file cannot be read: {_reason(error)}"

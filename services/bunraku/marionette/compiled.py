@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numba import config, njit
 
-from bunraku.marionette import arms, elbow, follow, limbs, vector
+from bunraku.marionette import arms, elbow, follow, limbs, spin, vector
 from bunraku.marionette.arm import Table
 from bunraku.marionette.arms import Arms, Shape, shape_of
 from bunraku.marionette.follow import STILL
@@ -23,7 +23,7 @@ from bunraku.marionette.proportions import Proportions
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import standard_figure
 
-SOLVING = ((elbow, "hang"), (follow, "advance"), (limbs, "bend_links"), (limbs, "places"))
+SOLVING = ((elbow, "hang"), (follow, "advance"), (limbs, "bend_links"), (limbs, "places"), (spin, "turn"))
 """What a pulled hand takes most of its time in: functions of numbers and plain tuples, by module and name."""
 _PLAIN = {(module, name): vars(module)[name] for module, name in SOLVING}
 
@@ -89,6 +89,7 @@ def _call(fast: dict[str, Any]) -> None:
         (tip, _, bend), _ = fast["hang"](rig.arm.links, rig.arm.nodes, rig.shoulder, memory, UP, 0.7, UP, 0.02)
         joints = fast["bend_links"](rig.arm.links, rig.frames, rig.palm_down, vector.length(tip), bend)
         fast["places"](rig.links, joints)
+        fast["turn"](rig.links, joints, spin.AT_REST, joints, 1.0, 0.02)
     fast["advance"](UP, STILL, BEND_AXIS, STILL, STILL, STILL, 0.02, 1.0, 0.0, inf)
 
 

@@ -202,11 +202,13 @@ class LegRig:
         level = vector.unit((ahead[0], 0.0, ahead[2]), FORWARDS)
         return hips, level
 
-    def angle(self, pose: Pose) -> float:
-        """The thigh's angle forwards from straight down, seen square to the vertical plane the hips face."""
+    def angle(self, pose: Pose, near: float = 0.0) -> float:
+        """The thigh's angle forwards from straight down, seen square to the vertical plane the hips face, within its
+        limits. A thigh that points beyond them is at the one it is on the way round from `near`, radians."""
         hips, level = self.facing(pose)
         thigh = vector.rotate(vector.multiply(hips, joint_rotation(pose, self.joints[0])), self.thigh)
-        return clamp_thigh(atan2(vector.dot(thigh, level), -thigh[1]))
+        theta = atan2(vector.dot(thigh, level), -thigh[1])
+        return clamp_thigh(theta + 2.0 * pi * round((near - theta) / (2.0 * pi)))
 
     def hang(self, theta: float, pose: Pose) -> Joints:
         """The leg with its thigh at `theta` radians in the plane the hips face, the shank hanging, the ankle fixed."""

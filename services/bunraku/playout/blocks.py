@@ -28,7 +28,7 @@ Block = TypeVar("Block", bound=_Block)
 Track = TypeVar("Track", bound=Timing)
 
 
-class _Store(Generic[Track, Block]):
+class Store(Generic[Track, Block]):
     """Decoded blocks of one track, of each the best rate that came."""
 
     def __init__(self, track: Track) -> None:
@@ -75,7 +75,7 @@ class _Store(Generic[Track, Block]):
         return block, instant, self._blocks[following][1]
 
 
-class BlockStore(_Store[MotionTrack, MotionBlock]):
+class BlockStore(Store[MotionTrack, MotionBlock]):
     """Decoded blocks of one motion, of each the best rate that came."""
 
     def pose_at(self, position: int, loop: bool = True) -> Pose | None:
@@ -125,7 +125,7 @@ def _rotations(block: MotionBlock, following: MotionBlock | None, instants: Arra
     return rotation.slerp(last, first, np.repeat(mix[:, None], len(last), axis=1))
 
 
-class SceneStore(_Store[SceneTrack, SceneBlock]):
+class SceneStore(Store[SceneTrack, SceneBlock]):
     """Decoded blocks of one camera or light, of each the best rate that came."""
 
     def scene_at(self, position: int, loop: bool, duration: int) -> Array | None:

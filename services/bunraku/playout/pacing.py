@@ -19,6 +19,9 @@ AHEAD = 4_000_000
 """How far ahead of the play position blocks are pushed, microseconds."""
 UPGRADE = 500_000
 """A better version of a block that a viewer has is worth sending only if it can still be decoded before it is shown."""
+AGAIN = AHEAD - 1_000_000
+"""The same of sound, but for short motions: it is bettered as it comes within reach once more in a loop. Bettering all
+that waits already would fill a line for what is heard once for a few seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +93,7 @@ class Pacer:
         blocks = timing.block_at(state.duration - 1) + 1
         first = min(timing.block_at(position), blocks - 1)
         place = 0 if track.base else 1 if track.audio else 2
+        soonest = AGAIN if track.audio and state.duration > AHEAD + 1_000_000 else UPGRADE
         better = None
         for count in range(blocks):
             turn, index = divmod(first + count, blocks)
@@ -100,7 +104,7 @@ class Pacer:
             if sent is None:
                 quick = place < 2 and count == 0
                 return Due(False, distance, place, track.number, index, 0 if quick else rate)
-            if sent < rate and distance > UPGRADE and better is None:
+            if sent < rate and distance > soonest and better is None:
                 better = Due(True, distance, place, track.number, index, rate)
         return better
 

@@ -46,9 +46,9 @@ def safe_step(shares: Sequence[Step]) -> int:
     return next((n for n, step in enumerate(shares) if step.audio >= 0), 0)
 
 
-def pinned_step(shares: Sequence[Step], rate: int | None) -> int | None:
-    """The widest step with the motion at `rate`, kept within its rates; None where none is asked for."""
+def pinned(shares: Sequence[Step], rate: int | None) -> tuple[Step, ...]:
+    """The steps with the motion at `rate`, kept within its rates; all of them where none is asked for."""
     if rate is None:
-        return None
+        return tuple(shares)
     kept = min(max(rate, 0), shares[-1].motion)
-    return max(n for n, step in enumerate(shares) if step.motion == kept)
+    return tuple(step for step in shares if step.motion == kept)

@@ -137,10 +137,9 @@ class Viewer:
             if motion is None:
                 raise Refusal(NOT_FOUND, "No such motion", f"there is no motion {state.motion[:40]!r}")
             self._motion, self._pacer = motion, Pacer(_paced(motion, self._wanted))
-            self._steps = _steps(motion, self._wanted)
-            pinned = sharing.pinned_step(self._steps, self._pinned)
+            self._steps = sharing.pinned(_steps(motion, self._wanted), self._pinned)
             first, safe = sharing.first_step(self._steps), sharing.safe_step(self._steps)
-            self._rate = RateChoice(len(self._steps), pinned, first, safe)
+            self._rate = RateChoice(len(self._steps), None, first, safe)
             channels = sum(map(_channels, motion.tracks))
             await put(ChannelHeader(motion.id, clock(), channels, __version__).pack())
             await put(motion.description)
@@ -151,7 +150,7 @@ class Viewer:
         if state is None or self._pacer is None or self._motion is None or self._rate is None:
             return None
         step = self._steps[self._rate.rate]
-        due = self._pacer.next(state, clock(), step.motion, step.audio)
+        due = self._pacer.next(state, clock(), step.motion, audio=step.audio)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
     async def _rest(self) -> None:

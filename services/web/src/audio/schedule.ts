@@ -1,5 +1,5 @@
 /**
- * Which stage time is put out with which frame of the audio device (`proto/NOTES.md`, Sound). Pure.
+ * Which stage time is put out with which frame of the audio device (`proto/NOTES.md`, Audio and stage). Pure.
  *
  * Frames are counted by the AudioContext, 48,000 a second, and scheduled in slots. A slot has a stage time at its start and a
  * speed; slots follow each other without a jump, and the speed is chosen so that the sound stays with the viewer's own clock.
