@@ -14,7 +14,8 @@ export type Planes = readonly Float32Array<ArrayBuffer>[];
 export class DecodedSound {
   /** By packet, the oldest first; null where one could not be decoded. */
   private readonly sounds = new Map<number, Planes | null>();
-  private readonly pending = new Set<number>();
+  /** Packets on their way, and through which decoder. */
+  private readonly pending = new Map<number, PacketDecoder>();
   private decoder: PacketDecoder | null = null;
   /** The packet that would follow in the decoder. */
   private next = -1;
@@ -36,7 +37,7 @@ export class DecodedSound {
       const bytes = this.packet(number);
       if (!bytes || this.sounds.has(number) || this.pending.has(number)) continue;
       if (number !== this.next || !this.decoder) this.decoder = this.start(number);
-      this.pending.add(number);
+      this.pending.set(number, this.decoder);
       this.decoder.decode(number, bytes);
       this.next = number + 1;
     }
@@ -53,17 +54,24 @@ export class DecodedSound {
     this.decoder?.end();
     const before: [number, Uint8Array][] = [];
     for (let number = Math.max(first - BEFORE, 0); number < first; number++) {
-      const bytes = this.packet(number);
+      const bytes = this.sounds.get(number) === null ? null : this.packet(number);
       if (bytes) before.push([number, bytes]);
     }
     const knows = before.length === Math.min(BEFORE, first);
     const decoder = this.make((number, planes) => {
       if (number < first) return;
-      this.pending.delete(number);
+      if (planes) this.pending.delete(number);
+      else this.fail(decoder);
       this.keep(number, number === first && !knows && planes ? planes.map(fadeIn) : planes);
     });
     if (knows) for (const [number, bytes] of before) decoder.decode(number, bytes);
     return decoder;
+  }
+
+  /** A decoder came upon what it cannot decode: it may be done for, and what else it was given is decoded by another. */
+  private fail(decoder: PacketDecoder): void {
+    for (const [number, by] of this.pending) if (by === decoder) this.pending.delete(number);
+    if (decoder === this.decoder) this.next = -1;
   }
 
   private keep(number: number, planes: Planes | null): void {

@@ -1,6 +1,9 @@
 /** What turns Opus packets into sound, whichever it is in this browser. */
 
-/** What packet `number` sounds like, `PACKET` samples for each channel; null where it cannot be decoded. */
+/**
+ * What packet `number` sounds like, `PACKET` samples for each channel; null where it cannot be decoded. After that a decoder may
+ * be done for, and nothing more come out of it.
+ */
 export type Emit = (number: number, channels: Float32Array<ArrayBuffer>[] | null) => void;
 
 export interface PacketDecoder {

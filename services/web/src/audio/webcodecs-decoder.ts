@@ -30,8 +30,8 @@ export async function webCodecsDecoder(channels: number): Promise<MakeDecoder | 
       // it is closed by that: nothing more comes out
       error(error) {
         console.warn(`sound could not be decoded: ${error.message}`);
-        for (const number of waiting) emit(number, null);
-        waiting.clear();
+        const [first] = waiting;
+        if (first !== undefined) emit(first, null);
       },
     });
     decoder.configure(config);

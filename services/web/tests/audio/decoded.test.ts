@@ -1,5 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { DecodedSound } from "../../src/audio/decoded";
+import type { Emit, MakeDecoder } from "../../src/audio/packet-decoder";
 import { PACKET } from "../../src/codec/audio";
 import { type Deeds, packetSound, toneDecoder, trackOf } from "./tones";
 
@@ -80,7 +81,25 @@ test("a packet that cannot be decoded is silence, and not tried for ever", () =>
   sounds.want([0, 1, 2]);
   sounds.want([0, 1, 2]);
   expect(sounds.sound(1)).toBeNull();
-  expect(deeds).toEqual(["made", 0, 1, 2]);
+  expect(deeds).toEqual(["made", 0, 1, "ended", "made", 2]);
+});
+
+test("what a decoder was given beside a packet that ended it is decoded by another", () => {
+  const deeds: Deeds = [];
+  const all: Emit[] = [];
+  const make: MakeDecoder = (emit) => {
+    deeds.push("made");
+    all.push(emit);
+    return { decode: (number) => void deeds.push(number), end: () => void deeds.push("ended") };
+  };
+  const sounds = new DecodedSound(make, here(0, 1, 2, 3));
+  sounds.want([0, 1, 2]);
+  all[0](0, packetSound(track, 0));
+  all[0](1, null);
+  sounds.want([0, 1, 2, 3]);
+  expect(deeds).toEqual(["made", 0, 1, 2, "ended", "made", 2, 3]);
+  all[1](2, packetSound(track, 2));
+  expect(sounds.sound(2)).not.toBeNull();
 });
 
 test("the oldest is forgotten, eight seconds are kept", () => {

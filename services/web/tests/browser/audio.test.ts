@@ -4,6 +4,7 @@ import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import type { Viewer } from "../../src/client/viewer";
 import type { Listening } from "../../src/listening";
 import type { Stage } from "../../src/stage/stage";
+import { bowing } from "./bowing";
 import { launch } from "./chromium";
 import { chromium, startServer, type RunningServer } from "./server";
 import { wave } from "./wave";
@@ -24,6 +25,7 @@ interface Surroundings {
 
 const PATIENCE = 90_000;
 const RATE = 48_000;
+const SECONDS = 13;
 /** Seconds between clicks: as none of the motion's own periods. */
 const EVERY = 0.37;
 /** Milliseconds between what is heard and what is shown. */
@@ -43,8 +45,8 @@ describe.skipIf(!path)("the sound", { timeout: 3 * PATIENCE }, () => {
   let motion: { id: string; duration: number };
 
   beforeAll(async () => {
-    [server, browser] = await Promise.all([startServer({ demo: true }), launch(path ?? "", "--autoplay-policy=no-user-gesture-required")]);
-    silent = (await json<{ items: { id: string; duration: number }[] }>("/v1/motions")).items[0];
+    [server, browser] = await Promise.all([startServer({ demo: false }), launch(path ?? "", "--autoplay-policy=no-user-gesture-required")]);
+    silent = await json("/v1/motions?filename=bows.bvh", { method: "POST", body: bowing(SECONDS * 30) });
     motion = await json(`/v1/motions/${silent.id}/audio?filename=clicks.wav`, { method: "POST", body: clicks(silent.duration) });
   }, 2 * PATIENCE);
   afterAll(async () => {
