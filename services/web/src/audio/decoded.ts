@@ -38,8 +38,8 @@ export class DecodedSound {
       if (!bytes || this.sounds.has(number) || this.pending.has(number)) continue;
       if (number !== this.next || !this.decoder) this.decoder = this.start(number);
       this.pending.set(number, this.decoder);
-      this.decoder.decode(number, bytes);
       this.next = number + 1;
+      this.decoder.decode(number, bytes);
     }
   }
 
