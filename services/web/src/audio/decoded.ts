@@ -59,9 +59,9 @@ export class DecodedSound {
     }
     const knows = before.length === Math.min(BEFORE, first);
     const decoder = this.make((number, planes) => {
-      if (number < first) return;
-      if (planes) this.pending.delete(number);
-      else this.fail(decoder);
+      if (!planes) this.fail(decoder);
+      else if (number < first) return;
+      this.pending.delete(number);
       this.keep(number, number === first && !knows && planes ? planes.map(fadeIn) : planes);
     });
     if (knows) for (const [number, bytes] of before) decoder.decode(number, bytes);

@@ -102,6 +102,23 @@ test("what a decoder was given beside a packet that ended it is decoded by anoth
   expect(sounds.sound(2)).not.toBeNull();
 });
 
+test("a packet before the first that ends the decoder is left out the next time", () => {
+  const deeds: Deeds = [];
+  const all: Emit[] = [];
+  const make: MakeDecoder = (emit) => {
+    deeds.push("made");
+    all.push(emit);
+    return { decode: (number) => void deeds.push(number), end: () => void deeds.push("ended") };
+  };
+  const sounds = new DecodedSound(make, here(18, 19, 20));
+  sounds.want([20]);
+  all[0](19, null);
+  sounds.want([20]);
+  expect(deeds).toEqual(["made", 18, 19, 20, "ended", "made", 20]);
+  all[1](20, packetSound(track, 20));
+  expect(sounds.sound(20)).not.toBeNull();
+});
+
 test("the oldest is forgotten, eight seconds are kept", () => {
   const sounds = new DecodedSound(toneDecoder(track).make, (number) => Uint8Array.of(number & 255));
   sounds.want(range(0, 200));
