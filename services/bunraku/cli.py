@@ -226,6 +226,65 @@ def keep(
     out.print(f"Kept {motion['duration']:.1f} s as {motion['id']}: {motion['name']}", markup=False, highlight=False)
 
 
+bench = typer.Typer(help="Load-test a server.", no_args_is_help=True)
+app.add_typer(bench, name="bench")
+
+
+@bench.callback()
+def _bench() -> None:
+    """Commands of their own below, also while there is but one."""
+
+
+@bench.command("viewers")
+def bench_viewers(
+    viewers: Annotated[int, typer.Option("--n", help="How many viewers.", min=1, max=100_000)] = 200,
+    url: Annotated[
+        str | None,
+        typer.Option("--url", help="A motion or session: its id, page or API address; default: the first session."),
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="How long they watch.", min=0.1, max=86400)] = 20.0,
+    joins: Annotated[float, typer.Option(help="How many join in a second.", min=0.1, max=10_000)] = 200.0,
+    server: Server = HERE,
+    as_json: Json = False,
+) -> None:
+    """Have many viewers watch at once, and print how they fared."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+    from rich.table import Table
+
+    from bunraku.client.api import Client
+    from bunraku.client.crowd import TooMany, watch_together
+
+    async def run() -> dict[str, Any]:
+        async with Client(server) as client:
+            found = url or await client.first_session()
+            if found is None:
+                raise typer.BadParameter(f"no session is open at {server}: name a motion", param_hint="--url")
+            stream = await _stream_url(client, found)
+        columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+        with Progress(*columns, console=err, disable=as_json or not err.is_terminal, transient=True) as progress:
+            task = progress.add_task("joining", total=1)
+
+            def told(stage: str, share: float) -> None:
+                progress.update(task, description=stage, completed=share)
+
+            return (await watch_together(stream, viewers, seconds, joins=joins, told=told)).as_json()
+
+    try:
+        figures = _ask(run, server)
+    except TooMany as error:
+        err.print(f"Too many viewers for one process: {error}")
+        raise typer.Exit(1) from None
+    if as_json:
+        out.print_json(data=figures)
+    else:
+        table = Table(show_header=False, box=None)
+        for key, value in figures.items():
+            table.add_row(key.replace("_", " "), "-" if value is None else str(value))
+        out.print(table)
+    if figures["joined"] == 0:
+        raise typer.Exit(1)
+
+
 @app.command()
 def version(as_json: Json = False) -> None:
     """Print the version."""

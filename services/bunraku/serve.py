@@ -24,7 +24,7 @@ import bunraku.ingest.app
 import bunraku.session.app
 import bunraku.stream.app
 from bunraku import __version__
-from bunraku.backing import problems
+from bunraku.backing import problems, together
 from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.cache import cache_of
 from bunraku.backing.direct import DirectProtocol
@@ -59,9 +59,10 @@ async def compose(settings: Settings, *, demo: bool = False) -> AsyncIterator[Fa
         sessions = bunraku.session.app.create_app(backing)
         app = FastAPI(title="Bunraku", version=__version__, docs_url="/v1/docs", openapi_url="/v1/openapi.json")
         problems.install(app)
+        # paths are looked up in this order: viewers come by the thousand
         for service in (
-            bunraku.ingest.app.create_app(backing),
             bunraku.stream.app.create_app(backing),
+            bunraku.ingest.app.create_app(backing),
             bunraku.ik.app.create_app(),
             sessions,
         ):
@@ -79,6 +80,11 @@ async def compose(settings: Settings, *, demo: bool = False) -> AsyncIterator[Fa
         if demo:
             await sessions.state.sessions.open(await add_demo(backing))
         yield app
+
+
+def protocol() -> dict[str, Any]:
+    """uvicorn's options for sockets."""
+    return {"ws": DirectProtocol, "ws_max_size": LARGEST_FROM_CLIENT, "ws_per_message_deflate": False}
 
 
 async def serve(settings: Settings, listening: socket.socket, *, demo: bool, ready: Callable[[], None]) -> None:
@@ -106,9 +112,7 @@ async def serve(settings: Settings, listening: socket.socket, *, demo: bool, rea
         async with compose(settings, demo=demo) as app:
             config = uvicorn.Config(
                 app,
-                ws=DirectProtocol,
-                ws_max_size=LARGEST_FROM_CLIENT,
-                ws_per_message_deflate=False,
+                **protocol(),
                 lifespan="off",
                 log_level="warning",
                 access_log=False,
@@ -122,6 +126,7 @@ async def _load(backing: Backing) -> None:
     """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
     await asyncio.sleep(LOAD_AFTER)
     await backing.catalogue.open()
+    await asyncio.to_thread(together.warm)
     await asyncio.to_thread(decode.warm)
     await asyncio.to_thread(_load_solving)
     # what is loaded by now stays: the collector need not walk through it again and again while limbs are solved

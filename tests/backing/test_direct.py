@@ -2,69 +2,160 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 
 import pytest
 import uvicorn
 from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
-from websockets.asyncio.client import connect
-from websockets.frames import Frame, Opcode
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
 
-from bunraku.backing.direct import DirectProtocol, frame, writer
-
-
-@pytest.mark.parametrize("size", [0, 1, 125, 126, 65_535, 65_536, 70_000])
-def test_a_frame_is_what_the_standard_says(size: int) -> None:
-    message = bytes(index & 0xFF for index in range(size))
-    assert frame(message) == Frame(Opcode.BINARY, message).serialize(mask=False)
+from bunraku.backing.direct import DirectProtocol, take
+from bunraku.backing.frames import frame
+from bunraku.backing.outlet import Outlet
+from bunraku.backing.sockets import Refusal
 
 
-async def test_frames_written_past_the_queue_come_between_the_others_whole() -> None:
-    outcomes: list[bool] = []
+class Heard:
+    """A listener that keeps what it is told."""
 
-    async def talk(ws: WebSocket) -> None:
-        write = writer(ws)
-        assert write is not None
-        outcomes.append(write(frame(b"too early")))
-        await ws.accept()
-        await ws.send_bytes(b"one")
-        outcomes.append(write(frame(b"two")))
-        await ws.send_bytes(b"three")
-        # a client that does not read: what does not fit is not taken
-        large = frame(bytes(1 << 20))
-        outcomes.extend(write(large) for _ in range(64))
-        await ws.receive()
-        await ws.close()
-        outcomes.append(write(frame(b"too late")))
+    def __init__(self) -> None:
+        self.messages: list[bytes] = []
+        self.events: list[str] = []
+        self.outlet: Outlet
+        self.ended = asyncio.Event()
+        self.resumed = asyncio.Event()
 
+    def hear(self, message: bytes) -> None:
+        if message == b"refuse me":
+            raise Refusal(4404, "Nothing", "here")
+        self.messages.append(message)
+        self.outlet.write(frame(b"heard " + message))
+
+    def pause(self) -> None:
+        self.events.append("pause")
+
+    def resume(self) -> None:
+        self.events.append("resume")
+        self.resumed.set()
+
+    def gone(self) -> None:
+        self.events.append("gone")
+        self.ended.set()
+
+
+@asynccontextmanager
+async def serving(talk: Callable[[WebSocket], Awaitable[None]]) -> AsyncIterator[tuple[str, uvicorn.Server]]:
     app = Starlette(routes=[WebSocketRoute("/", talk)])
     config = uvicorn.Config(app, ws=DirectProtocol, lifespan="off", log_level="warning", ws_per_message_deflate=False)
     server = uvicorn.Server(config)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         serving = asyncio.create_task(server.serve(sockets=[listening]))
-        url = f"ws://127.0.0.1:{listening.getsockname()[1]}/"
-        async with asyncio.timeout(20):
-            async with connect(url, compression=None, max_size=1 << 21) as client:
-                received = [await client.recv() for _ in range(3)]
-                assert received == [b"one", b"two", b"three"]
-                await client.send(b"go on")
-                count = 0
-                async for data in client:
-                    assert data == bytes(1 << 20)
-                    count += 1
+        async with asyncio.timeout(30):
+            yield f"ws://127.0.0.1:{listening.getsockname()[1]}/", server
             server.should_exit = True
             await serving
-    assert outcomes[:2] == [False, True]
-    assert not outcomes[-1]
-    taken = outcomes[2:-1]
-    assert count == sum(taken)
-    assert False in taken
 
 
-def test_a_server_without_it_is_served_the_usual_way() -> None:
+@asynccontextmanager
+async def taken() -> AsyncIterator[tuple[ClientConnection, Heard, uvicorn.Server]]:
+    """A client of a socket that was taken, who hears what comes, and the server."""
+    heard = Heard()
+
+    async def talk(ws: WebSocket) -> None:
+        await ws.accept()
+        heard.outlet = take(ws, heard)
+        heard.outlet.write(frame(b"hello"))
+
+    async with serving(talk) as (url, server), connect(url, compression=None, max_size=1 << 21) as client:
+        assert await client.recv() == b"hello"
+        yield client, heard, server
+
+
+async def test_what_is_taken_speaks_both_ways_and_ends_as_it_should() -> None:
+    async with taken() as (client, heard, _):
+        await client.send(b"one")
+        await client.send([b"t", b"w", b"o"])
+        assert [await client.recv(), await client.recv()] == [b"heard one", b"heard two"]
+        await (await client.ping())
+        before = heard.outlet.heard
+        heard.outlet.ping()
+        await (await client.ping())
+        assert heard.outlet.heard >= before
+        await client.close(1001, "enough")
+        await heard.ended.wait()
+        assert client.close_code == 1001
+        assert heard.events[-1] == "gone"
+        assert heard.events.count("gone") == 1
+
+
+@pytest.mark.parametrize(
+    ("sends", "code", "title"),
+    [(b"refuse me", 4404, b"Nothing"), ("text", 1008, b"Text"), (bytes(1025), 1009, b"Too large")],
+)
+async def test_a_refusal_is_said_and_closes(sends: bytes | str, code: int, title: bytes) -> None:
+    async with taken() as (client, heard, _):
+        await client.send(sends)
+        said = b""
+        with pytest.raises(ConnectionClosed):  # noqa: PT012
+            while True:
+                said += bytes(await client.recv())  # type: ignore[arg-type]
+        assert title in said
+        assert client.close_code == code
+        await heard.ended.wait()
+
+
+async def test_who_does_not_read_pauses_the_outlet_and_resumes_it() -> None:
+    async with taken() as (client, heard, _):
+        block = frame(bytes(1 << 18))
+        count = 0
+        while heard.outlet.clear:
+            heard.outlet.write(block)
+            count += 1
+            await asyncio.sleep(0)
+        assert heard.outlet.waiting > 0
+        for _ in range(count):
+            assert await client.recv() == bytes(1 << 18)
+        await heard.resumed.wait()
+        assert heard.events == ["pause", "resume"]
+        assert heard.outlet.waiting == 0
+
+
+async def test_one_that_is_gone_is_aborted() -> None:
+    async with taken() as (client, heard, _):
+        heard.outlet.abort()
+        await heard.ended.wait()
+        with pytest.raises(ConnectionClosed):
+            await client.recv()
+
+
+async def test_the_servers_end_closes_what_was_taken() -> None:
+    async with taken() as (client, heard, server):
+        server.should_exit = True
+        with pytest.raises(ConnectionClosed):
+            await client.recv()
+        assert client.close_code == 1012
+        await heard.ended.wait()
+
+
+async def test_other_sockets_are_served_the_usual_way() -> None:
+    async def talk(ws: WebSocket) -> None:
+        await ws.accept()
+        await ws.send_bytes(await ws.receive_bytes())
+        await ws.close()
+
+    async with serving(talk) as (url, _), connect(url, compression=None) as client:
+        await client.send(b"there and back")
+        assert await client.recv() == b"there and back"
+
+
+def test_another_server_is_said_to_be_the_wrong_one() -> None:
     async def nothing() -> None:
         return
 
     scope = {"type": "websocket", "path": "/", "headers": [], "extensions": {"websocket.http.response": {}}}
-    assert writer(WebSocket(scope, nothing, nothing)) is None  # type: ignore[arg-type]
+    with pytest.raises(RuntimeError, match=r"bunraku\.serve\.protocol"):
+        take(WebSocket(scope, nothing, nothing), Heard())  # type: ignore[arg-type]

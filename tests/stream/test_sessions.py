@@ -1,54 +1,139 @@
 from __future__ import annotations
 
+import asyncio
+
 import msgpack
 import pytest
 
 from bunraku.backing.bus import MemoryBus, NobodyAnswers
-from bunraku.backing.library import Library
+from bunraku.backing.frames import frame
+from bunraku.backing.library import Library, pack
+from bunraku.backing.sockets import NOT_FOUND, Refusal
+from bunraku.codec.encode import encode_motion
 from bunraku.playout import timeline
+from bunraku.stream import sessions
 from bunraku.stream.sessions import WatchedSessions
+from bunraku.stream.turns import Turns
 from bunraku.stream.viewers import Viewer
-from bunraku.wire.messages import Overlay, Presence
+from bunraku.wire.messages import Overlay, Presence, TimelineState
+from tests.stream.lines import Line
+from tests.vectors.blocks import wandering_motion
 
-STATE = timeline.start("m", 5_000_000, 1_000)
+STATE = timeline.start("m", 2_000_000, 1_000)
 PRESENCE = Presence(0, [], [None] * 4)
 
 
-def stage(bus: MemoryBus) -> list[list[object]]:
-    """A session on the bus; what it hears of viewers."""
+@pytest.fixture
+async def library() -> Library:
+    shelf = Library.open("memory:///")
+    encoded = encode_motion(wandering_motion(2.0, 30.0, 9), ladder=(30.0, 5.0), grade="live")
+    for name in ("m", "n"):
+        await shelf.put(name, pack(name, encoded))
+    return shelf
 
-    async def state(_: bytes) -> bytes:
-        packed: bytes = msgpack.packb([STATE.pack(), PRESENCE.pack(), Overlay(1, 5, {}).pack()])
+
+def stage(bus: MemoryBus, state: TimelineState = STATE) -> list[int]:
+    """A session on the bus; what it hears of how many viewers there are."""
+
+    async def answer(_: bytes) -> bytes:
+        packed: bytes = msgpack.packb([state.pack(), PRESENCE.pack(), Overlay(1, 5, {}).pack()])
         return packed
 
-    heard: list[list[object]] = []
-    bus.answer("session.s.state", state)
-    bus.subscribe("session.s.viewers", lambda message: heard.append(msgpack.unpackb(message)))
+    heard: list[int] = []
+    bus.answer("session.s.state", answer)
+    bus.subscribe("session.s.viewers", lambda message: heard.append(msgpack.unpackb(message)[1]))
     return heard
 
 
-async def test_one_subscription_serves_all_viewers_and_ends_with_the_last() -> None:
+async def come(watched: WatchedSessions) -> tuple[Viewer, Line]:
+    viewer, line = Viewer(Turns()), Line()
+    (await watched.open("s")).join(viewer)
+    viewer.open(line.outlet(viewer))
+    return viewer, line
+
+
+async def test_one_subscription_serves_all_viewers_and_ends_with_the_last(library: Library) -> None:
     bus = MemoryBus()
-    heard = stage(bus)
-    watched = WatchedSessions(bus)
-    viewers = [Viewer(Library.open("memory:///"), None) for _ in range(3)]
-    for viewer in viewers:
-        await watched.join("s", viewer)
+    stage(bus)
+    watched = WatchedSessions(bus, library)
+    there = [await come(watched) for _ in range(3)]
     assert len(bus._handlers["session.s.overlay"]) == 1
     pulled = Overlay(2, 6, {1: (0,) * 9}).pack()
     bus.publish("session.s.overlay", pulled)
-    viewers.append(Viewer(Library.open("memory:///"), None))
-    await watched.join("s", viewers[-1])
-    bus.publish("session.s.timeline", timeline.edit(STATE, 2_000, playing=False).pack())
-    assert all(viewer._overlay == pulled for viewer in viewers)
-    assert all(viewer._timelines.newest == timeline.edit(STATE, 2_000, playing=False) for viewer in viewers)
-    for viewer in viewers:
-        watched.leave("s", viewer)
-    watched.leave("s", viewers[0])
-    assert [count for _, count in heard] == [1, 2, 3, 4, 3, 2, 1, 0]
+    assert all(line.sent.endswith(frame(pulled)) for _, line in there)
+    there.append(await come(watched))
+    assert frame(pulled) in there[-1][1].sent
+    edited = timeline.edit(STATE, 2_000, playing=False)
+    bus.publish("session.s.timeline", edited.pack())
+    assert all(edited in line.messages for _, line in there)
+    for viewer, _ in there:
+        viewer.gone()
     assert "session.s.overlay" not in bus._handlers
+    assert not watched._sessions
 
 
-async def test_a_session_that_is_not_there_is_said_so() -> None:
+async def test_one_without_room_gets_the_newest_and_holds_up_nobody(library: Library) -> None:
+    bus = MemoryBus()
+    stage(bus)
+    watched = WatchedSessions(bus, library)
+    (_, slow), (_, quick) = [await come(watched) for _ in range(2)]
+    slow.room = False
+    for number in range(10, 20):
+        bus.publish("session.s.overlay", Overlay(number, 6, {1: (0,) * 9}).pack())
+
+    def sequences(line: Line) -> list[int]:
+        return [m.sequence for m in line.messages if isinstance(m, Overlay)]
+
+    assert sequences(quick) == [1, *range(10, 20)]
+    assert sequences(slow) == [1]
+    slow.drain()
+    assert sequences(slow) == [1, 10, 19]
+    bus.publish("session.s.overlay", Overlay(20, 6, {1: (0,) * 9}).pack())
+    assert sequences(slow)[-1] == sequences(quick)[-1] == 20
+
+
+async def test_many_who_come_and_go_are_counted_seldom(library: Library, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sessions, "COUNTED", 0.02)
+    bus = MemoryBus()
+    heard = stage(bus)
+    watched = WatchedSessions(bus, library)
+    there = [await come(watched) for _ in range(40)]
+    assert len(heard) < 20
+    async with asyncio.timeout(10):
+        while heard[-1] != 40:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+    for viewer, _ in there:
+        viewer.gone()
+    assert heard[-1] == 0
+
+
+async def test_another_motion_comes_to_all(library: Library) -> None:
+    bus = MemoryBus()
+    stage(bus)
+    watched = WatchedSessions(bus, library)
+    there = [await come(watched) for _ in range(2)]
+    other = timeline.change(STATE, 5_000, "n", 2_000_000)
+    bus.publish("session.s.timeline", other.pack())
+    await (await watched.open("s")).ready()
+    assert all(other in line.messages for _, line in there)
+    bus.publish("session.s.timeline", timeline.change(other, 6_000, "gone", 2_000_000).pack())
+    with pytest.raises(Refusal) as refused:
+        await watched.open("s")
+    assert refused.value.code == NOT_FOUND
+    assert all(b"No such motion" in line.sent for _, line in there)
+
+
+async def test_a_session_that_is_not_there_is_said_so(library: Library) -> None:
     with pytest.raises(NobodyAnswers):
-        await WatchedSessions(MemoryBus()).join("s", Viewer(Library.open("memory:///"), None))
+        await WatchedSessions(MemoryBus(), library).open("s")
+
+
+async def test_a_session_whose_motion_is_not_there_is_refused_and_let_go(library: Library) -> None:
+    bus = MemoryBus()
+    heard = stage(bus, timeline.start("none", 2_000_000, 1_000))
+    watched = WatchedSessions(bus, library)
+    with pytest.raises(Refusal) as refused:
+        await watched.open("s")
+    assert refused.value.code == NOT_FOUND
+    assert not watched._sessions
+    assert heard == []

@@ -1,19 +1,19 @@
 from __future__ import annotations
 
-import asyncio
-
 import numpy as np
 import pytest
 
 from bunraku.backing.backing import clock
-from bunraku.backing.direct import frame
-from bunraku.backing.library import Library, pack, with_audio
-from bunraku.backing.sockets import TOO_SLOW, Refusal
+from bunraku.backing.frames import frame
+from bunraku.backing.library import StoredMotion, pack, unpack, with_audio
+from bunraku.backing.sockets import BROKEN, TOO_SLOW, Refusal
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
-from bunraku.stream.viewers import QUEUE, Viewer
+from bunraku.stream import viewers
+from bunraku.stream.turns import Turns
+from bunraku.stream.viewers import PINGS, QUEUE, Viewer
 from bunraku.wire.messages import (
     ChannelHeader,
     Data,
@@ -22,234 +22,252 @@ from bunraku.wire.messages import (
     Ping,
     Pong,
     Presence,
+    Problem,
     Report,
     TimelineState,
-    unpack,
 )
+from tests.stream.lines import Line, frames
 from tests.vectors.blocks import wandering_motion
 from tests.vectors.scene import camera, light
 
+PRESENCE = frame(Presence(1, [], [None] * 4).pack())
 
-@pytest.fixture
-async def library() -> Library:
-    shelf = Library.open("memory:///")
-    for name, seconds in (("one", 9.2), ("two", 2.0)):
+
+@pytest.fixture(scope="module")
+def motions() -> dict[str, StoredMotion]:
+    shelf = {}
+    for name, seconds in (("one", 9.2), ("two", 2.0), ("filmed", 2.0)):
         encoded = encode_motion(wandering_motion(seconds, 30.0, 9), ladder=(30.0, 5.0), grade="live")
-        await shelf.put(name, pack(name, encoded))
-    encoded = encode_motion(wandering_motion(2.0, 30.0, 9), ladder=(30.0, 5.0), grade="live")
-    scenes = [encode_scene(make(2.0, 30.0), ladder=(20.0, 4.0)) for make in (camera, light)]
-    await shelf.put("filmed", pack("filmed", encoded, scenes))
-    return shelf
+        scenes = [encode_scene(make(2.0, 30.0), ladder=(20.0, 4.0)) for make in (camera, light)]
+        shelf[name] = unpack(name, pack(name, encoded, scenes if name == "filmed" else ()))
+    # "sung", with noise beside it
+    noise = np.random.default_rng(2).normal(0, 0.2, (441_600, 1)).astype(np.float32)
+    packed, _ = with_audio("sung", shelf["one"], encode_audio([noise], shelf["one"].track, 1))
+    return {**shelf, "sung": unpack("sung", packed)}
 
 
-class Line:
-    """A line that takes messages, and can be stopped."""
-
-    def __init__(self) -> None:
-        self.sent: list[bytes] = []
-        self.open = asyncio.Event()
-        self.open.set()
-        self._more = asyncio.Condition()
-
-    async def put(self, message: bytes) -> None:
-        await self.open.wait()
-        async with self._more:
-            self.sent.append(message)
-            self._more.notify_all()
-
-    async def count(self, kind: type, number: int) -> list[object]:
-        def found() -> list[object]:
-            return [m for m in map(unpack, self.sent) if isinstance(m, kind)]
-
-        async with asyncio.timeout(10), self._more:
-            await self._more.wait_for(lambda: len(found()) >= number)
-        return found()
+def watching(motion: StoredMotion, playing: bool = True, **options: object) -> tuple[Viewer, Line, TimelineState]:
+    """A viewer of a motion whose line is open, and the timeline that it was given."""
+    viewer, line = Viewer(Turns(), **options), Line()  # type: ignore[arg-type]
+    state = timeline.start(motion.id, motion.track.duration_us, clock(), playing=playing)
+    viewer.timeline(state, motion)
+    viewer.open(line.outlet(viewer))
+    return viewer, line, state
 
 
-async def test_another_motion_is_announced_before_its_blocks(library: Library) -> None:
-    viewer, line = Viewer(library, None), Line()
-    state = timeline.start("one", 9_200_000, clock())
-    viewer.timeline(state)
-    sending = asyncio.create_task(viewer.send(line.put))
-    await line.count(Data, 3)
-    viewer.timeline(timeline.change(state, clock(), "two", 2_000_000))
-    await line.count(ChannelHeader, 2)
-    await line.count(TimelineState, 2)
-    sending.cancel()
-    kinds = [message[0] for message in line.sent]
-    second = len(kinds) - 1 - kinds[::-1].index(1)
-    assert kinds[second : second + 3] == [1, 2, 4]
+def of(kind: type, line: Line) -> list[object]:
+    return [message for message in line.messages if isinstance(message, kind)]
 
 
-async def test_only_the_newest_overlay_waits(library: Library) -> None:
-    viewer, line = Viewer(library, None), Line()
-    viewer.timeline(timeline.start("one", 9_200_000, clock()))
-    line.open.clear()
-    sending = asyncio.create_task(viewer.send(line.put))
-    await asyncio.sleep(0)
-    for number in range(100):
-        message = Overlay(number, 5, {}).pack()
-        viewer.overlay(message, frame(message))
-    line.open.set()
-    overlays = await line.count(Overlay, 1)
-    await line.count(Data, 5)
-    sending.cancel()
-    assert [o.sequence for o in overlays if isinstance(o, Overlay)] == [99]
+def overlay(number: int) -> bytes:
+    return frame(Overlay(number, 5, {}).pack())
 
 
-async def test_one_who_does_not_keep_up_is_told_so(library: Library) -> None:
-    viewer, line = Viewer(library, None), Line()
-    viewer.timeline(timeline.start("one", 9_200_000, clock()))
-    for _ in range(QUEUE + 1):
-        viewer.control(Presence(1, [], [None] * 4).pack())
+async def test_all_that_is_known_leaves_in_one_piece(motions: dict[str, StoredMotion]) -> None:
+    viewer, line = Viewer(Turns()), Line()
+    viewer.timeline(timeline.start("one", 9_200_000, clock()), motions["one"])
+    viewer.control(PRESENCE)
+    viewer.overlay(overlay(3))
+    assert line.sent == b""
+    viewer.open(line.outlet(viewer))
+    assert line.writes == 1
+    kinds = [type(message).__name__ for message in line.messages]
+    assert kinds[:5] == ["ChannelHeader", "Description", "TimelineState", "Presence", "Overlay"]
+    assert set(kinds[5:]) == {"Data"}
+
+
+async def test_another_motion_is_announced_before_its_blocks(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, state = watching(motions["one"])
+    before = len(line.messages)
+    assert len(of(Data, line)) >= 3
+    viewer.timeline(timeline.change(state, clock(), "two", 2_000_000), motions["two"])
+    viewer.advance()
+    kinds = [type(message).__name__ for message in line.messages[before:]]
+    assert kinds[:3] == ["ChannelHeader", "Description", "TimelineState"]
+    assert set(kinds[3:]) == {"Data"}
+
+
+async def test_only_the_newest_overlay_waits(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["one"])
+    viewer.overlay(overlay(1))
+    line.room = False
+    for number in range(2, 100):
+        viewer.overlay(overlay(number))
+    # one is in the transport already
+    assert line.waiting == overlay(2)
+    line.drain()
+    assert [o.sequence for o in of(Overlay, line) if isinstance(o, Overlay)] == [1, 2, 99]
+    viewer.overlay(overlay(100))
+    assert line.sent.endswith(overlay(100))
+
+
+async def test_what_waits_leaves_in_order(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, state = watching(motions["one"])
+    line.room = False
+    viewer.control(PRESENCE)
+    before = len(line.messages)
+    viewer.overlay(overlay(7))
+    viewer.control(PRESENCE)
+    viewer.timeline(timeline.edit(state, clock(), position=8_000_000), motions["one"])
+    viewer.hear(Ping(1, 2).pack())
+    viewer.advance()
+    line.drain()
+    kinds = [type(message).__name__ for message in line.messages[before:]]
+    assert kinds[:5] == ["Presence", "Pong", "TimelineState", "Presence", "Overlay"]
+
+
+async def test_one_who_does_not_keep_up_is_told_so(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["one"])
+    line.room = False
+    for _ in range(QUEUE + 2):
+        viewer.control(PRESENCE)
+    assert line.waiting.startswith(PRESENCE)
+    line.drain()
+    (problem,) = of(Problem, line)
+    assert isinstance(problem, Problem)
+    assert problem.title == "Too slow"
+    opcode, payload = frames(line.sent)[-1]
+    assert (opcode, int.from_bytes(payload[:2], "big")) == (8, TOO_SLOW)
+
+
+async def test_pings_are_answered_and_only_some_wait(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["one"])
+    viewer.hear(Ping(1, 2).pack())
+    assert isinstance(line.messages[-1], Pong)
+    line.room = False
+    viewer.control(PRESENCE)
+    for number in range(2, 30):
+        viewer.hear(Ping(number, 2).pack())
+    line.drain()
+    assert [pong.sequence for pong in of(Pong, line) if isinstance(pong, Pong)] == list(range(1, PINGS + 2))
+
+
+async def test_reports_change_the_rate(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, state = watching(motions["one"])
+    viewer.hear(Report(buffer=3_000_000, hidden=True).pack())
+    viewer.timeline(timeline.edit(state, clock(), position=6_000_000), motions["one"])
+    viewer.advance()
+    assert [data.rate for data in of(Data, line) if isinstance(data, Data)][-2:] == [0, 0]
+
+
+async def test_private_timelines_are_edited_others_not(motions: dict[str, StoredMotion]) -> None:
+    for private in (True, False):
+        viewer, line, _ = watching(motions["one"], private=private)
+        viewer.hear(Edit(playing=False).pack())
+        assert [s.playing for s in of(TimelineState, line) if isinstance(s, TimelineState)] == [True, False][
+            : 1 + private
+        ]
+
+
+async def test_what_is_malformed_is_refused(motions: dict[str, StoredMotion]) -> None:
+    viewer, _, _ = watching(motions["one"])
     with pytest.raises(Refusal) as refused:
-        await viewer.send(line.put)
-    assert refused.value.code == TOO_SLOW
+        viewer.hear(b"\x40")
+    assert refused.value.code == BROKEN
+    viewer.hear(b"\x7fnews")
 
 
-async def test_pings_are_answered_before_blocks(library: Library) -> None:
-    viewer, line = Viewer(library, None), Line()
-    viewer.timeline(timeline.start("one", 9_200_000, clock()))
-    viewer.ping(Ping(1, 2))
-    sending = asyncio.create_task(viewer.send(line.put))
-    await line.count(Data, 1)
-    sending.cancel()
-    assert isinstance(unpack(line.sent[0]), Pong)
-
-
-async def test_reports_change_the_rate(library: Library) -> None:
-    viewer, line = Viewer(library, None), Line()
-    viewer.timeline(timeline.start("one", 9_200_000, clock()))
-    sending = asyncio.create_task(viewer.send(line.put))
-    await line.count(Data, 5)
-    viewer.report(Report(buffer=3_000_000, hidden=True))
-    viewer.timeline(timeline.edit(timeline.start("one", 9_200_000, clock()), clock(), position=6_000_000))
-    data = await line.count(Data, 8)
-    sending.cancel()
-    assert [d.rate for d in data if isinstance(d, Data)][-2:] == [0, 0]
-
-
-async def test_all_tracks_are_counted_and_sent_the_motion_first(library: Library) -> None:
-    viewer, line = Viewer(library, None), Line()
-    viewer.timeline(timeline.start("filmed", 2_000_000, clock(), playing=False))
-    sending = asyncio.create_task(viewer.send(line.put))
-    data = await line.count(Data, 6)
-    sending.cancel()
-    header = unpack(line.sent[0])
+async def test_all_tracks_are_counted_and_sent_the_motion_first(motions: dict[str, StoredMotion]) -> None:
+    _, line, _ = watching(motions["filmed"], playing=False)
+    header = line.messages[0]
     assert isinstance(header, ChannelHeader)
     assert header.channels == 19 + 3 + 3
-    assert [(d.track, d.index, d.rate) for d in data if isinstance(d, Data)] == [
+    assert [(d.track, d.index, d.rate) for d in of(Data, line) if isinstance(d, Data)][:6] == [
         *((0, 0, 0), (1, 0, 1), (2, 0, 1)),
         *((track, 1, 1) for track in range(3)),
     ]
 
 
-async def test_only_the_tracks_that_are_wanted_are_sent(library: Library) -> None:
-    viewer, line = Viewer(library, None, ("light", "audio")), Line()
-    viewer.timeline(timeline.start("filmed", 2_000_000, clock()))
-    sending = asyncio.create_task(viewer.send(line.put))
-    data = await line.count(Data, 2)
-    viewer.ping(Ping(1, 2))
-    await line.count(Pong, 1)
-    sending.cancel()
-    assert [(d.track, d.index) for d in data if isinstance(d, Data)] == [(2, 0), (2, 1)]
+async def test_only_the_tracks_that_are_wanted_are_sent(motions: dict[str, StoredMotion]) -> None:
+    _, line, _ = watching(motions["filmed"], wanted=("light", "audio"))
+    assert {(d.track, d.index) for d in of(Data, line) if isinstance(d, Data)} == {(2, 0), (2, 1)}
 
 
-async def test_an_overlay_goes_past_the_queue_only_where_nothing_else_waits(library: Library) -> None:
-    written: list[bytes] = []
-    ready = [True]
-
-    def write(framed: bytes) -> bool:
-        if ready[0]:
-            written.append(framed)
-        return ready[0]
-
-    viewer, line = Viewer(library, None, write=write), Line()
-    message = Overlay(1, 5, {}).pack()
-    # nothing was said yet: the Description must come first
-    viewer.overlay(message, frame(message))
-    assert written == []
-    viewer.timeline(timeline.start("two", 2_000_000, clock()))
-    sending = asyncio.create_task(viewer.send(line.put))
-    await line.count(Overlay, 1)
-    await line.count(Data, 2)
-    async with asyncio.timeout(10):
-        while not viewer._resting:  # noqa: ASYNC110
-            await asyncio.sleep(0)
-    viewer.overlay(message, frame(message))
-    assert written == [frame(message)]
-    # a presence that waits goes before it
-    viewer.control(Presence(1, [], [None] * 4).pack())
-    viewer.overlay(message, frame(message))
-    assert len(written) == 1
-    before = len(line.sent)
-    await line.count(Presence, 1)
-    await line.count(Overlay, 2)
-    assert [type(unpack(m)) for m in line.sent[before:]][:2] == [Presence, Overlay]
-    ready[0] = False
-    viewer.overlay(message, frame(message))
-    await line.count(Overlay, 3)
-    sending.cancel()
-    await asyncio.gather(sending, return_exceptions=True)
+async def test_the_silent_are_asked_once_and_then_gone(
+    motions: dict[str, StoredMotion], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewer, line, _ = watching(motions["one"])
+    began = clock()
+    now = [began]
+    monkeypatch.setattr(viewers, "clock", lambda: now[0])
+    for second in range(16):
+        now[0] = began + second * 1_000_000
+        viewer.advance()
+    assert [opcode for opcode, _ in frames(line.sent)].count(9) == 1
+    assert not line.aborted
+    now[0] = began + 17_000_000
+    viewer.advance()
+    assert line.aborted
 
 
-@pytest.fixture
-async def sounding(library: Library) -> Library:
-    """With a motion "sung" of 9.2 s that has noise beside it."""
-    stored = await library.get("one")
-    assert stored is not None
-    noise = np.random.default_rng(2).normal(0, 0.2, (441_600, 1)).astype(np.float32)
-    packed, _ = with_audio("sung", stored, encode_audio([noise], stored.track, 1))
-    await library.put("sung", packed)
-    return library
+async def test_turns_come_when_blocks_are_due_and_not_for_all_at_once(motions: dict[str, StoredMotion]) -> None:
+    found = [watching(motions["one"]) for _ in range(50)]
+    now = clock()
+    turns = [viewer._next_turn() - now for viewer, _, _ in found]
+    assert all(0 < turn <= 2_000_000 for turn in turns)
+    assert len({turn // 100_000 for turn in turns}) > 5
 
 
-async def sent_of(viewer: Viewer, count: int) -> list[tuple[int, int, int]]:
-    line = Line()
-    viewer.timeline(timeline.start("sung", 9_200_000, clock()))
-    sending = asyncio.create_task(viewer.send(line.put))
-    data = [m for m in await line.count(Data, count) if isinstance(m, Data)]
-    sending.cancel()
-    header = unpack(line.sent[0])
+async def test_a_failure_is_said_and_ends_it(
+    motions: dict[str, StoredMotion], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    viewer, line, _ = watching(motions["one"])
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(Viewer, "_next_turn", broken)
+    viewer.advance()
+    (problem,) = of(Problem, line)
+    assert isinstance(problem, Problem)
+    assert problem.title == "Our fault"
+    assert "a viewer's turn failed" in caplog.text
+
+
+def sent_of(line: Line) -> list[tuple[int, int, int]]:
+    header = line.messages[0]
     assert isinstance(header, ChannelHeader)
     assert header.channels == 20
-    return [(m.track, m.index, m.rate) for m in data[:count]]
+    return [(m.track, m.index, m.rate) for m in of(Data, line) if isinstance(m, Data)]
 
 
-async def test_sound_goes_with_the_dance_at_its_lowest_until_the_line_has_shown_itself(sounding: Library) -> None:
-    sent = await sent_of(Viewer(sounding, None), 10)
-    assert sent == [(0, 0, 0), (1, 0, 0), *((track, index, 1 - track) for index in range(1, 5) for track in (0, 1))]
+async def test_sound_goes_with_the_dance_at_its_lowest_until_the_line_has_shown_itself(
+    motions: dict[str, StoredMotion],
+) -> None:
+    _, line, _ = watching(motions["sung"])
+    assert sent_of(line)[:8] == [
+        *((0, 0, 0), (1, 0, 0)),
+        *((track, index, 1 - track) for index in range(1, 4) for track in (0, 1)),
+    ]
 
 
-async def test_a_pinned_rate_pins_the_dance_and_the_sound_goes_with_the_line(sounding: Library) -> None:
-    viewer = Viewer(sounding, 1)
-    assert (await sent_of(viewer, 4))[2:] == [(0, 1, 1), (1, 1, 0)]
-    choice = viewer._rate
-    assert choice is not None
-    for second in range(1, 9):
-        choice.report(Report(buffer=4_000_000), clock() + second * 2_000_000)
-    assert viewer._steps[choice.rate][:2] == (1, 2)
-    assert (await sent_of(Viewer(sounding, 0), 4))[2:] == [(0, 1, 0), (1, 1, 0)]
+async def test_a_pinned_rate_pins_the_dance_and_the_sound_goes_with_the_line(motions: dict[str, StoredMotion]) -> None:
+    for pinned, sound, expected in ((1, 2, [(0, 1, 1), (1, 1, 0)]), (0, 0, [(0, 1, 0), (1, 1, 0)])):
+        viewer, line, _ = watching(motions["sung"], pinned=pinned)
+        assert sent_of(line)[2:4] == expected
+        choice = viewer._rate
+        assert choice is not None
+        for second in range(1, 9):
+            choice.report(Report(buffer=4_000_000), clock() + second * 2_000_000)
+        assert viewer._steps[choice.rate][:2] == (pinned, sound)
 
 
-async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(sounding: Library) -> None:
-    assert {track for track, _, _ in await sent_of(Viewer(sounding, None, ("motion",)), 5)} == {0}
-    assert await sent_of(Viewer(sounding, None, ("audio",)), 5) == [(1, index, 0) for index in range(5)]
+async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(motions: dict[str, StoredMotion]) -> None:
+    _, line, _ = watching(motions["sung"], wanted=("motion",))
+    assert {track for track, _, _ in sent_of(line)} == {0}
+    _, line, _ = watching(motions["sung"], wanted=("audio",))
+    assert sent_of(line)[:4] == [(1, index, 0) for index in range(4)]
 
 
-async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(sounding: Library) -> None:
-    viewer, line = Viewer(sounding, None), Line()
-    viewer.timeline(timeline.start("sung", 9_200_000, clock()))
-    sending = asyncio.create_task(viewer.send(line.put))
-    await line.count(Data, 10)
+async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["sung"], private=True)
     choice = viewer._rate
     assert choice is not None
     for second in range(1, 6):
         choice.report(Report(buffer=0), clock() + second * 2_000_000)
-    sent = len(line.sent)
-    viewer.edit(Edit(position=6_000_000))
-    await line.count(TimelineState, 2)
-    await line.count(Data, 13)
-    sending.cancel()
-    after = [m for m in map(unpack, line.sent[sent:]) if isinstance(m, Data)]
-    assert {(m.track, m.rate) for m in after} == {(0, 0)}
+    before = len(sent_of(line))
+    viewer.hear(Edit(position=6_000_000).pack())
+    viewer.advance()
+    after = sent_of(line)[before:]
+    assert after
+    assert {(track, rate) for track, _, rate in after} == {(0, 0)}

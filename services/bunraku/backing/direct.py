@@ -1,33 +1,35 @@
-"""A way past the queue to a WebSocket: a message framed once is written to many sockets at once.
+"""How a WebSocket is taken out of ASGI's hands once it is accepted.
 
-What goes to every viewer of a session thirty times a second is the same bytes, and a task woken for each of them costs
-ten times the writing. So the server's protocol offers to applications, as an ASGI extension of its own, to write a
-whole frame straight to the transport, if that has nothing else to write. A server without it, and a socket that is not
-ready, are served the usual way.
+uvicorn's protocol offers applications, as an ASGI extension of its own, to take the connection: what the application
+then writes goes to the transport, and what comes goes to the application, with nothing between.
 """
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable
+import asyncio
+from typing import cast
 
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
-EXTENSION = "bunraku.write"
-Write = Callable[[bytes], bool]
-"""Writes a whole frame; False, and nothing is written, where the socket is not ready for it."""
+from bunraku.backing.outlet import Listener, Outlet
+
+EXTENSION = "bunraku.take"
 
 
-def frame(message: bytes) -> bytes:
-    """A server's frame of a binary message, whole and unmasked (RFC 6455, section 5.2)."""
-    size = len(message)
-    if size < 126:
-        return bytes((0x82, size)) + message
-    if size < 1 << 16:
-        return struct.pack(">BBH", 0x82, 126, size) + message
-    return struct.pack(">BBQ", 0x82, 127, size) + message
+class _Taken(asyncio.Transport):
+    """What is left to uvicorn of a connection that was taken: nothing that it does has an effect."""
+
+    def close(self) -> None:
+        """Nothing."""
+
+    def is_closing(self) -> bool:
+        """It is as if it were."""
+        return True
+
+
+_TAKEN = _Taken()
 
 
 class DirectProtocol(WebSocketsSansIOProtocol):
@@ -39,20 +41,30 @@ class DirectProtocol(WebSocketsSansIOProtocol):
         if not self.close_sent:
             extensions = self.scope["extensions"]
             assert extensions is not None
-            extensions[EXTENSION] = {"write": self.write_frame}
+            extensions[EXTENSION] = {"take": self.take}
 
-    def write_frame(self, data: bytes) -> bool:
-        """As `Write`."""
+    def take(self, listener: Listener) -> Outlet | None:
+        """The connection, accepted and not read from since; None where it has ended meanwhile."""
         transport = self.transport
         if not self.handshake_complete or self.close_sent or self.disconnected or transport.is_closing():
-            return False
-        if transport.get_write_buffer_size() > 0:
-            return False
-        transport.write(data)
-        return True
+            return None
+        if not self.queue.empty() or self.conn.reader.buffer:
+            raise RuntimeError("a connection is taken before anything is read from it")
+        self.stop_keepalive()
+        self.connections.discard(self)
+        self.transport = _TAKEN
+        return Outlet(transport, listener, cast(set[object], self.connections))
 
 
-def writer(socket: WebSocket) -> Write | None:
-    """The socket's own way past the queue, None where its server has none."""
+def take(socket: WebSocket, listener: Listener) -> Outlet:
+    """Take a socket that was accepted, with nothing awaited since; from here on the socket says no more.
+
+    Raises `WebSocketDisconnect` where the client has gone, RuntimeError where the server is not ours.
+    """
     offered = (socket.scope.get("extensions") or {}).get(EXTENSION)
-    return offered["write"] if offered else None
+    if offered is None:
+        raise RuntimeError("viewers need a server with uvicorn's options of bunraku.serve.protocol()")
+    outlet: Outlet | None = offered["take"](listener)
+    if outlet is None:
+        raise WebSocketDisconnect(1006)
+    return outlet

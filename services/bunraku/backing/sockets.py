@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Coroutine
 from typing import Any
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from bunraku.wire.messages import LARGEST_FROM_CLIENT, SUBPROTOCOL, Problem
 
@@ -15,6 +15,7 @@ NOT_FOUND = 4404
 NOT_SPOKEN = 4406
 BROKEN = 1008
 TOO_LARGE = 1009
+FAULT = 1011
 TOO_SLOW = 1013
 
 
@@ -51,6 +52,8 @@ async def converse(*ways: Coroutine[Any, Any, None]) -> None:
 async def close(socket: WebSocket, refusal: Refusal) -> None:
     """Tell the client why, and close; a client that is gone already is no trouble."""
     with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+        if socket.application_state is WebSocketState.CONNECTING:
+            await accept(socket)
         await socket.send_bytes(Problem(refusal.title, refusal.detail).pack())
         await socket.close(refusal.code, f"{refusal.title}: {refusal.detail}"[:120])
 

@@ -101,6 +101,11 @@ class Client:
         """One session."""
         return await self._ask("GET", f"/v1/sessions/{quote(session, safe='')}")
 
+    async def first_session(self) -> str | None:
+        """The id of the session that is open longest, None where none is."""
+        items = (await self._ask("GET", "/v1/sessions", params={"limit": 1}))["items"]
+        return items[0]["id"] if items else None
+
     async def edit_session(self, session: str, **edit: Any) -> dict[str, Any]:
         """Edit a session: any of `playing`, `position` (microseconds), `loop`, `motion`."""
         return await self._ask("PATCH", f"/v1/sessions/{quote(session, safe='')}", json=edit)

@@ -17,6 +17,8 @@ from bunraku.wire.messages import TimelineState
 
 AHEAD = 4_000_000
 """How far ahead of the play position blocks are pushed, microseconds."""
+MARGIN = 1_000
+"""So long after a block comes within reach it is looked for, microseconds."""
 UPGRADE = 500_000
 """A better version of a block that a viewer has is worth sending only if it can still be decoded before it is shown."""
 AGAIN = AHEAD - 1_000_000
@@ -79,12 +81,23 @@ class Pacer:
         self._sent[due.track, due.index] = due.rate
         return due
 
+    def follow(self, dues: Sequence[Due]) -> bool | None:
+        """Take `dues`, the `arrivals` for one who has been sent all before them, as sent: True. False where all of them
+        had been sent before, None where some had: then `next` tells."""
+        sent = [self._sent.get((due.track, due.index)) for due in dues]
+        if all(rate is None for rate in sent):
+            self._sent.update({(due.track, due.index): due.rate for due in dues})
+            return True
+        if all(rate is not None and rate >= due.rate for rate, due in zip(sent, dues, strict=True)):
+            return False
+        return None
+
     def wait(self, state: TimelineState, clock: int) -> int | None:
         """Microseconds until the next block comes within reach, None while nothing moves."""
         if not state.playing or not self._tracks:
             return None
         reach = (position_at(state, clock) + AHEAD) % state.duration
-        return min(_following(track.timing, reach, state.duration) for track in self._tracks) - reach + 1_000
+        return min(_following(track.timing, reach, state.duration) for track in self._tracks) - reach + MARGIN
 
     def _due(self, track: Paced, state: TimelineState, position: int, rate: int) -> Due | None:
         """What is to be sent first of one track."""
@@ -107,6 +120,19 @@ class Pacer:
             if sent < rate and distance > soonest and better is None:
                 better = Due(True, distance, place, track.number, index, rate)
         return better
+
+
+def arrivals(
+    tracks: Sequence[Paced], state: TimelineState, clock: int, rate: int, audio: int | None = None
+) -> list[Due]:
+    """The blocks that have come within reach by `clock`, a time that `Pacer.wait` told, and had not just before it."""
+    pacer = Pacer(tracks)
+    while pacer.next(state, clock - 2 * MARGIN, rate, audio) is not None:
+        pass
+    found: list[Due] = []
+    while (due := pacer.next(state, clock, rate, audio)) is not None:
+        found.append(due)
+    return found
 
 
 def _following(timing: Timing, reach: int, duration: int) -> int:

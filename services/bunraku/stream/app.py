@@ -5,17 +5,18 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import FastAPI, Query, Response, WebSocket
+from starlette.websockets import WebSocketDisconnect
 
 from bunraku.backing import problems, sockets
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.bus import NobodyAnswers
-from bunraku.backing.direct import writer
+from bunraku.backing.direct import take
 from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
 from bunraku.playout import timeline
-from bunraku.stream import viewers
 from bunraku.stream.sessions import WatchedSessions
+from bunraku.stream.turns import Turns
 from bunraku.stream.viewers import TRACKS, Viewer
 
 IMMUTABLE = {"Cache-Control": "public, max-age=31536000, immutable"}
@@ -28,7 +29,8 @@ def create_app(backing: Backing) -> FastAPI:
     """The service upon `backing`."""
     app = FastAPI(title="Bunraku stream")
     problems.install(app)
-    sessions = WatchedSessions(backing.bus)
+    sessions = WatchedSessions(backing.bus, backing.library)
+    turns = Turns()
 
     async def stored(motion: str) -> StoredMotion:
         found = await backing.library.get(motion)
@@ -60,31 +62,39 @@ def create_app(backing: Backing) -> FastAPI:
         socket: WebSocket, motion: str, rate: RateQuery = None, tracks: TracksQuery = "", at: float = 0.0
     ) -> None:
         try:
-            await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket))
+            viewer = Viewer(turns, rate, _wanted(tracks), private=True)
             found = await backing.library.get(motion)
             if found is None:
                 raise Refusal(sockets.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
             # NaN and infinities start at the beginning
             position = round(min(at, 1e6) * 1e6) if at > 0 else 0
-            viewer.timeline(timeline.start(motion, found.track.duration_us, clock(), position=position))
-            await viewers.serve(socket, viewer, private=True)
+            await sockets.accept(socket)
+            viewer.timeline(timeline.start(motion, found.track.duration_us, clock(), position=position), found)
+            viewer.open(take(socket, viewer))
+        except WebSocketDisconnect:
+            # gone before anything was said
+            pass
         except Refusal as refusal:
             await sockets.close(socket, refusal)
 
     @app.websocket("/v1/sessions/{session}/stream")
     async def watch_session(socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "") -> None:
         try:
-            await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket))
+            viewer = Viewer(turns, rate, _wanted(tracks))
             try:
-                await sessions.join(session, viewer)
+                watched = await sessions.open(session)
             except NobodyAnswers:
                 raise Refusal(sockets.NOT_FOUND, "No such session", f"there is no session {session[:40]!r}") from None
             try:
-                await viewers.serve(socket, viewer, private=False)
+                await sockets.accept(socket)
+                outlet = take(socket, viewer)
+                watched.join(viewer)
+                viewer.open(outlet)
             finally:
-                sessions.leave(session, viewer)
+                sessions.close(session)
+        except WebSocketDisconnect:
+            # gone before anything was said
+            pass
         except Refusal as refusal:
             await sockets.close(socket, refusal)
 

@@ -1,0 +1,82 @@
+"""The processes of `make bench-fanout`: each is told lines and answers lines, and ends with the bench."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Self
+
+HERE = Path(__file__).parent
+
+
+class Told:
+    """A process that answers each line with one line."""
+
+    def __init__(self, command: list[str]) -> None:
+        environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200"}
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
+
+    @classmethod
+    def module(cls, name: str, *arguments: object) -> Self:
+        """A module of the benches."""
+        return cls([sys.executable, "-m", f"tests.bench.{name}", *map(str, arguments)])
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait(20)
+        for stream in (self.process.stdin, self.process.stdout):
+            assert stream is not None
+            stream.close()
+
+    def line(self) -> str:
+        """Its next line; raises RuntimeError where it has ended."""
+        assert self.process.stdout is not None
+        found = self.process.stdout.readline()
+        if not found:
+            raise RuntimeError(f"{self.process.args!r} ended")
+        return found.strip()
+
+    def say(self, line: object) -> None:
+        """Tell it something."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{line}\n")
+        self.process.stdin.flush()
+
+    def ask(self, line: object) -> Any:
+        """Its answer."""
+        self.say(line)
+        return json.loads(self.line())
+
+    def processor_seconds(self) -> float:
+        """What it has used of a processor, in user and kernel mode."""
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def resident_kilobytes(self) -> int:
+        """Its memory."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
+
+
+@contextmanager
+def ceiling(folder: Path, viewers: int, size: int, hertz: int) -> Iterator[Told | None]:
+    """The bare loop in C, None where there is no compiler."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        yield None
+        return
+    program = folder / "ceiling"
+    subprocess.run([compiler, "-O2", "-o", program, HERE / "fanout_ceiling.c"], check=True)
+    with Told([str(program), str(viewers), str(size), str(hertz)]) as told:
+        yield told

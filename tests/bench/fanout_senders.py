@@ -1,0 +1,205 @@
+"""The servers that `make bench-fanout` sets side by side: the same bytes to every client, so many times a second.
+
+`python -m tests.bench.fanout_senders KIND BYTES HERTZ`: prints the port that it listens at, then for each line of
+standard input, a number of seconds, sends for that long and prints one JSON object: `messages` sent and `cpu`, seconds
+of this process in user and kernel mode. KIND is `bunraku` (the stream service as `bunraku up` serves it, an overlay
+published on its bus), `playing` (the same with a motion that plays), `fastapi` (`send_bytes` in a loop), `websockets`
+(`broadcast`) or `socketio` (`emit`). Of the first two, `waiting` asks for the most bytes that wait for a viewer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import json
+import resource
+import socket
+import struct
+import sys
+import tempfile
+import termios
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import uvicorn
+import uvloop
+from fastapi import FastAPI, WebSocket, WebSocketDisconnect
+
+from bunraku.backing import together
+from bunraku.backing.backing import clock, open_backing
+from bunraku.backing.library import pack
+from bunraku.backing.outlet import Outlet
+from bunraku.backing.settings import Settings
+from bunraku.playout import timeline
+from bunraku.wire.messages import Overlay, Presence
+
+SESSION = "bench"
+DURATION = 90_000_000
+Send = Callable[[bytes], Awaitable[int]]
+"""Sends to every client, and says how many those were."""
+
+
+def used() -> float:
+    """Seconds of processor that this process has had."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+async def conduct(
+    listening: socket.socket, send: Send, size: int, hertz: int, waiting: Callable[[], int] = lambda: 0
+) -> None:
+    """Do what standard input says until its end."""
+    print(listening.getsockname()[1], flush=True)
+    number = 0
+    while line := await asyncio.to_thread(sys.stdin.readline):
+        if line.strip() == "waiting":
+            print(json.dumps({"most": waiting(), "number": number}), flush=True)
+            continue
+        messages, before, begun = 0, used(), time.monotonic()
+        for tick in range(round(float(line) * hertz)):
+            await asyncio.sleep(max(begun + tick / hertz - time.monotonic(), 0.0))
+            number += 1
+            messages += await send(message(number, size))
+        print(json.dumps({"messages": messages, "cpu": round(used() - before, 6)}), flush=True)
+
+
+def message(number: int, size: int) -> bytes:
+    """An overlay of `size` bytes: 12 and a multiple of 18; of others a likeness."""
+    limbs, frames = next(((n, f) for n in (1, 2, 3, 4) for f in (1, 2, 3) if 12 + 18 * n * f == size), (0, 0))
+    one: dict[int, tuple[int, ...]] = dict.fromkeys(range(limbs), (number & 0xFF,) * 9)
+    return Overlay(number, clock() + 60_000, one, (one,) * (frames - 1)).pack() if limbs else bytes(size)
+
+
+async def serving(app: Any, listening: socket.socket, **options: Any) -> uvicorn.Server:
+    """A uvicorn server with its defaults, which listens when this returns."""
+    server = uvicorn.Server(uvicorn.Config(app, log_level="warning", access_log=False, **options))
+    _tasks.append(asyncio.create_task(server.serve(sockets=[listening])))
+    while not server.started:  # noqa: ASYNC110 - uvicorn has no event for it
+        await asyncio.sleep(0.01)
+    return server
+
+
+_tasks: list[asyncio.Task[None]] = []
+
+
+def most_waiting(server: uvicorn.Server) -> int:
+    """Bytes that wait for the viewer for whom most do: in the process, and in the kernel (SIOCOUTQ)."""
+    most = 0
+    for outlet in server.server_state.connections:
+        if isinstance(outlet, Outlet):
+            bare = outlet._transport.get_extra_info("socket")
+            held = struct.unpack("=i", fcntl.ioctl(bare.fileno(), termios.TIOCOUTQ, bytes(4)))[0]
+            most = max(most, outlet.waiting + held)
+    return most
+
+
+async def bunraku(listening: socket.socket, size: int, hertz: int, *, playing: bool = False) -> None:
+    import bunraku.stream.app
+    from bunraku.codec.encode import encode_motion
+    from bunraku.serve import protocol
+    from tests.vectors.blocks import wandering_motion
+
+    with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
+        async with open_backing(Settings(data=Path(folder))) as backing:
+            encoded = encode_motion(wandering_motion(DURATION / 1e6, 30.0, 9), ladder=(30.0, 5.0), grade="live")
+            await backing.library.put(SESSION, pack(SESSION, encoded))
+            state = timeline.start(SESSION, DURATION, clock())
+            # on a stage that stands what is measured is the overlay
+            state = timeline.edit(state, clock(), playing=playing)
+            viewers: dict[str, int] = {}
+
+            async def answer(_: bytes) -> bytes:
+                packed: bytes = msgpack.packb([state.pack(), Presence(0, [], [None] * 4).pack(), None])
+                return packed
+
+            backing.bus.answer(f"session.{SESSION}.state", answer)
+            backing.bus.subscribe(f"session.{SESSION}.viewers", lambda data: viewers.update([msgpack.unpackb(data)]))
+
+            async def send(data: bytes) -> int:
+                backing.bus.publish(f"session.{SESSION}.overlay", data)
+                return sum(viewers.values())
+
+            app = bunraku.stream.app.create_app(backing)
+            await asyncio.to_thread(together.warm)
+            server = await serving(app, listening, lifespan="off", **protocol())
+            await conduct(listening, send, size, hertz, lambda: most_waiting(server))
+
+
+async def bunraku_playing(listening: socket.socket, size: int, hertz: int) -> None:
+    await bunraku(listening, size, hertz, playing=True)
+
+
+async def fastapi(listening: socket.socket, size: int, hertz: int) -> None:
+    app = FastAPI()
+    sockets: set[WebSocket] = set()
+
+    @app.websocket("/")
+    async def watch(websocket: WebSocket) -> None:
+        await websocket.accept()
+        sockets.add(websocket)
+        try:
+            while True:
+                await websocket.receive_bytes()
+        except WebSocketDisconnect:
+            sockets.discard(websocket)
+
+    async def send(data: bytes) -> int:
+        for one in tuple(sockets):
+            await one.send_bytes(data)
+        return len(sockets)
+
+    await serving(app, listening)
+    await conduct(listening, send, size, hertz)
+
+
+async def websockets(listening: socket.socket, size: int, hertz: int) -> None:
+    from websockets.asyncio.server import ServerConnection, broadcast, serve
+
+    async def watch(connection: ServerConnection) -> None:
+        await connection.wait_closed()
+
+    async with serve(watch, sock=listening) as server:
+
+        async def send(data: bytes) -> int:
+            broadcast(server.connections, data)
+            return len(server.connections)
+
+        await conduct(listening, send, size, hertz)
+
+
+async def socketio(listening: socket.socket, size: int, hertz: int) -> None:
+    import socketio
+
+    server = socketio.AsyncServer(async_mode="asgi", ping_interval=3600)
+    there: set[str] = set()
+    server.on("connect", lambda sid, _: there.add(sid))
+    server.on("disconnect", lambda sid, _: there.discard(sid))
+
+    async def send(data: bytes) -> int:
+        await server.emit("overlay", data)
+        return len(there)
+
+    await serving(socketio.ASGIApp(server), listening)
+    await conduct(listening, send, size, hertz)
+
+
+KINDS = {
+    "bunraku": bunraku,
+    "playing": bunraku_playing,
+    "fastapi": fastapi,
+    "websockets": websockets,
+    "socketio": socketio,
+}
+
+
+def main() -> None:
+    kind, size, hertz = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    with socket.create_server(("127.0.0.1", 0), backlog=1024) as listening:
+        uvloop.run(KINDS[kind](listening, size, hertz))
+
+
+if __name__ == "__main__":
+    main()
