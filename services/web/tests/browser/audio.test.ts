@@ -95,7 +95,6 @@ describe.skipIf(!path)("the sound", { timeout: 3 * PATIENCE }, () => {
     expect(await loaded(page, /wasm-decoder/)).toBe(surroundings.decodes === false ? 1 : 0);
     const errors = await errorsOf(page);
     expect(errors.length).toBeGreaterThanOrEqual(CLICKS);
-    if (process.env["AUDIO_DEBUG"]) console.log(errors.map((e) => e.toFixed(1)).join(" "));
     const sizes = errors.map(Math.abs).sort((a, b) => a - b);
     const share = (part: number) => Math.round(sizes[Math.ceil(part * sizes.length) - 1] * 10) / 10;
     console.log(JSON.stringify({ bench: "audio", line, clicks: errors.length, audio_median_ms: share(0.5), audio_p95_ms: share(0.95), audio_max_ms: share(1) }));
