@@ -125,14 +125,30 @@ class Pacer:
 def arrivals(
     tracks: Sequence[Paced], state: TimelineState, clock: int, rate: int, audio: int | None = None
 ) -> list[Due]:
-    """The blocks that have come within reach by `clock`, a time that `Pacer.wait` told, and had not just before it."""
-    pacer = Pacer(tracks)
-    while pacer.next(state, clock - 2 * MARGIN, rate, audio) is not None:
-        pass
+    """The blocks that have come within reach by `clock`, a time that `Pacer.wait` told, and had not just before it: as
+    `Pacer.next` would tell one who has been sent all before them, without going through all that."""
+    position = position_at(state, clock)
+    reach = position + AHEAD
     found: list[Due] = []
-    while (due := pacer.next(state, clock, rate, audio)) is not None:
-        found.append(due)
-    return found
+    for track in tracks:
+        wanted = max(rate, 0) if audio is None or not track.audio else audio
+        if wanted < 0:
+            continue
+        timing = track.timing
+        blocks = timing.block_at(state.duration - 1) + 1
+        first = min(timing.block_at(position_at(state, clock - 2 * MARGIN)), blocks - 1)
+        place = 0 if track.base else 1 if track.audio else 2
+        turn, into = divmod(reach, state.duration)
+        index = min(timing.block_at(into) + 1, blocks - 1)
+        while (start := timing.start_us(index) + turn * state.duration) > reach - 2 * MARGIN:
+            # in a loop it was sent when it last came within reach, if it is still there
+            sent = turn > 1 or (turn == 1 and index >= first)
+            if start <= reach and not sent and (state.loop or not turn):
+                found.append(Due(False, start - position, place, track.number, index, min(wanted, track.rates - 1)))
+            turn, index = (turn, index - 1) if index else (turn - 1, blocks - 1)
+            if turn < 0:
+                break
+    return sorted(found)
 
 
 def _following(timing: Timing, reach: int, duration: int) -> int:
