@@ -129,6 +129,10 @@ def arrivals(
     `Pacer.next` would tell one who has been sent all before them, without going through all that."""
     position = position_at(state, clock)
     reach = position + AHEAD
+    before = position_at(state, clock - 2 * MARGIN)
+    if state.loop and any(_again(track.timing, before, state.duration) <= AHEAD for track in tracks):
+        # of so short a loop all is within reach, and what is on show may come better
+        return _told(tracks, state, clock, rate, audio)
     found: list[Due] = []
     for track in tracks:
         wanted = max(rate, 0) if audio is None or not track.audio else audio
@@ -136,7 +140,7 @@ def arrivals(
             continue
         timing = track.timing
         blocks = timing.block_at(state.duration - 1) + 1
-        first = min(timing.block_at(position_at(state, clock - 2 * MARGIN)), blocks - 1)
+        first = min(timing.block_at(before), blocks - 1)
         place = 0 if track.base else 1 if track.audio else 2
         turn, into = divmod(reach, state.duration)
         index = min(timing.block_at(into) + 1, blocks - 1)
@@ -149,6 +153,22 @@ def arrivals(
             if turn < 0:
                 break
     return sorted(found)
+
+
+def _again(timing: Timing, position: int, duration: int) -> int:
+    """Microseconds until the block at `position` comes again in a loop."""
+    return timing.start_us(timing.block_at(position)) + duration - position
+
+
+def _told(tracks: Sequence[Paced], state: TimelineState, clock: int, rate: int, audio: int | None) -> list[Due]:
+    """`arrivals` by sending all that was before."""
+    pacer = Pacer(tracks)
+    while pacer.next(state, clock - 2 * MARGIN, rate, audio) is not None:
+        pass
+    found: list[Due] = []
+    while (due := pacer.next(state, clock, rate, audio)) is not None:
+        found.append(due)
+    return found
 
 
 def _following(timing: Timing, reach: int, duration: int) -> int:
