@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import base64
+import gc
 import json
 import os
 import re
@@ -26,10 +27,12 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from typing import cast
 from urllib.parse import urlsplit
 
 import httpx2
 import numpy as np
+import uvloop
 
 from bunraku.backing.backing import clock
 from bunraku.client.api import Client
@@ -72,14 +75,13 @@ class Screen(asyncio.Protocol):
         self._buffer = b""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = cast(asyncio.Transport, transport)
         key = base64.b64encode(secrets.token_bytes(16)).decode()
         lines = (
             f"GET {self._path} HTTP/1.1", f"Host: {self._host}", "Upgrade: websocket", "Connection: Upgrade",
             f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Protocol: {SUBPROTOCOL}", "", "",
         )  # fmt: skip
-        transport.write("\r\n".join(lines).encode())
+        self._transport.write("\r\n".join(lines).encode())
 
     def data_received(self, data: bytes) -> None:
         now = clock()
@@ -282,7 +284,9 @@ def main() -> None:
         try:
             url = next(found[1] for line in server.stdout if (found := re.search(r"is at (http://\S+)/", line)))
             print(f"{given.sessions} sessions of one puppeteer and {given.viewers} viewers, {given.seconds:g} s")
-            figures = asyncio.run(run(url, server.pid, given.sessions, given.viewers, given.seconds))
+            # what is kept for later is not walked through meanwhile: that would stop the screens' clocks
+            gc.disable()
+            figures = uvloop.run(run(url, server.pid, given.sessions, given.viewers, given.seconds))
         finally:
             server.terminate()
             server.wait(20)
