@@ -43,11 +43,14 @@ from bunraku.marionette.limbs import ArmRig, Limb
 from bunraku.marionette.vector import Quaternion, Vector
 from bunraku.motion.skeleton import Figure
 from bunraku.playout.overlays import UNIT
+from bunraku.serve import LOAD_AFTER
 from bunraku.wire.messages import SUBPROTOCOL, Description, Overlay, unpack
 
 FRAME = 1e6 / 60.0
 WARM = 4.0
 """Seconds that limbs are held before the first pull that counts."""
+SETTLE = 60.0
+"""Seconds that a server is waited for at most, until it has loaded all it needs."""
 EVERY = 0.5
 """Seconds between two pulls of a puppeteer."""
 PLACES = ((0.45, -0.2, 0.5), (0.45, 0.0, 0.5))
@@ -220,6 +223,21 @@ def processor_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def settled(pid: int) -> None:
+    """Waits until a server that has just begun has loaded what it needs, and has nothing more to do."""
+    end = time.monotonic() + SETTLE
+    # it begins to load a little after it answers
+    time.sleep(LOAD_AFTER + 1.0)
+    before = processor_seconds(pid)
+    while time.monotonic() < end:
+        time.sleep(1.0)
+        now = processor_seconds(pid)
+        if now - before < 0.1:
+            return
+        before = now
+    print(f"the server was still busy after {SETTLE:g} s", file=sys.stderr)
+
+
 async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -> dict[str, float]:
     """The run, and its figures."""
     async with Client(url) as client:
@@ -229,12 +247,13 @@ async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -
         assert isinstance(description, Description)
         figure: Figure = read_track(description.tracks[0]).figure
         stages = [await watch(client, motion, viewers) for _ in range(sessions)]
-        before, begun = processor_seconds(pid), time.perf_counter()
+        before, begun, own = processor_seconds(pid), time.perf_counter(), time.process_time()
         async with asyncio.TaskGroup() as pulling:
             for nth, (session, one) in enumerate(stages):
                 pulling.create_task(pull(client, session, one, seconds, nth, nth / sessions))
         played = [one for _, one in stages]
-        busy = (processor_seconds(pid) - before) / (time.perf_counter() - begun)
+        passed = time.perf_counter() - begun
+        busy, own = (processor_seconds(pid) - before) / passed, (time.process_time() - own) / passed
     rig = ArmRig(figure, Limb.LEFT_HAND)
     random = np.random.default_rng(1)
     delays: list[float] = []
@@ -263,6 +282,7 @@ async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -
         "overlay_frame_ms_p99": round(float(np.percentile(gaps, 99)), 1),
         "messages_per_s": round(messages / seconds),
         "server_cores": round(busy, 2),
+        "screens_cores": round(own, 2),
     }
 
 
@@ -284,6 +304,7 @@ def main() -> None:
         try:
             url = next(found[1] for line in server.stdout if (found := re.search(r"is at (http://\S+)/", line)))
             print(f"{given.sessions} sessions of one puppeteer and {given.viewers} viewers, {given.seconds:g} s")
+            settled(server.pid)
             # what is kept for later is not walked through meanwhile: that would stop the screens' clocks
             gc.disable()
             figures = uvloop.run(run(url, server.pid, given.sessions, given.viewers, given.seconds))
