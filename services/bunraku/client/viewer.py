@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
@@ -52,12 +54,15 @@ class StreamEnded(Exception):
 @dataclass(slots=True)
 class Figures:
     """How a viewer fared. Times in milliseconds; `kbps` counts all payload received over the time watched; `blocks` are
-    the motion's, `camera` where the show's camera was last: `position` and `gaze` in metres, `fov` in radians."""
+    the motion's, `gaps` how often one was missing and `dark_ms` for how long, `shown_kbps` the mean of the rates shown;
+    `camera` where the show's camera was last: `position` and `gaze` in metres, `fov` in radians."""
 
     seconds: float = 0.0
     first_pose_ms: float | None = None
     frames: int = 0
     gaps: int = 0
+    dark_ms: float = 0.0
+    shown_kbps: float = 0.0
     blocks: int = 0
     camera_blocks: int = 0
     light_blocks: int = 0
@@ -84,10 +89,22 @@ def _rounded(value: Any) -> Any:
 
 
 class Viewer:
-    """One viewer of a stream at a WebSocket `url` (`.../stream`)."""
+    """One viewer of a stream at a WebSocket `url` (`.../stream`).
 
-    def __init__(self, url: str) -> None:
+    `now` is the local clock in microseconds; `open_socket` makes the unconnected, non-blocking socket of a connection
+    where the machine's own way is not the one meant.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        now: Callable[[], int] | None = None,
+        open_socket: Callable[[], socket.socket] | None = None,
+    ) -> None:
         self.url = url
+        self._local = now or _local
+        self._open_socket = open_socket
         self.figures = Figures()
         self.clock = ReferenceClock()
         self.timelines = timeline.Timelines()
@@ -103,10 +120,14 @@ class Viewer:
         self._early: list[float] = []
         self._decode = 0.0
         self._began = 0.0
+        self._lit = 0.0
+        self._rates: list[float] = []
 
-    async def watch(self, seconds: float, on_frame: Callable[[int, Pose], None] | None = None) -> Figures:
-        """Watch for `seconds` at 60 frames a second; `on_frame` is told reference time (of what is shown: the
-        play-out delay behind the clock) and merged pose of each.
+    async def watch(
+        self, seconds: float, on_frame: Callable[[int, Pose], None] | None = None, *, frame: float = FRAME
+    ) -> Figures:
+        """Watch for `seconds`, a picture every `frame` seconds; `on_frame` is told reference time (of what is shown:
+        the play-out delay behind the clock) and merged pose of each.
 
         Raises `StreamEnded` where the server closes the stream, OSError where there is none.
         """
@@ -114,6 +135,7 @@ class Viewer:
         self._began = time.monotonic()
         async with connect(
             self.url,
+            sock=await self._connected(),
             subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
             compression=None,
             max_size=LARGEST_FROM_SERVER,
@@ -123,7 +145,7 @@ class Viewer:
             tasks = [
                 asyncio.create_task(self._receive(connection)),
                 asyncio.create_task(self._ask_time(connection)),
-                asyncio.create_task(self._show(seconds, on_frame)),
+                asyncio.create_task(self._show(seconds, on_frame, frame)),
             ]
             done, rest = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in rest:
@@ -132,6 +154,13 @@ class Viewer:
             for task in done:
                 task.result()
         return self._settled()
+
+    async def _connected(self) -> socket.socket | None:
+        if self._open_socket is None:
+            return None
+        made, parts = self._open_socket(), urlsplit(self.url)
+        await asyncio.get_running_loop().sock_connect(made, (parts.hostname, parts.port or 80))
+        return made
 
     def pose_at(self, reference: int) -> Pose | None:
         """The merged pose at clock time `reference`, None where nothing is there to be shown."""
@@ -173,7 +202,7 @@ class Viewer:
             self._keep(message)
         elif isinstance(message, Overlay):
             self.figures.overlays += 1
-            local = _local()
+            local = self._local()
             late = self.clock.at(local) - message.due
             if self.clock.ready:
                 self._early.append(-late / 1e3)
@@ -181,11 +210,11 @@ class Viewer:
                 self._delay.heard(late + (len(message.earlier) + 1) * Overlay.FRAME, local)
             self._overlays.put(message)
         elif isinstance(message, Pong):
-            self.clock.pong(message.sent, message.received, message.answered, _local())
+            self.clock.pong(message.sent, message.received, message.answered, self._local())
         elif isinstance(message, TimelineState):
             self.timelines.put(message)
         elif isinstance(message, ChannelHeader):
-            self.clock.guess(message.now, _local())
+            self.clock.guess(message.now, self._local())
         elif isinstance(message, Description):
             self._describe(message)
         elif isinstance(message, Presence):
@@ -205,6 +234,8 @@ class Viewer:
             raise StreamEnded(str(error)) from None
         self.motion, self._track_number = description.motion, numbers[0]
         self._blocks = BlockStore(self.track)
+        rates = description.tracks[numbers[0]].get("rates", [])
+        self._rates = [float(rate.get("kbps", 0.0)) for rate in rates]
         self._scene_stores = {}
         for number, track in enumerate(description.tracks):
             if track.get("type") in ("camera", "light"):
@@ -231,19 +262,20 @@ class Viewer:
     async def _ask_time(self, connection: ClientConnection) -> None:
         for sequence in range(1 << 32):
             with contextlib.suppress(ConnectionClosed):
-                await connection.send(Ping(sequence, _local()).pack())
-                state = self.timelines.at(self.clock.at(_local()))
+                await connection.send(Ping(sequence, self._local()).pack())
+                state = self.timelines.at(self.clock.at(self._local()))
                 if sequence >= BURST and state is not None and self._blocks is not None:
-                    position = timeline.position_at(state, self.clock.at(_local()))
+                    position = timeline.position_at(state, self.clock.at(self._local()))
                     ahead = self._blocks.ahead(position, state.loop)
                     await connection.send(Report(ahead, round(self._decode * 1e6)).pack())
             await asyncio.sleep(0.06 if sequence < BURST else 1.0)
 
-    async def _show(self, seconds: float, on_frame: Callable[[int, Pose], None] | None) -> None:
+    async def _show(self, seconds: float, on_frame: Callable[[int, Pose], None] | None, frame: float) -> None:
         loop = asyncio.get_running_loop()
         due, end, dark = loop.time(), loop.time() + seconds, False
+        before, weighed = loop.time(), 0.0
         while loop.time() < end:
-            local = _local()
+            local = self._local()
             reference = self.clock.at(local) - round(self._delay.at(local))
             pose = self.pose_at(reference)
             if (camera := self.camera_at(reference)) is not None:
@@ -258,14 +290,31 @@ class Viewer:
             elif self.figures.first_pose_ms is not None and not dark:
                 self.figures.gaps += 1
             dark = pose is None
-            due = max(due + FRAME, loop.time())
+            now = loop.time()
+            if self.figures.first_pose_ms is not None:
+                if dark:
+                    self.figures.dark_ms += (now - before) * 1e3
+                weighed += (now - before) * self._kbps_at(reference)
+                self._lit += now - before
+                self.figures.shown_kbps = weighed / max(self._lit, 1e-9)
+            before = now
+            due = max(due + frame, loop.time())
             await asyncio.sleep(max(due - loop.time(), 0))
+
+    def _kbps_at(self, reference: int) -> float:
+        """What the rate shown at `reference` costs, nothing where the block is missing."""
+        state = self.timelines.at(reference)
+        if state is None or self._blocks is None:
+            return 0.0
+        track = self._blocks.track
+        rate = self._blocks.rate(track.block_at(timeline.position_at(state, reference)))
+        return self._rates[rate] if 0 <= rate < len(self._rates) else 0.0
 
     def _settled(self) -> Figures:
         figures = self.figures
         figures.seconds = time.monotonic() - self._began
         figures.kbps = figures.bytes * 8e-3 / figures.seconds
-        figures.clock_offset_ms = self.clock.offset / 1e3 - (time.time_ns() // 1000 - _local()) / 1e3
+        figures.clock_offset_ms = self.clock.offset / 1e3 - (time.time_ns() // 1000 - self._local()) / 1e3
         figures.clock_error_ms = self.clock.error / 1e3 if self.clock.ready else None
         figures.overlay_early_ms = float(np.median(self._early)) if self._early else None
         return figures
