@@ -7,8 +7,8 @@ ARGUMENTS="--only live"`.
     9k6 28k8 56k   a motion at these kbit/s (round trips of 300, 150, 150 ms): time from the start of the TCP connection
                    to the first pose (median of five lines side by side), and gaps over 60 s on one of them
     steps          56 -> 14.4 -> 56 kbit/s under a pulled dancer: gaps, latency of the live overlay
-    live           all four limbs pulled, on 28.8 kbit/s: latency, frames that come against those that the line could carry,
-                   and the same written naively: each overlay as it comes
+    live           all four limbs pulled, on 28.8 kbit/s: latency, how much of the line is used, and the same written
+                   naively: each overlay as it comes
     clock          the same line, a viewer's clock right, and an hour off and 200 ppm fast
     join           a session that runs already, 64 kbit/s: the right pose, and the difference to one on a quick line
     cut            28.8 kbit/s, cut for 25 s: what is shown after
@@ -194,7 +194,7 @@ async def steps(bench: Bench) -> Figures:
 async def live(bench: Bench) -> Figures:
     """Cases live and clock: one line ours, one naive, one whose viewer's clock is off."""
     figures: Figures = {}
-    seconds, settle = 30.0, 5.0
+    seconds, settle = 60.0, 5.0
 
     async def work(session: str) -> None:
         path = f"/v1/sessions/{session}/stream"

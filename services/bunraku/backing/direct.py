@@ -15,6 +15,8 @@ from starlette.websockets import WebSocket
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
+from bunraku.backing import line
+
 EXTENSION = "bunraku.write"
 Write = Callable[[bytes], bool]
 """Writes a whole frame; False, and nothing is written, where the socket is not ready for it."""
@@ -40,6 +42,7 @@ class DirectProtocol(WebSocketsSansIOProtocol):
             extensions = self.scope["extensions"]
             assert extensions is not None
             extensions[EXTENSION] = {"write": self.write_frame}
+            extensions[line.EXTENSION] = {"transport": self.transport}
 
     def write_frame(self, data: bytes) -> bool:
         """As `Write`."""

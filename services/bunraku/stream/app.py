@@ -11,6 +11,7 @@ from bunraku.backing.backing import Backing, clock
 from bunraku.backing.bus import NobodyAnswers
 from bunraku.backing.direct import writer
 from bunraku.backing.library import StoredMotion
+from bunraku.backing.line import line_of
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
 from bunraku.playout import timeline
@@ -61,7 +62,7 @@ def create_app(backing: Backing) -> FastAPI:
     ) -> None:
         try:
             await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket))
+            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket), line_of(socket))
             found = await backing.library.get(motion)
             if found is None:
                 raise Refusal(sockets.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
@@ -76,7 +77,7 @@ def create_app(backing: Backing) -> FastAPI:
     async def watch_session(socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "") -> None:
         try:
             await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket))
+            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket), line_of(socket))
             try:
                 await sessions.join(session, viewer)
             except NobodyAnswers:

@@ -24,6 +24,7 @@ from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.playout import timeline
 from bunraku.playout.pacing import Paced, Pacer
 from bunraku.playout.rate import RateChoice
+from bunraku.stream.flow import Flow, Readable
 from bunraku.wire.messages import (
     ChannelHeader,
     Edit,
@@ -32,6 +33,7 @@ from bunraku.wire.messages import (
     Pong,
     Report,
     TimelineState,
+    newest,
     unpack,
 )
 
@@ -45,11 +47,17 @@ class Viewer:
     """What one viewer has been sent and is still to be sent."""
 
     def __init__(
-        self, library: Library, pinned: int | None, wanted: Container[str] = TRACKS, write: Write | None = None
+        self,
+        library: Library,
+        pinned: int | None,
+        wanted: Container[str] = TRACKS,
+        write: Write | None = None,
+        line: Readable | None = None,
     ) -> None:
         """`pinned` is the rate to keep to, if any; `wanted` the types of tracks whose blocks are sent; `write` writes a
-        frame past the queue, where the server can."""
+        frame past the queue, where the server can; `line` tells how much is on its way, where the system does."""
         self._write = write
+        self._flow = Flow(line, clock)
         self._resting = False
         self._library = library
         self._pinned = pinned
@@ -75,7 +83,14 @@ class Viewer:
     def overlay(self, message: bytes, framed: bytes) -> None:
         """The newest overlay, and its frame: written at once where nothing else waits, else one that was not sent yet
         is replaced."""
-        if self._resting and not self._wake.is_set() and self._write is not None and self._write(framed):
+        if (
+            self._resting
+            and not self._wake.is_set()
+            and self._write is not None
+            and self._flow.quick()
+            and self._write(framed)
+        ):
+            self._flow.wrote(len(framed))
             return
         self._overlay = message
         self._wake.set()
@@ -106,27 +121,38 @@ class Viewer:
     async def send(self, put: Callable[[bytes], Awaitable[None]]) -> None:
         """Send for ever; raises `Refusal`."""
         shown: TimelineState | None = None
+
+        async def write(message: bytes) -> None:
+            await put(message)
+            self._flow.wrote(len(message))
+
         while True:
             self._wake.clear()
             if self.overrun:
                 raise Refusal(TOO_SLOW, "Too slow", f"{QUEUE} messages waited; come again")
             while self._pings:
                 ping, received = self._pings.popleft()
-                await put(Pong(ping.sequence, ping.sent, received, clock()).pack())
+                await write(Pong(ping.sequence, ping.sent, received, clock()).pack())
             if (state := self._timelines.newest) is not None and state is not shown:
-                await self._show(state, put)
+                await self._show(state, write)
                 shown = state
             while self._control and not self._pings:
-                await put(self._control.popleft())
-            if self._overlay is not None:
-                overlay, self._overlay = self._overlay, None
-                await put(overlay)
+                await write(self._control.popleft())
             if self._wake.is_set():
                 continue
-            if (packet := self._next_packet()) is not None:
-                await put(packet)
+            if not self._flow.room():
+                await self._rest(full=True)
                 continue
-            await self._rest()
+            if self._overlay is not None and not (self._flow.blocks_turn and (packet := self._next_packet())):
+                overlay, self._overlay = self._overlay, None
+                await write(newest(overlay) if self._flow.narrow else overlay)
+                self._flow.overlay_went(len(overlay))
+            elif self._overlay is not None or (packet := self._next_packet()) is not None:
+                assert packet is not None
+                await write(packet)
+                self._flow.block_went(len(packet))
+            else:
+                await self._rest()
 
     async def _show(self, state: TimelineState, put: Callable[[bytes], Awaitable[None]]) -> None:
         if self._motion is None or self._motion.id != state.motion:
@@ -147,8 +173,11 @@ class Viewer:
         due = self._pacer.next(state, clock(), self._rate.rate)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
-    async def _rest(self) -> None:
-        """Until something is to be sent again."""
+    async def _rest(self, full: bool = False) -> None:
+        """Until something is to be sent again, or there may be room on a line that is full."""
+        if full:
+            await asyncio.sleep(self._flow.window.wait() / 1e6)
+            return
         state = self._timelines.at(clock())
         wait = self._pacer.wait(state, clock()) if state is not None and self._pacer is not None else None
         self._resting = True

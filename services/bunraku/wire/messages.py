@@ -262,6 +262,12 @@ class Overlay:
         return cls(sequence, due, frames[-1], tuple(frames[:-1]))
 
 
+def newest(overlay: bytes) -> bytes:
+    """An Overlay's message with its last frame alone, for a line that does not carry all."""
+    limbs = (overlay[1] & 15).bit_count()
+    return bytes((overlay[0], overlay[1] & 15)) + overlay[2:12] + overlay[len(overlay) - 18 * limbs :]
+
+
 @dataclass(frozen=True, slots=True)
 class Ping:
     """Asks for the time; `sent` is the sender's own clock. As long as its answer, so that both ways cost the same."""

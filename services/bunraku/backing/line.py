@@ -1,0 +1,67 @@
+"""What the operating system knows of a socket's line: what was acknowledged and what waits (Linux, tcp(7), tcp_info)."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+import sys
+from dataclasses import dataclass
+
+from starlette.websockets import WebSocket
+
+if sys.platform == "linux":
+    import fcntl
+
+EXTENSION = "bunraku.line"
+"""The ASGI extension by which the server's protocol hands its transport to `line_of`."""
+_OUTQ = 0x5411
+"""SIOCOUTQ: bytes that were written and are not acknowledged."""
+_TCP_INFO = getattr(socket, "TCP_INFO", 11)
+_NUMBER = struct.Struct("=I")
+_ROUND_TRIP, _LEAST = 68, 148
+"""Where `tcpi_rtt` and `tcpi_min_rtt` stand in `struct tcp_info`; the kernel only ever adds to its end."""
+_SIZE = 152
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Bytes `waiting` for acknowledgement, the smoothed `round_trip` and the `least` one, microseconds; 0: not known."""
+
+    waiting: int
+    round_trip: int
+    least: int
+
+
+class Line:
+    """The line of one connected transport."""
+
+    def __init__(self, transport: asyncio.Transport) -> None:
+        """Raises OSError where the system does not tell."""
+        connected = transport.get_extra_info("socket")
+        if sys.platform != "linux" or connected is None:
+            raise OSError("only Linux tells what is on its way")
+        self._transport = transport
+        self._socket = connected
+        self.read()
+
+    def read(self) -> Reading:
+        """How it stands now; raises OSError once the socket is closed."""
+        waiting = struct.unpack("=i", fcntl.ioctl(self._socket.fileno(), _OUTQ, b"\0\0\0\0"))[0]
+        info = self._socket.getsockopt(socket.IPPROTO_TCP, _TCP_INFO, _SIZE)
+        # what the transport has not handed to the system yet waits too
+        waiting += self._transport.get_write_buffer_size()
+        if len(info) < _SIZE:
+            return Reading(waiting, 0, 0)
+        return Reading(waiting, _NUMBER.unpack_from(info, _ROUND_TRIP)[0], _NUMBER.unpack_from(info, _LEAST)[0])
+
+
+def line_of(ws: WebSocket) -> Line | None:
+    """The line of a WebSocket, None where its server or the system does not tell of it."""
+    offered = (ws.scope.get("extensions") or {}).get(EXTENSION)
+    if not offered:
+        return None
+    try:
+        return Line(offered["transport"])
+    except OSError:
+        return None

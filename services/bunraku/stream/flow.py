@@ -1,0 +1,88 @@
+"""When there is room on one viewer's line, and whose turn it is where the live overlay and blocks share a narrow one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from bunraku.backing.line import Reading
+from bunraku.playout.window import Window
+
+CLEAN = 64
+"""So many times there was room at once before a line counts as quick."""
+SKIPPED = 8
+"""On a quick line the system is asked for every so many overlays."""
+BLOCKS = 0.3
+"""The share of a full line that better blocks get while overlays wait."""
+
+
+class Readable(Protocol):
+    """A line that can be read, as `bunraku.backing.line.Line`."""
+
+    def read(self) -> Reading:
+        """How it stands now; raises OSError once it is closed."""
+
+
+class Flow:
+    """What one viewer's line can take now."""
+
+    def __init__(self, line: Readable | None, now: Callable[[], int]) -> None:
+        """`line` None: nothing is known of it, and there is always room; `now` tells microseconds."""
+        self._line = line
+        self._now = now
+        self.window = Window()
+        self._clean = 0
+        self._skip = 0
+        self._credit = 0.0
+
+    def wrote(self, size: int) -> None:
+        """Bytes were written, in one go."""
+        if not self._skip and self._line is not None:
+            self.window.wrote(self._now(), size)
+
+    def quick(self) -> bool:
+        """Whether an overlay may be written whole and at once: most often told without asking the system."""
+        if self._skip:
+            self._skip -= 1
+            return True
+        if self._line is None:
+            return True
+        if self.narrow or not self.room():
+            self._clean = 0
+            return False
+        self._clean += 1
+        if self._clean >= CLEAN:
+            self._skip = SKIPPED
+        return True
+
+    def room(self) -> bool:
+        """Whether something may be written now."""
+        if self._line is None:
+            return True
+        now = self._now()
+        if self.window.flying:
+            try:
+                reading = self._line.read()
+            except OSError:
+                # it is closed: whoever writes to it is told
+                return True
+            self.window.acknowledged(now, reading.waiting, reading.least)
+        return self.window.room(now)
+
+    @property
+    def narrow(self) -> bool:
+        """Whether the line was full of late."""
+        return self._line is not None and self.window.narrow(self._now())
+
+    def overlay_went(self, size: int) -> None:
+        """An overlay was written: blocks that waited come closer to their turn."""
+        self._credit = min(self._credit + size * BLOCKS / (1 - BLOCKS), 400.0)
+
+    def block_went(self, size: int) -> None:
+        """A block was written."""
+        self._credit = max(self._credit - size, -2_000.0)
+
+    @property
+    def blocks_turn(self) -> bool:
+        """Whether a block goes before an overlay that waits too."""
+        return self._credit > 0
