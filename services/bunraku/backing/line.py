@@ -1,4 +1,4 @@
-"""What the operating system knows of a socket's line: what was acknowledged and what waits (Linux, tcp(7), tcp_info)."""
+"""What the system knows of a socket's line: how much is not acknowledged, and its round trips (Linux, tcp(7))."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SIZE = 152
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Bytes `waiting` for acknowledgement, the smoothed `round_trip` and the `least` one, microseconds; 0: not known."""
+    """Bytes `waiting` for acknowledgement, the smoothed `round_trip` and the `least`, microseconds; 0: not known."""
 
     waiting: int
     round_trip: int
@@ -47,7 +47,10 @@ class Line:
 
     def read(self) -> Reading:
         """How it stands now; raises OSError once the socket is closed."""
-        waiting = struct.unpack("=i", fcntl.ioctl(self._socket.fileno(), _OUTQ, b"\0\0\0\0"))[0]
+        number = self._socket.fileno()
+        if number < 0:
+            raise OSError("the socket is closed")
+        waiting = struct.unpack("=i", fcntl.ioctl(number, _OUTQ, b"\0\0\0\0"))[0]
         info = self._socket.getsockopt(socket.IPPROTO_TCP, _TCP_INFO, _SIZE)
         # what the transport has not handed to the system yet waits too
         waiting += self._transport.get_write_buffer_size()

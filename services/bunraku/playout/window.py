@@ -1,10 +1,12 @@
 """How much a sender may have on its way over a line, so that what is newest does not wait behind what is old.
 
 A narrow line keeps what it cannot send yet in a queue, and TCP fills it. So a window of unacknowledged bytes is kept
-such that the queue holds about `QUEUE` of time: the window grows with what is acknowledged while answers come as soon as
-they can, and goes back to what the line carries once they come late (as TCP Vegas, Brakmo and Peterson 1995, and BBR's
-bandwidth-delay product, Cardwell et al. 2016). Bytes are those of the line: every message is a packet and pays for its
-heads. Times are microseconds of any clock that does not run backwards.
+such that answers come about `QUEUE` later than they could: once a round trip it is corrected by what is too much or too
+little in the queue (as in FAST TCP, Wei, Jin, Low and Hegde 2006). Of the round trips of that time the shortest counts,
+as receivers take their time to acknowledge. What the line carries is told by Little's law: what was on its way when a
+message was written, over the time until that was acknowledged; of the last second the most counts, as a line that is
+not filled tells less. Bytes are those of the line: every message is a packet and pays for its heads. Times are
+microseconds of any clock that does not run backwards.
 """
 
 from __future__ import annotations
@@ -16,11 +18,17 @@ HEADS = 54
 PACKET = 1_400
 """Of a longer message each such part is a packet."""
 QUEUE = 100_000
-"""What may wait in the line's queue, and an acknowledgement with the receiver, microseconds."""
-LEAST = 1_200
+"""How much later than they could acknowledgements are to come: the line's queue and the receiver's own wait."""
+LEAST = 1_600
 """The window before anything is known: a first block, its Description, and some more."""
-SLOPE = 400_000
-"""The line's rate is told over this time, microseconds."""
+SPARE = 1.2
+"""The window is never more than so much of what the line carries."""
+STEP = 60.0
+"""Bytes that a window grows by at least, where it is too small."""
+WATCHED = 30_000
+"""A round trip counts only if its end was looked out for as often as this."""
+REMEMBERED = 1_000_000
+"""What the line carried in this time counts."""
 FORGET = 10_000_000
 """So long after its queue was last seen filled a line counts as narrow."""
 
@@ -45,11 +53,14 @@ class Window:
         self._written = 0
         self._line_written = 0
         self._line_acknowledged = 0
-        # of what is on its way: end in bytes written, end in bytes on the line, and when it was written
-        self._flying: deque[tuple[int, int, int]] = deque()
-        # acknowledged bytes of the line over the last time: instants and totals
-        self._slope: deque[tuple[int, int]] = deque()
+        # of what is on its way: end in bytes written, end in bytes on the line, when, and what was on its way then
+        self._flying: deque[tuple[int, int, int, int]] = deque()
+        self._rates: deque[tuple[int, float]] = deque()
+        self._looked = 0
         self._limited = False
+        # the present round trip: since when, and the shortest in it
+        self._turn = 0
+        self._took: int | None = None
 
     @property
     def flying(self) -> int:
@@ -58,65 +69,61 @@ class Window:
 
     def wrote(self, at: int, size: int) -> None:
         """`size` bytes were written at once at `at`."""
-        if not self._flying:
-            # a slope begins where something is on its way again
-            self._slope.clear()
-            self._slope.append((at, self._line_acknowledged))
         self._written += size
         self._line_written += on_line(size)
-        self._flying.append((self._written, self._line_written, at))
+        self._flying.append((self._written, self._line_written, at, self.flying))
 
     def acknowledged(self, at: int, waiting: int, least: int | None = None) -> None:
         """At `at`, of all that was written the last `waiting` bytes are not acknowledged yet; `least` is the shortest
         round trip that the system knows of, if it tells."""
         done = self._written - max(waiting, 0)
-        newest: int | None = None
+        looked, self._looked = self._looked, at
+        newest = None
         while self._flying and self._flying[0][0] <= done:
-            _, self._line_acknowledged, newest = self._flying.popleft()
+            newest = self._flying.popleft()
+            self._line_acknowledged = newest[1]
         if newest is None:
             return
-        took = max(at - newest, 1)
-        known = [time for time in (self.base, least, took) if time is not None and time > 0]
-        self.base = min(known)
-        gained = self._line_acknowledged - self._slope[-1][1] if self._slope else 0
-        self._slope.append((at, self._line_acknowledged))
-        while len(self._slope) > 2 and at - self._slope[1][0] >= SLOPE:
-            self._slope.popleft()
-        self._heed(at, took - self.base, gained)
+        _, _, written, flying = newest
+        took = max(at - written, 1)
+        self.base = min(time for time in (self.base, least, took) if time)
+        if at - max(looked, written) <= WATCHED:
+            self._heed(at, took, flying, written)
 
-    def _heed(self, at: int, queued: int, gained: int) -> None:
-        """Acknowledgements came `queued` later than they could, of `gained` bytes."""
-        begun, before = self._slope[0]
-        slope = (self._line_acknowledged - before) * 1e6 / max(at - begun, 1)
-        if queued > QUEUE // 2:
-            self.full_at = at
-            if at - begun >= SLOPE // 2:
-                self.rate = slope
-            if queued > QUEUE and self.rate is not None:
-                self.limit = max(self.carried, float(HEADS))
-        else:
-            if self.rate is None or slope > self.rate:
-                self.rate = slope
-            if self._limited:
-                self.limit += gained
-        self._limited = False
-
-    @property
-    def carried(self) -> float:
-        """Bytes that the line carries in a round trip and `QUEUE`."""
+    def _heed(self, at: int, took: int, flying: int, written: int) -> None:
+        """What was written at `written` with `flying` on its way took so long."""
         assert self.base is not None
-        assert self.rate is not None
-        return self.rate * (self.base + QUEUE) * 1e-6
+        self._rates.append((at, flying * 1e6 / took))
+        while at - self._rates[0][0] > REMEMBERED:
+            self._rates.popleft()
+        self.rate = max(rate for _, rate in self._rates)
+        if took - self.base > QUEUE:
+            self.full_at = at
+            self.limit = min(self.limit, SPARE * self.rate * (self.base + QUEUE) * 1e-6)
+        if flying <= self.limit + STEP:
+            # else it was behind something larger than the window
+            self._took = min(self._took or took, took)
+        if written < self._turn:
+            return
+        # a round trip has passed: this was written after the last turn
+        if self._took is not None:
+            queued = self._took - self.base
+            if queued > QUEUE:
+                self.limit *= (self.base + QUEUE) / self._took
+            elif self._limited:
+                self.limit += max(self.limit * (1.0 - queued / QUEUE), STEP)
+        self.limit = max(self.limit, STEP)
+        self._turn, self._took, self._limited = at, None, False
 
     def room(self, at: int) -> bool:
         """Whether something may be written at `at`: always when nothing is on its way."""
         if not self._flying:
             return True
-        late = self.base is not None and at - self._flying[0][2] > self.base + 2 * QUEUE
-        if self.flying >= self.limit or late:
+        if self.flying >= self.limit:
             self._limited = True
             return False
-        return True
+        # nothing came back for long: the line has become slower, or stands
+        return self.base is None or at - self._flying[0][2] <= self.base + 2 * QUEUE
 
     def wait(self) -> int:
         """Microseconds after which there may be room."""

@@ -1,4 +1,4 @@
-"""When there is room on one viewer's line, and whose turn it is where the live overlay and blocks share a narrow one."""
+"""When there is room on one viewer's line, and whose turn it is where the live overlay and blocks share it."""
 
 from __future__ import annotations
 
