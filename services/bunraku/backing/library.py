@@ -41,6 +41,8 @@ class StoredMotion:
     tracks: tuple[Track, ...]
     packets: list[list[list[bytes]]]
     front: float = 0.0
+    costs: tuple[float, ...] = ()
+    """What each rate of the motion's own track costs, kbit/s."""
 
     @property
     def track(self) -> MotionTrack:
@@ -88,7 +90,9 @@ def unpack(motion: str, packed: bytes) -> StoredMotion:
     # objects from when a motion was one track have its packets alone
     packets = values["tracks"] if "tracks" in values else [values["packets"]]
     tracks: tuple[Track, ...] = (read_track(described[0]), *map(read_scene, described[1:]))
-    return StoredMotion(motion, values["description"], tracks, packets, float(described[0].get("front", 0.0)))
+    costs = tuple(float(rate["kbps"]) for rate in described[0].get("rates", ()))
+    front = float(described[0].get("front", 0.0))
+    return StoredMotion(motion, values["description"], tracks, packets, front, costs)
 
 
 class Library:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import struct
 import sys
@@ -17,6 +18,7 @@ EXTENSION = "bunraku.line"
 """The ASGI extension by which the server's protocol hands its transport to `line_of`."""
 _OUTQ = 0x5411
 """SIOCOUTQ: bytes that were written and are not acknowledged."""
+_CORK = getattr(socket, "TCP_CORK", 3)
 _TCP_INFO = getattr(socket, "TCP_INFO", 11)
 _NUMBER = struct.Struct("=I")
 _ROUND_TRIP, _LEAST = 68, 148
@@ -57,6 +59,12 @@ class Line:
         if len(info) < _SIZE:
             return Reading(waiting, 0, 0)
         return Reading(waiting, _NUMBER.unpack_from(info, _ROUND_TRIP)[0], _NUMBER.unpack_from(info, _LEAST)[0])
+
+    def hold(self, held: bool) -> None:
+        """Keep what is written until a packet is full (for 200 ms at most), or let it go: at the start each packet of
+        its own costs a narrow line the time of its heads."""
+        with contextlib.suppress(OSError):
+            self._socket.setsockopt(socket.IPPROTO_TCP, _CORK, held)
 
 
 def line_of(ws: WebSocket) -> Line | None:

@@ -1,7 +1,7 @@
 """How much a sender may have on its way over a line, so that what is newest does not wait behind what is old.
 
 A narrow line keeps what it cannot send yet in a queue, and TCP fills it. So a window of unacknowledged bytes is kept
-such that answers come about `QUEUE` later than they could: once a round trip it is corrected by what is too much or too
+such that about `QUEUED` bytes wait in the queue: once a round trip it is corrected by what is too much or too
 little in the queue (as in FAST TCP, Wei, Jin, Low and Hegde 2006). Of the round trips of that time the shortest counts,
 as receivers take their time to acknowledge. What the line carries is told by Little's law: what was on its way when a
 message was written, over the time until that was acknowledged; of the last second the most counts, as a line that is
@@ -17,12 +17,14 @@ HEADS = 54
 """Bytes of heads that a message costs on the line: IPv4, TCP with time stamps, and a WebSocket frame's."""
 PACKET = 1_400
 """Of a longer message each such part is a packet."""
-QUEUE = 100_000
-"""How much later than they could acknowledgements are to come: the line's queue and the receiver's own wait."""
+DELAYED = 40_000
+"""A receiver waits so long before it acknowledges, microseconds."""
+QUEUED = 220
+"""Bytes that are to wait in the line's queue: a message or two."""
 LEAST = 1_600
 """The window before anything is known: a first block, its Description, and some more."""
-SPARE = 1.2
-"""The window is never more than so much of what the line carries."""
+LARGE = 250
+"""Bytes of a message that is not large."""
 STEP = 60.0
 """Bytes that a window grows by at least, where it is too small."""
 WATCHED = 30_000
@@ -67,6 +69,11 @@ class Window:
         """Bytes of the line that are not acknowledged yet."""
         return self._line_written - self._line_acknowledged
 
+    @property
+    def late(self) -> float:
+        """How much later than they could acknowledgements are to come, microseconds."""
+        return DELAYED + (QUEUED / self.rate * 1e6 if self.rate else 0.0)
+
     def wrote(self, at: int, size: int) -> None:
         """`size` bytes were written at once at `at`."""
         self._written += size
@@ -97,22 +104,24 @@ class Window:
         while at - self._rates[0][0] > REMEMBERED:
             self._rates.popleft()
         self.rate = max(rate for _, rate in self._rates)
-        if took - self.base > QUEUE:
+        if took - self.base > self.late:
             self.full_at = at
-            self.limit = min(self.limit, SPARE * self.rate * (self.base + QUEUE) * 1e-6)
-        if flying <= self.limit + STEP:
+        if flying <= self.limit + LARGE:
             # else it was behind something larger than the window
             self._took = min(self._took or took, took)
+            if took - self.base > 2 * self.late:
+                # the line has become slower
+                self.limit = min(self.limit, self.rate * (self.base + self.late) * 1e-6)
         if written < self._turn:
             return
         # a round trip has passed: this was written after the last turn
         if self._took is not None:
             queued = self._took - self.base
-            if queued > QUEUE:
-                self.limit *= (self.base + QUEUE) / self._took
+            if queued > self.late:
+                self.limit *= (self.base + self.late) / self._took
             elif self._limited:
-                self.limit += max(self.limit * (1.0 - queued / QUEUE), STEP)
-        self.limit = max(self.limit, STEP)
+                self.limit += max(self.limit * 0.5 * (1.0 - queued / self.late), STEP)
+        self.limit = max(self.limit, float(LARGE))
         self._turn, self._took, self._limited = at, None, False
 
     def room(self, at: int) -> bool:
@@ -123,7 +132,7 @@ class Window:
             self._limited = True
             return False
         # nothing came back for long: the line has become slower, or stands
-        return self.base is None or at - self._flying[0][2] <= self.base + 2 * QUEUE
+        return self.base is None or at - self._flying[0][2] <= self.base + 2 * self.late
 
     def wait(self) -> int:
         """Microseconds after which there may be room."""

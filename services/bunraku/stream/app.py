@@ -15,6 +15,7 @@ from bunraku.backing.line import line_of
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
 from bunraku.playout import timeline
+from bunraku.playout.held import Held
 from bunraku.stream import viewers
 from bunraku.stream.sessions import WatchedSessions
 from bunraku.stream.viewers import TRACKS, Viewer
@@ -23,6 +24,9 @@ IMMUTABLE = {"Cache-Control": "public, max-age=31536000, immutable"}
 
 RateQuery = Annotated[int | None, Query(ge=0, le=15)]
 TracksQuery = Annotated[str, Query(max_length=64)]
+HaveQuery = Annotated[str, Query(max_length=160)]
+RETURN = 60_000_000
+"""Who says when a private timeline began says so within this of now, microseconds."""
 
 
 def create_app(backing: Backing) -> FastAPI:
@@ -56,28 +60,45 @@ def create_app(backing: Backing) -> FastAPI:
             )
         return Response(packets[rate][index], media_type=_BYTES, headers=IMMUTABLE)
 
+    async def come(socket: WebSocket, rate: int | None, tracks: str, have: str) -> Viewer:
+        """The viewer of a socket, which is accepted."""
+        line = line_of(socket)
+        if line is not None:
+            line.hold(True)
+        await sockets.accept(socket)
+        return Viewer(backing.library, rate, _wanted(tracks), writer(socket), line, _held(have))
+
     @app.websocket("/v1/motions/{motion}/stream")
     async def watch_motion(
-        socket: WebSocket, motion: str, rate: RateQuery = None, tracks: TracksQuery = "", at: float = 0.0
+        socket: WebSocket,
+        motion: str,
+        rate: RateQuery = None,
+        tracks: TracksQuery = "",
+        have: HaveQuery = "",
+        at: float = 0.0,
+        clock_at: Annotated[int | None, Query(alias="clock")] = None,
     ) -> None:
         try:
-            await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket), line_of(socket))
+            viewer = await come(socket, rate, tracks, have)
             found = await backing.library.get(motion)
             if found is None:
                 raise Refusal(sockets.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
             # NaN and infinities start at the beginning
             position = round(min(at, 1e6) * 1e6) if at > 0 else 0
-            viewer.timeline(timeline.start(motion, found.track.duration_us, clock(), position=position))
+            now = clock()
+            # who comes back goes on where it was, however long the way here took
+            began = now if clock_at is None or abs(now - clock_at) > RETURN else clock_at
+            viewer.timeline(timeline.start(motion, found.track.duration_us, began, position=position))
             await viewers.serve(socket, viewer, private=True)
         except Refusal as refusal:
             await sockets.close(socket, refusal)
 
     @app.websocket("/v1/sessions/{session}/stream")
-    async def watch_session(socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "") -> None:
+    async def watch_session(
+        socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "", have: HaveQuery = ""
+    ) -> None:
         try:
-            await sockets.accept(socket)
-            viewer = Viewer(backing.library, rate, _wanted(tracks), writer(socket), line_of(socket))
+            viewer = await come(socket, rate, tracks, have)
             try:
                 await sessions.join(session, viewer)
             except NobodyAnswers:
@@ -93,6 +114,14 @@ def create_app(backing: Backing) -> FastAPI:
 
 
 _BYTES = "application/octet-stream"
+
+
+def _held(have: str) -> Held | None:
+    """What a viewer says it has; raises `Refusal` where it cannot be read."""
+    try:
+        return Held.read(have) if have else None
+    except ValueError as error:
+        raise Refusal(sockets.BROKEN, "Unreadable query", str(error)) from None
 
 
 def _wanted(tracks: str) -> tuple[str, ...]:

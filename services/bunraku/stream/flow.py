@@ -6,14 +6,14 @@ from collections.abc import Callable
 from typing import Protocol
 
 from bunraku.backing.line import Reading
-from bunraku.playout.window import Window
+from bunraku.playout.window import Window, on_line
 
 CLEAN = 64
 """So many times there was room at once before a line counts as quick."""
 SKIPPED = 8
 """On a quick line the system is asked for every so many overlays."""
 BLOCKS = 0.3
-"""The share of a full line that better blocks get while overlays wait."""
+"""The share of a narrow line that blocks get beside overlays."""
 
 
 class Readable(Protocol):
@@ -21,6 +21,9 @@ class Readable(Protocol):
 
     def read(self) -> Reading:
         """How it stands now; raises OSError once it is closed."""
+
+    def hold(self, held: bool) -> None:
+        """Keep what is written together in packets as full as can be, or let it go."""
 
 
 class Flow:
@@ -34,6 +37,14 @@ class Flow:
         self._clean = 0
         self._skip = 0
         self._credit = 0.0
+        self._credited_at = now()
+        self._began = line is None
+
+    def begun(self) -> None:
+        """The first block was written, or there is none: what was held so far goes, in one packet."""
+        if not self._began and self._line is not None:
+            self._began = True
+            self._line.hold(False)
 
     def wrote(self, size: int) -> None:
         """Bytes were written, in one go."""
@@ -74,15 +85,14 @@ class Flow:
         """Whether the line was full of late."""
         return self._line is not None and self.window.narrow(self._now())
 
-    def overlay_went(self, size: int) -> None:
-        """An overlay was written: blocks that waited come closer to their turn."""
-        self._credit = min(self._credit + size * BLOCKS / (1 - BLOCKS), 400.0)
-
     def block_went(self, size: int) -> None:
         """A block was written."""
-        self._credit = max(self._credit - size, -2_000.0)
+        self._credit -= on_line(size)
 
-    @property
     def blocks_turn(self) -> bool:
-        """Whether a block goes before an overlay that waits too."""
+        """Whether a block that can wait may take room from overlays: on a narrow line they have a share of it."""
+        now, rate = self._now(), self.window.rate or 0.0
+        self._credit += BLOCKS * rate * (now - self._credited_at) * 1e-6
+        self._credit = min(self._credit, BLOCKS * rate)
+        self._credited_at = now
         return self._credit > 0

@@ -22,11 +22,13 @@ from bunraku.codec.coefficients import SCENE_CHANNELS
 from bunraku.codec.scene import SceneTrack
 from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.playout import timeline
+from bunraku.playout.held import Held
 from bunraku.playout.pacing import Paced, Pacer
 from bunraku.playout.rate import RateChoice
 from bunraku.stream.flow import Flow, Readable
 from bunraku.wire.messages import (
     ChannelHeader,
+    Choice,
     Edit,
     MalformedMessage,
     Ping,
@@ -39,6 +41,8 @@ from bunraku.wire.messages import (
 
 QUEUE = 64
 """Messages that may wait for a viewer."""
+BESIDE = 1_000_000
+"""So long after an overlay the hands share the line with blocks, microseconds."""
 TRACKS = ("motion", "audio", "camera", "light")
 """Types of tracks that a viewer may ask for."""
 
@@ -53,9 +57,12 @@ class Viewer:
         wanted: Container[str] = TRACKS,
         write: Write | None = None,
         line: Readable | None = None,
+        held: Held | None = None,
     ) -> None:
         """`pinned` is the rate to keep to, if any; `wanted` the types of tracks whose blocks are sent; `write` writes a
-        frame past the queue, where the server can; `line` tells how much is on its way, where the system does."""
+        frame past the queue, where the server can; `line` tells how much is on its way, where the system does; `held`
+        is what the viewer has and is not sent again."""
+        self._held = held
         self._write = write
         self._flow = Flow(line, clock)
         self._resting = False
@@ -69,6 +76,8 @@ class Viewer:
         self._motion: StoredMotion | None = None
         self._pacer: Pacer | None = None
         self._rate: RateChoice | None = None
+        self._told: Choice | None = None
+        self._beside_at = 0
         self._wake = asyncio.Event()
         self.overrun = False
 
@@ -93,6 +102,7 @@ class Viewer:
             self._flow.wrote(len(framed))
             return
         self._overlay = message
+        self._beside_at = clock()
         self._wake.set()
 
     def timeline(self, state: TimelineState) -> None:
@@ -143,14 +153,16 @@ class Viewer:
             if not self._flow.room():
                 await self._rest(full=True)
                 continue
-            if self._overlay is not None and not (self._flow.blocks_turn and (packet := self._next_packet())):
-                overlay, self._overlay = self._overlay, None
-                await write(newest(overlay) if self._flow.narrow else overlay)
-                self._flow.overlay_went(len(overlay))
-            elif self._overlay is not None or (packet := self._next_packet()) is not None:
-                assert packet is not None
+            narrow = self._flow.narrow
+            if (self._overlay is None or narrow) and (packet := self._next_packet(narrow)) is not None:
                 await write(packet)
                 self._flow.block_went(len(packet))
+                self._flow.begun()
+            elif self._overlay is not None:
+                overlay, self._overlay = self._overlay, None
+                await write(newest(overlay) if narrow else overlay)
+            elif (news := self._news()) is not None:
+                await write(news)
             else:
                 await self._rest()
 
@@ -160,26 +172,51 @@ class Viewer:
             if motion is None:
                 raise Refusal(NOT_FOUND, "No such motion", f"there is no motion {state.motion[:40]!r}")
             self._motion, self._pacer = motion, Pacer(_paced(motion, self._wanted))
-            self._rate = RateChoice(len(motion.dance), self._pinned)
+            self._rate = RateChoice(len(motion.dance), self._pinned, motion.costs)
+            self._told = None
             channels = sum(SCENE_CHANNELS if isinstance(t, SceneTrack) else CHANNEL_COUNT for t in motion.tracks)
             await put(ChannelHeader(motion.id, clock(), channels, __version__).pack())
-            await put(motion.description)
+            if self._held is not None and self._held.motion == motion.id:
+                for nth, rate in enumerate(self._held.rates):
+                    if rate >= 0:
+                        self._pacer.has(0, (self._held.first + nth) % motion.track.blocks, rate)
+            else:
+                await put(motion.description)
+            self._held = None
         await put(state.pack())
 
-    def _next_packet(self) -> bytes | None:
-        state = self._timelines.at(clock())
+    def _next_packet(self, narrow: bool) -> bytes | None:
+        now = clock()
+        state = self._timelines.at(now)
         if state is None or self._pacer is None or self._motion is None or self._rate is None:
             return None
-        due = self._pacer.next(state, clock(), self._rate.rate)
+        beside = narrow and now - self._beside_at < BESIDE
+        self._rate.line(self._flow.window.rate if narrow else None, now, beside)
+        due = self._pacer.next(state, now, self._rate.rate, narrow, not beside or self._flow.blocks_turn())
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
+
+    def _news(self) -> bytes | None:
+        """The choice of a rate, where the viewer has not been told yet."""
+        if self._rate is None or "motion" not in self._wanted:
+            return None
+        choice = self._rate.choice
+        told, self._told = self._told, choice
+        if told is not None and (told.rate, told.reason) == (choice.rate, choice.reason):
+            return None
+        return choice.pack()
 
     async def _rest(self, full: bool = False) -> None:
         """Until something is to be sent again, or there may be room on a line that is full."""
+        self._flow.begun()
         if full:
             await asyncio.sleep(self._flow.window.wait() / 1e6)
             return
         state = self._timelines.at(clock())
-        wait = self._pacer.wait(state, clock()) if state is not None and self._pacer is not None else None
+        wait = (
+            self._pacer.wait(state, clock(), self._flow.narrow)
+            if state is not None and self._pacer is not None
+            else None
+        )
         self._resting = True
         try:
             with contextlib.suppress(TimeoutError):
