@@ -3,15 +3,15 @@
 A narrow line keeps what it cannot send yet in a queue, and TCP fills it. So a window of unacknowledged bytes is kept
 such that about `QUEUED` bytes wait in the queue: once a round trip it is corrected by what is too much or too
 little in the queue (as in FAST TCP, Wei, Jin, Low and Hegde 2006). Of the round trips of that time the shortest counts,
-as receivers take their time to acknowledge. What the line carries is told by Little's law: what was on its way when a
-message was written, over the time until that was acknowledged; of the last second the most counts, as a line that is
-not filled tells less. Bytes are those of the line: every message is a packet and pays for its heads. Times are
-microseconds of any clock that does not run backwards.
+as receivers take their time to acknowledge. What the line carries is told by what was acknowledged between two
+answers (the delivery rate of BBR, Cardwell et al. 2016, over the bytes of the line). Bytes are those of the line: every
+message is a packet and pays for its heads. Times are microseconds of any clock that does not run backwards.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from typing import NamedTuple
 
 HEADS = 54
 """Bytes of heads that a message costs on the line: IPv4, TCP with time stamps, and a WebSocket frame's."""
@@ -29,8 +29,8 @@ STEP = 60.0
 """Bytes that a window grows by at least, where it is too small."""
 WATCHED = 30_000
 """A round trip counts only if its end was looked out for as often as this."""
-REMEMBERED = 1_000_000
-"""What the line carried in this time counts."""
+WEIGHT = 0.3
+"""Of the newest in the mean of the line's rate."""
 FORGET = 10_000_000
 """So long after its queue was last seen filled a line counts as narrow."""
 
@@ -38,6 +38,20 @@ FORGET = 10_000_000
 def on_line(size: int) -> int:
     """Bytes that a message of `size` bytes takes on the line."""
     return size + HEADS * (1 + max(size - 1, 0) // PACKET)
+
+
+class _Flying(NamedTuple):
+    """A message on its way: its end in bytes written and in bytes of the line, when it was written, the bytes on their
+    way then (of none more than a message has), how much larger it is than a message; what was acknowledged by then, and
+    since when nothing else was."""
+
+    end: int
+    line_end: int
+    at: int
+    flying: int
+    large: int
+    acknowledged: int
+    since: int
 
 
 class Window:
@@ -55,9 +69,11 @@ class Window:
         self._written = 0
         self._line_written = 0
         self._line_acknowledged = 0
-        # of what is on its way: end in bytes written, end in bytes on the line, when, and what was on its way then
-        self._flying: deque[tuple[int, int, int, int]] = deque()
-        self._rates: deque[tuple[int, float]] = deque()
+        self._flying: deque[_Flying] = deque()
+        self._answered_at = 0
+        # beyond what a message has, of what is on its way; and when the line is through with it
+        self._large = 0
+        self._through = 0.0
         self._looked = 0
         self._limited = False
         # the present round trip: since when, and the shortest in it
@@ -77,41 +93,58 @@ class Window:
     def wrote(self, at: int, size: int) -> None:
         """`size` bytes were written at once at `at`."""
         self._written += size
+        large = max(on_line(size) - LARGE, 0)
         self._line_written += on_line(size)
-        self._flying.append((self._written, self._line_written, at, self.flying))
+        self._large += large
+        if large and self.rate:
+            self._through = max(self._through, at) + on_line(size) / self.rate * 1e6
+        since = self._answered_at if self._flying else at
+        self._flying.append(
+            _Flying(
+                self._written, self._line_written, at, self.flying - self._large, large, self._line_acknowledged, since
+            )
+        )
 
     def acknowledged(self, at: int, waiting: int, least: int | None = None) -> None:
         """At `at`, of all that was written the last `waiting` bytes are not acknowledged yet; `least` is the shortest
         round trip that the system knows of, if it tells."""
         done = self._written - max(waiting, 0)
         looked, self._looked = self._looked, at
-        newest = None
-        while self._flying and self._flying[0][0] <= done:
+        newest: _Flying | None = None
+        while self._flying and self._flying[0].end <= done:
             newest = self._flying.popleft()
-            self._line_acknowledged = newest[1]
+            self._line_acknowledged = newest.line_end
+            self._large -= newest.large
         if newest is None:
             return
-        _, _, written, flying = newest
-        took = max(at - written, 1)
+        self._answered_at = at
+        if not self._large:
+            self._through = at
+        took = max(at - newest.at, 1)
         self.base = min(time for time in (self.base, least, took) if time)
-        if at - max(looked, written) <= WATCHED:
-            self._heed(at, took, flying, written)
+        if at - max(looked, newest.at) <= WATCHED:
+            self._heed(at, took, newest)
 
-    def _heed(self, at: int, took: int, flying: int, written: int) -> None:
-        """What was written at `written` with `flying` on its way took so long."""
+    def _heed(self, at: int, took: int, newest: _Flying) -> None:
+        """What was last acknowledged took so long."""
         assert self.base is not None
-        self._rates.append((at, flying * 1e6 / took))
-        while at - self._rates[0][0] > REMEMBERED:
-            self._rates.popleft()
-        self.rate = max(rate for _, rate in self._rates)
-        if took - self.base > self.late:
+        rate = (newest.line_end - newest.acknowledged) * 1e6 / max(at - newest.since, 1)
+        late = took - self.base
+        if self.rate is None:
+            self.rate = rate
+        elif late > self.late:
+            self.rate += WEIGHT * (rate - self.rate)
+        else:
+            self.rate = max(self.rate, rate)
+        if late > self.late:
             self.full_at = at
-        if flying <= self.limit + LARGE:
+        if newest.flying <= self.limit + LARGE and not newest.large:
             # else it was behind something larger than the window
             self._took = min(self._took or took, took)
-            if took - self.base > 2 * self.late:
+            if late > 2 * self.late and not self._large:
                 # the line has become slower
                 self.limit = min(self.limit, self.rate * (self.base + self.late) * 1e-6)
+        written = newest.at
         if written < self._turn:
             return
         # a round trip has passed: this was written after the last turn
@@ -128,8 +161,10 @@ class Window:
         """Whether something may be written at `at`: always when nothing is on its way."""
         if not self._flying:
             return True
-        if self.flying >= self.limit:
+        if self.flying - self._large >= self.limit:
             self._limited = True
+            return False
+        if at < self._through:
             return False
         # nothing came back for long: the line has become slower, or stands
         return self.base is None or at - self._flying[0][2] <= self.base + 2 * self.late

@@ -12,6 +12,8 @@ CLEAN = 64
 """So many times there was room at once before a line counts as quick."""
 SKIPPED = 8
 """On a quick line the system is asked for every so many overlays."""
+FAR = 20_000
+"""Round trips that take longer, microseconds, may be those of a narrow line."""
 BLOCKS = 0.3
 """The share of a narrow line that blocks get beside overlays."""
 
@@ -39,6 +41,8 @@ class Flow:
         self._credit = 0.0
         self._credited_at = now()
         self._began = line is None
+        # of a line over which answers take their time nothing is known before the first
+        self._far = line is not None and line.read().round_trip > FAR
 
     def begun(self) -> None:
         """The first block was written, or there is none: what was held so far goes, in one packet."""
@@ -84,6 +88,16 @@ class Flow:
     def narrow(self) -> bool:
         """Whether the line was full of late."""
         return self._line is not None and self.window.narrow(self._now())
+
+    @property
+    def unknown(self) -> bool:
+        """Whether the line may be narrow: nothing was acknowledged yet."""
+        return self._far and self.window.rate is None
+
+    @property
+    def learning(self) -> bool:
+        """Whether something is on its way that will tell of the line."""
+        return self.unknown and self.window.flying > 0
 
     def block_went(self, size: int) -> None:
         """A block was written."""

@@ -192,7 +192,8 @@ class Viewer:
             return None
         beside = narrow and now - self._beside_at < BESIDE
         self._rate.line(self._flow.window.rate if narrow else None, now, beside)
-        due = self._pacer.next(state, now, self._rate.rate, narrow, not beside or self._flow.blocks_turn())
+        rate = 0 if self._flow.unknown else self._rate.rate
+        due = self._pacer.next(state, now, rate, narrow, not beside or self._flow.blocks_turn())
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
     def _news(self) -> bytes | None:
@@ -208,7 +209,7 @@ class Viewer:
     async def _rest(self, full: bool = False) -> None:
         """Until something is to be sent again, or there may be room on a line that is full."""
         self._flow.begun()
-        if full:
+        if full or self._flow.learning:
             await asyncio.sleep(self._flow.window.wait() / 1e6)
             return
         state = self._timelines.at(clock())
