@@ -32,6 +32,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,7 @@ class Screen(Viewer):
         self.truth = truth
         self.came: list[tuple[int, float, int]] = []
         """When each overlay came, how late after its newest frame was made (ms), and how many frames it had."""
+        self.begun = 0
         self.clock_errors: list[float] = []
         self.shown: list[tuple[int, int, int]] = []
         """Of each picture: local time, reference time, rate of the block shown or -1."""
@@ -83,11 +85,16 @@ class Screen(Viewer):
             self.clock_errors.append(shown / 1e3)
             self.shown.append((now, reference, round(self._kbps_at(reference) * 1e3)))
 
-        try:
-            await self.watch(seconds, picture, **options)
-        except StreamEnded as ended:
-            print(f"a stream ended: {ended}")
-            self.figures.gaps += 1
+        self.begun = time.monotonic_ns() // 1000
+        while (left := seconds - (time.monotonic_ns() // 1000 - self.begun) / 1e6) > 0.5:
+            try:
+                await self.watch(left, picture, **options)
+            except StreamEnded as ended:
+                print(f"a stream ended: {ended}")
+                self.figures.gaps += 1
+            except (OSError, TimeoutError):
+                # the line does not carry a connection yet
+                continue
 
 
 class Bench:
@@ -270,6 +277,31 @@ async def join(bench: Bench) -> Figures:
     return figures
 
 
+async def cut(bench: Bench) -> Figures:
+    """Case cut."""
+    figures: Figures = {}
+    begin, end = 8.0, 33.0
+    with bench.net.lines([Link(28_800, 75, cut=(begin, end))]) as (far,):
+        screen = bench.dance(far)
+        before = time.monotonic_ns() // 1000
+        received: list[int] = []
+        await asyncio.gather(screen.look(45.0), _counted(far, end - 1.0, received), _counted(far, 44.0, received))
+    shown = [(at - before, reference) for at, reference, _ in screen.shown]
+    steps = [(b - a) / 1e3 for (_, a), (_, b) in pairwise(shown)]
+    figures["cut_reconnects"] = screen.figures.reconnects
+    figures["cut_stalls"] = screen.figures.gaps
+    figures["cut_dark_ms"] = round(screen.figures.dark_ms)
+    figures["cut_shown_twice"] = sum(step < 0 for step in steps)
+    figures["cut_longest_step_ms"] = round(max(steps))
+    figures["cut_kb_after"] = round((received[1] - received[0]) / 1e3, 1)
+    return figures
+
+
+async def _counted(far: Far, after: float, into: list[int]) -> None:
+    await asyncio.sleep(after)
+    into.append(far.received)
+
+
 async def traces(bench: Bench, seconds: float, scaled: list[int]) -> Figures:
     """Case traces, at these mean rates in bit/s."""
     figures: Figures = {}
@@ -337,8 +369,9 @@ def _mean(row: list[tuple[float, float]]) -> float:
 
 def _dark(screen: Screen, seconds: float) -> float:
     """Milliseconds without a picture, from the beginning on."""
-    first = screen.figures.first_pose_ms
-    return seconds * 1e3 if first is None else screen.figures.dark_ms
+    if not screen.shown:
+        return seconds * 1e3
+    return (screen.shown[0][0] - screen.begun) / 1e3 + screen.figures.dark_ms
 
 
 def _percentile(values: Any, share: float) -> float:
@@ -368,7 +401,7 @@ async def _truth() -> float:
     return best.offset
 
 
-CASES = ("9k6", "28k8", "56k", "steps", "live", "clock", "join", "traces")
+CASES = ("9k6", "28k8", "56k", "steps", "live", "clock", "join", "cut", "traces")
 
 
 async def run(net: Network, only: set[str], seconds: float) -> Figures:
@@ -391,6 +424,7 @@ async def run(net: Network, only: set[str], seconds: float) -> Figures:
     await case({"live", "clock"}, lambda: live(bench))
     await case({"steps"}, lambda: steps(bench))
     await case({"join"}, lambda: join(bench))
+    await case({"cut"}, lambda: cut(bench))
     await case({"traces"}, lambda: traces(bench, seconds, [28_800, 56_000]))
     return figures
 

@@ -40,14 +40,15 @@ class Flow:
         self._skip = 0
         self._credit = 0.0
         self._credited_at = now()
-        self._began = line is None
+        self.beginning = line is not None
+        """Whether what is written is held until the first block is."""
         # of a line over which answers take their time nothing is known before the first
         self._far = line is not None and line.read().round_trip > FAR
 
     def begun(self) -> None:
         """The first block was written, or there is none: what was held so far goes, in one packet."""
-        if not self._began and self._line is not None:
-            self._began = True
+        if self.beginning and self._line is not None:
+            self.beginning = False
             self._line.hold(False)
 
     def wrote(self, size: int) -> None:

@@ -157,7 +157,10 @@ class Viewer:
             if (self._overlay is None or narrow) and (packet := self._next_packet(narrow)) is not None:
                 await write(packet)
                 self._flow.block_went(len(packet))
-                self._flow.begun()
+                if self._flow.beginning:
+                    # the transport writes at the end of the loop's round: the first block waits for no second
+                    await asyncio.sleep(0)
+                    self._flow.begun()
             elif self._overlay is not None:
                 overlay, self._overlay = self._overlay, None
                 await write(newest(overlay) if narrow else overlay)
