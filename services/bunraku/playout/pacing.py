@@ -5,8 +5,9 @@ once, then the camera and light that go with it, then what lies within `AHEAD` a
 the motion first where several are due; last, better versions of what was sent. What a viewer already has is not sent
 again.
 
-Over a line that is narrow the lowest rate goes far ahead as a net, a second of it for the bytes of two packets' heads,
-and better versions of what is soon shown just in time: whatever the line does for half a minute, the dance goes on.
+Over a line that is narrow or may stand for a while the lowest rate goes far ahead as a net, a second of it for the bytes
+of a packet's heads, and better versions of what is soon shown just in time: whatever the line does for half a minute,
+the dance goes on.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from bunraku.wire.messages import TimelineState
 
 AHEAD = 4_000_000
 """How far ahead of the play position blocks are pushed, microseconds."""
-NARROW_AHEAD = 10_000_000
-"""As `AHEAD`, for better versions over a narrow line, which may stand for seconds."""
+NET_AHEAD = 10_000_000
+"""As `AHEAD`, for better versions where a net is kept: such a line may stand for seconds."""
 SOON = 4_000_000
 """What is shown within this goes before the rest of the net, microseconds."""
 NET = 30_000_000
@@ -74,14 +75,14 @@ class Pacer:
         """The viewer has this block at this rate already."""
         self._sent[track, index] = max(rate, self._sent.get((track, index), rate))
 
-    def next(self, state: TimelineState, clock: int, rate: int, narrow: bool = False, spare: bool = True) -> Due | None:
+    def next(self, state: TimelineState, clock: int, rate: int, net: bool = False, spare: bool = True) -> Due | None:
         """The block to send now, None when enough is on its way.
 
         A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has;
-        `narrow` says that the line is: a net is kept. Without `spare` room only what is missing soon is sent.
+        `net` says that one is kept, as over a narrow line. Without `spare` room only what is missing soon is sent.
         """
         position = position_at(state, clock)
-        found = [due for track in self._tracks if (due := self._due(track, state, position, rate, narrow)) is not None]
+        found = [due for track in self._tracks if (due := self._due(track, state, position, rate, net)) is not None]
         if not found:
             self._filling = False
             return None
@@ -91,33 +92,33 @@ class Pacer:
         self._sent[due.track, due.index] = due.rate
         return due
 
-    def wait(self, state: TimelineState, clock: int, narrow: bool = False) -> int | None:
+    def wait(self, state: TimelineState, clock: int, net: bool = False) -> int | None:
         """Microseconds until the next block comes within reach, None while nothing moves."""
         if not state.playing or not self._tracks:
             return None
-        reach = (position_at(state, clock) + (NARROW_AHEAD if narrow else AHEAD)) % state.duration
+        reach = (position_at(state, clock) + (NET_AHEAD if net else AHEAD)) % state.duration
         return min(_following(track.timing, reach, state.duration) for track in self._tracks) - reach + 1_000
 
-    def _due(self, track: Paced, state: TimelineState, position: int, rate: int, narrow: bool) -> Due | None:
+    def _due(self, track: Paced, state: TimelineState, position: int, rate: int, net: bool) -> Due | None:
         """What is to be sent first of one track."""
         timing, rate = track.timing, min(max(rate, 0), track.rates - 1)
         # a track may be shorter or longer than the motion, and turns with it
         blocks = timing.block_at(state.duration - 1) + 1
         first = min(timing.block_at(position), blocks - 1)
-        ahead = NARROW_AHEAD if narrow else AHEAD
+        ahead = NET_AHEAD if net else AHEAD
         found: list[Due] = []
         for count in range(blocks):
             turn, index = divmod(first + count, blocks)
             distance = max(timing.start_us(index) + turn * state.duration - position, 0)
-            if distance > (NET if narrow else AHEAD) or (turn and not state.loop):
+            if distance > (NET if net else AHEAD) or (turn and not state.loop):
                 break
             sent = self._sent.get((track.number, index))
-            far = narrow and distance > SOON
+            far = net and distance > SOON
             if sent is None:
                 if far and distance <= REFILL:
                     self._filling = True
                 if not far or self._filling:
-                    low = narrow or (track.base and count == 0)
+                    low = net or (track.base and count == 0)
                     found.append(Due(far, False, distance, not track.base, track.number, index, 0 if low else rate))
                 if not far:
                     break

@@ -27,7 +27,7 @@ LARGE = 250
 """Bytes of a message that is not large."""
 STEP = 60.0
 """Bytes that a window grows by at least, where it is too small."""
-WATCHED = 30_000
+WATCHED = 40_000
 """A round trip counts only if its end was looked out for as often as this."""
 WEIGHT = 0.3
 """Of the newest in the mean of the line's rate."""
@@ -161,7 +161,8 @@ class Window:
         """Whether something may be written at `at`: always when nothing is on its way."""
         if not self._flying:
             return True
-        if self.flying - self._large >= self.limit:
+        # the line is through with what is large at a time that is known, once its rate is
+        if self.flying - (self._large if self.rate else 0) >= self.limit:
             self._limited = True
             return False
         if at < self._through:

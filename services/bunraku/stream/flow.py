@@ -42,8 +42,8 @@ class Flow:
         self._credited_at = now()
         self.beginning = line is not None
         """Whether what is written is held until the first block is."""
-        # of a line over which answers take their time nothing is known before the first
-        self._far = line is not None and line.read().round_trip > FAR
+        self.far = line is not None and line.read().round_trip > FAR
+        """Whether answers take their time: the line may be a narrow one, or one that stands now and then."""
 
     def begun(self) -> None:
         """The first block was written, or there is none: what was held so far goes, in one packet."""
@@ -93,7 +93,7 @@ class Flow:
     @property
     def unknown(self) -> bool:
         """Whether the line may be narrow: nothing was acknowledged yet."""
-        return self._far and self.window.rate is None
+        return self.far and self.window.rate is None
 
     @property
     def learning(self) -> bool:

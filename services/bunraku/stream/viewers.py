@@ -196,7 +196,8 @@ class Viewer:
         beside = narrow and now - self._beside_at < BESIDE
         self._rate.line(self._flow.window.rate if narrow else None, now, beside)
         rate = 0 if self._flow.unknown else self._rate.rate
-        due = self._pacer.next(state, now, rate, narrow, not beside or self._flow.blocks_turn())
+        spare = not beside or self._flow.blocks_turn()
+        due = self._pacer.next(state, now, rate, narrow or self._flow.far, spare)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
     def _news(self) -> bytes | None:
