@@ -5,9 +5,9 @@ once, then the camera and light that go with it, then what lies within `AHEAD` a
 the motion first where several are due; last, better versions of what was sent. What a viewer already has is not sent
 again.
 
-Over a line that is narrow or may stand for a while the lowest rate goes far ahead as a net, a second of it for the bytes
-of a packet's heads, and better versions of what is soon shown just in time: whatever the line does for half a minute,
-the dance goes on.
+Over a line that is narrow or may stand for a while the lowest rate goes far ahead as a net, a second of it for the
+bytes of a packet's heads, and better versions of what is soon shown just in time: whatever the line does for half a
+minute, the dance goes on.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ NET_AHEAD = 10_000_000
 """As `AHEAD`, for better versions where a net is kept: such a line may stand for seconds."""
 SOON = 4_000_000
 """What is shown within this goes before the rest of the net, microseconds."""
+JUST = 2_000_000
+"""What is shown within this is bettered before the rest of the net, microseconds."""
 NET = 30_000_000
 """How far ahead of the play position the net reaches, microseconds."""
 REFILL = 20_000_000
@@ -113,7 +115,7 @@ class Pacer:
             if distance > (NET if net else AHEAD) or (turn and not state.loop):
                 break
             sent = self._sent.get((track.number, index))
-            far = net and distance > SOON
+            far = net and distance > (SOON if sent is None else JUST)
             if sent is None:
                 if far and distance <= REFILL:
                     self._filling = True

@@ -31,6 +31,10 @@ WATCHED = 40_000
 """A round trip counts only if its end was looked out for as often as this."""
 WEIGHT = 0.3
 """Of the newest in the mean of the line's rate."""
+FULL = 2_000_000
+"""So long after its queue was seen filled what a line carries is known."""
+PROBE = 2.0
+"""A line that was not full is taken to carry so much more."""
 FORGET = 10_000_000
 """So long after its queue was last seen filled a line counts as narrow."""
 
@@ -97,7 +101,9 @@ class Window:
         self._line_written += on_line(size)
         self._large += large
         if large and self.rate:
-            self._through = max(self._through, at) + on_line(size) / self.rate * 1e6
+            # a line that was never full carries more than it was seen to
+            rate = self.rate if self.full_at is not None and at - self.full_at < FULL else PROBE * self.rate
+            self._through = max(self._through, at) + on_line(size) / rate * 1e6
         since = self._answered_at if self._flying else at
         self._flying.append(
             _Flying(
