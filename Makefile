@@ -54,8 +54,8 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python services/bunraku/codec/*.py services/bunraku/codec/prior.json services/bunraku/motion/bvh_numbers.py
-	@echo "setup: compiling reader and codec"
+.setup/warm: .setup/python services/bunraku/codec/*.py services/bunraku/codec/prior.json services/bunraku/motion/bvh_numbers.py services/bunraku/marionette/*.py
+	@echo "setup: compiling reader, codec and what moves limbs"
 	@$(BIN)/bunraku warm
 	@touch $@
 
@@ -70,8 +70,9 @@ lint: .setup/python
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# on all processors, each file's tests in one process
 test-python: setup
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 # the merge beside its model for a million steps, some fifteen minutes
 test-nightly: setup

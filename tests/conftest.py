@@ -6,6 +6,7 @@ import os
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -26,6 +27,19 @@ TALLIES = pytest.StashKey[list[str]]()
 def tally(pytestconfig: pytest.Config) -> Callable[[str], None]:
     """Says a line at the end of the run, when all is well too."""
     return pytestconfig.stash.setdefault(TALLIES, []).append
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Hands on what this process counted, where it is one of several."""
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["counted"] = session.config.stash.get(TALLIES, [])
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Takes in what a process of several counted, when it has ended."""
+    counted = getattr(node, "workeroutput", {}).get("counted", [])
+    node.config.stash.setdefault(TALLIES, []).extend(counted)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:

@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 
 from bunraku import __version__
 from bunraku.cli import app
+from tests.sounds import tone, write
 
 RUN = CliRunner()
 
@@ -27,6 +28,20 @@ def test_upload_list_watch_and_version_speak_json(server: str, clip_file: Path) 
     assert json.loads(RUN.invoke(app, ["version", "--json"]).stdout) == {"version": __version__}
 
 
+def test_audio_is_added_and_told(server: str, clip_file: Path, tmp_path: Path) -> None:
+    song = str(write(tmp_path / "song.wav", tone(1.0, 48_000), 48_000))
+    motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
+    added = RUN.invoke(app, ["audio", f"{server}/v1/motions/{motion}", song, "--json"])
+    assert added.exit_code == 0, added.output
+    sung = json.loads(added.stdout)
+    assert sung["tracks"] == ["motion", "audio"]
+    shown = RUN.invoke(app, ["audio", motion, song, "--server", server])
+    assert "1.0 s of sound at" in shown.stdout
+    assert sung["id"] in shown.stdout
+    watched = RUN.invoke(app, ["watch", sung["id"], "--server", server, "--seconds", "0.4", "--json"])
+    assert json.loads(watched.stdout)["audio_blocks"] > 0
+
+
 def test_for_people_there_are_tables(server: str, clip_file: Path) -> None:
     shown = RUN.invoke(app, ["upload", str(clip_file), "--server", server])
     assert "18 of 18" in shown.stdout
@@ -44,6 +59,8 @@ def test_failures_are_said_in_words(server: str, tmp_path: Path) -> None:
         ["watch", f"{server}/v1/health"],
         ["keep", "none", "--server", server],
         ["keep", f"{server}/v1/motions/none"],
+        ["audio", "none", str(bad), "--server", server],
+        ["audio", f"{server}/v1/sessions/none", str(bad)],
         ["list", "--server", "http://127.0.0.1:9"],
         ["upload", str(tmp_path / "missing.bvh"), "--server", server],
     ):

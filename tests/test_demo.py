@@ -29,6 +29,10 @@ async def test_the_dance_is_taken_in_once_and_again_when_it_was_removed(
         assert entry is not None
         assert entry.description["name"] == choreography.TITLE
         assert entry.description["duration"] >= 20
+        assert entry.description["tracks"] == ["motion", "audio", "camera", "light", "light", "light"]
+        assert entry.description["audio"]["seconds"] == pytest.approx(entry.description["duration"])
+        entries, _ = await backing.catalogue.page(10)
+        assert [entry.id for entry in entries] == [motion], "what was on the way is not kept"
         assert await demo.add_demo(backing) == motion
         assert danced == 1
         await backing.catalogue.remove(motion)

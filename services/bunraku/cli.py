@@ -7,6 +7,7 @@ import re
 import socket
 import sys
 import webbrowser
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Annotated, Any
 from urllib.parse import unquote, urlsplit
@@ -73,28 +74,9 @@ def upload(
     as_json: Json = False,
 ) -> None:
     """Upload a motion file, and say what was made of it."""
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
     from rich.table import Table
 
-    from bunraku.client.api import Client
-
-    async def run() -> dict[str, Any]:
-        columns = (
-            TextColumn("{task.fields[name]}", markup=False),
-            BarColumn(),
-            TaskProgressColumn(),
-            TextColumn("{task.description}"),
-        )
-        with Progress(*columns, console=err, disable=as_json or not err.is_terminal, transient=True) as progress:
-            task = progress.add_task("sending", name=file.name, total=1)
-
-            def at(stage: str, share: float) -> None:
-                progress.update(task, description=stage, completed=share)
-
-            async with Client(server) as client:
-                return await client.upload(file, lambda sent, size: at("sending", sent / size), at)
-
-    motion = _ask(run, server)
+    motion = _send(file, server, as_json, lambda client, *told: client.upload(file, *told))
     if as_json:
         out.print_json(data=motion)
         return
@@ -107,6 +89,58 @@ def upload(
     for guess in motion["guessed"]:
         table.add_row("guessed", guess)
     out.print(table)
+
+
+@app.command()
+def audio(
+    motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="WAV, FLAC, MP3 or Ogg.")],
+    server: Server = HERE,
+    as_json: Json = False,
+) -> None:
+    """Make a new motion of one and a sound, which begins with it."""
+    base, kind, identity = _address(motion)
+    if kind == "sessions":
+        raise typer.BadParameter("sound is added to a motion: give one", param_hint="MOTION")
+    made = _send(file, base or server, as_json, lambda client, *told: client.add_audio(identity, file, *told))
+    if as_json:
+        out.print_json(data=made)
+        return
+    rates = ", ".join(f"{rate['kbps']:.0f}" for rate in made["audio"]["rates"])
+    said = f"{made['audio']['seconds']:.1f} s of sound at {rates} kbit/s beside {made['name']}: {made['id']}"
+    out.print(said, markup=False, highlight=False, soft_wrap=True)
+
+
+@app.command()
+def scene(
+    motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="JSON: camera, lights.")],
+    server: Server = HERE,
+    as_json: Json = False,
+) -> None:
+    """Make a new motion of one with a camera and lights, from keyframes."""
+    import json
+
+    from bunraku.client.api import Client
+
+    base, kind, identity = _address(motion)
+    if kind == "sessions":
+        raise typer.BadParameter("a scene is added to a motion: give one", param_hint="MOTION")
+    try:
+        staging = json.loads(file.read_bytes())
+    except ValueError as error:
+        raise typer.BadParameter(f"{file.name} is no JSON: {error}", param_hint="FILE") from None
+
+    async def run() -> dict[str, Any]:
+        async with Client(base or server) as client:
+            return await client.add_scene(identity, staging)
+
+    made = _ask(run, base or server)
+    if as_json:
+        out.print_json(data=made)
+        return
+    said = f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}"
+    out.print(said, markup=False, highlight=False, soft_wrap=True)
 
 
 @app.command(name="list")
@@ -124,10 +158,11 @@ def list_motions(server: Server = HERE, as_json: Json = False) -> None:
     if as_json:
         out.print_json(data=motions)
         return
-    table = Table("id", "name", "length", "fps", "rates, kbit/s", box=None, header_style="bold")
+    table = Table("id", "name", "length", "fps", "rates, kbit/s", "tracks", box=None, header_style="bold")
     for motion in motions:
         rates = " ".join(f"{rate['kbps']:.1f}" for rate in motion["rates"])
-        table.add_row(motion["id"], motion["name"], f"{motion['duration']:.1f} s", f"{motion['fps']:g}", rates)
+        length, tracks = f"{motion['duration']:.1f} s", " ".join(motion["tracks"])
+        table.add_row(motion["id"], motion["name"], length, f"{motion['fps']:g}", rates, tracks)
     out.print(table)
 
 
@@ -199,8 +234,38 @@ def version(as_json: Json = False) -> None:
 
 @app.command()
 def warm() -> None:
-    """Compile reader and codec once, so that no upload waits for it (done by `make setup`)."""
+    """Compile reader, codec and what moves limbs once, so that nobody waits for it (done by `make setup`)."""
+    from bunraku.backing.cache import cache_of
     from bunraku.ingest import making  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
+    from bunraku.marionette import compiled
+
+    compiled.load(cache_of("marionette"))
+
+
+def _send(file: Path, server: str, quiet: bool, send: Callable[..., Awaitable[dict[str, Any]]]) -> dict[str, Any]:
+    """What the server makes of a file; `send` is told the client, and what to tell how far it is."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+    from bunraku.client.api import Client
+
+    async def run() -> dict[str, Any]:
+        columns = (
+            TextColumn("{task.fields[name]}", markup=False),
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.description}"),
+        )
+        with Progress(*columns, console=err, disable=quiet or not err.is_terminal, transient=True) as progress:
+            task = progress.add_task("sending", name=file.name, total=1)
+
+            def at(stage: str, share: float) -> None:
+                progress.update(task, description=stage, completed=share)
+
+            async with Client(server) as client:
+                return await send(client, lambda sent, size: at("sending", sent / size), at)
+
+    made: dict[str, Any] = _ask(run, server)
+    return made
 
 
 async def _stream_url(client: Any, address: str) -> str:

@@ -26,6 +26,7 @@ import bunraku.stream.app
 from bunraku import __version__
 from bunraku.backing import problems
 from bunraku.backing.backing import Backing, open_backing
+from bunraku.backing.cache import cache_of
 from bunraku.backing.direct import DirectProtocol
 from bunraku.backing.settings import Settings
 from bunraku.codec import decode
@@ -122,10 +123,17 @@ async def _load(backing: Backing) -> None:
     await asyncio.sleep(LOAD_AFTER)
     await backing.catalogue.open()
     await asyncio.to_thread(decode.warm)
+    await asyncio.to_thread(_load_solving)
     # what is loaded by now stays: the collector need not walk through it again and again while limbs are solved
-    gc.collect()
     gc.freeze()
     gc.set_threshold(*COLLECT)
+
+
+def _load_solving() -> None:
+    # imported here, as it brings the compiler along
+    from bunraku.marionette import compiled
+
+    compiled.load(cache_of("marionette"))
 
 
 async def _ended(task: asyncio.Task[None]) -> None:

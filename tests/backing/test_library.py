@@ -6,13 +6,15 @@ import msgpack
 import pytest
 
 from bunraku.backing import library
-from bunraku.backing.library import Library, pack
+from bunraku.backing.library import Library, StoredMotion, pack, with_audio
+from bunraku.codec.audio import AudioTrack, EncodedAudio, audio_track, in_blocks, unpack_audio
 from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decode import decode_scene
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.wire.messages import Data, Description, unpack
+from tests.vectors import audio as sounds
 from tests.vectors import scene as scenes
 from tests.vectors.blocks import wandering_motion
 
@@ -62,6 +64,42 @@ def test_more_tracks_than_can_be_numbered_are_refused() -> None:
     assert len(library.unpack("m", pack("m", ENCODED, [still] * 15)).tracks) == 16
     with pytest.raises(ValueError, match="at most 16 tracks, not 17"):
         pack("m", ENCODED, [still] * 16)
+
+
+def encoded_audio(stored: StoredMotion, seconds: float) -> EncodedAudio:
+    track = audio_track(stored.track, 2, 120, round(seconds * 48_000))
+    return EncodedAudio(track, [in_blocks(track, sounds.packets(track.packets, most, 5)) for most in (30, 300)])
+
+
+def test_audio_stands_last_and_another_takes_its_place() -> None:
+    before = library.unpack("m1", pack("m1", ENCODED, [encode_scene(scenes.camera(2.5, 30.0), ladder=(10.0,))]))
+    first, kinds = with_audio("m2", before, encoded_audio(before, 2.0))
+    assert kinds == ["motion", "camera", "audio"]
+    sung = library.unpack("m2", first)
+    assert sung.packets[:2] == before.packets
+    assert sung.kbps[:2] == before.kbps
+    assert [len(rates) for rates in sung.kbps] == [2, 1, 2]
+    assert sung.front == before.front
+    again, kinds = with_audio("m3", sung, encoded_audio(sung, 1.0))
+    assert kinds == ["motion", "camera", "audio"]
+    other = library.unpack("m3", again)
+    audio = other.tracks[2]
+    assert isinstance(audio, AudioTrack)
+    assert audio.samples == 48_000
+    assert other.packets[:2] == before.packets
+    for rate, sent in enumerate(other.packets[2]):
+        for index, packet in enumerate(sent):
+            data = unpack(packet)
+            assert isinstance(data, Data)
+            assert (data.track, data.rate, data.index) == (2, rate, index)
+            assert all(audio.block_of(one.number) == index for one in unpack_audio(data.block))
+
+
+def test_audio_beside_as_many_tracks_as_can_be_numbered_is_refused() -> None:
+    still = encode_scene(scenes.camera(0.1, 30.0), ladder=(10.0,))
+    full = library.unpack("m", pack("m", ENCODED, [still] * 15))
+    with pytest.raises(ValueError, match="at most 16 tracks"):
+        with_audio("n", full, encoded_audio(full, 1.0))
 
 
 async def test_an_object_from_when_a_motion_was_one_track_still_opens(tmp_path: Path) -> None:

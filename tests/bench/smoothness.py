@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bunraku.marionette import shoulder as limit
 from bunraku.marionette import vector
 from bunraku.marionette.bodies import BODIES
 from bunraku.marionette.elbow import Elbow, elevation
@@ -106,7 +107,7 @@ def elbow_steps(rig: ArmRig, path: Path) -> tuple[float, float, float]:
         shoulder, *others = rig.bend(vector.length(tip), bend)
         places = rig.places((vector.multiply(rig.chord(rig.direction(tip), normal), shoulder), others[0], others[1]))
         here, there = (vector.scale(one, 1.0 / rig.scale) for one in (places[0], places[2]))
-        depth = max(depth, rig.shoulder.depth(rig.direction(here)))
+        depth = max(depth, limit.depth(rig.shoulder, rig.direction(here)))
         error = max(error, vector.length(vector.subtract(there, place)))
         if last is not None:
             farthest = max(farthest, vector.length(vector.subtract(here, last)))
@@ -192,7 +193,7 @@ def handovers(count: int, distance: float) -> list[Handover]:
         begin = int(random.integers(4, len(motion.rotations) - 90))
         way = vector.unit(_random(random), UP)
         target = vector.add(rig.target(rig.dance(motion.rotations[begin].tolist())), vector.scale(way, distance))
-        if LEAST_REACH < vector.length(target) < MOST_REACH and rig.shoulder.depth(rig.direction(target)) < 0.0:
+        if LEAST_REACH < vector.length(target) < MOST_REACH and limit.depth(rig.shoulder, rig.direction(target)) < 0.0:
             found.append(
                 handover(
                     limb,

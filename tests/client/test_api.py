@@ -7,6 +7,7 @@ import pytest
 
 from bunraku.client import Client, ServerProblem, api
 from tests.servers import clip
+from tests.sounds import tone, write
 
 
 async def test_upload_tells_how_far_it_is_and_what_was_made(server: str, clip_file: Path) -> None:
@@ -36,6 +37,21 @@ async def test_upload_tells_what_the_server_does_with_it(
     shares = [share for stage, share in told if stage == "encoding"]
     assert len(set(shares)) > 1
     assert shares == sorted(shares)
+
+
+async def test_sound_is_added_to_a_motion(server: str, clip_file: Path, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    song = write(tmp_path / "song.flac", tone(1.0, 44_100, 2), 44_100, "stereo")
+    async with Client(server) as client:
+        motion = await client.upload(clip_file)
+        sung = await client.add_audio(motion["id"], song, lambda sent, size: told.append((sent, size)))
+        assert await client.motion(sung["id"]) == sung
+        assert (sung["made_from"], sung["tracks"]) == (motion["id"], ["motion", "audio"])
+        with pytest.raises(ServerProblem, match="Not a sound"):
+            await client.add_audio(motion["id"], clip_file)
+        with pytest.raises(ServerProblem, match="No such motion"):
+            await client.add_audio("none", song)
+    assert told[-1] == (song.stat().st_size,) * 2
 
 
 async def test_a_refusal_says_line_and_hint(server: str, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 import bunraku.codec.kernels  # noqa: F401 - compiled, so it must be here before the instrumenting begins
 
 INSTRUMENTED = [
+    "bunraku.codec.audio",
     "bunraku.codec.coefficients",
     "bunraku.codec.dancer",
     "bunraku.codec.decode",

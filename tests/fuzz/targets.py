@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from bunraku.codec import coefficients
+from bunraku.codec.audio import LARGEST_BLOCK as LARGEST_AUDIO
+from bunraku.codec.audio import pack_audio, unpack_audio
 from bunraku.codec.coefficients import LARGEST_BLOCK
 from bunraku.codec.dancer import LARGEST_DANCER, Dancer
 from bunraku.codec.decode import MotionBlock, decode_block
@@ -107,6 +109,17 @@ def message(data: bytes) -> bool:
     return True
 
 
+def audio(data: bytes) -> bool:
+    """A block of Opus packets."""
+    try:
+        packets = unpack_audio(data)
+    except DamagedBlock:
+        return False
+    assert sum(len(packet.data) for packet in packets) <= len(data) <= LARGEST_AUDIO
+    assert unpack_audio(pack_audio(packets[0].number if packets else 0, [packet.data for packet in packets])) == packets
+    return True
+
+
 def track_of(described: dict[str, Any]) -> MotionTrack:
     """The track of a Description's map, once each of its questions has an answer; raises `DamagedBlock`."""
     track = read_track(described)
@@ -119,7 +132,7 @@ def track_of(described: dict[str, Any]) -> MotionTrack:
     return track
 
 
-TARGETS: tuple[Callable[[bytes], bool], ...] = (block, dancer, message)
+TARGETS: tuple[Callable[[bytes], bool], ...] = (block, dancer, message, audio)
 
 
 def _longest() -> bytes:
@@ -137,4 +150,6 @@ def seeds() -> list[tuple[int, bytes]]:
     found += [(2, Description("a", [track]).pack()) for track in DESCRIBED]
     messages = golden("messages.json")
     found += [(2, base64.b64decode(v["bytes"])) for v in messages["valid"] + messages["invalid"]]
+    sounds = golden("audio.json")
+    found += [(3, base64.b64decode(v["block"])) for v in sounds["valid"] + sounds["invalid"]]
     return found

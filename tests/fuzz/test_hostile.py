@@ -63,8 +63,8 @@ DESCRIPTIONS = st.builds(
 
 @pytest.mark.parametrize(
     ("number", "inputs"),
-    [(0, hostile(0)), (1, hostile(1)), (2, hostile(2)), (2, DESCRIPTIONS)],
-    ids=["blocks", "dancers", "messages", "descriptions"],
+    [(0, hostile(0)), (1, hostile(1)), (2, hostile(2)), (2, DESCRIPTIONS), (3, hostile(3))],
+    ids=["blocks", "dancers", "messages", "descriptions", "audio"],
 )
 def test_hypothesis(
     number: int, inputs: st.SearchStrategy[bytes], tally: Callable[[str], None], request: pytest.FixtureRequest

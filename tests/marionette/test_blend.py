@@ -31,7 +31,7 @@ def test_the_same_place_is_kept_from_the_dances_way_to_the_marionettes(index: in
         return  # a straight arm reaches less as its wrist bends
     normal = vertical_normal(RIG.direction(target), UP)
     assert normal is not None
-    mixed = ArmBlend(RIG).joints(joints, bent(target), target, IDENTITY, normal, weight)
+    mixed = ArmBlend(RIG).joints(joints, bent(target), target, IDENTITY, normal, weight, 0.0)
     np.testing.assert_allclose(RIG.target(mixed), target, atol=1e-9)
 
 
@@ -42,8 +42,8 @@ def test_both_ends_are_exact(index: int) -> None:
     normal = vertical_normal(RIG.direction(target), UP)
     assert normal is not None
     hung = bent(target)
-    assert ArmBlend(RIG).joints(joints, hung, target, IDENTITY, normal, 0.0) is joints
-    assert ArmBlend(RIG).joints(joints, hung, target, IDENTITY, normal, 1.0) == RIG.hang(target, UP, normal)
+    assert ArmBlend(RIG).joints(joints, hung, target, IDENTITY, normal, 0.0, 0.0) is joints
+    assert ArmBlend(RIG).joints(joints, hung, target, IDENTITY, normal, 1.0, 0.0) == RIG.hang(target, UP, normal)
 
 
 @given(st.integers(0, len(POSES) - 1))
@@ -52,6 +52,6 @@ def test_a_small_weight_is_a_small_change(index: int) -> None:
     target = RIG.target(joints)
     normal = vertical_normal(RIG.direction(target), UP)
     assert normal is not None
-    mixed = ArmBlend(RIG).joints(joints, bent(target), target, IDENTITY, normal, 1e-6)
+    mixed = ArmBlend(RIG).joints(joints, bent(target), target, IDENTITY, normal, 1e-6, 0.0)
     for a, b in zip(joints, mixed, strict=True):
         assert abs(abs(sum(x * y for x, y in zip(a, b, strict=True))) - 1.0) < 1e-5

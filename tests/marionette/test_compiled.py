@@ -1,11 +1,20 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+from types import FunctionType
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import arms, compiled, table
+from bunraku.backing.cache import cache_of
+from bunraku.marionette import arms, compiled, follow, table
+from bunraku.marionette.limbs import Limb
 from bunraku.marionette.proportions import Proportions
+from bunraku.marionette.pulled import PulledHand
+from bunraku.motion import rotation
+from bunraku.motion.skeleton import standard_figure
 from tests.marionette.arms import ARMS
 
 coordinates = st.one_of(st.floats(-1.5, 1.5), st.floats(-1e6, 1e6), st.sampled_from([0.0, -0.0, 1e-170, 1.0]))
@@ -16,3 +25,48 @@ def test_compiled_arms_are_the_same(proportions: Proportions, places: list[tuple
     stored, targets = table.table_of(proportions.identity), np.array(places).reshape(-1, 3)
     plain, fast = arms.solve(proportions, stored, targets), compiled.solve(proportions, stored, targets)
     np.testing.assert_allclose(fast.solved, plain.solved, rtol=0.0, atol=1e-12)
+
+
+@pytest.fixture
+def loaded() -> Iterator[None]:
+    compiled.load(cache_of("marionette"))
+    yield
+    compiled.unload()
+
+
+def way(limb: Limb, seed: int) -> list[object]:
+    """A hand pulled through wherever it is asked to, in a body that turns, then let go."""
+    random = np.random.default_rng(seed)
+    hand = PulledHand(standard_figure(), limb)
+    pose = rotation.from_rotation_vector(random.uniform(-0.5, 0.5, (18, 3)))
+    shown: list[object] = []
+    for frame in range(240):
+        if frame % 12 == 0:
+            x, y, z = random.uniform(-1.2, 1.2, 3).tolist()
+        pose[0] = rotation.from_rotation_vector(np.array([0.02, 0.05, 0.01]) * frame)
+        hand.see(pose.tolist(), 1 / 60)
+        held = frame < 200
+        shown.append(
+            hand.pull(pose.tolist(), (x, y, z) if held else None, min(frame / 9, 1.0) if held else 0.1, 1 / 60)
+        )
+        shown.append(hand.place)
+    return shown
+
+
+PLAIN = {(limb, seed): way(limb, seed) for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND) for seed in range(3)}
+
+
+@pytest.mark.usefixtures("loaded")
+@pytest.mark.parametrize(("limb", "seed"), PLAIN)
+def test_compiled_limbs_are_the_same_to_the_last_bit(limb: Limb, seed: int) -> None:
+    assert way(limb, seed) == PLAIN[limb, seed]
+
+
+@pytest.mark.usefixtures("loaded")
+def test_what_it_was_not_compiled_for_is_refused_and_does_not_wait_for_the_compiler() -> None:
+    with pytest.raises(TypeError, match="No matching definition"):
+        vars(follow)["advance"]("here", *[(0.0, 0.0, 0.0)] * 5, 0.02, 1.0, 0.0, 1.0)
+
+
+def test_plain_functions_are_back_once_unloaded() -> None:
+    assert all(isinstance(vars(module)[name], FunctionType) for module, name in compiled.SOLVING)

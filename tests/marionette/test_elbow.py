@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bunraku.marionette import shoulder as limit
 from bunraku.marionette import vector
 from bunraku.marionette.elbow import Elbow, elevation, lift_between, vertical_normal
 from bunraku.marionette.limbs import ArmRig, Limb
@@ -44,10 +45,10 @@ def test_limits_hold_on_any_way_and_the_tip_is_exact_wherever_a_shoulder_lets_it
             places = RIG.places((vector.multiply(chord, shoulder), others[0], others[1]))
             np.testing.assert_allclose(np.array(places[2]) / RIG.scale, hanging.tip, atol=1e-9)
             if frame == 9:
-                assert RIG.shoulder.depth(RIG.direction(places[0])) <= 1e-6
+                assert limit.depth(RIG.shoulder, RIG.direction(places[0])) <= 1e-6
         for _ in range(120):
             hanging = elbow.follow(RIG.direction(tip), vector.length(tip), UP, FRAME)
-        if RIG.shoulder.depth(RIG.direction(tip)) < -0.1:
+        if limit.depth(RIG.shoulder, RIG.direction(tip)) < -0.1:
             # in front of the body an arm reaches every place once its elbow has come round
             np.testing.assert_allclose(hanging.tip, tip, atol=1e-9)
 

@@ -134,3 +134,15 @@ def test_an_arm_too_short_to_hang_is_refused() -> None:
     tips[INDEX["l_wrist"]] = 0.0
     with pytest.raises(ProportionsError, match="L2"):
         ArmRig(Figure(FIGURE.offsets, tips), Limb.LEFT_HAND)
+
+
+def test_a_thigh_lifted_over_the_top_stays_at_its_limit_and_is_not_thrown_back() -> None:
+    rig = LegRig(FIGURE, Limb.LEFT_LEG)
+    pose = np.tile(rotation.IDENTITY, (18, 1))
+    own, seen = 0.0, []
+    for lifted in np.linspace(0.0, 4.0, 100):
+        pose[rig.joints[0]] = rotation.about_axis(0, np.array(-lifted))
+        own = rig.angle(pose.tolist(), own)
+        seen.append(own)
+    assert max(seen) == leg.THIGH_GREATEST == seen[-1]
+    assert np.abs(np.diff(seen)).max() < 0.05

@@ -75,7 +75,9 @@ def test_a_held_hand_is_where_it_is_put_and_a_leg_too() -> None:
 
 def taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> tuple[Array, Array]:
     """All limbs pulled twice for `hold` frames at up to one arm length a second, `gap` frames between: how far each
-    joint turned from frame to frame, and in the dance alone, degrees."""
+    joint turned from frame to frame, and in the dance alone, degrees.
+
+    Not counted is an arm whose hand flies past its shoulder within a quarter of an arm: it has to whirl."""
     poses = dance(2 * (hold + gap) + 30, seed)
     random = np.random.default_rng(seed)
     puppet = Marionette(FIGURE)
@@ -99,23 +101,35 @@ def taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> tuple[Array, Arr
         if phase == hold:
             puppet.leave("ada", now)
         merged.append(apply(pose, puppet.overlay(pose, now)))
-    return steps(np.array(merged)), steps(poses)
+    turned = steps(np.array(merged))
+    for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
+        rig = ArmRig(FIGURE, limb)
+        near = np.array([np.linalg.norm(rig.target(rig.dance(pose.tolist()))) < 0.25 for pose in merged])
+        turned[np.ix_(near[1:] | near[:-1], limb.joints)] = 0.0
+    return turned, steps(poses)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 120), st.integers(24, 60))
 def test_nothing_pops_when_a_limb_is_taken_dragged_and_let_go(seed: int, hold: int, gap: int) -> None:
     """A hard switch turns joints by up to 180 degrees in one frame; the dance itself by up to ten."""
     turned, own = taken_dragged_and_let_go(seed, hold, gap)
-    assert float(turned.max()) < 80.0
-    assert float(np.abs(turned[1] - own[1]).max()) < 8.0
+    assert float(turned.max()) < 60.0
+    first = np.abs(turned[1] - own[1])
+    pose = dance(3, seed)[2].tolist()
+    for limb in Limb:
+        joints = list(limb.joints)
+        rig = ArmRig(FIGURE, limb) if limb.is_hand else None
+        # an arm that is all but straight bends by ten degrees where its hand comes a hundredth nearer
+        straight = rig is not None and float(np.linalg.norm(rig.target(rig.dance(pose)))) > 0.93
+        assert float(first[joints].max()) < (20.0 if straight else 4.0)
 
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 60), st.integers(1, 23))
 def test_nor_when_it_is_taken_again_before_it_is_back(seed: int, hold: int, gap: int) -> None:
     turned, _ = taken_dragged_and_let_go(seed, hold, gap)
-    assert float(turned.max()) < 90.0
+    assert float(turned.max()) < 60.0
 
 
 def test_a_jump_of_the_target_does_not_throw_the_limb() -> None:
@@ -131,7 +145,7 @@ def test_a_jump_of_the_target_does_not_throw_the_limb() -> None:
                 puppet.input("ada", Input(limb, 1, epoch, i + 1, i * FRAME, (x, y, z)), i * FRAME)
         puppet.alive("ada", list(Limb), i * FRAME)
         merged.append(apply(pose, puppet.overlay(pose, i * FRAME)))
-    assert float(steps(np.array(merged)).max()) < 75.0
+    assert float(steps(np.array(merged)).max()) < 60.0
 
 
 def test_a_silent_puppeteer_holds_still_then_loses_the_limb_which_goes_back_to_the_dance() -> None:

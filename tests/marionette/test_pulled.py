@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bunraku.marionette import shoulder as limit
 from bunraku.marionette import vector
 from bunraku.marionette.handover import HAND_ACCELERATION, Handover
 from bunraku.marionette.limbs import Limb
@@ -35,7 +36,7 @@ def test_a_hand_taken_in_the_dance_is_soon_where_it_is_wanted_without_a_jerk(beg
         assert joints is not None
         places.append(hand.place)
         # the arm is where its hand is, the whole way, wherever the shoulder lets it
-        if hand.rig.shoulder.depth(hand.rig.direction(hand.place)) < -0.3 and vector.length(hand.place) < 0.9:
+        if limit.depth(hand.rig.shoulder, hand.rig.direction(hand.place)) < -0.3 and vector.length(hand.place) < 0.9:
             np.testing.assert_allclose(hand.rig.target(joints), hand.place, atol=1e-6)
     if LEAST_REACH < reach < MOST_REACH:
         assert vector.length(vector.subtract(places[-1], wanted)) < 1e-9
@@ -85,4 +86,4 @@ def test_no_upper_arm_goes_where_no_shoulder_does_past_the_shoulder_too(one: Vec
         joints = hand.pull(pose, one if frame < 90 else other, 1.0, FRAME)
         assert joints is not None
         elbow = hand.rig.direction(hand.rig.places(joints)[0])
-        assert hand.rig.shoulder.depth(elbow) <= 1e-6
+        assert limit.depth(hand.rig.shoulder, elbow) <= 1e-6

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bunraku.marionette import arm, table
+from bunraku.marionette.links import SIDE
 from bunraku.marionette.proportions import OUTER_RADIUS, Proportions, ProportionsError
 from tests.marionette.arms import ARMS
 
@@ -11,7 +12,7 @@ from tests.marionette.arms import ARMS
 @pytest.mark.parametrize("proportions", ARMS, ids=lambda p: p.identity)
 def test_nodes_are_the_lowest_of_a_fine_search(proportions: Proportions) -> None:
     built = table.build_table(proportions)
-    assert built.shape == (arm.SIDE, arm.SIDE)
+    assert built.shape == (SIDE, SIDE)
     assert built.dtype == np.float16
     r, beta = (places[::7, ::7] for places in table.nodes(proportions))
     low, high = arm.bend_limits(proportions, r)

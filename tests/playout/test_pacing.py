@@ -99,6 +99,52 @@ def test_the_base_motion_comes_first_then_camera_and_light_then_better_motion() 
     assert all(due.better for due in later[2:])
 
 
+def sounding(*timings: Timing) -> Pacer:
+    """Of a motion, sound beside it, and scenes."""
+    tracks = [Paced(0, TRACK, 4, True), Paced(1, even_blocks(30.0, 360), 3, False, audio=True)]
+    return Pacer([*tracks, *(Paced(number, timing, 3, False) for number, timing in enumerate(timings, 2))])
+
+
+def all_of(pacer: Pacer, state: TimelineState, rate: int, audio: int | None) -> list[tuple[int, int, int]]:
+    sent = []
+    while (due := pacer.next(state, 0, rate, audio=audio)) is not None:
+        sent.append((due.track, due.index, due.rate))
+        assert len(sent) < 100
+    return sent
+
+
+def test_of_one_instant_the_motion_goes_first_then_the_sound_then_scenes_and_the_first_of_both_is_the_lowest() -> None:
+    state = start("m", TRACK.duration_us, 0)
+    sent = all_of(sounding(CAMERA), state, 3, 1)
+    assert sent[:3] == [(0, 0, 0), (1, 0, 0), (2, 0, 2)]
+    assert sent[3:] == [(track, index, rate) for index in range(1, 5) for track, rate in ((0, 3), (1, 1), (2, 2))]
+
+
+def test_in_a_loop_sound_is_bettered_as_it_comes_near_again() -> None:
+    for seconds in (2.0, 4.5, 5.5, 12.0):
+        timing = even_blocks(30.0, round(30 * seconds))
+        state = start("m", timing.duration_us, 0)
+        pacer = Pacer([Paced(0, timing, 1, True), Paced(1, timing, 3, False, audio=True)])
+        sent = []
+        for clock in range(0, 3 * timing.duration_us, 100_000):
+            while (due := pacer.next(state, clock, 0, audio=0 if clock < timing.duration_us else 2)) is not None:
+                sent.append((due.track, due.index, due.rate))
+        sound = [(index, rate) for track, index, rate in sent if track == 1]
+        assert sorted(sound) == [(index, rate) for index in range(timing.blocks) for rate in (0, 2)]
+
+
+def test_sound_has_a_rate_of_its_own_and_may_be_left_out() -> None:
+    state = start("m", TRACK.duration_us, 0)
+    pacer = sounding()
+    assert {track for track, _, _ in all_of(pacer, state, 1, -1)} == {0}
+    # what was left out is missing: it goes before what could only be better
+    later = all_of(pacer, state, 3, 0)
+    assert later == [*((1, index, 0) for index in range(5)), *((0, index, 3) for index in range(1, 5))]
+    # better sound only where it is far off, not all that waits already
+    assert all_of(pacer, state, 3, 2) == [(1, 4, 2)]
+    assert {rate for track, _, rate in all_of(sounding(), state, 1, None) if track == 1} == {0, 1}
+
+
 def test_a_viewer_of_the_camera_alone_is_sent_that() -> None:
     state = start("m", TRACK.duration_us, 0)
     pacer = Pacer([Paced(1, CAMERA, 3, False)])

@@ -40,3 +40,18 @@ def test_a_hidden_tab_gets_the_lowest_rate_and_its_own_back() -> None:
 def test_a_pinned_rate_stays_and_is_kept_within_those_there_are() -> None:
     assert run(RateChoice(4, pinned=2), Report(buffer=0), 9) == 2
     assert RateChoice(4, pinned=99).rate == 3
+
+
+def test_who_does_not_look_still_hears_and_a_slow_machine_does_not_silence_it() -> None:
+    choice = RateChoice(6, first=4, safe=1)
+    assert choice.rate == 4
+    assert choice.report(Report(buffer=3_000_000, hidden=True), 0) == 1
+    assert choice.report(Report(buffer=3_000_000), 1) == 4
+    clock = 0
+    for _ in range(20):
+        clock += 2_000_000
+        choice.report(Report(buffer=3_000_000, frame=90_000), clock)
+    assert choice.rate == 1
+    # a line that does not carry it is another matter
+    assert choice.report(Report(buffer=0, frame=90_000), clock + 2_000_000) == 0
+    assert choice.report(Report(buffer=3_000_000, hidden=True), clock + 3_000_000) == 0

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 
 import msgpack
@@ -13,6 +14,7 @@ from bunraku.codec import decode
 from bunraku.codec.encode import encode_motion
 from bunraku.marionette.log import Log
 from bunraku.marionette.merge import Marionette
+from bunraku.marionette.ownership import LOST_AFTER
 from bunraku.motion import rotation
 from bunraku.playout.blocks import BlockStore
 from bunraku.playout.overlays import pack_joints
@@ -21,6 +23,7 @@ from bunraku.session import puppeteers
 from bunraku.session.puppeteers import Full, Puppeteer
 from bunraku.session.stage import EDIT_LEAD, FRAME, FRAMES, Stage
 from bunraku.wire.messages import (
+    Alive,
     Ask,
     Claim,
     Data,
@@ -238,3 +241,16 @@ async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -
     }
     # once the dance is alone nothing is noted
     assert {due: again.get(due) or {} for due in shown} == shown
+
+
+async def test_a_holder_whom_a_stalled_server_could_not_hear_keeps_the_limb(stage: Stage, bus: MemoryBus) -> None:
+    audience = Audience(bus)
+    aiko = stage.join("Aiko")
+    stage.hear(aiko, Claim(0))
+    shown = len(await audience.until(2, Overlay))
+    # the machine has something else to do for longer than a lease: what Aiko says meanwhile waits at the socket
+    time.sleep(1.5e-6 * LOST_AFTER)  # noqa: ASYNC251 - it is the loop that stands still
+    await audience.until(shown + 1, Overlay)
+    stage.hear(aiko, Alive([0]))
+    await audience.until(shown + 8, Overlay)
+    assert stage.presence.limbs[0] == aiko.id

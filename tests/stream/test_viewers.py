@@ -2,17 +2,30 @@ from __future__ import annotations
 
 import asyncio
 
+import numpy as np
 import pytest
 
 from bunraku.backing.backing import clock
 from bunraku.backing.direct import frame
-from bunraku.backing.library import Library, pack
+from bunraku.backing.library import Library, pack, with_audio
 from bunraku.backing.sockets import TOO_SLOW, Refusal
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
+from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.stream.viewers import QUEUE, Viewer
-from bunraku.wire.messages import ChannelHeader, Data, Overlay, Ping, Pong, Presence, Report, TimelineState, unpack
+from bunraku.wire.messages import (
+    ChannelHeader,
+    Data,
+    Edit,
+    Overlay,
+    Ping,
+    Pong,
+    Presence,
+    Report,
+    TimelineState,
+    unpack,
+)
 from tests.vectors.blocks import wandering_motion
 from tests.vectors.scene import camera, light
 
@@ -178,3 +191,65 @@ async def test_an_overlay_goes_past_the_queue_only_where_nothing_else_waits(libr
     await line.count(Overlay, 3)
     sending.cancel()
     await asyncio.gather(sending, return_exceptions=True)
+
+
+@pytest.fixture
+async def sounding(library: Library) -> Library:
+    """With a motion "sung" of 9.2 s that has noise beside it."""
+    stored = await library.get("one")
+    assert stored is not None
+    noise = np.random.default_rng(2).normal(0, 0.2, (441_600, 1)).astype(np.float32)
+    packed, _ = with_audio("sung", stored, encode_audio([noise], stored.track, 1))
+    await library.put("sung", packed)
+    return library
+
+
+async def sent_of(viewer: Viewer, count: int) -> list[tuple[int, int, int]]:
+    line = Line()
+    viewer.timeline(timeline.start("sung", 9_200_000, clock()))
+    sending = asyncio.create_task(viewer.send(line.put))
+    data = [m for m in await line.count(Data, count) if isinstance(m, Data)]
+    sending.cancel()
+    header = unpack(line.sent[0])
+    assert isinstance(header, ChannelHeader)
+    assert header.channels == 20
+    return [(m.track, m.index, m.rate) for m in data[:count]]
+
+
+async def test_sound_goes_with_the_dance_at_its_lowest_until_the_line_has_shown_itself(sounding: Library) -> None:
+    sent = await sent_of(Viewer(sounding, None), 10)
+    assert sent == [(0, 0, 0), (1, 0, 0), *((track, index, 1 - track) for index in range(1, 5) for track in (0, 1))]
+
+
+async def test_a_pinned_rate_pins_the_dance_and_the_sound_goes_with_the_line(sounding: Library) -> None:
+    viewer = Viewer(sounding, 1)
+    assert (await sent_of(viewer, 4))[2:] == [(0, 1, 1), (1, 1, 0)]
+    choice = viewer._rate
+    assert choice is not None
+    for second in range(1, 9):
+        choice.report(Report(buffer=4_000_000), clock() + second * 2_000_000)
+    assert viewer._steps[choice.rate][:2] == (1, 2)
+    assert (await sent_of(Viewer(sounding, 0), 4))[2:] == [(0, 1, 0), (1, 1, 0)]
+
+
+async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(sounding: Library) -> None:
+    assert {track for track, _, _ in await sent_of(Viewer(sounding, None, ("motion",)), 5)} == {0}
+    assert await sent_of(Viewer(sounding, None, ("audio",)), 5) == [(1, index, 0) for index in range(5)]
+
+
+async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(sounding: Library) -> None:
+    viewer, line = Viewer(sounding, None), Line()
+    viewer.timeline(timeline.start("sung", 9_200_000, clock()))
+    sending = asyncio.create_task(viewer.send(line.put))
+    await line.count(Data, 10)
+    choice = viewer._rate
+    assert choice is not None
+    for second in range(1, 6):
+        choice.report(Report(buffer=0), clock() + second * 2_000_000)
+    sent = len(line.sent)
+    viewer.edit(Edit(position=6_000_000))
+    await line.count(TimelineState, 2)
+    await line.count(Data, 13)
+    sending.cancel()
+    after = [m for m in map(unpack, line.sent[sent:]) if isinstance(m, Data)]
+    assert {(m.track, m.rate) for m in after} == {(0, 0)}

@@ -8,10 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tests.vectors import blocks, messages, one_euro, pulled, scene
+from tests.vectors import audio, blocks, messages, one_euro, pulled, scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "proto" / "vectors"
 MAKERS: dict[str, Callable[[], Any]] = {
+    "audio.json": audio.make,
     "blocks.json": blocks.make,
     "messages.json": messages.make,
     "one_euro.json": one_euro.make,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ import msgpack
 import obstore
 from obstore.store import LocalStore, ObjectStore, from_url
 
+from bunraku.codec.audio import AudioTrack, EncodedAudio, read_audio
 from bunraku.codec.encode import EncodedMotion
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.scene import SceneTrack, read_scene
@@ -27,22 +28,22 @@ CACHE_BYTES = 64 << 20
 MOST_TRACKS = 16
 """Tracks that a Data message can number."""
 
-Track = MotionTrack | SceneTrack
+Track = MotionTrack | SceneTrack | AudioTrack
 _LOG_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
 @dataclass(frozen=True, slots=True)
 class StoredMotion:
     """A motion as it is sent: the tracks of its Description, the motion first, and `packets[track][rate][index]`, whole
-    Data messages, lowest rate first; `front` is where the dance faces, radians about y from z towards x."""
+    Data messages, lowest rate first; `front` is where the dance faces, radians about y from z towards x; `kbps` what
+    each rate of each track costs."""
 
     id: str
     description: bytes
     tracks: tuple[Track, ...]
     packets: list[list[list[bytes]]]
     front: float = 0.0
-    costs: tuple[float, ...] = ()
-    """What each rate of the motion's own track costs, kbit/s."""
+    kbps: tuple[tuple[float, ...], ...] = ()
 
     @property
     def track(self) -> MotionTrack:
@@ -71,16 +72,55 @@ def pack(motion: str, encoded: EncodedMotion, scenes: Sequence[EncodedScene] = (
     tracks: list[EncodedMotion | EncodedScene] = [encoded, *scenes]
     if len(tracks) > MOST_TRACKS:
         raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, not {len(tracks)}")
-    packets = [
-        [
-            [Data(number, nth, index, block).pack() for index, block in enumerate(rate.blocks)]
-            for nth, rate in enumerate(track.rates)
-        ]
-        for number, track in enumerate(tracks)
-    ]
+    packets = [_messages(number, [rate.blocks for rate in track.rates]) for number, track in enumerate(tracks)]
     description = Description(motion, [track.describe() for track in tracks]).pack()
     packed: bytes = msgpack.packb({"description": description, "tracks": packets})
     return packed
+
+
+def with_audio(motion: str, stored: StoredMotion, audio: EncodedAudio) -> tuple[bytes, list[str]]:
+    """The object of the motion of this id: `stored` with its audio, which replaces what audio there was; and the types
+    of its tracks. All other blocks are the same bytes.
+
+    Raises ValueError where there are more tracks than a Data message can number.
+    """
+    described: list[dict[str, Any]] = msgpack.unpackb(stored.description[1:])["tracks"]
+    packets = list(stored.packets)
+    number = next((n for n, track in enumerate(described) if track["type"] == "audio"), len(described))
+    if number == MOST_TRACKS:
+        raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, and this one has them without audio")
+    described[number:] = [audio.describe(), *described[number + 1 :]]
+    packets[number:] = [_messages(number, [rate.blocks for rate in audio.rates]), *packets[number + 1 :]]
+    packed: bytes = msgpack.packb({"description": Description(motion, described).pack(), "tracks": packets})
+    return packed, [track["type"] for track in described]
+
+
+def with_scenes(
+    motion: str, stored: StoredMotion, scenes: Sequence[EncodedScene], replaced: Container[str]
+) -> tuple[bytes, list[str]]:
+    """The object of the motion of this id: `stored` with cameras and lights, in place of its tracks of the `replaced`
+    types; and the types of its tracks. All other blocks are the same but for the number of their track.
+
+    Raises ValueError where there are more tracks than a Data message can number.
+    """
+    described: list[dict[str, Any]] = msgpack.unpackb(stored.description[1:])["tracks"]
+    kept = [number for number, track in enumerate(described) if track["type"] not in replaced]
+    if len(kept) + len(scenes) > MOST_TRACKS:
+        raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, and this would have {len(kept) + len(scenes)}")
+    blocks = [[[Data.unpack(packet).block for packet in rate] for rate in stored.packets[number]] for number in kept]
+    blocks += [[rate.blocks for rate in scene.rates] for scene in scenes]
+    tracks = [*(described[number] for number in kept), *(scene.describe() for scene in scenes)]
+    packets = [_messages(number, rates) for number, rates in enumerate(blocks)]
+    packed: bytes = msgpack.packb({"description": Description(motion, tracks).pack(), "tracks": packets})
+    return packed, [track["type"] for track in tracks]
+
+
+def _messages(track: int, rates: Sequence[Sequence[bytes]]) -> list[list[bytes]]:
+    """The Data messages of a track's blocks, by rate and index."""
+    return [
+        [Data(track, nth, index, block).pack() for index, block in enumerate(blocks)]
+        for nth, blocks in enumerate(rates)
+    ]
 
 
 def unpack(motion: str, packed: bytes) -> StoredMotion:
@@ -89,10 +129,11 @@ def unpack(motion: str, packed: bytes) -> StoredMotion:
     described: list[dict[str, Any]] = msgpack.unpackb(values["description"][1:])["tracks"]
     # objects from when a motion was one track have its packets alone
     packets = values["tracks"] if "tracks" in values else [values["packets"]]
-    tracks: tuple[Track, ...] = (read_track(described[0]), *map(read_scene, described[1:]))
-    costs = tuple(float(rate["kbps"]) for rate in described[0].get("rates", ()))
-    front = float(described[0].get("front", 0.0))
-    return StoredMotion(motion, values["description"], tracks, packets, front, costs)
+    dance = read_track(described[0])
+    beside = (read_audio(track, dance) if track["type"] == "audio" else read_scene(track) for track in described[1:])
+    tracks: tuple[Track, ...] = (dance, *beside)
+    kbps = tuple(tuple(float(rate["kbps"]) for rate in track["rates"]) for track in described)
+    return StoredMotion(motion, values["description"], tracks, packets, float(described[0].get("front", 0.0)), kbps)
 
 
 class Library:

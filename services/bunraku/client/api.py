@@ -55,40 +55,24 @@ class Client:
     ) -> dict[str, Any]:
         """Upload a motion file and wait until it can be watched; `progress` is told bytes sent and in all, and `made`
         again and again what the server does with it (`waiting`, `reading`, `encoding`) and the share done, 0..1."""
-        size = await asyncio.to_thread(os.path.getsize, path)
-        name = secrets.token_urlsafe(16)
+        return await self._send(path, "/v1/motions", progress, made)
 
-        async def chunks() -> AsyncIterator[bytes]:
-            sent = 0
-            with path.open("rb") as file:
-                while chunk := file.read(CHUNK):
-                    yield chunk
-                    sent += len(chunk)
-                    if progress is not None:
-                        progress(sent, size)
+    async def add_audio(
+        self,
+        motion: str,
+        path: Path,
+        progress: Callable[[int, int], None] | None = None,
+        made: Callable[[str, float], None] | None = None,
+    ) -> dict[str, Any]:
+        """Make a new motion that is `motion` with the sound of a WAV, FLAC, MP3 or Ogg file, and wait until it can be
+        watched; the rest as of `upload`."""
+        return await self._send(path, f"/v1/motions/{quote(motion, safe='')}/audio", progress, made)
 
-        following = asyncio.create_task(self._follow(name, made)) if made is not None else None
-        try:
-            return await self._ask(
-                "POST",
-                "/v1/motions",
-                params={"filename": path.name, "upload": name},
-                content=chunks(),
-                headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
-            )
-        finally:
-            if following is not None:
-                following.cancel()
-                await asyncio.wait((following,))
-
-    async def _follow(self, upload: str, told: Callable[[str, float], None]) -> None:
-        """Tell how far an upload is until cancelled. What fails in this is no matter: the upload's own answer tells."""
-        while True:
-            await asyncio.sleep(EVERY)
-            with contextlib.suppress(ServerProblem, httpx2.TransportError):
-                said = await self._ask("GET", f"/v1/uploads/{upload}")
-                if said["stage"] != "receiving":
-                    told(said["stage"], said["share"])
+    async def add_scene(self, motion: str, staging: dict[str, Any]) -> dict[str, Any]:
+        """Make a new motion that is `motion` with a camera and lights: keyframes as `POST /v1/motions/{id}/scene` takes
+        them."""
+        path = f"/v1/motions/{quote(motion, safe='')}/scene"
+        return await self._ask("POST", path, json=staging)
 
     async def motions(self) -> list[dict[str, Any]]:
         """All motions, newest first."""
@@ -140,6 +124,49 @@ class Client:
         parts = urlsplit(self.url)
         scheme = {"http": "ws", "https": "wss"}.get(parts.scheme, parts.scheme)
         return urlunsplit((scheme, parts.netloc, parts.path.rstrip("/") + path, "", ""))
+
+    async def _send(
+        self,
+        path: Path,
+        address: str,
+        progress: Callable[[int, int], None] | None,
+        made: Callable[[str, float], None] | None,
+    ) -> dict[str, Any]:
+        """Send a file to an address that takes one, as `upload` says."""
+        size = await asyncio.to_thread(os.path.getsize, path)
+        name = secrets.token_urlsafe(16)
+
+        async def chunks() -> AsyncIterator[bytes]:
+            sent = 0
+            with path.open("rb") as file:
+                while chunk := file.read(CHUNK):
+                    yield chunk
+                    sent += len(chunk)
+                    if progress is not None:
+                        progress(sent, size)
+
+        following = asyncio.create_task(self._follow(name, made)) if made is not None else None
+        try:
+            return await self._ask(
+                "POST",
+                address,
+                params={"filename": path.name, "upload": name},
+                content=chunks(),
+                headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
+            )
+        finally:
+            if following is not None:
+                following.cancel()
+                await asyncio.wait((following,))
+
+    async def _follow(self, upload: str, told: Callable[[str, float], None]) -> None:
+        """Tell how far an upload is until cancelled. What fails in this is no matter: the upload's own answer tells."""
+        while True:
+            await asyncio.sleep(EVERY)
+            with contextlib.suppress(ServerProblem, httpx2.TransportError):
+                said = await self._ask("GET", f"/v1/uploads/{upload}")
+                if said["stage"] != "receiving":
+                    told(said["stage"], said["share"])
 
     async def _ask(self, method: str, path: str, **options: Any) -> dict[str, Any]:
         response = await self._http.request(method, path, **options)

@@ -22,6 +22,8 @@ class Figures:
     blocks: int = 0
     camera_blocks: int = 0
     light_blocks: int = 0
+    audio_blocks: int = 0
+    audio_rate: int = -1
     overlays: int = 0
     reconnects: int = 0
     reason: str | None = None

@@ -15,6 +15,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from bunraku.client.figures import Figures
 from bunraku.codec import decode
+from bunraku.codec.audio import AudioTrack, Packet, read_audio
 from bunraku.codec.decode import decode_block
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.scene import SceneTrack, read_scene
@@ -27,6 +28,7 @@ from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.delay import PlayoutDelay
 from bunraku.playout.held import MOST, Held
 from bunraku.playout.overlays import Overlays
+from bunraku.playout.sounds import AudioStore
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
     SUBPROTOCOL,
@@ -89,6 +91,8 @@ class Viewer:
         self._blocks: BlockStore | None = None
         self._track_number = 0
         self._scene_stores: dict[int, SceneStore] = {}
+        self._sound: AudioStore | None = None
+        self._sound_number = -1
         self._overlays = Overlays()
         self._delay = PlayoutDelay()
         self._early: list[float] = []
@@ -209,6 +213,26 @@ class Viewer:
         kinds = [track.kind for track in self.scenes]
         return self.scene_at(reference, kinds.index("camera")) if "camera" in kinds else None
 
+    @property
+    def audio(self) -> AudioTrack | None:
+        """The sound of the motion, None where there is none that can be heard here."""
+        return self._sound.track if self._sound is not None else None
+
+    def audio_ahead(self, reference: int) -> int:
+        """Microseconds of sound that are here from clock time `reference` on without a gap."""
+        state = self.timelines.at(reference)
+        if state is None or self._sound is None or state.motion != self.motion:
+            return 0
+        return self._sound.ahead(timeline.position_at(state, reference), state.loop)
+
+    def packets_from(self, reference: int) -> list[Packet]:
+        """The Opus packets that are here without a gap, from the one heard at clock time `reference` to the motion's
+        end at most; `audio.first_sample` says when each begins."""
+        state = self.timelines.at(reference)
+        if state is None or self._sound is None or state.motion != self.motion:
+            return []
+        return self._sound.packets_from(timeline.position_at(state, reference))
+
     async def _receive(self, connection: ClientConnection) -> None:
         try:
             async for data in connection:
@@ -280,6 +304,11 @@ class Viewer:
             if track.get("type") in ("camera", "light"):
                 with contextlib.suppress(DamagedBlock):
                     self._scene_stores[number] = SceneStore(read_scene(track))
+        self._sound, self._sound_number = None, -1
+        for number, track in enumerate(description.tracks):
+            if track.get("type") == "audio" and self._sound is None:
+                with contextlib.suppress(DamagedBlock):
+                    self._sound, self._sound_number = AudioStore(read_audio(track, self.track)), number
         self.scenes = [store.track for store in self._scene_stores.values()]
 
     def _keep(self, data: Data) -> None:
@@ -292,6 +321,10 @@ class Viewer:
                 self.figures.camera_blocks += 1
             else:
                 self.figures.light_blocks += 1
+        elif data.track == self._sound_number and self._sound is not None:
+            self._sound.keep(data.index, data.rate, data.block)
+            self.figures.audio_blocks += 1
+            self.figures.audio_rate = data.rate
         elif data.track == self._track_number and self._blocks is not None:
             self._blocks.put(data.index, data.rate, decode_block(self._blocks.track, data.block))
             self._decode = time.perf_counter() - began

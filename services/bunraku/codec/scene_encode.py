@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bunraku.codec import coefficients, transform
 from bunraku.codec.coefficients import Head
@@ -23,8 +24,10 @@ SCENE_LADDER: tuple[float, ...] = (40.0, 20.0, 10.0, 4.0, 1.0)
 _FINEST, _COARSEST = 0, 255
 _ROUNDINGS = 0.5, 0.4, 0.3, 0.2
 """What is added to a coefficient before it is rounded down: the less, the more zeros, but at a finer step."""
+_APART = 16
+"""Steps are tried so far apart first, all at once, then all between two of these."""
 _BEYOND = 8
-"""Steps that are tried past the first that is too coarse."""
+"""Steps that are tried past those."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,23 +103,31 @@ class _Tried:
 
     def quantised(self, step: int) -> Integers:
         """Coefficients (3, 3, n) at step index `step`."""
-        size = np.abs(self._spectrum) / step_size(step, self._frames)
-        whole: Integers = (np.sign(self._spectrum) * np.floor(size + self._rounding)).astype(np.int64)
+        whole: Integers = self._all_quantised(np.array([step]))[0]
         return whole
-
-    def _holds(self, step: int, bound: float) -> bool:
-        values = reconstruct(self.quantised(step)) * step_size(step, self._frames)
-        off = np.moveaxis(values @ self._basis.T, -1, 0) - self._truth
-        return bool(np.linalg.norm(off, axis=-1).max() * 1e3 <= bound * (1 - 1e-6))
 
     def coarsest(self, bound: float) -> int | None:
         """The coarsest step found that holds `bound` mm: errors rise with the step, but not evenly, so some steps
         beyond the first that does not hold are tried too."""
-        if self._holds(_COARSEST, bound):
-            return _COARSEST
-        good, bad = _FINEST - 1, _COARSEST
-        while bad - good > 1:
-            middle = (good + bad) // 2
-            good, bad = (middle, bad) if self._holds(middle, bound) else (good, middle)
-        beyond = [step for step in range(good + 1, min(good + _BEYOND, _COARSEST)) if self._holds(step, bound)]
-        return max([good, *beyond]) if good >= _FINEST or beyond else None
+        apart = np.arange(_FINEST, _COARSEST + 1, _APART)
+        holding = self._hold(apart, bound)
+        last = int(np.argmin(holding)) if not holding.all() else len(apart)
+        begin = int(apart[last - 1]) if last else _FINEST
+        near = np.arange(begin, min(begin + _APART + _BEYOND, _COARSEST) + 1)
+        good = near[self._hold(near, bound)]
+        return int(good[-1]) if len(good) else None
+
+    def _all_quantised(self, steps: Integers) -> Integers:
+        sizes = np.array([step_size(int(step), self._frames) for step in steps])[:, None, None, None]
+        whole: Integers = (np.sign(self._spectrum) * np.floor(np.abs(self._spectrum) / sizes + self._rounding)).astype(
+            np.int64
+        )
+        return whole
+
+    def _hold(self, steps: Integers, bound: float) -> npt.NDArray[np.bool_]:
+        """Of each of some steps, whether no channel is more than `bound` mm off at any frame."""
+        sizes = np.array([step_size(int(step), self._frames) for step in steps])[:, None, None, None]
+        shown = (reconstruct(self._all_quantised(steps)) * sizes) @ self._basis.T
+        off = np.linalg.norm(np.moveaxis(shown, -1, 1) - self._truth, axis=-1)
+        held: npt.NDArray[np.bool_] = off.max(axis=(1, 2)) * 1e3 <= bound * (1 - 1e-6)
+        return held

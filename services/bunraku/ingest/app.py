@@ -14,9 +14,12 @@ from bunraku.backing import problems
 from bunraku.backing.backing import Backing
 from bunraku.backing.catalogue import BadCursor
 from bunraku.backing.problems import ProblemError
-from bunraku.ingest.entry import entry_json
+from bunraku.ingest.entry import entry_json, no_such_motion
+from bunraku.ingest.keyframes import Staging
 from bunraku.ingest.progress import Progress
 from bunraku.ingest.recordings import SUBJECT, Recordings
+from bunraku.ingest.soundtracks import Soundtracks
+from bunraku.ingest.stagings import Stagings
 from bunraku.ingest.uploads import Uploads
 
 NAME = r"^[A-Za-z0-9_-]{8,64}$"
@@ -26,6 +29,8 @@ NAME = r"^[A-Za-z0-9_-]{8,64}$"
 def create_app(backing: Backing) -> FastAPI:
     """The service upon `backing`."""
     uploads = Uploads(backing)
+    soundtracks = Soundtracks(backing, uploads)
+    stagings = Stagings(backing, uploads)
     recordings = Recordings(backing, uploads.places)
 
     @asynccontextmanager
@@ -54,6 +59,31 @@ def create_app(backing: Backing) -> FastAPI:
             return Response(status_code=400)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
+    @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=_BODY)
+    async def add_audio(
+        request: Request,
+        motion: str,
+        filename: Annotated[str, Query(min_length=1, max_length=255)],
+        upload: Annotated[str | None, Query(pattern=NAME)] = None,
+    ) -> Response:
+        """Make a motion that is another with the sound of the file in the request's body: WAV, FLAC, MP3 or Ogg. What
+        is beyond the motion's end is left out. The motion itself stays as it is; the same file again gives the same
+        new motion, with 200. `upload` as of an uploaded motion."""
+        try:
+            entry, new = await soundtracks.take(request, motion, filename, upload)
+        except ClientDisconnect:
+            # nobody is there to read this
+            return Response(status_code=400)
+        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+
+    @app.post("/v1/motions/{motion}/scene", status_code=201, tags=["motions"])
+    async def add_scene(motion: str, asked: Staging) -> Response:
+        """Make a motion that is another with a camera and lights, given as keyframes in motion time. What is left out
+        stays as that motion has it. The motion itself stays as it is; the same keyframes again give the same new
+        motion, with 200."""
+        entry, new = await stagings.add(motion, asked)
+        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+
     @app.get("/v1/uploads/{upload}", tags=["motions"])
     async def progress(upload: Annotated[str, Path(pattern=NAME)], response: Response) -> Progress:
         """How far an upload is that is under way: what is being done, and the share of that which is done. 404 before
@@ -80,21 +110,17 @@ def create_app(backing: Backing) -> FastAPI:
         """One motion."""
         entry = await backing.catalogue.get(motion)
         if entry is None:
-            raise _missing(motion)
+            raise no_such_motion(motion)
         return entry_json(entry)
 
     @app.delete("/v1/motions/{motion}", status_code=204, tags=["motions"])
     async def remove(motion: str) -> None:
         """Remove one motion; sessions that play it go on with what they have."""
         if not await backing.catalogue.remove(motion):
-            raise _missing(motion)
+            raise no_such_motion(motion)
         await backing.library.remove(motion)
 
     return app
-
-
-def _missing(motion: str) -> ProblemError:
-    return ProblemError(404, "No such motion", f"there is no motion {motion[:40]!r}", hint="GET /v1/motions lists them")
 
 
 _BODY = {

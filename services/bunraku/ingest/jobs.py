@@ -1,4 +1,4 @@
-"""An upload's bytes, or a session's log, to an encoded motion, in a process of its own.
+"""An upload's bytes, or a session's log, to an encoded motion or sound, in a process of its own.
 
 Reading strangers' files and encoding motions takes seconds of processor time and may go wrong in any way: a process
 apart keeps the service's loop free, and can be ended when it takes too long or too much. What a job needs is loaded in
@@ -14,7 +14,7 @@ import os
 import resource
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from bunraku.ingest.results import Made, Refused
 
@@ -23,26 +23,65 @@ MEMORY = 4 << 30
 SHARES = 100
 """Times that a job says how far it is, at most: few enough that its pipe never fills."""
 
-Job = Literal["make", "keep"]
-"""`making.make` or `keeping.keep`."""
+Job = Literal["make", "keep", "add", "dress"]
+"""`making.make`, `keeping.keep`, `adding.add` or `scenery.dress`."""
 
 _context = multiprocessing.get_context("forkserver")
-_context.set_forkserver_preload(["bunraku.ingest.making", "bunraku.ingest.keeping"])
+_context.set_forkserver_preload(
+    ["bunraku.ingest.making", "bunraku.ingest.keeping", "bunraku.ingest.adding", "bunraku.ingest.scenery"]
+)
 
 
-_SHORTER: dict[Job, str] = {"make": "cut the file into shorter ones", "keep": "keep a shorter part"}
-_BROKEN_OFF: dict[Job, str] = {
-    "make": "the reader broke off on this file",
-    "keep": "the replay of this session broke off",
+class _Words(NamedTuple):
+    """What is said of a kind of job that did not come to its end."""
+
+    too_much: str
+    shorter: str
+    unreadable: str
+    broken_off: str
+    report: str
+
+
+_WORDS: dict[Job, _Words] = {
+    "make": _Words(
+        "Too much motion",
+        "cut the file into shorter ones",
+        "Unreadable motion",
+        "the reader broke off on this file",
+        "please report it with the file",
+    ),
+    "keep": _Words(
+        "Too much motion",
+        "keep a shorter part",
+        "Unreadable motion",
+        "the replay of this session broke off",
+        "please report it",
+    ),
+    "add": _Words(
+        "Too much sound",
+        "send a file that is no longer than the motion",
+        "Unreadable sound",
+        "the reader broke off on this file",
+        "please report it with the file",
+    ),
+    "dress": _Words(
+        "Too many lights",
+        "ask for fewer at once",
+        "Unreadable keyframes",
+        "the encoder broke off on these keyframes",
+        "please report it with the keyframes",
+    ),
 }
-_REPORT: dict[Job, str] = {"make": "please report it with the file", "keep": "please report it"}
 
 
 def _work(answer: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
+    from bunraku.ingest.adding import add
     from bunraku.ingest.keeping import keep
     from bunraku.ingest.making import make
+    from bunraku.ingest.scenery import dress
 
-    work: Callable[..., Made | Refused] = make if job == "make" else keep
+    works: dict[Job, Callable[..., Made | Refused]] = {"make": make, "keep": keep, "add": add, "dress": dress}
+    work, words = works[job], _WORDS[job]
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     told = -1
 
@@ -55,7 +94,7 @@ def _work(answer: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
     try:
         answer.send(work(*arguments, tell))
     except MemoryError:
-        answer.send(Refused("Too much motion", "this takes more memory than one may have", hint=_SHORTER[job]))
+        answer.send(Refused(words.too_much, "this takes more memory than one may have", hint=words.shorter))
 
 
 async def run(
@@ -76,7 +115,7 @@ async def run(
                 break
             progress(result)
     except TimeoutError:
-        return Refused("Takes too long", f"reading and encoding took more than {seconds:g} s", hint=_SHORTER[job])
+        return Refused("Takes too long", f"reading and encoding took more than {seconds:g} s", hint=_WORDS[job].shorter)
     except EOFError:
         result = None
     finally:
@@ -88,7 +127,8 @@ async def run(
         receiver.close()
     if isinstance(result, Made | Refused):
         return result
-    return Refused("Unreadable motion", _BROKEN_OFF[job], hint=_REPORT[job])
+    words = _WORDS[job]
+    return Refused(words.unreadable, words.broken_off, hint=words.report)
 
 
 async def _to_its_end(work: Callable[[], Any]) -> Any:

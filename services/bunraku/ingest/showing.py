@@ -55,7 +55,7 @@ class Showing:
                 following = next(replayed, None)
             while following is not None and following[0] <= clock + AHEAD:
                 due, over = following
-                rotations = () if over is None else zip(over.limbs, over.rotations.tolist(), strict=True)
+                rotations = () if over is None else zip(over.limbs, over.joints, strict=True)
                 limbs = {int(limb): pack_joints(joints) for limb, joints in rotations}
                 overlays.put(Overlay(sequence, due, limbs))
                 sequence = (sequence + 1) & 0xFFFF

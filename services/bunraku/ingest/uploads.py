@@ -8,7 +8,9 @@ import hashlib
 import os
 import secrets
 import tempfile
+from collections.abc import Callable, Coroutine
 from pathlib import Path, PurePath
+from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
 
@@ -24,6 +26,9 @@ AT_ONCE = 2
 WAITING = 16
 """Uploads that may be under way; one more is told to come again."""
 CHUNK = 1 << 20
+
+Add = Callable[[bytes, Path, Progress], Coroutine[Any, Any, tuple[Entry, bool]]]
+"""Makes a motion of a file: of its SHA-256, where it lies, and what is told how far that is. Whether it is new, too."""
 
 
 def motion_id(digest: bytes) -> str:
@@ -45,8 +50,16 @@ class Uploads:
         return self._under_way.get(upload)
 
     async def take(self, request: Request, filename: str, upload: str | None = None) -> tuple[Entry, bool]:
-        """The motion of the request's body, and whether it is new; while it is under way its `progress` can be asked
-        for by the name `upload`.
+        """The motion of the request's body, and whether it is new. `upload` and errors as of `receive`."""
+
+        async def add(digest: bytes, path: Path, progress: Progress) -> tuple[Entry, bool]:
+            return await self.add(motion_id(digest), path, filename, progress)
+
+        return await self.receive(request, upload, add)
+
+    async def receive(self, request: Request, upload: str | None, add: Add) -> tuple[Entry, bool]:
+        """What `add` makes of the file in the request's body, and whether that is new; while it is under way its
+        `progress` can be asked for by the name `upload`.
 
         Raises `ProblemError`, and `ClientDisconnect` where the sender goes away: all that was begun is then ended.
         """
@@ -60,8 +73,8 @@ class Uploads:
         try:
             with tempfile.TemporaryDirectory(prefix="bunraku-upload-") as folder:
                 path = Path(folder) / "source"
-                motion = await self._receive(request, path, progress)
-                return await self._while_there(request, motion, path, filename, progress)
+                digest = await self._receive(request, path, progress)
+                return await _while_there(request, add(digest, path, progress))
         finally:
             del self._under_way[name]
 
@@ -82,23 +95,8 @@ class Uploads:
             await self._backing.catalogue.remove(motion)
         return await self._store(motion, made, filename, size)
 
-    async def _while_there(
-        self, request: Request, motion: str, path: Path, filename: str, progress: Progress
-    ) -> tuple[Entry, bool]:
-        """As `add`, broken off when the sender of the request goes away."""
-        adding = asyncio.create_task(self.add(motion, path, filename, progress))
-        leaving = asyncio.create_task(_gone(request))
-        try:
-            await asyncio.wait((adding, leaving), return_when=asyncio.FIRST_COMPLETED)
-            if not adding.done():
-                raise ClientDisconnect
-            return adding.result()
-        finally:
-            adding.cancel()
-            leaving.cancel()
-            await asyncio.wait((adding, leaving))
-
-    async def _receive(self, request: Request, path: Path, progress: Progress) -> str:
+    async def _receive(self, request: Request, path: Path, progress: Progress) -> bytes:
+        """Write the body to `path`; its SHA-256."""
         limit = self._backing.settings.upload_bytes
         too_large = ProblemError(
             413, "Too large", f"a file may have {limit} bytes", limit=limit, hint="cut it into shorter clips"
@@ -119,7 +117,7 @@ class Uploads:
                     await asyncio.to_thread(file.write, bytes(pending))
                     pending.clear()
             file.write(pending)
-        return motion_id(digest.digest())
+        return digest.digest()
 
     async def _store(self, motion: str, made: Made | Refused, filename: str, size: int) -> tuple[Entry, bool]:
         if isinstance(made, Refused):
@@ -132,6 +130,21 @@ class Uploads:
         entry = Entry(motion, clock(), described)
         new = await self._backing.catalogue.add(entry)
         return (entry if new else (await self._backing.catalogue.get(motion) or entry)), new
+
+
+async def _while_there(request: Request, making: Coroutine[Any, Any, tuple[Entry, bool]]) -> tuple[Entry, bool]:
+    """The result of `making`, broken off when the sender of the request goes away."""
+    adding = asyncio.create_task(making)
+    leaving = asyncio.create_task(_gone(request))
+    try:
+        await asyncio.wait((adding, leaving), return_when=asyncio.FIRST_COMPLETED)
+        if not adding.done():
+            raise ClientDisconnect
+        return adding.result()
+    finally:
+        adding.cancel()
+        leaving.cancel()
+        await asyncio.wait((adding, leaving))
 
 
 async def _gone(request: Request) -> None:

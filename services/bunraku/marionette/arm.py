@@ -11,17 +11,17 @@ Here are angles, one arm at a time; `arms` has the same arm in places, many at a
 
 from __future__ import annotations
 
-from math import acos, asin, atan2, cos, hypot, sin, sqrt
+from math import atan2, cos, hypot, sin
 
 import numpy as np
 import numpy.typing as npt
 
+from bunraku.marionette import links
+from bunraku.marionette.links import Links
 from bunraku.marionette.proportions import ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, Proportions
 from bunraku.motion.rotation import Array
 
 Table = npt.NDArray[np.float16]
-SIDE = 64
-"""A table has SIDE x SIDE nodes: rows from the inner radius to the outer, columns from straight down to straight up."""
 
 
 def bend_limits(proportions: Proportions, r: Array) -> tuple[Array, Array]:
@@ -57,47 +57,25 @@ class Arm:
     def __init__(self, proportions: Proportions, table: Table) -> None:
         self.proportions = proportions
         self.inner = proportions.inner_radius
-        self._node: list[list[float]] = table.astype(np.float64).tolist()
-        self._folded, self._lean = folded_elbow(proportions)
+        self.links: Links = (*proportions.lengths, self.inner, *folded_elbow(proportions))
+        self.nodes: Array = table.astype(np.float64)
+        """The table (SIDE, SIDE)."""
 
     def clamp(self, r: float) -> float:
         """The nearest distance that is solved for."""
         return min(max(r, self.inner), OUTER_RADIUS)
 
     def limits(self, r: float) -> tuple[float, float]:
-        """Least and greatest wrist bend, radians, that reach `r` (clamped) with elbow and wrist within their limits."""
-        upper, fore, hand = self.proportions.lengths
-        straight, folded = upper + fore, self._folded
-        high = min(WRIST_LIMIT, _acos1((r * r - straight * straight - hand * hand) / (2.0 * straight * hand)))
-        low = self._lean - ELBOW_LIMIT + _acos1((r * r - folded * folded - hand * hand) / (2.0 * folded * hand))
-        return min(max(low, 0.0), high), high
+        """As `links.limits`; `r` is clamped."""
+        return links.limits(self.links, r)
 
     def bend(self, r: float, beta: float) -> float:
-        """The wrist bend, radians, at which gravity leaves an arm with its tip at (`r`, `beta`), from the table."""
-        q = sqrt((1.0 - r) / (1.0 - self.inner))
-        level, up = cos(beta), sin(beta)
-        u = (1.0 - q) * (1.0 + 0.75 * q) * (SIDE - 1)
-        v = 0.5 * (1.0 + up / (level + abs(up))) * (SIDE - 1)
-        i, j = min(max(int(u), 0), SIDE - 2), min(max(int(v), 0), SIDE - 2)
-        p, q = u - i, v - j
-        row, after = self._node[i], self._node[i + 1]
-        share = (row[j] * (1.0 - q) + row[j + 1] * q) * (1.0 - p)
-        share += (after[j] * (1.0 - q) + after[j + 1] * q) * p
-        low, high = self.limits(r)
-        least, greatest = sin(0.5 * low), sin(0.5 * high)
-        return 2.0 * asin(least + share * (greatest - least))
+        """As `links.gravity`, from this arm's table."""
+        return links.gravity(self.links, self.nodes, r, beta)
 
     def close(self, r: float, beta: float, bend: float) -> tuple[float, float, float]:
-        """Link angles t0, t1, t2 that bring the tip to (`r`, `beta`) with the wrist bent by `bend`, elbow below.
-
-        Exact for any `bend` within `limits(r)`; beyond them the arm does not reach, or a joint breaks its limit.
-        """
-        upper, fore, hand = self.proportions.lengths
-        x, y = fore + hand * cos(bend), hand * sin(bend)
-        lower = hypot(x, y)
-        t0 = beta - _acos1((upper * upper + r * r - lower * lower) / (2.0 * upper * r))
-        t1 = t0 + _acos1((r * r - upper * upper - lower * lower) / (2.0 * upper * lower)) - atan2(y, x)
-        return t0, t1, t1 + bend
+        """As `links.close`."""
+        return links.close(self.links, r, beta, bend)
 
     def angles(self, r: float, beta: float) -> tuple[float, float, float]:
         """Link angles t0, t1, t2 for a tip at distance `r` (already clamped) and elevation `beta`, -pi/2..pi/2."""
@@ -107,7 +85,3 @@ class Arm:
 def _acos(x: Array) -> Array:
     angle: Array = np.arccos(np.clip(x, -1.0, 1.0))
     return angle
-
-
-def _acos1(x: float) -> float:
-    return acos(min(max(x, -1.0), 1.0))

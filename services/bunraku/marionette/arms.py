@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bunraku.marionette.arm import SIDE, Table, folded_elbow
+from bunraku.marionette.arm import Table, folded_elbow
+from bunraku.marionette.links import SIDE
 from bunraku.marionette.proportions import ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, Proportions
 from bunraku.motion.rotation import Array
 

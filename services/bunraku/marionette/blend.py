@@ -2,66 +2,104 @@
 
 Both arms are seen in the frame of their chord, the line from shoulder to tip with the plane of the elbow about it.
 There they differ by little, and mixing their joints moves the tip by little; the arm is then closed on the target
-again, so that the tip is exact all the way.
+again, so that the tip is exact all the way. What is left of jumps turns nothing but the elbow about the chord, or links
+about themselves, and is gone through at a bounded speed.
 """
 
 from __future__ import annotations
 
-from math import atan2, pi, sqrt
+from math import atan2, cbrt, copysign, hypot, pi, sqrt
 
 from bunraku.marionette import vector
 from bunraku.marionette.limbs import ArmRig, Joints
+from bunraku.marionette.spin import FARTHEST, FASTEST, Spins
 from bunraku.marionette.vector import Quaternion, Vector
-
-BELOW = 0.5
-"""How far the elbow of a straight arm is drawn to the marionette's side, in parts of the upper arm at weight 1."""
-
 
 FRESH = 0.05
 """Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more."""
+AWAY = 2.0
+"""An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned quite otherwise, at any weight."""
 
 
 class ArmBlend:
-    """One arm on its way. It remembers which way round the elbow swings, so that it never changes its mind halfway."""
+    """One arm on its way. It remembers which way round the elbow swings, and how far its links are turned."""
 
     def __init__(self, rig: ArmRig) -> None:
         self._rig = rig
         self._swivel: float | None = None
+        # radians about the chord that the elbow is shown ahead of its way, and goes back
+        self._ahead = 0.0
+        self._spins = Spins(rig.links)
 
     def joints(
-        self, dance: Joints, bent: Joints, target: Vector, turn: Quaternion, normal: Vector, weight: float
+        self,
+        dance: Joints,
+        bent: Joints,
+        target: Vector,
+        turn: Quaternion,
+        normal: Vector,
+        weight: float,
+        seconds: float,
     ) -> Joints:
-        """The joints at `weight`: 0 gives back the dance's, 1 the bent arm's in the plane of `normal`.
+        """The joints at `weight`, `seconds` after the last: 0 gives back the dance's, 1 the bent arm's in the plane of
+        `normal`, both as soon as the links have come round.
 
         `dance` are the pose's joints, `bent` those of `ArmRig.bend` for the `target` (arm lengths, axes of vl5); `turn`
         brings the direction of the dance's own hand to the target's, and `normal` is a unit vector square to that.
         Between, the elbow goes to the nearest place from which forearm and hand reach the target; where the mixed wrist
         leaves none, the tip comes as near as it can.
         """
-        rig = self._rig
-        direction = rig.direction(target)
+        direction = self._rig.direction(target)
+        own = self._rig.target(dance) if weight < 1.0 else target
+        # nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
+        share = min(max(cbrt(weight), AWAY * vector.length(vector.subtract(target, own))), 1.0)
+        most = min(abs(self._ahead), 2.0 * pi * share)
+        self._ahead = copysign(max(most - FASTEST * seconds, 0.0), self._ahead)
         if weight >= 1.0:
             self._swivel = None
-            shoulder = vector.multiply(rig.chord(direction, normal), bent[0])
-            return (vector.normalise(shoulder), bent[1], bent[2])
-        own = rig.direction(rig.target(dance))
+            plane = vector.rotate(vector.about(direction, self._ahead), normal) if self._ahead else normal
+            shoulder = vector.multiply(self._rig.chord(direction, plane), bent[0])
+            joints = (vector.normalise(shoulder), bent[1], bent[2])
+        else:
+            joints = self._mixed(dance, self._rig.direction(own), bent, target, turn, normal, weight)
+        return self._spins.follow(joints, share, seconds)
+
+    def _mixed(
+        self,
+        dance: Joints,
+        own: Vector,
+        bent: Joints,
+        target: Vector,
+        turn: Quaternion,
+        normal: Vector,
+        weight: float,
+    ) -> Joints:
+        """The joints below weight 1; `own` is the direction of the dance's hand."""
+        rig = self._rig
+        direction = rig.direction(target)
         own_normal = vector.unit(vector.square_to(rig.bend_axis(dance), own), vector.across(own))
         carried = vector.rotate(turn, own_normal)
         swivel = atan2(vector.dot(vector.cross(carried, normal), direction), vector.dot(carried, normal))
-        if self._swivel is not None and weight > FRESH:
-            swivel += 2.0 * pi * round((self._swivel - swivel) / (2.0 * pi))
+        if self._swivel is not None:
+            onwards = swivel + 2.0 * pi * round((self._swivel - swivel) / (2.0 * pi))
+            if weight > FRESH and abs(onwards) <= FARTHEST:
+                swivel = onwards
+            else:
+                # the other way round from here on; it is shown where it was, and comes over
+                ahead = self._ahead + weight * (onwards - swivel)
+                self._ahead = ahead - 2.0 * pi * round(ahead / (2.0 * pi))
         self._swivel = swivel
         if weight <= 0.0:
             return dance
-        plane = vector.rotate(vector.about(direction, swivel * weight), carried)
+        plane = vector.rotate(vector.about(direction, swivel * weight + self._ahead), carried)
         in_chord = vector.multiply(vector.conjugate(rig.chord(own, own_normal)), dance[0])
         shoulder = vector.slerp(in_chord, bent[0], weight)
         elbow, wrist = (vector.slerp(a, b, weight) for a, b in zip(dance[1:], bent[1:], strict=True))
-        shoulder, elbow = self._close(shoulder, elbow, wrist, vector.length(target), weight)
+        shoulder, elbow = self._close(shoulder, elbow, wrist, vector.length(target))
         return (vector.normalise(vector.multiply(rig.chord(direction, plane), shoulder)), elbow, wrist)
 
     def _close(
-        self, shoulder: Quaternion, elbow: Quaternion, wrist: Quaternion, reach: float, weight: float
+        self, shoulder: Quaternion, elbow: Quaternion, wrist: Quaternion, reach: float
     ) -> tuple[Quaternion, Quaternion]:
         """Shoulder and elbow, turned by as little as brings the tip to `reach` arm lengths along the chord."""
         upper, fore, hand = self._rig.links
@@ -71,8 +109,10 @@ class ArmBlend:
         along = min(max((near * near + chord * chord - far * far) / (2.0 * chord), -near), near)
         off = sqrt(max(near * near - along * along, 0.0))
         mixed = vector.rotate(shoulder, upper)
-        # a straight arm leaves open to which side its elbow goes; that of the bent one is on the side of -y
-        _, y, z = vector.unit((0.0, mixed[1] - BELOW * weight * near, mixed[2]), (0.0, -1.0, 0.0))
+        # where the elbow has to go farther off the chord, it goes to the side of -y: a straight arm leaves open which,
+        # and that of the bent arm is there
+        farther = max(off - hypot(mixed[1], mixed[2]), 0.0)
+        _, y, z = vector.unit((0.0, mixed[1] - farther, mixed[2]), (0.0, -1.0, 0.0))
         place = (along, off * y, off * z)
         before = vector.multiply(shoulder, elbow)
         raised = vector.between(vector.scale(mixed, 1.0 / near), vector.scale(place, 1.0 / near))

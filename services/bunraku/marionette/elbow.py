@@ -11,14 +11,18 @@ every instant, as only the two freedoms are slowed down, never the hand.
 
 from __future__ import annotations
 
-from math import acos, asin, atan2, cos, hypot, pi, sin, sqrt
+from math import asin, atan2, cos, exp, isnan, log, pi, sin, sqrt
 from typing import NamedTuple
 
+from bunraku.marionette import links as link
+from bunraku.marionette import shoulder as limit
 from bunraku.marionette import vector
 from bunraku.marionette.arm import Arm
+from bunraku.marionette.links import Links
 from bunraku.marionette.proportions import ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT
 from bunraku.marionette.shoulder import Shoulder
 from bunraku.marionette.vector import Vector
+from bunraku.motion.rotation import Array
 
 NEAR_AXIS = 0.05
 """Distance from the vertical axis, in arm lengths, at which the plane is drawn half as fast as far away."""
@@ -49,6 +53,11 @@ class Hanging(NamedTuple):
     bend: float
 
 
+Memory = tuple[Vector, Vector, float, Vector]
+"""What an elbow goes on from: the unit direction of the tip; the unit normal of the plane, square to it; how far the
+upper arm lies off the chord, radians; and where it was shown last, a unit vector, or zero."""
+
+
 def vertical_normal(direction: Vector, up: Vector) -> Vector | None:
     """Normal of the vertical plane through the unit `direction`; None within 1e-9 of the axis.
 
@@ -70,147 +79,135 @@ class Elbow:
     def __init__(self, arm: Arm, shoulder: Shoulder) -> None:
         self._arm = arm
         self._shoulder = shoulder
-        self._upper = arm.proportions.lengths[0]
-        self._direction: Vector | None = None
-        self._normal: Vector = (1.0, 0.0, 0.0)
-        self._lift = 0.0
-        # where the upper arm was shown last
-        self._was: Vector | None = None
+        self._memory: Memory | None = None
 
     def forget(self) -> None:
         """The next call of `begin` starts anew."""
-        self._direction = self._was = None
+        self._memory = None
 
     @property
     def known(self) -> bool:
         """Whether it has begun."""
-        return self._direction is not None
+        return self._memory is not None
 
     def begin(self, direction: Vector, normal: Vector, lift: float) -> None:
         """Starts with the tip in the unit `direction`, the plane as near to `normal` as square to it allows, and the
         upper arm `lift` radians off the chord."""
-        self._direction = direction
-        self._normal = vector.unit(vector.square_to(normal, direction), vector.across(direction))
-        self._lift = lift
+        square = vector.unit(vector.square_to(normal, direction), vector.across(direction))
+        self._memory = (direction, square, lift, (0.0, 0.0, 0.0))
 
     def follow(self, direction: Vector, reach: float, up: Vector, seconds: float) -> Hanging:
         """The arm once the tip has come to the unit `direction` at `reach` arm lengths, `seconds` after the last.
 
         `up` is the world's up, a unit vector in the same frame.
         """
-        before = self._upper_arm(self._direction or direction, self._normal, self._lift)
-        normal = self._carry(direction)
-        r = self._arm.clamp(reach)
-        low, high = self._arm.limits(r)
-        least, greatest = self._lift_of(r, high), self._lift_of(r, low)
-        wanted = self._lift_of(r, self._arm.bend(r, elevation(direction, up)))
-        # towards full stretch the lift ends anyhow: evenly, and not within the last frames
-        wanted = min(wanted, SLOPE * (OUTER_RADIUS - r) / self._upper)
-        most = LIFT_SPEED * seconds / self._upper
-        lift = min(max(wanted, self._lift - most), self._lift + most)
-        lift = min(max(lift, least), greatest)
-        moved = _apart(self._upper_arm(direction, normal, lift), before) * self._upper
-        left = max(SPEED * seconds - moved, LEAST_SPEED * seconds)
-        normal = self._swing(direction, normal, up, r, lift, seconds, left)
-        self._lift = lift
-        r, normal, lift, low, high, allowed = self._shoulder_allows(direction, normal, r, lift, low, high)
-        self._direction, self._normal = direction, normal
-        was, self._was = self._was, self._upper_arm(direction, normal, lift)
-        most = (moved + left) / self._upper
-        if was is not None and (not allowed or _apart(self._was, was) > most):
-            # the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow; where it
-            # leaves none, close to the shoulder, the elbow waits too
-            self._was = self._shoulder.toward(was, self._was, most) if allowed else was
-            return self._reach_out(self._was, vector.scale(direction, reach), normal)
-        return Hanging(vector.scale(direction, r), normal, self._bend_of(r, lift, low, high))
-
-    def _upper_arm(self, direction: Vector, normal: Vector, lift: float) -> Vector:
-        """The unit vector from the shoulder to the elbow."""
-        down = vector.cross(direction, normal)
-        return vector.add(vector.scale(direction, cos(lift)), vector.scale(down, sin(lift)))
-
-    def _carry(self, direction: Vector) -> Vector:
-        if self._direction is None:
+        if self._memory is None:
             raise RuntimeError("an elbow follows once it has begun")
-        turned = vector.rotate(vector.between(self._direction, direction), self._normal)
-        return vector.unit(vector.square_to(turned, direction), vector.across(direction))
+        arm = self._arm
+        settled, self._memory = hang(arm.links, arm.nodes, self._shoulder, self._memory, direction, reach, up, seconds)
+        return Hanging(*settled)
 
-    def _swing(
-        self, direction: Vector, normal: Vector, up: Vector, r: float, lift: float, seconds: float, left: float
-    ) -> Vector:
-        """The normal, swung about the chord towards the vertical plane's by as much as the elbow may move."""
-        wanted = vertical_normal(direction, up)
-        if wanted is None:
-            return normal
-        off = vector.length(vector.square_to(direction, up)) * r
-        pull = off * off / (off * off + NEAR_AXIS * NEAR_AXIS)
-        swing = atan2(vector.dot(vector.cross(normal, wanted), direction), vector.dot(normal, wanted))
-        most = min(FASTEST * seconds, left / max(self._upper * sin(lift), 1e-3))
-        turn = min(max(swing * (1.0 - 2.0 ** (-seconds * pull / HALF_LIFE)), -most), most)
-        return _turned(direction, normal, turn)
 
-    def _shoulder_allows(
-        self, direction: Vector, normal: Vector, r: float, lift: float, low: float, high: float
-    ) -> tuple[float, Vector, float, float, float, bool]:
-        """Distance, normal, lift, and least and greatest wrist bend nearest to these that the shoulder lets be, and
-        whether it lets any."""
-        turn: float | None = self._shoulder.turn(direction, normal, lift)
-        if turn == 0.0:
-            return r, normal, lift, low, high, True
-        if turn is None:
-            # no turn helps: more bend of the elbow may, and where it does not, a hand that is nearer
-            away = self._shoulder.away(direction) + CLEAR
-            if away > self._lift_of(r, low):
-                r = self._nearer(r, away)
-                low, high = self._arm.limits(r)
-            lift = min(max(lift, away), self._lift_of(r, low))
-            turn = self._shoulder.turn(direction, normal, lift)
-        return r, _turned(direction, normal, turn or 0.0), lift, low, high, turn is not None
+def hang(
+    links: Links,
+    nodes: Array,
+    shoulder: Shoulder,
+    memory: Memory,
+    direction: Vector,
+    reach: float,
+    up: Vector,
+    seconds: float,
+) -> tuple[tuple[Vector, Vector, float], Memory]:
+    """The arm of these `links` and this table of `nodes` (64, 64), `seconds` after its `memory`, and what it remembers
+    then; the rest as `Elbow.follow` has it."""
+    last_direction, last_normal, last_lift, last_shown = memory
+    upper, inner = links[0], links[3]
+    before = upper_arm(last_direction, last_normal, last_lift)
+    turned = vector.rotate(vector.between(last_direction, direction), last_normal)
+    normal = vector.unit(vector.square_to(turned, direction), vector.across(direction))
+    r = min(max(reach, inner), OUTER_RADIUS)
+    low, high = link.limits(links, r)
+    wanted = link.lift_of(links, r, link.gravity(links, nodes, r, elevation(direction, up)))
+    # towards full stretch the lift ends anyhow: evenly, and not within the last frames
+    wanted = min(wanted, SLOPE * (OUTER_RADIUS - r) / upper)
+    most = LIFT_SPEED * seconds / upper
+    lift = min(max(wanted, last_lift - most), last_lift + most)
+    lift = min(max(lift, link.lift_of(links, r, high)), link.lift_of(links, r, low))
+    moved = _apart(upper_arm(direction, normal, lift), before) * upper
+    left = max(SPEED * seconds - moved, LEAST_SPEED * seconds)
+    normal = _swing(direction, normal, up, r, upper * sin(lift), seconds, left)
+    goes_on = lift
+    turn = limit.turn(shoulder, direction, normal, lift)
+    if isnan(turn):
+        # no turn helps: more bend of the elbow may, and where it does not, a hand that is nearer
+        away = limit.away(shoulder, direction) + CLEAR
+        if away > link.lift_of(links, r, low):
+            r = link.nearer(links, r, away)
+            low, high = link.limits(links, r)
+        lift = min(max(lift, away), link.lift_of(links, r, low))
+        turn = limit.turn(shoulder, direction, normal, lift)
+    allowed = not isnan(turn)
+    if allowed and turn != 0.0:
+        normal = _turned(direction, normal, turn)
+    shown = upper_arm(direction, normal, lift)
+    most = (moved + left) / upper
+    if vector.dot(last_shown, last_shown) > 0.0 and (not allowed or _apart(shown, last_shown) > most):
+        # the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow; where it
+        # leaves none, close to the shoulder, the elbow waits too
+        shown = limit.toward(shoulder, last_shown, shown, most) if allowed else last_shown
+        hanging = _reach_out(links, shown, vector.scale(direction, reach), normal)
+    else:
+        hanging = (vector.scale(direction, r), normal, link.bend_of(links, r, lift, low, high))
+    return hanging, (direction, normal, goes_on, shown)
 
-    def _reach_out(self, upper_arm: Vector, target: Vector, normal: Vector) -> Hanging:
-        """What hangs from an upper arm that is on its way, forearm and hand as near to `target` as they come."""
-        upper, fore, hand = self._arm.proportions.lengths
-        elbow = vector.scale(upper_arm, upper)
-        way = vector.subtract(target, elbow)
-        shortest = sqrt(fore * fore + hand * hand + 2.0 * fore * hand * cos(WRIST_LIMIT))
-        length = min(max(vector.length(way), shortest), fore + hand)
-        # where forearm and hand are straight, the cosine has lost the digits that tell the bend
-        cosine = (length * length - fore * fore - hand * hand) / (2.0 * fore * hand)
-        bend = acos(min(max(cosine, -1.0), 1.0)) if length < fore + hand else 0.0
-        lean = atan2(hand * sin(bend), fore + hand * cos(bend))
-        side = vector.square_to(way, upper_arm)
-        off = vector.unit(side, vector.cross(normal, upper_arm))
-        angle = atan2(vector.dot(way, off), vector.dot(way, upper_arm))
-        angle = min(max(angle, lean), min(ELBOW_LIMIT + lean, pi))
-        along = vector.add(vector.scale(upper_arm, cos(angle)), vector.scale(off, sin(angle)))
-        tip = vector.add(elbow, vector.scale(along, length))
-        r = min(vector.length(tip), OUTER_RADIUS)
-        direction = vector.unit(tip, upper_arm)
-        low, high = self._arm.limits(r)
-        down = vector.unit(vector.square_to(upper_arm, direction), vector.cross(direction, normal))
-        return Hanging(vector.scale(direction, r), vector.cross(down, direction), min(max(bend, low), high))
 
-    def _nearer(self, r: float, away: float) -> float:
-        """The farthest tip, no farther than `r`, whose upper arm is lifted `away` radians off the chord."""
-        near, far = self._arm.inner, r
-        for _ in range(40):
-            middle = 0.5 * (near + far)
-            near, far = (middle, far) if self._lift_of(middle, self._arm.limits(middle)[0]) >= away else (near, middle)
-        return near
+def upper_arm(direction: Vector, normal: Vector, lift: float) -> Vector:
+    """The unit vector from the shoulder to an elbow `lift` radians off the unit `direction` of the tip, below it in
+    the plane of the unit `normal`."""
+    down = vector.cross(direction, normal)
+    return vector.add(vector.scale(direction, cos(lift)), vector.scale(down, sin(lift)))
 
-    def _lift_of(self, r: float, bend: float) -> float:
-        upper, fore, hand = self._arm.proportions.lengths
-        square = fore * fore + hand * hand + 2.0 * fore * hand * cos(bend)
-        return acos(min(max((upper * upper + r * r - square) / (2.0 * upper * r), -1.0), 1.0))
 
-    def _bend_of(self, r: float, lift: float, low: float, high: float) -> float:
-        upper, fore, hand = self._arm.proportions.lengths
-        # at a limit the cosine has lost the digits that tell the bend
-        if lift >= self._lift_of(r, low):
-            return low
-        square = upper * upper + r * r - 2.0 * upper * r * cos(lift)
-        bend = acos(min(max((square - fore * fore - hand * hand) / (2.0 * fore * hand), -1.0), 1.0))
-        return min(max(bend, low), high)
+def _swing(
+    direction: Vector, normal: Vector, up: Vector, r: float, radius: float, seconds: float, left: float
+) -> Vector:
+    """The normal, swung about the chord towards the vertical plane's by as much as the elbow may move, `left` arm
+    lengths on its circle of this `radius` about the chord."""
+    wanted = vector.cross(direction, up)
+    size = vector.length(wanted)
+    if size <= 1e-9:
+        return normal
+    wanted = vector.scale(wanted, 1.0 / size)
+    off = vector.length(vector.square_to(direction, up)) * r
+    pull = off * off / (off * off + NEAR_AXIS * NEAR_AXIS)
+    swing = atan2(vector.dot(vector.cross(normal, wanted), direction), vector.dot(normal, wanted))
+    most = min(FASTEST * seconds, left / max(radius, 1e-3))
+    turn = min(max(swing * (1.0 - exp(-log(2.0) * seconds * pull / HALF_LIFE)), -most), most)
+    return _turned(direction, normal, turn)
+
+
+def _reach_out(links: Links, upper_arm: Vector, target: Vector, normal: Vector) -> tuple[Vector, Vector, float]:
+    """What hangs from an upper arm that is on its way, forearm and hand as near to `target` as they come."""
+    upper, fore, hand, _, _, _ = links
+    elbow = vector.scale(upper_arm, upper)
+    way = vector.subtract(target, elbow)
+    shortest = sqrt(fore * fore + hand * hand + 2.0 * fore * hand * cos(WRIST_LIMIT))
+    length = min(max(vector.length(way), shortest), fore + hand)
+    # where forearm and hand are straight, the cosine has lost the digits that tell the bend
+    cosine = (length * length - fore * fore - hand * hand) / (2.0 * fore * hand)
+    bend = link.arc_cosine(cosine) if length < fore + hand else 0.0
+    lean = atan2(hand * sin(bend), fore + hand * cos(bend))
+    side = vector.square_to(way, upper_arm)
+    off = vector.unit(side, vector.cross(normal, upper_arm))
+    angle = atan2(vector.dot(way, off), vector.dot(way, upper_arm))
+    angle = min(max(angle, lean), min(ELBOW_LIMIT + lean, pi))
+    along = vector.add(vector.scale(upper_arm, cos(angle)), vector.scale(off, sin(angle)))
+    tip = vector.add(elbow, vector.scale(along, length))
+    r = min(vector.length(tip), OUTER_RADIUS)
+    direction = vector.unit(tip, upper_arm)
+    low, high = link.limits(links, r)
+    down = vector.unit(vector.square_to(upper_arm, direction), vector.cross(direction, normal))
+    return (vector.scale(direction, r), vector.cross(down, direction), min(max(bend, low), high))
 
 
 def lift_between(elbow: Vector, direction: Vector) -> float:
@@ -222,7 +219,7 @@ def lift_between(elbow: Vector, direction: Vector) -> float:
 def _turned(direction: Vector, normal: Vector, turn: float) -> Vector:
     side = vector.cross(direction, normal)
     turned = vector.add(vector.scale(normal, cos(turn)), vector.scale(side, sin(turn)))
-    return vector.scale(turned, 1.0 / hypot(*turned))
+    return vector.scale(turned, 1.0 / vector.length(turned))
 
 
 def _apart(a: Vector, b: Vector) -> float:

@@ -57,52 +57,73 @@ class Follower:
             ahead = moved if vector.length(moved) <= JUMP else STILL
             before = STILL
         self._wanted, self._carried = wanted, carried
-        # what is left of the way when the target's own is taken off
-        direction, distance = self._way(vector.subtract(wanted, vector.scale(ahead, seconds)), inner)
-        most = acceleration * seconds
-        # the speed from which whole steps of the bounded acceleration come to rest after `distance`
-        speed = most * (sqrt(0.25 + 2.0 * distance / (most * seconds)) - 0.5)
-        speed = min(speed, distance / seconds, FASTEST)
         # with a moving ground all velocities are against it
         ground = ahead if carried is not None else STILL
-        aim = vector.subtract(vector.add(ahead, vector.scale(direction, speed)), ground)
-        had = vector.subtract(self.velocity, before)
-        change = vector.subtract(aim, had)
-        size = vector.length(change)
-        if size > most:
-            change = vector.scale(change, most / size)
-        velocity = vector.add(vector.add(had, change), ground)
-        place = _within(vector.add(self.place, vector.scale(velocity, seconds)), inner, outer)
-        self.velocity = vector.scale(vector.subtract(place, self.place), 1.0 / seconds)
-        self.place = place
-        return place
+        self.place, self.velocity = advance(
+            self.place, self.velocity, wanted, ahead, before, ground, seconds, acceleration, inner, outer
+        )
+        return self.place
 
-    def _way(self, wanted: Vector, inner: float) -> tuple[Vector, float]:
-        """The unit vector to set out on, and how far it is: straight, or past a point beside the origin."""
-        straight = vector.subtract(wanted, self.place)
-        distance = vector.length(straight)
-        if distance < 1e-12:
-            return STILL, 0.0
-        direction = vector.scale(straight, 1.0 / distance)
-        if inner <= 0.0:
-            return direction, distance
-        along = -vector.dot(self.place, direction)
-        near = min(CLEARANCE, vector.length(self.place), vector.length(wanted))
-        if not 0.0 < along < distance:
-            return direction, distance
-        nearest = vector.add(self.place, vector.scale(direction, along))
-        off = vector.length(nearest)
-        if off >= near:
-            return direction, distance
-        # in front of the chest, where a hand that comes straight across has the room
-        aside = vector.unit(nearest, (0.0, 0.0, 1.0)) if off > 1e-3 else _aside(direction)
-        past = vector.scale(aside, near)
-        first = vector.subtract(past, self.place)
-        leg = vector.length(first)
-        if leg < 1e-9:
-            return direction, distance
-        rest = vector.length(vector.subtract(wanted, past))
-        return vector.scale(first, 1.0 / leg), leg + rest
+
+def advance(
+    place: Vector,
+    velocity: Vector,
+    wanted: Vector,
+    ahead: Vector,
+    before: Vector,
+    ground: Vector,
+    seconds: float,
+    acceleration: float,
+    inner: float,
+    outer: float,
+) -> tuple[Vector, Vector]:
+    """Place and velocity `seconds` later, on the way to `wanted`, which itself goes `ahead` at that velocity.
+
+    The velocity of the ground that one goes on is `ground`, and was `before`; the rest as `Follower.step` has it.
+    """
+    # what is left of the way when the target's own is taken off
+    direction, distance = _way(place, vector.subtract(wanted, vector.scale(ahead, seconds)), inner)
+    most = acceleration * seconds
+    # the speed from which whole steps of the bounded acceleration come to rest after `distance`
+    speed = most * (sqrt(0.25 + 2.0 * distance / (most * seconds)) - 0.5)
+    speed = min(speed, distance / seconds, FASTEST)
+    aim = vector.subtract(vector.add(ahead, vector.scale(direction, speed)), ground)
+    had = vector.subtract(velocity, before)
+    change = vector.subtract(aim, had)
+    size = vector.length(change)
+    if size > most:
+        change = vector.scale(change, most / size)
+    velocity = vector.add(vector.add(had, change), ground)
+    after = _within(vector.add(place, vector.scale(velocity, seconds)), inner, outer)
+    return after, vector.scale(vector.subtract(after, place), 1.0 / seconds)
+
+
+def _way(place: Vector, wanted: Vector, inner: float) -> tuple[Vector, float]:
+    """The unit vector to set out on, and how far it is: straight, or past a point beside the origin."""
+    straight = vector.subtract(wanted, place)
+    distance = vector.length(straight)
+    if distance < 1e-12:
+        return STILL, 0.0
+    direction = vector.scale(straight, 1.0 / distance)
+    if inner <= 0.0:
+        return direction, distance
+    along = -vector.dot(place, direction)
+    near = min(CLEARANCE, vector.length(place), vector.length(wanted))
+    if not 0.0 < along < distance:
+        return direction, distance
+    nearest = vector.add(place, vector.scale(direction, along))
+    off = vector.length(nearest)
+    if off >= near:
+        return direction, distance
+    # in front of the chest, where a hand that comes straight across has the room
+    aside = vector.unit(nearest, (0.0, 0.0, 1.0)) if off > 1e-3 else _aside(direction)
+    past = vector.scale(aside, near)
+    first = vector.subtract(past, place)
+    leg = vector.length(first)
+    if leg < 1e-9:
+        return direction, distance
+    rest = vector.length(vector.subtract(wanted, past))
+    return vector.scale(first, 1.0 / leg), leg + rest
 
 
 def _aside(direction: Vector) -> Vector:

@@ -18,8 +18,9 @@ from bunraku.marionette import vector
 from bunraku.marionette.arm import Arm
 from bunraku.marionette.elbow import elevation, vertical_normal
 from bunraku.marionette.leg import clamp_thigh, knee_bend
+from bunraku.marionette.links import Links, close
 from bunraku.marionette.proportions import WRIST_LIMIT, Proportions
-from bunraku.marionette.shoulder import Shoulder
+from bunraku.marionette.shoulder import shoulder_of
 from bunraku.marionette.table import table_of
 from bunraku.marionette.vector import Quaternion, Vector
 from bunraku.motion.skeleton import INDEX, Figure
@@ -56,6 +57,10 @@ class Limb(IntEnum):
         return (INDEX[f"{side}_{a}"], INDEX[f"{side}_{b}"], INDEX[f"{side}_{c}"])
 
 
+LIMBS = tuple(Limb)
+"""All four, in order: to go through an enumeration takes ten times as long, which counts at a stage's rate."""
+
+
 def link_frame(link: Vector, axis: Vector) -> Quaternion:
     """Orientation with x along `link` and z as near to `axis` as square to it allows."""
     x = vector.unit(link, (0.0, -1.0, 0.0))
@@ -82,11 +87,11 @@ class ArmRig:
         # the lengths are the figure's own, to the last digit; only the bend comes from the nearest table
         self.arm = Arm(proportions, table_of(proportions.identity))
         first, second, third = self.links
-        self._frames = (link_frame(first, BEND_AXIS), link_frame(second, BEND_AXIS), link_frame(third, BEND_AXIS))
-        self.shoulder = Shoulder(right=limb is Limb.RIGHT_HAND)
+        self.frames = (link_frame(first, BEND_AXIS), link_frame(second, BEND_AXIS), link_frame(third, BEND_AXIS))
+        self.shoulder = shoulder_of(right=limb is Limb.RIGHT_HAND)
         side = 1.0 if limb is Limb.LEFT_HAND else -1.0
         # the more the wrist bends, the more the palm turns down: to the side a wrist bends little
-        self._palm_down = side * pi / 2.0
+        self.palm_down = side * pi / 2.0
 
     def up(self, pose: Pose) -> Vector:
         """The world's up in the shoulder's frame."""
@@ -95,13 +100,7 @@ class ArmRig:
 
     def places(self, joints: Joints) -> tuple[Vector, Vector, Vector]:
         """Elbow, wrist and tip from the shoulder, in metres on the axes of vl5."""
-        turn, place = vector.IDENTITY, (0.0, 0.0, 0.0)
-        found = []
-        for joint, link in zip(joints, self.links, strict=True):
-            turn = vector.multiply(turn, joint)
-            place = vector.add(place, vector.rotate(turn, link))
-            found.append(place)
-        return (found[0], found[1], found[2])
+        return places(self.links, joints)
 
     def dance(self, pose: Pose) -> Joints:
         """The arm's three rotations in a pose."""
@@ -130,17 +129,7 @@ class ArmRig:
     def bend(self, reach: float, bend: float) -> Joints:
         """The arm that reaches as far as `reach` (arm lengths) with its wrist bent by `bend` radians, in the frame of
         its chord: that frame times the first is the shoulder's rotation."""
-        t0, t1, t2 = self.arm.close(reach, 0.0, bend)
-        first, second, third = self._frames
-        share = (t2 - t1) / WRIST_LIMIT
-        palm = vector.about((1.0, 0.0, 0.0), self._palm_down * share * share * (3.0 - 2.0 * share))
-        elbow = vector.multiply(vector.multiply(_about_z(t1 - t0), palm), vector.conjugate(second))
-        wrist = vector.multiply(vector.multiply(_about_z(t2 - t1), palm), vector.conjugate(third))
-        return (
-            vector.multiply(_about_z(t0), vector.conjugate(first)),
-            vector.normalise(vector.multiply(first, elbow)),
-            vector.normalise(vector.multiply(vector.multiply(second, vector.conjugate(palm)), wrist)),
-        )
+        return bend_links(self.arm.links, self.frames, self.palm_down, reach, bend)
 
     def hang(self, target: Vector, up: Vector, normal: Vector | None = None) -> Joints:
         """The arm with its tip at `target` as gravity alone has it, in the plane of `normal` (by default the vertical).
@@ -157,6 +146,31 @@ class ArmRig:
         reach = self.arm.clamp(vector.length(target))
         shoulder, elbow, wrist = self.bend(reach, self.arm.bend(reach, elevation(direction, up)))
         return (vector.normalise(vector.multiply(self.chord(direction, normal), shoulder)), elbow, wrist)
+
+
+def places(bones: tuple[Vector, Vector, Vector], joints: Joints) -> tuple[Vector, Vector, Vector]:
+    """As `ArmRig.places`, of these bones at rest."""
+    upper, fore, hand = bones
+    elbow = vector.rotate(joints[0], upper)
+    turn = vector.multiply(joints[0], joints[1])
+    wrist = vector.add(elbow, vector.rotate(turn, fore))
+    return elbow, wrist, vector.add(wrist, vector.rotate(vector.multiply(turn, joints[2]), hand))
+
+
+def bend_links(links: Links, frames: Joints, palm_down: float, reach: float, bend: float) -> Joints:
+    """As `ArmRig.bend`, of an arm with these `links` and `frames`, whose palm turns by `palm_down` radians as its wrist
+    bends to its limit."""
+    t0, t1, t2 = close(links, reach, 0.0, bend)
+    first, second, third = frames
+    share = (t2 - t1) / WRIST_LIMIT
+    palm = vector.about((1.0, 0.0, 0.0), palm_down * share * share * (3.0 - 2.0 * share))
+    elbow = vector.multiply(vector.multiply(_about_z(t1 - t0), palm), vector.conjugate(second))
+    wrist = vector.multiply(vector.multiply(_about_z(t2 - t1), palm), vector.conjugate(third))
+    return (
+        vector.multiply(_about_z(t0), vector.conjugate(first)),
+        vector.normalise(vector.multiply(first, elbow)),
+        vector.normalise(vector.multiply(vector.multiply(second, vector.conjugate(palm)), wrist)),
+    )
 
 
 class LegRig:
@@ -188,11 +202,13 @@ class LegRig:
         level = vector.unit((ahead[0], 0.0, ahead[2]), FORWARDS)
         return hips, level
 
-    def angle(self, pose: Pose) -> float:
-        """The thigh's angle forwards from straight down, seen square to the vertical plane the hips face."""
+    def angle(self, pose: Pose, near: float = 0.0) -> float:
+        """The thigh's angle forwards from straight down, seen square to the vertical plane the hips face, within its
+        limits. A thigh that points beyond them is at the one it is on the way round from `near`, radians."""
         hips, level = self.facing(pose)
         thigh = vector.rotate(vector.multiply(hips, joint_rotation(pose, self.joints[0])), self.thigh)
-        return clamp_thigh(atan2(vector.dot(thigh, level), -thigh[1]))
+        theta = atan2(vector.dot(thigh, level), -thigh[1])
+        return clamp_thigh(theta + 2.0 * pi * round((near - theta) / (2.0 * pi)))
 
     def hang(self, theta: float, pose: Pose) -> Joints:
         """The leg with its thigh at `theta` radians in the plane the hips face, the shank hanging, the ankle fixed."""

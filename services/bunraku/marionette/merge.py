@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.marionette.handover import Handover
-from bunraku.marionette.limbs import Joints, Limb, Pose
+from bunraku.marionette.limbs import LIMBS, Joints, Limb, Pose
 from bunraku.marionette.ownership import Grant, Input, Outcome, Ownership, Refusal
 from bunraku.marionette.pulled import PulledHand, PulledLeg
 from bunraku.motion.rotation import Array
@@ -27,10 +27,15 @@ LONGEST_STEP = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Overlay:
-    """What lies over the dance: the pulled `limbs`, in order, and the local `rotations` (n, 3, 4) of their joints."""
+    """What lies over the dance: the pulled `limbs`, in order, and of each the local rotations of its `joints`."""
 
     limbs: tuple[Limb, ...]
-    rotations: Array
+    joints: tuple[Joints, ...]
+
+    @property
+    def rotations(self) -> Array:
+        """The joints' rotations (n, 3, 4)."""
+        return np.array(self.joints)
 
     @property
     def mask(self) -> int:
@@ -42,8 +47,8 @@ def apply(rotations: Array, overlay: Overlay | None) -> Array:
     """The pose (18, 4) with the overlay's joints in place of the dance's; all others bit for bit as they were."""
     merged = rotations.copy()
     if overlay is not None:
-        for limb, turned in zip(overlay.limbs, overlay.rotations, strict=True):
-            merged[list(limb.joints)] = turned
+        for limb, joints in zip(overlay.limbs, overlay.joints, strict=True):
+            merged[list(limb.joints)] = joints
     return merged
 
 
@@ -149,12 +154,13 @@ class Marionette:
         pulled: list[Limb] = []
         turned: list[Joints] = []
         pose: Pose = rotations.tolist()
-        for limb, holder in zip(Limb, self._ownership.holders(), strict=True):
-            hand, puppet = self._handovers[limb], self._limbs[limb]
-            hand.advance(holder is not None, seconds)
-            steering = self._ownership.steering(limb)
+        holders = self._ownership.holders()
+        for limb in LIMBS:
+            steering, holder = self._ownership.steering(limb), holders[limb]
             if steering is None:
                 continue
+            hand, puppet = self._handovers[limb], self._limbs[limb]
+            hand.advance(holder is not None, seconds)
             if not puppet.pulled:
                 for earlier, step in self._recent:
                     puppet.see(earlier.tolist(), step)
@@ -169,4 +175,4 @@ class Marionette:
             pulled.append(limb)
             turned.append(joints)
         self._recent.append((rotations, seconds))
-        return Overlay(tuple(pulled), np.array(turned)) if pulled else None
+        return Overlay(tuple(pulled), tuple(turned)) if pulled else None

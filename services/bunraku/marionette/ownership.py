@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal
 
-from bunraku.marionette.limbs import Limb
+from bunraku.marionette.limbs import LIMBS, Limb
 from bunraku.marionette.steering import Kind, Late, Steering
 from bunraku.marionette.vector import Vector
 
@@ -140,7 +140,7 @@ class Ownership:
         too old are forgotten."""
         grants: list[tuple[str, Grant]] = []
         changed = False
-        for limb, hold in zip(Limb, self._holds, strict=True):
+        for limb, hold in zip(LIMBS, self._holds, strict=True):
             for old in [who for who, until in hold.asks.items() if until <= now]:
                 del hold.asks[old]
                 changed = True
@@ -192,7 +192,7 @@ class Ownership:
     def expire(self, now: int) -> list[tuple[Limb, str]]:
         """Frees the limbs whose holders have been silent for `LOST_AFTER`; says which, and whose they were."""
         lost: list[tuple[Limb, str]] = []
-        for limb, hold in zip(Limb, self._holds, strict=True):
+        for limb, hold in zip(LIMBS, self._holds, strict=True):
             if hold.holder is not None and hold.steering and now - hold.steering.heard >= LOST_AFTER:
                 lost.append((limb, hold.holder))
                 hold.free(now)

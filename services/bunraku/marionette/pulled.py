@@ -130,7 +130,7 @@ class PulledHand(_Pulled):
         # the dance may hold its arms where the marionette's shoulders do not go: that they do not comes with the weight
         target = vector.add(hand, vector.scale(vector.subtract(tip, hand), weight))
         turn = self._turn.follow(own, target, weight)
-        return self._blend.joints(dance, bent, target, turn, normal, max(weight, LEAST_WEIGHT))
+        return self._blend.joints(dance, bent, target, turn, normal, max(weight, LEAST_WEIGHT), seconds)
 
 
 class PulledLeg(_Pulled):
@@ -148,7 +148,7 @@ class PulledLeg(_Pulled):
 
     def see(self, pose: Pose, seconds: float) -> None:
         """The dance's pose, `seconds` after the last."""
-        self._saw((self.rig.angle(pose), 0.0, 0.0), seconds)
+        self._saw((self.rig.angle(pose, self.own[0]), 0.0, 0.0), seconds)
 
     def pull(self, pose: Pose, wanted: Vector | None, weight: float, seconds: float) -> Joints | None:
         """As `PulledHand.pull`, of the leg's joints."""

@@ -11,8 +11,7 @@ Directions are unit vectors on the axes of vl5: x to the left, y up, z forwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import acos, atan2, cos, hypot, pi, radians, sin
+from math import acos, atan2, cos, inf, nan, pi, radians, sin, sqrt
 
 from bunraku.marionette import vector
 from bunraku.marionette.vector import Vector
@@ -20,23 +19,19 @@ from bunraku.marionette.vector import Vector
 _EDGE = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class Cap:
-    """Directions within `radius` radians of the unit vector `axis`, where no upper arm goes."""
-
-    axis: Vector
-    radius: float
-
-    def depth(self, direction: Vector) -> float:
-        """How far inside a unit vector is, radians; below zero outside."""
-        return self.radius - _angle(self.axis, direction)
+Cap = tuple[Vector, float]
+"""A unit vector, and within how many radians of it no upper arm goes."""
+Caps = tuple[Cap, ...]
+Shoulder = tuple[Caps, tuple[Vector, ...]]
+"""One shoulder's limit: its caps, and the corners where the edges of two meet and no third one lies. A plain tuple, as
+those are handed to compiled code in no time."""
 
 
 def _cap(side: float, up: float, forwards: float, degrees: float) -> Cap:
-    return Cap(vector.unit((side, up, forwards), (0.0, 0.0, -1.0)), radians(degrees))
+    return vector.unit((side, up, forwards), (0.0, 0.0, -1.0)), radians(degrees)
 
 
-LEFT = (
+LEFT: Caps = (
     # straight back: extension ends at 60 degrees, horizontal abduction 45 to 50 behind the side
     _cap(0.0, 0.2, -1.0, 42.0),
     # up and back: flexion and abduction end overhead, at 180 degrees
@@ -49,74 +44,109 @@ LEFT = (
 """Where no left upper arm goes. Ranges: American Academy of Orthopaedic Surgeons, Joint Motion (1965), rounded out."""
 
 
-class Shoulder:
-    """One shoulder's limit. `limit` says where the elbow goes."""
+def shoulder_of(*, right: bool) -> Shoulder:
+    """The left shoulder, or its mirror image."""
+    side = -1.0 if right else 1.0
+    caps = tuple(((side * axis[0], axis[1], axis[2]), radius) for axis, radius in LEFT)
+    alone: Shoulder = (caps, ())
+    pairs = ((one, other) for i, one in enumerate(caps) for other in caps[i + 1 :])
+    corners = tuple(corner for one, other in pairs for corner in _corners(one, other) if depth(alone, corner) <= _EDGE)
+    return caps, corners
 
-    def __init__(self, *, right: bool, caps: tuple[Cap, ...] = LEFT) -> None:
-        """`caps` are the left shoulder's; the right one's mirror them."""
-        side = -1.0 if right else 1.0
-        self.caps = tuple(Cap((side * cap.axis[0], cap.axis[1], cap.axis[2]), cap.radius) for cap in caps)
-        self._corners = tuple(
-            corner
-            for i, one in enumerate(self.caps)
-            for other in self.caps[i + 1 :]
-            for corner in _corners(one, other)
-            if self.depth(corner) <= _EDGE
-        )
 
-    def depth(self, direction: Vector) -> float:
-        """How far a unit vector is inside a cap, radians; not above zero where a shoulder goes."""
-        return max(cap.depth(direction) for cap in self.caps)
+def depth(shoulder: Shoulder, direction: Vector) -> float:
+    """How far a unit vector is inside a cap, radians; not above zero where a shoulder goes."""
+    caps, _ = shoulder
+    deepest = -inf
+    for cap in caps:
+        deepest = max(deepest, _depth_in(cap, direction))
+    return deepest
 
-    def away(self, direction: Vector) -> float:
-        """The angle from a unit vector to the nearest direction that a shoulder has, radians."""
-        if self.depth(direction) <= 0.0:
-            return 0.0
-        edges = []
-        for cap in self.caps:
-            across = vector.unit(vector.square_to(direction, cap.axis), vector.across(cap.axis))
-            edges.append(vector.add(vector.scale(cap.axis, cos(cap.radius)), vector.scale(across, sin(cap.radius))))
-        return min(_angle(edge, direction) for edge in (*edges, *self._corners) if self.depth(edge) <= _EDGE)
 
-    def toward(self, begin: Vector, end: Vector, most: float) -> Vector:
-        """The unit vector `most` radians from `begin` on a way to `end` round the caps; `end` where it is nearer."""
-        angle = _angle(begin, end)
-        if angle <= most:
-            return end
-        axis = vector.unit(vector.cross(begin, end), vector.across(begin))
-        step = vector.rotate(vector.about(axis, most), begin)
-        for cap in self.caps:
-            if cap.depth(step) > 0.0 and cap.depth(begin) <= 0.0:
-                # along the edge, to the side that leads on
-                out = vector.unit(vector.square_to(step, cap.axis), vector.across(cap.axis))
-                edge = cap.radius + _EDGE
-                step = vector.add(vector.scale(cap.axis, cos(edge)), vector.scale(out, sin(edge)))
-        # in a corner of two caps it stays where it is
-        return step if self.depth(step) <= max(self.depth(begin), 0.0) else begin
+def away(shoulder: Shoulder, direction: Vector) -> float:
+    """The angle from a unit vector to the nearest direction that a shoulder has, radians."""
+    if depth(shoulder, direction) <= 0.0:
+        return 0.0
+    caps, corners = shoulder
+    nearest = inf
+    for axis, radius in caps:
+        across = vector.unit(vector.square_to(direction, axis), vector.across(axis))
+        edge = vector.add(vector.scale(axis, cos(radius)), vector.scale(across, sin(radius)))
+        if depth(shoulder, edge) <= _EDGE:
+            nearest = min(nearest, _angle(edge, direction))
+    for corner in corners:
+        nearest = min(nearest, _angle(corner, direction))
+    return nearest
 
-    def turn(self, chord: Vector, normal: Vector, lift: float) -> float | None:
-        """The least turn about the unit `chord` from shoulder to tip, radians, that brings the upper arm where a
-        shoulder goes; None where none does.
 
-        The upper arm is `lift` radians off the chord, below it in the plane of the unit `normal` (square to the chord).
-        """
-        along, off = cos(lift), sin(lift)
-        down = vector.cross(chord, normal)
-        closed: list[tuple[float, float]] = []
-        for cap in self.caps:
-            a, b = vector.dot(cap.axis, down), -vector.dot(cap.axis, normal)
-            swing = off * hypot(a, b)
-            over = cos(cap.radius) - along * vector.dot(cap.axis, chord)
-            if over >= swing:
+def toward(shoulder: Shoulder, begin: Vector, end: Vector, most: float) -> Vector:
+    """The unit vector `most` radians from `begin` on a way to `end` round the caps; `end` where it is nearer."""
+    if _angle(begin, end) <= most:
+        return end
+    caps, _ = shoulder
+    step = vector.rotate(vector.about(vector.unit(vector.cross(begin, end), vector.across(begin)), most), begin)
+    for cap in caps:
+        if _depth_in(cap, step) > 0.0 and _depth_in(cap, begin) <= 0.0:
+            # along the edge, to the side that leads on
+            axis, radius = cap
+            out = vector.unit(vector.square_to(step, axis), vector.across(axis))
+            edge = radius + _EDGE
+            step = vector.add(vector.scale(axis, cos(edge)), vector.scale(out, sin(edge)))
+    # in a corner of two caps it stays where it is
+    return step if depth(shoulder, step) <= max(depth(shoulder, begin), 0.0) else begin
+
+
+def turn(shoulder: Shoulder, chord: Vector, normal: Vector, lift: float) -> float:
+    """The least turn about the unit `chord` from shoulder to tip, radians, that brings the upper arm where a shoulder
+    goes; NaN where none does.
+
+    The upper arm is `lift` radians off the chord, below it in the plane of the unit `normal` (square to the chord).
+    """
+    caps, _ = shoulder
+    down = vector.cross(chord, normal)
+    closed = False
+    for cap in caps:
+        middle, half = _closes(cap, chord, normal, down, lift)
+        if half >= pi:
+            return nan
+        closed = closed or abs(middle) < half
+    if not closed:
+        return 0.0
+    least = nan
+    for cap in caps:
+        middle, half = _closes(cap, chord, normal, down, lift)
+        if half <= 0.0:
+            continue
+        for way in (middle - half - _EDGE, middle + half + _EDGE):
+            to = _wrapped(way)
+            if abs(to) >= abs(least):
                 continue
-            if over <= -swing:
-                return None
-            closed.append((atan2(b, a), acos(over / swing)))
-        if all(abs(_wrapped(middle)) >= half for middle, half in closed):
-            return 0.0
-        turns = (_wrapped(middle + sign * (half + _EDGE)) for middle, half in closed for sign in (-1.0, 1.0))
-        allowed = [t for t in turns if all(abs(_wrapped(t - middle)) >= half for middle, half in closed)]
-        return min(allowed, key=abs, default=None)
+            free = True
+            for other in caps:
+                middle_there, half_there = _closes(other, chord, normal, down, lift)
+                free = free and abs(_wrapped(to - middle_there)) >= half_there
+            if free:
+                least = to
+    return least
+
+
+def _closes(cap: Cap, chord: Vector, normal: Vector, down: Vector, lift: float) -> tuple[float, float]:
+    """The turns about the chord that bring the upper arm into a cap: the middle of them, and half of how many there
+    are: 0 for none, more than pi for all."""
+    axis, radius = cap
+    a, b = vector.dot(axis, down), -vector.dot(axis, normal)
+    swing = sin(lift) * sqrt(a * a + b * b)
+    over = cos(radius) - cos(lift) * vector.dot(axis, chord)
+    if over >= swing:
+        return 0.0, 0.0
+    if over <= -swing:
+        return 0.0, 2.0 * pi
+    return atan2(b, a), acos(over / swing)
+
+
+def _depth_in(cap: Cap, direction: Vector) -> float:
+    axis, radius = cap
+    return radius - _angle(axis, direction)
 
 
 def _angle(a: Vector, b: Vector) -> float:
@@ -129,15 +159,16 @@ def _wrapped(angle: float) -> float:
 
 def _corners(one: Cap, other: Cap) -> list[Vector]:
     """Where the edges of two caps cross: none, or two unit vectors."""
-    d = vector.dot(one.axis, other.axis)
+    (axis, radius), (other_axis, other_radius) = one, other
+    d = vector.dot(axis, other_axis)
     square = 1.0 - d * d
     if square < _EDGE:
         return []
-    a = (cos(one.radius) - d * cos(other.radius)) / square
-    b = (cos(other.radius) - d * cos(one.radius)) / square
-    middle = vector.add(vector.scale(one.axis, a), vector.scale(other.axis, b))
+    a = (cos(radius) - d * cos(other_radius)) / square
+    b = (cos(other_radius) - d * cos(radius)) / square
+    middle = vector.add(vector.scale(axis, a), vector.scale(other_axis, b))
     left = 1.0 - vector.dot(middle, middle)
     if left <= 0.0:
         return []
-    across = vector.scale(vector.cross(one.axis, other.axis), (left / square) ** 0.5)
+    across = vector.scale(vector.cross(axis, other_axis), (left / square) ** 0.5)
     return [vector.add(middle, across), vector.subtract(middle, across)]

@@ -12,7 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from bunraku.marionette.arm import SIDE, Table, bend_limits, close
+from bunraku.marionette.arm import Table, bend_limits, close
+from bunraku.marionette.links import SIDE
 from bunraku.marionette.proportions import OUTER_RADIUS, Proportions
 from bunraku.motion.rotation import Array
 

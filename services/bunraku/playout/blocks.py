@@ -28,7 +28,7 @@ Block = TypeVar("Block", bound=_Block)
 Track = TypeVar("Track", bound=Timing)
 
 
-class _Store(Generic[Track, Block]):
+class Store(Generic[Track, Block]):
     """Decoded blocks of one track, of each the best rate that came."""
 
     def __init__(self, track: Track) -> None:
@@ -75,7 +75,7 @@ class _Store(Generic[Track, Block]):
         return block, instant, self._blocks[following][1]
 
 
-class BlockStore(_Store[MotionTrack, MotionBlock]):
+class BlockStore(Store[MotionTrack, MotionBlock]):
     """Decoded blocks of one motion, of each the best rate that came."""
 
     def pose_at(self, position: int, loop: bool = True) -> Pose | None:
@@ -101,26 +101,31 @@ class BlockStore(_Store[MotionTrack, MotionBlock]):
     def rotations_at(self, positions: list[int], loop: bool = True) -> list[Array | None]:
         """The rotations (18, 4) of `pose_at` at some motion times at once, which costs little more than one."""
         found: list[Array | None] = [None] * len(positions)
-        together: dict[int, tuple[MotionBlock, list[int], list[float]]] = {}
+        together: dict[tuple[int, bool], tuple[MotionBlock, MotionBlock | None, list[int], list[float]]] = {}
         for nth, position in enumerate(positions):
             place = self._at(position, loop)
             if place is None:
                 continue
             block, instant, following = place
-            if following is not None:
-                pose = self.pose_at(position, loop)
-                found[nth] = None if pose is None else pose[1]
-            else:
-                _, members, instants = together.setdefault(id(block), (block, [], []))
-                members.append(nth)
-                instants.append(instant)
-        for block, members, instants in together.values():
-            for nth, rotations in zip(members, block.at(np.array(instants))[1], strict=True):
+            members = together.setdefault((id(block), following is None), (block, following, [], []))
+            members[2].append(nth)
+            members[3].append(instant)
+        for block, following, numbers, instants in together.values():
+            for nth, rotations in zip(numbers, _rotations(block, following, np.array(instants)), strict=True):
                 found[nth] = rotations
         return found
 
 
-class SceneStore(_Store[SceneTrack, SceneBlock]):
+def _rotations(block: MotionBlock, following: MotionBlock | None, instants: Array) -> Array:
+    """Rotations (m, 18, 4) at `instants` (m,) of a block, or between its last frame and the `following` one's first."""
+    if following is None:
+        return block.at(instants)[1]
+    last, first = block.at(block.frames - 1.0)[1][0], following.at(0.0)[1][0]
+    mix = np.minimum(instants - (block.frames - 1), 1.0)
+    return rotation.slerp(last, first, np.repeat(mix[:, None], len(last), axis=1))
+
+
+class SceneStore(Store[SceneTrack, SceneBlock]):
     """Decoded blocks of one camera or light, of each the best rate that came."""
 
     def scene_at(self, position: int, loop: bool, duration: int) -> Array | None:

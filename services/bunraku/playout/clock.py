@@ -53,7 +53,7 @@ class ReferenceClock:
         if trip < 0 or answered < received:
             return
         self._samples.append(Sample(((received - sent) + (answered - arrived)) / 2, trip, arrived))
-        if len(self._samples) == 1 or abs(self.offset - self._shown) > STEP:
+        if self._shown_at is None or abs(self.offset - self._shown) > STEP:
             self._shown, self._shown_at = self.offset, arrived
 
     def guess(self, reference: int, local: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from math import atan2, sqrt
+from math import atan2, pi, sqrt
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from bunraku.wire.messages import Overlay
 Quaternion = Sequence[float]
 JOINTS: tuple[tuple[int, int, int], ...] = ((12, 13, 14), (15, 16, 17), (2, 3, 4), (6, 7, 8))
 """The joints of each limb."""
-UNIT = np.pi / 32767
+UNIT = pi / 32767
 """Radians in one unit of an overlay's numbers."""
 LASTS = 250_000
 """Microseconds that an overlay holds when none comes after it."""
@@ -71,10 +71,12 @@ def pack_joints(rotations: Sequence[Quaternion]) -> tuple[int, ...]:
     numbers: list[int] = []
     for w, x, y, z in rotations:
         sine = sqrt(x * x + y * y + z * z)
-        # of the two quaternions of a rotation the one that turns by less than half a round
-        angle = 2.0 * atan2(sine, w) if w >= 0.0 else -2.0 * atan2(sine, -w)
-        scale = angle / (sine * UNIT) if sine > 1e-12 else 2.0 / UNIT
-        numbers += (round(min(max(part * scale, -32767.0), 32767.0)) for part in (x, y, z))
+        if sine > 1e-12:
+            # of the two quaternions of a rotation the one that turns by less than half a round
+            scale = (2.0 * atan2(sine, w) if w >= 0.0 else -2.0 * atan2(sine, -w)) / (sine * UNIT)
+        else:
+            scale = 2.0 / UNIT
+        numbers += (round(x * scale), round(y * scale), round(z * scale))
     return tuple(numbers)
 
 

@@ -1,9 +1,9 @@
 """Which block goes to a viewer next, and when (design.md, The line).
 
 The server pushes ahead of the play position: the motion's first block at the lowest rate, so that something moves at
-once, then the camera and light that go with it, then what lies within `AHEAD` at the chosen rate, the soonest first and
-the motion first where several are due; last, better versions of what was sent. What a viewer already has is not sent
-again.
+once, then the sound at its lowest, the camera and light that go with it, then what lies within `AHEAD` at the chosen
+rates, the soonest first and where several are due the motion first, then the sound; last, better versions of what was
+sent. What a viewer already has is not sent again.
 
 Over a line that is narrow or may stand for a while the lowest rate goes far ahead as a net, a second of it for the
 bytes of a packet's heads, and better versions of what is soon shown just in time: whatever the line does for half a
@@ -33,29 +33,34 @@ REFILL = 20_000_000
 """It is filled again when it reaches less far: several small blocks together are one packet."""
 UPGRADE = 500_000
 """A better version of a block that a viewer has is worth sending only if it can still be decoded before it is shown."""
+AGAIN = AHEAD - 1_000_000
+"""The same of sound, but for short motions: it is bettered as it comes within reach once more in a loop. Bettering all
+that waits already would fill a line for what is heard once for a few seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Paced:
     """A track that is sent: its index in the Description, when its blocks are, and how many rates it has. The blocks of
-    a `base` track come first, and the first of them at the lowest rate: the motion's."""
+    a `base` track come first, and the first of them at the lowest rate: the motion's; next to them those of `audio`,
+    alike."""
 
     number: int
     timing: Timing
     rates: int
     base: bool
+    audio: bool = False
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Due:
-    """A block to be sent, those to be sent first being the least: whether it lies far ahead over a narrow line, whether
-    it only betters one that was sent, how long until it is shown in microseconds, whether it can wait for others of the
+    """A block to be sent, those to be sent first being the least: whether it lies far ahead where a net is kept,
+    whether it only betters one that was sent, how long until it is shown in microseconds, its place among others of the
     same instant, and which one it is."""
 
     far: bool
     better: bool
     distance: int
-    beside: bool
+    place: int
     track: int
     index: int
     rate: int
@@ -70,21 +75,35 @@ class Pacer:
             raise ValueError("a track has one rate at least")
         self._tracks = tracks
         self._sent: dict[tuple[int, int], int] = {}
-
         self._filling = True
 
     def has(self, track: int, index: int, rate: int) -> None:
         """The viewer has this block at this rate already."""
         self._sent[track, index] = max(rate, self._sent.get((track, index), rate))
 
-    def next(self, state: TimelineState, clock: int, rate: int, net: bool = False, spare: bool = True) -> Due | None:
+    def next(
+        self,
+        state: TimelineState,
+        clock: int,
+        rate: int,
+        audio: int | None = None,
+        *,
+        net: bool = False,
+        spare: bool = True,
+    ) -> Due | None:
         """The block to send now, None when enough is on its way.
 
-        A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has;
-        `net` says that one is kept, as over a narrow line. Without `spare` room only what is missing soon is sent.
+        A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has, and
+        `audio` that of sound where it is another, -1 for none of it. `net` says that one is kept, as over a narrow
+        line; sound is in none. Without `spare` room only what is missing soon is sent.
         """
         position = position_at(state, clock)
-        found = [due for track in self._tracks if (due := self._due(track, state, position, rate, net)) is not None]
+        rates = ((track, max(rate, 0) if audio is None or not track.audio else audio) for track in self._tracks)
+        found = [
+            due
+            for track, wanted in rates
+            if wanted >= 0 and (due := self._due(track, state, position, wanted, net and not track.audio)) is not None
+        ]
         if not found:
             self._filling = False
             return None
@@ -103,10 +122,12 @@ class Pacer:
 
     def _due(self, track: Paced, state: TimelineState, position: int, rate: int, net: bool) -> Due | None:
         """What is to be sent first of one track."""
-        timing, rate = track.timing, min(max(rate, 0), track.rates - 1)
+        timing, rate = track.timing, min(rate, track.rates - 1)
         # a track may be shorter or longer than the motion, and turns with it
         blocks = timing.block_at(state.duration - 1) + 1
         first = min(timing.block_at(position), blocks - 1)
+        place = 0 if track.base else 1 if track.audio else 2
+        soonest = AGAIN if track.audio and state.duration > AHEAD + 1_000_000 else UPGRADE
         ahead = NET_AHEAD if net else AHEAD
         found: list[Due] = []
         for count in range(blocks):
@@ -120,12 +141,12 @@ class Pacer:
                 if far and distance <= REFILL:
                     self._filling = True
                 if not far or self._filling:
-                    low = net or (track.base and count == 0)
-                    found.append(Due(far, False, distance, not track.base, track.number, index, 0 if low else rate))
+                    low = net or (place < 2 and count == 0)
+                    found.append(Due(far, False, distance, place, track.number, index, 0 if low else rate))
                 if not far:
                     break
-            elif sent < rate and UPGRADE < distance <= ahead:
-                found.append(Due(far, True, distance, not track.base, track.number, index, rate))
+            elif sent < rate and soonest < distance <= ahead:
+                found.append(Due(far, True, distance, place, track.number, index, rate))
         return min(found, default=None)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from bunraku.playout.pacing import AHEAD
 from bunraku.playout.window import HEADS
-from bunraku.wire.messages import Choice, Report
+from bunraku.wire.messages import Report
 
 LOW = 800_000
 """Less than this ready ahead, microseconds, says that the line does not carry the rate."""
@@ -28,20 +28,32 @@ class RateChoice:
     """The rate of one viewer, from the reports it sends each second and what its line carries; times are clock times in
     microseconds.
 
-    `reason` is one of `best` (the highest rate there is), `line` (it carries no more), `hands` (pulled limbs go before
-    a finer dance), `machine` (frames or blocks take the viewer too long), `buffer` (too little was ready ahead),
-    `hidden` (a tab that nobody sees gets the lowest), `pinned` (the viewer asked for it).
+    `rate` is a step of how motion and sound share the line (`sharing`), and `reason` one of `best` (the highest there
+    is), `line` (it carries no more), `hands` (pulled limbs go before a finer dance), `machine` (frames or blocks take
+    the viewer too long), `buffer` (too little was ready ahead), `start` (more is tried once this goes well), `hidden`
+    (a tab that nobody sees), `pinned` (the viewer asked for it).
     """
 
-    def __init__(self, rates: int, pinned: int | None = None, costs: Sequence[float] = ()) -> None:
-        """`costs` are the rates' in kbit/s, lowest first; without them the line's rate says nothing."""
+    def __init__(
+        self,
+        rates: int,
+        pinned: int | None = None,
+        first: int | None = None,
+        safe: int = 0,
+        costs: Sequence[float] = (),
+    ) -> None:
+        """`first` is the rate to begin with, if not the highest; `safe` the one of who does not look or cannot keep up
+        with more: a line that does not carry it gets less; `costs` are the rates' in kbit/s, lowest first: without them
+        what the line carries says nothing."""
         self._highest = rates - 1
+        self._safe = safe
         self._pinned = pinned is not None
-        self._wanted = min(max(self._highest if pinned is None else pinned, 0), self._highest)
+        begun = pinned if pinned is not None else first if first is not None else self._highest
+        self._wanted = min(max(begun, 0), self._highest)
         self._costs = costs
         self._since: int | None = None
         self._hidden = False
-        self._lowered = "buffer"
+        self._lowered = "start"
         self._carried: float | None = None
         self._carried_at = 0
         self._by_line = self._highest
@@ -52,7 +64,8 @@ class RateChoice:
         """The rate now."""
         if self._pinned:
             return self._wanted
-        return 0 if self._hidden else min(self._wanted, self._by_line)
+        rate = min(self._wanted, self._by_line)
+        return min(self._safe, rate) if self._hidden else rate
 
     @property
     def reason(self) -> str:
@@ -66,10 +79,9 @@ class RateChoice:
         return self._lowered if self._wanted < self._highest else "best"
 
     @property
-    def choice(self) -> Choice:
-        """Both, and what the line carries where that is known, as the viewer is told."""
-        carried = None if self._carried is None else round(self._carried * 8 / 100) * 100
-        return Choice(self.rate, self.reason, carried)
+    def carried(self) -> int | None:
+        """What the line carries with all heads, bit/s to the nearest 100, None where it is not narrow."""
+        return None if self._carried is None else round(self._carried * 8 / 100) * 100
 
     def line(self, carried: float | None, clock: int, beside: bool) -> None:
         """A narrow line carries so many bytes a second, heads included; None where it is not narrow. `beside` says that
@@ -102,9 +114,13 @@ class RateChoice:
             self._since = clock
         settled = clock - self._since
         struggling = report.frame > SLOW_FRAME or report.decode > SLOW_DECODE
-        if (report.buffer < LOW or struggling) and settled >= 1_000_000:
-            self._lowered = "machine" if struggling else "buffer"
+        if report.buffer < LOW and settled >= 1_000_000:
+            self._lowered = "buffer"
             self._move(-1, clock)
+        elif struggling and settled >= 1_000_000:
+            if self.rate > self._safe:
+                self._lowered = "machine"
+                self._move(-1, clock)
         elif report.buffer >= HIGH and not struggling and settled >= PATIENCE:
             self._move(1, clock)
         return self.rate

@@ -12,7 +12,7 @@ from bunraku.playout.blocks import BlockStore
 from bunraku.playout.timeline import Timelines
 from bunraku.wire.messages import Data
 
-AHEAD = 36
+AHEAD = 60
 """Frames that are worked out at once: many cost little more than one."""
 
 

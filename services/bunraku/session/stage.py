@@ -213,13 +213,14 @@ class Stage:
                 due = self._time(before) + LEAD
                 if (pose := self._poses.at(due, FRAME)) is not None:
                     self._marionette.see(pose, due, self._time(before))
-            pace = Pace()
-            while self._frames(range(frame if self._every_frame(pace) else frame + FRAMES - 1, frame + FRAMES)):
+            pace, late = Pace(), 0
+            while self._frames(range(frame if self._every_frame(pace) else frame + FRAMES - 1, frame + FRAMES), late):
                 # a stage that was kept from working goes on from where it should be, in step with the others
                 frame = max(frame + FRAMES, self._frame_at(clock()) - LONGEST_PAUSE)
                 planned = self._time(frame + FRAMES - 1)
                 await asyncio.sleep((planned - clock()) * 1e-6)
-                pace.late(clock() - planned)
+                late = clock() - planned
+                pace.late(late)
                 await self._poses.prepare(self._time(frame) + LEAD)
 
     def _every_frame(self, pace: Pace) -> bool:
@@ -234,11 +235,11 @@ class Stage:
     def _frame_at(self, now: int) -> int:
         return (now - self._phase) // FRAME
 
-    def _frames(self, frames: range) -> bool:
+    def _frames(self, frames: range, late: int = 0) -> bool:
         """Publish what lies over the dance in some frames, each due `LEAD` after its time; whether any limb is
-        pulled."""
+        pulled. It is `late` by so many microseconds, in which nobody could be heard: they are not taken for silence."""
         now = clock()
-        lost = self._marionette.expire(now)
+        lost = self._marionette.expire(now - max(late, 0))
         for limb, holder in lost:
             self._puppeteers.tell(holder, Refusal(limb, "lost").pack())
         if self._settle(now) or lost:
@@ -262,7 +263,7 @@ def _overlay(sequence: int, due: int, shown: list[Pulled | None]) -> bytes:
     for pulled in reversed(shown):
         if (pulled.limbs if pulled is not None else ()) != last:
             break
-        turned = pulled.rotations.tolist() if pulled is not None else []
+        turned = pulled.joints if pulled is not None else ()
         frames.append({int(limb): pack_joints(joints) for limb, joints in zip(last, turned, strict=True)})
     if not last:
         return Overlay(sequence, due, {}).pack()

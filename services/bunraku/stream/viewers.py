@@ -16,12 +16,14 @@ from starlette.websockets import WebSocket
 from bunraku import __version__
 from bunraku.backing.backing import clock
 from bunraku.backing.direct import Write
-from bunraku.backing.library import Library, StoredMotion
+from bunraku.backing.library import Library, StoredMotion, Track
 from bunraku.backing.sockets import BROKEN, NOT_FOUND, TOO_SLOW, Refusal, converse, receive
+from bunraku.codec.audio import AudioTrack
 from bunraku.codec.coefficients import SCENE_CHANNELS
 from bunraku.codec.scene import SceneTrack
+from bunraku.codec.track import MotionTrack
 from bunraku.motion.skeleton import CHANNEL_COUNT
-from bunraku.playout import timeline
+from bunraku.playout import sharing, timeline
 from bunraku.playout.held import Held
 from bunraku.playout.pacing import Paced, Pacer
 from bunraku.playout.rate import RateChoice
@@ -78,6 +80,7 @@ class Viewer:
         self._rate: RateChoice | None = None
         self._told: Choice | None = None
         self._beside_at = 0
+        self._steps: tuple[sharing.Step, ...] = ()
         self._wake = asyncio.Event()
         self.overrun = False
 
@@ -175,9 +178,11 @@ class Viewer:
             if motion is None:
                 raise Refusal(NOT_FOUND, "No such motion", f"there is no motion {state.motion[:40]!r}")
             self._motion, self._pacer = motion, Pacer(_paced(motion, self._wanted))
-            self._rate = RateChoice(len(motion.dance), self._pinned, motion.costs)
+            self._steps = sharing.pinned(_steps(motion, self._wanted), self._pinned)
+            first, safe = sharing.first_step(self._steps), sharing.safe_step(self._steps)
+            self._rate = RateChoice(len(self._steps), None, first, safe, [step.kbps for step in self._steps])
             self._told = None
-            channels = sum(SCENE_CHANNELS if isinstance(t, SceneTrack) else CHANNEL_COUNT for t in motion.tracks)
+            channels = sum(map(_channels, motion.tracks))
             await put(ChannelHeader(motion.id, clock(), channels, __version__).pack())
             if self._held is not None and self._held.motion == motion.id:
                 for nth, rate in enumerate(self._held.rates):
@@ -195,16 +200,18 @@ class Viewer:
             return None
         beside = narrow and now - self._beside_at < BESIDE
         self._rate.line(self._flow.window.rate if narrow else None, now, beside)
-        rate = 0 if self._flow.unknown else self._rate.rate
+        step = self._steps[0 if self._flow.unknown else self._rate.rate]
         spare = not beside or self._flow.blocks_turn()
-        due = self._pacer.next(state, now, rate, narrow or self._flow.far, spare)
+        net = narrow or self._flow.far
+        due = self._pacer.next(state, now, step.motion, audio=step.audio, net=net, spare=spare)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
 
     def _news(self) -> bytes | None:
         """The choice of a rate, where the viewer has not been told yet."""
         if self._rate is None or "motion" not in self._wanted:
             return None
-        choice = self._rate.choice
+        reason = self._rate.reason if self._pinned is None else "pinned"
+        choice = Choice(self._steps[self._rate.rate].motion, reason, self._rate.carried)
         told, self._told = self._told, choice
         if told is not None and (told.rate, told.reason) == (choice.rate, choice.reason):
             return None
@@ -218,7 +225,7 @@ class Viewer:
             return
         state = self._timelines.at(clock())
         wait = (
-            self._pacer.wait(state, clock(), self._flow.narrow)
+            self._pacer.wait(state, clock(), self._flow.far or self._flow.narrow)
             if state is not None and self._pacer is not None
             else None
         )
@@ -231,14 +238,30 @@ class Viewer:
             self._resting = False
 
 
+def _channels(track: Track) -> int:
+    if isinstance(track, AudioTrack):
+        return track.channels
+    return SCENE_CHANNELS if isinstance(track, SceneTrack) else CHANNEL_COUNT
+
+
 def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
     """The tracks of a motion whose blocks a viewer wants."""
-    kinds = [track.kind if isinstance(track, SceneTrack) else "motion" for track in motion.tracks]
     return [
-        Paced(number, track, len(motion.packets[number]), kind == "motion")
-        for number, (track, kind) in enumerate(zip(motion.tracks, kinds, strict=True))
-        if kind in wanted
+        Paced(number, track, len(motion.packets[number]), _kind(track) == "motion", _kind(track) == "audio")
+        for number, track in enumerate(motion.tracks)
+        if _kind(track) in wanted
     ]
+
+
+def _steps(motion: StoredMotion, wanted: Container[str]) -> tuple[sharing.Step, ...]:
+    """The ways in which the tracks that a viewer wants may share its line."""
+    kinds = list(map(_kind, motion.tracks))
+    audio = motion.kbps[kinds.index("audio")] if "audio" in kinds and "audio" in wanted else ()
+    return sharing.steps(motion.kbps[0] if "motion" in wanted or not audio else (), audio)
+
+
+def _kind(track: Track) -> str:
+    return "motion" if isinstance(track, MotionTrack) else track.kind
 
 
 async def serve(socket: WebSocket, viewer: Viewer, private: bool) -> None:

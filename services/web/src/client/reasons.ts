@@ -7,6 +7,7 @@ const REASONS: Readonly<Record<string, string>> = {
   hands: "so that pulled limbs come in time",
   machine: "as drawing takes this machine long",
   buffer: "until more is ready ahead",
+  start: "more is tried once this goes well",
   hidden: "as nobody looks at this tab",
   pinned: "pinned by the address",
 };

@@ -1,25 +1,29 @@
 /**
  * An arm between the dance's way of reaching its hand tip and the marionette's. Both arms are seen in the frame of their chord,
  * the line from shoulder to tip with the plane of the elbow about it. There they differ by little, and mixing their joints moves
- * the tip by little; the arm is then closed on the target again, so that the tip is exact all the way. As `marionette/blend.py`.
+ * the tip by little; the arm is then closed on the target again, so that the tip is exact all the way. What is left of jumps turns
+ * nothing but the elbow about the chord, or links about themselves, and is gone through at a bounded speed. As
+ * `marionette/blend.py`.
  */
 
 import { conjugate, multiply, rotate, slerp, type Numbers } from "../motion/rotation";
-import { about, across, addScaled, between, cross, dot, length, normalise, put, squareTo, unit } from "../motion/vector";
+import { about, across, addScaled, apart, between, cross, dot, length, normalise, put, squareTo, unit } from "../motion/vector";
 import type { ArmRig } from "./limbs";
-
-/** How far the elbow of a straight arm is drawn to the marionette's side, in parts of the upper arm at weight 1. */
-const BELOW = 0.5;
-const ROUND = 2 * Math.PI;
+import { FARTHEST, FASTEST, ROUND, Spins } from "./spin";
 
 /** Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more. */
 const FRESH = 0.05;
+/** An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned quite otherwise, at any weight. */
+const AWAY = 2;
 
-/** One arm on its way. It remembers which way round the elbow swings, so that it never changes its mind halfway. */
+/** One arm on its way. It remembers which way round the elbow swings, and how far its links are turned. */
 export class ArmBlend {
   private swivel: number | null = null;
-  private readonly direction = new Float64Array(3);
+  /** Radians about the chord that the elbow is shown ahead of its way, and goes back. */
+  private ahead = 0;
+  private readonly spins: Spins;
   private readonly own = new Float64Array(3);
+  private readonly direction = new Float64Array(3);
   private readonly ownNormal = new Float64Array(3);
   private readonly carried = new Float64Array(3);
   private readonly side = new Float64Array(3);
@@ -30,15 +34,20 @@ export class ArmBlend {
   private readonly turn = new Float64Array(4);
   private readonly before = new Float64Array(4);
 
-  constructor(private readonly rig: ArmRig) {}
+  constructor(private readonly rig: ArmRig) {
+    this.spins = new Spins(rig.links);
+  }
 
   /** Forgets the way it went. */
   forget(): void {
     this.swivel = null;
+    this.ahead = 0;
+    this.spins.forget();
   }
 
   /**
-   * The joints (12) at `weight`: 0 gives back the dance's, 1 the bent arm's in the plane of `normal`.
+   * The joints (12) at `weight`, `seconds` after the last: 0 gives back the dance's, 1 the bent arm's in the plane of `normal`,
+   * both as soon as the links have come round.
    *
    * `dance` (12 at `danceAt`) are the pose's joints, `bent` (12) those of `ArmRig.bend` for the `target` (3, arm lengths, axes of
    * vl5); `turn` (4) brings the direction of the dance's own hand to the target's, and `normal` is a unit vector (3) square to
@@ -47,27 +56,51 @@ export class ArmBlend {
    */
   joints(
     out: Numbers, outAt: number, dance: Numbers, danceAt: number, bent: Numbers,
-    target: Numbers, turn: Numbers, normal: Numbers, weight: number,
+    target: Numbers, turn: Numbers, normal: Numbers, weight: number, seconds: number,
   ): void {
-    const { rig, direction, own, ownNormal, carried, side, frame } = this;
+    const { rig, own, direction, frame, carried } = this;
     rig.direction(direction, 0, target, 0);
+    rig.target(own, 0, dance, danceAt);
+    // nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
+    const share = Math.min(Math.max(Math.cbrt(weight), AWAY * apart(target, 0, own, 0)), 1);
+    const most = Math.min(Math.abs(this.ahead), ROUND * share);
+    this.ahead = Math.sign(this.ahead) * Math.max(most - FASTEST * seconds, 0);
     if (weight >= 1) {
       this.swivel = null;
-      rig.chord(frame, 0, direction, normal);
+      about(frame, 0, direction, 0, this.ahead);
+      rotate(carried, 0, frame, 0, normal, 0);
+      rig.chord(frame, 0, direction, this.ahead === 0 ? normal : carried);
       multiply(out, outAt, frame, 0, bent, 0);
       normalise(out, outAt);
       for (let i = 4; i < 12; i++) out[outAt + i] = bent[i];
-      return;
+    } else {
+      rig.direction(own, 0, own, 0);
+      this.mixed(out, outAt, dance, danceAt, bent, target, turn, normal, weight);
     }
-    rig.target(own, 0, dance, danceAt);
-    rig.direction(own, 0, own, 0);
+    this.spins.follow(out, outAt, share, seconds);
+  }
+
+  /** The joints (12) below weight 1, the directions of the target and of the dance's own hand being known. */
+  private mixed(
+    out: Numbers, outAt: number, dance: Numbers, danceAt: number, bent: Numbers,
+    target: Numbers, turn: Numbers, normal: Numbers, weight: number,
+  ): void {
+    const { rig, direction, own, ownNormal, carried, side, frame } = this;
     rig.bendAxis(ownNormal, 0, dance, danceAt);
     squareTo(ownNormal, 0, ownNormal, 0, own, 0);
     if (!unit(ownNormal, 0, ownNormal, 0)) across(ownNormal, 0, own, 0);
     rotate(carried, 0, turn, 0, ownNormal, 0);
     cross(side, 0, carried, 0, normal, 0);
     let swivel = Math.atan2(dot(side, 0, direction, 0), dot(carried, 0, normal, 0));
-    if (this.swivel !== null && weight > FRESH) swivel += ROUND * Math.round((this.swivel - swivel) / ROUND);
+    if (this.swivel !== null) {
+      const onwards = swivel + ROUND * Math.round((this.swivel - swivel) / ROUND);
+      if (weight > FRESH && Math.abs(onwards) <= FARTHEST) swivel = onwards;
+      else {
+        // the other way round from here on; it is shown where it was, and comes over
+        this.ahead += weight * (onwards - swivel);
+        this.ahead -= ROUND * Math.round(this.ahead / ROUND);
+      }
+    }
     this.swivel = swivel;
     if (weight <= 0) {
       for (let i = 0; i < 12; i++) out[outAt + i] = dance[danceAt + i];
@@ -81,8 +114,8 @@ export class ArmBlend {
       slerp(out, outAt + i, out, outAt + i, bent, i, weight);
       normalise(out, outAt + i);
     }
-    this.close(out, outAt, length(target, 0), weight);
-    about(frame, 0, direction, 0, swivel * weight);
+    this.close(out, outAt, length(target, 0));
+    about(frame, 0, direction, 0, swivel * weight + this.ahead);
     rotate(carried, 0, frame, 0, carried, 0);
     rig.chord(frame, 0, direction, carried);
     multiply(out, outAt, frame, 0, out, outAt);
@@ -90,7 +123,7 @@ export class ArmBlend {
   }
 
   /** Turns shoulder and elbow by as little as brings the tip to `reach` arm lengths along the chord. */
-  private close(joints: Numbers, at: number, reach: number, weight: number): void {
+  private close(joints: Numbers, at: number, reach: number): void {
     const { rig, rest, place, goal, turn, before, side: mixed } = this;
     const { links } = rig;
     rotate(rest, 0, joints, at + 8, links, 6);
@@ -100,8 +133,9 @@ export class ArmBlend {
     const along = Math.min(Math.max((near * near + chord * chord - far * far) / (2 * chord), -near), near);
     const off = Math.sqrt(Math.max(near * near - along * along, 0));
     rotate(mixed, 0, joints, at, links, 0);
-    // a straight arm leaves open to which side its elbow goes; that of the bent one is on the side of -y
-    put(place, 0, 0, mixed[1] - BELOW * weight * near, mixed[2]);
+    // where the elbow has to go farther off the chord, it goes to the side of -y: a straight arm leaves open which, and that of
+    // the bent arm is there
+    put(place, 0, 0, mixed[1] - Math.max(off - Math.hypot(mixed[1], mixed[2]), 0), mixed[2]);
     if (!unit(place, 0, place, 0)) put(place, 0, 0, -1, 0);
     put(place, 0, along, off * place[1], off * place[2]);
     multiply(before, 0, joints, at, joints, at + 4);

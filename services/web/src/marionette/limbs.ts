@@ -224,12 +224,16 @@ export class LegRig {
     cross(columns, 6, columns, 0, UP, 0);
   }
 
-  /** The thigh's angle in a pose (18 rotations), within its limits. */
-  angle(rotations: Numbers): number {
+  /**
+   * The thigh's angle in a pose (18 rotations), within its limits. A thigh that points beyond them is at the one it is on the way
+   * round from `near`, radians.
+   */
+  angle(rotations: Numbers, near = 0): number {
     this.face(rotations);
     multiply(this.turn, 0, this.hips, 0, rotations, 4 * this.first);
     rotate(this.place, 0, this.turn, 0, this.thigh, 0);
-    return clampThigh(Math.atan2(dot(this.place, 0, this.columns, 0), -this.place[1]));
+    const theta = Math.atan2(dot(this.place, 0, this.columns, 0), -this.place[1]);
+    return clampThigh(theta + 2 * Math.PI * Math.round((near - theta) / (2 * Math.PI)));
   }
 
   /** Rotations of hip, knee and ankle (12) with the thigh at `theta` radians and the shank hanging. */

@@ -151,7 +151,7 @@ export class PulledHand extends Pulled {
     addScaled(target, 0, tip, 0, hand, 0, -1);
     addScaled(target, 0, hand, 0, target, 0, weight);
     this.turn.follow(around, 0, own, target, weight);
-    this.blend.joints(out, outAt, rotations, at, bent, target, around, normal, Math.max(weight, LEAST_WEIGHT));
+    this.blend.joints(out, outAt, rotations, at, bent, target, around, normal, Math.max(weight, LEAST_WEIGHT), seconds);
     return true;
   }
 
@@ -195,7 +195,7 @@ export class PulledLeg extends Pulled {
   }
 
   protected override whereIn(out: Numbers, rotations: Numbers): void {
-    out[0] = this.rig.angle(rotations);
+    out[0] = this.rig.angle(rotations, this.own[0]);
     out[1] = out[2] = 0;
   }
 }

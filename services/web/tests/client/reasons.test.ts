@@ -14,10 +14,10 @@ describe("the panel's reason", () => {
   });
 
   test("every word of the contract has words for a person, and a narrow line its figure", () => {
-    const said = ["best", "line", "hands", "machine", "buffer", "hidden", "pinned"].map((reason) =>
+    const said = ["best", "line", "hands", "machine", "buffer", "start", "hidden", "pinned"].map((reason) =>
       reasonOf({ ...well, choice: { name: "Choice", rate: 1, reason, line: 28_400 } }),
     );
-    expect(new Set(said).size).toBe(7);
+    expect(new Set(said).size).toBe(8);
     for (const words of said) expect(words).toMatch(/ \(28\.4 kbit\/s\)$/);
     expect(reasonOf({ ...well, choice: { name: "Choice", rate: 1, reason: "new", line: null } })).toBe("chosen by the server");
     expect(reasonOf({ ...well, pinned: true })).toBe("pinned by the address");

@@ -27,14 +27,14 @@ test("between the dance's way of reaching a place and the marionette's, the tip 
       const reach = length(target, 0);
       rig.bend(bent, 0, reach, rig.arm.bend(reach, 0));
       new Turn().follow(turn, 0, own, target, 0.5);
-      blend.joints(out, 0, dance, 0, bent, target, turn, normal, weight);
+      blend.joints(out, 0, dance, 0, bent, target, turn, normal, weight, 0);
       for (const at of [0, 4, 8]) expect(Math.hypot(...out.subarray(at, at + 4))).toBeCloseTo(1, 9);
       if (weight === 0) expect(out).toEqual(dance);
       else {
         rig.target(tip, 0, out, 0);
         expect(apart(tip, 0, target, 0)).toBeLessThan(1e-9);
       }
-      blend.joints(out, 0, dance, 0, bent, target, turn, normal, 1);
+      blend.joints(out, 0, dance, 0, bent, target, turn, normal, 1, 10);
       expect([...out.subarray(4)]).toEqual([...bent.subarray(4)]);
     }),
   );

@@ -1,0 +1,1 @@
+"""Pure: music of our own for the dance, from notes to samples."""

@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgpack
+import pytest
+
+from bunraku.backing import library
+from bunraku.backing.library import StoredMotion, pack
+from bunraku.codec.audio import AudioTrack, unpack_audio
+from bunraku.codec.encode import encode_motion
+from bunraku.codec.scene_encode import encode_scene
+from bunraku.ingest.adding import add
+from bunraku.ingest.results import Made, Refused
+from bunraku.wire.messages import Data
+from tests.sounds import click, decode, onset, tone, write
+from tests.vectors.blocks import wandering_motion
+from tests.vectors.scene import camera
+
+
+@pytest.fixture(scope="module")
+def stored() -> StoredMotion:
+    encoded = encode_motion(wandering_motion(2.0, 30.0, 9), ladder=(30.0, 5.0), grade="live", first_seconds=0.5)
+    return library.unpack("one", pack("one", encoded, [encode_scene(camera(2.0, 30.0), ladder=(20.0,))]))
+
+
+def added(stored: StoredMotion, path: Path, motion: str = "two") -> tuple[StoredMotion, Made]:
+    made = add(motion, stored, path)
+    assert isinstance(made, Made), made
+    return library.unpack(motion, made.packed), made
+
+
+def test_all_else_stays_the_same_bytes(stored: StoredMotion, tmp_path: Path) -> None:
+    new, made = added(stored, write(tmp_path / "a.wav", click(2.0, 44_100, 1.25, 2), 44_100, "stereo"))
+    assert made.described["tracks"] == ["motion", "camera", "audio"]
+    assert made.described["made_from"] == "one"
+    assert (made.described["audio"]["seconds"], made.described["audio"]["channels"]) == (2.0, 2)
+    assert new.packets[:2] == stored.packets
+    before, after = (msgpack.unpackb(motion.description[1:]) for motion in (stored, new))
+    assert after["tracks"][:2] == before["tracks"]
+    assert (before["motion"], after["motion"]) == ("one", "two")
+    track = new.tracks[2]
+    assert isinstance(track, AudioTrack)
+    assert [track.start_us(n) for n in range(track.blocks)] == [stored.track.start_us(n) for n in range(3)]
+    for rate in new.packets[2]:
+        data = [Data.unpack(packet) for packet in rate]
+        assert [(one.track, one.index) for one in data] == [(2, 0), (2, 1), (2, 2)]
+        packets = [packet.data for one in data for packet in unpack_audio(one.block)]
+        played = decode(packets)[track.pre_skip :][: track.samples]
+        assert abs(onset(played[:, 0]) - onset(click(2.0, 48_000, 1.25)[:, 0])) < 1e-3
+
+
+def test_another_sound_takes_the_place_of_the_first(stored: StoredMotion, tmp_path: Path) -> None:
+    first, _ = added(stored, write(tmp_path / "a.flac", tone(2.0, 48_000), 48_000))
+    second, made = added(first, write(tmp_path / "b.flac", tone(1.0, 48_000, 2), 48_000, "stereo"), "three")
+    assert made.described["tracks"] == ["motion", "camera", "audio"]
+    assert made.described["made_from"] == "two"
+    assert len(second.packets) == 3
+    assert second.packets[2] != first.packets[2]
+    assert second.tracks[2] != first.tracks[2]
+
+
+@pytest.mark.parametrize(("seconds", "kept"), [(0.3, 14_400), (1.0, 48_000), (2.0, 96_000), (30.0, 96_000)])
+def test_a_shorter_sound_ends_in_silence_and_a_longer_one_with_the_motion(
+    stored: StoredMotion, tmp_path: Path, seconds: float, kept: int
+) -> None:
+    shares: list[float] = []
+    path = write(tmp_path / "a.mp3", tone(seconds, 48_000), 48_000)
+    made = add("two", stored, path, shares.append)
+    assert isinstance(made, Made)
+    new = library.unpack("two", made.packed)
+    track = new.tracks[2]
+    assert isinstance(track, AudioTrack)
+    assert track.samples == kept
+    assert len(new.packets[2][0]) == track.blocks == 3
+    blocks = [unpack_audio(Data.unpack(packet).block) for packet in new.packets[2][0]]
+    assert [bool(block) for block in blocks] == [track.start_us(n) * 48 // 1000 < kept for n in range(3)]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+
+
+def test_what_cannot_be_heard_is_refused(stored: StoredMotion, tmp_path: Path) -> None:
+    path = tmp_path / "a.wav"
+    path.write_bytes(b"no sound at all")
+    refused = add("two", stored, path)
+    assert isinstance(refused, Refused)
+    assert refused.title == "Not a sound"
+    assert refused.hint

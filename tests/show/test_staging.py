@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bunraku.ingest.keyframes import Staging, check
+from bunraku.motion import skeleton
+from bunraku.motion.choreography import SCORE, dance
+from bunraku.show import staging
+
+
+def test_the_camera_closes_and_moves_calmly() -> None:
+    keyframes = staging.camera(SCORE)
+    assert len(keyframes) == round(SCORE.duration * staging.FPS)
+    places = np.array([key["position"] for key in keyframes])
+    steps = np.diff(places, axis=0, append=places[:1])
+    assert np.linalg.norm(steps, axis=1).max() * staging.FPS < 4.0
+    assert np.linalg.norm(steps[-1]) < 0.01
+
+
+def test_the_dancer_is_in_the_picture_all_the_time() -> None:
+    motion = dance(30.0)
+    places = skeleton.points(motion.figure, motion.root, motion.rotations)
+    for frame, (place, gaze, field) in enumerate(_views()):
+        ahead = (gaze - place) / np.linalg.norm(gaze - place)
+        right = np.cross(ahead, (0.0, 1.0, 0.0))
+        right /= np.linalg.norm(right)
+        above = np.cross(right, ahead)
+        seen = places[frame] - place
+        depth = seen @ ahead
+        half = np.tan(field / 2)
+        assert np.abs(seen @ above / depth).max() < half, f"cut off at {frame / 30:.1f} s"
+        assert np.abs(seen @ right / depth).max() < half * 4 / 3, f"cut off at {frame / 30:.1f} s"
+
+
+def test_three_lights_close_and_none_goes_out() -> None:
+    tracks = staging.lights(SCORE)
+    assert len(tracks) == 3
+    for keyframes in tracks:
+        intensity = [key["intensity"] for key in keyframes]
+        assert 0.3 < min(intensity) <= max(intensity) < 2.0
+        assert intensity[0] == pytest.approx(intensity[-1], abs=0.02)
+
+
+def test_they_are_keyframes_as_the_service_takes_them() -> None:
+    asked = Staging.model_validate({"camera": staging.camera(SCORE), "lights": staging.lights(SCORE)})
+    check(asked)
+
+
+def _views() -> list[tuple[np.ndarray, np.ndarray, float]]:
+    return [(np.array(k["position"]), np.array(k["gaze"]), float(k["fov"])) for k in staging.camera(SCORE)]

@@ -1,0 +1,82 @@
+"""Golden audio blocks, valid and invalid. Their packets have true first bytes and noise for sound."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bunraku.codec.audio import AudioTrack, audio_track, describe_audio, in_blocks, most_samples, unpack_audio
+from bunraku.codec.timing import Timing
+from tests.vectors.blocks import text
+
+HEADS = b"\x18", b"\x58", b"\xff\x83", b"\xfb\x43"
+"""First bytes of packets of 60 ms: SILK of one frame, CELT of three."""
+TIMINGS = (
+    Timing(30.0, 78, 30, 15),
+    Timing(59.94, 200, 67, 6),
+    Timing(128.0, 40, 3, 1),
+)
+"""Of motions: a short first block; starts between microseconds; blocks shorter than a packet."""
+
+
+def packets(count: int, most: int, seed: int) -> list[bytes]:
+    """Packets of 60 ms and up to `most` bytes."""
+    random = np.random.default_rng(seed)
+    sizes = random.integers(2, most, count)
+    return [HEADS[random.integers(len(HEADS))] + random.bytes(int(size)) for size in sizes]
+
+
+def vector(track: AudioTrack, number: int, index: int, data: bytes) -> dict[str, Any]:
+    """A valid block of track `number` and what it holds: of each packet its number, its first sample and its bytes."""
+    return {
+        "track": number,
+        "index": index,
+        "block": text(data),
+        "packets": [
+            {"number": packet.number, "sample": track.first_sample(packet.number), "data": text(packet.data)}
+            for packet in unpack_audio(data)
+        ],
+    }
+
+
+def make() -> dict[str, Any]:
+    """Tracks beside motions of some timing, blocks of each, and what is no block."""
+    tracks = [
+        audio_track(TIMINGS[0], 2, 120, most_samples(TIMINGS[0])),
+        audio_track(TIMINGS[1], 1, 312, 100_000),
+        audio_track(TIMINGS[2], 1, 0, most_samples(TIMINGS[2])),
+    ]
+    rates = [in_blocks(track, packets(track.packets, 3 + 200 * n * n, n)) for n, track in enumerate(tracks)]
+    packet = b"\x18abc"
+    invalid = {
+        "no packet": b"\x05",
+        "no length": b"\x85",
+        "an empty packet": b"\x05\x00",
+        "a packet cut off": b"\x05\x05" + packet,
+        "a length cut off": b"\x05\x04" + packet + b"\x84",
+        "a packet of 20 ms": b"\x05\x04\x08abc",
+        "a packet of 120 ms": b"\x05\x04\x19abc",
+        "a packet without its number of frames": b"\x05\x01\xff",
+        "a number of five bytes": b"\x85\x80\x80\x80\x00\x04" + packet,
+        "a number too large": b"\xff\xff\xff\x7f\x04" + packet + b"\x04" + packet,
+        "too large": b"\x00" + (b"\xff\x7f\x18" + bytes(16_382)) * 4,
+    }
+    return {
+        "motions": [
+            {
+                "fps": timing.fps,
+                "frames": timing.frames,
+                "block_frames": timing.block_frames,
+                "first_frames": timing.first_frames,
+            }
+            for timing in TIMINGS
+        ],
+        "tracks": [describe_audio(track, [round(rate.kbps, 3)]) for track, rate in zip(tracks, rates, strict=True)],
+        "valid": [
+            vector(track, number, index, block)
+            for number, (track, rate) in enumerate(zip(tracks, rates, strict=True))
+            for index, block in enumerate(rate.blocks)
+        ],
+        "invalid": [{"why": why, "block": text(data)} for why, data in invalid.items()],
+    }
