@@ -73,7 +73,8 @@ async def test_all_that_is_known_leaves_in_one_piece(motions: dict[str, StoredMo
     assert line.writes == 1
     kinds = [type(message).__name__ for message in line.messages]
     assert kinds[:5] == ["ChannelHeader", "Description", "TimelineState", "Presence", "Overlay"]
-    assert set(kinds[5:]) == {"Data"}
+    assert set(kinds[5:-1]) == {"Data"}
+    assert kinds[-1] == "Choice"
 
 
 async def test_another_motion_is_announced_before_its_blocks(motions: dict[str, StoredMotion]) -> None:
@@ -84,7 +85,8 @@ async def test_another_motion_is_announced_before_its_blocks(motions: dict[str, 
     viewer.advance()
     kinds = [type(message).__name__ for message in line.messages[before:]]
     assert kinds[:3] == ["ChannelHeader", "Description", "TimelineState"]
-    assert set(kinds[3:]) == {"Data"}
+    assert set(kinds[3:-1]) == {"Data"}
+    assert kinds[-1] == "Choice"
 
 
 async def test_only_the_newest_overlay_waits(motions: dict[str, StoredMotion]) -> None:

@@ -11,6 +11,7 @@ from bunraku.wire.messages import (
     Alive,
     Ask,
     ChannelHeader,
+    Choice,
     Claim,
     Data,
     Description,
@@ -88,6 +89,8 @@ def make() -> dict[str, Any]:
             ),
         ),
         Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)),
+        Choice(2, "line", 27_400),
+        Choice(4, "best"),
         Input(2, Input.VELOCITY, 9, 13, NOW, (-1.0, 0.0, 0.0)),
     ]
     target = examples[-2].pack()

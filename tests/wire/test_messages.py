@@ -13,6 +13,7 @@ from bunraku.wire.messages import (
     Alive,
     Ask,
     ChannelHeader,
+    Choice,
     Claim,
     Data,
     Description,
@@ -82,6 +83,7 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
     st.builds(Claim, limb=LIMB),
     st.builds(Release, limb=LIMB, epoch=U32),
     st.builds(Alive, limbs=st.lists(LIMB, max_size=4)),
+    st.builds(Choice, rate=TIME, reason=TEXT, line=st.none() | TIME),
     st.builds(Notice, limb=LIMB, reason=TEXT, detail=TEXT),
     st.builds(Ask, limb=LIMB, wanted=st.booleans()),
     st.builds(

@@ -170,8 +170,8 @@ class WatchedSession:
         self._overlay = framed if message[1] else None
         ready = self._ready
         if ready is None:
-            ready = self._ready = Together([viewer.outlet for viewer in self._viewers if viewer.outlet.clear])
-            self._behind = [viewer for viewer in self._viewers if not viewer.outlet.clear]
+            ready = self._ready = Together([viewer.outlet for viewer in self._viewers if viewer.unasked])
+            self._behind = [viewer for viewer in self._viewers if not viewer.unasked]
         for viewer in self._behind:
             viewer.overlay(framed)
         ready.write(framed)

@@ -1,42 +1,47 @@
 """One viewer's socket: what it is sent, in which order, and what it says back (SPEC.md, Sockets).
 
-A viewer has no task and no timer of its own: it acts when something comes for it, when it is heard, when its line has
-room again, and when it has a turn (`bunraku.stream.turns`). What cannot be written at once waits: messages that must
-arrive in a small queue, and of overlays the newest. A viewer whose queue fills is dropped and told why; one who says
-nothing is asked, and dropped when nothing comes.
+A viewer has no task of its own: it acts when something comes for it, when it is heard, when its line has room again,
+and when it has a turn (`bunraku.stream.turns`). What cannot be written at once waits: messages that must arrive in a
+small queue, and of overlays the newest. A viewer whose queue fills is dropped and told why; one who says nothing is
+asked, and dropped when nothing comes.
+
+To a quick line (`bunraku.stream.flow`) all is written as it comes. To another what must arrive is, and then, each when
+there is room, blocks and the newest overlay: the line's queue is kept short, and until there may be room again a timer
+runs, which quick lines have none of.
 """
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import random
-from collections.abc import Sequence
 from typing import Protocol, cast
 
 from bunraku import __version__
 from bunraku.backing.backing import clock
 from bunraku.backing.frames import frame
-from bunraku.backing.library import StoredMotion, Track
+from bunraku.backing.frames import message as unframed
+from bunraku.backing.library import StoredMotion
 from bunraku.backing.outlet import Outlet
 from bunraku.backing.sockets import BROKEN, FAULT, TOO_SLOW, Refusal
-from bunraku.codec.audio import AudioTrack
-from bunraku.codec.coefficients import SCENE_CHANNELS
-from bunraku.codec.scene import SceneTrack
-from bunraku.codec.track import MotionTrack
-from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.playout import sharing, timeline
+from bunraku.playout.held import Held
 from bunraku.playout.pacing import Paced, Pacer
 from bunraku.playout.rate import RateChoice
+from bunraku.stream.flow import Flow, Readable
 from bunraku.stream.plans import Plans
+from bunraku.stream.tracks import TRACKS, channels, described, paced, steps
 from bunraku.stream.turns import Turns
 from bunraku.wire.messages import (
     ChannelHeader,
+    Choice,
     Edit,
     MalformedMessage,
     Ping,
     Pong,
     Report,
     TimelineState,
+    newest,
     unpack,
 )
 
@@ -44,8 +49,6 @@ QUEUE = 64
 """Messages that may wait for a viewer."""
 PINGS = 8
 """Pings whose answers may wait; more are not answered."""
-TRACKS = ("motion", "audio", "camera", "light")
-"""Types of tracks that a viewer may ask for."""
 SILENT = 8_000_000
 """A viewer of whom nothing was heard for this long, microseconds, is asked for a sign of life."""
 GONE = 16_000_000
@@ -55,6 +58,10 @@ SPREAD = 1_000_000
 what is sent ahead, and the server's work is even."""
 BATCH = 16_384
 """Bytes that are written in one piece, about."""
+BESIDE = 1_000_000
+"""So long after an overlay the hands share a narrow line with blocks, microseconds."""
+LOOK = 250_000
+"""A line far away that counts as quick is looked at so often, microseconds."""
 
 _log = logging.getLogger(__name__)
 
@@ -78,14 +85,16 @@ class _Shut:
 
 
 _SHUT = cast(Outlet, _Shut())
+_UNKNOWN = Flow(None, clock)
 
 
 class Viewer:
     """What one viewer has been sent and is still to be sent. Until `open` is called everything waits."""
 
     __slots__ = (
-        "_asked", "_control", "_following", "_motion", "_overlay", "_pacer", "_phase", "_pinned", "_planned", "_pongs",
-        "_private", "_rate", "_shown", "_steps", "_timelines", "_tracks", "_turns", "_wanted", "audience", "outlet",
+        "_asked", "_beside_at", "_control", "_flow", "_following", "_held", "_motion", "_overlay", "_pacer", "_phase",
+        "_pinned", "_planned", "_pongs", "_private", "_rate", "_shown", "_steps", "_timelines", "_timer", "_told",
+        "_tracks", "_turns", "_unsaid", "_wanted", "audience", "outlet",
     )  # fmt: skip
 
     def __init__(
@@ -95,18 +104,21 @@ class Viewer:
         wanted: tuple[str, ...] = TRACKS,
         *,
         private: bool = False,
+        held: Held | None = None,
     ) -> None:
         """`pinned` is the rate to keep to, if any; `wanted` the types of tracks whose blocks are sent; a `private`
-        viewer may edit its timeline."""
+        viewer may edit its timeline; `held` is what the viewer has and is not sent again."""
         self._turns = turns
         self._pinned = pinned
         self._wanted = wanted
         self._private = private
+        self._held = held
         self._phase = random.randrange(SPREAD)
         # what waits, framed, but for pings: their answers tell when they leave
         self._pongs: list[tuple[Ping, int]] = []
         self._control: list[bytes] = []
         self._overlay: bytes | None = None
+        self._beside_at = 0
         self._timelines = timeline.Timelines()
         self._shown: tuple[StoredMotion, TimelineState] | None = None
         self._motion: StoredMotion | None = None
@@ -117,43 +129,70 @@ class Viewer:
         # when the next block comes within reach, and of which timeline at which step; None while some are to be sent
         self._following: int | None = None
         self._planned: tuple[TimelineState, sharing.Step] | None = None
+        # the choice of a rate that was told last, and whether it may be another by now
+        self._told: Choice | None = None
+        self._unsaid = False
         self._asked = 0
+        self._flow = _UNKNOWN
+        self._timer: asyncio.TimerHandle | None = None
         self.audience: Audience | None = None
         self.outlet: Outlet = _SHUT
 
-    def open(self, outlet: Outlet) -> None:
-        """The line is there: what waits is sent, in one piece, and the first blocks."""
+    def open(self, outlet: Outlet, line: Readable | None = None) -> None:
+        """The line is there: what waits is sent, in one piece, and the first blocks. `line` tells how much is on its
+        way, where the system does."""
         self.outlet = outlet
+        try:
+            self._flow = Flow(line, clock)
+        except OSError:
+            # it is closed already, as the outlet will say
+            return
         self.advance()
+        self._flow.begun()
+
+    @property
+    def unasked(self) -> bool:
+        """Whether overlays may be written to the outlet as they come, with nothing asked and nothing told."""
+        return self.outlet.clear and self._flow.steady
 
     def control(self, framed: bytes) -> None:
         """A framed message that must arrive."""
         if self.outlet.clear:
-            self.outlet.write(framed)
+            self._put(framed)
         elif len(self._control) < QUEUE:
             self._control.append(framed)
         else:
             self.refuse(Refusal(TOO_SLOW, "Too slow", f"{QUEUE} messages waited; come again"))
 
     def overlay(self, framed: bytes) -> None:
-        """The frame of the newest overlay: written at once where nothing waits, else in place of one that was not."""
-        outlet = self.outlet
-        if outlet.clear:
-            outlet.write(framed)
+        """The frame of the newest overlay: written at once where nothing waits and the line has room, else in place of
+        one that was not."""
+        clear, flow = self.outlet.clear, self._flow
+        if clear and flow.steady:
+            self.outlet.write(framed)
+        elif clear and self._timer is None and flow.quick():
+            self._put(framed)
+            if flow.steady:
+                self._turned()
+                self._turns.put(self, 0)
         else:
             self._overlay = framed
+            self._beside_at = clock()
+            if clear and self._timer is None:
+                self._act(self._beside_at)
 
     def timeline(self, state: TimelineState, motion: StoredMotion) -> None:
         """A new timeline of the stage, and the motion that it names. It is sent at once, blocks at the next turn."""
         self._timelines.put(state)
         if self._motion is not motion:
-            self._tracks = _paced(motion, self._wanted)
+            self._tracks = paced(motion, self._wanted)
             self._motion, self._pacer = motion, Pacer(self._tracks)
-            self._steps = sharing.pinned(_steps(motion, self._wanted), self._pinned)
+            self._steps = sharing.pinned(steps(motion, self._wanted), self._pinned)
             first, safe = sharing.first_step(self._steps), sharing.safe_step(self._steps)
-            self._rate = RateChoice(len(self._steps), None, first, safe)
+            self._rate = RateChoice(len(self._steps), None, first, safe, [step.kbps for step in self._steps])
+            self._told, self._unsaid = None, True
         if self.outlet.clear:
-            self.outlet.write(b"".join(self._announced()))
+            self._put(b"".join(self._announced()))
         self._turns.put(self, 0)
 
     def hear(self, message: bytes) -> None:
@@ -166,28 +205,27 @@ class Viewer:
             if len(self._pongs) < PINGS:
                 self._pongs.append((said, clock()))
             if self.outlet.clear:
-                self.outlet.write(b"".join(self._answers()))
+                self._put(b"".join(self._answers()))
         elif isinstance(said, Report) and self._rate is not None:
-            before = self._rate.rate
-            if self._rate.report(said, clock()) != before:
+            before = self._rate.rate, self._rate.reason
+            if (self._rate.report(said, clock()), self._rate.reason) != before:
+                self._unsaid = True
                 self._turns.put(self, 0)
         elif isinstance(said, Edit) and self._private:
             self._edit(said)
 
     def pause(self) -> None:
         """The line has no room."""
-        if self.audience is not None:
-            self.audience.turned()
+        self._turned()
 
     def resume(self) -> None:
         """The line has room again."""
-        if self.audience is not None:
-            self.audience.turned()
+        self._turned()
         self.advance()
 
     def gone(self) -> None:
         """The connection has ended."""
-        self._turns.remove(self)
+        self._end()
         if self.audience is not None:
             self.audience.leave(self)
 
@@ -200,18 +238,87 @@ class Viewer:
         if now - outlet.heard > SILENT and outlet.heard != self._asked:
             self._asked = outlet.heard
             outlet.ping()
+        flow = self._flow
+        steady = flow.steady
+        if outlet.clear:
+            flow.look()
+        if flow.steady != steady:
+            self._turned()
+        self._act(now)
+
+    def _act(self, now: int) -> None:
+        """Send what the line has room for, and say when the next turn is."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
         try:
-            if outlet.clear and not self._follow(now):
-                self._send(now)
-                self._look_ahead(now)
+            if self.outlet.clear:
+                if not self._flow.free:
+                    self._send_for_room(now)
+                elif not self._follow(now):
+                    self._send(now)
+                    self._look_ahead(now)
             self._turns.put(self, self._next_turn())
         except Exception:
             _log.exception("a viewer's turn failed")
             self.refuse(Refusal(FAULT, "Our fault", "the server could not go on with this stream"))
 
-    def _send(self, now: int) -> None:
+    def _again(self) -> None:
+        self._timer = None
+        self._act(clock())
+
+    def _put(self, data: bytes) -> None:
+        """Write, and count it."""
+        self.outlet.write(data)
+        self._flow.wrote(len(data))
+
+    def _turned(self) -> None:
+        if self.audience is not None:
+            self.audience.turned()
+
+    def _end(self) -> None:
+        self._turns.remove(self)
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _send_for_room(self, now: int) -> None:
+        """Send what must arrive, then the rest as long as the line has room; look again when it may have some."""
+        outlet, flow = self.outlet, self._flow
+        self._planned = self._following = None
+        if first := b"".join(self._first()):
+            self._put(first)
+        while outlet.clear:
+            if not flow.room():
+                break
+            narrow = flow.narrow
+            if (self._overlay is None or narrow) and (packet := self._next_packet(now)) is not None:
+                self._put(frame(packet))
+                flow.block_went(len(packet))
+                flow.begun()
+            elif self._overlay is not None:
+                overlay, self._overlay = self._overlay, None
+                self._put(frame(newest(unframed(overlay))) if narrow else overlay)
+            elif news := self._news():
+                self._put(news)
+            else:
+                self._look_ahead(now)
+                if not flow.learning:
+                    return
+                break
+        if outlet.clear:
+            flow.begun()
+            self._timer = asyncio.get_running_loop().call_later(flow.window.wait() * 1e-6, self._again)
+
+    def _first(self) -> list[bytes]:
+        """What goes before all else, framed."""
         frames = [*self._answers(), *self._announced(), *self._control]
         self._control.clear()
+        return frames
+
+    def _send(self, now: int) -> None:
+        """Send all that there is."""
+        frames = self._first()
         if self._overlay is not None:
             frames.append(self._overlay)
             self._overlay = None
@@ -222,6 +329,8 @@ class Viewer:
             if size >= BATCH:
                 outlet.write(b"".join(frames))
                 frames, size = [], 0
+        if outlet.clear and (news := self._news()):
+            frames.append(news)
         if frames:
             outlet.write(b"".join(frames))
 
@@ -237,8 +346,14 @@ class Viewer:
             return []
         messages = [state.pack()]
         if self._shown is None or self._shown[0] is not motion:
-            channels = sum(map(_channels, motion.tracks))
-            messages[:0] = [ChannelHeader(motion.id, clock(), channels, __version__).pack(), motion.description]
+            held, self._held = self._held, None
+            if held is not None and held.motion == motion.id and self._pacer is not None:
+                for nth, rate in enumerate(held.rates):
+                    if rate >= 0:
+                        self._pacer.has(0, (held.first + nth) % motion.track.blocks, rate)
+            else:
+                messages.insert(0, described(motion, self._wanted))
+            messages.insert(0, ChannelHeader(motion.id, clock(), channels(motion), __version__).pack())
         self._shown = motion, state
         return [frame(message) for message in messages]
 
@@ -246,9 +361,26 @@ class Viewer:
         state = self._timelines.at(now)
         if state is None or self._pacer is None or self._motion is None or self._rate is None:
             return None
-        step = self._steps[self._rate.rate]
-        due = self._pacer.next(state, now, step.motion, audio=step.audio)
+        flow = self._flow
+        narrow = flow.narrow
+        beside = narrow and now - self._beside_at < BESIDE
+        self._rate.line(flow.window.rate if narrow else None, now, beside)
+        step = self._steps[0 if flow.unknown else self._rate.rate]
+        spare = not beside or flow.blocks_turn()
+        due = self._pacer.next(state, now, step.motion, audio=step.audio, net=narrow or flow.far, spare=spare)
         return None if due is None else self._motion.packets[due.track][due.rate][due.index]
+
+    def _news(self) -> bytes | None:
+        """The framed choice of a rate, where the viewer has not been told yet."""
+        self._unsaid = False
+        if self._rate is None or "motion" not in self._wanted:
+            return None
+        reason = self._rate.reason if self._pinned is None else "pinned"
+        choice = Choice(self._steps[self._rate.rate].motion, reason, self._rate.carried)
+        told, self._told = self._told, choice
+        if told is not None and (told.rate, told.reason) == (choice.rate, choice.reason):
+            return None
+        return frame(choice.pack())
 
     def _follow(self, now: int) -> bool:
         """Send what all who are in step are sent, where this one is, and nothing else waits; whether it is."""
@@ -260,7 +392,9 @@ class Viewer:
         assert self._motion is not None
         assert self._rate is not None
         assert self._pacer is not None
-        if step != self._steps[self._rate.rate] or self._pongs or self._control or self._overlay is not None:
+        if step != self._steps[self._rate.rate] or self._unsaid:
+            return False
+        if self._pongs or self._control or self._overlay is not None:
             return False
         plan = self.audience.plans.at(self._following, state, self._motion, step, self._wanted, self._tracks)
         new = self._pacer.follow(plan.dues)
@@ -276,18 +410,23 @@ class Viewer:
         self._planned = self._following = None
         state = self._timelines.at(now)
         if self.outlet.clear and state is not None and self._pacer is not None and self._rate is not None:
-            wait = self._pacer.wait(state, now)
+            wait = self._pacer.wait(state, now, self._flow.far or self._flow.narrow)
             if wait is not None:
                 self._following = now + wait
-                self._planned = state, self._steps[self._rate.rate]
+                self._planned = (state, self._steps[self._rate.rate]) if self._flow.free else None
 
     def _next_turn(self) -> int:
         """Clock time of the next turn: for the next block, or to ask for a sign of life."""
         heard = self.outlet.heard
         due = heard + (GONE if heard == self._asked else SILENT) + 1
-        if self._following is None or not self.outlet.clear:
+        if not self.outlet.clear:
             return due
-        return min(due, self._following + self._phase)
+        if self._following is not None:
+            # what goes over a narrow line just in time cannot wait so that the server's work is even
+            due = min(due, self._following + (self._phase if self._flow.free else 0))
+        if self._flow.far and self._flow.steady:
+            due = min(due, clock() + LOOK)
+        return due
 
     def _edit(self, edit: Edit) -> None:
         """Edit the viewer's own timeline."""
@@ -298,31 +437,5 @@ class Viewer:
 
     def refuse(self, refusal: Refusal) -> None:
         """End it, and say why."""
-        self._turns.remove(self)
+        self._end()
         self.outlet.refuse(refusal)
-
-
-def _channels(track: Track) -> int:
-    if isinstance(track, AudioTrack):
-        return track.channels
-    return SCENE_CHANNELS if isinstance(track, SceneTrack) else CHANNEL_COUNT
-
-
-def _paced(motion: StoredMotion, wanted: Sequence[str]) -> list[Paced]:
-    """The tracks of a motion whose blocks a viewer wants."""
-    return [
-        Paced(number, track, len(motion.packets[number]), _kind(track) == "motion", _kind(track) == "audio")
-        for number, track in enumerate(motion.tracks)
-        if _kind(track) in wanted
-    ]
-
-
-def _steps(motion: StoredMotion, wanted: Sequence[str]) -> tuple[sharing.Step, ...]:
-    """The ways in which the tracks that a viewer wants may share its line."""
-    kinds = list(map(_kind, motion.tracks))
-    audio = motion.kbps[kinds.index("audio")] if "audio" in kinds and "audio" in wanted else ()
-    return sharing.steps(motion.kbps[0] if "motion" in wanted or not audio else (), audio)
-
-
-def _kind(track: Track) -> str:
-    return "motion" if isinstance(track, MotionTrack) else track.kind

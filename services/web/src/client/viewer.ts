@@ -11,12 +11,14 @@ import { Overlays } from "../playout/overlay";
 import { positionAt, Timelines } from "../playout/timeline";
 import { Tracks } from "../playout/tracks";
 import {
-  type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState,
+  type Choice, type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState,
 } from "../wire/messages";
 import { Connection } from "./connection";
 import type { LineFigures } from "./line-figures";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
+import { reasonOf } from "./reasons";
+import { returningUrl } from "./returning";
 import type { Solver, SolverOf } from "./solver";
 import type { ViewerOptions } from "./viewer-options";
 
@@ -30,7 +32,6 @@ const REPORT_EVERY = 1_000;
 
 /** Weight of the newest in running means. */
 const NEWEST = 1 / 8;
-
 /** The marionette comes after the first picture: nobody pulls before. */
 const marionette: SolverOf = async (figure, origin) => (await import("./marionette")).fetchMarionette(figure, origin);
 
@@ -72,6 +73,7 @@ export class Viewer extends EventTarget {
   private decodeMs = 0;
   private frameMs = 0;
   private rate = -1;
+  private choice: Choice | null = null;
   private closedReason: string | null = null;
   /** The private timeline to go on with when the line comes back. */
   private resume: TimelineState | null = null;
@@ -221,7 +223,10 @@ export class Viewer extends EventTarget {
       playoutDelayMs: this.delay.at(now * 1000) / 1000,
       firstPoseMs: this.firstPoseMs,
       gaps: this.gaps,
-      reason: this.reason(),
+      reason: reasonOf({
+        closed: this.closedReason, damaged: this.damaged, shown: this.shown, missing: this.missing >= 0, choice: this.choice,
+        pinned: this.url.searchParams.has("rate"),
+      }),
     };
   }
 
@@ -236,21 +241,13 @@ export class Viewer extends EventTarget {
   }
 
   private address(): string {
-    const url = new URL(this.url);
-    if (!this.connectsToSession && this.resume) url.searchParams.set("at", String(this.positionAt(this.now())));
-    return url.href;
+    const { store, resume } = this;
+    if (!store || resume?.motion !== this.motion) return this.url.href;
+    return returningUrl(this.url, store, resume, this.clock.at(this.now() * 1000), !this.connectsToSession);
   }
 
   private get connectsToSession(): boolean {
     return this.url.pathname.includes("/sessions/");
-  }
-
-  private reason(): string {
-    if (this.closedReason !== null) return this.closedReason;
-    if (this.damaged > 0) return `${this.damaged} messages could not be read`;
-    if (!this.shown) return "waiting for the first block";
-    if (this.missing >= 0) return "waiting for a block";
-    return this.url.searchParams.has("rate") ? "pinned by the address" : "chosen by the server";
   }
 
   private opened(): void {
@@ -311,6 +308,9 @@ export class Viewer extends EventTarget {
       case "Presence":
         this.presence = message;
         this.tell("presence");
+        break;
+      case "Choice":
+        this.choice = message;
         break;
       case "Pong":
         this.clock.pong(message.sent, message.received, message.answered, now * 1000);

@@ -1,12 +1,15 @@
 /**
  * The reference clock as seen from this end of a line (after NTP, RFC 5905, clock filter: the sample that waited least).
  *
- * Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last 8 the one with the
- * smallest round trip says the offset. The offset in use slews towards it and never steps: it closes on it exponentially, and
+ * Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last samples the one
+ * that can be off least says the offset: by half its round trip, and by what the clocks have drifted since. The offset in use slews towards it and never steps: it closes on it exponentially, and
  * time never runs slower than a tenth of its speed, so what is shown neither jumps nor runs backwards.
  */
 
-const SAMPLES = 8;
+const SAMPLES = 32;
+
+/** Microseconds a microsecond that two clocks may go apart. */
+const DRIFT = 200e-6;
 
 /** Time constant of the slew, microseconds: a greeting 100 ms late is made good to a frame within half a second. */
 const SLEW = 250e3;
@@ -20,12 +23,14 @@ const ANOTHER = 2e6;
 interface Sample {
   offset: number;
   trip: number;
+  at: number;
 }
 
 /** Local time to reference time; all arguments and results are microseconds. */
 export class ReferenceClock {
   private readonly samples: Sample[] = [];
   private best: Sample | null = null;
+  private bestError = Infinity;
   // the offset in use was `from` at local time `since`, and goes to `goal`
   private from = 0;
   private since = 0;
@@ -36,14 +41,14 @@ export class ReferenceClock {
     return this.goal !== null;
   }
 
-  /** Reference minus local, by the sample that waited least; until there is one, by the greeting. */
+  /** Reference minus local, by the sample that can be off least; until there is one, by the greeting. */
   get offset(): number {
     return this.goal ?? 0;
   }
 
-  /** How far the offset may be off at most: half the smallest round trip. Infinite before the first answer. */
+  /** How far the offset may be off at most, when the last answer came. Infinite before the first. */
   get error(): number {
-    return this.best ? this.best.trip / 2 : Infinity;
+    return this.best ? this.bestError : Infinity;
   }
 
   /**
@@ -63,9 +68,11 @@ export class ReferenceClock {
   pong(sent: number, received: number, answered: number, arrived: number): void {
     const trip = arrived - sent - (answered - received);
     if (trip < 0 || answered < received) return;
-    this.samples.push({ offset: (received - sent + (answered - arrived)) / 2, trip });
+    this.samples.push({ offset: (received - sent + (answered - arrived)) / 2, trip, at: arrived });
     if (this.samples.length > SAMPLES) this.samples.shift();
-    this.best = this.samples.reduce((least, sample) => (sample.trip < least.trip ? sample : least));
+    const off = (sample: Sample) => sample.trip / 2 + DRIFT * (arrived - sample.at);
+    this.best = this.samples.reduce((least, sample) => (off(sample) < off(least) ? sample : least));
+    this.bestError = off(this.best);
     this.aim(this.best.offset, arrived);
   }
 

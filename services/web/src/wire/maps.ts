@@ -65,6 +65,7 @@ const FIELDS: { [name in MapName]: Readonly<Record<string, Field>> } = {
   Release: { limb, epoch: count },
   Alive: { limbs: list(limb) },
   Notice: { limb, reason: text, detail: text },
+  Choice: { rate: count, reason: text, line: optional(count) },
   Ask: { limb, wanted: flag },
 };
 

@@ -276,10 +276,20 @@ describe("when the line is lost", () => {
     Line.last.say(timeline({ epoch: 2, clock: UNIX, position: 700_000, playing: false, loop: false }));
     Line.last.end(1006);
     pass(250);
-    expect(Line.last.url).toBe("ws://stage/v1/motions/dance/stream?rate=1&at=0.7");
+    const clock = UNIX + 650_000;
+    expect(Line.last.url).toBe(`ws://stage/v1/motions/dance/stream?rate=1&have=dance.0.1--&at=0.700000&clock=${clock}`);
     Line.last.accept();
     Line.last.say(header(), description(), timeline({ position: 700_000 }));
     expect(Line.last.of("Edit")).toEqual([{ name: "Edit", playing: false, position: null, loop: false }]);
+  });
+
+  test("what is held is not asked for again, in a session either", () => {
+    watching();
+    Line.last.say(data(0, 1, best));
+    Line.last.end(1006);
+    pass(250);
+    expect(new URL(Line.last.url).searchParams.get("have")).toBe("dance.0.1--");
+    expect(new URL(Line.last.url).searchParams.has("at")).toBe(false);
   });
 
   test("a missing session is the end", () => {
