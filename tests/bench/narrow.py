@@ -163,8 +163,8 @@ async def first_poses(bench: Bench, only: set[str]) -> Figures:
         for case, (name, _) in enumerate(cases):
             mine = screens[5 * case : 5 * case + 5]
             first = [screen.figures.first_pose_ms or float("inf") for screen in mine]
-            figures[f"first_pose_ms_{name}"] = round(float(np.median(first)))
-            figures[f"first_pose_worst_ms_{name}"] = round(max(first))
+            figures[f"first_pose_ms_{name}"] = _whole(float(np.median(first)))
+            figures[f"first_pose_worst_ms_{name}"] = _whole(max(first))
             figures[f"stalls_{name}"] = sum(screen.figures.gaps for screen in mine)
             figures[f"shown_kbps_{name}"] = round(mine[0].figures.shown_kbps, 2)
             figures[f"line_kbps_{name}"] = round(fars[5 * case].received * 8e-3 / 60.0, 2)
@@ -269,7 +269,7 @@ async def join(bench: Bench) -> Figures:
             await late.watch(4.0, picture)
             await seeing
             now = time.monotonic_ns() // 1000
-            figures["join_first_pose_ms_64k"] = round(late.figures.first_pose_ms or float("inf"))
+            figures["join_first_pose_ms_64k"] = _whole(late.figures.first_pose_ms or float("inf"))
             figures["join_apart_mm_p95"] = round(_percentile(apart[60:], 95), 1)
             figures["join_clock_apart_ms"] = round(abs(late.clock.at(now) - quick.clock.at(now)) / 1e3, 2)
 
@@ -374,6 +374,11 @@ def _dark(screen: Screen, seconds: float) -> float:
     return (screen.shown[0][0] - screen.begun) / 1e3 + screen.figures.dark_ms
 
 
+def _whole(value: float) -> int | None:
+    """To the nearest one; None for what did not come."""
+    return round(value) if np.isfinite(value) else None
+
+
 def _percentile(values: Any, share: float) -> float:
     return float(np.percentile(values, share)) if len(values) else float("nan")
 
@@ -417,7 +422,7 @@ async def run(net: Network, only: set[str], seconds: float) -> Figures:
         if only & names:
             found = await made()
             for name, value in found.items():
-                print(f"{name:<40}{value:>10}", flush=True)
+                print(f"{name:<40}{value!s:>10}", flush=True)
             figures.update(found)
 
     await case({"9k6", "28k8", "56k"}, lambda: first_poses(bench, only))

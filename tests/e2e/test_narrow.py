@@ -17,7 +17,7 @@ from tests.servers import running
 
 def test_a_dance_comes_soon_over_28_kbit_and_goes_on_where_it_was_after_a_cut(tmp_path: Path) -> None:
     if (reason := missing()) is not None:
-        if os.environ.get("CI") and not reason.startswith("there is no "):
+        if os.environ.get("CI") and "/dev/net/tun" not in reason:
             pytest.fail(f"in CI lines must be emulated: {reason}")
         pytest.skip(reason)
     decode.warm()

@@ -13,9 +13,11 @@ from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
+from bunraku.playout.held import Held
 from bunraku.stream.viewers import QUEUE, Viewer
 from bunraku.wire.messages import (
     ChannelHeader,
+    Choice,
     Data,
     Edit,
     Overlay,
@@ -253,3 +255,36 @@ async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(sounding: Li
     sending.cancel()
     after = [m for m in map(unpack, line.sent[sent:]) if isinstance(m, Data)]
     assert {(m.track, m.rate) for m in after} == {(0, 0)}
+
+
+async def test_who_comes_back_is_not_sent_again_what_it_holds(library: Library) -> None:
+    viewer, line = Viewer(library, None, held=Held("one", 0, (1, 1, -1, 0))), Line()
+    viewer.timeline(timeline.start("one", 9_200_000, clock(), playing=False))
+    sending = asyncio.create_task(viewer.send(line.put))
+    await line.count(Choice, 1)
+    sending.cancel()
+    assert [message[0] for message in line.sent[:2]] == [1, 4]
+    data = [Data.unpack(message) for message in line.sent if message[0] == Data.TYPE]
+    assert {(d.index, d.rate) for d in data if d.index < 4} == {(2, 1), (3, 1)}
+
+
+async def test_held_blocks_of_another_motion_are_no_matter(library: Library) -> None:
+    viewer, line = Viewer(library, None, held=Held("two", 0, (1, 1))), Line()
+    viewer.timeline(timeline.start("one", 9_200_000, clock(), playing=False))
+    sending = asyncio.create_task(viewer.send(line.put))
+    data = await line.count(Data, 2)
+    sending.cancel()
+    assert [message[0] for message in line.sent[:3]] == [1, 2, 4]
+    assert [d.index for d in data if isinstance(d, Data)][:2] == [0, 1]
+
+
+async def test_a_viewer_is_told_once_what_was_chosen_and_why(library: Library) -> None:
+    viewer, line = Viewer(library, 0), Line()
+    viewer.timeline(timeline.start("one", 9_200_000, clock(), playing=False))
+    sending = asyncio.create_task(viewer.send(line.put))
+    choices = await line.count(Choice, 1)
+    viewer.ping(Ping(1, 2))
+    await line.count(Pong, 1)
+    sending.cancel()
+    assert choices == [Choice(0, "pinned")]
+    assert sum(message[0] == Choice.TYPE for message in line.sent) == 1
