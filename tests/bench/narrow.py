@@ -15,7 +15,7 @@ ARGUMENTS="--only live"`.
     traces         18 lines of 3G at a mean of 28.8 and of 56 kbit/s: stalls against those of the lowest rate alone, and
                    the mean rate shown against the best constant one that an oracle sends
 
-Latency of an overlay is from when the session made its newest frame to when it came. Both ends share one kernel's
+All viewers ask for the motion alone. Latency of an overlay is from when the session made its newest frame to when it came. Both ends share one kernel's
 clock, so a viewer's true offset is known.
 """
 
@@ -151,7 +151,7 @@ async def first_poses(bench: Bench, only: set[str]) -> Figures:
     ]
     figures: Figures = {}
     with bench.net.lines([link for _, link in cases for _ in range(5)]) as fars:
-        screens = [bench.dance(far) for far in fars]
+        screens = [bench.dance(far, "?tracks=motion") for far in fars]
         # the first of each stays; one after the other, as they share two cores
         watching = []
         for nth in range(5):
@@ -178,7 +178,7 @@ async def steps(bench: Bench) -> Figures:
     async def work(session: str) -> None:
         with bench.net.lines([Link(56_000, 75, step="10:14400,18:56000")]) as (far,):
             begun = time.monotonic_ns() // 1000
-            screen = bench.screen(far, f"/v1/sessions/{session}/stream")
+            screen = bench.screen(far, f"/v1/sessions/{session}/stream?tracks=motion")
             await screen.look(26.0)
 
         def late(begin: float, end: float) -> list[float]:
@@ -204,7 +204,7 @@ async def live(bench: Bench) -> Figures:
     seconds, settle = 60.0, 5.0
 
     async def work(session: str) -> None:
-        path = f"/v1/sessions/{session}/stream"
+        path = f"/v1/sessions/{session}/stream?tracks=motion"
         link = Link(28_800, 75, queue_bytes=64_000)
         async with naive_relay(f"ws://127.0.0.1:{PORT}{path}", PORT + 1):
             with bench.net.lines([link] * 3) as fars:
@@ -252,7 +252,7 @@ async def join(bench: Bench) -> Figures:
     figures: Figures = {}
 
     async def work(session: str) -> None:
-        path = f"/v1/sessions/{session}/stream"
+        path = f"/v1/sessions/{session}/stream?tracks=motion"
         with bench.net.lines([Link(64_000, 50)]) as (far,):
             quick = Screen(f"ws://127.0.0.1:{PORT}{path}", None, bench.truth)
             seeing = asyncio.create_task(quick.look(8.0))
@@ -282,7 +282,7 @@ async def cut(bench: Bench) -> Figures:
     figures: Figures = {}
     begin, end = 8.0, 33.0
     with bench.net.lines([Link(28_800, 75, cut=(begin, end))]) as (far,):
-        screen = bench.dance(far)
+        screen = bench.dance(far, "?tracks=motion")
         before = time.monotonic_ns() // 1000
         received: list[int] = []
         await asyncio.gather(screen.look(45.0), _counted(far, end - 1.0, received), _counted(far, 44.0, received))
@@ -315,7 +315,10 @@ async def traces(bench: Bench, seconds: float, scaled: list[int]) -> Figures:
             Link(delay_ms=75, trace=str(file), scale=mean / _mean(row)) for file, row in zip(files, rows, strict=True)
         ]
         with bench.net.lines(links * 2) as fars:
-            screens = [bench.dance(far, "" if nth < len(links) else "?rate=0") for nth, far in enumerate(fars)]
+            screens = [
+                bench.dance(far, "?tracks=motion" if nth < len(links) else "?tracks=motion&rate=0")
+                for nth, far in enumerate(fars)
+            ]
             await asyncio.gather(*(screen.look(seconds, frame=1 / 15) for screen in screens))
         ours, lowest = screens[: len(links)], screens[len(links) :]
         watched = seconds * 1e3 * len(links)

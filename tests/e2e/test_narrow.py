@@ -30,7 +30,9 @@ def test_a_dance_comes_soon_over_28_kbit_and_goes_on_where_it_was_after_a_cut(tm
         port = url.rpartition(":")[2]
         motion = asyncio.run(_only_motion(url))
         with net.lines([Link(28_800, 75, cut=(4.0, 10.0))]) as (far,):
-            viewer = Viewer(f"ws://{far.host}:{port}/v1/motions/{motion}/stream", open_socket=far.open_socket)
+            viewer = Viewer(
+                f"ws://{far.host}:{port}/v1/motions/{motion}/stream?tracks=motion", open_socket=far.open_socket
+            )
             figures = asyncio.run(watch(viewer))
     assert figures.first_pose_ms is not None
     assert figures.first_pose_ms < 3_000

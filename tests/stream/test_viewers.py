@@ -19,6 +19,7 @@ from bunraku.wire.messages import (
     ChannelHeader,
     Choice,
     Data,
+    Description,
     Edit,
     Overlay,
     Ping,
@@ -288,3 +289,15 @@ async def test_a_viewer_is_told_once_what_was_chosen_and_why(library: Library) -
     sending.cancel()
     assert choices == [Choice(0, "pinned")]
     assert sum(message[0] == Choice.TYPE for message in line.sent) == 1
+
+
+async def test_tracks_after_the_last_wanted_one_are_not_described(library: Library) -> None:
+    described = []
+    for wanted in (("motion",), ("motion", "camera"), ("motion", "camera", "light")):
+        viewer, line = Viewer(library, None, wanted), Line()
+        viewer.timeline(timeline.start("filmed", 2_000_000, clock(), playing=False))
+        sending = asyncio.create_task(viewer.send(line.put))
+        described += await line.count(Description, 1)
+        sending.cancel()
+    kinds = [[track["type"] for track in d.tracks] for d in described if isinstance(d, Description)]
+    assert kinds == [["motion"], ["motion", "camera"], ["motion", "camera", "light"]]

@@ -31,6 +31,7 @@ from bunraku.stream.flow import Flow, Readable
 from bunraku.wire.messages import (
     ChannelHeader,
     Choice,
+    Description,
     Edit,
     MalformedMessage,
     Ping,
@@ -189,7 +190,7 @@ class Viewer:
                     if rate >= 0:
                         self._pacer.has(0, (self._held.first + nth) % motion.track.blocks, rate)
             else:
-                await put(motion.description)
+                await put(_described(motion, self._wanted))
             self._held = None
         await put(state.pack())
 
@@ -242,6 +243,19 @@ def _channels(track: Track) -> int:
     if isinstance(track, AudioTrack):
         return track.channels
     return SCENE_CHANNELS if isinstance(track, SceneTrack) else CHANNEL_COUNT
+
+
+def _described(motion: StoredMotion, wanted: Container[str]) -> bytes:
+    """A motion's Description without the tracks after the last wanted one, which keeps the others' numbers: on a narrow
+    line what is told of those costs more than the first block."""
+    whole = unpack(motion.description)
+    assert isinstance(whole, Description)
+    last = max((number for number, track in enumerate(whole.tracks) if track["type"] in wanted), default=0)
+    return (
+        motion.description
+        if last + 1 == len(whole.tracks)
+        else Description(whole.motion, whole.tracks[: last + 1]).pack()
+    )
 
 
 def _paced(motion: StoredMotion, wanted: Container[str]) -> list[Paced]:
