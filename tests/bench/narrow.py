@@ -15,8 +15,8 @@ ARGUMENTS="--only live"`.
     traces         18 lines of 3G at a mean of 28.8 and of 56 kbit/s: stalls against those of the lowest rate alone, and
                    the mean rate shown against the best constant one that an oracle sends
 
-All viewers ask for the motion alone. Latency of an overlay is from when the session made its newest frame to when it came. Both ends share one kernel's
-clock, so a viewer's true offset is known.
+All viewers ask for the motion alone. Latency of an overlay is from when the session made its newest frame to when it
+came. Both ends share one kernel's clock, so a viewer's true offset is known.
 """
 
 from __future__ import annotations
