@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -39,7 +38,8 @@ def test_a_dance_comes_soon_over_28_kbit_and_goes_on_where_it_was_after_a_cut(tm
     assert figures.reconnects >= 1
     # the net that came before carried the dance over the cut
     assert figures.gaps == 0
-    assert all(b > a for a, b in pairwise(shown))
+    # the stage's time went on as the watching did, over the cut too
+    assert 13e6 < shown[-1] - shown[0] < 18e6
     assert figures.reason in ("best", "line")
     assert figures.shown_kbps > 0
 
