@@ -15,8 +15,8 @@ ARGUMENTS="--only live"`.
     traces         18 lines of 3G at a mean of 28.8 and of 56 kbit/s: stalls against those of the lowest rate alone, and
                    the mean rate shown against the best constant one that an oracle sends
 
-Latency of an overlay is from when the session made its newest frame to when it came. Both ends share one kernel's
-clock, so a viewer's true offset is known.
+All viewers ask for the motion alone. Latency of an overlay is from when the session made its newest frame to when it
+came. Both ends share one kernel's clock, so a viewer's true offset is known.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ async def first_poses(bench: Bench, only: set[str]) -> Figures:
     ]
     figures: Figures = {}
     with bench.net.lines([link for _, link in cases for _ in range(5)]) as fars:
-        screens = [bench.dance(far) for far in fars]
+        screens = [bench.dance(far, "?tracks=motion") for far in fars]
         # the first of each stays; one after the other, as they share two cores
         watching = []
         for nth in range(5):
@@ -163,8 +163,8 @@ async def first_poses(bench: Bench, only: set[str]) -> Figures:
         for case, (name, _) in enumerate(cases):
             mine = screens[5 * case : 5 * case + 5]
             first = [screen.figures.first_pose_ms or float("inf") for screen in mine]
-            figures[f"first_pose_ms_{name}"] = round(float(np.median(first)))
-            figures[f"first_pose_worst_ms_{name}"] = round(max(first))
+            figures[f"first_pose_ms_{name}"] = _whole(float(np.median(first)))
+            figures[f"first_pose_worst_ms_{name}"] = _whole(max(first))
             figures[f"stalls_{name}"] = sum(screen.figures.gaps for screen in mine)
             figures[f"shown_kbps_{name}"] = round(mine[0].figures.shown_kbps, 2)
             figures[f"line_kbps_{name}"] = round(fars[5 * case].received * 8e-3 / 60.0, 2)
@@ -178,7 +178,7 @@ async def steps(bench: Bench) -> Figures:
     async def work(session: str) -> None:
         with bench.net.lines([Link(56_000, 75, step="10:14400,18:56000")]) as (far,):
             begun = time.monotonic_ns() // 1000
-            screen = bench.screen(far, f"/v1/sessions/{session}/stream")
+            screen = bench.screen(far, f"/v1/sessions/{session}/stream?tracks=motion")
             await screen.look(26.0)
 
         def late(begin: float, end: float) -> list[float]:
@@ -204,7 +204,7 @@ async def live(bench: Bench) -> Figures:
     seconds, settle = 60.0, 5.0
 
     async def work(session: str) -> None:
-        path = f"/v1/sessions/{session}/stream"
+        path = f"/v1/sessions/{session}/stream?tracks=motion"
         link = Link(28_800, 75, queue_bytes=64_000)
         async with naive_relay(f"ws://127.0.0.1:{PORT}{path}", PORT + 1):
             with bench.net.lines([link] * 3) as fars:
@@ -252,7 +252,7 @@ async def join(bench: Bench) -> Figures:
     figures: Figures = {}
 
     async def work(session: str) -> None:
-        path = f"/v1/sessions/{session}/stream"
+        path = f"/v1/sessions/{session}/stream?tracks=motion"
         with bench.net.lines([Link(64_000, 50)]) as (far,):
             quick = Screen(f"ws://127.0.0.1:{PORT}{path}", None, bench.truth)
             seeing = asyncio.create_task(quick.look(8.0))
@@ -269,7 +269,7 @@ async def join(bench: Bench) -> Figures:
             await late.watch(4.0, picture)
             await seeing
             now = time.monotonic_ns() // 1000
-            figures["join_first_pose_ms_64k"] = round(late.figures.first_pose_ms or float("inf"))
+            figures["join_first_pose_ms_64k"] = _whole(late.figures.first_pose_ms or float("inf"))
             figures["join_apart_mm_p95"] = round(_percentile(apart[60:], 95), 1)
             figures["join_clock_apart_ms"] = round(abs(late.clock.at(now) - quick.clock.at(now)) / 1e3, 2)
 
@@ -282,7 +282,7 @@ async def cut(bench: Bench) -> Figures:
     figures: Figures = {}
     begin, end = 8.0, 33.0
     with bench.net.lines([Link(28_800, 75, cut=(begin, end))]) as (far,):
-        screen = bench.dance(far)
+        screen = bench.dance(far, "?tracks=motion")
         before = time.monotonic_ns() // 1000
         received: list[int] = []
         await asyncio.gather(screen.look(45.0), _counted(far, end - 1.0, received), _counted(far, 44.0, received))
@@ -315,7 +315,10 @@ async def traces(bench: Bench, seconds: float, scaled: list[int]) -> Figures:
             Link(delay_ms=75, trace=str(file), scale=mean / _mean(row)) for file, row in zip(files, rows, strict=True)
         ]
         with bench.net.lines(links * 2) as fars:
-            screens = [bench.dance(far, "" if nth < len(links) else "?rate=0") for nth, far in enumerate(fars)]
+            screens = [
+                bench.dance(far, "?tracks=motion" if nth < len(links) else "?tracks=motion&rate=0")
+                for nth, far in enumerate(fars)
+            ]
             await asyncio.gather(*(screen.look(seconds, frame=1 / 15) for screen in screens))
         ours, lowest = screens[: len(links)], screens[len(links) :]
         watched = seconds * 1e3 * len(links)
@@ -374,6 +377,11 @@ def _dark(screen: Screen, seconds: float) -> float:
     return (screen.shown[0][0] - screen.begun) / 1e3 + screen.figures.dark_ms
 
 
+def _whole(value: float) -> int | None:
+    """To the nearest one; None for what did not come."""
+    return round(value) if np.isfinite(value) else None
+
+
 def _percentile(values: Any, share: float) -> float:
     return float(np.percentile(values, share)) if len(values) else float("nan")
 
@@ -417,7 +425,7 @@ async def run(net: Network, only: set[str], seconds: float) -> Figures:
         if only & names:
             found = await made()
             for name, value in found.items():
-                print(f"{name:<40}{value:>10}", flush=True)
+                print(f"{name:<40}{value!s:>10}", flush=True)
             figures.update(found)
 
     await case({"9k6", "28k8", "56k"}, lambda: first_poses(bench, only))

@@ -72,3 +72,17 @@ def test_a_guess_serves_until_an_answer_comes() -> None:
     assert clock.at(2_020_050) == 2_020_050 + OFFSET
     clock.guess(0, 0)
     assert clock.at(2_020_060) == 2_020_060 + OFFSET
+
+
+def test_a_new_connection_forgets_the_answers_and_goes_on_without_a_step() -> None:
+    clock = ReferenceClock()
+    answer(clock, 0, 20_000, 20_000)
+    before = clock.at(1_000_000)
+    clock.restart()
+    assert clock.error == float("inf")
+    assert clock.at(1_010_000) == before + 10_000
+    # the first answer is a bad one
+    answer(clock, 1_020_000, 20_000, 420_000)
+    after = clock.at(1_500_000)
+    assert abs(after - before - 500_000) <= 200_000
+    assert clock.at(1_510_000) > after

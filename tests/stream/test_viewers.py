@@ -11,12 +11,15 @@ from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
+from bunraku.playout.held import Held
 from bunraku.stream import viewers
 from bunraku.stream.turns import Turns
 from bunraku.stream.viewers import PINGS, QUEUE, Viewer
 from bunraku.wire.messages import (
     ChannelHeader,
+    Choice,
     Data,
+    Description,
     Edit,
     Overlay,
     Ping,
@@ -273,3 +276,41 @@ async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dic
     after = sent_of(line)[before:]
     assert after
     assert {(track, rate) for track, _, rate in after} == {(0, 0)}
+
+
+async def test_who_comes_back_is_not_sent_again_what_it_holds(motions: dict[str, StoredMotion]) -> None:
+    _, line, _ = watching(motions["one"], playing=False, held=Held("one", 0, (1, 1, -1, 0)))
+    assert [type(message) for message in line.messages[:2]] == [ChannelHeader, TimelineState]
+    data = [message for message in line.messages if isinstance(message, Data)]
+    assert {(d.index, d.rate) for d in data if d.index < 4} == {(2, 1), (3, 1)}
+
+
+async def test_held_blocks_of_another_motion_are_no_matter(motions: dict[str, StoredMotion]) -> None:
+    _, line, _ = watching(motions["one"], playing=False, held=Held("two", 0, (1, 1)))
+    assert [type(message) for message in line.messages[:3]] == [ChannelHeader, Description, TimelineState]
+    assert [message.index for message in line.messages if isinstance(message, Data)][:2] == [0, 1]
+
+
+async def test_a_viewer_is_told_once_what_was_chosen_and_why(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["one"], playing=False, pinned=0)
+    viewer.hear(Ping(1, 2).pack())
+    viewer.advance()
+    assert of(Choice, line) == [Choice(0, "pinned")]
+
+
+async def test_a_viewer_is_told_when_the_reason_is_another(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["one"], playing=False)
+    for hidden in (True, True, False):
+        viewer.hear(Report(buffer=3_000_000, hidden=hidden).pack())
+        viewer.advance()
+    assert [choice.reason for choice in of(Choice, line) if isinstance(choice, Choice)] == ["best", "hidden", "best"]
+
+
+async def test_tracks_after_the_last_wanted_one_are_not_described(motions: dict[str, StoredMotion]) -> None:
+    kinds = []
+    for wanted in (("motion",), ("motion", "camera"), ("motion", "camera", "light")):
+        _, line, _ = watching(motions["filmed"], playing=False, wanted=wanted)
+        (described,) = of(Description, line)
+        assert isinstance(described, Description)
+        kinds.append([track["type"] for track in described.tracks])
+    assert kinds == [["motion"], ["motion", "camera"], ["motion", "camera", "light"]]
