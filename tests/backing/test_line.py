@@ -31,7 +31,8 @@ async def ends() -> AsyncIterator[Ends]:
 async def test_what_is_not_acknowledged_is_told(ends: Ends) -> None:
     transport, client = ends
     line = Line(transport)
-    assert line.read().waiting == 0
+    before = line.read()
+    assert before.waiting == 0
     size = 16 << 20
     transport.write(bytes(size))
     reading = line.read()
@@ -43,8 +44,10 @@ async def test_what_is_not_acknowledged_is_told(ends: Ends) -> None:
     async with asyncio.timeout(10):
         while line.read().waiting:  # noqa: ASYNC110
             await asyncio.sleep(0)
-    reading = line.read()
-    assert 0 < reading.least <= reading.round_trip < 10_000_000
+    after = line.read()
+    assert 0 < after.least <= after.round_trip < 10_000_000
+    assert after.written - before.written == size
+    assert before.written < reading.written <= after.written
 
 
 async def test_a_closed_line_is_an_error_to_read_and_none_to_let_go(ends: Ends) -> None:

@@ -136,3 +136,17 @@ def test_what_nobody_looked_out_for_says_nothing() -> None:
     window.acknowledged(5 * SECOND, 0)
     assert window.rate is None
     assert not window.narrow(5 * SECOND)
+
+
+def test_what_was_written_besides_is_waited_for_but_not_counted() -> None:
+    window = Window()
+    window.wrote(0, 1_000)
+    window.passed(500)
+    assert window.written == 1_500
+    assert window.flying == on_line(1_000)
+    # the system knows of both: the first is acknowledged when only what came after it is waiting
+    window.acknowledged(50_000, 501)
+    assert window.flying > 0
+    window.acknowledged(60_000, 500)
+    assert window.flying == 0
+    assert window.room(60_000)

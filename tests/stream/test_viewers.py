@@ -250,11 +250,11 @@ async def test_a_pinned_rate_pins_the_dance_and_the_sound_goes_with_the_line(mot
     for pinned, sound, expected in ((1, 2, [(0, 1, 1), (1, 1, 0)]), (0, 0, [(0, 1, 0), (1, 1, 0)])):
         viewer, line, _ = watching(motions["sung"], pinned=pinned)
         assert sent_of(line)[2:4] == expected
-        choice = viewer._rate
-        assert choice is not None
+        assert viewer._playing is not None
+        choice = viewer._playing.rate
         for second in range(1, 9):
             choice.report(Report(buffer=4_000_000), clock() + second * 2_000_000)
-        assert viewer._steps[choice.rate][:2] == (pinned, sound)
+        assert viewer._playing.step[:2] == (pinned, sound)
 
 
 async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(motions: dict[str, StoredMotion]) -> None:
@@ -266,8 +266,8 @@ async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(mot
 
 async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dict[str, StoredMotion]) -> None:
     viewer, line, _ = watching(motions["sung"], private=True)
-    choice = viewer._rate
-    assert choice is not None
+    assert viewer._playing is not None
+    choice = viewer._playing.rate
     for second in range(1, 6):
         choice.report(Report(buffer=0), clock() + second * 2_000_000)
     before = len(sent_of(line))

@@ -23,7 +23,7 @@ _TCP_INFO = getattr(socket, "TCP_INFO", 11)
 _NUMBER = struct.Struct("=I")
 _LARGE_NUMBER = struct.Struct("=Q")
 _ROUND_TRIP, _ACKNOWLEDGED, _LEAST = 68, 120, 148
-"""Where `tcpi_rtt`, `tcpi_bytes_acked` and `tcpi_min_rtt` stand in `struct tcp_info`; the kernel only adds to its end."""
+"""Where `tcpi_rtt`, `tcpi_bytes_acked` and `tcpi_min_rtt` stand in `struct tcp_info`, to whose end the kernel adds."""
 _SIZE = 152
 
 

@@ -26,15 +26,13 @@ from bunraku.backing.outlet import Outlet
 from bunraku.backing.sockets import BROKEN, FAULT, TOO_SLOW, Refusal
 from bunraku.playout import sharing, timeline
 from bunraku.playout.held import Held
-from bunraku.playout.pacing import Paced, Pacer
-from bunraku.playout.rate import RateChoice
 from bunraku.stream.flow import Flow, Readable
 from bunraku.stream.plans import Plans
-from bunraku.stream.tracks import TRACKS, channels, described, paced, steps
+from bunraku.stream.playing import Playing
+from bunraku.stream.tracks import TRACKS, channels, described
 from bunraku.stream.turns import Turns
 from bunraku.wire.messages import (
     ChannelHeader,
-    Choice,
     Edit,
     MalformedMessage,
     Ping,
@@ -58,8 +56,6 @@ SPREAD = 1_000_000
 what is sent ahead, and the server's work is even."""
 BATCH = 16_384
 """Bytes that are written in one piece, about."""
-BESIDE = 1_000_000
-"""So long after an overlay the hands share a narrow line with blocks, microseconds."""
 LOOK = 250_000
 """A line far away that counts as quick is looked at so often, microseconds."""
 
@@ -92,9 +88,9 @@ class Viewer:
     """What one viewer has been sent and is still to be sent. Until `open` is called everything waits."""
 
     __slots__ = (
-        "_asked", "_beside_at", "_control", "_flow", "_following", "_held", "_motion", "_overlay", "_pacer", "_phase",
-        "_pinned", "_planned", "_pongs", "_private", "_rate", "_shown", "_steps", "_timelines", "_timer", "_told",
-        "_tracks", "_turns", "_unsaid", "_wanted", "audience", "outlet",
+        "_asked", "_beside_at", "_control", "_flow", "_following", "_held", "_overlay", "_phase", "_pinned",
+        "_planned", "_playing", "_pongs", "_private", "_shown", "_timelines", "_timer", "_turns", "_wanted", "audience",
+        "outlet",
     )  # fmt: skip
 
     def __init__(
@@ -121,17 +117,10 @@ class Viewer:
         self._beside_at = 0
         self._timelines = timeline.Timelines()
         self._shown: tuple[StoredMotion, TimelineState] | None = None
-        self._motion: StoredMotion | None = None
-        self._pacer: Pacer | None = None
-        self._rate: RateChoice | None = None
-        self._steps: tuple[sharing.Step, ...] = ()
-        self._tracks: list[Paced] = []
+        self._playing: Playing | None = None
         # when the next block comes within reach, and of which timeline at which step; None while some are to be sent
         self._following: int | None = None
         self._planned: tuple[TimelineState, sharing.Step] | None = None
-        # the choice of a rate that was told last, and whether it may be another by now
-        self._told: Choice | None = None
-        self._unsaid = False
         self._asked = 0
         self._flow = _UNKNOWN
         self._timer: asyncio.TimerHandle | None = None
@@ -184,13 +173,8 @@ class Viewer:
     def timeline(self, state: TimelineState, motion: StoredMotion) -> None:
         """A new timeline of the stage, and the motion that it names. It is sent at once, blocks at the next turn."""
         self._timelines.put(state)
-        if self._motion is not motion:
-            self._tracks = paced(motion, self._wanted)
-            self._motion, self._pacer = motion, Pacer(self._tracks)
-            self._steps = sharing.pinned(steps(motion, self._wanted), self._pinned)
-            first, safe = sharing.first_step(self._steps), sharing.safe_step(self._steps)
-            self._rate = RateChoice(len(self._steps), None, first, safe, [step.kbps for step in self._steps])
-            self._told, self._unsaid = None, True
+        if self._playing is None or self._playing.motion is not motion:
+            self._playing = Playing(motion, self._wanted, self._pinned)
         if self.outlet.clear:
             self._put(b"".join(self._announced()))
         self._turns.put(self, 0)
@@ -206,10 +190,8 @@ class Viewer:
                 self._pongs.append((said, clock()))
             if self.outlet.clear:
                 self._put(b"".join(self._answers()))
-        elif isinstance(said, Report) and self._rate is not None:
-            before = self._rate.rate, self._rate.reason
-            if (self._rate.report(said, clock()), self._rate.reason) != before:
-                self._unsaid = True
+        elif isinstance(said, Report) and self._playing is not None:
+            if self._playing.report(said, clock()):
                 self._turns.put(self, 0)
         elif isinstance(said, Edit) and self._private:
             self._edit(said)
@@ -238,22 +220,22 @@ class Viewer:
         if now - outlet.heard > SILENT and outlet.heard != self._asked:
             self._asked = outlet.heard
             outlet.ping()
-        flow = self._flow
-        steady = flow.steady
-        if outlet.clear:
-            flow.look()
-        if flow.steady != steady:
-            self._turned()
-        self._act(now)
+        self._act(now, look=True)
 
-    def _act(self, now: int) -> None:
-        """Send what the line has room for, and say when the next turn is."""
+    def _act(self, now: int, look: bool = False) -> None:
+        """Send what the line has room for, and say when the next turn is; `look` whether the line is a quick one."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+        flow = self._flow
         try:
             if self.outlet.clear:
-                if not self._flow.free:
+                steady = flow.steady
+                if look:
+                    flow.look()
+                if flow.steady != steady:
+                    self._turned()
+                if not flow.free:
                     self._send_for_room(now)
                 elif not self._follow(now):
                     self._send(now)
@@ -299,7 +281,7 @@ class Viewer:
             elif self._overlay is not None:
                 overlay, self._overlay = self._overlay, None
                 self._put(frame(newest(unframed(overlay))) if narrow else overlay)
-            elif news := self._news():
+            elif self._playing is not None and (news := self._playing.news()):
                 self._put(news)
             else:
                 self._look_ahead(now)
@@ -329,7 +311,7 @@ class Viewer:
             if size >= BATCH:
                 outlet.write(b"".join(frames))
                 frames, size = [], 0
-        if outlet.clear and (news := self._news()):
+        if outlet.clear and self._playing is not None and (news := self._playing.news()):
             frames.append(news)
         if frames:
             outlet.write(b"".join(frames))
@@ -341,17 +323,13 @@ class Viewer:
 
     def _announced(self) -> list[bytes]:
         """The framed timeline if it is new, after what says of a new motion what it is."""
-        state, motion = self._timelines.newest, self._motion
-        if state is None or motion is None or (self._shown is not None and self._shown[1] is state):
+        state, playing = self._timelines.newest, self._playing
+        if state is None or playing is None or (self._shown is not None and self._shown[1] is state):
             return []
-        messages = [state.pack()]
+        messages, motion = [state.pack()], playing.motion
         if self._shown is None or self._shown[0] is not motion:
             held, self._held = self._held, None
-            if held is not None and held.motion == motion.id and self._pacer is not None:
-                for nth, rate in enumerate(held.rates):
-                    if rate >= 0:
-                        self._pacer.has(0, (held.first + nth) % motion.track.blocks, rate)
-            else:
+            if not playing.has(held):
                 messages.insert(0, described(motion, self._wanted))
             messages.insert(0, ChannelHeader(motion.id, clock(), channels(motion), __version__).pack())
         self._shown = motion, state
@@ -359,28 +337,9 @@ class Viewer:
 
     def _next_packet(self, now: int) -> bytes | None:
         state = self._timelines.at(now)
-        if state is None or self._pacer is None or self._motion is None or self._rate is None:
+        if state is None or self._playing is None:
             return None
-        flow = self._flow
-        narrow = flow.narrow
-        beside = narrow and now - self._beside_at < BESIDE
-        self._rate.line(flow.window.rate if narrow else None, now, beside)
-        step = self._steps[0 if flow.unknown else self._rate.rate]
-        spare = not beside or flow.blocks_turn()
-        due = self._pacer.next(state, now, step.motion, audio=step.audio, net=narrow or flow.far, spare=spare)
-        return None if due is None else self._motion.packets[due.track][due.rate][due.index]
-
-    def _news(self) -> bytes | None:
-        """The framed choice of a rate, where the viewer has not been told yet."""
-        self._unsaid = False
-        if self._rate is None or "motion" not in self._wanted:
-            return None
-        reason = self._rate.reason if self._pinned is None else "pinned"
-        choice = Choice(self._steps[self._rate.rate].motion, reason, self._rate.carried)
-        told, self._told = self._told, choice
-        if told is not None and (told.rate, told.reason) == (choice.rate, choice.reason):
-            return None
-        return frame(choice.pack())
+        return self._playing.next_packet(state, now, self._flow, self._beside_at)
 
     def _follow(self, now: int) -> bool:
         """Send what all who are in step are sent, where this one is, and nothing else waits; whether it is."""
@@ -389,15 +348,14 @@ class Viewer:
         state, step = self._planned
         if state is not self._timelines.at(now) or self._shown is None or self._shown[1] is not state:
             return False
-        assert self._motion is not None
-        assert self._rate is not None
-        assert self._pacer is not None
-        if step != self._steps[self._rate.rate] or self._unsaid:
+        playing = self._playing
+        assert playing is not None
+        if step != playing.step or playing.unsaid:
             return False
         if self._pongs or self._control or self._overlay is not None:
             return False
-        plan = self.audience.plans.at(self._following, state, self._motion, step, self._wanted, self._tracks)
-        new = self._pacer.follow(plan.dues)
+        plan = self.audience.plans.at(self._following, state, playing.motion, step, self._wanted, playing.tracks)
+        new = playing.pacer.follow(plan.dues)
         if new is None:
             return False
         self._following = plan.following
@@ -408,12 +366,12 @@ class Viewer:
     def _look_ahead(self, now: int) -> None:
         """All that is within reach was sent: when more will be."""
         self._planned = self._following = None
-        state = self._timelines.at(now)
-        if self.outlet.clear and state is not None and self._pacer is not None and self._rate is not None:
-            wait = self._pacer.wait(state, now, self._flow.far or self._flow.narrow)
+        state, flow = self._timelines.at(now), self._flow
+        if self.outlet.clear and state is not None and self._playing is not None:
+            wait = self._playing.pacer.wait(state, now, flow.far or flow.narrow)
             if wait is not None:
                 self._following = now + wait
-                self._planned = (state, self._steps[self._rate.rate]) if self._flow.free else None
+                self._planned = (state, self._playing.step) if flow.free else None
 
     def _next_turn(self) -> int:
         """Clock time of the next turn: for the next block, or to ask for a sign of life."""
@@ -430,10 +388,10 @@ class Viewer:
 
     def _edit(self, edit: Edit) -> None:
         """Edit the viewer's own timeline."""
-        newest, motion = self._timelines.newest, self._motion
-        if newest is not None and motion is not None:
-            state = timeline.edit(newest, clock(), playing=edit.playing, position=edit.position, loop=edit.loop)
-            self.timeline(state, motion)
+        state, playing = self._timelines.newest, self._playing
+        if state is not None and playing is not None:
+            state = timeline.edit(state, clock(), playing=edit.playing, position=edit.position, loop=edit.loop)
+            self.timeline(state, playing.motion)
 
     def refuse(self, refusal: Refusal) -> None:
         """End it, and say why."""
