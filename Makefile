@@ -90,6 +90,10 @@ vectors: .setup/python
 prior: .setup/python
 	$(BIN)/python -m training.prior $(or $(CORPUS),../shared/mocap)
 
+# how far apart what is heard and what is shown are, in Chromium
+bench-audio: setup
+	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "is heard where"
+
 bench-%: setup
 	$(BIN)/python -m tests.bench.$(subst -,_,$*) $(ARGUMENTS)
 

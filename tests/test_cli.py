@@ -42,6 +42,23 @@ def test_audio_is_added_and_told(server: str, clip_file: Path, tmp_path: Path) -
     assert json.loads(watched.stdout)["audio_blocks"] > 0
 
 
+def test_a_camera_and_lights_are_added_from_keyframes(server: str, clip_file: Path, tmp_path: Path) -> None:
+    motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
+    show = tmp_path / "show.json"
+    light = {"time": 0, "position": [-2, 4, 4], "colour": [1, 0.8, 0.5], "intensity": 1}
+    show.write_text(json.dumps({"lights": [[light]]}))
+    added = RUN.invoke(app, ["scene", f"{server}/v1/motions/{motion}", str(show), "--json"])
+    assert added.exit_code == 0, added.output
+    lit = json.loads(added.stdout)
+    assert lit["tracks"] == ["motion", "light"]
+    shown = RUN.invoke(app, ["scene", motion, str(show), "--server", server])
+    assert shown.stdout == f"motion, light of {lit['name']}: {lit['id']}\n"
+    show.write_text("{lights:")
+    refused = RUN.invoke(app, ["scene", motion, str(show), "--server", server])
+    assert refused.exit_code != 0
+    assert "show.json is no JSON" in refused.output
+
+
 def test_for_people_there_are_tables(server: str, clip_file: Path) -> None:
     shown = RUN.invoke(app, ["upload", str(clip_file), "--server", server])
     assert "18 of 18" in shown.stdout
@@ -61,6 +78,7 @@ def test_failures_are_said_in_words(server: str, tmp_path: Path) -> None:
         ["keep", f"{server}/v1/motions/none"],
         ["audio", "none", str(bad), "--server", server],
         ["audio", f"{server}/v1/sessions/none", str(bad)],
+        ["scene", f"{server}/v1/sessions/none", str(bad)],
         ["list", "--server", "http://127.0.0.1:9"],
         ["upload", str(tmp_path / "missing.bvh"), "--server", server],
     ):

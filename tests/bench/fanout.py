@@ -19,7 +19,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import os
 import re
 import resource
 import socket
@@ -59,7 +58,7 @@ def rates(viewers: int = 600, size: int = 120, hertz: int = 60, rounds: int = 7,
             kinds.append("socketio")
         else:
             print("python-socketio is not installed: without Socket.IO")
-        print("nats-server: not measured" if not _installed("nats-server") else "nats-server: only beside, see below")
+        print("nats-server's WebSocket: not measured")
         for kind in kinds:
             senders[kind] = stack.enter_context(Told.module("fanout_senders", kind, size, hertz))
         speech = {"c": ("raw",), "bunraku": ("bunraku", STREAM)}
@@ -294,10 +293,6 @@ def _read(viewer: socket.socket, wait: float) -> tuple[bytes, bool]:
     except ConnectionError:
         pass
     return data, True
-
-
-def _installed(program: str) -> bool:
-    return any((Path(folder) / program).exists() for folder in os.get_exec_path())
 
 
 def _round(value: float | None, digits: int = 2) -> float | None:

@@ -55,8 +55,14 @@ LOST = 1_000_000
 """Microseconds: a pull that nobody saw by then is lost."""
 
 
+_PING, _PONG = 9, 10
+"""Opcodes of WebSocket frames."""
+
+
 class Screen(asyncio.Protocol):
     """One viewer's socket: messages are kept with the clock time at which they came."""
+
+    _transport: asyncio.Transport
 
     def __init__(self, path: str, host: str) -> None:
         self.messages: list[tuple[int, bytes]] = []
@@ -67,6 +73,7 @@ class Screen(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
         key = base64.b64encode(secrets.token_bytes(16)).decode()
         lines = (
             f"GET {self._path} HTTP/1.1", f"Host: {self._host}", "Upgrade: websocket", "Connection: Upgrade",
@@ -95,7 +102,11 @@ class Screen(asyncio.Protocol):
                 size, body = int.from_bytes(buffer[at + 2 : at + 10], "big"), at + 10
             if body + size > len(buffer):
                 break
-            self.messages.append((now, buffer[body : body + size]))
+            if buffer[at] & 0x0F == _PING:
+                # with a mask of zeros, which leaves it as it is
+                self._transport.write(bytes((0x80 | _PONG, 0x80 | size)) + bytes(4) + buffer[body : body + size])
+            else:
+                self.messages.append((now, buffer[body : body + size]))
             at = body + size
         self._buffer = buffer[at:]
 

@@ -17,14 +17,26 @@ def heard(path: Path, most: int = ALL) -> np.ndarray:
         return np.concatenate(list(sound.samples(most)))
 
 
-@pytest.mark.parametrize("layout", ["mono", "stereo", "5.1"])
-@pytest.mark.parametrize("rate", [8_000, 44_100, 48_000, 96_000])
-@pytest.mark.parametrize("kind", KINDS)
+def there_is(kind: str, rate: int, layout: str) -> bool:
+    """Whether files of this kind have this rate and these channels, and FFmpeg writes them."""
+    if kind == "mp3":
+        return rate <= 48_000 and layout != "5.1"
+    if kind == "opus.ogg":
+        return rate in (8_000, 48_000)
+    return kind != "vorbis.ogg" or layout == "stereo"
+
+
+@pytest.mark.parametrize(
+    ("kind", "rate", "layout"),
+    [
+        (kind, rate, layout)
+        for kind in KINDS
+        for rate in (8_000, 44_100, 48_000, 96_000)
+        for layout in ("mono", "stereo", "5.1")
+        if there_is(kind, rate, layout)
+    ],
+)
 def test_every_kind_of_file_is_heard_sample_exact(tmp_path: Path, kind: str, rate: int, layout: str) -> None:
-    if (kind == "mp3" and (rate > 48_000 or layout == "5.1")) or (kind == "opus.ogg" and rate not in (8_000, 48_000)):
-        pytest.skip("there are no such files")
-    if kind == "vorbis.ogg" and layout != "stereo":
-        pytest.skip("FFmpeg writes Vorbis in stereo alone")
     channels = {"mono": 1, "stereo": 2, "5.1": 6}[layout]
     path = write(tmp_path / f"a.{kind}", click(1.5, rate, 0.7, channels), rate, layout)
     sound = heard(path)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from bunraku.codec.timing import Timing, even_blocks
 from bunraku.codec.track import MotionTrack, plan
-from bunraku.playout.pacing import AHEAD, JUST, NET, NET_AHEAD, SOON, UPGRADE, Due, Paced, Pacer
+from bunraku.playout.pacing import AHEAD, JUST, MARGIN, NET, NET_AHEAD, SOON, UPGRADE, Due, Paced, Pacer, arrivals
 from bunraku.playout.timeline import edit, start
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import wandering_motion
@@ -240,3 +240,38 @@ def test_what_a_viewer_has_is_not_sent_again(rates: list[int], net: bool) -> Non
             pacer.has(0, index, rate)
     while (due := pacer.next(state, 0, 3, net=net)) is not None:
         assert due.index >= len(rates) or due.rate > rates[due.index]
+
+
+def told_by_next(
+    tracks: list[Paced], state: TimelineState, clock: int, rate: int, audio: int | None
+) -> list[tuple[int, int, int]]:
+    """What comes within reach by `clock` for one who was sent, one by one, all that was before."""
+    pacer = Pacer(tracks)
+    while pacer.next(state, clock - 2 * MARGIN, rate, audio) is not None:
+        pass
+    found = []
+    while (due := pacer.next(state, clock, rate, audio)) is not None:
+        found.append((due.track, due.index, due.rate))
+    return found
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([24.0, 30.0, 59.94]), st.integers(20, 700), st.integers(10, 90)),
+        min_size=1,
+        max_size=3,
+    ),
+    st.integers(0, 20_000_000),
+    st.booleans(),
+    st.integers(0, 2),
+    st.sampled_from([None, -1, 0, 1]),
+)
+def test_arrivals_are_what_one_who_has_all_before_is_sent(
+    shapes: list[tuple[float, int, int]], begin: int, loop: bool, rate: int, audio: int | None
+) -> None:
+    timings = [Timing(fps, frames, min(block, frames), min(block // 2, frames)) for fps, frames, block in shapes]
+    tracks = [Paced(n, timing, 3, n == 0, n == 1) for n, timing in enumerate(timings)]
+    state = TimelineState(1, "one", 0, 0, True, loop, timings[0].duration_us)
+    clock = begin + (Pacer(tracks).wait(state, begin) or 0)
+    told = [(due.track, due.index, due.rate) for due in arrivals(tracks, state, clock, rate, audio)]
+    assert told == told_by_next(tracks, state, clock, rate, audio)

@@ -21,7 +21,7 @@ from tests.playout.virtual_line import VirtualLine
 from tests.stream.lines import Line, frames
 from tests.vectors.blocks import wandering_motion
 
-LIMBS = dict.fromkeys(range(4), (7,) * 9)
+LIMBS: dict[int, tuple[int, ...]] = dict.fromkeys(range(4), (7,) * 9)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def motion() -> StoredMotion:
 
 
 class NarrowLine(Line):
-    """A line of a rate in bytes a second, with a way of `delay` microseconds; what is written to it and when it came."""
+    """A line of so many bytes a second and a way of `delay` microseconds; what was written to it, and when it came."""
 
     def __init__(self, now: Callable[[], int], rate: float, delay: int) -> None:
         super().__init__()
@@ -41,7 +41,7 @@ class NarrowLine(Line):
         self.held: list[bool] = []
         self.reads = 0
 
-    def write(self, data: bytes | bytearray | memoryview) -> None:  # type: ignore[type-arg]
+    def write(self, data: bytes | bytearray | memoryview) -> None:
         super().write(data)
         arrives = self.line.write(self.now(), len(data))
         self.came += [(self.now(), arrives, payload) for _, payload in frames(bytes(data))]
@@ -91,7 +91,7 @@ async def test_the_first_block_is_small_and_goes_with_what_says_of_it_and_no_mor
 ) -> None:
     watching = Watching(motion, monkeypatch)
     blocks = [data for _, _, data in watching.of(Data)]
-    assert [(data.index, data.rate) for data in blocks if isinstance(data, Data)][0] == (0, 0)
+    assert next((data.index, data.rate) for data in blocks if isinstance(data, Data)) == (0, 0)
     assert all(data.rate == 0 for data in blocks if isinstance(data, Data))
     assert watching.line.held == [False]
     assert len(watching.line.sent) < 3_000

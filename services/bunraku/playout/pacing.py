@@ -166,7 +166,43 @@ class Pacer:
 def arrivals(
     tracks: Sequence[Paced], state: TimelineState, clock: int, rate: int, audio: int | None = None
 ) -> list[Due]:
-    """The blocks that have come within reach by `clock`, a time that `Pacer.wait` told, and had not just before it."""
+    """The blocks that have come within reach by `clock`, a time that `Pacer.wait` told, and had not just before it: as
+    `Pacer.next` would tell one who has been sent all before them, without going through all that."""
+    position = position_at(state, clock)
+    reach = position + AHEAD
+    before = position_at(state, clock - 2 * MARGIN)
+    if state.loop and any(_again(track.timing, before, state.duration) <= AHEAD for track in tracks):
+        # of so short a loop all is within reach, and what is on show may come better
+        return _told(tracks, state, clock, rate, audio)
+    found: list[Due] = []
+    for track in tracks:
+        wanted = max(rate, 0) if audio is None or not track.audio else audio
+        if wanted < 0:
+            continue
+        timing = track.timing
+        blocks = timing.block_at(state.duration - 1) + 1
+        first = min(timing.block_at(before), blocks - 1)
+        place, rated = 0 if track.base else 1 if track.audio else 2, min(wanted, track.rates - 1)
+        turn, into = divmod(reach, state.duration)
+        index = min(timing.block_at(into) + 1, blocks - 1)
+        while (start := timing.start_us(index) + turn * state.duration) > reach - 2 * MARGIN:
+            # in a loop it was sent when it last came within reach, if it is still there
+            sent = turn > 1 or (turn == 1 and index >= first)
+            if start <= reach and not sent and (state.loop or not turn):
+                found.append(Due(False, False, start - position, place, track.number, index, rated))
+            turn, index = (turn, index - 1) if index else (turn - 1, blocks - 1)
+            if turn < 0:
+                break
+    return sorted(found)
+
+
+def _again(timing: Timing, position: int, duration: int) -> int:
+    """Microseconds until the block at `position` comes again in a loop."""
+    return timing.start_us(timing.block_at(position)) + duration - position
+
+
+def _told(tracks: Sequence[Paced], state: TimelineState, clock: int, rate: int, audio: int | None) -> list[Due]:
+    """`arrivals` by sending all that was before."""
     pacer = Pacer(tracks)
     while pacer.next(state, clock - 2 * MARGIN, rate, audio) is not None:
         pass

@@ -55,7 +55,8 @@ SHOTS = (
 
 
 class Cue(NamedTuple):
-    """The lights come to these intensities at `beat`, having set out `over` beats earlier; 1 is as bright as usual."""
+    """The lights come to these intensities at `beat`, having set out `over` beats earlier; 1 is full, as bright as the
+    stage has them without a show."""
 
     beat: float
     over: float
@@ -68,19 +69,19 @@ PLACES = {"key": (-1.9, 3.9, 4.1), "warm": (2.6, 3.0, -2.3), "cool": (-2.9, 1.6,
 """Where the lights hang: before the dancer, and two behind that draw the outline."""
 COLOURS = {"key": (1.0, 0.775, 0.539), "warm": (1.0, 0.694, 0.352), "cool": (0.275, 0.434, 1.0)}
 """Linear RGB."""
-FIRST = Cue(0.0, 0.0, 0.75, 0.8, 0.9)
+FIRST = Cue(0.0, 0.0, 0.7, 0.7, 0.7)
 CUES = (
-    Cue(5.5, 4.0, 1.0, 1.0, 1.0),
+    Cue(5.5, 4.0, 0.95, 0.9, 0.8),
     # dark before the pose is struck, bright on it
-    Cue(17.6, 1.2, 0.7, 0.9, 1.1),
-    Cue(18.3, 0.5, 1.25, 1.2, 0.8),
-    Cue(21.5, 2.0, 1.0, 1.0, 1.0),
+    Cue(17.6, 1.2, 0.55, 0.8, 0.8),
+    Cue(18.3, 0.5, 1.0, 1.0, 0.7),
+    Cue(21.5, 2.0, 0.95, 0.9, 0.8),
     # the slow turn is the moon's
-    Cue(26.5, 2.5, 0.42, 0.5, 1.9),
-    Cue(32.5, 1.5, 1.0, 1.0, 1.0),
-    Cue(42.5, 1.2, 0.7, 0.9, 1.1),
-    Cue(43.3, 0.5, 1.25, 1.2, 0.8),
-    Cue(47.5, 3.0, 0.75, 0.8, 0.9),
+    Cue(26.5, 2.5, 0.4, 0.45, 1.0),
+    Cue(32.5, 1.5, 0.95, 0.9, 0.8),
+    Cue(42.5, 1.2, 0.55, 0.8, 0.8),
+    Cue(43.3, 0.5, 1.0, 1.0, 0.7),
+    Cue(47.5, 3.0, 0.7, 0.7, 0.7),
 )
 
 

@@ -9,6 +9,7 @@ import type { Hands } from "./input/hands";
 import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { PointerInput } from "./input/pointer";
 import type { VelocityInputs } from "./input/velocity";
+import { Listening } from "./listening";
 import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
 import { createPage } from "./page/page";
@@ -49,6 +50,8 @@ const page = createPage(document.body, {
   loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
   seek: (seconds) => room?.seek(seconds, performance.now()),
   camera: () => stage?.follow(!stage.following),
+  sound: () => listening.toggle(),
+  volume: (volume) => (listening.volume = volume),
   keep: keepThis({
     keep: (session, called) => keep(session, { name: called, camera: cameraMoves() }),
     toast: (message, action) => page.toast(message, action),
@@ -87,6 +90,7 @@ const page = createPage(document.body, {
   reframe: resize,
 });
 const holding = new Holding(page, () => mapping);
+const listening = new Listening((state) => page.transport.sound.render(state), page.transport.sound.element);
 theme = createTheme((now) => {
   page.header.theme(now);
   stage?.setTheme(now);
@@ -174,6 +178,7 @@ function enter(id: string): Room {
   });
   const { viewer, puppeteer } = room;
   holding.enter(room);
+  listening.enter(viewer);
   const url = new URL(location.href);
   url.searchParams.set("session", id);
   history.replaceState(null, "", url);
@@ -215,7 +220,7 @@ function resize(): void {
 
 /** `window.bunraku`: the parts of the running page, for tests and for people who like to look inside. */
 function expose(): void {
-  Object.assign(window, { bunraku: { stage, viewer: room?.viewer ?? null, puppeteer: room?.puppeteer ?? null, hands } });
+  Object.assign(window, { bunraku: { stage, viewer: room?.viewer ?? null, puppeteer: room?.puppeteer ?? null, hands, listening } });
 }
 
 async function openStage(): Promise<void> {
@@ -243,6 +248,7 @@ async function openStage(): Promise<void> {
     play,
     back: () => step(-1),
     forward: () => step(1),
+    sound: () => listening.toggle(),
     keep: () => page.transport.keep(),
     library: () => page.panels.toggle("library"),
     strings: () => page.panels.toggle("strings"),
@@ -289,7 +295,7 @@ function frame(): void {
     lit: pointer?.near === limb || focused === limb || selected,
     pull: hands?.pull(limb) ?? null,
   }));
-  stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.shownTime(now));
+  stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.shownTime(now));
   page.tags.render(limbs, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
   if (pose) invite(now);
   page.transport.camera(stage.hasShow, stage.following);

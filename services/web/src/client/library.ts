@@ -9,8 +9,9 @@ export interface Motion {
   /** Seconds. */
   duration: number;
   fps: number;
-  /** Of a motion that was kept from a session: the types of its tracks, words of where it is from, and its dance's id. */
+  /** The types of its tracks. */
   tracks?: string[];
+  /** Of a motion that was kept from a session: words of where it is from, and its dance's id. */
   source?: string;
   kept_from?: string;
   [key: string]: unknown;

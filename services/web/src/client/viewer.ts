@@ -7,7 +7,10 @@ import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
 import type { BlockStore } from "../playout/blocks";
 import { ReferenceClock } from "../playout/clock";
 import { PlayoutDelay } from "../playout/delay";
+import { Following, type Lead } from "../playout/following";
 import { Overlays } from "../playout/overlay";
+import { type LightState, lightStates } from "../playout/scenes";
+import type { AudioStore } from "../playout/sounds";
 import { positionAt, Timelines } from "../playout/timeline";
 import { Tracks } from "../playout/tracks";
 import {
@@ -17,9 +20,9 @@ import { Connection } from "./connection";
 import type { LineFigures } from "./line-figures";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
+import { OwnSolver } from "./own-solver";
 import { reasonOf } from "./reasons";
 import { returningUrl } from "./returning";
-import type { Solver, SolverOf } from "./solver";
 import type { ViewerOptions } from "./viewer-options";
 
 export type Timeline = TimelineState;
@@ -32,8 +35,6 @@ const REPORT_EVERY = 1_000;
 
 /** Weight of the newest in running means. */
 const NEWEST = 1 / 8;
-/** The marionette comes after the first picture: nobody pulls before. */
-const marionette: SolverOf = async (figure, origin) => (await import("./marionette")).fetchMarionette(figure, origin);
 
 const NO_BLOCKS = new Int8Array(0);
 
@@ -48,21 +49,24 @@ export class Viewer extends EventTarget {
   presence: Presence | null = null;
   motion: string | null = null;
   puppeteer: Puppeteer | null = null;
+  /** Which timelines hold, and will. */
+  readonly timelines = new Timelines();
+  /** What the stage follows while it is there: the stage time of the sound that is heard at local `nowMs`. */
+  lead: ((nowMs: number) => Lead | null) | null = null;
 
   private readonly url: URL;
   private readonly now: () => number;
-  private readonly solverOf: SolverOf | null;
+  private readonly solver: OwnSolver;
   private readonly connection: Connection;
   private readonly started: number;
-  private readonly timelines = new Timelines();
   private readonly overlays = new Overlays();
   private readonly delay = new PlayoutDelay();
+  private readonly following = new Following();
   private readonly meter = new Meter();
   private readonly reporting: ReturnType<typeof setInterval>;
   private pinging: ReturnType<typeof setTimeout> | undefined;
   private pings = 0;
   private tracks: Tracks | null = null;
-  private solver: Solver | null = null;
   private readonly dance = restPose();
   private readonly merged = restPose();
   private shown = false;
@@ -82,7 +86,7 @@ export class Viewer extends EventTarget {
     super();
     this.url = new URL(options.url);
     this.now = options.now ?? (() => performance.now());
-    this.solverOf = options.solver === undefined ? marionette : options.solver;
+    this.solver = new OwnSolver(this.url.origin.replace(/^ws/, "http"), options.solver);
     this.started = this.now();
     this.connection = new Connection({
       url: () => this.address(),
@@ -133,9 +137,19 @@ export class Viewer extends EventTarget {
     return this.clock.ready ? this.clock.at(nowMs * 1000) : null;
   }
 
-  /** The reference time that the stage shows at local `nowMs`, microseconds: earlier by the play-out delay. */
+  /** The reference time that the stage shows at local `nowMs`, microseconds: its own, or while sound is heard the sound's. */
   shownTime(nowMs: number): number {
+    return this.following.at(this.ownTime(nowMs), this.lead?.(nowMs) ?? null, nowMs * 1000);
+  }
+
+  /** What `shownTime` is without sound: the reference time less the play-out delay. */
+  ownTime(nowMs: number): number {
     return this.clock.at(nowMs * 1000) - this.delay.at(nowMs * 1000);
+  }
+
+  /** The sound of the motion, null where it has none. */
+  get sound(): AudioStore | null {
+    return this.tracks?.sound ?? null;
   }
 
   /** Seconds in the motion at local `nowMs`. */
@@ -168,7 +182,7 @@ export class Viewer extends EventTarget {
     if (!this.shown) return null;
     copyPose(dance, merged);
     const laid = this.overlays.lay(clock, merged);
-    if (this.solver) this.puppeteer?.lay(merged, dance, laid, nowMs, this.solver);
+    if (this.solver.solver) this.puppeteer?.lay(merged, dance, laid, nowMs, this.solver.solver);
     return merged;
   }
 
@@ -190,8 +204,12 @@ export class Viewer extends EventTarget {
 
   /** As `sceneAt`, of the show's camera: the first there is. */
   cameraAt(nowMs: number): Float64Array | null {
-    const camera = this.tracks?.scenes.findIndex((store) => store.track.kind === "camera") ?? -1;
-    return camera < 0 ? null : this.sceneAt(nowMs, camera);
+    return this.sceneAt(nowMs, this.scenes.findIndex(({ kind }) => kind === "camera"));
+  }
+
+  /** As `sceneAt`, of every light of which anything is known yet. */
+  lightsAt(nowMs: number): LightState[] {
+    return lightStates(this.scenes, (scene) => this.sceneAt(nowMs, scene));
   }
 
   /** Shows `puppeteer`'s own limbs at once. */
@@ -256,7 +274,7 @@ export class Viewer extends EventTarget {
     this.timelines.restart();
     this.pings = 0;
     this.ping();
-    this.prepareSolver();
+    this.solver.prepare(this.figure);
     this.tell("open");
   }
 
@@ -335,28 +353,9 @@ export class Viewer extends EventTarget {
     this.shown = false;
     this.missing = -1;
     this.rate = -1;
-    this.solver = null;
-    this.prepareSolver();
+    this.solver.prepare(this.figure);
     this.tell("figure");
     this.tell("blocks");
-  }
-
-  private prepareSolver(): void {
-    const { figure, solverOf } = this;
-    if (this.solver || !figure || !solverOf) return;
-    const origin = this.url.origin.replace(/^ws/, "http");
-    void Promise.resolve()
-      .then(() => solverOf(figure, origin))
-      .then(
-        (solver) => {
-          // another motion may have come while it was made
-          if (this.figure === figure) this.solver = solver;
-        },
-        (error: unknown) => {
-          // it is tried again with the next connection
-          console.warn("your own limbs follow with the session's delay: no arm tables.", error);
-        },
-      );
   }
 
   private retime(message: TimelineState): void {

@@ -11,9 +11,10 @@ import { createPanels, PHONE, type Panels } from "./panels";
 import { createStringsCard, type StringsActions, type StringsCard } from "./strings-card";
 import { createTags, type Tags } from "./tags";
 import { createToast, type Toast } from "./toast";
+import type { SoundActions } from "./sound-control";
 import { createTransport, type PanelName, type Transport } from "./transport";
 
-export interface PageActions extends StringsActions {
+export interface PageActions extends StringsActions, SoundActions {
   share(): void;
   theme(): void;
   play(): void;

@@ -10,11 +10,11 @@ export function asPiece(motion: Motion): Piece {
   return { id: motion.id, name: motion.name || pieceName(motion.filename), detail: kind(motion), seconds: motion.duration };
 }
 
-/** "BVH, 120 Hz". */
-function kind({ filename, fps }: Motion): string {
-  const rate = `${Number.isInteger(fps) ? fps : figure(fps)} Hz`;
+/** "BVH, 120 Hz, with music". */
+function kind({ filename, fps, tracks }: Motion): string {
   const ending = /\.([^.]+)$/.exec(filename)?.[1];
-  return ending ? `${ending.toUpperCase()}, ${rate}` : rate;
+  const music = tracks?.includes("audio") ? "with music" : null;
+  return [ending?.toUpperCase(), `${Number.isInteger(fps) ? fps : figure(fps)} Hz`, music].filter(Boolean).join(", ");
 }
 
 export class Pieces {

@@ -1,13 +1,15 @@
-/** Play, seek, loop, keep, and the three panels' buttons. */
+/** Play, seek, loop, sound, keep, and the three panels' buttons. */
 import { element, setAttribute, setText } from "./dom";
 import { clockTime } from "./format";
 import { icon, type IconName } from "./icons";
 import { createSeek } from "./seek";
+import { createSoundControl, type SoundActions, type SoundControl } from "./sound-control";
 
 export type PanelName = "library" | "strings" | "line";
 export type Health = "good" | "poor" | "lost" | "none";
 
 export interface Transport {
+  readonly sound: SoundControl;
   timeline(playing: boolean, loop: boolean, ready: boolean): void;
   position(seconds: number, duration: number): void;
   blocks(blocks: ArrayLike<number>, rates: number): void;
@@ -28,7 +30,7 @@ const KEEP = "Keep this";
 const KEEPING = "Keeping";
 const HEALTH: Readonly<Record<Health, string>> = { good: "good", poor: "short of data", lost: "not connected", none: "no dance yet" };
 
-export interface TransportActions {
+export interface TransportActions extends SoundActions {
   play(): void;
   loop(): void;
   seek(seconds: number): void;
@@ -45,6 +47,7 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
   const seek = createSeek(on.seek);
   const loop = element("button", { class: "round-button loop", type: "button", "aria-label": "Loop", onClick: on.loop }, icon("loop"));
   const camera = element("button", { class: "round-button camera", type: "button", "aria-label": "Show's camera", hidden: true, onClick: on.camera }, icon("camera"));
+  const sound = createSoundControl(on);
   const keepName = element("span", {}, KEEP);
   const keep = element("button", { class: "pill keep", type: "button", "aria-label": KEEP, disabled: true, hidden: !on.keep, onClick: () => void keepNow() }, icon("keep"), keepName);
   let ready = false;
@@ -75,11 +78,12 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
       return [name, pill] as const;
     }),
   );
-  const tools = element("div", { class: "tools" }, loop, camera, keep, element("span", { class: "tools-rule" }), ...pills.values());
+  const tools = element("div", { class: "tools" }, loop, camera, sound.element, keep, element("span", { class: "tools-rule" }), ...pills.values());
   const area = element("div", { class: "seek-area" }, element("div", { class: "times" }, now, end), seek.element);
   root.append(element("section", { class: "transport", "aria-label": "Transport" }, play, area, tools));
   let shown = "";
   return {
+    sound,
     timeline(playing, looping, known) {
       ready = known;
       play.disabled = !ready;

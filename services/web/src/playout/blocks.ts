@@ -9,7 +9,7 @@ import { slerp } from "../motion/rotation";
 import { JOINT_COUNT, type Pose, restPose } from "../motion/skeleton";
 
 /** Decoded blocks of one track, of each the best rate that came. */
-abstract class Store<Track extends Timing, Block extends { readonly frames: number }> {
+export abstract class Store<Track extends Timing, Block extends { readonly frames: number }> {
   /** Per block: -1 missing, else the best rate held. */
   readonly rates: Int8Array;
   protected readonly blocks: (Block | null)[];
@@ -19,7 +19,7 @@ abstract class Store<Track extends Timing, Block extends { readonly frames: numb
     this.blocks = new Array<Block | null>(track.blocks).fill(null);
   }
 
-  protected abstract decode(data: Uint8Array): Block;
+  protected abstract decode(data: Uint8Array, index: number): Block;
 
   /**
    * Decodes block `index` and keeps it, unless as good a one is here already; whether it was kept.
@@ -30,7 +30,7 @@ abstract class Store<Track extends Timing, Block extends { readonly frames: numb
     const { track } = this;
     if (index >= track.blocks) throw new DamagedBlock(`this motion has ${track.blocks} blocks, and none of index ${index}`);
     if (this.rates[index] >= rate) return false;
-    const block = this.decode(data);
+    const block = this.decode(data, index);
     if (block.frames !== track.framesIn(index)) {
       throw new DamagedBlock(`block ${index} has ${track.framesIn(index)} frames, not ${block.frames}`);
     }

@@ -2,20 +2,19 @@
  * The reference clock as seen from this end of a line (after NTP, RFC 5905, clock filter: the sample that waited least).
  *
  * Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last samples the one
- * that can be off least says the offset: by half its round trip, and by what the clocks have drifted since. The offset in use slews towards it and never steps: it closes on it exponentially, and
- * time never runs slower than a tenth of its speed, so what is shown neither jumps nor runs backwards.
+ * that can be off least says the offset: by half its round trip, and by what the clocks have drifted since. The offset in
+ * use slews towards it and never steps.
  */
+
+import { Slew } from "./slew";
 
 const SAMPLES = 32;
 
+/** So many answers, and the best of them is a good one. */
+const SETTLED = 8;
+
 /** Microseconds a microsecond that two clocks may go apart. */
 const DRIFT = 200e-6;
-
-/** Time constant of the slew, microseconds: a greeting 100 ms late is made good to a frame within half a second. */
-const SLEW = 250e3;
-
-/** How much slower than real the clock may run. */
-const SLOWEST = 0.9;
 
 /** Further off than any greeting is late, microseconds. */
 const ANOTHER = 2e6;
@@ -31,14 +30,17 @@ export class ReferenceClock {
   private readonly samples: Sample[] = [];
   private best: Sample | null = null;
   private bestError = Infinity;
-  // the offset in use was `from` at local time `since`, and goes to `goal`
-  private from = 0;
-  private since = 0;
+  private readonly slew = new Slew();
   private goal: number | null = null;
 
   /** Whether anything has told the time yet. */
   get ready(): boolean {
     return this.goal !== null;
+  }
+
+  /** Whether so many answers came that the offset will not change by much any more. */
+  get settled(): boolean {
+    return this.samples.length >= SETTLED;
   }
 
   /** Reference minus local, by the sample that can be off least; until there is one, by the greeting. */
@@ -84,16 +86,7 @@ export class ReferenceClock {
 
   /** The offset in use at `local`: on its way to `offset`. */
   shownOffset(local: number): number {
-    if (this.goal === null) return 0;
-    let away = this.from - this.goal;
-    let elapsed = Math.max(local - this.since, 0);
-    if (away > SLOWEST * SLEW) {
-      // far ahead: the exponential would run backwards, so go at the slowest speed until it no longer does
-      const until = Math.min((away - SLOWEST * SLEW) / SLOWEST, elapsed);
-      away -= SLOWEST * until;
-      elapsed -= until;
-    }
-    return this.goal + away * Math.exp(-elapsed / SLEW);
+    return this.goal === null ? 0 : this.slew.at(local);
   }
 
   /** The reference time at `local`. */
@@ -102,8 +95,8 @@ export class ReferenceClock {
   }
 
   private aim(goal: number, local: number): void {
-    this.from = this.goal === null ? goal : this.shownOffset(local);
-    this.since = local;
+    if (this.goal === null) this.slew.start(goal, goal, local);
+    else this.slew.aim(goal, local);
     this.goal = goal;
   }
 }

@@ -1,17 +1,23 @@
-/** The tracks of a stream that are known here: the dance, and the cameras and lights beside it. */
+/** The tracks of a stream that are known here: the dance, and the sound, the cameras and the lights beside it. */
 
+import { AudioTrack } from "../codec/audio";
 import { DamagedBlock } from "../codec/errors";
 import { SceneTrack } from "../codec/scene";
 import { MotionTrack } from "../codec/track";
 import type { Track } from "../wire/messages";
 import { BlockStore, SceneStore } from "./blocks";
+import { AudioStore } from "./sounds";
+
+type TrackStore = BlockStore | SceneStore | AudioStore;
 
 export class Tracks {
   readonly dance: BlockStore;
   /** Cameras and lights, in the Description's order. */
   readonly scenes: readonly SceneStore[];
+  /** The sound, null where there is none: the first of the Description. */
+  readonly sound: AudioStore | null;
   /** By index in the Description; tracks that are not known here are missing. */
-  private readonly stores = new Map<number, BlockStore | SceneStore>();
+  private readonly stores = new Map<number, TrackStore>();
 
   /**
    * @param described the `tracks` of a Description; those of a type or codec that is not known here are skipped
@@ -23,22 +29,28 @@ export class Tracks {
     this.dance = new BlockStore(MotionTrack.fromDescription(described[index]));
     this.stores.set(index, this.dance);
     const scenes: SceneStore[] = [];
+    let sound: AudioStore | null = null;
     described.forEach((map, number) => {
-      if (map.type !== "camera" && map.type !== "light") return;
       try {
-        const store = new SceneStore(SceneTrack.fromDescription(map));
-        this.stores.set(number, store);
-        scenes.push(store);
+        if (map.type === "camera" || map.type === "light") {
+          const store = new SceneStore(SceneTrack.fromDescription(map));
+          this.stores.set(number, store);
+          scenes.push(store);
+        } else if (map.type === "audio" && !sound) {
+          sound = new AudioStore(AudioTrack.fromDescription(map, this.dance.track));
+          this.stores.set(number, sound);
+        }
       } catch (error) {
         if (!(error instanceof DamagedBlock)) throw error;
-        console.warn(`a ${map.type} of this motion cannot be shown here: ${error.message}`);
+        console.warn(`the ${map.type} of this motion is left out: ${error.message}`);
       }
     });
     this.scenes = scenes;
+    this.sound = sound;
   }
 
   /** What keeps the blocks of the track of this index, null where it is not known here. */
-  store(track: number): BlockStore | SceneStore | null {
+  store(track: number): TrackStore | null {
     return this.stores.get(track) ?? null;
   }
 }

@@ -1,37 +1,77 @@
-/** One shadow-casting key, a fill, two rims, and a studio for the lacquer and the hair to gleam with (section 4). */
-import {
-  Color, DirectionalLight, DoubleSide, Group, Mesh, MeshBasicMaterial, PlaneGeometry, PMREMGenerator, Scene, SpotLight, Vector3,
-  type Texture, type WebGLRenderer,
-} from "three";
+/** One shadow-casting key, a fill and two rims (art direction, section 4); a show's own lights take their places. */
+import { Color, DirectionalLight, Group, LinearSRGBColorSpace, MathUtils, SpotLight, Vector3 } from "three";
+import type { LightState } from "../playout/scenes";
 import type { Look } from "./look";
+
+/** Seconds in which a show's lights come on or go. */
+const OVER = 0.9;
+/** What the fill and the studio keep of their light where the show is dark: the puppet is never lost from sight. */
+const DARKEST = 0.2;
+/** Depth about the dancer that the key's shadows have, metres: towards the light and away. */
+const SHADOWED = [3.4, 3.6] as const;
+/** No spot is wider, radians, and none nearer to the dancer, metres. */
+const WIDEST = 1.2;
+const NEAREST = 0.8;
 
 export interface Lights {
   readonly group: Group;
   shadows: boolean;
+  /** How much light there is beside the spots, `DARKEST`..1 of the look's own. */
+  readonly level: number;
   dress(look: Look): void;
+  /**
+   * Moves on by `seconds`. The first of a show's `lights` stands for the key, the second for the warm rim, the third for the cool
+   * one; full, each throws on the dancer what the look's own does, from its own place and in its own colour. The group's world
+   * matrix is up to date.
+   */
+  show(lights: readonly LightState[], seconds: number): void;
+}
+
+/** A spot as the look has it, and as it stands in for a light of the show. */
+interface Role {
+  readonly light: SpotLight;
+  readonly place: Vector3;
+  readonly angle: number;
+  readonly distance: number;
+  readonly colour: Color;
+  intensity: number;
+  /** The show's: where, in which colour, and how much of full. */
+  readonly shown: { place: Vector3; colour: Color; share: number };
+  /** Of the way over to the show's, 0..1. */
+  over: number;
 }
 
 export function createLights(): Lights {
-  const spot = (angle: number, penumbra: number, from: [number, number, number], height: number) => {
+  const role = (angle: number, penumbra: number, from: [number, number, number], height: number): Role => {
     const light = new SpotLight("#fff", 1, 0, angle, penumbra, 2);
-    light.position.set(...from);
+    const place = new Vector3(...from);
+    light.position.copy(place);
     light.target.position.set(0, height, 0);
-    return light;
+    const distance = place.distanceTo(light.target.position);
+    return { light, place, angle, distance, colour: new Color(), intensity: 1, shown: { place: place.clone(), colour: new Color(), share: 1 }, over: 0 };
   };
-  const key = spot(0.36, 0.7, [-1.9, 3.9, 4.1], 0.9);
+  const roles = [role(0.36, 0.7, [-1.9, 3.9, 4.1], 0.9), role(0.5, 0.8, [2.6, 3, -2.3], 1.05), role(0.5, 0.8, [-2.9, 1.6, -2], 1)];
+  const key = roles[0].light;
   key.castShadow = true;
   key.shadow.mapSize.set(1024, 1024);
   key.shadow.bias = -0.0006;
   key.shadow.normalBias = 0.012;
   key.shadow.radius = 5;
-  key.shadow.camera.near = 2;
-  key.shadow.camera.far = 9;
   const fill = new DirectionalLight("#fff", 1);
   fill.position.set(2.6, 1.5, 3.6);
-  const warmRim = spot(0.5, 0.8, [2.6, 3, -2.3], 1.05);
-  const coolRim = spot(0.5, 0.8, [-2.9, 1.6, -2], 1);
   const group = new Group();
-  for (const light of [key, fill, warmRim, coolRim]) group.add(light, light.target);
+  for (const light of [key, fill, roles[1].light, roles[2].light]) group.add(light, light.target);
+  let filled = 1;
+  let level = 1;
+  const apply = () => {
+    for (const one of roles) mix(one, level);
+    fill.intensity = filled * level;
+    const { camera } = key.shadow;
+    const distance = key.position.distanceTo(key.target.position);
+    camera.near = Math.max(distance - SHADOWED[0], 0.2);
+    camera.far = distance + SHADOWED[1];
+    camera.updateProjectionMatrix();
+  };
   return {
     group,
     get shadows() {
@@ -40,45 +80,49 @@ export function createLights(): Lights {
     set shadows(on) {
       key.castShadow = on;
     },
+    get level() {
+      return level;
+    },
     dress(look) {
-      for (const [light, [colour, intensity]] of [[key, look.key], [fill, look.fill], [warmRim, look.warmRim], [coolRim, look.coolRim]] as const) {
-        light.color.set(colour);
-        light.intensity = intensity;
-      }
+      fill.color.set(look.fill[0]);
+      filled = look.fill[1];
+      [look.key, look.warmRim, look.coolRim].forEach(([colour, intensity], at) => {
+        roles[at].colour.set(colour);
+        roles[at].intensity = intensity;
+      });
+      apply();
+    },
+    show(lights, seconds) {
+      roles.forEach((one, at) => {
+        const told = lights[at];
+        if (told) read(told, one, group);
+        const step = seconds / OVER;
+        one.over = told ? Math.min(one.over + step, 1) : Math.max(one.over - step, 0);
+      });
+      const brightest = Math.max(...roles.map(({ over, shown }) => (over > 0 ? shown.share : 0)));
+      const over = MathUtils.smoothstep(Math.max(...roles.map((one) => one.over)), 0, 1);
+      level = MathUtils.lerp(1, MathUtils.lerp(DARKEST, 1, Math.min(brightest, 1)), over);
+      apply();
     },
   };
 }
 
-type Pane = readonly [colour: string, strength: number, width: number, height: number, at: readonly [number, number, number]];
+/** Takes in what a light of the show is: its numbers are in the world's frame, a role's place is in the group's. */
+function read({ full, numbers }: LightState, { shown, light }: Role, group: Group): void {
+  shown.place.set(numbers[0], numbers[1], numbers[2]);
+  group.worldToLocal(shown.place);
+  const away = shown.place.clone().sub(light.target.position);
+  if (away.length() < NEAREST) shown.place.copy(light.target.position).add(away.lengthSq() > 0 ? away.setLength(NEAREST) : away.set(0, NEAREST, 0));
+  shown.colour.setRGB(numbers[3], numbers[4], numbers[5], LinearSRGBColorSpace);
+  shown.share = numbers[6] / full;
+}
 
-const NIGHT: readonly Pane[] = [
-  ["#ffe6c6", 7, 2.2, 3.4, [-4, 4.2, 3.5]],
-  ["#ffd7a0", 2.2, 1.2, 5, [4.6, 2, -3]],
-  ["#7d97e0", 2, 1.6, 5, [-4.8, 1.6, -2.6]],
-  ["#ffffff", 1, 5, 1.2, [0, 6, 0]],
-  ["#4b3a22", 1, 5, 5, [0, 1.4, -6]],
-  ["#120f0d", 1, 14, 14, [0, -1.2, 0]],
-];
-const DAY: readonly Pane[] = [
-  ["#fff6e8", 6, 3, 4, [-4, 4.2, 3.5]],
-  ["#ffffff", 3, 4, 4, [0, 6, 0]],
-  ["#dfe8ff", 2, 2, 5, [4.6, 2, 2]],
-  ["#efe2cc", 1, 14, 14, [0, -1.2, 0]],
-];
-
-/** Prefiltered studio of light panes, built by code. The caller disposes of it. */
-export function studio(renderer: WebGLRenderer, look: Look): Texture {
-  const room = new Scene();
-  room.background = new Color(look.dark ? "#07080d" : "#b9b0a2");
-  for (const [colour, strength, width, height, at] of look.dark ? NIGHT : DAY) {
-    const material = new MeshBasicMaterial({ color: new Color(colour).multiplyScalar(strength), side: DoubleSide });
-    const pane = new Mesh(new PlaneGeometry(width, height), material);
-    pane.position.set(...at);
-    pane.lookAt(new Vector3(0, 1, 0));
-    room.add(pane);
-  }
-  const generator = new PMREMGenerator(renderer);
-  const { texture } = generator.fromScene(room, 0.035);
-  generator.dispose();
-  return texture;
+/** Between the look's own light, of which `level` is left, and the show's. From any distance as much light and as wide a cone reach the dancer. */
+function mix({ light, place, angle, distance, colour, intensity, shown, over }: Role, level: number): void {
+  const share = MathUtils.smoothstep(over, 0, 1);
+  light.position.lerpVectors(place, shown.place, share);
+  const nearer = distance / Math.max(light.position.distanceTo(light.target.position), NEAREST);
+  light.color.lerpColors(colour, shown.colour, share);
+  light.intensity = (intensity * MathUtils.lerp(level, shown.share, share)) / nearer ** 2;
+  light.angle = Math.min(Math.atan(Math.tan(angle) * nearer), WIDEST);
 }

@@ -1,11 +1,12 @@
 /** The stage: puppet, disc, floor, lights, strings and the seat in the audience. Draws what it is given; keeps no time. */
 import { ACESFilmicToneMapping, PCFShadowMap, Plane, Raycaster, Scene, Vector2, Vector3, WebGLRenderer, type IUniform } from "three";
 import type { Figure, Pose } from "../motion/skeleton";
+import type { LightState } from "../playout/scenes";
 import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
 import { AudienceCamera, type Framing } from "./camera";
 import { createFloor, type Floor } from "./floor";
 import { FrameGate } from "./frame-gate";
-import { createLights, studio } from "./lights";
+import { createLights } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
 import { Puppet } from "./puppet";
@@ -14,6 +15,7 @@ import { Rig } from "./rig";
 import { Scenery } from "./scenery";
 import type { Paint } from "./shading";
 import { Strings, type StringState } from "./strings";
+import { studio } from "./studio";
 import { CameraTrail } from "./trail";
 
 /** Pixel ratios above these cost more than they show. */
@@ -100,7 +102,6 @@ export class Stage {
     this.#lights.dress(this.#look);
     this.scene.environment?.dispose();
     this.scene.environment = this.#quality.quality.plain ? null : studio(this.renderer, this.#look);
-    this.scene.environmentIntensity = this.#look.environment;
     this.renderer.toneMappingExposure = this.#look.exposure;
     this.#furnish();
   }
@@ -137,9 +138,12 @@ export class Stage {
   /**
    * Moves everything on to a pose (null: none yet) and its strings, and draws it if the graphics are done with the frame
    * before; `interval` is the seconds since the last call, `show` the seven numbers of the show's camera, null where there is
-   * none, and `clock` the clock time of the pose in microseconds, by which the camera is remembered.
+   * none, `lights` are the show's, and `clock` the clock time of the pose in microseconds, by which the camera is remembered.
    */
-  draw(pose: Pose | null, states: readonly StringState[] = FREE, interval = 0, show: ArrayLike<number> | null = null, clock: number | null = null): void {
+  draw(
+    pose: Pose | null, states: readonly StringState[] = FREE, interval = 0, show: ArrayLike<number> | null = null,
+    lights: readonly LightState[] = [], clock: number | null = null,
+  ): void {
     const { puppet } = this;
     const seconds = Math.min(interval, LONGEST_STEP);
     if (puppet && pose) {
@@ -150,6 +154,8 @@ export class Stage {
     }
     this.rig.group.updateMatrixWorld(true);
     this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0, show);
+    this.#lights.show(lights, this.#still ? Infinity : seconds);
+    this.scene.environmentIntensity = this.#look.environment * this.#lights.level;
     this.#scenery.turn(this.audience.view, this.audience.seated, seconds);
     if (pose && clock !== null) this.trail.add(clock, this.audience.view, this.audience.moved);
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());

@@ -37,7 +37,7 @@ function header(motion = "dance"): Message {
 }
 
 function description(motion = "dance"): Message {
-  return { name: "Description", motion, tracks: [{ type: "audio" }, goldenDescription()] };
+  return { name: "Description", motion, tracks: [{ type: "song" }, goldenDescription()] };
 }
 
 function timeline(change: Partial<TimelineState> = {}): Message {

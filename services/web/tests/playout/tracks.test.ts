@@ -2,12 +2,14 @@ import { afterEach, expect, test, vi } from "vitest";
 import { DamagedBlock } from "../../src/codec/errors";
 import { Tracks } from "../../src/playout/tracks";
 import { goldenDescription } from "../golden";
+import type { Track } from "../../src/wire/messages";
 import { goldenScene } from "../scenes";
+import { vectors } from "../vectors";
 
 afterEach(() => void vi.restoreAllMocks());
 
 test("each track is found by its index, the dance and the scenes beside it", () => {
-  const tracks = new Tracks([goldenScene(1), { type: "audio" }, goldenDescription(), goldenScene(0), goldenDescription(1)]);
+  const tracks = new Tracks([goldenScene(1), { type: "song" }, goldenDescription(), goldenScene(0), goldenDescription(1)]);
   expect(tracks.store(2)).toBe(tracks.dance);
   expect(tracks.dance.track.durationUs).toBe(2_600_000);
   expect(tracks.scenes.map((store) => store.track.kind)).toEqual(["light", "camera"]);
@@ -21,6 +23,17 @@ test("a camera that cannot be read is left out, and the dance goes on", () => {
   expect(tracks.scenes.map((store) => store.track.kind)).toEqual(["light"]);
   expect(tracks.store(1)).toBeNull();
   expect(warned.mock.calls[0][0]).toContain("bunraku.scene/9");
+});
+
+test("the first sound is the show's, timed as the dance; one that cannot be read is left out", () => {
+  const [sound] = vectors<{ tracks: Track[] }>("audio").tracks;
+  const tracks = new Tracks([sound, goldenDescription(), { ...sound, channels: 1 }]);
+  expect(tracks.sound?.track.channels).toBe(2);
+  expect(tracks.sound?.track.blocks).toBe(tracks.dance.track.blocks);
+  expect([tracks.store(0), tracks.store(2)]).toEqual([tracks.sound, null]);
+  const warned = vi.spyOn(console, "warn").mockReturnValue();
+  expect(new Tracks([goldenDescription(), { ...sound, codec: "bunraku.audio/9" }]).sound).toBeNull();
+  expect(warned.mock.calls[0][0]).toContain("bunraku.audio/9");
 });
 
 test("without a dance there is nothing to show", () => {

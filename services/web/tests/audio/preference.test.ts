@@ -1,0 +1,27 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { loadPreference, savePreference } from "../../src/audio/preference";
+
+const stored = new Map<string, string>();
+
+beforeEach(() => {
+  stored.clear();
+  vi.stubGlobal("localStorage", { getItem: (key: string) => stored.get(key) ?? null, setItem: (key: string, value: string) => void stored.set(key, value) });
+});
+afterEach(() => void vi.unstubAllGlobals());
+
+test("sound is wanted unless told otherwise, and what was told is remembered", () => {
+  expect(loadPreference()).toEqual({ on: true, volume: 0.8 });
+  savePreference({ on: false, volume: 0.25 });
+  expect(loadPreference()).toEqual({ on: false, volume: 0.25 });
+});
+
+test.each(["{", "null", '"loud"', '{"on":"yes","volume":3}', '{"volume":-1}', '{"volume":null}'])("what is none is the default: %s", (content) => {
+  stored.set("bunraku.sound", content);
+  expect(loadPreference()).toEqual({ on: true, volume: 0.8 });
+});
+
+test("where storage is forbidden it lasts as long as the page", () => {
+  vi.stubGlobal("localStorage", { getItem: () => { throw new Error("forbidden"); }, setItem: () => { throw new Error("forbidden"); } });
+  expect(loadPreference().on).toBe(true);
+  expect(() => savePreference({ on: false, volume: 1 })).not.toThrow();
+});

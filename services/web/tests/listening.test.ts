@@ -1,0 +1,153 @@
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import type { Viewer } from "../src/client/viewer";
+import { Listening, type SoundState } from "../src/listening";
+
+const { players, speakers } = vi.hoisted(() => ({
+  players: [] as { store: unknown; retimed: number; closed: boolean }[],
+  speakers: [] as { allowed: boolean; heard: boolean; volume: number; changed: () => void }[],
+}));
+
+/** What is heard through: the browser's audio, and the player that is tested by itself. */
+vi.mock("../src/audio/sound", () => ({
+  findDecoder: async () => () => undefined,
+  AudioPlayer: class {
+    closed = false;
+    retimed = 0;
+    readonly store: unknown;
+    constructor(_context: unknown, _output: unknown, played: { store: unknown }) {
+      this.store = played.store;
+      players.push(this);
+    }
+    leadAt = (now: number) => ({ time: now, run: players.length });
+    retime = () => void this.retimed++;
+    close = () => void (this.closed = true);
+  },
+  Speaker: class {
+    allowed = false;
+    heard = false;
+    volume = 0;
+    constructor(readonly changed: () => void) {
+      speakers.push(this);
+    }
+    resume(): void {
+      this.set(this.allowed);
+    }
+    suspend(): void {
+      this.set(false);
+    }
+    private set(heard: boolean): void {
+      this.heard = heard;
+      this.changed();
+    }
+  },
+}));
+
+class Watched extends EventTarget {
+  sound: { track: { channels: number } } | null = null;
+  lead: ((now: number) => unknown) | null = null;
+  /** Another motion comes on, with sound or without. */
+  show(sound: boolean): Promise<unknown> {
+    this.sound = sound ? { track: { channels: 2 } } : null;
+    this.dispatchEvent(new Event("figure"));
+    return new Promise((done) => setTimeout(done));
+  }
+}
+
+const stored = new Map<string, string>();
+let page: EventTarget;
+let viewer: Watched;
+let listening: Listening;
+let states: SoundState[];
+const button = { contains: (target: unknown) => target === button } as unknown as Element;
+
+beforeEach(() => {
+  players.length = speakers.length = 0;
+  stored.clear();
+  page = new EventTarget();
+  vi.stubGlobal("addEventListener", page.addEventListener.bind(page));
+  vi.stubGlobal("Node", EventTarget);
+  vi.stubGlobal("KeyboardEvent", class {});
+  vi.stubGlobal("localStorage", { getItem: (key: string) => stored.get(key) ?? null, setItem: (key: string, value: string) => void stored.set(key, value) });
+  states = [];
+  start();
+});
+afterEach(() => void vi.unstubAllGlobals());
+
+function start(): void {
+  viewer = new Watched();
+  listening = new Listening((state) => states.push(state), button);
+  listening.enter(viewer as unknown as Viewer);
+}
+
+/** A gesture of the person, which the browser lets the page be heard after. */
+function gesture(): void {
+  if (speakers[0]) speakers[0].allowed = true;
+  page.dispatchEvent(new Event("keydown"));
+}
+
+test("without sound nothing is fetched and nothing shown", async () => {
+  await viewer.show(false);
+  gesture();
+  expect([players.length, speakers.length, viewer.lead]).toEqual([0, 0, null]);
+  expect(states.every(({ there }) => !there)).toBe(true);
+});
+
+describe("with sound", () => {
+  beforeEach(() => viewer.show(true));
+
+  test("it is there, and heard from the first gesture on; the stage follows it, and edits reach it", async () => {
+    expect(states.at(-1)).toEqual({ there: true, heard: false, volume: 0.8 });
+    gesture();
+    expect(states.at(-1)).toEqual({ there: true, heard: true, volume: 0.8 });
+    expect(viewer.lead?.(5)).toEqual({ time: 5, run: 1 });
+    viewer.dispatchEvent(new Event("timeline"));
+    expect(players[0].retimed).toBe(1);
+  });
+
+  test("a first key that means sound on does not switch it off again; the next one does, and that is remembered", async () => {
+    gesture();
+    listening.toggle();
+    expect(speakers[0].heard).toBe(true);
+    await new Promise((done) => setTimeout(done));
+    gesture();
+    listening.toggle();
+    expect(states.at(-1)?.heard).toBe(false);
+    gesture();
+    expect(states.at(-1)?.heard).toBe(false);
+    start();
+    await viewer.show(true);
+    gesture();
+    speakers[1].allowed = true;
+    page.dispatchEvent(new Event("click"));
+    expect(speakers[1].heard).toBe(false);
+    listening.toggle();
+    expect(speakers[1].heard).toBe(true);
+  });
+
+  test("how loud is told at once, and who tells it wants to hear", () => {
+    speakers[0].allowed = true;
+    listening.toggle();
+    listening.toggle();
+    expect(speakers[0].heard).toBe(false);
+    listening.volume = 0.25;
+    expect([speakers[0].volume, speakers[0].heard, states.at(-1)]).toEqual([0.25, true, { there: true, heard: true, volume: 0.25 }]);
+  });
+
+  test("another motion's takes its place, on the same device; one without is silence", async () => {
+    gesture();
+    await viewer.show(true);
+    expect(players.map(({ closed }) => closed)).toEqual([true, false]);
+    expect(speakers).toHaveLength(1);
+    await viewer.show(false);
+    expect(players.map(({ closed }) => closed)).toEqual([true, true]);
+    expect([viewer.lead, speakers[0].heard, states.at(-1)?.there]).toEqual([null, false, false]);
+    await viewer.show(true);
+    expect(speakers[0].heard).toBe(true);
+  });
+
+  test("of two that come on at once the later is played", async () => {
+    void viewer.show(true);
+    await viewer.show(true);
+    expect(players.filter(({ closed }) => !closed).map(({ store }) => store)).toEqual([viewer.sound]);
+  });
+});
