@@ -104,7 +104,7 @@ class Window:
             # a line that was never full carries more than it was seen to
             rate = self.rate if self.full_at is not None and at - self.full_at < FULL else PROBE * self.rate
             self._through = max(self._through, at) + on_line(size) / rate * 1e6
-        since = self._answered_at if self._flying else at
+        since = max(self._answered_at, self._flying[0].at) if self._flying else at
         self._flying.append(
             _Flying(
                 self._written, self._line_written, at, self.flying - self._large, large, self._line_acknowledged, since
