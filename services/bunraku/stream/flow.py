@@ -16,6 +16,8 @@ CLEAN = 64
 """So many times there was room at once before a line counts as quick."""
 FAR = 20_000
 """Round trips that take longer, microseconds, may be those of a narrow line."""
+HEAP = 16_384
+"""So much may wait on a line that is near: who reads in gulps is not narrow."""
 LATE = 100_000
 """So much longer than the least the round trips of a quick line may take: receivers may wait 40 ms to acknowledge."""
 BLOCKS = 0.3
@@ -88,7 +90,7 @@ class Flow:
         except OSError:
             # it is closed: whoever writes to it is told
             return
-        untold = reading.waiting - self.window.flying > LEAST
+        untold = reading.waiting - self.window.flying > (LEAST if self.far else HEAP)
         if untold or not room or reading.round_trip > reading.least + LATE:
             self.steady, self._clean = False, 0
         if untold:
