@@ -29,7 +29,7 @@ help:
 .setup/python: requirements-dev.lock requirements.lock pyproject.toml | $(filter .tools/bin/uv,$(UV))
 	@echo "setup: Python packages in .venv"
 	@test -x $(BIN)/python || $(UV) venv --quiet --python $(PYTHON) .venv
-	@$(UV) pip install --quiet --python $(BIN)/python --require-hashes -r requirements-dev.lock
+	@$(UV) pip install --quiet --compile-bytecode --python $(BIN)/python --require-hashes -r requirements-dev.lock
 	@$(UV) pip install --quiet --python $(BIN)/python --no-deps --editable .
 	@mkdir -p .setup && touch $@
 

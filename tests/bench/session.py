@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import base64
+import gc
 import json
 import os
 import re
@@ -26,10 +27,12 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from typing import cast
 from urllib.parse import urlsplit
 
 import httpx2
 import numpy as np
+import uvloop
 
 from bunraku.backing.backing import clock
 from bunraku.client.api import Client
@@ -40,11 +43,14 @@ from bunraku.marionette.limbs import ArmRig, Limb
 from bunraku.marionette.vector import Quaternion, Vector
 from bunraku.motion.skeleton import Figure
 from bunraku.playout.overlays import UNIT
+from bunraku.serve import LOAD_AFTER
 from bunraku.wire.messages import SUBPROTOCOL, Description, Overlay, unpack
 
 FRAME = 1e6 / 60.0
 WARM = 4.0
 """Seconds that limbs are held before the first pull that counts."""
+SETTLE = 60.0
+"""Seconds that a server is waited for at most, until it has loaded all it needs."""
 EVERY = 0.5
 """Seconds between two pulls of a puppeteer."""
 PLACES = ((0.45, -0.2, 0.5), (0.45, 0.0, 0.5))
@@ -72,14 +78,13 @@ class Screen(asyncio.Protocol):
         self._buffer = b""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = cast(asyncio.Transport, transport)
         key = base64.b64encode(secrets.token_bytes(16)).decode()
         lines = (
             f"GET {self._path} HTTP/1.1", f"Host: {self._host}", "Upgrade: websocket", "Connection: Upgrade",
             f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Protocol: {SUBPROTOCOL}", "", "",
         )  # fmt: skip
-        transport.write("\r\n".join(lines).encode())
+        self._transport.write("\r\n".join(lines).encode())
 
     def data_received(self, data: bytes) -> None:
         now = clock()
@@ -218,6 +223,21 @@ def processor_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def settled(pid: int) -> None:
+    """Waits until a server that has just begun has loaded what it needs, and has nothing more to do."""
+    end = time.monotonic() + SETTLE
+    # it begins to load a little after it answers
+    time.sleep(LOAD_AFTER + 1.0)
+    before = processor_seconds(pid)
+    while time.monotonic() < end:
+        time.sleep(1.0)
+        now = processor_seconds(pid)
+        if now - before < 0.1:
+            return
+        before = now
+    print(f"the server was still busy after {SETTLE:g} s", file=sys.stderr)
+
+
 async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -> dict[str, float]:
     """The run, and its figures."""
     async with Client(url) as client:
@@ -227,12 +247,13 @@ async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -
         assert isinstance(description, Description)
         figure: Figure = read_track(description.tracks[0]).figure
         stages = [await watch(client, motion, viewers) for _ in range(sessions)]
-        before, begun = processor_seconds(pid), time.perf_counter()
+        before, begun, own = processor_seconds(pid), time.perf_counter(), time.process_time()
         async with asyncio.TaskGroup() as pulling:
             for nth, (session, one) in enumerate(stages):
                 pulling.create_task(pull(client, session, one, seconds, nth, nth / sessions))
         played = [one for _, one in stages]
-        busy = (processor_seconds(pid) - before) / (time.perf_counter() - begun)
+        passed = time.perf_counter() - begun
+        busy, own = (processor_seconds(pid) - before) / passed, (time.process_time() - own) / passed
     rig = ArmRig(figure, Limb.LEFT_HAND)
     random = np.random.default_rng(1)
     delays: list[float] = []
@@ -261,6 +282,7 @@ async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -
         "overlay_frame_ms_p99": round(float(np.percentile(gaps, 99)), 1),
         "messages_per_s": round(messages / seconds),
         "server_cores": round(busy, 2),
+        "screens_cores": round(own, 2),
     }
 
 
@@ -282,7 +304,10 @@ def main() -> None:
         try:
             url = next(found[1] for line in server.stdout if (found := re.search(r"is at (http://\S+)/", line)))
             print(f"{given.sessions} sessions of one puppeteer and {given.viewers} viewers, {given.seconds:g} s")
-            figures = asyncio.run(run(url, server.pid, given.sessions, given.viewers, given.seconds))
+            settled(server.pid)
+            # what is kept for later is not walked through meanwhile: that would stop the screens' clocks
+            gc.disable()
+            figures = uvloop.run(run(url, server.pid, given.sessions, given.viewers, given.seconds))
         finally:
             server.terminate()
             server.wait(20)

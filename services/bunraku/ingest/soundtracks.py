@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import os
 from pathlib import Path
+from typing import Any
 
 from starlette.requests import Request
 
-from bunraku.backing.backing import Backing, clock
+from bunraku.backing.backing import Backing
 from bunraku.backing.catalogue import Entry
-from bunraku.backing.problems import ProblemError
+from bunraku.backing.library import StoredMotion
 from bunraku.ingest import jobs
-from bunraku.ingest.entry import no_such_motion
+from bunraku.ingest.derived import Derived
 from bunraku.ingest.progress import Progress
-from bunraku.ingest.results import Refused
-from bunraku.ingest.uploads import Uploads, motion_id
+from bunraku.ingest.results import Made, Refused
+from bunraku.ingest.uploads import Uploads
 
 
 class Soundtracks:
     """The sounds that come to one replica, as uploads beside its `uploads`."""
 
     def __init__(self, backing: Backing, uploads: Uploads) -> None:
-        self._backing = backing
         self._uploads = uploads
+        self._derived = Derived(backing, uploads)
+        self._seconds = backing.settings.upload_seconds
 
     async def take(self, request: Request, motion: str, filename: str, upload: str | None = None) -> tuple[Entry, bool]:
         """The motion `motion` with the sound of the request's body, and whether it is new. `upload` and errors as of
         `Uploads.receive`; a motion that there is not raises `ProblemError` before the body is read."""
-        await self._known(motion)
+        await self._derived.known(motion)
 
         async def add(digest: bytes, path: Path, progress: Progress) -> tuple[Entry, bool]:
             return await self.add(motion, digest, path, filename, progress)
@@ -41,39 +42,18 @@ class Soundtracks:
     ) -> tuple[Entry, bool]:
         """The motion `motion` with the sound of the file at `path`, whose SHA-256 is `digest`, and whether it is new;
         raises `ProblemError`."""
-        progress = progress or Progress()
-        progress.at("waiting")
-        backing = self._backing
-        before = await self._known(motion)
-        made_id = motion_id(hashlib.sha256(f"{motion} with the sound ".encode() + digest).digest())
-        known = await backing.catalogue.get(made_id)
-        if known is not None and await backing.library.get(made_id) is not None:
-            return known, False
-        async with self._uploads.places:
-            # it may have been removed while this waited
-            stored = await backing.library.get(motion)
-            if stored is None:
-                raise no_such_motion(motion)
-            progress.at("reading")
-            seconds = backing.settings.upload_seconds
-            arguments = (made_id, stored, path)
-            made = await jobs.run("add", arguments, seconds, lambda share: progress.at("encoding", share))
-        if isinstance(made, Refused):
-            raise ProblemError(422, made.title, made.detail, field=made.field, hint=made.hint, filename=filename)
-        if known is not None:
-            # stored in a codec that is no longer spoken: made anew
-            await backing.catalogue.remove(made_id)
-        size = await asyncio.to_thread(os.path.getsize, path)
-        audio = {"filename": filename, "bytes": size, **made.described["audio"]}
-        described = {**before.description, **made.described, "audio": audio}
-        # the object first: a row always has its object, and an object without a row is harmless
-        await backing.library.put(made_id, made.packed)
-        entry = Entry(made_id, clock(), described)
-        new = await backing.catalogue.add(entry)
-        return (entry if new else (await backing.catalogue.get(made_id) or entry)), new
+        under_way = progress or Progress()
+        under_way.at("waiting")
 
-    async def _known(self, motion: str) -> Entry:
-        entry = await self._backing.catalogue.get(motion)
-        if entry is None or await self._backing.library.get(motion) is None:
-            raise no_such_motion(motion)
-        return entry
+        async def sing(made: str, stored: StoredMotion) -> Made | Refused:
+            under_way.at("reading")
+            return await jobs.run(
+                "add", (made, stored, path), self._seconds, lambda share: under_way.at("encoding", share)
+            )
+
+        async def described(before: Entry, made: Made) -> dict[str, Any]:
+            size = await asyncio.to_thread(os.path.getsize, path)
+            audio = {"filename": filename, "bytes": size, **made.described["audio"]}
+            return {**before.description, **made.described, "audio": audio}
+
+        return await self._derived.add(motion, b" with the sound " + digest, sing, described, filename=filename)
