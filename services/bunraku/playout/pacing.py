@@ -52,6 +52,15 @@ class Paced:
     base: bool
     audio: bool = False
 
+    @property
+    def place(self) -> int:
+        """Among the blocks of one instant: the motion's first, then sound, then cameras and lights."""
+        return 0 if self.base else 1 if self.audio else 2
+
+    def wanted(self, rate: int, audio: int | None) -> int:
+        """Which of `rate` and the rate of sound, where that is another, is this track's; below zero for none."""
+        return max(rate, 0) if audio is None or not self.audio else audio
+
 
 @dataclass(frozen=True, slots=True, order=True)
 class Due:
@@ -100,7 +109,7 @@ class Pacer:
         line; sound is in none. Without `spare` room only what is missing soon is sent.
         """
         position = position_at(state, clock)
-        rates = ((track, max(rate, 0) if audio is None or not track.audio else audio) for track in self._tracks)
+        rates = ((track, track.wanted(rate, audio)) for track in self._tracks)
         found = [
             due
             for track, wanted in rates
@@ -139,7 +148,7 @@ class Pacer:
         # a track may be shorter or longer than the motion, and turns with it
         blocks = timing.block_at(state.duration - 1) + 1
         first = min(timing.block_at(position), blocks - 1)
-        place = 0 if track.base else 1 if track.audio else 2
+        place = track.place
         soonest = AGAIN if track.audio and state.duration > AHEAD + 1_000_000 else UPGRADE
         ahead = NET_AHEAD if net else AHEAD
         found: list[Due] = []
@@ -176,13 +185,13 @@ def arrivals(
         return _told(tracks, state, clock, rate, audio)
     found: list[Due] = []
     for track in tracks:
-        wanted = max(rate, 0) if audio is None or not track.audio else audio
+        wanted = track.wanted(rate, audio)
         if wanted < 0:
             continue
         timing = track.timing
         blocks = timing.block_at(state.duration - 1) + 1
         first = min(timing.block_at(before), blocks - 1)
-        place, rated = 0 if track.base else 1 if track.audio else 2, min(wanted, track.rates - 1)
+        place, rated = track.place, min(wanted, track.rates - 1)
         turn, into = divmod(reach, state.duration)
         index = min(timing.block_at(into) + 1, blocks - 1)
         while (start := timing.start_us(index) + turn * state.duration) > reach - 2 * MARGIN:

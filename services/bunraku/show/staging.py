@@ -33,25 +33,26 @@ class Shot(NamedTuple):
 
 FIELD = radians(26.0)
 """Vertical field of view, the same as the audience's own."""
-OPENING = Shot(0.0, 0.0, 0.0, 3.0, 7.0, 0.0, 1.0)
+OPENING = Shot(0.0, 0.0, 0.0, 3.0, 7.0, 0.0, 0.92)
 SHOTS = (
     # the greeting, nearer as the sleeves open
-    Shot(7.5, 6.5, -6.0, 2.0, 6.0, 0.0, 1.02),
+    Shot(7.5, 6.5, -6.0, 2.0, 6.4, 0.0, 0.9),
     # with the glides, to the one side and the other
-    Shot(12.0, 4.0, 14.0, 2.0, 5.8, 0.14, 1.0),
-    Shot(15.5, 3.25, -12.0, 2.0, 5.7, 0.06, 1.0),
+    Shot(12.0, 4.0, 14.0, 2.0, 6.3, 0.14, 0.9),
+    Shot(15.5, 3.25, -12.0, 2.0, 6.3, 0.06, 0.9),
     # the first held pose, from below
-    Shot(18.1, 2.4, -20.0, -3.0, 5.7, -0.12, 1.08),
-    Shot(23.5, 3.0, 8.0, 1.0, 5.6, 0.0, 1.05),
+    Shot(18.1, 2.4, -20.0, -3.0, 6.6, -0.12, 0.92),
+    Shot(23.5, 3.0, 8.0, 1.0, 6.3, 0.0, 0.94),
     # round a little, against the slow turn
-    Shot(29.5, 6.0, -34.0, 5.0, 5.6, 0.0, 1.0),
-    Shot(34.0, 4.5, 0.0, 5.0, 6.4, 0.0, 1.0),
+    Shot(29.5, 6.0, -34.0, 5.0, 6.4, 0.0, 0.94),
+    Shot(34.0, 4.5, 0.0, 5.0, 6.6, 0.0, 0.9),
     # the circle, from above
-    Shot(40.0, 5.5, 20.0, 13.0, 7.2, -0.1, 0.95),
+    Shot(40.0, 5.5, 20.0, 13.0, 7.4, -0.14, 0.88),
     # the last held pose
-    Shot(43.1, 3.0, 22.0, -3.0, 5.7, 0.2, 1.06),
-    Shot(47.75, 3.5, 0.0, 3.0, 7.0, 0.0, 1.0),
+    Shot(43.1, 3.0, 22.0, -3.0, 6.6, 0.2, 0.92),
+    Shot(47.75, 3.5, 0.0, 3.0, 7.0, 0.0, 0.92),
 )
+"""They look a little low: below, a page has its controls."""
 
 
 class Cue(NamedTuple):

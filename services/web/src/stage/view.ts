@@ -9,7 +9,7 @@ export interface View {
 }
 
 /** Width over height below which a view is widened: what it shows from side to side at this shape is not cut off. */
-export const NARROWEST = 4 / 3;
+export const NARROWEST = 4 / 5;
 
 /** Nearer than this a camera and what it looks at have no direction, metres. */
 const TOUCHING = 1e-3;

@@ -143,7 +143,7 @@ describe("the show's camera", () => {
 
   test("is seen wider in a narrow window, while one's own seat is framed for it already", () => {
     const audience = shown(0.5);
-    expect(Math.tan((audience.camera.fov * Math.PI) / 360)).toBeCloseTo((Math.tan(0.4) * 4) / 3 / 0.5, 9);
+    expect(Math.tan((audience.camera.fov * Math.PI) / 360)).toBeCloseTo((Math.tan(0.4) * 4) / 5 / 0.5, 9);
     expect(audience.view.fov).toBeCloseTo(0.8, 9);
     audience.follow(false);
     for (let i = 0; i < 120; i++) audience.update(1 / 60, 0, SHOW);

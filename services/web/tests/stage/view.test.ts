@@ -53,9 +53,9 @@ describe("going over", () => {
 });
 
 describe("in any window", () => {
-  test("the height is kept where it is wide, and what 4:3 shows from side to side where it is narrow", () => {
+  test("the height is kept where it is wide, and what 4:5 shows from side to side where it is narrow", () => {
     const camera = new PerspectiveCamera();
-    for (const [aspect, wide] of [[21 / 9, true], [16 / 9, true], [4 / 3, true], [1, false], [9 / 19.5, false]] as const) {
+    for (const [aspect, wide] of [[21 / 9, true], [16 / 9, true], [4 / 3, true], [4 / 5, true], [2 / 3, false], [9 / 19.5, false]] as const) {
       const recorded = 0.7;
       camera.aspect = aspect;
       camera.fov = (fovIn(recorded, aspect) * 180) / Math.PI;
