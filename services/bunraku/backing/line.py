@@ -7,7 +7,7 @@ import contextlib
 import socket
 import struct
 import sys
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from starlette.websockets import WebSocket
 
@@ -18,17 +18,14 @@ EXTENSION = "bunraku.line"
 """The ASGI extension by which the server's protocol hands its transport to `line_of`."""
 _OUTQ = 0x5411
 """SIOCOUTQ: bytes that were written and are not acknowledged."""
+_NOUGHT = bytes(4)
 _CORK = getattr(socket, "TCP_CORK", 3)
 _TCP_INFO = getattr(socket, "TCP_INFO", 11)
-_NUMBER = struct.Struct("=I")
-_LARGE_NUMBER = struct.Struct("=Q")
-_ROUND_TRIP, _ACKNOWLEDGED, _LEAST = 68, 120, 148
+_INFO = struct.Struct("=68xI48xQ20xI")
 """Where `tcpi_rtt`, `tcpi_bytes_acked` and `tcpi_min_rtt` stand in `struct tcp_info`, to whose end the kernel adds."""
-_SIZE = 152
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+class Reading(NamedTuple):
     """Bytes `waiting` for acknowledgement, the smoothed `round_trip` and the `least`, microseconds, and all bytes that
     were ever `written`, from a start of the system's own, never told as more than they are; 0: not known."""
 
@@ -58,14 +55,14 @@ class Line:
         if number < 0:
             raise OSError("the socket is closed")
         # what is acknowledged between the two questions is counted in neither
-        info = self._socket.getsockopt(socket.IPPROTO_TCP, _TCP_INFO, _SIZE)
-        waiting = struct.unpack("=i", fcntl.ioctl(number, _OUTQ, b"\0\0\0\0"))[0]
+        info = self._socket.getsockopt(socket.IPPROTO_TCP, _TCP_INFO, _INFO.size)
+        waiting = int.from_bytes(fcntl.ioctl(number, _OUTQ, _NOUGHT), sys.byteorder)
         # what the transport has not handed to the system yet waits too
         waiting += self._transport.get_write_buffer_size()
-        if len(info) < _SIZE:
+        if len(info) < _INFO.size:
             return Reading(waiting, 0, 0)
-        round_trip, least = (_NUMBER.unpack_from(info, at)[0] for at in (_ROUND_TRIP, _LEAST))
-        return Reading(waiting, round_trip, least, _LARGE_NUMBER.unpack_from(info, _ACKNOWLEDGED)[0] + waiting)
+        round_trip, acknowledged, least = _INFO.unpack(info)
+        return Reading(waiting, round_trip, least, acknowledged + waiting)
 
     def hold(self, held: bool) -> None:
         """Keep what is written until a packet is full (for 200 ms at most), or let it go: at the start each packet of

@@ -135,6 +135,24 @@ class Pacer:
             return False
         return None
 
+    def fresh(self, state: TimelineState, clock: int) -> int:
+        """Microseconds for which nothing comes within reach that was sent before, for those without a net: at most as
+        long as a loop takes."""
+        position = position_at(state, clock)
+        fresh = state.duration
+        for track in self._tracks:
+            timing = track.timing
+            blocks = timing.block_at(state.duration - 1) + 1
+            first = min(timing.block_at(position), blocks - 1)
+            for count in range(blocks + 1 if state.loop else blocks - first):
+                turn, index = divmod(first + count, blocks)
+                beyond = timing.start_us(index) + turn * state.duration - position - AHEAD
+                if beyond >= fresh:
+                    break
+                if beyond >= 0 and (track.number, index) in self._sent:
+                    fresh = beyond
+        return fresh
+
     def wait(self, state: TimelineState, clock: int, net: bool = False) -> int | None:
         """Microseconds until the next block comes within reach, None while nothing moves."""
         if not state.playing or not self._tracks:

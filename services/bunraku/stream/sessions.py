@@ -14,6 +14,7 @@ from bunraku.backing.frames import frame
 from bunraku.backing.library import Library, StoredMotion
 from bunraku.backing.sockets import FAULT, NOT_FOUND, Refusal
 from bunraku.backing.together import Together
+from bunraku.stream.cohorts import Cohorts
 from bunraku.stream.plans import Plans
 from bunraku.stream.viewers import Viewer
 from bunraku.wire.messages import MalformedMessage, Presence, TimelineState, unpack
@@ -38,6 +39,7 @@ class WatchedSession:
         self._subject = f"session.{session}"
         self._replica = replica
         self.plans = Plans()
+        self.cohorts = Cohorts(self.plans)
         self._viewers: set[Viewer] = set()
         # to those whose line has room the same bytes are written, with nothing asked in between
         self._ready: Together | None = None

@@ -26,6 +26,8 @@ from bunraku.backing.outlet import Outlet
 from bunraku.backing.sockets import BROKEN, FAULT, TOO_SLOW, Refusal
 from bunraku.playout import sharing, timeline
 from bunraku.playout.held import Held
+from bunraku.playout.pacing import MARGIN
+from bunraku.stream.cohorts import Cohort, Cohorts, Course
 from bunraku.stream.flow import Flow, Readable
 from bunraku.stream.plans import Plans
 from bunraku.stream.playing import Playing
@@ -54,10 +56,14 @@ GONE = 16_000_000
 SPREAD = 1_000_000
 """Blocks are due to all viewers of a session at once, and sent to each up to this much later, microseconds: little of
 what is sent ahead, and the server's work is even."""
+TOGETHER = 4_000_000
+"""Who will be in step for less, microseconds, goes on alone."""
 BATCH = 16_384
 """Bytes that are written in one piece, about."""
 LOOK = 250_000
 """A line far away that counts as quick is looked at so often, microseconds."""
+LOOK_NEAR = 4_000_000
+"""The same of a near one: what it is asked costs as much as a block."""
 
 _log = logging.getLogger(__name__)
 
@@ -66,6 +72,7 @@ class Audience(Protocol):
     """Those who watch a session, as one of them sees it."""
 
     plans: Plans
+    cohorts: Cohorts
 
     def turned(self) -> None:
         """Of one of them the line has room again, or no more."""
@@ -88,9 +95,9 @@ class Viewer:
     """What one viewer has been sent and is still to be sent. Until `open` is called everything waits."""
 
     __slots__ = (
-        "_asked", "_beside_at", "_control", "_flow", "_following", "_held", "_overlay", "_phase", "_pinned",
-        "_planned", "_playing", "_pongs", "_private", "_shown", "_timelines", "_timer", "_turns", "_wanted", "audience",
-        "outlet",
+        "_asked", "_beside_at", "_cohort", "_control", "_flow", "_following", "_held", "_look_at", "_overlay", "_phase",
+        "_pinned", "_planned", "_playing", "_pongs", "_private", "_shown", "_timelines", "_timer", "_turns", "_until",
+        "_wanted", "audience", "outlet",
     )  # fmt: skip
 
     def __init__(
@@ -121,8 +128,12 @@ class Viewer:
         # when the next block comes within reach, and of which timeline at which step; None while some are to be sent
         self._following: int | None = None
         self._planned: tuple[TimelineState, sharing.Step] | None = None
+        # those it is in step with, until then at the latest; while there are any it has nothing to follow itself
+        self._cohort: Cohort | None = None
+        self._until = 0
         self._asked = 0
         self._flow = _UNKNOWN
+        self._look_at = 0
         self._timer: asyncio.TimerHandle | None = None
         self.audience: Audience | None = None
         self.outlet: Outlet = _SHUT
@@ -172,6 +183,7 @@ class Viewer:
 
     def timeline(self, state: TimelineState, motion: StoredMotion) -> None:
         """A new timeline of the stage, and the motion that it names. It is sent at once, blocks at the next turn."""
+        self._leave_cohort()
         self._timelines.put(state)
         if self._playing is None or self._playing.motion is not motion:
             self._playing = Playing(motion, self._wanted, self._pinned)
@@ -191,13 +203,15 @@ class Viewer:
             if self.outlet.clear:
                 self._put(b"".join(self._answers()))
         elif isinstance(said, Report) and self._playing is not None:
-            if self._playing.report(said, clock()):
+            now = clock()
+            if self._playing.report(said, now) or now >= self._look_at:
                 self._turns.put(self, 0)
         elif isinstance(said, Edit) and self._private:
             self._edit(said)
 
     def pause(self) -> None:
         """The line has no room."""
+        self._leave_cohort()
         self._turned()
 
     def resume(self) -> None:
@@ -230,20 +244,30 @@ class Viewer:
         flow = self._flow
         try:
             if self.outlet.clear:
-                steady = flow.steady
-                if look:
-                    flow.look()
-                if flow.steady != steady:
-                    self._turned()
+                if look and now >= self._look_at:
+                    self._look(now)
+                if self._cohort is not None and not self._stays(now):
+                    self._leave_cohort()
                 if not flow.free:
                     self._send_for_room(now)
-                elif not self._follow(now):
-                    self._send(now)
-                    self._look_ahead(now)
+                elif self._cohort is None:
+                    if not self._follow(now):
+                        self._send(now)
+                        self._look_ahead(now)
+                    self._join_cohort()
             self._turns.put(self, self._next_turn())
         except Exception:
             _log.exception("a viewer's turn failed")
             self.refuse(Refusal(FAULT, "Our fault", "the server could not go on with this stream"))
+
+    def _look(self, now: int) -> None:
+        """See whether the line is a quick one still, or has become one."""
+        flow = self._flow
+        steady = flow.steady
+        flow.look()
+        if flow.steady != steady:
+            self._turned()
+        self._look_at = now + (LOOK_NEAR if flow.free else LOOK) - 1
 
     def _again(self) -> None:
         self._timer = None
@@ -259,6 +283,7 @@ class Viewer:
             self.audience.turned()
 
     def _end(self) -> None:
+        self._leave_cohort()
         self._turns.remove(self)
         if self._timer is not None:
             self._timer.cancel()
@@ -363,6 +388,43 @@ class Viewer:
             self.outlet.write(plan.framed)
         return True
 
+    def _join_cohort(self) -> None:
+        """Go on with those who are in step, where this one is for a while."""
+        if self.audience is None or self._planned is None or self._following is None:
+            return
+        (state, step), playing = self._planned, self._playing
+        assert playing is not None
+        if state is not self._timelines.newest or playing.unsaid:
+            return
+        # what comes from the next instant on, which may have passed
+        begin = self._following - MARGIN
+        fresh = playing.pacer.fresh(state, begin)
+        if fresh < TOGETHER:
+            return
+        course = Course(state, playing.motion, step, self._wanted)
+        self._cohort = self.audience.cohorts.join(
+            self, self._turns, course, playing.tracks, self._following, self._phase
+        )
+        if self._cohort is not None:
+            self._planned = self._following = None
+            self._until = begin + fresh - SPREAD
+
+    def _stays(self, now: int) -> bool:
+        """Whether this one is still in step, and nothing waits for it."""
+        cohort, playing = self._cohort, self._playing
+        assert cohort is not None
+        assert playing is not None
+        waits = self._pongs or self._control or self._overlay is not None or playing.unsaid
+        return self._flow.free and now < self._until and cohort.course.step == playing.step and not waits
+
+    def _leave_cohort(self) -> None:
+        cohort, self._cohort = self._cohort, None
+        if cohort is None:
+            return
+        assert self._playing is not None
+        for track, index, rate in cohort.leave(self):
+            self._playing.pacer.has(track, index, rate)
+
     def _look_ahead(self, now: int) -> None:
         """All that is within reach was sent: when more will be."""
         self._planned = self._following = None
@@ -379,6 +441,8 @@ class Viewer:
         due = heard + (GONE if heard == self._asked else SILENT) + 1
         if not self.outlet.clear:
             return due
+        if self._cohort is not None:
+            return min(due, self._until)
         if self._following is not None:
             # what goes over a narrow line just in time cannot wait so that the server's work is even
             due = min(due, self._following + (self._phase if self._flow.free else 0))
