@@ -162,6 +162,7 @@ async def test_a_quick_line_is_not_asked_for_overlays_and_one_that_becomes_slow_
     assert watching.line.reads == before
     assert len(watching.of(Overlay)) == 100
     assert watching.viewer.unasked
+    watching.at += viewers.LOOK_NEAR
     watching.line.line.write(watching.at, 2_000_000)
     watching.line.sent += bytes(2_000_000)
     watching.viewer.advance()

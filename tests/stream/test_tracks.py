@@ -7,7 +7,7 @@ from bunraku.backing.library import StoredMotion, pack, unpack, with_audio
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
-from bunraku.stream.tracks import TRACKS, channels, described, paced, steps
+from bunraku.stream.tracks import TRACKS, channels, described, paced, steps, told_of
 from bunraku.wire.messages import Description
 from bunraku.wire.messages import unpack as unpack_message
 from tests.vectors.blocks import wandering_motion
@@ -36,11 +36,19 @@ def kinds(message: bytes) -> list[str]:
 def test_what_comes_after_the_last_track_that_is_wanted_is_not_described(motion: StoredMotion) -> None:
     whole = kinds(motion.description)
     assert sorted(whole) == ["audio", "camera", "motion"]
-    assert described(motion, TRACKS) == motion.description
-    assert kinds(described(motion, whole[:1])) == whole[:1]
-    assert kinds(described(motion, whole[1:2])) == whole[:2]
-    assert kinds(described(motion, whole[2:])) == whole
-    assert kinds(described(motion, ())) == whole[:1]
+    assert [told_of(motion, wanted) for wanted in (TRACKS, whole[:1], whole[1:2], whole[2:], ())] == [3, 1, 2, 3, 1]
+    assert described(motion, 0, 3) == motion.description
+    assert kinds(described(motion, 0, 2)) == whole[:2]
+
+
+def test_the_rest_says_which_track_it_begins_with(motion: StoredMotion) -> None:
+    whole = kinds(motion.description)
+    rest = described(motion, 1, 3)
+    assert kinds(rest) == whole[1:]
+    assert len(rest) + len(described(motion, 0, 1)) < len(motion.description) + 40
+    found = unpack_message(rest)
+    assert isinstance(found, Description)
+    assert found.first == 1
 
 
 def test_tracks_keep_their_numbers_and_say_what_they_are(motion: StoredMotion) -> None:

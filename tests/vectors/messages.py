@@ -56,6 +56,7 @@ def make() -> dict[str, Any]:
     examples: list[Message] = [
         ChannelHeader(motion="k3v9q", now=NOW, channels=19, software="0.1.0"),
         Description("k3v9q", [{"type": "motion", "fps": 60.0, "figure": bytes(range(138))}]),
+        Description("k3v9q", [{"type": "audio"}, {"type": "light"}], first=1),
         Data(0, 3, 86_399, b"\x01block"),
         Data(1, 0, 5, b""),
         TimelineState(7, "k3v9q", NOW, 1_500_000, True, False, 32_475_000),

@@ -7,6 +7,7 @@ import contextlib
 import socket
 import time
 from collections.abc import Callable
+from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 import numpy as np
@@ -93,6 +94,7 @@ class Viewer:
         self._scene_stores: dict[int, SceneStore] = {}
         self._sound: AudioStore | None = None
         self._sound_number = -1
+        self._told = 0
         self._overlays = Overlays()
         self._delay = PlayoutDelay()
         self._early: list[float] = []
@@ -171,7 +173,7 @@ class Viewer:
         track = self._blocks.track
         first = track.block_at(position)
         ahead = [self._blocks.rate((first + nth) % track.blocks) for nth in range(min(track.blocks, MOST))]
-        query = {"have": Held(self.motion, first, ahead).text()}
+        query = {"have": Held(self.motion, first, ahead, self._told).text()}
         if "/sessions/" not in self.url:
             query |= {"at": f"{position / 1e6:.6f}", "clock": str(now)}
         parts = urlsplit(self.url)
@@ -284,8 +286,13 @@ class Viewer:
 
     def _describe(self, description: Description) -> None:
         """Take in the tracks that can be read here: the motion must, and of others what is not known is skipped."""
+        first = description.first or 0
         if description.motion == self.motion:
             # what an id names never changes: the blocks that are here are good
+            self._add_tracks(first, description.tracks)
+            return
+        if first:
+            # the rest of one that was not told of
             return
         numbers = [n for n, track in enumerate(description.tracks) if track.get("type") == "motion"]
         if not numbers:
@@ -300,15 +307,23 @@ class Viewer:
         rates = description.tracks[numbers[0]].get("rates", [])
         self._rates = [float(rate.get("kbps", 0.0)) for rate in rates]
         self._scene_stores = {}
-        for number, track in enumerate(description.tracks):
+        self._sound, self._sound_number = None, -1
+        self._told = 0
+        self._add_tracks(0, description.tracks)
+
+    def _add_tracks(self, first: int, described: list[dict[str, Any]]) -> None:
+        """Take in the tracks beside the motion from number `first` on that were not told of yet."""
+        assert self.track is not None
+        for number, track in enumerate(described, first):
+            if number < self._told:
+                continue
             if track.get("type") in ("camera", "light"):
                 with contextlib.suppress(DamagedBlock):
                     self._scene_stores[number] = SceneStore(read_scene(track))
-        self._sound, self._sound_number = None, -1
-        for number, track in enumerate(description.tracks):
-            if track.get("type") == "audio" and self._sound is None:
+            elif track.get("type") == "audio" and self._sound is None:
                 with contextlib.suppress(DamagedBlock):
                     self._sound, self._sound_number = AudioStore(read_audio(track, self.track)), number
+        self._told = max(self._told, first + len(described))
         self.scenes = [store.track for store in self._scene_stores.values()]
 
     def _keep(self, data: Data) -> None:

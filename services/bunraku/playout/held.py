@@ -8,21 +8,23 @@ from dataclasses import dataclass
 
 MOST = 64
 """Blocks that may be told of."""
-_FORM = re.compile(r"([A-Za-z0-9]{1,64})\.([0-9]{1,7})\.([0-9a-f-]{0,64})")
+_FORM = re.compile(r"([A-Za-z0-9]{1,64})\.([0-9]{1,7})\.([0-9a-f-]{0,64})(?:\.([0-9]{1,2}))?")
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """The Description of `motion`, and of its own track's blocks from `first` on the rates held, -1 for none."""
+    """The Description of `motion`, of its first `tracks` or, None, of all; and of its own track's blocks from `first`
+    on the rates held, -1 for none."""
 
     motion: str
     first: int
     rates: Sequence[int]
+    tracks: int | None = None
 
     def text(self) -> str:
         """As it stands in a URL."""
         digits = "".join("-" if rate < 0 else f"{rate:x}" for rate in self.rates[:MOST])
-        return f"{self.motion}.{self.first}.{digits}"
+        return f"{self.motion}.{self.first}.{digits}" + ("" if self.tracks is None else f".{self.tracks}")
 
     @classmethod
     def read(cls, text: str) -> Held:
@@ -30,8 +32,8 @@ class Held:
         found = _FORM.fullmatch(text)
         if found is None:
             raise ValueError(
-                "have=MOTION.FIRST.RATES: an id, a block's index, and a hexadecimal digit or - for that block and for "
-                f"each after it, {MOST} at most"
+                "have=MOTION.FIRST.RATES.TRACKS: an id, a block's index, a hexadecimal digit or - for that block and "
+                f"for each after it, {MOST} at most, and how many tracks were told of"
             )
         rates = tuple(-1 if digit == "-" else int(digit, 16) for digit in found[3])
-        return cls(found[1], int(found[2]), rates)
+        return cls(found[1], int(found[2]), rates, int(found[4]) if found[4] else None)

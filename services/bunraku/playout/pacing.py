@@ -84,7 +84,8 @@ class Pacer:
         """Raises ValueError for a track without rates."""
         if any(track.rates < 1 for track in tracks):
             raise ValueError("a track has one rate at least")
-        self._tracks = tracks
+        self.tracks = tracks
+        """Of others nothing is sent."""
         self._sent: dict[tuple[int, int], int] = {}
         self._filling = True
 
@@ -109,7 +110,7 @@ class Pacer:
         line; sound is in none. Without `spare` room only what is missing soon is sent.
         """
         position = position_at(state, clock)
-        rates = ((track, track.wanted(rate, audio)) for track in self._tracks)
+        rates = ((track, track.wanted(rate, audio)) for track in self.tracks)
         found = [
             due
             for track, wanted in rates
@@ -140,7 +141,7 @@ class Pacer:
         long as a loop takes."""
         position = position_at(state, clock)
         fresh = state.duration
-        for track in self._tracks:
+        for track in self.tracks:
             timing = track.timing
             blocks = timing.block_at(state.duration - 1) + 1
             first = min(timing.block_at(position), blocks - 1)
@@ -155,10 +156,10 @@ class Pacer:
 
     def wait(self, state: TimelineState, clock: int, net: bool = False) -> int | None:
         """Microseconds until the next block comes within reach, None while nothing moves."""
-        if not state.playing or not self._tracks:
+        if not state.playing or not self.tracks:
             return None
         reach = (position_at(state, clock) + (NET_AHEAD if net else AHEAD)) % state.duration
-        return min(_following(track.timing, reach, state.duration) for track in self._tracks) - reach + MARGIN
+        return min(_following(track.timing, reach, state.duration) for track in self.tracks) - reach + MARGIN
 
     def _due(self, track: Paced, state: TimelineState, position: int, rate: int, net: bool) -> Due | None:
         """What is to be sent first of one track."""

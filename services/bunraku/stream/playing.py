@@ -9,7 +9,7 @@ from bunraku.playout.held import Held
 from bunraku.playout.pacing import Pacer
 from bunraku.playout.rate import RateChoice
 from bunraku.stream.flow import Flow
-from bunraku.stream.tracks import paced, steps
+from bunraku.stream.tracks import described, paced, steps, told_of
 from bunraku.wire.messages import Choice, Report, TimelineState
 
 BESIDE = 1_000_000
@@ -20,12 +20,27 @@ class Playing:
     """What one viewer has been sent of `motion`, and at which rate it is sent the rest; times are clock times in
     microseconds."""
 
-    __slots__ = ("_pinned", "_tells", "_told", "motion", "pacer", "rate", "steps", "tracks", "unsaid")
+    __slots__ = (
+        "_known",
+        "_pinned",
+        "_tells",
+        "_told",
+        "_wanted",
+        "motion",
+        "pacer",
+        "rate",
+        "steps",
+        "tracks",
+        "unsaid",
+    )
 
     def __init__(self, motion: StoredMotion, wanted: tuple[str, ...], pinned: int | None) -> None:
         """`wanted` are the types of tracks whose blocks are sent, `pinned` the motion's rate to keep to, if any."""
         self.motion = motion
         self.tracks = paced(motion, wanted)
+        # tracks that the viewer is to be told of, and was
+        self._wanted = told_of(motion, wanted)
+        self._known = self._wanted
         self.pacer = Pacer(self.tracks)
         self.steps = sharing.pinned(steps(motion, wanted), pinned)
         first, safe = sharing.first_step(self.steps), sharing.safe_step(self.steps)
@@ -45,10 +60,20 @@ class Playing:
         """What the viewer holds already is not sent again; whether it is of this motion."""
         if held is None or held.motion != self.motion.id:
             return False
+        self._told_of(min(len(self.motion.tracks) if held.tracks is None else held.tracks, self._wanted))
         for nth, rate in enumerate(held.rates):
             if rate >= 0:
                 self.pacer.has(0, (held.first + nth) % self.motion.track.blocks, rate)
         return True
+
+    def described(self, far: bool) -> bytes:
+        """The Description that goes before all else: of the motion alone where the line is `far` and there is more."""
+        self._told_of(1 if far and self._tells else self._wanted)
+        return described(self.motion, 0, self._known)
+
+    def _told_of(self, known: int) -> None:
+        self._known = known
+        self.pacer.tracks = [track for track in self.tracks if track.number < known]
 
     def report(self, report: Report, clock: int) -> bool:
         """How the viewer fares; whether rate or reason have changed."""
@@ -63,6 +88,14 @@ class Playing:
         beside = narrow and clock - beside_at < BESIDE
         self.rate.line(flow.window.rate if narrow else None, clock, beside)
         step = self.steps[0] if flow.unknown else self.step
+        if self._known < self._wanted:
+            due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=True, spare=False)
+            if due is None:
+                # the motion goes on for a while
+                known = self._known
+                self._told_of(self._wanted)
+                return described(self.motion, known, self._known)
+            return self.motion.packets[due.track][due.rate][due.index]
         spare = not beside or flow.blocks_turn()
         due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=narrow or flow.far, spare=spare)
         return None if due is None else self.motion.packets[due.track][due.rate][due.index]

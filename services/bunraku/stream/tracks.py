@@ -23,15 +23,20 @@ def channels(motion: StoredMotion) -> int:
     return sum(map(_channels, motion.tracks))
 
 
-def described(motion: StoredMotion, wanted: Sequence[str]) -> bytes:
-    """A motion's Description without the tracks after the last wanted one, which keeps the others' numbers: on a narrow
-    line what is told of those costs more than the first block."""
-    last = max((number for number, track in enumerate(motion.tracks) if _kind(track) in wanted), default=0)
-    if last + 1 == len(motion.tracks):
+def told_of(motion: StoredMotion, wanted: Sequence[str]) -> int:
+    """How many tracks one is told of who wants these types: none after the last wanted one, as that leaves the others'
+    numbers as they are."""
+    return 1 + max((number for number, track in enumerate(motion.tracks) if _kind(track) in wanted), default=0)
+
+
+def described(motion: StoredMotion, first: int, end: int) -> bytes:
+    """A motion's Description of the tracks from index `first` to before `end`: on a narrow line what is told of the
+    others costs more than the first block."""
+    if first == 0 and end == len(motion.tracks):
         return motion.description
     whole = unpack(motion.description)
     assert isinstance(whole, Description)
-    return Description(whole.motion, whole.tracks[: last + 1]).pack()
+    return Description(whole.motion, whole.tracks[first:end], first or None).pack()
 
 
 def paced(motion: StoredMotion, wanted: Sequence[str]) -> list[Paced]:

@@ -31,7 +31,7 @@ from bunraku.stream.cohorts import Cohort, Cohorts, Course
 from bunraku.stream.flow import Flow, Readable
 from bunraku.stream.plans import Plans
 from bunraku.stream.playing import Playing
-from bunraku.stream.tracks import TRACKS, channels, described
+from bunraku.stream.tracks import TRACKS, channels
 from bunraku.stream.turns import Turns
 from bunraku.wire.messages import (
     ChannelHeader,
@@ -355,7 +355,7 @@ class Viewer:
         if self._shown is None or self._shown[0] is not motion:
             held, self._held = self._held, None
             if not playing.has(held):
-                messages.insert(0, described(motion, self._wanted))
+                messages.insert(0, playing.described(self._flow.far))
             messages.insert(0, ChannelHeader(motion.id, clock(), channels(motion), __version__).pack())
         self._shown = motion, state
         return [frame(message) for message in messages]

@@ -58,11 +58,13 @@ class ChannelHeader(_Packed):
 
 @dataclass(frozen=True, slots=True)
 class Description(_Packed):
-    """The type of every track and what its blocks have in common (paper 3)."""
+    """The type of every track and what its blocks have in common (paper 3); of those from index `first` on, where that
+    is not None."""
 
     TYPE = 2
     motion: str
     tracks: list[dict[str, Any]]
+    first: Count | None = None
 
 
 @dataclass(frozen=True, slots=True)

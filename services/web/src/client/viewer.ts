@@ -38,7 +38,7 @@ const NEWEST = 1 / 8;
 
 const NO_BLOCKS = new Int8Array(0);
 
-/** Events: "figure", "timeline", "presence", "blocks", "open", and "closed" (a CustomEvent whose detail is the reason). */
+/** Events: "figure", "tracks" (more of them are known), "timeline", "presence", "blocks", "open", and "closed" (a CustomEvent whose detail is the reason). */
 export class Viewer extends EventTarget {
   /** The reference clock, in microseconds of local time. */
   readonly clock = new ReferenceClock();
@@ -259,9 +259,9 @@ export class Viewer extends EventTarget {
   }
 
   private address(): string {
-    const { store, resume } = this;
-    if (!store || resume?.motion !== this.motion) return this.url.href;
-    return returningUrl(this.url, store, resume, this.clock.at(this.now() * 1000), !this.connectsToSession);
+    const { tracks, resume } = this;
+    if (!tracks || resume?.motion !== this.motion) return this.url.href;
+    return returningUrl(this.url, tracks, resume, this.clock.at(this.now() * 1000), !this.connectsToSession);
   }
 
   private get connectsToSession(): boolean {
@@ -340,7 +340,14 @@ export class Viewer extends EventTarget {
 
   private describe(message: Description): void {
     // what an id names never changes, so the blocks of the same motion are good still
-    if (message.motion === this.motion && this.store) return;
+    if (message.motion === this.motion && this.tracks) {
+      const { told } = this.tracks;
+      this.tracks.add(message.first ?? 0, message.tracks);
+      if (this.tracks.told > told) this.tell("tracks");
+      return;
+    }
+    // the rest of one that was not told of
+    if (message.first) return;
     try {
       this.tracks = new Tracks(message.tracks);
     } catch (error) {

@@ -50,7 +50,7 @@ const asked: Field = (value) => {
 
 const FIELDS: { [name in MapName]: Readonly<Record<string, Field>> } = {
   ChannelHeader: { motion: text, now: count, channels: count, software: text, version: count, clock: text },
-  Description: { motion: text, tracks: list(track) },
+  Description: { motion: text, first: optional(count), tracks: list(track) },
   TimelineState: {
     epoch: count, motion: text, clock: count, position: count, playing: flag, loop: flag, duration: count,
   },

@@ -20,10 +20,11 @@ export interface ChannelHeader {
 /** A track of a Description: its `type`, and what that type says besides. */
 export type Track = { type: string } & Record<string, unknown>;
 
-/** The type of every track and what its blocks have in common. */
+/** The type of every track and what its blocks have in common; of those from index `first` on, where that is not null. */
 export interface Description {
   name: "Description";
   motion: string;
+  first: number | null;
   tracks: Track[];
 }
 
