@@ -172,18 +172,20 @@ class Window:
         self.limit = max(self.limit, float(LARGE))
         self._turn, self._took, self._limited = at, None, False
 
-    def room(self, at: int) -> bool:
-        """Whether something may be written at `at`: always when nothing is on its way."""
+    def room(self, at: int, ahead: int = 0) -> bool:
+        """Whether something may be written at `at`: always when nothing is on its way. `ahead` is for how long more may
+        wait in the line's queue, microseconds, so that it never runs dry; once what the line carries is known."""
         if not self._flying:
             return True
+        ahead = ahead if self.rate else 0
         # the line is through with what is large at a time that is known, once its rate is
-        if self.flying - (self._large if self.rate else 0) >= self.limit:
+        if self.flying - (self._large if self.rate else 0) >= self.limit + (self.rate or 0.0) * ahead * 1e-6:
             self._limited = True
             return False
-        if at < self._through:
+        if at < self._through - ahead:
             return False
         # nothing came back for long: the line has become slower, or stands
-        return self.base is None or at - self._flying[0][2] <= self.base + 2 * self.late
+        return self.base is None or at - self._flying[0].at <= self.base + 2 * self.late + ahead
 
     def wait(self) -> int:
         """Microseconds after which there may be room."""

@@ -111,8 +111,8 @@ class Flow:
         self._clean = self._clean + 1 if clean else 0
         self.steady = self._clean >= CLEAN
 
-    def room(self) -> bool:
-        """Whether something may be written now."""
+    def room(self, ahead: int = 0) -> bool:
+        """Whether something may be written now; `ahead` as of `Window.room`."""
         if self._line is None:
             return True
         now = self._now()
@@ -125,7 +125,7 @@ class Flow:
             # overlays that were written unasked
             self.window.passed(max(reading.written - self._before - self.window.written, 0))
             self.window.acknowledged(now, reading.waiting, reading.least)
-        return self.window.room(now)
+        return self.window.room(now, ahead)
 
     @property
     def narrow(self) -> bool:

@@ -30,7 +30,7 @@ from bunraku.playout.pacing import MARGIN
 from bunraku.stream.cohorts import Cohort, Cohorts, Course
 from bunraku.stream.flow import Flow, Readable
 from bunraku.stream.plans import Plans
-from bunraku.stream.playing import Playing
+from bunraku.stream.playing import BESIDE, Playing
 from bunraku.stream.tracks import TRACKS, channels
 from bunraku.stream.turns import Turns
 from bunraku.wire.messages import (
@@ -58,6 +58,8 @@ SPREAD = 1_000_000
 what is sent ahead, and the server's work is even."""
 TOGETHER = 4_000_000
 """Who will be in step for less, microseconds, goes on alone."""
+DEEP = 200_000
+"""So much more of what is not live may wait in the queue of a narrow line, microseconds."""
 BATCH = 16_384
 """Bytes that are written in one piece, about."""
 LOOK = 250_000
@@ -296,10 +298,14 @@ class Viewer:
         if first := b"".join(self._first()):
             self._put(first)
         while outlet.clear:
-            if not flow.room():
+            if not flow.room(0 if now - self._beside_at < BESIDE else DEEP):
                 break
             narrow = flow.narrow
-            if (self._overlay is None or narrow) and (packet := self._next_packet(now)) is not None:
+            told = self._playing is not None and self._playing.unsaid and not flow.unknown
+            if told and self._playing is not None and (news := self._playing.news()):
+                # before what is sent far ahead, which may take long
+                self._put(news)
+            elif (self._overlay is None or narrow) and (packet := self._next_packet(now)) is not None:
                 self._put(frame(packet))
                 flow.block_went(len(packet))
                 flow.begun()
