@@ -14,6 +14,7 @@ from bunraku.backing.frames import frame
 from bunraku.backing.library import Library, StoredMotion
 from bunraku.backing.sockets import FAULT, NOT_FOUND, Refusal
 from bunraku.backing.together import Together
+from bunraku.stream.cohorts import Cohorts
 from bunraku.stream.plans import Plans
 from bunraku.stream.viewers import Viewer
 from bunraku.wire.messages import MalformedMessage, Presence, TimelineState, unpack
@@ -38,6 +39,7 @@ class WatchedSession:
         self._subject = f"session.{session}"
         self._replica = replica
         self.plans = Plans()
+        self.cohorts = Cohorts(self.plans)
         self._viewers: set[Viewer] = set()
         # to those whose line has room the same bytes are written, with nothing asked in between
         self._ready: Together | None = None
@@ -170,8 +172,8 @@ class WatchedSession:
         self._overlay = framed if message[1] else None
         ready = self._ready
         if ready is None:
-            ready = self._ready = Together([viewer.outlet for viewer in self._viewers if viewer.outlet.clear])
-            self._behind = [viewer for viewer in self._viewers if not viewer.outlet.clear]
+            ready = self._ready = Together([viewer.outlet for viewer in self._viewers if viewer.unasked])
+            self._behind = [viewer for viewer in self._viewers if not viewer.unasked]
         for viewer in self._behind:
             viewer.overlay(framed)
         ready.write(framed)
