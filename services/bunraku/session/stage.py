@@ -1,8 +1,9 @@
 """One session: its timeline, its puppeteers, and the merge of their limbs into the dance (paper 5).
 
-The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5); it listens to
-`viewers` and answers `state`. Overlays are computed for the instant when they are due, `LEAD` ahead of now, so that
-every viewer can lay them over the dance in time and at the same time.
+The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5), and `appear`
+where it goes on with a session of another replica; it listens to `viewers` and answers `state`. Overlays are computed
+for the instant when they are due, `LEAD` ahead of now, so that every viewer can lay them over the dance in time and at
+the same time.
 """
 
 from __future__ import annotations
@@ -108,6 +109,7 @@ class Stage:
 
     def appear(self) -> None:
         """Tell those who watched when the session was another replica's where it goes on: nobody holds a limb."""
+        self._bus.publish(f"session.{self.id}.appear", b"")
         self._bus.publish(f"session.{self.id}.timeline", self.timeline.pack())
         self._announce()
         self._sequence += 1
