@@ -32,14 +32,27 @@ class Backing:
 
 @asynccontextmanager
 async def open_backing(settings: Settings) -> AsyncIterator[Backing]:
-    """Open everything at the addresses in `settings`, and close it again."""
-    if settings.bus != "memory:":
-        raise ValueError(f"a bus is at memory:, not {settings.bus!r}")
+    """Open everything at the addresses in `settings`, and close it again; raises ValueError for what is no address.
+
+    Nothing need be there yet: what is away is tried again when it is used, or goes on being tried.
+    """
     settings.data.mkdir(parents=True, exist_ok=True)
     catalogue = Catalogue(settings.catalogue_url())
-    bus = MemoryBus()
+    library = Library.open(settings.library_url())
+    bus = await _open_bus(settings.bus)
     try:
-        yield Backing(settings, catalogue, Library.open(settings.library_url()), bus)
+        yield Backing(settings, catalogue, library, bus)
     finally:
         await bus.close()
         await catalogue.close()
+
+
+async def _open_bus(url: str) -> Bus:
+    if url == "memory:":
+        return MemoryBus()
+    # imported here, as most processes have no use for it
+    from bunraku.backing.bus_nats import NatsBus
+
+    bus = NatsBus(url)
+    await bus.open()
+    return bus
