@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pwd
 import shutil
@@ -9,8 +10,9 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -38,12 +40,15 @@ def free_port() -> int:
 class Owned:
     """A server process that can be killed, stood still and started again at the same place."""
 
-    def __init__(self, command: list[str], port: int, folder: Path, user: str | None = None) -> None:
-        self.command, self.port, self.folder, self._user = command, port, folder, user
+    def __init__(
+        self, command: list[str], port: int, folder: Path, user: str | None = None, ready: Sequence[str] = ()
+    ) -> None:
+        """`ready` is a command that succeeds once it takes connections; without one its port says so."""
+        self.command, self.port, self.folder, self._user, self._ready = command, port, folder, user, ready
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
-        """Start it; returns when its port is open."""
+        """Start it; returns when it takes connections."""
         log = self.folder / "log"
         with log.open("ab") as said:
             self._process = subprocess.Popen(
@@ -53,9 +58,11 @@ class Owned:
         while time.monotonic() < end and self._process.poll() is None:
             try:
                 socket.create_connection(("127.0.0.1", self.port), 1).close()
-                return
+                if not self._ready or subprocess.run(self._ready, stdout=subprocess.DEVNULL).returncode == 0:
+                    return
             except OSError:
-                time.sleep(0.02)
+                pass
+            time.sleep(0.02)
         self.stop()
         pytest.fail(f"{self.command[0]} did not start: {log.read_text(errors='replace')[-2000:]}")
 
@@ -64,8 +71,17 @@ class Owned:
         assert self._process is not None
         self._process.send_signal(number)
 
+    def send_to_all(self, number: signal.Signals) -> None:
+        """Send it and its own processes a signal."""
+        assert self._process is not None
+        for child in Path(f"/proc/{self._process.pid}/task/{self._process.pid}/children").read_text().split():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(int(child), number)
+        self.send(number)
+
     def kill(self) -> None:
-        """End it as a power cut does."""
+        """End it, and its own processes, as a power cut does."""
+        self.send_to_all(signal.SIGKILL)
         self._end(signal.SIGKILL)
 
     def stop(self) -> None:
@@ -108,40 +124,36 @@ def url_of(server: Owned) -> str:
 
 
 @contextmanager
-def postgres(folder: Path) -> Iterator[Owned]:
+def postgres() -> Iterator[Owned]:
     """A PostgreSQL server without a password, its only user `postgres`; skips the test where there is none."""
     debian = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
     initdb, program = needed("initdb", *debian), needed("postgres", *debian)
-    user = None
-    if os.geteuid() == 0:
-        # it refuses to run as root
-        user = _somebody()
-        shutil.chown(folder, user)
-    data = folder / "data"
-    made = subprocess.run(
-        [initdb, "-D", data, "-U", "postgres", "-A", "trust", "-E", "UTF8", "--locale=C", "--no-sync"],
-        capture_output=True,
-        user=user,
-        cwd=folder,
-    )
-    assert made.returncode == 0, made.stderr.decode(errors="replace")
-    port = free_port()
-    options = {
-        "listen_addresses": "127.0.0.1",
-        "port": str(port),
-        "unix_socket_directories": "",
-        "fsync": "off",
-        "max_connections": "150",
-        "shared_buffers": "16MB",
-    }
-    command = [
-        program,
-        "-D",
-        str(data),
-        *(word for name, value in options.items() for word in ("-c", f"{name}={value}")),
-    ]
-    with _owned(Owned(command, port, folder, user)) as server:
-        yield server
+    # it refuses to run as root, and whom it runs as has no way into the tests' own folder
+    user = _somebody() if os.geteuid() == 0 else None
+    with tempfile.TemporaryDirectory(prefix="bunraku-postgres-", dir="/tmp") as name:
+        folder = Path(name)
+        if user is not None:
+            shutil.chown(folder, user)
+        subprocess.run(
+            [initdb, "-D", folder / "data", "-U", "postgres", "-A", "trust", "-E", "UTF8", "--locale=C", "--no-sync"],
+            check=True,
+            stdout=subprocess.DEVNULL,
+            user=user,
+            cwd=folder,
+        )
+        port = free_port()
+        options = {
+            "listen_addresses": "127.0.0.1",
+            "port": str(port),
+            "unix_socket_directories": "",
+            "fsync": "off",
+            "shared_buffers": "16MB",
+        }
+        set_to = (word for option, value in options.items() for word in ("-c", f"{option}={value}"))
+        command = [program, "-D", str(folder / "data"), *set_to]
+        ready = [needed("pg_isready", *debian), "-q", "-h", "127.0.0.1", "-p", str(port)]
+        with _owned(Owned(command, port, folder, user, ready)) as server:
+            yield server
 
 
 def _somebody() -> str:
