@@ -17,7 +17,7 @@ from sqlalchemy.ext.asyncio import AsyncEngine, create_async_engine
 
 from bunraku.backing.catalogue import BadCursor, Entry
 from bunraku.backing.migrate import HEAD, migrate, version
-from bunraku.backing.unavailable import ANSWERED, Unavailable
+from bunraku.backing.unavailable import ANSWERED, Patience, Unavailable
 
 METADATA = MetaData()
 MOTIONS = Table(
@@ -28,8 +28,6 @@ MOTIONS = Table(
     Column("description", Text, nullable=False),
 )
 _DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg"}
-_GRACE = 0.3
-"""Of the seconds for an answer, those in which a loop that stood still reads what came meanwhile."""
 _OURS = ("22", "23", "42", "53100")
 """SQLSTATEs of PostgreSQL that are not its own trouble: of data, constraints and statements, and the full disk."""
 
@@ -44,13 +42,13 @@ class SqlCatalogue:
         """`url` is SQLAlchemy's, of an async driver."""
         self._url = url
         self._postgres = url.startswith("postgresql")
-        self._late: set[asyncio.Task[Any]] = set()
-        patience = {
+        self._patience = Patience("the catalogue")
+        limits = {
             "pool_pre_ping": True,
             "pool_timeout": ANSWERED,
             "connect_args": {"timeout": ANSWERED, "command_timeout": ANSWERED},
         }
-        self._engine: AsyncEngine = create_async_engine(url, **(patience if self._postgres else {}))
+        self._engine: AsyncEngine = create_async_engine(url, **(limits if self._postgres else {}))
 
     @classmethod
     async def open(cls, url: str) -> SqlCatalogue:
@@ -68,10 +66,7 @@ class SqlCatalogue:
 
     async def close(self) -> None:
         """Close every connection."""
-        for late in self._late:
-            late.cancel()
-        if self._late:
-            await asyncio.wait(tuple(self._late), timeout=ANSWERED)
+        await self._patience.end()
         await self._engine.dispose()
 
     async def add(self, entry: Entry) -> bool:
@@ -124,31 +119,14 @@ class SqlCatalogue:
             return await connection.run_sync(version)
 
     async def _answer(self, asking: Coroutine[Any, Any, Found], *, hurry: bool = True) -> Found:
-        """What the database answers; raises `Unavailable`. One who waits in vain is let go at once, and the connection
-        put in order behind their back, which takes a while where nobody answers."""
-        task = asyncio.create_task(asking)
+        """What the database answers; raises `Unavailable`."""
         try:
-            for seconds in (ANSWERED - _GRACE, _GRACE) if self._postgres and hurry else (None,):
-                await asyncio.wait((task,), timeout=seconds)
-                if task.done():
-                    return task.result()
+            return await self._patience.wait(asking, ANSWERED if self._postgres and hurry else None)
         except (DBAPIError, NoConnection, OSError) as error:
             if isinstance(error, DBAPIError) and not _is_away(error):
                 raise
             cause = error.orig if isinstance(error, DBAPIError) else error
             raise Unavailable("the catalogue", str(cause) or type(cause).__name__) from error
-        finally:
-            if not task.done():
-                task.cancel()
-                self._late.add(task)
-                task.add_done_callback(self._forget)
-        raise Unavailable("the catalogue", "no answer in time")
-
-    def _forget(self, task: asyncio.Task[Any]) -> None:
-        self._late.discard(task)
-        if not task.cancelled():
-            # looked at, so that nobody warns of it: who asked was told already
-            task.exception()
 
 
 def _is_away(error: DBAPIError) -> bool:
