@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
+import uvloop
 
 from bunraku.backing import nats_link
 from bunraku.backing.bus import NobodyAnswers
@@ -281,6 +282,32 @@ async def test_it_closes_at_any_time(server: Owned) -> None:
         await bus.close()
         with pytest.raises(Unavailable):
             await asking
+
+
+def test_it_is_the_same_on_the_loop_that_the_services_have(server: Owned) -> None:
+    async def scenario() -> None:
+        async with connected(url_of(server), url_of(server)) as (one, two):
+            heard = Heard()
+            one.subscribe("a", heard)
+            one.answer("echo", echo)
+            await settled(one)
+            expected = [b"%d" % number for number in range(5000)]
+            for message in expected:
+                two.publish("a", message)
+            assert await heard.until(expected[-1]) == expected
+            assert await two.ask("echo", b"1") == b"1"
+            server.send(signal.SIGSTOP)
+            while two.up:
+                two.publish("b", bytes(10_000))
+                assert two._link is None or two._link.waiting <= nats_link.WAITING + 20_000
+                await asyncio.sleep(0)
+            server.kill()
+            server.start()
+            await until(lambda: one.up and two.up)
+            two.publish("a", b"after")
+            await heard.until(b"after")
+
+    uvloop.run(scenario())
 
 
 def test_addresses() -> None:

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import cast
 
 import uvloop
 
@@ -61,8 +62,7 @@ class Bare(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """As asyncio has it."""
-        assert isinstance(transport, asyncio.Transport)
-        self.transport = transport
+        self.transport = cast(asyncio.Transport, transport)
 
     def data_received(self, data: bytes) -> None:
         """As asyncio has it."""
@@ -74,7 +74,7 @@ class Bare(asyncio.Protocol):
 
 
 async def listen(where: str) -> None:
-    """The other process: told how many sessions there are it listens to them, told nothing it says how late they were."""
+    """The other process: listens to all sessions, and says how late messages were for each line that it is told."""
     loop = asyncio.get_running_loop()
     heard = Heard()
     bus = NatsBus(where)
@@ -144,9 +144,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=8.0, help="of each line")
     seconds = parser.parse_args().seconds
-    with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder, nats_server(Path(folder)) as server:
-        with Told.module("bus", "listen", url_of(server)) as other:
-            figures = uvloop.run(measure(url_of(server), other, seconds))
+    with (
+        tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder,
+        nats_server(Path(folder)) as server,
+        Told.module("bus", "listen", url_of(server)) as other,
+    ):
+        figures = uvloop.run(measure(url_of(server), other, seconds))
     print(json.dumps({"bench": "bus", **figures}))
 
 
