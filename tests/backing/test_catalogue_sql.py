@@ -1,8 +1,8 @@
 from __future__ import annotations
 
+import asyncio
 import base64
 from collections.abc import AsyncIterator
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +11,8 @@ from bunraku.backing.catalogue_sql import SqlCatalogue
 
 
 @pytest.fixture
-async def catalogue(tmp_path: Path) -> AsyncIterator[SqlCatalogue]:
-    opened = await SqlCatalogue.open(f"sqlite:///{tmp_path}/catalogue.sqlite")
+async def catalogue(url: str) -> AsyncIterator[SqlCatalogue]:
+    opened = await SqlCatalogue.open(url)
     yield opened
     await opened.close()
 
@@ -40,10 +40,16 @@ async def test_pages_go_through_all_newest_first_even_where_times_are_equal(cata
     assert seen == ["m6", "m5", "m4", "m3", "m2", "m1", "m0"]
 
 
-@pytest.mark.parametrize("cursor", ["", "x", "bm8=", "é", "Og=="])
+@pytest.mark.parametrize("cursor", ["", "x", "bm8=", "é", "Og==", "MTp4AA=="])
 async def test_a_strange_cursor_is_refused(catalogue: SqlCatalogue, cursor: str) -> None:
     with pytest.raises(BadCursor):
         await catalogue.page(3, cursor)
+
+
+@pytest.mark.parametrize("motion", ["", "m\0", "m/1", "é", "m" * 100_000, "\ud800"])
+async def test_what_could_not_be_an_id_is_not_there(catalogue: SqlCatalogue, motion: str) -> None:
+    assert await catalogue.get(motion) is None
+    assert not await catalogue.remove(motion)
 
 
 @pytest.mark.parametrize("created", [-(10**30), 10**30])
@@ -55,11 +61,16 @@ async def test_a_cursor_out_of_this_world_is_an_empty_or_whole_list(catalogue: S
     assert following is None
 
 
-async def test_it_is_there_after_opening_again(tmp_path: Path) -> None:
-    url = f"sqlite:///{tmp_path}/c.sqlite"
+async def test_it_is_there_after_opening_again(url: str) -> None:
     first = await SqlCatalogue.open(url)
     await first.add(Entry("m1", 5, {"a": 1}))
     await first.close()
     again = await SqlCatalogue.open(url)
     assert await again.get("m1") == Entry("m1", 5, {"a": 1})
     await again.close()
+
+
+async def test_what_many_add_at_once_is_there_once(catalogue: SqlCatalogue) -> None:
+    added = await asyncio.gather(*(catalogue.add(Entry("m1", number, {})) for number in range(30)))
+    assert sum(added) == 1
+    assert len((await catalogue.page(5))[0]) == 1

@@ -5,6 +5,7 @@ from fastapi.testclient import TestClient
 
 from bunraku.backing import problems
 from bunraku.backing.problems import ProblemError
+from bunraku.backing.unavailable import Unavailable
 
 
 def client() -> TestClient:
@@ -18,6 +19,10 @@ def client() -> TestClient:
     @app.get("/number/{number}")
     async def number(number: int) -> int:
         return number
+
+    @app.get("/away")
+    async def away() -> None:
+        raise Unavailable("the catalogue", "connection refused by 10.0.0.7")
 
     return TestClient(app)
 
@@ -55,3 +60,12 @@ def test_a_field_deep_inside_is_named_as_one_would_write_it() -> None:
     assert problem.extra["field"] == "targets[3][1]"
     assert problem.detail == "targets[3][1]: not a number"
     assert problems.invalid_field((), "not an object").extra["field"] is None
+
+
+def test_what_is_away_may_be_asked_again_and_addresses_stay_inside() -> None:
+    answer = client().get("/away")
+    assert answer.status_code == answer.json()["status"] == 503
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert int(answer.headers["retry-after"]) > 0
+    assert "the catalogue" in answer.json()["detail"]
+    assert "10.0.0.7" not in answer.text

@@ -1,34 +1,84 @@
+"""What holds of every register: within one process, and over a real nats-server."""
+
 from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator
 
 import pytest
 
-from bunraku.backing.register import Conflict, MemoryRegister
+from bunraku.backing.register import Conflict, MemoryRegister, Register
+from bunraku.backing.register_nats import NatsRegister
+from tests.processes import jetstream, url_of
 
 
-async def test_who_has_not_seen_the_newest_changes_nothing() -> None:
-    register = MemoryRegister()
-    first = await register.put("sessions.a", b"1", 0)
+@pytest.fixture(scope="module")
+def nats_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with jetstream(tmp_path_factory.mktemp("nats")) as server:
+        yield url_of(server)
+
+
+@pytest.fixture(params=["memory", "nats"])
+async def registers(request: pytest.FixtureRequest) -> AsyncIterator[tuple[Register, Register]]:
+    """The register as two replicas see it."""
+    if request.param == "memory":
+        register = MemoryRegister()
+        yield register, register
+        return
+    url = request.getfixturevalue("nats_url")
+    one, two = NatsRegister(url), NatsRegister(url)
+    yield one, two
+    for prefix in ("sessions", "replicas", "sessionsc"):
+        for key in await one.all(prefix):
+            await one.remove(key)
+    await one.close()
+    await two.close()
+
+
+async def test_who_has_not_seen_the_newest_changes_nothing(registers: tuple[Register, Register]) -> None:
+    one, two = registers
+    assert await one.get("sessions.a") is None
+    first = await one.put("sessions.a", b"1", 0)
     with pytest.raises(Conflict):
-        await register.put("sessions.a", b"2", 0)
-    second = await register.put("sessions.a", b"2", first)
+        await two.put("sessions.a", b"2", 0)
+    second = await two.put("sessions.a", b"2", first)
     assert second > first
-    for late in (register.put("sessions.a", b"3", first), register.remove("sessions.a", first)):
+    for late in (one.put("sessions.a", b"3", first), one.remove("sessions.a", first)):
         with pytest.raises(Conflict):
             await late
-    found = await register.get("sessions.a")
+    found = await one.get("sessions.a")
     assert found is not None
     assert (found.value, found.revision) == (b"2", second)
-    third = await register.put("sessions.a", b"4")
-    await register.remove("sessions.a", third)
-    assert await register.get("sessions.a") is None
-    await register.remove("sessions.a")
-    assert await register.put("sessions.a", b"5", 0) > third
+    third = await two.put("sessions.a", b"4")
+    await one.remove("sessions.a", third)
+    assert await two.get("sessions.a") is None
+    await one.remove("sessions.a")
+    assert await two.put("sessions.a", b"", 0) > third
+    empty = await one.get("sessions.a")
+    assert empty is not None
+    assert empty.value == b""
 
 
-async def test_keys_are_listed_by_their_first_words_in_the_order_they_were_made() -> None:
-    register = MemoryRegister()
-    for key in ("sessions.b", "replicas.b", "sessions.a", "sessionsc.a"):
-        await register.put(key, key.encode())
-    await register.put("sessions.b", b"new")
-    found = await register.all("sessions")
-    assert [(key, one.value) for key, one in found.items()] == [("sessions.b", b"new"), ("sessions.a", b"sessions.a")]
+async def test_keys_are_found_by_their_first_words(registers: tuple[Register, Register]) -> None:
+    one, two = registers
+    assert await two.all("sessions") == {}
+    for key in ("sessions.b-_1", "replicas.b", "sessions.a", "sessions.gone", "sessionsc.a"):
+        await one.put(key, key.encode())
+    await two.put("sessions.b-_1", b"new")
+    await one.remove("sessions.gone")
+    found = await two.all("sessions")
+    assert {key: registered.value for key, registered in found.items()} == {
+        "sessions.b-_1": b"new",
+        "sessions.a": b"sessions.a",
+    }
+    assert found["sessions.a"] == await one.get("sessions.a")
+
+
+async def test_of_many_who_want_a_key_one_has_it(registers: tuple[Register, Register]) -> None:
+    one, two = registers
+    revision = await one.put("sessions.a", b"nobody")
+    tried = await asyncio.gather(
+        *(register.put("sessions.a", b"x", revision) for register in (one, two) * 10), return_exceptions=True
+    )
+    assert sum(isinstance(outcome, int) for outcome in tried) == 1
+    assert sum(isinstance(outcome, Conflict) for outcome in tried) == 19

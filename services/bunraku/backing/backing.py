@@ -34,15 +34,30 @@ class Backing:
 
 @asynccontextmanager
 async def open_backing(settings: Settings) -> AsyncIterator[Backing]:
-    """Open everything at the addresses in `settings`, and close it again."""
-    if settings.bus != "memory:":
-        raise ValueError(f"a bus is at memory:, not {settings.bus!r}")
+    """Open everything at the addresses in `settings`, and close it again; raises ValueError for what is no address.
+
+    Nothing need be there yet: what is away is tried again when it is used, or goes on being tried.
+    """
     settings.data.mkdir(parents=True, exist_ok=True)
     catalogue = Catalogue(settings.catalogue_url())
-    bus, register = MemoryBus(), MemoryRegister()
+    library = Library.open(settings.library_url())
+    bus, register = await _open_bus(settings.bus)
     try:
-        yield Backing(settings, catalogue, Library.open(settings.library_url()), bus, register)
+        yield Backing(settings, catalogue, library, bus, register)
     finally:
         await register.close()
         await bus.close()
         await catalogue.close()
+
+
+async def _open_bus(url: str) -> tuple[Bus, Register]:
+    """The bus and the register at one address."""
+    if url == "memory:":
+        return MemoryBus(), MemoryRegister()
+    # imported here, as most processes have no use for them
+    from bunraku.backing.bus_nats import NatsBus
+    from bunraku.backing.register_nats import NatsRegister
+
+    bus, register = NatsBus(url), NatsRegister(url)
+    await bus.open()
+    return bus, register

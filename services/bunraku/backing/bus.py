@@ -1,20 +1,29 @@
 """What services say to each other: subjects, published bytes, and questions with one answer.
 
-The shape is that of NATS core, so that a broker can take the place of this process's own. Subjects are words joined by
-dots. Handlers of published messages are plain functions that must return at once; they run in the order of publishing.
+The shape is that of NATS core, so that a broker can take the place of this process's own (`bunraku.backing.bus_nats`).
+Subjects are words joined by dots. Handlers of published messages are plain functions that must return at once; they run
+in the order of publishing, that of each publisher. What one raises is logged, and nobody else sees it.
 """
 
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 from collections import defaultdict
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
-_WORD = re.compile(r"[A-Za-z0-9_-]{1,64}")
+from bunraku.backing.unavailable import ANSWERED
+
 Handler = Callable[[bytes], None]
 Answerer = Callable[[bytes], Awaitable[bytes]]
+
+LONGEST_SUBJECT = 256
+_WORD = re.compile(r"[A-Za-z0-9_-]{1,64}")
+_SUBJECT = re.compile(r"[^\s\x00-\x1f\x7f.*>]+(\.[^\s\x00-\x1f\x7f.*>]+)*")
+
+_log = logging.getLogger(__name__)
 
 
 def is_word(text: str) -> bool:
@@ -26,6 +35,27 @@ class NobodyAnswers(Exception):
     """A question that nobody answered in time."""
 
 
+def sayable(subject: str) -> bool:
+    """Whether this is a subject: words joined by dots, without white space, wildcards or control characters, at most
+    `LONGEST_SUBJECT` characters. What people send in becomes part of subjects."""
+    return len(subject) <= LONGEST_SUBJECT and _SUBJECT.fullmatch(subject) is not None
+
+
+def checked(subject: str) -> str:
+    """The subject; raises ValueError where it is none."""
+    if not sayable(subject):
+        raise ValueError(f"a subject is words joined by dots, not {subject[:80]!r}")
+    return subject
+
+
+def hand(handler: Handler, subject: str, data: bytes) -> None:
+    """Call a handler with a message."""
+    try:
+        handler(data)
+    except Exception:
+        _log.exception("a message to %s could not be taken", subject)
+
+
 class Subscription(Protocol):
     """What ends a subscription."""
 
@@ -34,47 +64,65 @@ class Subscription(Protocol):
 
 
 class Bus(Protocol):
-    """The bus as the services see it."""
+    """The bus as the services see it. Methods raise ValueError for what is no subject."""
+
+    @property
+    def up(self) -> bool:
+        """Whether messages can be sent now."""
+
+    def on_return(self, handler: Callable[[], None]) -> Subscription:
+        """Call `handler` whenever the bus is up again after it was away, with all subscriptions in place. What was
+        published meanwhile is lost: who keeps something up to date asks for it anew."""
 
     def publish(self, subject: str, data: bytes) -> None:
-        """Send to all who have subscribed; lost where nobody has."""
+        """Send to all who have subscribed; lost where nobody has, or the bus is away. Never blocks."""
 
     def subscribe(self, subject: str, handler: Handler) -> Subscription:
         """Call `handler` with every message to `subject` from now on."""
 
     def answer(self, subject: str, answerer: Answerer) -> Subscription:
-        """Answer the questions put to `subject`; one answerer a subject."""
+        """Answer the questions put to `subject`. Of several processes that do, one gets each question."""
 
-    async def ask(self, subject: str, data: bytes = b"", seconds: float = 2.0) -> bytes:
-        """The answer to a question; raises `NobodyAnswers` after `seconds`, or at once where nobody is there."""
+    async def ask(self, subject: str, data: bytes = b"", seconds: float = ANSWERED) -> bytes:
+        """The answer to a question; raises `NobodyAnswers` after `seconds`, or at once where nobody is there or could
+        be, and `Unavailable` where the bus is away."""
 
     async def close(self) -> None:
         """End every subscription."""
 
 
-class _End:
+class End:
+    """A subscription that ends by a function."""
+
     def __init__(self, end: Callable[[], None]) -> None:
         self._end = end
 
     def end(self) -> None:
+        """As `Subscription.end`."""
         self._end()
 
 
 class MemoryBus:
-    """The bus within one process."""
+    """The bus within one process: never away."""
+
+    up = True
 
     def __init__(self) -> None:
         self._handlers: dict[str, list[Handler]] = defaultdict(list)
         self._answerers: dict[str, Answerer] = {}
 
+    def on_return(self, _: Callable[[], None]) -> Subscription:
+        """As `Bus.on_return`."""
+        return End(lambda: None)
+
     def publish(self, subject: str, data: bytes) -> None:
         """As `Bus.publish`."""
-        for handler in tuple(self._handlers.get(subject, ())):
-            handler(data)
+        for handler in tuple(self._handlers.get(checked(subject), ())):
+            hand(handler, subject, data)
 
     def subscribe(self, subject: str, handler: Handler) -> Subscription:
         """As `Bus.subscribe`."""
-        self._handlers[subject].append(handler)
+        self._handlers[checked(subject)].append(handler)
 
         def end() -> None:
             handlers = self._handlers.get(subject, [])
@@ -83,20 +131,20 @@ class MemoryBus:
             if not handlers:
                 self._handlers.pop(subject, None)
 
-        return _End(end)
+        return End(end)
 
     def answer(self, subject: str, answerer: Answerer) -> Subscription:
         """As `Bus.answer`."""
-        self._answerers[subject] = answerer
+        self._answerers[checked(subject)] = answerer
 
         def end() -> None:
             # another may answer by now
             if self._answerers.get(subject) is answerer:
                 del self._answerers[subject]
 
-        return _End(end)
+        return End(end)
 
-    async def ask(self, subject: str, data: bytes = b"", seconds: float = 2.0) -> bytes:
+    async def ask(self, subject: str, data: bytes = b"", seconds: float = ANSWERED) -> bytes:
         """As `Bus.ask`."""
         answerer = self._answerers.get(subject)
         if answerer is None:

@@ -29,7 +29,8 @@ class Catalogue:
     """The catalogue at `sqlite:///path` or `postgresql://...`.
 
     It is opened at its first use, or by `open`: loading SQLAlchemy takes seconds on a small machine, and a stage can
-    be seen without it. Raises ValueError for another address.
+    be seen without it. Raises ValueError for another address. Every method raises `Unavailable` while the database is
+    away.
     """
 
     def __init__(self, url: str) -> None:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import binascii
 import json
-from typing import Any
+import sqlite3
+from collections.abc import Coroutine
+from typing import Any, TypeVar
 
 from sqlalchemy import BigInteger, Column, MetaData, Row, String, Table, Text, delete, select, tuple_
-from sqlalchemy.exc import IntegrityError
+from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
+from sqlalchemy.exc import TimeoutError as NoConnection
 from sqlalchemy.ext.asyncio import AsyncEngine, create_async_engine
 
 from bunraku.backing.catalogue import BadCursor, Entry
+from bunraku.backing.migrate import HEAD, migrate, version
+from bunraku.backing.unavailable import ANSWERED, Patience, Unavailable
 
 METADATA = MetaData()
 MOTIONS = Table(
@@ -22,29 +28,64 @@ MOTIONS = Table(
     Column("description", Text, nullable=False),
 )
 _DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg"}
+_OURS = ("22", "23", "42", "53100")
+"""SQLSTATEs of PostgreSQL that are not its own trouble: of data, constraints and statements, and the full disk."""
+
+Found = TypeVar("Found")
 
 
 class SqlCatalogue:
-    """The table of motions."""
+    """The table of motions. Every method raises `Unavailable` where the database is away, and PostgreSQL's also where
+    it does not answer within `ANSWERED`; once it is back they work again."""
 
-    def __init__(self, engine: AsyncEngine) -> None:
-        self._engine = engine
+    def __init__(self, url: str) -> None:
+        """`url` is SQLAlchemy's, of an async driver."""
+        self._url = url
+        self._postgres = url.startswith("postgresql")
+        self._patience = Patience("the catalogue")
+        limits = {
+            "pool_pre_ping": True,
+            "pool_timeout": ANSWERED,
+            "connect_args": {"timeout": ANSWERED, "command_timeout": ANSWERED},
+        }
+        self._engine: AsyncEngine = create_async_engine(url, **(limits if self._postgres else {}))
 
     @classmethod
     async def open(cls, url: str) -> SqlCatalogue:
-        """The catalogue at `sqlite:///path` or `postgresql://...`, its table made where it is missing."""
+        """The catalogue at `sqlite:///path` or `postgresql://...`, brought to the version of this code; raises
+        `UnknownVersion` where it is of a newer one."""
         scheme, rest = url.split(":", 1)
-        engine = create_async_engine(f"{_DRIVERS[scheme]}:{rest}", pool_pre_ping=scheme != "sqlite")
-        async with engine.begin() as connection:
-            await connection.run_sync(METADATA.create_all)
-        return cls(engine)
+        catalogue = cls(f"{_DRIVERS[scheme]}:{rest}")
+        try:
+            if await catalogue._answer(catalogue._version()) != HEAD:
+                await catalogue._answer(asyncio.to_thread(migrate, catalogue._url), hurry=False)
+        except BaseException:
+            await catalogue.close()
+            raise
+        return catalogue
 
     async def close(self) -> None:
         """Close every connection."""
+        await self._patience.end()
         await self._engine.dispose()
 
     async def add(self, entry: Entry) -> bool:
         """Add a motion; whether it was new."""
+        return await self._answer(self._add(entry))
+
+    async def get(self, motion: str) -> Entry | None:
+        """The motion of this id."""
+        return await self._answer(self._get(motion)) if _is_id(motion) else None
+
+    async def page(self, limit: int, cursor: str | None = None) -> tuple[list[Entry], str | None]:
+        """At most `limit` motions, newest first, and the cursor of the next page; raises `BadCursor`."""
+        return await self._answer(self._page(limit, _read_cursor(cursor) if cursor is not None else None))
+
+    async def remove(self, motion: str) -> bool:
+        """Remove a motion; whether it was there."""
+        return _is_id(motion) and await self._answer(self._remove(motion))
+
+    async def _add(self, entry: Entry) -> bool:
         row = {"id": entry.id, "created": entry.created, "description": json.dumps(entry.description)}
         try:
             async with self._engine.begin() as connection:
@@ -53,17 +94,15 @@ class SqlCatalogue:
             return False
         return True
 
-    async def get(self, motion: str) -> Entry | None:
-        """The motion of this id."""
+    async def _get(self, motion: str) -> Entry | None:
         async with self._engine.connect() as connection:
             row = (await connection.execute(select(MOTIONS).where(MOTIONS.c.id == motion))).first()
         return _entry(row) if row is not None else None
 
-    async def page(self, limit: int, cursor: str | None = None) -> tuple[list[Entry], str | None]:
-        """At most `limit` motions, newest first, and the cursor of the next page; raises `BadCursor`."""
+    async def _page(self, limit: int, after: tuple[int, str] | None) -> tuple[list[Entry], str | None]:
         statement = select(MOTIONS).order_by(MOTIONS.c.created.desc(), MOTIONS.c.id.desc()).limit(limit + 1)
-        if cursor is not None:
-            statement = statement.where(tuple_(MOTIONS.c.created, MOTIONS.c.id) < tuple_(*_read_cursor(cursor)))
+        if after is not None:
+            statement = statement.where(tuple_(MOTIONS.c.created, MOTIONS.c.id) < tuple_(*after))
         async with self._engine.connect() as connection:
             entries = [_entry(row) for row in (await connection.execute(statement)).all()]
         if len(entries) <= limit:
@@ -71,10 +110,35 @@ class SqlCatalogue:
         last = entries[limit - 1]
         return entries[:limit], base64.urlsafe_b64encode(f"{last.created}:{last.id}".encode()).decode()
 
-    async def remove(self, motion: str) -> bool:
-        """Remove a motion; whether it was there."""
+    async def _remove(self, motion: str) -> bool:
         async with self._engine.begin() as connection:
             return (await connection.execute(delete(MOTIONS).where(MOTIONS.c.id == motion))).rowcount > 0
+
+    async def _version(self) -> str | None:
+        async with self._engine.connect() as connection:
+            return await connection.run_sync(version)
+
+    async def _answer(self, asking: Coroutine[Any, Any, Found], *, hurry: bool = True) -> Found:
+        """What the database answers; raises `Unavailable`."""
+        try:
+            return await self._patience.wait(asking, ANSWERED if self._postgres and hurry else None)
+        except (DBAPIError, NoConnection, OSError) as error:
+            if isinstance(error, DBAPIError) and not _is_away(error):
+                raise
+            cause = error.orig if isinstance(error, DBAPIError) else error
+            raise Unavailable("the catalogue", str(cause) or type(cause).__name__) from error
+
+
+def _is_away(error: DBAPIError) -> bool:
+    """Whether it is the database's trouble, which passes, and not that of the statement or a full disk."""
+    if isinstance(error.orig, sqlite3.Error):
+        return isinstance(error, OperationalError) and error.orig.sqlite_errorcode != sqlite3.SQLITE_FULL
+    return not str(getattr(error.orig, "sqlstate", "")).startswith(_OURS)
+
+
+def _is_id(motion: str) -> bool:
+    """Whether this could be an id: not all text is to all databases."""
+    return motion.isascii() and motion.isalnum()
 
 
 def _entry(row: Row[Any]) -> Entry:
@@ -84,6 +148,8 @@ def _entry(row: Row[Any]) -> Entry:
 def _read_cursor(cursor: str) -> tuple[int, str]:
     try:
         created, motion = base64.urlsafe_b64decode(cursor.encode()).decode().split(":", 1)
+        if not _is_id(motion):
+            raise ValueError(motion)
         return min(max(int(created), 0), (1 << 63) - 1), motion
     except (ValueError, binascii.Error):
         raise BadCursor("the cursor is not one of this list; leave it out to start anew") from None

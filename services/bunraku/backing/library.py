@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import msgpack
-import obstore
-from obstore.store import LocalStore, ObjectStore, from_url
 
+from bunraku.backing.objects import Objects
 from bunraku.codec.audio import AudioTrack, EncodedAudio, read_audio
 from bunraku.codec.encode import EncodedMotion
 from bunraku.codec.errors import DamagedBlock
@@ -137,23 +136,22 @@ def unpack(motion: str, packed: bytes) -> StoredMotion:
 
 
 class Library:
-    """The motions in an object store, those last used kept in memory."""
+    """The motions in an object store, those last used kept in memory. Methods raise `Unavailable` as `Objects` has it;
+    what is in memory can be had without the store."""
 
-    def __init__(self, store: ObjectStore) -> None:
-        self._store = store
+    def __init__(self, objects: Objects) -> None:
+        self._objects = objects
         self._cache: OrderedDict[str, StoredMotion] = OrderedDict()
         self._cached = 0
 
     @classmethod
     def open(cls, url: str) -> Library:
         """The library at `file:///folder`, `s3://bucket/prefix` and what else obstore knows."""
-        if url.startswith("file://"):
-            return cls(LocalStore(url.removeprefix("file://"), mkdir=True))
-        return cls(from_url(url))
+        return cls(Objects(url))
 
     async def put(self, motion: str, packed: bytes) -> None:
         """Store the object that `pack` made."""
-        await obstore.put_async(self._store, _path(motion), packed)
+        await self._objects.put(_path(motion), packed)
 
     async def get(self, motion: str) -> StoredMotion | None:
         """The motion of this id, None where there is none in a codec that is spoken; what could not be an id is never a
@@ -163,7 +161,7 @@ class Library:
         if motion in self._cache:
             self._cache.move_to_end(motion)
             return self._cache[motion]
-        packed = await self._read(_path(motion))
+        packed = await self._objects.get(_path(motion))
         if packed is None:
             return None
         try:
@@ -178,35 +176,22 @@ class Library:
         """Remove a motion's object; nothing happens where there is none."""
         dropped = self._cache.pop(motion, None)
         self._cached -= dropped.size if dropped else 0
-        await self._delete(_path(motion))
+        await self._objects.delete(_path(motion))
 
     async def put_log(self, name: str, data: bytes) -> None:
         """Store a session's log under a random name of 1..64 of A-Z a-z 0-9 _ -; raises ValueError for another."""
         if not _LOG_NAME.fullmatch(name):
             raise ValueError(f"a log's name is 1..64 of A-Z a-z 0-9 _ -, not {name[:80]!r}")
-        await obstore.put_async(self._store, _log_path(name), data)
+        await self._objects.put(_log_path(name), data)
 
     async def get_log(self, name: str) -> bytes | None:
         """The log of this name, None where there is none."""
-        return await self._read(_log_path(name)) if _LOG_NAME.fullmatch(name) else None
+        return await self._objects.get(_log_path(name)) if _LOG_NAME.fullmatch(name) else None
 
     async def remove_log(self, name: str) -> None:
         """Remove a log; nothing happens where there is none."""
         if _LOG_NAME.fullmatch(name):
-            await self._delete(_log_path(name))
-
-    async def _read(self, path: str) -> bytes | None:
-        try:
-            found = await obstore.get_async(self._store, path)
-            return bytes(await found.bytes_async())
-        except FileNotFoundError:
-            return None
-
-    async def _delete(self, path: str) -> None:
-        try:
-            await obstore.delete_async(self._store, path)
-        except FileNotFoundError:
-            return
+            await self._objects.delete(_log_path(name))
 
     def _keep(self, stored: StoredMotion) -> None:
         if stored.id not in self._cache:

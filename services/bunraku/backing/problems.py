@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from http import HTTPStatus
 from typing import Any
 
@@ -10,7 +11,13 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
+from bunraku.backing.unavailable import Unavailable
+
 MEDIA_TYPE = "application/problem+json"
+RETRY_AFTER = 2
+"""Seconds after which a request that could not be served is worth another try."""
+
+_log = logging.getLogger(__name__)
 
 
 class ProblemError(Exception):
@@ -48,6 +55,13 @@ def install(app: FastAPI) -> None:
     async def told(_: Request, error: ProblemError) -> JSONResponse:
         # what else comes of a body that is too large is not wanted
         return response(error, {"Connection": "close"} if error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE else None)
+
+    @app.exception_handler(Unavailable)
+    async def unavailable(request: Request, error: Unavailable) -> JSONResponse:
+        _log.warning("%s %s: %s", request.method, request.url.path, error)
+        detail = f"{error.what} does not answer now; nothing is lost by sending the request again"
+        problem = ProblemError(503, "Not available now", detail, hint="try again in a while")
+        return response(problem, {"Retry-After": str(RETRY_AFTER)})
 
     @app.exception_handler(RequestValidationError)
     async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:

@@ -24,13 +24,13 @@ class Registered:
 
 
 class Register(Protocol):
-    """The register as the services see it."""
+    """The register as the services see it. Each call raises `Unavailable` where the broker is gone."""
 
     async def get(self, key: str) -> Registered | None:
         """What is under a key."""
 
     async def all(self, prefix: str) -> dict[str, Registered]:
-        """Everything under keys that begin with `prefix` and a dot, in the order in which keys were made."""
+        """Everything under keys that begin with `prefix` and a dot, in no order."""
 
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
         """Its new revision. With `revision` only where that is still the newest, 0 where nothing is there; raises

@@ -1,4 +1,5 @@
-"""Where the services find what they stand on: environment variables `BUNRAKU_...`, or defaults for one machine."""
+"""Where the services find what they stand on: environment variables `BUNRAKU_...` (docs/settings.md), or defaults for
+one machine."""
 
 from __future__ import annotations
 
@@ -15,11 +16,11 @@ class Settings(BaseSettings):
     data: Path = Path(".bunraku")
     """Folder of the embedded defaults."""
     catalogue: str = ""
-    """URL of the catalogue; empty: SQLite in `data`."""
+    """URL of the catalogue, `sqlite:///...` or `postgresql://...`; empty: SQLite in `data`."""
     library: str = ""
-    """URL of the library; empty: a folder in `data`."""
+    """URL of the library, `file:///...`, `s3://...` and what else obstore knows; empty: a folder in `data`."""
     bus: str = "memory:"
-    """URL of the bus."""
+    """URL of the bus, `memory:` for one process or `nats://...`, more servers after commas."""
     upload_bytes: int = 64 << 20
     """The largest upload."""
     upload_seconds: float = 60.0

@@ -15,6 +15,7 @@ from bunraku.backing.backing import clock
 from bunraku.backing.bus import Bus
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
+from bunraku.backing.unavailable import Unavailable
 from bunraku.session.distant import DistantStage
 from bunraku.session.stage_door import PRESENT
 from bunraku.session.visitor import QUEUE, Visitor
@@ -52,6 +53,8 @@ async def _join(stage: DistantStage, visitor: Visitor, name: str) -> None:
             detail = "there is no such session; it may have ended"
             raise Refusal(sockets.NOT_FOUND, error.title, detail) from None
         raise Refusal(sockets.TOO_SLOW, error.title, error.detail) from None
+    except Unavailable as error:
+        raise Refusal(sockets.TOO_SLOW, "Not now", f"{error.what} cannot be used now; come again") from None
 
 
 async def _listen(socket: WebSocket, stage: DistantStage, visitor: Visitor) -> None:

@@ -98,7 +98,10 @@ class Sessions:
     async def page(self, limit: int, cursor: str | None) -> tuple[list[dict[str, Any]], str | None]:
         """At most `limit` sessions of all replicas, oldest first, and the cursor of the next page; raises
         `ProblemError`."""
-        ids = [key.partition(".")[2] for key in await self._backing.register.all(KEY)]
+        records = {
+            key: Record(*msgpack.unpackb(one.value)) for key, one in (await self._backing.register.all(KEY)).items()
+        }
+        ids = [key.partition(".")[2] for key in sorted(records, key=lambda key: (records[key].created, key))]
         if cursor is not None and cursor not in ids:
             raise ProblemError(422, "Bad cursor", "the session at the cursor has ended; start anew", field="cursor")
         first = ids.index(cursor) if cursor is not None else 0

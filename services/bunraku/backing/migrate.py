@@ -1,0 +1,96 @@
+"""Brings a catalogue to the version that this code is written for, whichever of several replicas comes first.
+
+A migration adds what the replicas that still run can do without: they go on while others already have the new version.
+A new one is a file in `migrations/versions` with the next `revision`, and `HEAD` here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from pathlib import Path
+
+from sqlalchemy import Connection, NullPool, inspect, text
+from sqlalchemy.ext.asyncio import AsyncConnection, create_async_engine
+
+from bunraku.backing.unavailable import ANSWERED
+
+HEAD = "0001"
+"""The version that this code is written for."""
+BEFORE_VERSIONS = "0001"
+"""The version of a catalogue that has the table of motions and says none."""
+WAITING = 60.0
+"""Seconds for a migration, and for those of others before it."""
+_LOCK = 0x42756E72616B75
+"""The name of PostgreSQL's advisory lock."""
+_SCRIPTS = Path(__file__).parent / "migrations"
+# Alembic keeps what it is about in a module
+_one_at_a_time = threading.Lock()
+
+
+class UnknownVersion(Exception):
+    """The catalogue was last used by a Bunraku that is newer than this one."""
+
+
+def version(connection: Connection) -> str | None:
+    """The version that a catalogue says it has. Loads nothing that migrating needs."""
+    if not inspect(connection).has_table("alembic_version"):
+        return None
+    found: str | None = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
+    return found
+
+
+def migrate(url: str) -> None:
+    """Bring the catalogue at an SQLAlchemy URL of an async driver to `HEAD`; nothing happens where it is there already.
+
+    Blocks, and loads Alembic: to be called in a thread. Raises `UnknownVersion`, and what SQLAlchemy raises.
+    """
+    with _one_at_a_time:
+        asyncio.run(_migrate(url))
+
+
+async def _migrate(url: str) -> None:
+    postgres = url.startswith("postgresql")
+    patience = {"timeout": ANSWERED, "command_timeout": WAITING} if postgres else {"timeout": WAITING}
+    engine = create_async_engine(url, poolclass=NullPool, connect_args=patience)
+    try:
+        async with engine.connect() as connection:
+            if postgres:
+                await connection.execute(text(f"SELECT pg_advisory_xact_lock({_LOCK})"))
+                await connection.run_sync(_upgrade)
+                await connection.commit()
+            else:
+                await _immediately(connection)
+    finally:
+        await engine.dispose()
+
+
+async def _immediately(connection: AsyncConnection) -> None:
+    """Upgrade SQLite in a transaction that writes from its beginning, so that there is one at a time."""
+    await connection.execution_options(isolation_level="AUTOCOMMIT")
+    await connection.exec_driver_sql("BEGIN IMMEDIATE")
+    try:
+        await connection.run_sync(_upgrade)
+    except BaseException:
+        await connection.exec_driver_sql("ROLLBACK")
+        raise
+    await connection.exec_driver_sql("COMMIT")
+
+
+def _upgrade(connection: Connection) -> None:
+    # imported here, as it takes a second and is wanted once in a catalogue's life
+    from alembic import command
+    from alembic.config import Config
+    from alembic.script import ScriptDirectory
+
+    config = Config()
+    config.set_main_option("script_location", str(_SCRIPTS).replace("%", "%%"))
+    config.set_main_option("path_separator", "os")
+    config.attributes["connection"] = connection
+    at = version(connection)
+    known = [script.revision for script in ScriptDirectory.from_config(config).walk_revisions()]
+    if at is not None and at not in known:
+        raise UnknownVersion(f"the catalogue has version {at}, and this Bunraku knows {HEAD}: use a newer one")
+    if at is None and inspect(connection).has_table("motions"):
+        command.stamp(config, BEFORE_VERSIONS)
+    command.upgrade(config, HEAD)

@@ -1,0 +1,78 @@
+"""Objects by name, in a folder or in an object store by URL."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable
+from datetime import timedelta
+from typing import Any, TypeVar
+
+import obstore
+from obstore.exceptions import BaseError
+from obstore.store import LocalStore, ObjectStore, from_url
+
+from bunraku.backing.unavailable import ANSWERED, Patience, Unavailable
+
+SLOW = 1 << 20
+"""Bytes a second: a store that takes or gives fewer counts as gone."""
+
+Found = TypeVar("Found")
+
+
+class Objects:
+    """Objects at `file:///folder`, `s3://bucket/prefix`, and what else obstore knows.
+
+    Methods raise `Unavailable` where a store is not the machine's own and is away, refuses us, or has no such bucket.
+    Endpoint and keys of S3 are those of the environment (`AWS_ENDPOINT_URL`, `AWS_ACCESS_KEY_ID` ...).
+    """
+
+    def __init__(self, url: str) -> None:
+        """Raises ValueError, or what obstore raises, for what is no address."""
+        self._patience = Patience("the library")
+        self._local = url.startswith("file://")
+        self._store: ObjectStore
+        if self._local:
+            self._store = LocalStore(url.removeprefix("file://"), mkdir=True)
+        elif url.startswith("memory:"):
+            self._store = from_url(url)
+        else:
+            # an endpoint without TLS is one only where somebody says so in its address
+            patience: Any = {"allow_http": True, "connect_timeout": timedelta(seconds=ANSWERED / 2)}
+            again: Any = {"max_retries": 3, "retry_timeout": timedelta(seconds=ANSWERED / 2)}
+            self._store = from_url(url, client_options=patience, retry_config=again)
+
+    async def put(self, path: str, data: bytes) -> None:
+        """Store an object; once this returns it is there."""
+        try:
+            await self._answer(obstore.put_async(self._store, path, data), len(data))
+        except FileNotFoundError as error:
+            if self._local:
+                raise
+            raise Unavailable("the library", _told(error)) from error
+
+    async def get(self, path: str) -> bytes | None:
+        """The object, None where there is none."""
+        try:
+            found = await self._answer(obstore.get_async(self._store, path))
+            return bytes(await self._answer(found.bytes_async(), found.meta["size"]))
+        except FileNotFoundError:
+            return None
+
+    async def delete(self, path: str) -> None:
+        """Remove an object; nothing happens where there is none."""
+        try:
+            await self._answer(obstore.delete_async(self._store, path))
+        except FileNotFoundError:
+            return
+
+    async def _answer(self, asked: Awaitable[Found], size: int = 0) -> Found:
+        if self._local:
+            return await asked
+        try:
+            return await self._patience.wait(asked, ANSWERED + size / SLOW)
+        except BaseError as error:
+            raise Unavailable("the library", _told(error)) from error
+
+
+def _told(error: Exception) -> str:
+    """The first line of what obstore says at length."""
+    return str(error).partition("\n")[0]

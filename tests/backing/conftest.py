@@ -1,0 +1,48 @@
+"""What the tests of catalogues share: a place for a new one, in SQLite and in PostgreSQL."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+
+import asyncpg
+import pytest
+
+from tests.processes import Owned, postgres
+
+
+@pytest.fixture(scope="session")
+def postgres_server() -> Iterator[Owned]:
+    """A server that the tests of one process share."""
+    with postgres() as server:
+        yield server
+
+
+async def _create(port: int, name: str) -> None:
+    connection = await asyncpg.connect(host="127.0.0.1", port=port, user="postgres", database="postgres")
+    await connection.execute(f"CREATE DATABASE {name}")
+    await connection.close()
+
+
+def database(server: Owned) -> str:
+    """The address of a new, empty database."""
+    name = f"c{secrets.token_hex(6)}"
+    asyncio.run(_create(server.port, name))
+    return f"postgresql://postgres@127.0.0.1:{server.port}/{name}"
+
+
+@pytest.fixture
+def postgres_url(postgres_server: Owned) -> str:
+    """The address of a new, empty database in PostgreSQL."""
+    return database(postgres_server)
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """The address of a catalogue that is not there yet."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path}/catalogue.sqlite"
+    found: str = request.getfixturevalue("postgres_url")
+    return found

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from bunraku.backing.unavailable import Patience, Unavailable
+
+
+async def test_answers_and_errors_come_as_they_are() -> None:
+    async def answer() -> int:
+        return 7
+
+    async def refuse() -> int:
+        raise KeyError("no")
+
+    patience = Patience("the test")
+    assert await patience.wait(answer()) == 7
+    assert await patience.wait(answer(), None) == 7
+    with pytest.raises(KeyError):
+        await patience.wait(refuse())
+
+
+async def test_who_waits_in_vain_is_let_go_before_what_they_waited_for_has_ended() -> None:
+    ended = asyncio.Event()
+    go = asyncio.Event()
+
+    async def stubborn() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await go.wait()
+            ended.set()
+
+    patience = Patience("the test")
+    with pytest.raises(Unavailable, match="the test"):
+        await patience.wait(stubborn(), 0.31)
+    assert not ended.is_set()
+    go.set()
+    await patience.end()
+    assert ended.is_set()
+
+
+async def test_who_goes_away_takes_the_question_along() -> None:
+    cancelled = asyncio.Event()
+
+    async def never() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            cancelled.set()
+
+    waiting = asyncio.create_task(Patience("the test").wait(never(), None))
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    waiting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await waiting
+    async with asyncio.timeout(20):
+        await cancelled.wait()
+
+
+async def test_a_loop_that_stood_still_hears_what_came_meanwhile() -> None:
+    loop = asyncio.get_running_loop()
+    answer: asyncio.Future[int] = loop.create_future()
+    waiting = asyncio.create_task(Patience("the test").wait(answer, 0.35))
+    await asyncio.sleep(0)
+    # the loop comes to its timers and to what came from elsewhere at the same time
+    loop.call_later(0.05, answer.set_result, 7)
+    loop.call_soon(lambda: [sum(range(1000)) for _ in range(20_000)])
+    assert await waiting == 7

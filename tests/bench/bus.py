@@ -1,0 +1,157 @@
+"""From the publishing of a message to its handler in another process: `make bench-bus`. Needs nats-server.
+
+The last line printed is one JSON object. A line of the table is some publishers' worth of overlays, 66 bytes twenty
+times a second of each session, through one nats-server on loopback; each process has a loop as the services have it.
+Beside it, a bare socket between two processes with the same loop, and the bus within a process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import socket
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import cast
+
+import uvloop
+
+from bunraku.backing.bus import Bus, MemoryBus
+from bunraku.backing.bus_nats import NatsBus
+from tests.bench.fanout_processes import Told
+from tests.processes import nats_server, url_of
+
+HERTZ = 20
+BYTES = 66
+SESSIONS = (1, 50, 200)
+
+
+class Heard:
+    """How long messages were on the way, seconds: each begins with the instant of its publishing."""
+
+    def __init__(self) -> None:
+        self.late: list[float] = []
+
+    def __call__(self, message: bytes) -> None:
+        self.late.append((time.monotonic_ns() - int.from_bytes(message[:8], "little")) * 1e-9)
+
+
+async def publish(bus: Bus, sessions: int, seconds: float) -> int:
+    """Publish as so many stages do, each at instants of its own; how many messages."""
+    begun = time.monotonic()
+    total = round(seconds * HERTZ) * sessions
+    for number in range(total):
+        wait = begun + number / (HERTZ * sessions) - time.monotonic()
+        if wait > 0:
+            await asyncio.sleep(wait)
+        data = time.monotonic_ns().to_bytes(8, "little") + bytes(BYTES - 8)
+        bus.publish(f"session.{number % sessions}.overlay", data)
+    return total
+
+
+class Bare(asyncio.Protocol):
+    """A socket that carries messages of `BYTES` and nothing else, as `Bus.publish` would."""
+
+    def __init__(self, heard: Heard | None = None) -> None:
+        self._heard, self._unread = heard, b""
+        self.transport: asyncio.Transport
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """As asyncio has it."""
+        self.transport = cast(asyncio.Transport, transport)
+
+    def data_received(self, data: bytes) -> None:
+        """As asyncio has it."""
+        assert self._heard is not None
+        self._unread += data
+        while len(self._unread) >= BYTES:
+            self._heard(self._unread[:BYTES])
+            self._unread = self._unread[BYTES:]
+
+
+async def listen(where: str) -> None:
+    """The other process: listens to all sessions, and says how late messages were for each line that it is told."""
+    loop = asyncio.get_running_loop()
+    heard = Heard()
+    bus = NatsBus(where)
+    await bus.open()
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        bare = await loop.create_server(lambda: Bare(heard), sock=listening)
+        print(listening.getsockname()[1], flush=True)
+        for number in range(max(SESSIONS)):
+            bus.subscribe(f"session.{number}.overlay", heard)
+
+        async def ready(_: bytes) -> bytes:
+            return b""
+
+        bus.answer("ready", ready)
+        while await asyncio.to_thread(sys.stdin.readline):
+            print(json.dumps(heard.late), flush=True)
+            heard.late.clear()
+        bare.close()
+
+
+async def measure(url: str, other: Told, seconds: float) -> dict[str, float]:
+    """Every line of the table."""
+    figures: dict[str, float] = {}
+    bus = NatsBus(url)
+    await bus.open()
+    port = int(other.line())
+    _, bare = await asyncio.get_running_loop().create_connection(Bare, "127.0.0.1", port)
+
+    class Socket(MemoryBus):
+        def publish(self, _: str, data: bytes) -> None:
+            bare.transport.write(data)
+
+    await bus.ask("ready")
+    print(f"{'':24}{'messages/s':>12}{'p50 ms':>10}{'p99 ms':>10}{'worst ms':>10}")
+    for sessions in SESSIONS:
+        for name, through in (("nats", bus), ("socket", Socket()), ("memory", memory := MemoryBus())):
+            inside = Heard()
+            for number in range(sessions):
+                memory.subscribe(f"session.{number}.overlay", inside)
+            sent = await publish(through, sessions, seconds)
+            await asyncio.sleep(0.3)
+            late = inside.late if name == "memory" else await asyncio.to_thread(other.ask, "")
+            assert len(late) == sent, f"{name}: {len(late)} of {sent} came"
+            cuts = statistics.quantiles(late, n=100)
+            p50, p99, worst = (value * 1e3 for value in (cuts[49], cuts[98], max(late)))
+            print(
+                f"{name}, {sessions} sessions".ljust(24) + f"{sessions * HERTZ:12}{p50:10.3f}{p99:10.3f}{worst:10.2f}"
+            )
+            figures |= {f"{name}_{sessions}_ms_p50": round(p50, 3), f"{name}_{sessions}_ms_p99": round(p99, 3)}
+    cost = 20_000
+    before = time.process_time()
+    for _ in range(20):
+        for _ in range(cost // 20):
+            bus.publish("nobody.listens", bytes(BYTES))
+        await asyncio.sleep(0.05)
+    figures["publish_us"] = round((time.process_time() - before) / cost * 1e6, 2)
+    print(f"processor time of one publishing: {figures['publish_us']} us")
+    await bus.close()
+    return figures
+
+
+def main() -> None:
+    """Measure, or be the other process."""
+    if sys.argv[1:2] == ["listen"]:
+        uvloop.run(listen(sys.argv[2]))
+        return
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=8.0, help="of each line")
+    seconds = parser.parse_args().seconds
+    with (
+        tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder,
+        nats_server(Path(folder)) as server,
+        Told.module("bus", "listen", url_of(server)) as other,
+    ):
+        figures = uvloop.run(measure(url_of(server), other, seconds))
+    print(json.dumps({"bench": "bus", **figures}))
+
+
+if __name__ == "__main__":
+    main()

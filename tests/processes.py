@@ -1,0 +1,185 @@
+"""Servers of others that tests own: each a process with a port and a folder of its own, ended by its number."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pwd
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+STARTING = 30.0
+
+
+def needed(program: str, *folders: Path) -> str:
+    """Where a program is; without it a test is skipped, and fails in CI."""
+    found = shutil.which(program, path=os.pathsep.join([os.environ.get("PATH", ""), "/usr/sbin", *map(str, folders)]))
+    if found is None:
+        if os.environ.get("CI"):
+            pytest.fail(f"in CI {program} must be there")
+        pytest.skip(f"{program} is not installed")
+    return found
+
+
+def free_port() -> int:
+    """A port that nobody has."""
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        return int(taken.getsockname()[1])
+
+
+class Owned:
+    """A server process that can be killed, stood still and started again at the same place."""
+
+    def __init__(
+        self, command: list[str], port: int, folder: Path, user: str | None = None, ready: Sequence[str] = ()
+    ) -> None:
+        """`ready` is a command that succeeds once it takes connections; without one its port says so."""
+        self.command, self.port, self.folder, self._user, self._ready = command, port, folder, user, ready
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it; returns when it takes connections."""
+        log = self.folder / "log"
+        with log.open("ab") as said:
+            self._process = subprocess.Popen(
+                self.command, stdout=said, stderr=said, stdin=subprocess.DEVNULL, cwd=self.folder, user=self._user
+            )
+        end = time.monotonic() + STARTING
+        while time.monotonic() < end and self._process.poll() is None:
+            try:
+                socket.create_connection(("127.0.0.1", self.port), 1).close()
+                if not self._ready or subprocess.run(self._ready, stdout=subprocess.DEVNULL).returncode == 0:
+                    return
+            except OSError:
+                pass
+            time.sleep(0.02)
+        self.stop()
+        pytest.fail(f"{self.command[0]} did not start: {log.read_text(errors='replace')[-2000:]}")
+
+    def send(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        assert self._process is not None
+        self._process.send_signal(number)
+
+    def send_to_all(self, number: signal.Signals) -> None:
+        """Send it and its own processes a signal."""
+        assert self._process is not None
+        for child in Path(f"/proc/{self._process.pid}/task/{self._process.pid}/children").read_text().split():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(int(child), number)
+        self.send(number)
+
+    def kill(self) -> None:
+        """End it, and its own processes, as a power cut does."""
+        self.send_to_all(signal.SIGKILL)
+        self._end(signal.SIGKILL)
+
+    def stop(self) -> None:
+        """End it; nothing happens where it has ended."""
+        self._end(signal.SIGINT)
+
+    def _end(self, number: signal.Signals) -> None:
+        if self._process is not None:
+            self._process.send_signal(signal.SIGCONT)
+            self._process.send_signal(number)
+            try:
+                self._process.wait(10)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait(10)
+            self._process = None
+
+
+@contextmanager
+def _owned(server: Owned) -> Iterator[Owned]:
+    try:
+        server.start()
+        yield server
+    finally:
+        server.stop()
+
+
+@contextmanager
+def nats_server(folder: Path, *options: str) -> Iterator[Owned]:
+    """A nats-server; skips the test where there is none."""
+    port = free_port()
+    program = needed("nats-server")
+    with _owned(Owned([program, "-a", "127.0.0.1", "-p", str(port), *options], port, folder)) as server:
+        yield server
+
+
+@contextmanager
+def jetstream(folder: Path) -> Iterator[Owned]:
+    """A nats-server that keeps what it is given, also when it is killed; skips the test where there is none."""
+    config = folder / "nats.conf"
+    config.write_text(f'jetstream {{ store_dir: "{folder / "store"}" }}\n')
+    with nats_server(folder, "-c", str(config)) as server:
+        yield server
+
+
+def url_of(server: Owned) -> str:
+    """The bus's address of a nats-server."""
+    return f"nats://127.0.0.1:{server.port}"
+
+
+@contextmanager
+def postgres() -> Iterator[Owned]:
+    """A PostgreSQL server without a password, its only user `postgres`; skips the test where there is none."""
+    debian = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
+    initdb, program = needed("initdb", *debian), needed("postgres", *debian)
+    # it refuses to run as root, and whom it runs as has no way into the tests' own folder
+    user = _somebody() if os.geteuid() == 0 else None
+    with tempfile.TemporaryDirectory(prefix="bunraku-postgres-", dir="/tmp") as name:
+        folder = Path(name)
+        if user is not None:
+            shutil.chown(folder, user)
+        subprocess.run(
+            [initdb, "-D", folder / "data", "-U", "postgres", "-A", "trust", "-E", "UTF8", "--locale=C", "--no-sync"],
+            check=True,
+            stdout=subprocess.DEVNULL,
+            user=user,
+            cwd=folder,
+        )
+        port = free_port()
+        options = {
+            "listen_addresses": "127.0.0.1",
+            "port": str(port),
+            "unix_socket_directories": "",
+            "fsync": "off",
+            "shared_buffers": "16MB",
+        }
+        set_to = (word for option, value in options.items() for word in ("-c", f"{option}={value}"))
+        command = [program, "-D", str(folder / "data"), *set_to]
+        ready = [needed("pg_isready", *debian), "-q", "-h", "127.0.0.1", "-p", str(port)]
+        with _owned(Owned(command, port, folder, user, ready)) as server:
+            yield server
+
+
+def _somebody() -> str:
+    for name in ("postgres", "nobody"):
+        try:
+            pwd.getpwnam(name)
+        except KeyError:
+            continue
+        return name
+    pytest.skip("PostgreSQL does not run as root, and there is nobody else")
+
+
+@contextmanager
+def s3_server(folder: Path) -> Iterator[Owned]:
+    """moto's server, which speaks the S3 API and keeps everything in memory."""
+    port = free_port()
+    with _owned(
+        Owned([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)], port, folder)
+    ) as server:
+        yield server
