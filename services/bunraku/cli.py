@@ -34,11 +34,20 @@ def up(
     port: Annotated[int, typer.Option(help="Port to listen at; 0: any free one.", min=0, max=65535)] = 8000,
     data: Annotated[Path | None, typer.Option(help="Folder for what is kept; default .bunraku.")] = None,
     demo: Annotated[bool, typer.Option("--demo", help="Open a stage with Bunraku's own dance.")] = False,
+    service: Annotated[
+        list[str] | None, typer.Option(help="Serve this alone, of stream, ingest, ik, session, page; may be repeated.")
+    ] = None,
     open_page: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
-    """Run everything in one process, until Ctrl-C."""
+    """Run everything in one process, until Ctrl-C. Several processes meet over a bus: BUNRAKU_BUS=nats://..."""
     from bunraku.backing.settings import Settings
-    from bunraku.serve import serve
+    from bunraku.serve import SERVICES, serve
+
+    services = SERVICES if service is None else tuple(service)
+    if unknown := [name for name in services if name not in SERVICES]:
+        raise typer.BadParameter(f"{unknown[0]!r} is none of {', '.join(SERVICES)}", param_hint="--service")
+    if demo and "session" not in services:
+        raise typer.BadParameter("the demo's stage is opened where sessions are", param_hint="--demo")
 
     settings = Settings() if data is None else Settings(data=data)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -57,7 +66,7 @@ def up(
             webbrowser.open(url)
 
     out.print("Setting the stage ..." if demo else "Starting ...")
-    serving = serve(settings, listening, demo=demo, ready=ready)
+    serving = serve(settings, listening, demo=demo, ready=ready, services=services)
     if sys.platform == "win32":
         asyncio.run(serving)
     else:

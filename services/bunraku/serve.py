@@ -1,4 +1,4 @@
-"""The only wiring: backing, services and page in one process."""
+"""The only wiring: backing, services and page in one process, or those of them that one process is for."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import asyncio
 import gc
 import socket
 import threading
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
 from pathlib import Path
 from signal import SIGINT, SIGTERM
@@ -36,6 +36,8 @@ from bunraku.wire.messages import LARGEST_FROM_CLIENT
 PAGE = Path(__file__).parent / "page"
 COLLECT = (20_000, 20, 50)
 """When the collector looks for cycles: vectors are many and short-lived, cycles few."""
+SERVICES = ("stream", "ingest", "ik", "session", "page")
+"""What a process may serve. Paths are looked up in this order: viewers come by the thousand."""
 LOAD_AFTER = 1.5
 """Seconds in which the first page has the process to itself."""
 
@@ -52,20 +54,22 @@ class Page(StaticFiles):
 
 
 @asynccontextmanager
-async def compose(settings: Settings, *, demo: bool = False) -> AsyncIterator[FastAPI]:
-    """All four services and the page as one app, upon what `settings` name; with `demo`, a stage with our own dance."""
+async def compose(
+    settings: Settings, *, demo: bool = False, services: Collection[str] = SERVICES
+) -> AsyncIterator[FastAPI]:
+    """Services (of `SERVICES`) as one app, upon what `settings` name; with `demo`, a stage with our own dance."""
     async with AsyncExitStack() as stack:
         backing = await stack.enter_async_context(open_backing(settings))
-        sessions = bunraku.session.app.create_app(backing)
+        made: dict[str, Callable[[], FastAPI]] = {
+            "stream": lambda: bunraku.stream.app.create_app(backing),
+            "ingest": lambda: bunraku.ingest.app.create_app(backing),
+            "ik": bunraku.ik.app.create_app,
+            "session": lambda: bunraku.session.app.create_app(backing),
+        }
+        apps = {name: make() for name, make in made.items() if name in services}
         app = FastAPI(title="Bunraku", version=__version__, docs_url="/v1/docs", openapi_url="/v1/openapi.json")
         problems.install(app)
-        # paths are looked up in this order: viewers come by the thousand
-        for service in (
-            bunraku.stream.app.create_app(backing),
-            bunraku.ingest.app.create_app(backing),
-            bunraku.ik.app.create_app(),
-            sessions,
-        ):
+        for service in apps.values():
             await stack.enter_async_context(service.router.lifespan_context(service))
             app.include_router(service.router)
 
@@ -74,11 +78,12 @@ async def compose(settings: Settings, *, demo: bool = False) -> AsyncIterator[Fa
             """Whether this process serves."""
             return {"status": "ok", "version": __version__}
 
-        app.mount("/", _page())
-        loading = asyncio.create_task(_load(backing), name="load what is needed later")
+        if "page" in services:
+            app.mount("/", _page())
+        loading = asyncio.create_task(_load(backing, services), name="load what is needed later")
         stack.push_async_callback(_ended, loading)
         if demo:
-            await sessions.state.sessions.open(await add_demo(backing))
+            await apps["session"].state.sessions.open(await add_demo(backing))
         yield app
 
 
@@ -87,7 +92,14 @@ def protocol() -> dict[str, Any]:
     return {"ws": DirectProtocol, "ws_max_size": LARGEST_FROM_CLIENT, "ws_per_message_deflate": False}
 
 
-async def serve(settings: Settings, listening: socket.socket, *, demo: bool, ready: Callable[[], None]) -> None:
+async def serve(
+    settings: Settings,
+    listening: socket.socket,
+    *,
+    demo: bool,
+    ready: Callable[[], None],
+    services: Collection[str] = SERVICES,
+) -> None:
     """Serve on a listening socket until SIGINT or SIGTERM; `ready` is called once requests are answered."""
 
     class Server(uvicorn.Server):
@@ -109,7 +121,7 @@ async def serve(settings: Settings, listening: socket.socket, *, demo: bool, rea
                     loop.remove_signal_handler(number)
 
     with listening:
-        async with compose(settings, demo=demo) as app:
+        async with compose(settings, demo=demo, services=services) as app:
             config = uvicorn.Config(
                 app,
                 **protocol(),
@@ -122,13 +134,16 @@ async def serve(settings: Settings, listening: socket.socket, *, demo: bool, rea
             await Server(config).serve(sockets=[listening])
 
 
-async def _load(backing: Backing) -> None:
+async def _load(backing: Backing, services: Collection[str]) -> None:
     """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
     await asyncio.sleep(LOAD_AFTER)
-    await backing.catalogue.open()
-    await asyncio.to_thread(together.warm)
-    await asyncio.to_thread(decode.warm)
-    await asyncio.to_thread(_load_solving)
+    if "ingest" in services:
+        await backing.catalogue.open()
+    if "stream" in services:
+        await asyncio.to_thread(together.warm)
+    if "session" in services:
+        await asyncio.to_thread(decode.warm)
+        await asyncio.to_thread(_load_solving)
     # what is loaded by now stays: the collector need not walk through it again and again while limbs are solved
     gc.freeze()
     gc.set_threshold(*COLLECT)

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Iterator
 
 import pytest
 
+from bunraku.backing.bus_nats import NatsBus
 from bunraku.backing.register import Conflict, MemoryRegister, Register
 from bunraku.backing.register_nats import NatsRegister
 from tests.processes import jetstream, url_of
@@ -26,13 +27,16 @@ async def registers(request: pytest.FixtureRequest) -> AsyncIterator[tuple[Regis
         yield register, register
         return
     url = request.getfixturevalue("nats_url")
-    one, two = NatsRegister(url), NatsRegister(url)
+    buses = NatsBus(url), NatsBus(url)
+    for bus in buses:
+        await bus.open()
+    one, two = map(NatsRegister, buses)
     yield one, two
     for prefix in ("sessions", "replicas", "sessionsc"):
         for key in await one.all(prefix):
             await one.remove(key)
-    await one.close()
-    await two.close()
+    for bus in buses:
+        await bus.close()
 
 
 async def test_who_has_not_seen_the_newest_changes_nothing(registers: tuple[Register, Register]) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 import msgpack
 import pytest
@@ -107,6 +108,33 @@ async def test_many_who_come_and_go_are_counted_seldom(library: Library, monkeyp
     assert heard[-1] == 0
 
 
+async def test_what_was_published_while_the_bus_was_away_is_asked_for(
+    library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = MemoryBus()
+    returned: list[Callable[[], None]] = []
+    monkeypatch.setattr(bus, "on_return", returned.append)
+    state: list[bytes | None] = [STATE.pack(), PRESENCE.pack(), Overlay(1, 5, {2: (0,) * 9}).pack()]
+
+    async def answer(_: bytes) -> bytes:
+        packed: bytes = msgpack.packb(state)
+        return packed
+
+    bus.answer("session.s.state", answer)
+    watched = WatchedSessions(bus, library)
+    viewer, line = await come(watched)
+    await asyncio.gather(*watched._renewing)
+    assert [m.limbs.keys() for m in line.messages if isinstance(m, Overlay)] == [{2}]
+    edited, left = timeline.edit(STATE, 2_000, playing=False), Presence(1, [{"id": "a"}], [None] * 4)
+    state[:] = [edited.pack(), left.pack(), None]
+    returned[0]()
+    await asyncio.gather(*watched._renewing)
+    assert edited in line.messages
+    assert left in line.messages
+    assert [m.limbs.keys() for m in line.messages if isinstance(m, Overlay)] == [{2}, set()]
+    viewer.gone()
+
+
 async def test_a_session_that_goes_on_elsewhere_hears_how_many_watch(library: Library) -> None:
     bus = MemoryBus()
     heard = stage(bus)
@@ -120,14 +148,16 @@ async def test_a_session_that_goes_on_elsewhere_hears_how_many_watch(library: Li
 
 
 @pytest.mark.parametrize("session", ["*", ">", "s.state", ""])
-async def test_what_cannot_be_a_session_is_not_asked_for(library: Library, session: str) -> None:
+async def test_what_cannot_be_a_session_is_not_asked_for(
+    library: Library, monkeypatch: pytest.MonkeyPatch, session: str
+) -> None:
     bus, asked = MemoryBus(), []
 
-    async def answer(question: bytes) -> bytes:
-        asked.append(question)
+    async def ask(subject: str, *_: object) -> bytes:
+        asked.append(subject)
         return b""
 
-    bus.answer(f"session.{session}.state", answer)
+    monkeypatch.setattr(bus, "ask", ask)
     with pytest.raises(NobodyAnswers):
         await WatchedSessions(bus, library).open(session)
     assert asked == []

@@ -58,6 +58,6 @@ async def _open_bus(url: str) -> tuple[Bus, Register]:
     from bunraku.backing.bus_nats import NatsBus
     from bunraku.backing.register_nats import NatsRegister
 
-    bus, register = NatsBus(url), NatsRegister(url)
+    bus = NatsBus(url)
     await bus.open()
-    return bus, register
+    return bus, NatsRegister(bus)

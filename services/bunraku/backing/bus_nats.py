@@ -9,7 +9,7 @@ import asyncio
 import logging
 import random
 import secrets
-from collections.abc import Callable, Set
+from collections.abc import Callable, Mapping, Set
 from itertools import count, cycle
 
 from bunraku.backing.bus import Answerer, End, Handler, NobodyAnswers, Subscription, checked, hand, sayable
@@ -110,7 +110,9 @@ class NatsBus:
         # members of a queue group, of whom one gets each question
         return self._listen(subject, "answer", asked)
 
-    async def ask(self, subject: str, data: bytes = b"", seconds: float = ANSWERED) -> bytes:
+    async def ask(
+        self, subject: str, data: bytes = b"", seconds: float = ANSWERED, headers: Mapping[str, str] | None = None
+    ) -> bytes:
         """As `Bus.ask`; raises ValueError for more bytes than the server takes in one message."""
         if not sayable(subject):
             raise NobodyAnswers(subject)
@@ -123,7 +125,7 @@ class NatsBus:
         answer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
         self._questions[token] = answer
         try:
-            if not link.publish(subject, data, f"{self._inbox}.{token}"):
+            if not link.publish(subject, data, f"{self._inbox}.{token}", headers):
                 raise Unavailable("the bus", "the server does not keep up")
             async with asyncio.timeout(seconds):
                 return await answer

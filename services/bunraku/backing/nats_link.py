@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 from urllib.parse import unquote, urlsplit
@@ -116,8 +117,14 @@ class Link(asyncio.Protocol):
         self._transport.write(command)
         return True
 
-    def publish(self, subject: str, data: bytes, reply: str = "") -> bool:
+    def publish(self, subject: str, data: bytes, reply: str = "", headers: Mapping[str, str] | None = None) -> bool:
         """Send a message of at most `max_payload` bytes; whether there was room for it."""
+        if headers:
+            head = "".join(
+                ["NATS/1.0\r\n", *(f"{name}: {value}\r\n" for name, value in headers.items()), "\r\n"]
+            ).encode()
+            sizes = b"%d %d" % (len(head), len(head) + len(data))
+            return self.say(b"HPUB %b %b %b\r\n%b%b\r\n" % (subject.encode(), reply.encode(), sizes, head, data))
         return self.say(b"PUB %b %b %d\r\n%b\r\n" % (subject.encode(), reply.encode(), len(data), data))
 
     @property

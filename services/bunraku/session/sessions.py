@@ -21,6 +21,7 @@ from bunraku.backing.backing import Backing, clock
 from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.register import Conflict, Registered
+from bunraku.backing.unavailable import Unavailable
 from bunraku.marionette.merge import Marionette
 from bunraku.playout import timeline
 from bunraku.session.distant import KEY, DistantStage
@@ -139,20 +140,23 @@ class Sessions:
             try:
                 await self._beat()
                 await self._end_idle()
+            except Unavailable as error:
+                _log.warning("%s; trying again", error)
             except Exception:
-                _log.exception("the register of sessions cannot be reached; trying again")
+                _log.exception("sessions could not be looked after; trying again")
             await asyncio.sleep(BEAT)
 
     async def close(self) -> None:
-        """Leave all sessions to the other replicas."""
+        """Leave all sessions to the other replicas; where the register is away they find out by themselves."""
         register = self._backing.register
         for session, door in tuple(self._doors.items()):
             record = Record(NOBODY, door.stage.created, door.stage.timeline.pack())
             revision = self._revisions.get(session)
             await self._let_go(session)
-            with contextlib.suppress(Conflict):
+            with contextlib.suppress(Conflict, Unavailable):
                 await register.put(_key(session), record.pack(), revision)
-        await register.remove(f"{REPLICAS}.{self._replica}")
+        with contextlib.suppress(Unavailable):
+            await register.remove(f"{REPLICAS}.{self._replica}")
 
     async def _beat(self) -> None:
         register = self._backing.register

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import secrets
 from collections.abc import Callable
 
 import msgpack
 
+from bunraku.backing.backing import clock
 from bunraku.backing.bus import Bus, NobodyAnswers, Subscription, is_word
 from bunraku.backing.frames import frame
 from bunraku.backing.library import Library, StoredMotion
 from bunraku.backing.sockets import FAULT, NOT_FOUND, Refusal
 from bunraku.backing.together import Together
+from bunraku.backing.unavailable import Unavailable
 from bunraku.stream.cohorts import Cohorts
 from bunraku.stream.plans import Plans
 from bunraku.stream.viewers import Viewer
-from bunraku.wire.messages import MalformedMessage, Presence, TimelineState, unpack
+from bunraku.wire.messages import MalformedMessage, Overlay, Presence, TimelineState, unpack
 
 COUNTED = 0.5
 """Seconds between two counts of the viewers that are published: each is told to every viewer, so that a thousand who
@@ -67,6 +70,19 @@ class WatchedSession:
             await asyncio.wait((self._showing,))
         if self._refusal is not None:
             raise self._refusal
+
+    async def renew(self) -> None:
+        """Take in where the session is: what was published while nobody listened here is lost. Raises `NobodyAnswers`
+        and `Unavailable`."""
+        timeline, presence, overlay = msgpack.unpackb(await self._bus.ask(f"{self._subject}.state"))
+        if _timeline(timeline) != self._timeline:
+            self._on_timeline(timeline)
+        if frame(presence) != self._presence:
+            self._on_presence(presence)
+        if (None if overlay is None else frame(overlay)) != self._overlay:
+            # limbs that were let go meanwhile are let go here, too
+            self._on_overlay(overlay or Overlay(0, clock(), {}).pack())
+        self._on_appear(b"")
 
     def join(self, viewer: Viewer) -> None:
         """A viewer comes, to a session that is `ready`."""
@@ -193,6 +209,8 @@ class WatchedSessions:
         self._library = library
         self._replica = secrets.token_hex(6)
         self._sessions: dict[str, WatchedSession] = {}
+        self._renewing: set[asyncio.Task[None]] = set()
+        bus.on_return(lambda: self._renew(*self._sessions.values()))
 
     async def open(self, session: str) -> WatchedSession:
         """A session, to be joined before anything else is awaited, or closed again; raises `NobodyAnswers` where there
@@ -206,6 +224,8 @@ class WatchedSessions:
                 self._sessions[session] = WatchedSession(
                     session, self._bus, self._library, self._replica, state, lambda: self.close(session)
                 )
+                # something may have changed before it was listened to
+                self._renew(self._sessions[session])
         watched = self._sessions[session]
         try:
             await watched.ready()
@@ -213,6 +233,17 @@ class WatchedSessions:
             self.close(session)
             raise
         return watched
+
+    def _renew(self, *watched: WatchedSession) -> None:
+        async def renew() -> None:
+            for one in watched:
+                # one between two replicas is told of when it goes on
+                with contextlib.suppress(NobodyAnswers, Unavailable):
+                    await one.renew()
+
+        renewing = asyncio.create_task(renew(), name="where sessions are")
+        self._renewing.add(renewing)
+        renewing.add_done_callback(self._renewing.discard)
 
     def close(self, session: str) -> None:
         """Let a session go if nobody watches it."""
