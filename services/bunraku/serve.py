@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import logging
 import socket
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -29,6 +30,7 @@ from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.cache import cache_of
 from bunraku.backing.direct import DirectProtocol
 from bunraku.backing.settings import Settings
+from bunraku.backing.unavailable import Unavailable
 from bunraku.codec import decode
 from bunraku.demo import add_demo
 from bunraku.wire.messages import LARGEST_FROM_CLIENT
@@ -38,6 +40,8 @@ COLLECT = (20_000, 20, 50)
 """When the collector looks for cycles: vectors are many and short-lived, cycles few."""
 LOAD_AFTER = 1.5
 """Seconds in which the first page has the process to itself."""
+
+_log = logging.getLogger(__name__)
 
 
 class Page(StaticFiles):
@@ -125,7 +129,11 @@ async def serve(settings: Settings, listening: socket.socket, *, demo: bool, rea
 async def _load(backing: Backing) -> None:
     """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
     await asyncio.sleep(LOAD_AFTER)
-    await backing.catalogue.open()
+    try:
+        await backing.catalogue.open()
+    except Unavailable as error:
+        # it is tried again when it is used
+        _log.warning("%s", error)
     await asyncio.to_thread(together.warm)
     await asyncio.to_thread(decode.warm)
     await asyncio.to_thread(_load_solving)

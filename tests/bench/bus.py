@@ -82,7 +82,6 @@ async def listen(where: str) -> None:
     await bus.open()
     with socket.create_server(("127.0.0.1", 0)) as listening:
         bare = await loop.create_server(lambda: Bare(heard), sock=listening)
-        print(listening.getsockname()[1], flush=True)
         for number in range(max(SESSIONS)):
             bus.subscribe(f"session.{number}.overlay", heard)
 
@@ -90,6 +89,9 @@ async def listen(where: str) -> None:
             return b""
 
         bus.answer("ready", ready)
+        # what was said before holds once this is answered
+        await bus.ask("ready")
+        print(listening.getsockname()[1], flush=True)
         while await asyncio.to_thread(sys.stdin.readline):
             print(json.dumps(heard.late), flush=True)
             heard.late.clear()
@@ -123,7 +125,6 @@ async def measure(url: str, other: Told, seconds: float, rounds: int) -> dict[st
     memory, inside = MemoryBus(), Heard()
     for number in range(max(SESSIONS)):
         memory.subscribe(f"session.{number}.overlay", inside)
-    await bus.ask("ready")
     ways: list[tuple[str, Bus]] = [("nats", bus), ("socket", Socket()), ("memory", memory)]
     found: dict[tuple[str, int], list[tuple[float, float]]] = {}
     for turn in range(rounds + 1):
