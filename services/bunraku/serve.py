@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import logging
 import socket
 import threading
 from collections.abc import AsyncIterator, Callable, Collection, Iterator
@@ -29,6 +30,7 @@ from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.cache import cache_of
 from bunraku.backing.direct import DirectProtocol
 from bunraku.backing.settings import Settings
+from bunraku.backing.unavailable import Unavailable
 from bunraku.codec import decode
 from bunraku.demo import add_demo
 from bunraku.wire.messages import LARGEST_FROM_CLIENT
@@ -40,6 +42,8 @@ SERVICES = ("stream", "ingest", "ik", "session", "page")
 """What a process may serve. Paths are looked up in this order: viewers come by the thousand."""
 LOAD_AFTER = 1.5
 """Seconds in which the first page has the process to itself."""
+
+_log = logging.getLogger(__name__)
 
 
 class Page(StaticFiles):
@@ -138,7 +142,11 @@ async def _load(backing: Backing, services: Collection[str]) -> None:
     """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
     await asyncio.sleep(LOAD_AFTER)
     if "ingest" in services:
-        await backing.catalogue.open()
+        try:
+            await backing.catalogue.open()
+        except Unavailable as error:
+            # it is tried again when it is used
+            _log.warning("%s", error)
     if "stream" in services:
         await asyncio.to_thread(together.warm)
     if "session" in services:

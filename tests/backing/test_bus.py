@@ -8,8 +8,9 @@ from collections.abc import AsyncIterator, Iterator
 
 import pytest
 
-from bunraku.backing.bus import Bus, MemoryBus, NobodyAnswers, sayable
+from bunraku.backing.bus import AnswerFailed, Bus, MemoryBus, NobodyAnswers, sayable
 from bunraku.backing.bus_nats import NatsBus
+from bunraku.backing.unavailable import Unavailable
 from tests.processes import nats_server, url_of
 
 
@@ -151,6 +152,22 @@ async def test_a_question_without_an_answer_ends(buses: tuple[Bus, Bus]) -> None
     await settled(bus)
     with pytest.raises(NobodyAnswers):
         await other.ask("silence", seconds=0.05)
+
+
+async def test_an_answer_that_fails_is_known_at_once(buses: tuple[Bus, Bus], caplog: pytest.LogCaptureFixture) -> None:
+    bus, other = buses
+
+    async def broken(data: bytes) -> bytes:
+        raise Unavailable("the catalogue", "it is Sunday") if data else RuntimeError("broken")
+
+    bus.answer("broken", broken)
+    await settled(bus)
+    async with asyncio.timeout(30):
+        with caplog.at_level(logging.CRITICAL, "bunraku.backing.bus"), pytest.raises(AnswerFailed):
+            await other.ask("broken", seconds=3600)
+        with pytest.raises(Unavailable) as told:
+            await other.ask("broken", b"1", 3600)
+    assert told.value.what == "the catalogue"
 
 
 async def test_nobody_is_known_at_once(buses: tuple[Bus, Bus]) -> None:

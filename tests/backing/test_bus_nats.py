@@ -238,19 +238,6 @@ async def test_what_is_too_large_is_said_and_nothing_else_suffers(server: Owned)
         assert await heard.until(b"small") == [b"small"]
 
 
-async def test_an_answer_that_fails_is_none(server: Owned) -> None:
-    async with connected(url_of(server)) as (bus,):
-
-        async def broken(_: bytes) -> bytes:
-            raise RuntimeError("broken")
-
-        bus.answer("broken", broken)
-        bus.answer("echo", echo)
-        with pytest.raises(NobodyAnswers):
-            await bus.ask("broken", seconds=0.2)
-        assert await bus.ask("echo", b"1") == b"1"
-
-
 async def test_each_question_goes_to_one_of_several(server: Owned) -> None:
     async with connected(*[url_of(server)] * 3) as (one, two, three):
         asked: list[bytes] = []

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import asyncio
+import socket
+import time
 
 import pytest
 
@@ -62,10 +64,21 @@ async def test_who_goes_away_takes_the_question_along() -> None:
 
 async def test_a_loop_that_stood_still_hears_what_came_meanwhile() -> None:
     loop = asyncio.get_running_loop()
-    answer: asyncio.Future[int] = loop.create_future()
-    waiting = asyncio.create_task(Patience("the test").wait(answer, 0.35))
-    await asyncio.sleep(0)
-    # the loop comes to its timers and to what came from elsewhere at the same time
-    loop.call_later(0.05, answer.set_result, 7)
-    loop.call_soon(lambda: [sum(range(1000)) for _ in range(20_000)])
-    assert await waiting == 7
+    here, there = socket.socketpair()
+    here.setblocking(False)
+
+    async def through(tasks: int) -> bytes:
+        # as a driver has it: several wait for each other
+        return await (asyncio.create_task(through(tasks - 1)) if tasks else loop.sock_recv(here, 1))
+
+    with here, there:
+        waiting = asyncio.create_task(Patience("the test").wait(through(4), 0.35))
+        for _ in range(8):
+            await asyncio.sleep(0)
+
+        def stand_still() -> None:
+            there.send(b"x")
+            time.sleep(0.2)
+
+        loop.call_soon(stand_still)
+        assert await waiting == b"x"

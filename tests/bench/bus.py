@@ -2,7 +2,8 @@
 
 The last line printed is one JSON object. A line of the table is some publishers' worth of overlays, 66 bytes twenty
 times a second of each session, through one nats-server on loopback; each process has a loop as the services have it.
-Beside it, a bare socket between two processes with the same loop, and the bus within a process.
+Beside it, in turns, a bare socket between the same two processes, and the bus within a process. The median of the
+rounds is told, and the p99 of the best one: what else the machine does is in the others.
 """
 
 from __future__ import annotations
@@ -81,7 +82,6 @@ async def listen(where: str) -> None:
     await bus.open()
     with socket.create_server(("127.0.0.1", 0)) as listening:
         bare = await loop.create_server(lambda: Bare(heard), sock=listening)
-        print(listening.getsockname()[1], flush=True)
         for number in range(max(SESSIONS)):
             bus.subscribe(f"session.{number}.overlay", heard)
 
@@ -89,13 +89,28 @@ async def listen(where: str) -> None:
             return b""
 
         bus.answer("ready", ready)
+        # what was said before holds once this is answered
+        await bus.ask("ready")
+        print(listening.getsockname()[1], flush=True)
         while await asyncio.to_thread(sys.stdin.readline):
             print(json.dumps(heard.late), flush=True)
             heard.late.clear()
         bare.close()
 
 
-async def measure(url: str, other: Told, seconds: float) -> dict[str, float]:
+async def _one(through: Bus, sessions: int, seconds: float, heard: Heard | Told) -> list[float]:
+    """How late messages were in one round."""
+    sent = await publish(through, sessions, seconds)
+    await asyncio.sleep(0.3)
+    if isinstance(heard, Told):
+        late: list[float] = await asyncio.to_thread(heard.ask, "")
+    else:
+        late, heard.late = heard.late, []
+    assert len(late) == sent, f"{len(late)} of {sent} came"
+    return late
+
+
+async def measure(url: str, other: Told, seconds: float, rounds: int) -> dict[str, float]:
     """Every line of the table."""
     figures: dict[str, float] = {}
     bus = NatsBus(url)
@@ -107,23 +122,25 @@ async def measure(url: str, other: Told, seconds: float) -> dict[str, float]:
         def publish(self, _: str, data: bytes) -> None:
             bare.transport.write(data)
 
-    await bus.ask("ready")
-    print(f"{'':24}{'messages/s':>12}{'p50 ms':>10}{'p99 ms':>10}{'worst ms':>10}")
-    for sessions in SESSIONS:
-        for name, through in (("nats", bus), ("socket", Socket()), ("memory", memory := MemoryBus())):
-            inside = Heard()
-            for number in range(sessions):
-                memory.subscribe(f"session.{number}.overlay", inside)
-            sent = await publish(through, sessions, seconds)
-            await asyncio.sleep(0.3)
-            late = inside.late if name == "memory" else await asyncio.to_thread(other.ask, "")
-            assert len(late) == sent, f"{name}: {len(late)} of {sent} came"
-            cuts = statistics.quantiles(late, n=100)
-            p50, p99, worst = (value * 1e3 for value in (cuts[49], cuts[98], max(late)))
-            print(
-                f"{name}, {sessions} sessions".ljust(24) + f"{sessions * HERTZ:12}{p50:10.3f}{p99:10.3f}{worst:10.2f}"
-            )
-            figures |= {f"{name}_{sessions}_ms_p50": round(p50, 3), f"{name}_{sessions}_ms_p99": round(p99, 3)}
+    memory, inside = MemoryBus(), Heard()
+    for number in range(max(SESSIONS)):
+        memory.subscribe(f"session.{number}.overlay", inside)
+    ways: list[tuple[str, Bus]] = [("nats", bus), ("socket", Socket()), ("memory", memory)]
+    found: dict[tuple[str, int], list[tuple[float, float]]] = {}
+    for turn in range(rounds + 1):
+        for sessions in SESSIONS:
+            for name, through in ways:
+                late = await _one(through, sessions, seconds, inside if name == "memory" else other)
+                cuts = statistics.quantiles(late, n=100)
+                if turn:
+                    found.setdefault((name, sessions), []).append((cuts[49] * 1e3, cuts[98] * 1e3))
+    print(f"{'':24}{'messages/s':>12}{'p50 ms':>10}{'p99 ms':>10}{'best p99':>10}")
+    for (name, sessions), turns in found.items():
+        p50, p99 = (statistics.median(values) for values in zip(*turns, strict=True))
+        best = min(value for _, value in turns)
+        print(f"{name}, {sessions} sessions".ljust(24) + f"{sessions * HERTZ:12}{p50:10.3f}{p99:10.3f}{best:10.3f}")
+        figures |= {f"{name}_{sessions}_ms_p50": round(p50, 3), f"{name}_{sessions}_ms_p99": round(p99, 3)}
+        figures[f"{name}_{sessions}_ms_p99_best"] = round(best, 3)
     cost = 20_000
     before = time.process_time()
     for _ in range(20):
@@ -142,14 +159,15 @@ def main() -> None:
         uvloop.run(listen(sys.argv[2]))
         return
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=8.0, help="of each line")
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--seconds", type=float, default=2.0, help="of each line and round")
+    parser.add_argument("--rounds", type=int, default=7, help="of which the median is told")
+    given = parser.parse_args()
     with (
         tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder,
         nats_server(Path(folder)) as server,
         Told.module("bus", "listen", url_of(server)) as other,
     ):
-        figures = uvloop.run(measure(url_of(server), other, seconds))
+        figures = uvloop.run(measure(url_of(server), other, given.seconds, given.rounds))
     print(json.dumps({"bench": "bus", **figures}))
 
 

@@ -14,7 +14,7 @@ from collections import defaultdict
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
-from bunraku.backing.unavailable import ANSWERED
+from bunraku.backing.unavailable import ANSWERED, Unavailable
 
 Handler = Callable[[bytes], None]
 Answerer = Callable[[bytes], Awaitable[bytes]]
@@ -33,6 +33,10 @@ def is_word(text: str) -> bool:
 
 class NobodyAnswers(Exception):
     """A question that nobody answered in time."""
+
+
+class AnswerFailed(Exception):
+    """A question whose answerer failed; its own log says how."""
 
 
 def sayable(subject: str) -> bool:
@@ -54,6 +58,17 @@ def hand(handler: Handler, subject: str, data: bytes) -> None:
         handler(data)
     except Exception:
         _log.exception("a message to %s could not be taken", subject)
+
+
+async def answered(answerer: Answerer, subject: str, data: bytes) -> bytes:
+    """What an answerer says; raises `Unavailable` as it does, `AnswerFailed` for all else that it raises."""
+    try:
+        return await answerer(data)
+    except Unavailable:
+        raise
+    except Exception:
+        _log.exception("a question to %s could not be answered", subject)
+        raise AnswerFailed(subject) from None
 
 
 class Subscription(Protocol):
@@ -84,8 +99,11 @@ class Bus(Protocol):
         """Answer the questions put to `subject`. Of several processes that do, one gets each question."""
 
     async def ask(self, subject: str, data: bytes = b"", seconds: float = ANSWERED) -> bytes:
-        """The answer to a question; raises `NobodyAnswers` after `seconds`, or at once where nobody is there or could
-        be, and `Unavailable` where the bus is away."""
+        """The answer to a question.
+
+        Raises `NobodyAnswers` after `seconds`, or at once where nobody is there or could be; `Unavailable` where the
+        bus is away, or the answerer misses what it stands on; `AnswerFailed` where that raises anything else.
+        """
 
     async def close(self) -> None:
         """End every subscription."""
@@ -151,7 +169,7 @@ class MemoryBus:
             raise NobodyAnswers(subject)
         try:
             async with asyncio.timeout(seconds):
-                return await answerer(data)
+                return await answered(answerer, subject, data)
         except TimeoutError:
             raise NobodyAnswers(subject) from None
 

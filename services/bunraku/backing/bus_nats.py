@@ -12,7 +12,18 @@ import secrets
 from collections.abc import Callable, Mapping, Set
 from itertools import count, cycle
 
-from bunraku.backing.bus import Answerer, End, Handler, NobodyAnswers, Subscription, checked, hand, sayable
+from bunraku.backing.bus import (
+    Answerer,
+    AnswerFailed,
+    End,
+    Handler,
+    NobodyAnswers,
+    Subscription,
+    answered,
+    checked,
+    hand,
+    sayable,
+)
 from bunraku.backing.nats_link import CONNECTING, Link, read_servers
 from bunraku.backing.unavailable import ANSWERED, Unavailable
 
@@ -20,7 +31,7 @@ AGAIN = (0.1, 0.4)
 """Seconds between two tries to connect, at random between these so that not all come at once."""
 _INBOX = 0
 """The number of the subscription that answers come to."""
-_NOBODY = b"503"
+_NOBODY, _FAILED = b"503", b"500"
 
 _log = logging.getLogger(__name__)
 
@@ -93,13 +104,14 @@ class NatsBus:
         return self._listen(subject, "", lambda _, data: hand(handler, subject, data))
 
     def answer(self, subject: str, answerer: Answerer) -> Subscription:
-        """As `Bus.answer`. Where answering fails the asker hears nothing."""
+        """As `Bus.answer`."""
 
         async def answer(reply: str, data: bytes) -> None:
             try:
-                self.publish(reply, await answerer(data))
-            except Exception:
-                _log.exception("a question to %s could not be answered", subject)
+                self.publish(reply, await answered(answerer, subject, data))
+            except (AnswerFailed, Unavailable) as error:
+                if self._link is not None:
+                    self._link.fail(reply, error.what if isinstance(error, Unavailable) else "")
 
         def asked(reply: str, data: bytes) -> None:
             if reply:
@@ -146,6 +158,10 @@ class NatsBus:
             return
         if status == _NOBODY:
             question.set_exception(NobodyAnswers("nobody is there"))
+        elif status == _FAILED and data:
+            question.set_exception(Unavailable(data.decode(), "so says who was asked"))
+        elif status == _FAILED:
+            question.set_exception(AnswerFailed("who was asked could not answer"))
         else:
             question.set_result(data)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from sqlalchemy import Connection, NullPool, inspect, text
 from sqlalchemy.ext.asyncio import AsyncConnection, create_async_engine
 
-from bunraku.backing.unavailable import ANSWERED
+from bunraku.backing.unavailable import ANSWERED, Unavailable
 
 HEAD = "0001"
 """The version that this code is written for."""
@@ -28,8 +28,11 @@ _SCRIPTS = Path(__file__).parent / "migrations"
 _one_at_a_time = threading.Lock()
 
 
-class UnknownVersion(Exception):
+class UnknownVersion(Unavailable):
     """The catalogue was last used by a Bunraku that is newer than this one."""
+
+    def __init__(self, found: str) -> None:
+        super().__init__("the catalogue", f"it has version {found}, and this Bunraku knows {HEAD}: run a newer one")
 
 
 def version(connection: Connection) -> str | None:
@@ -90,7 +93,7 @@ def _upgrade(connection: Connection) -> None:
     at = version(connection)
     known = [script.revision for script in ScriptDirectory.from_config(config).walk_revisions()]
     if at is not None and at not in known:
-        raise UnknownVersion(f"the catalogue has version {at}, and this Bunraku knows {HEAD}: use a newer one")
+        raise UnknownVersion(at)
     if at is None and inspect(connection).has_table("motions"):
         command.stamp(config, BEFORE_VERSIONS)
     command.upgrade(config, HEAD)

@@ -61,7 +61,8 @@ class Listener(Protocol):
     """Who a connection belongs to."""
 
     def hear(self, number: int, subject: str, reply: str, data: bytes, status: bytes) -> None:
-        """A message to subscription `number`; `status` is empty, or that of the server's own (503: nobody listens)."""
+        """A message to subscription `number`; `status` is empty, 500 where an answer failed, or the
+        server's own 503 where nobody listens."""
 
 
 class Link(asyncio.Protocol):
@@ -126,6 +127,12 @@ class Link(asyncio.Protocol):
             sizes = b"%d %d" % (len(head), len(head) + len(data))
             return self.say(b"HPUB %b %b %b\r\n%b%b\r\n" % (subject.encode(), reply.encode(), sizes, head, data))
         return self.say(b"PUB %b %b %d\r\n%b\r\n" % (subject.encode(), reply.encode(), len(data), data))
+
+    def fail(self, subject: str, why: str) -> bool:
+        """Send `why` under the status 500, in place of an answer; whether there was room for it."""
+        head, data = b"NATS/1.0 500\r\n\r\n", why.encode()
+        sizes = len(head), len(head) + len(data)
+        return self.say(b"HPUB %b %d %d\r\n%b%b\r\n" % (subject.encode(), *sizes, head, data))
 
     @property
     def waiting(self) -> int:

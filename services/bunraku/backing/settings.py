@@ -1,5 +1,7 @@
-"""Where the services find what they stand on: environment variables `BUNRAKU_...` (docs/settings.md), or defaults for
-one machine."""
+"""Where the services find what they stand on: environment variables `BUNRAKU_...`, or defaults for one machine.
+
+docs/settings.md says it for people.
+"""
 
 from __future__ import annotations
 
