@@ -17,9 +17,9 @@ from tests.vectors.blocks import wandering_motion
 
 
 @contextmanager
-def running(data: Path, *, demo: bool = False, **settings: object) -> Iterator[str]:
-    """The address of a server that runs in a thread until the block ends."""
-    listening = socket.create_server(("127.0.0.1", 0))
+def running(data: Path, *, demo: bool = False, host: str = "127.0.0.1", **settings: object) -> Iterator[str]:
+    """The address of a server that runs in a thread until the block ends; it listens at `host`."""
+    listening = socket.create_server((host, 0))
     url = f"http://127.0.0.1:{listening.getsockname()[1]}"
     started, ended = threading.Event(), threading.Event()
     failures: list[BaseException] = []

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from websockets.frames import Frame
 from websockets.frames import Opcode as Theirs
 
-from bunraku.backing.frames import BrokenFrame, ClientFrames, Opcode, close_code, close_frame, frame
+from bunraku.backing.frames import BrokenFrame, ClientFrames, Opcode, close_code, close_frame, frame, message
 
 
 @pytest.mark.parametrize("size", [0, 1, 125, 126, 65_535, 65_536, 70_000])
@@ -86,6 +86,12 @@ def test_nothing_that_comes_is_worse_than_broken(data: bytes) -> None:
         for opcode, payload in ClientFrames(64).read(data):
             assert opcode in Opcode
             assert len(payload) <= 125
+
+
+@pytest.mark.parametrize("size", [0, 125, 126, 65_535, 65_536])
+def test_the_message_of_a_frame_is_what_was_framed(size: int) -> None:
+    sent = bytes(number % 251 for number in range(size))
+    assert message(frame(sent)) == sent
 
 
 def test_a_close_is_short_and_is_answered_with_its_code() -> None:

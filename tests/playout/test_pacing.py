@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from bunraku.codec.timing import Timing, even_blocks
 from bunraku.codec.track import MotionTrack, plan
-from bunraku.playout.pacing import AHEAD, MARGIN, UPGRADE, Due, Paced, Pacer, arrivals
+from bunraku.playout.pacing import AHEAD, JUST, MARGIN, NET, NET_AHEAD, SOON, UPGRADE, Due, Paced, Pacer, arrivals
 from bunraku.playout.timeline import edit, start
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import wandering_motion
@@ -190,6 +190,56 @@ def test_what_is_sent_again_is_better_and_can_still_be_used(position: int, befor
         assert due.better
         assert due.distance > UPGRADE
         assert due.rate > had[due.track, due.index]
+
+
+LONG = even_blocks(30.0, 30 * 60)
+"""A minute."""
+
+
+def test_a_net_goes_before_what_is_not_shown_at_once_and_is_filled_again_in_one_go() -> None:
+    state = start("m", 60 * SECOND, 0)
+    pacer = Pacer([Paced(0, LONG, 5, True)])
+    sent = []
+    while (due := pacer.next(state, 0, 4, net=True)) is not None:
+        sent.append((due.index, due.rate))
+    net = [index for index, rate in sent if rate == 0]
+    assert net == sorted(net)
+    assert LONG.start_us(max(net)) <= NET < LONG.start_us(max(net) + 1)
+    last = sent.index((max(net), 0))
+    bettered = [LONG.start_us(index) for index, rate in sent[:last] if rate == 4]
+    assert max(bettered) <= JUST
+    assert max(LONG.start_us(index) for index, rate in sent if rate == 4) <= NET_AHEAD
+    # it is left until it reaches less far than it should, and then filled up
+    fills = []
+    for clock in range(0, 25 * SECOND, SECOND):
+        low = 0
+        while (due := pacer.next(state, clock, 4, net=True)) is not None:
+            low += due.rate == 0
+        if low:
+            fills.append(low)
+    assert min(fills) >= 9
+    assert len(fills) <= 3
+
+
+@given(st.integers(0, 59 * SECOND), st.integers(1, 4))
+def test_without_room_to_spare_only_what_is_missing_soon_goes(position: int, rate: int) -> None:
+    state = start("m", 60 * SECOND, 0, position=position)
+    pacer = Pacer([Paced(0, LONG, 5, True)])
+    while (due := pacer.next(state, 0, rate, net=True, spare=False)) is not None:
+        assert not due.better
+        assert due.distance <= SOON
+        assert due.rate == 0
+
+
+@given(st.lists(st.integers(-1, 4), min_size=5, max_size=5), st.booleans())
+def test_what_a_viewer_has_is_not_sent_again(rates: list[int], net: bool) -> None:
+    state = start("m", TRACK.duration_us, 0)
+    pacer = Pacer([Paced(0, TRACK, 5, True)])
+    for index, rate in enumerate(rates):
+        if rate >= 0:
+            pacer.has(0, index, rate)
+    while (due := pacer.next(state, 0, 3, net=net)) is not None:
+        assert due.index >= len(rates) or due.rate > rates[due.index]
 
 
 def told_by_next(

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from bunraku.playout.rate import RateChoice
 from bunraku.wire.messages import Report
 
@@ -55,3 +58,48 @@ def test_who_does_not_look_still_hears_and_a_slow_machine_does_not_silence_it() 
     # a line that does not carry it is another matter
     assert choice.report(Report(buffer=0, frame=90_000), clock + 2_000_000) == 0
     assert choice.report(Report(buffer=3_000_000, hidden=True), clock + 3_000_000) == 0
+
+
+COSTS = (0.5, 1.2, 2.1, 3.4, 6.4)
+
+
+def carried(choice: RateChoice, bps: float, seconds: int, *, beside: bool = False, start: int = 0) -> int:
+    for second in range(seconds):
+        choice.line(bps / 8, (start + second) * SECOND, beside)
+    return choice.rate
+
+
+def test_a_narrow_line_gets_what_it_carries_and_is_told_so() -> None:
+    choice = RateChoice(5, costs=COSTS)
+    assert (choice.rate, choice.reason, choice.carried) == (4, "best", None)
+    assert carried(choice, 28_800, 10) == 4
+    assert carried(choice, 4_000, 20, start=10) == 2
+    assert choice.reason == "line"
+    assert abs((choice.carried or 0) - 4_000) < 300
+    assert carried(choice, 300, 20, start=30) == 0
+    choice.line(None, 60 * SECOND, False)
+    assert f"{choice.rate} {choice.reason} {choice.carried}" == "4 best None"
+
+
+def test_hands_go_before_a_finer_dance() -> None:
+    choice = RateChoice(5, costs=COSTS)
+    assert carried(choice, 14_400, 5, beside=True) == 3
+    assert choice.reason == "hands"
+
+
+@given(st.lists(st.floats(100, 1e6), min_size=1, max_size=60))
+def test_what_is_chosen_costs_no_more_than_the_most_that_the_line_carried(rates: list[float]) -> None:
+    choice = RateChoice(5, costs=COSTS)
+    for second, bps in enumerate(rates):
+        choice.line(bps / 8, second * SECOND, False)
+        assert choice.rate == 0 or COSTS[choice.rate] * 1000 <= max(rates)
+
+
+def test_every_choice_has_its_reason() -> None:
+    assert RateChoice(4, pinned=1).reason == "pinned"
+    assert RateChoice(4, first=1).reason == "start"
+    hidden, slow, late = RateChoice(4), RateChoice(4), RateChoice(4)
+    run(hidden, Report(buffer=3_900_000, hidden=True), 3)
+    run(slow, Report(buffer=3_900_000, frame=90_000), 3)
+    run(late, Report(buffer=0), 3)
+    assert [choice.reason for choice in (hidden, slow, late)] == ["hidden", "machine", "buffer"]

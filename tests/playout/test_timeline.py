@@ -59,3 +59,15 @@ def test_the_timeline_before_holds_until_the_next_begins() -> None:
     assert timelines.at(NOW + SECOND) == first
     assert timelines.at(NOW + 2 * SECOND) == second
     assert timelines.newest == second
+
+
+def test_after_a_new_connection_its_first_timeline_counts() -> None:
+    timelines = Timelines()
+    timelines.put(edit(edit(start("m", 9_000_000, 0), 5), 6))
+    begun = start("m", 9_000_000, 7)
+    timelines.put(begun)
+    assert timelines.newest != begun
+    timelines.restart()
+    timelines.put(begun)
+    assert timelines.newest == begun
+    Timelines().restart()

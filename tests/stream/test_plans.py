@@ -12,6 +12,7 @@ from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.stream import viewers
+from bunraku.stream.cohorts import Cohorts
 from bunraku.stream.plans import Plans
 from bunraku.stream.turns import Turns
 from bunraku.stream.viewers import Viewer
@@ -34,6 +35,7 @@ class Audience:
 
     def __init__(self) -> None:
         self.plans = Plans()
+        self.cohorts = Cohorts(self.plans)
 
     def turned(self) -> None: ...
 
@@ -85,6 +87,10 @@ async def test_each_is_sent_what_it_would_be_sent_alone(
                 # a turn for each instant at which something comes
                 while one.viewer._following is not None and one.viewer._following <= now[0]:
                     one.viewer.advance()
+        for cohort in audience.cohorts:
+            while cohort.following is not None and cohort.following <= now[0]:
+                cohort.advance()
+        for together, alone in pairs:
             assert together.sent() == alone.sent()
         made.append(len(audience.plans._plans))
     assert max(made) > 3

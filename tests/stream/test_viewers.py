@@ -11,12 +11,15 @@ from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
+from bunraku.playout.held import Held
 from bunraku.stream import viewers
 from bunraku.stream.turns import Turns
 from bunraku.stream.viewers import PINGS, QUEUE, Viewer
 from bunraku.wire.messages import (
     ChannelHeader,
+    Choice,
     Data,
+    Description,
     Edit,
     Overlay,
     Ping,
@@ -73,7 +76,8 @@ async def test_all_that_is_known_leaves_in_one_piece(motions: dict[str, StoredMo
     assert line.writes == 1
     kinds = [type(message).__name__ for message in line.messages]
     assert kinds[:5] == ["ChannelHeader", "Description", "TimelineState", "Presence", "Overlay"]
-    assert set(kinds[5:]) == {"Data"}
+    assert set(kinds[5:-1]) == {"Data"}
+    assert kinds[-1] == "Choice"
 
 
 async def test_another_motion_is_announced_before_its_blocks(motions: dict[str, StoredMotion]) -> None:
@@ -84,7 +88,8 @@ async def test_another_motion_is_announced_before_its_blocks(motions: dict[str, 
     viewer.advance()
     kinds = [type(message).__name__ for message in line.messages[before:]]
     assert kinds[:3] == ["ChannelHeader", "Description", "TimelineState"]
-    assert set(kinds[3:]) == {"Data"}
+    assert set(kinds[3:-1]) == {"Data"}
+    assert kinds[-1] == "Choice"
 
 
 async def test_only_the_newest_overlay_waits(motions: dict[str, StoredMotion]) -> None:
@@ -245,11 +250,11 @@ async def test_a_pinned_rate_pins_the_dance_and_the_sound_goes_with_the_line(mot
     for pinned, sound, expected in ((1, 2, [(0, 1, 1), (1, 1, 0)]), (0, 0, [(0, 1, 0), (1, 1, 0)])):
         viewer, line, _ = watching(motions["sung"], pinned=pinned)
         assert sent_of(line)[2:4] == expected
-        choice = viewer._rate
-        assert choice is not None
+        assert viewer._playing is not None
+        choice = viewer._playing.rate
         for second in range(1, 9):
             choice.report(Report(buffer=4_000_000), clock() + second * 2_000_000)
-        assert viewer._steps[choice.rate][:2] == (pinned, sound)
+        assert viewer._playing.step[:2] == (pinned, sound)
 
 
 async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(motions: dict[str, StoredMotion]) -> None:
@@ -261,8 +266,8 @@ async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(mot
 
 async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dict[str, StoredMotion]) -> None:
     viewer, line, _ = watching(motions["sung"], private=True)
-    choice = viewer._rate
-    assert choice is not None
+    assert viewer._playing is not None
+    choice = viewer._playing.rate
     for second in range(1, 6):
         choice.report(Report(buffer=0), clock() + second * 2_000_000)
     before = len(sent_of(line))
@@ -271,3 +276,41 @@ async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dic
     after = sent_of(line)[before:]
     assert after
     assert {(track, rate) for track, _, rate in after} == {(0, 0)}
+
+
+async def test_who_comes_back_is_not_sent_again_what_it_holds(motions: dict[str, StoredMotion]) -> None:
+    _, line, _ = watching(motions["one"], playing=False, held=Held("one", 0, (1, 1, -1, 0)))
+    assert [type(message) for message in line.messages[:2]] == [ChannelHeader, TimelineState]
+    data = [message for message in line.messages if isinstance(message, Data)]
+    assert {(d.index, d.rate) for d in data if d.index < 4} == {(2, 1), (3, 1)}
+
+
+async def test_held_blocks_of_another_motion_are_no_matter(motions: dict[str, StoredMotion]) -> None:
+    _, line, _ = watching(motions["one"], playing=False, held=Held("two", 0, (1, 1)))
+    assert [type(message) for message in line.messages[:3]] == [ChannelHeader, Description, TimelineState]
+    assert [message.index for message in line.messages if isinstance(message, Data)][:2] == [0, 1]
+
+
+async def test_a_viewer_is_told_once_what_was_chosen_and_why(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["one"], playing=False, pinned=0)
+    viewer.hear(Ping(1, 2).pack())
+    viewer.advance()
+    assert of(Choice, line) == [Choice(0, "pinned")]
+
+
+async def test_a_viewer_is_told_when_the_reason_is_another(motions: dict[str, StoredMotion]) -> None:
+    viewer, line, _ = watching(motions["one"], playing=False)
+    for hidden in (True, True, False):
+        viewer.hear(Report(buffer=3_000_000, hidden=hidden).pack())
+        viewer.advance()
+    assert [choice.reason for choice in of(Choice, line) if isinstance(choice, Choice)] == ["best", "hidden", "best"]
+
+
+async def test_tracks_after_the_last_wanted_one_are_not_described(motions: dict[str, StoredMotion]) -> None:
+    kinds = []
+    for wanted in (("motion",), ("motion", "camera"), ("motion", "camera", "light")):
+        _, line, _ = watching(motions["filmed"], playing=False, wanted=wanted)
+        (described,) = of(Description, line)
+        assert isinstance(described, Description)
+        kinds.append([track["type"] for track in described.tracks])
+    assert kinds == [["motion"], ["motion", "camera"], ["motion", "camera", "light"]]

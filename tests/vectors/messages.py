@@ -11,6 +11,7 @@ from bunraku.wire.messages import (
     Alive,
     Ask,
     ChannelHeader,
+    Choice,
     Claim,
     Data,
     Description,
@@ -55,6 +56,7 @@ def make() -> dict[str, Any]:
     examples: list[Message] = [
         ChannelHeader(motion="k3v9q", now=NOW, channels=19, software="0.1.0"),
         Description("k3v9q", [{"type": "motion", "fps": 60.0, "figure": bytes(range(138))}]),
+        Description("k3v9q", [{"type": "audio"}, {"type": "light"}], first=1),
         Data(0, 3, 86_399, b"\x01block"),
         Data(1, 0, 5, b""),
         TimelineState(7, "k3v9q", NOW, 1_500_000, True, False, 32_475_000),
@@ -88,6 +90,8 @@ def make() -> dict[str, Any]:
             ),
         ),
         Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)),
+        Choice(2, "line", 27_400),
+        Choice(4, "best"),
         Input(2, Input.VELOCITY, 9, 13, NOW, (-1.0, 0.0, 0.0)),
     ]
     target = examples[-2].pack()

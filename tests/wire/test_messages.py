@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from random import Random
 from typing import Any
 
 import msgpack
@@ -13,6 +14,7 @@ from bunraku.wire.messages import (
     Alive,
     Ask,
     ChannelHeader,
+    Choice,
     Claim,
     Data,
     Description,
@@ -32,6 +34,7 @@ from bunraku.wire.messages import (
     Report,
     TimelineState,
     Welcome,
+    newest,
     unpack,
 )
 
@@ -82,6 +85,7 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
     st.builds(Claim, limb=LIMB),
     st.builds(Release, limb=LIMB, epoch=U32),
     st.builds(Alive, limbs=st.lists(LIMB, max_size=4)),
+    st.builds(Choice, rate=TIME, reason=TEXT, line=st.none() | TIME),
     st.builds(Notice, limb=LIMB, reason=TEXT, detail=TEXT),
     st.builds(Ask, limb=LIMB, wanted=st.booleans()),
     st.builds(
@@ -159,3 +163,14 @@ def test_types_are_unique_and_client_types_start_at_64() -> None:
     assert len(set(types)) == len(types)
     client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Input}
     assert {kind for kind in messages.Message.__args__ if kind.TYPE >= 64} == client
+
+
+@given(st.integers(0, 0xFFFF), TIME, st.sets(LIMB), st.integers(0, 5), st.randoms(use_true_random=False))
+def test_the_newest_frame_of_an_overlay_is_an_overlay_of_it_alone(
+    sequence: int, due: int, limbs: set[int], earlier: int, random: Random
+) -> None:
+    frames = [
+        {limb: tuple(random.randint(-32768, 32767) for _ in range(9)) for limb in limbs} for _ in range(earlier + 1)
+    ]
+    message = Overlay(sequence, due, frames[-1], tuple(frames[:-1]))
+    assert unpack(newest(message.pack())) == Overlay(sequence, due, frames[-1])

@@ -16,6 +16,7 @@ from typing import Protocol
 
 from bunraku.backing.unavailable import ANSWERED, Unavailable
 
+_WORD = re.compile(r"[A-Za-z0-9_-]{1,64}")
 Handler = Callable[[bytes], None]
 Answerer = Callable[[bytes], Awaitable[bytes]]
 
@@ -23,6 +24,11 @@ LONGEST_SUBJECT = 256
 _SUBJECT = re.compile(r"[^\s\x00-\x1f\x7f.*>]+(\.[^\s\x00-\x1f\x7f.*>]+)*")
 
 _log = logging.getLogger(__name__)
+
+
+def is_word(text: str) -> bool:
+    """Whether a text can be one word of a subject or of a key: what is not could be many (`*`, `>`)."""
+    return _WORD.fullmatch(text) is not None
 
 
 class NobodyAnswers(Exception):
@@ -150,7 +156,9 @@ class MemoryBus:
         self._answerers[checked(subject)] = answerer
 
         def end() -> None:
-            self._answerers.pop(subject, None)
+            # another may answer by now
+            if self._answerers.get(subject) is answerer:
+                del self._answerers[subject]
 
         return End(end)
 

@@ -13,6 +13,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
+from bunraku.backing import line
 from bunraku.backing.outlet import Listener, Outlet
 
 EXTENSION = "bunraku.take"
@@ -42,6 +43,7 @@ class DirectProtocol(WebSocketsSansIOProtocol):
             extensions = self.scope["extensions"]
             assert extensions is not None
             extensions[EXTENSION] = {"take": self.take}
+            extensions[line.EXTENSION] = {"transport": self.transport}
 
     def take(self, listener: Listener) -> Outlet | None:
         """The connection, accepted and not read from since; None where it has ended meanwhile."""

@@ -50,6 +50,12 @@ def frame(message: bytes, opcode: int = Opcode.BINARY) -> bytes:
     return struct.pack(">BBQ", 0x80 | opcode, 127, size) + message
 
 
+def message(framed: bytes) -> bytes:
+    """The message in a whole frame of a server, as `frame` made it."""
+    size = framed[1]
+    return framed[2 if size < 126 else 4 if size == 126 else 10 :]
+
+
 def close_frame(code: int, reason: str = "") -> bytes:
     """A server's Close; of `reason` what has room."""
     text = reason.encode()[: MOST_CONTROL - 2].decode(errors="ignore").encode()

@@ -65,6 +65,8 @@ class Outlet(asyncio.Protocol):
                 self.number = bare.fileno()
             with contextlib.suppress(OSError):
                 bare.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KERNEL_BYTES)
+                # what is written goes at once; not every event loop sees to it
+                bare.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         transport.set_protocol(self)
         # paused with the first byte that stays behind, resumed with the last one that leaves
         transport.set_write_buffer_limits(0, 0)

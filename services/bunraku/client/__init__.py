@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bunraku.client.api import Client, ServerProblem
+    from bunraku.client.figures import Figures
     from bunraku.client.one_euro import OneEuro
     from bunraku.client.puppeteer import Puppeteer, Refused
-    from bunraku.client.viewer import Figures, StreamEnded, Viewer
+    from bunraku.client.viewer import StreamEnded, Viewer
 
 _HOMES = {
     "Client": "api",
@@ -18,7 +19,7 @@ _HOMES = {
     "OneEuro": "one_euro",
     "Puppeteer": "puppeteer",
     "Refused": "puppeteer",
-    "Figures": "viewer",
+    "Figures": "figures",
     "StreamEnded": "viewer",
     "Viewer": "viewer",
 }

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from typing import Any
+from urllib.parse import parse_qsl, urlencode, urlsplit
 
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, WebSocketException
 
+from bunraku.client.figures import Figures
 from bunraku.codec import decode
 from bunraku.codec.audio import AudioTrack, Packet, read_audio
 from bunraku.codec.decode import decode_block
@@ -25,12 +27,14 @@ from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore, Pose, SceneStore
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.delay import PlayoutDelay
+from bunraku.playout.held import MOST, Held
 from bunraku.playout.overlays import Overlays
 from bunraku.playout.sounds import AudioStore
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
     SUBPROTOCOL,
     ChannelHeader,
+    Choice,
     Data,
     Description,
     Overlay,
@@ -45,53 +49,39 @@ from bunraku.wire.messages import (
 
 FRAME = 1 / 60
 BURST = 8
+SILENT = 4.0
+"""Seconds without a word after which a line counts as lost: the time is asked every second."""
+ANSWER = 3.0
+"""Seconds that a new connection may take before another is tried."""
+AGAIN = 0.5
+"""Seconds from one try to the next."""
 
 
 class StreamEnded(Exception):
     """The server closed the stream; the text says why."""
 
 
-@dataclass(slots=True)
-class Figures:
-    """How a viewer fared. Times in milliseconds; `kbps` counts all payload received over the time watched; `blocks` are
-    the motion's, `camera` where the show's camera was last: `position` and `gaze` in metres, `fov` in radians."""
-
-    seconds: float = 0.0
-    first_pose_ms: float | None = None
-    frames: int = 0
-    gaps: int = 0
-    blocks: int = 0
-    camera_blocks: int = 0
-    light_blocks: int = 0
-    audio_blocks: int = 0
-    audio_rate: int = -1
-    overlays: int = 0
-    bytes: int = 0
-    kbps: float = 0.0
-    rate: int = -1
-    clock_offset_ms: float = 0.0
-    clock_error_ms: float | None = None
-    overlay_early_ms: float | None = None
-    camera: dict[str, Any] | None = None
-
-    def as_json(self) -> dict[str, Any]:
-        """The figures as plain values."""
-        return {key: _rounded(value) for key, value in asdict(self).items()}
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _rounded(part) for key, part in value.items()}
-    if isinstance(value, list):
-        return [_rounded(part) for part in value]
-    return round(value, 3) if isinstance(value, float) else value
+class LineLost(StreamEnded):
+    """The line broke, or the server was too busy: it may be tried again."""
 
 
 class Viewer:
-    """One viewer of a stream at a WebSocket `url` (`.../stream`)."""
+    """One viewer of a stream at a WebSocket `url` (`.../stream`).
 
-    def __init__(self, url: str) -> None:
+    `now` is the local clock in microseconds; `open_socket` makes the unconnected, non-blocking socket of a connection
+    where the machine's own way is not the one meant.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        now: Callable[[], int] | None = None,
+        open_socket: Callable[[], socket.socket] | None = None,
+    ) -> None:
         self.url = url
+        self._local = now or _local
+        self._open_socket = open_socket
         self.figures = Figures()
         self.clock = ReferenceClock()
         self.timelines = timeline.Timelines()
@@ -104,40 +94,102 @@ class Viewer:
         self._scene_stores: dict[int, SceneStore] = {}
         self._sound: AudioStore | None = None
         self._sound_number = -1
+        self._told = 0
         self._overlays = Overlays()
         self._delay = PlayoutDelay()
         self._early: list[float] = []
         self._decode = 0.0
         self._began = 0.0
+        self._heard_at = 0.0
+        self._lit = 0.0
+        self._rates: list[float] = []
 
-    async def watch(self, seconds: float, on_frame: Callable[[int, Pose], None] | None = None) -> Figures:
-        """Watch for `seconds` at 60 frames a second; `on_frame` is told reference time (of what is shown: the
-        play-out delay behind the clock) and merged pose of each.
+    async def watch(
+        self, seconds: float, on_frame: Callable[[int, Pose], None] | None = None, *, frame: float = FRAME
+    ) -> Figures:
+        """Watch for `seconds`, a picture every `frame` seconds; `on_frame` is told reference time (of what is shown:
+        the play-out delay behind the clock) and merged pose of each.
 
-        Raises `StreamEnded` where the server closes the stream, OSError where there is none.
+        A line that is lost is taken up again where it was. Raises `StreamEnded` where the server closes the stream,
+        OSError where there is none.
         """
         await asyncio.to_thread(decode.warm)
         self._began = time.monotonic()
-        async with connect(
-            self.url,
-            subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
-            compression=None,
-            max_size=LARGEST_FROM_SERVER,
-            open_timeout=10,
-            close_timeout=2,
-        ) as connection:
-            tasks = [
-                asyncio.create_task(self._receive(connection)),
-                asyncio.create_task(self._ask_time(connection)),
-                asyncio.create_task(self._show(seconds, on_frame)),
-            ]
-            done, rest = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            for task in rest:
-                task.cancel()
-            await asyncio.gather(*rest, return_exceptions=True)
-            for task in done:
-                task.result()
+        showing = asyncio.create_task(self._show(seconds, on_frame, frame))
+        try:
+            while not showing.done():
+                await self._converse(showing)
+        finally:
+            showing.cancel()
+            await asyncio.gather(showing, return_exceptions=True)
         return self._settled()
+
+    async def _converse(self, showing: asyncio.Task[None]) -> None:
+        """One connection, until the show or the line is over; a line that is lost after something was shown ends
+        quietly, and the next connection goes on where it was."""
+        resumed = self.figures.first_pose_ms is not None
+        tasks = [showing]
+        try:
+            async with (
+                asyncio.timeout(ANSWER if resumed else None) as opening,
+                connect(
+                    self._address(),
+                    sock=await self._connected(),
+                    subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
+                    compression=None,
+                    max_size=LARGEST_FROM_SERVER,
+                    open_timeout=10,
+                    close_timeout=0.5 if resumed else 2,
+                    ping_interval=None,
+                ) as connection,
+            ):
+                opening.reschedule(None)
+                self.clock.restart()
+                self.timelines.restart()
+                self._heard_at = time.monotonic()
+                work = (self._receive(connection), self._ask_time(connection), self._watch_line())
+                tasks += [asyncio.create_task(way) for way in work]
+                try:
+                    done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+                finally:
+                    for task in tasks[1:]:
+                        task.cancel()
+                    await asyncio.gather(*tasks[1:], return_exceptions=True)
+                for task in done:
+                    task.result()
+        except (LineLost, OSError, TimeoutError, WebSocketException):
+            if self.figures.first_pose_ms is None:
+                raise
+            self.figures.reconnects += 1
+            await asyncio.wait((showing,), timeout=AGAIN)
+
+    def _address(self) -> str:
+        """Where to connect: after the first time with what is here already, and where a private timeline goes on."""
+        state = self.timelines.newest
+        if state is None or self._blocks is None or self.motion is None:
+            return self.url
+        now = self.clock.at(self._local())
+        position = timeline.position_at(state, now)
+        track = self._blocks.track
+        first = track.block_at(position)
+        ahead = [self._blocks.rate((first + nth) % track.blocks) for nth in range(min(track.blocks, MOST))]
+        query = {"have": Held(self.motion, first, ahead, self._told).text()}
+        if "/sessions/" not in self.url:
+            query |= {"at": f"{position / 1e6:.6f}", "clock": str(now)}
+        parts = urlsplit(self.url)
+        kept = [(key, value) for key, value in parse_qsl(parts.query) if key not in query]
+        return parts._replace(query=urlencode([*kept, *query.items()])).geturl()
+
+    async def _connected(self) -> socket.socket | None:
+        if self._open_socket is None:
+            return None
+        made, parts = self._open_socket(), urlsplit(self.url)
+        try:
+            await asyncio.get_running_loop().sock_connect(made, (parts.hostname, parts.port or 80))
+        except BaseException:
+            made.close()
+            raise
+        return made
 
     def pose_at(self, reference: int) -> Pose | None:
         """The merged pose at clock time `reference`, None where nothing is there to be shown."""
@@ -186,12 +238,23 @@ class Viewer:
     async def _receive(self, connection: ClientConnection) -> None:
         try:
             async for data in connection:
+                self._heard_at = time.monotonic()
                 if isinstance(data, bytes):
                     self.figures.bytes += len(data)
                     self._take(data)
         except ConnectionClosed:
             pass
+        if connection.close_code in (None, 1001, 1006, 1011, 1012, 1013):
+            raise LineLost(f"the line to the server was lost ({connection.close_code})")
         raise StreamEnded(connection.close_reason or f"the server closed the stream ({connection.close_code})")
+
+    async def _watch_line(self) -> None:
+        """Ends a connection over which nothing was heard for long, though the time was asked."""
+        quiet = 0.0
+        while quiet < SILENT:
+            await asyncio.sleep(SILENT - quiet)
+            quiet = time.monotonic() - self._heard_at
+        raise LineLost(f"nothing was heard for {SILENT:g} s")
 
     def _take(self, data: bytes) -> None:
         message = unpack(data)
@@ -199,7 +262,7 @@ class Viewer:
             self._keep(message)
         elif isinstance(message, Overlay):
             self.figures.overlays += 1
-            local = _local()
+            local = self._local()
             late = self.clock.at(local) - message.due
             if self.clock.ready:
                 self._early.append(-late / 1e3)
@@ -207,20 +270,30 @@ class Viewer:
                 self._delay.heard(late + (len(message.earlier) + 1) * Overlay.FRAME, local)
             self._overlays.put(message)
         elif isinstance(message, Pong):
-            self.clock.pong(message.sent, message.received, message.answered, _local())
+            self.clock.pong(message.sent, message.received, message.answered, self._local())
         elif isinstance(message, TimelineState):
             self.timelines.put(message)
         elif isinstance(message, ChannelHeader):
-            self.clock.guess(message.now, _local())
+            self.clock.guess(message.now, self._local())
         elif isinstance(message, Description):
             self._describe(message)
         elif isinstance(message, Presence):
             self.presence = message
+        elif isinstance(message, Choice):
+            self.figures.reason = message.reason
         elif isinstance(message, Problem):
             raise StreamEnded(f"{message.title}: {message.detail}")
 
     def _describe(self, description: Description) -> None:
         """Take in the tracks that can be read here: the motion must, and of others what is not known is skipped."""
+        first = description.first or 0
+        if description.motion == self.motion:
+            # what an id names never changes: the blocks that are here are good
+            self._add_tracks(first, description.tracks)
+            return
+        if first:
+            # the rest of one that was not told of
+            return
         numbers = [n for n, track in enumerate(description.tracks) if track.get("type") == "motion"]
         if not numbers:
             kinds = ", ".join(str(track.get("type")) for track in description.tracks) or "nothing"
@@ -231,16 +304,26 @@ class Viewer:
             raise StreamEnded(str(error)) from None
         self.motion, self._track_number = description.motion, numbers[0]
         self._blocks = BlockStore(self.track)
+        rates = description.tracks[numbers[0]].get("rates", [])
+        self._rates = [float(rate.get("kbps", 0.0)) for rate in rates]
         self._scene_stores = {}
-        for number, track in enumerate(description.tracks):
+        self._sound, self._sound_number = None, -1
+        self._told = 0
+        self._add_tracks(0, description.tracks)
+
+    def _add_tracks(self, first: int, described: list[dict[str, Any]]) -> None:
+        """Take in the tracks beside the motion from number `first` on that were not told of yet."""
+        assert self.track is not None
+        for number, track in enumerate(described, first):
+            if number < self._told:
+                continue
             if track.get("type") in ("camera", "light"):
                 with contextlib.suppress(DamagedBlock):
                     self._scene_stores[number] = SceneStore(read_scene(track))
-        self._sound, self._sound_number = None, -1
-        for number, track in enumerate(description.tracks):
-            if track.get("type") == "audio" and self._sound is None:
+            elif track.get("type") == "audio" and self._sound is None:
                 with contextlib.suppress(DamagedBlock):
                     self._sound, self._sound_number = AudioStore(read_audio(track, self.track)), number
+        self._told = max(self._told, first + len(described))
         self.scenes = [store.track for store in self._scene_stores.values()]
 
     def _keep(self, data: Data) -> None:
@@ -266,19 +349,20 @@ class Viewer:
     async def _ask_time(self, connection: ClientConnection) -> None:
         for sequence in range(1 << 32):
             with contextlib.suppress(ConnectionClosed):
-                await connection.send(Ping(sequence, _local()).pack())
-                state = self.timelines.at(self.clock.at(_local()))
+                await connection.send(Ping(sequence, self._local()).pack())
+                state = self.timelines.at(self.clock.at(self._local()))
                 if sequence >= BURST and state is not None and self._blocks is not None:
-                    position = timeline.position_at(state, self.clock.at(_local()))
+                    position = timeline.position_at(state, self.clock.at(self._local()))
                     ahead = self._blocks.ahead(position, state.loop)
                     await connection.send(Report(ahead, round(self._decode * 1e6)).pack())
             await asyncio.sleep(0.06 if sequence < BURST else 1.0)
 
-    async def _show(self, seconds: float, on_frame: Callable[[int, Pose], None] | None) -> None:
+    async def _show(self, seconds: float, on_frame: Callable[[int, Pose], None] | None, frame: float) -> None:
         loop = asyncio.get_running_loop()
         due, end, dark = loop.time(), loop.time() + seconds, False
+        before, weighed = loop.time(), 0.0
         while loop.time() < end:
-            local = _local()
+            local = self._local()
             reference = self.clock.at(local) - round(self._delay.at(local))
             pose = self.pose_at(reference)
             if (camera := self.camera_at(reference)) is not None:
@@ -293,14 +377,31 @@ class Viewer:
             elif self.figures.first_pose_ms is not None and not dark:
                 self.figures.gaps += 1
             dark = pose is None
-            due = max(due + FRAME, loop.time())
+            now = loop.time()
+            if self.figures.first_pose_ms is not None:
+                if dark:
+                    self.figures.dark_ms += (now - before) * 1e3
+                weighed += (now - before) * self._kbps_at(reference)
+                self._lit += now - before
+                self.figures.shown_kbps = weighed / max(self._lit, 1e-9)
+            before = now
+            due = max(due + frame, loop.time())
             await asyncio.sleep(max(due - loop.time(), 0))
+
+    def _kbps_at(self, reference: int) -> float:
+        """What the rate shown at `reference` costs, nothing where the block is missing."""
+        state = self.timelines.at(reference)
+        if state is None or self._blocks is None:
+            return 0.0
+        track = self._blocks.track
+        rate = self._blocks.rate(track.block_at(timeline.position_at(state, reference)))
+        return self._rates[rate] if 0 <= rate < len(self._rates) else 0.0
 
     def _settled(self) -> Figures:
         figures = self.figures
         figures.seconds = time.monotonic() - self._began
         figures.kbps = figures.bytes * 8e-3 / figures.seconds
-        figures.clock_offset_ms = self.clock.offset / 1e3 - (time.time_ns() // 1000 - _local()) / 1e3
+        figures.clock_offset_ms = self.clock.offset / 1e3 - (time.time_ns() // 1000 - self._local()) / 1e3
         figures.clock_error_ms = self.clock.error / 1e3 if self.clock.ready else None
         figures.overlay_early_ms = float(np.median(self._early)) if self._early else None
         return figures

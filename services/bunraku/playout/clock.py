@@ -1,7 +1,8 @@
 """The reference clock as seen from this end of a line (the clock filter of NTP, RFC 5905: who waited least knows best).
 
-Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last 8 the one with
-the smallest round trip says the offset. What is shown slews towards it and never steps, so the picture does not jump.
+Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last samples the one
+that can be off least says the offset: by half its round trip, and by what the clocks have drifted since. What is shown
+slews towards it and never steps, so the picture does not jump.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-SAMPLES = 8
+SAMPLES = 32
+DRIFT = 200e-6
+"""Microseconds a microsecond that two clocks may go apart."""
 CLOSING = 250_000
 """The shown offset closes on the best one with this time constant, microseconds."""
 SLEW = 0.9
@@ -21,10 +24,16 @@ STEP = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One round trip: reference minus local `offset`, and the time on the way, `trip`; microseconds."""
+    """One round trip: reference minus local `offset`, the time on the way, `trip`, and when it came, `at` on the local
+    clock; microseconds."""
 
     offset: float
     trip: int
+    at: int = 0
+
+    def error(self, now: int) -> float:
+        """How far the offset may be off at `now`."""
+        return self.trip / 2 + DRIFT * (now - self.at)
 
 
 class ReferenceClock:
@@ -43,8 +52,8 @@ class ReferenceClock:
         trip = (arrived - sent) - (answered - received)
         if trip < 0 or answered < received:
             return
-        self._samples.append(Sample(((received - sent) + (answered - arrived)) / 2, trip))
-        if len(self._samples) == 1 or abs(self.offset - self._shown) > STEP:
+        self._samples.append(Sample(((received - sent) + (answered - arrived)) / 2, trip, arrived))
+        if self._shown_at is None or abs(self.offset - self._shown) > STEP:
             self._shown, self._shown_at = self.offset, arrived
 
     def guess(self, reference: int, local: int) -> None:
@@ -59,13 +68,21 @@ class ReferenceClock:
 
     @property
     def offset(self) -> float:
-        """Reference minus local, by the sample that waited least."""
-        return min(self._samples, key=lambda sample: sample.trip).offset if self._samples else 0.0
+        """Reference minus local, by the sample that can be off least."""
+        return self._best().offset if self._samples else 0.0
 
     @property
     def error(self) -> float:
-        """How far the offset may be off at most: half the smallest round trip."""
-        return min(sample.trip for sample in self._samples) / 2 if self._samples else float("inf")
+        """How far the offset may be off at most, when the last answer came."""
+        return self._best().error(self._samples[-1].at) if self._samples else float("inf")
+
+    def restart(self) -> None:
+        """A new connection, perhaps to another machine: older answers say nothing about it. The offset in use stays."""
+        self._samples.clear()
+
+    def _best(self) -> Sample:
+        now = self._samples[-1].at
+        return min(self._samples, key=lambda sample: sample.error(now))
 
     @property
     def shown_offset(self) -> float:

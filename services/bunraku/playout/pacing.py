@@ -4,6 +4,10 @@ The server pushes ahead of the play position: the motion's first block at the lo
 once, then the sound at its lowest, the camera and light that go with it, then what lies within `AHEAD` at the chosen
 rates, the soonest first and where several are due the motion first, then the sound; last, better versions of what was
 sent. What a viewer already has is not sent again.
+
+Over a line that is narrow or may stand for a while the lowest rate goes far ahead as a net, a second of it for the
+bytes of a packet's heads, and better versions of what is soon shown just in time: whatever the line does for half a
+minute, the dance goes on.
 """
 
 from __future__ import annotations
@@ -19,6 +23,16 @@ AHEAD = 4_000_000
 """How far ahead of the play position blocks are pushed, microseconds."""
 MARGIN = 1_000
 """So long after a block comes within reach it is looked for, microseconds."""
+NET_AHEAD = 10_000_000
+"""As `AHEAD`, for better versions where a net is kept: such a line may stand for seconds."""
+SOON = 4_000_000
+"""What is shown within this goes before the rest of the net, microseconds."""
+JUST = 2_000_000
+"""What is shown within this is bettered before the rest of the net, microseconds."""
+NET = 30_000_000
+"""How far ahead of the play position the net reaches, microseconds."""
+REFILL = 20_000_000
+"""It is filled again when it reaches less far: several small blocks together are one packet."""
 UPGRADE = 500_000
 """A better version of a block that a viewer has is worth sending only if it can still be decoded before it is shown."""
 AGAIN = AHEAD - 1_000_000
@@ -50,9 +64,11 @@ class Paced:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Due:
-    """A block to be sent, those to be sent first being the least: whether it only betters one that was sent, how long
-    until it is shown in microseconds, its place among others of the same instant, and which one it is."""
+    """A block to be sent, those to be sent first being the least: whether it lies far ahead where a net is kept,
+    whether it only betters one that was sent, how long until it is shown in microseconds, its place among others of the
+    same instant, and which one it is."""
 
+    far: bool
     better: bool
     distance: int
     place: int
@@ -68,31 +84,50 @@ class Pacer:
         """Raises ValueError for a track without rates."""
         if any(track.rates < 1 for track in tracks):
             raise ValueError("a track has one rate at least")
-        self._tracks = tracks
+        self.tracks = tracks
+        """Of others nothing is sent."""
         self._sent: dict[tuple[int, int], int] = {}
+        self._filling = True
 
-    def next(self, state: TimelineState, clock: int, rate: int, audio: int | None = None) -> Due | None:
+    def has(self, track: int, index: int, rate: int) -> None:
+        """The viewer has this block at this rate already."""
+        self._sent[track, index] = max(rate, self._sent.get((track, index), rate))
+
+    def next(
+        self,
+        state: TimelineState,
+        clock: int,
+        rate: int,
+        audio: int | None = None,
+        *,
+        net: bool = False,
+        spare: bool = True,
+    ) -> Due | None:
         """The block to send now, None when enough is on its way.
 
         A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has, and
-        `audio` that of sound where it is another, -1 for none of it.
+        `audio` that of sound where it is another, -1 for none of it. `net` says that one is kept, as over a narrow
+        line; sound is in none. Without `spare` room only what is missing soon is sent.
         """
         position = position_at(state, clock)
-        rates = ((track, track.wanted(rate, audio)) for track in self._tracks)
+        rates = ((track, track.wanted(rate, audio)) for track in self.tracks)
         found = [
             due
             for track, wanted in rates
-            if wanted >= 0 and (due := self._due(track, state, position, wanted)) is not None
+            if wanted >= 0 and (due := self._due(track, state, position, wanted, net and not track.audio)) is not None
         ]
         if not found:
+            self._filling = False
             return None
         due = min(found)
+        if not spare and (due.far or due.better):
+            return None
         self._sent[due.track, due.index] = due.rate
         return due
 
     def follow(self, dues: Sequence[Due]) -> bool | None:
         """Take `dues`, the `arrivals` for one who has been sent all before them, as sent: True. False where all of them
-        had been sent before, None where some had: then `next` tells."""
+        had been sent before, None where some had: then `next` tells. For those without a net."""
         sent = [self._sent.get((due.track, due.index)) for due in dues]
         if all(rate is None for rate in sent):
             self._sent.update({(due.track, due.index): due.rate for due in dues})
@@ -101,14 +136,32 @@ class Pacer:
             return False
         return None
 
-    def wait(self, state: TimelineState, clock: int) -> int | None:
-        """Microseconds until the next block comes within reach, None while nothing moves."""
-        if not state.playing or not self._tracks:
-            return None
-        reach = (position_at(state, clock) + AHEAD) % state.duration
-        return min(_following(track.timing, reach, state.duration) for track in self._tracks) - reach + MARGIN
+    def fresh(self, state: TimelineState, clock: int) -> int:
+        """Microseconds for which nothing comes within reach that was sent before, for those without a net: at most as
+        long as a loop takes."""
+        position = position_at(state, clock)
+        fresh = state.duration
+        for track in self.tracks:
+            timing = track.timing
+            blocks = timing.block_at(state.duration - 1) + 1
+            first = min(timing.block_at(position), blocks - 1)
+            for count in range(blocks + 1 if state.loop else blocks - first):
+                turn, index = divmod(first + count, blocks)
+                beyond = timing.start_us(index) + turn * state.duration - position - AHEAD
+                if beyond >= fresh:
+                    break
+                if beyond >= 0 and (track.number, index) in self._sent:
+                    fresh = beyond
+        return fresh
 
-    def _due(self, track: Paced, state: TimelineState, position: int, rate: int) -> Due | None:
+    def wait(self, state: TimelineState, clock: int, net: bool = False) -> int | None:
+        """Microseconds until the next block comes within reach, None while nothing moves."""
+        if not state.playing or not self.tracks:
+            return None
+        reach = (position_at(state, clock) + (NET_AHEAD if net else AHEAD)) % state.duration
+        return min(_following(track.timing, reach, state.duration) for track in self.tracks) - reach + MARGIN
+
+    def _due(self, track: Paced, state: TimelineState, position: int, rate: int, net: bool) -> Due | None:
         """What is to be sent first of one track."""
         timing, rate = track.timing, min(rate, track.rates - 1)
         # a track may be shorter or longer than the motion, and turns with it
@@ -116,19 +169,26 @@ class Pacer:
         first = min(timing.block_at(position), blocks - 1)
         place = track.place
         soonest = AGAIN if track.audio and state.duration > AHEAD + 1_000_000 else UPGRADE
-        better = None
+        ahead = NET_AHEAD if net else AHEAD
+        found: list[Due] = []
         for count in range(blocks):
             turn, index = divmod(first + count, blocks)
             distance = max(timing.start_us(index) + turn * state.duration - position, 0)
-            if distance > AHEAD or (turn and not state.loop):
+            if distance > (NET if net else AHEAD) or (turn and not state.loop):
                 break
             sent = self._sent.get((track.number, index))
+            far = net and distance > (SOON if sent is None else JUST)
             if sent is None:
-                quick = place < 2 and count == 0
-                return Due(False, distance, place, track.number, index, 0 if quick else rate)
-            if sent < rate and distance > soonest and better is None:
-                better = Due(True, distance, place, track.number, index, rate)
-        return better
+                if far and distance <= REFILL:
+                    self._filling = True
+                if not far or self._filling:
+                    low = net or (place < 2 and count == 0)
+                    found.append(Due(far, False, distance, place, track.number, index, 0 if low else rate))
+                if not far:
+                    break
+            elif sent < rate and soonest < distance <= ahead:
+                found.append(Due(far, True, distance, place, track.number, index, rate))
+        return min(found, default=None)
 
 
 def arrivals(
@@ -150,14 +210,14 @@ def arrivals(
         timing = track.timing
         blocks = timing.block_at(state.duration - 1) + 1
         first = min(timing.block_at(before), blocks - 1)
-        place = track.place
+        place, rated = track.place, min(wanted, track.rates - 1)
         turn, into = divmod(reach, state.duration)
         index = min(timing.block_at(into) + 1, blocks - 1)
         while (start := timing.start_us(index) + turn * state.duration) > reach - 2 * MARGIN:
             # in a loop it was sent when it last came within reach, if it is still there
             sent = turn > 1 or (turn == 1 and index >= first)
             if start <= reach and not sent and (state.loop or not turn):
-                found.append(Due(False, start - position, place, track.number, index, min(wanted, track.rates - 1)))
+                found.append(Due(False, False, start - position, place, track.number, index, rated))
             turn, index = (turn, index - 1) if index else (turn - 1, blocks - 1)
             if turn < 0:
                 break

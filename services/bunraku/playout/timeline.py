@@ -70,6 +70,11 @@ class Timelines:
         if self._newest is None or state.epoch > self._newest.epoch:
             self._before, self._newest = self._newest, state
 
+    def restart(self) -> None:
+        """A new connection: its first timeline counts, whatever its epoch."""
+        if self._newest is not None:
+            self._newest = replace(self._newest, epoch=-1)
+
     @property
     def newest(self) -> TimelineState | None:
         """The timeline of the highest epoch."""

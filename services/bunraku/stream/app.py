@@ -12,17 +12,24 @@ from bunraku.backing.backing import Backing, clock
 from bunraku.backing.bus import NobodyAnswers
 from bunraku.backing.direct import take
 from bunraku.backing.library import StoredMotion
+from bunraku.backing.line import Line, line_of
+from bunraku.backing.outlet import Outlet
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
 from bunraku.playout import timeline
+from bunraku.playout.held import Held
 from bunraku.stream.sessions import WatchedSessions
+from bunraku.stream.tracks import TRACKS
 from bunraku.stream.turns import Turns
-from bunraku.stream.viewers import TRACKS, Viewer
+from bunraku.stream.viewers import Viewer
 
 IMMUTABLE = {"Cache-Control": "public, max-age=31536000, immutable"}
 
 RateQuery = Annotated[int | None, Query(ge=0, le=15)]
 TracksQuery = Annotated[str, Query(max_length=64)]
+HaveQuery = Annotated[str, Query(max_length=160)]
+RETURN = 60_000_000
+"""Who says when a private timeline began says so within this of now, microseconds."""
 
 
 def create_app(backing: Backing) -> FastAPI:
@@ -59,18 +66,27 @@ def create_app(backing: Backing) -> FastAPI:
 
     @app.websocket("/v1/motions/{motion}/stream")
     async def watch_motion(
-        socket: WebSocket, motion: str, rate: RateQuery = None, tracks: TracksQuery = "", at: float = 0.0
+        socket: WebSocket,
+        motion: str,
+        rate: RateQuery = None,
+        tracks: TracksQuery = "",
+        have: HaveQuery = "",
+        at: float = 0.0,
+        clock_at: Annotated[int | None, Query(alias="clock")] = None,
     ) -> None:
         try:
-            viewer = Viewer(turns, rate, _wanted(tracks), private=True)
+            viewer = Viewer(turns, rate, _wanted(tracks), private=True, held=_held(have))
             found = await backing.library.get(motion)
             if found is None:
                 raise Refusal(sockets.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
             # NaN and infinities start at the beginning
             position = round(min(at, 1e6) * 1e6) if at > 0 else 0
-            await sockets.accept(socket)
-            viewer.timeline(timeline.start(motion, found.track.duration_us, clock(), position=position), found)
-            viewer.open(take(socket, viewer))
+            outlet, line = await _come(socket, viewer)
+            now = clock()
+            # who comes back goes on where it was, however long the way here took
+            began = now if clock_at is None or abs(now - clock_at) > RETURN else clock_at
+            viewer.timeline(timeline.start(motion, found.track.duration_us, began, position=position), found)
+            viewer.open(outlet, line)
         except WebSocketDisconnect:
             # gone before anything was said
             pass
@@ -78,18 +94,19 @@ def create_app(backing: Backing) -> FastAPI:
             await sockets.close(socket, refusal)
 
     @app.websocket("/v1/sessions/{session}/stream")
-    async def watch_session(socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "") -> None:
+    async def watch_session(
+        socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "", have: HaveQuery = ""
+    ) -> None:
         try:
-            viewer = Viewer(turns, rate, _wanted(tracks))
+            viewer = Viewer(turns, rate, _wanted(tracks), held=_held(have))
             try:
                 watched = await sessions.open(session)
             except NobodyAnswers:
                 raise Refusal(sockets.NOT_FOUND, "No such session", f"there is no session {session[:40]!r}") from None
             try:
-                await sockets.accept(socket)
-                outlet = take(socket, viewer)
+                outlet, line = await _come(socket, viewer)
                 watched.join(viewer)
-                viewer.open(outlet)
+                viewer.open(outlet, line)
             finally:
                 sessions.close(session)
         except WebSocketDisconnect:
@@ -102,6 +119,29 @@ def create_app(backing: Backing) -> FastAPI:
 
 
 _BYTES = "application/octet-stream"
+
+
+async def _come(socket: WebSocket, viewer: Viewer) -> tuple[Outlet, Line | None]:
+    """Accept a viewer's socket and take it. What is written is held until `Viewer.open` lets it go: the answer to the
+    handshake and the first block share a packet. Raises as `sockets.accept` and `take` do."""
+    line = line_of(socket)
+    if line is not None:
+        line.hold(True)
+    try:
+        await sockets.accept(socket)
+        return take(socket, viewer), line
+    except BaseException:
+        if line is not None:
+            line.hold(False)
+        raise
+
+
+def _held(have: str) -> Held | None:
+    """What a viewer says it has; raises `Refusal` where it cannot be read."""
+    try:
+        return Held.read(have) if have else None
+    except ValueError as error:
+        raise Refusal(sockets.BROKEN, "Unreadable query", str(error)) from None
 
 
 def _wanted(tracks: str) -> tuple[str, ...]:

@@ -1,33 +1,37 @@
 """One viewer's socket: what it is sent, in which order, and what it says back (SPEC.md, Sockets).
 
-A viewer has no task and no timer of its own: it acts when something comes for it, when it is heard, when its line has
-room again, and when it has a turn (`bunraku.stream.turns`). What cannot be written at once waits: messages that must
-arrive in a small queue, and of overlays the newest. A viewer whose queue fills is dropped and told why; one who says
-nothing is asked, and dropped when nothing comes.
+A viewer has no task of its own: it acts when something comes for it, when it is heard, when its line has room again,
+and when it has a turn (`bunraku.stream.turns`). What cannot be written at once waits: messages that must arrive in a
+small queue, and of overlays the newest. A viewer whose queue fills is dropped and told why; one who says nothing is
+asked, and dropped when nothing comes.
+
+To a quick line (`bunraku.stream.flow`) all is written as it comes. To another what must arrive is, and then, each when
+there is room, blocks and the newest overlay: the line's queue is kept short, and until there may be room again a timer
+runs, which quick lines have none of.
 """
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import random
-from collections.abc import Sequence
 from typing import Protocol, cast
 
 from bunraku import __version__
 from bunraku.backing.backing import clock
 from bunraku.backing.frames import frame
-from bunraku.backing.library import StoredMotion, Track
+from bunraku.backing.frames import message as unframed
+from bunraku.backing.library import StoredMotion
 from bunraku.backing.outlet import Outlet
 from bunraku.backing.sockets import BROKEN, FAULT, TOO_SLOW, Refusal
-from bunraku.codec.audio import AudioTrack
-from bunraku.codec.coefficients import SCENE_CHANNELS
-from bunraku.codec.scene import SceneTrack
-from bunraku.codec.track import MotionTrack
-from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.playout import sharing, timeline
-from bunraku.playout.pacing import Paced, Pacer
-from bunraku.playout.rate import RateChoice
+from bunraku.playout.held import Held
+from bunraku.playout.pacing import MARGIN
+from bunraku.stream.cohorts import Cohort, Cohorts, Course
+from bunraku.stream.flow import Flow, Readable
 from bunraku.stream.plans import Plans
+from bunraku.stream.playing import BESIDE, Playing
+from bunraku.stream.tracks import TRACKS, channels
 from bunraku.stream.turns import Turns
 from bunraku.wire.messages import (
     ChannelHeader,
@@ -37,6 +41,7 @@ from bunraku.wire.messages import (
     Pong,
     Report,
     TimelineState,
+    newest,
     unpack,
 )
 
@@ -44,8 +49,6 @@ QUEUE = 64
 """Messages that may wait for a viewer."""
 PINGS = 8
 """Pings whose answers may wait; more are not answered."""
-TRACKS = ("motion", "audio", "camera", "light")
-"""Types of tracks that a viewer may ask for."""
 SILENT = 8_000_000
 """A viewer of whom nothing was heard for this long, microseconds, is asked for a sign of life."""
 GONE = 16_000_000
@@ -53,8 +56,16 @@ GONE = 16_000_000
 SPREAD = 1_000_000
 """Blocks are due to all viewers of a session at once, and sent to each up to this much later, microseconds: little of
 what is sent ahead, and the server's work is even."""
+TOGETHER = 4_000_000
+"""Who will be in step for less, microseconds, goes on alone."""
+DEEP = 200_000
+"""So much more of what is not live may wait in the queue of a narrow line, microseconds."""
 BATCH = 16_384
 """Bytes that are written in one piece, about."""
+LOOK = 250_000
+"""A line far away that counts as quick is looked at so often, microseconds."""
+LOOK_NEAR = 4_000_000
+"""The same of a near one: what it is asked costs as much as a block."""
 
 _log = logging.getLogger(__name__)
 
@@ -63,6 +74,7 @@ class Audience(Protocol):
     """Those who watch a session, as one of them sees it."""
 
     plans: Plans
+    cohorts: Cohorts
 
     def turned(self) -> None:
         """Of one of them the line has room again, or no more."""
@@ -78,14 +90,16 @@ class _Shut:
 
 
 _SHUT = cast(Outlet, _Shut())
+_UNKNOWN = Flow(None, clock)
 
 
 class Viewer:
     """What one viewer has been sent and is still to be sent. Until `open` is called everything waits."""
 
     __slots__ = (
-        "_asked", "_control", "_following", "_motion", "_overlay", "_pacer", "_phase", "_pinned", "_planned", "_pongs",
-        "_private", "_rate", "_shown", "_steps", "_timelines", "_tracks", "_turns", "_wanted", "audience", "outlet",
+        "_asked", "_beside_at", "_cohort", "_control", "_flow", "_following", "_held", "_look_at", "_overlay", "_phase",
+        "_pinned", "_planned", "_playing", "_pongs", "_private", "_shown", "_timelines", "_timer", "_turns", "_until",
+        "_wanted", "audience", "outlet",
     )  # fmt: skip
 
     def __init__(
@@ -95,65 +109,88 @@ class Viewer:
         wanted: tuple[str, ...] = TRACKS,
         *,
         private: bool = False,
+        held: Held | None = None,
     ) -> None:
         """`pinned` is the rate to keep to, if any; `wanted` the types of tracks whose blocks are sent; a `private`
-        viewer may edit its timeline."""
+        viewer may edit its timeline; `held` is what the viewer has and is not sent again."""
         self._turns = turns
         self._pinned = pinned
         self._wanted = wanted
         self._private = private
+        self._held = held
         self._phase = random.randrange(SPREAD)
         # what waits, framed, but for pings: their answers tell when they leave
         self._pongs: list[tuple[Ping, int]] = []
         self._control: list[bytes] = []
         self._overlay: bytes | None = None
+        self._beside_at = 0
         self._timelines = timeline.Timelines()
         self._shown: tuple[StoredMotion, TimelineState] | None = None
-        self._motion: StoredMotion | None = None
-        self._pacer: Pacer | None = None
-        self._rate: RateChoice | None = None
-        self._steps: tuple[sharing.Step, ...] = ()
-        self._tracks: list[Paced] = []
+        self._playing: Playing | None = None
         # when the next block comes within reach, and of which timeline at which step; None while some are to be sent
         self._following: int | None = None
         self._planned: tuple[TimelineState, sharing.Step] | None = None
+        # those it is in step with, until then at the latest; while there are any it has nothing to follow itself
+        self._cohort: Cohort | None = None
+        self._until = 0
         self._asked = 0
+        self._flow = _UNKNOWN
+        self._look_at = 0
+        self._timer: asyncio.TimerHandle | None = None
         self.audience: Audience | None = None
         self.outlet: Outlet = _SHUT
 
-    def open(self, outlet: Outlet) -> None:
-        """The line is there: what waits is sent, in one piece, and the first blocks."""
+    def open(self, outlet: Outlet, line: Readable | None = None) -> None:
+        """The line is there: what waits is sent, in one piece, and the first blocks. `line` tells how much is on its
+        way, where the system does."""
         self.outlet = outlet
+        try:
+            self._flow = Flow(line, clock)
+        except OSError:
+            # it is closed already, as the outlet will say
+            return
         self.advance()
+        self._flow.begun()
+
+    @property
+    def unasked(self) -> bool:
+        """Whether overlays may be written to the outlet as they come, with nothing asked and nothing told."""
+        return self.outlet.clear and self._flow.steady
 
     def control(self, framed: bytes) -> None:
         """A framed message that must arrive."""
         if self.outlet.clear:
-            self.outlet.write(framed)
+            self._put(framed)
         elif len(self._control) < QUEUE:
             self._control.append(framed)
         else:
             self.refuse(Refusal(TOO_SLOW, "Too slow", f"{QUEUE} messages waited; come again"))
 
     def overlay(self, framed: bytes) -> None:
-        """The frame of the newest overlay: written at once where nothing waits, else in place of one that was not."""
-        outlet = self.outlet
-        if outlet.clear:
-            outlet.write(framed)
+        """The frame of the newest overlay: written at once where nothing waits and the line has room, else in place of
+        one that was not."""
+        clear, flow = self.outlet.clear, self._flow
+        if clear and flow.steady:
+            self.outlet.write(framed)
+        elif clear and self._timer is None and flow.quick():
+            self._put(framed)
+            if flow.steady:
+                self._turned()
+                self._turns.put(self, 0)
         else:
             self._overlay = framed
+            self._beside_at = clock()
+            if clear and self._timer is None:
+                self._act(self._beside_at)
 
     def timeline(self, state: TimelineState, motion: StoredMotion) -> None:
         """A new timeline of the stage, and the motion that it names. It is sent at once, blocks at the next turn."""
+        self._leave_cohort()
         self._timelines.put(state)
-        if self._motion is not motion:
-            self._tracks = _paced(motion, self._wanted)
-            self._motion, self._pacer = motion, Pacer(self._tracks)
-            self._steps = sharing.pinned(_steps(motion, self._wanted), self._pinned)
-            first, safe = sharing.first_step(self._steps), sharing.safe_step(self._steps)
-            self._rate = RateChoice(len(self._steps), None, first, safe)
+        if self._playing is None or self._playing.motion is not motion:
+            self._playing = Playing(motion, self._wanted, self._pinned)
         if self.outlet.clear:
-            self.outlet.write(b"".join(self._announced()))
+            self._put(b"".join(self._announced()))
         self._turns.put(self, 0)
 
     def hear(self, message: bytes) -> None:
@@ -166,28 +203,27 @@ class Viewer:
             if len(self._pongs) < PINGS:
                 self._pongs.append((said, clock()))
             if self.outlet.clear:
-                self.outlet.write(b"".join(self._answers()))
-        elif isinstance(said, Report) and self._rate is not None:
-            before = self._rate.rate
-            if self._rate.report(said, clock()) != before:
+                self._put(b"".join(self._answers()))
+        elif isinstance(said, Report) and self._playing is not None:
+            now = clock()
+            if self._playing.report(said, now) or now >= self._look_at:
                 self._turns.put(self, 0)
         elif isinstance(said, Edit) and self._private:
             self._edit(said)
 
     def pause(self) -> None:
         """The line has no room."""
-        if self.audience is not None:
-            self.audience.turned()
+        self._leave_cohort()
+        self._turned()
 
     def resume(self) -> None:
         """The line has room again."""
-        if self.audience is not None:
-            self.audience.turned()
+        self._turned()
         self.advance()
 
     def gone(self) -> None:
         """The connection has ended."""
-        self._turns.remove(self)
+        self._end()
         if self.audience is not None:
             self.audience.leave(self)
 
@@ -200,18 +236,102 @@ class Viewer:
         if now - outlet.heard > SILENT and outlet.heard != self._asked:
             self._asked = outlet.heard
             outlet.ping()
+        self._act(now, look=True)
+
+    def _act(self, now: int, look: bool = False) -> None:
+        """Send what the line has room for, and say when the next turn is; `look` whether the line is a quick one."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        flow = self._flow
         try:
-            if outlet.clear and not self._follow(now):
-                self._send(now)
-                self._look_ahead(now)
+            if self.outlet.clear:
+                if look and now >= self._look_at:
+                    self._look(now)
+                if self._cohort is not None and not self._stays(now):
+                    self._leave_cohort()
+                if not flow.free:
+                    self._send_for_room(now)
+                elif self._cohort is None:
+                    if not self._follow(now):
+                        self._send(now)
+                        self._look_ahead(now)
+                    self._join_cohort()
             self._turns.put(self, self._next_turn())
         except Exception:
             _log.exception("a viewer's turn failed")
             self.refuse(Refusal(FAULT, "Our fault", "the server could not go on with this stream"))
 
-    def _send(self, now: int) -> None:
+    def _look(self, now: int) -> None:
+        """See whether the line is a quick one still, or has become one."""
+        flow = self._flow
+        steady = flow.steady
+        flow.look()
+        if flow.steady != steady:
+            self._turned()
+        self._look_at = now + (LOOK_NEAR if flow.free else LOOK) - 1
+
+    def _again(self) -> None:
+        self._timer = None
+        self._act(clock())
+
+    def _put(self, data: bytes) -> None:
+        """Write, and count it."""
+        self.outlet.write(data)
+        self._flow.wrote(len(data))
+
+    def _turned(self) -> None:
+        if self.audience is not None:
+            self.audience.turned()
+
+    def _end(self) -> None:
+        self._leave_cohort()
+        self._turns.remove(self)
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _send_for_room(self, now: int) -> None:
+        """Send what must arrive, then the rest as long as the line has room; look again when it may have some."""
+        outlet, flow = self.outlet, self._flow
+        self._planned = self._following = None
+        if first := b"".join(self._first()):
+            self._put(first)
+        while outlet.clear:
+            if not flow.room(0 if now - self._beside_at < BESIDE else DEEP):
+                break
+            narrow = flow.narrow
+            told = self._playing is not None and self._playing.unsaid and not flow.unknown
+            if told and self._playing is not None and (news := self._playing.news()):
+                # before what is sent far ahead, which may take long
+                self._put(news)
+            elif (self._overlay is None or narrow) and (packet := self._next_packet(now)) is not None:
+                self._put(frame(packet))
+                flow.block_went(len(packet))
+                flow.begun()
+            elif self._overlay is not None:
+                overlay, self._overlay = self._overlay, None
+                self._put(frame(newest(unframed(overlay))) if narrow else overlay)
+            elif self._playing is not None and (news := self._playing.news()):
+                self._put(news)
+            else:
+                self._look_ahead(now)
+                if not flow.learning:
+                    return
+                break
+        if outlet.clear:
+            flow.begun()
+            self._timer = asyncio.get_running_loop().call_later(flow.window.wait() * 1e-6, self._again)
+
+    def _first(self) -> list[bytes]:
+        """What goes before all else, framed."""
         frames = [*self._answers(), *self._announced(), *self._control]
         self._control.clear()
+        return frames
+
+    def _send(self, now: int) -> None:
+        """Send all that there is."""
+        frames = self._first()
         if self._overlay is not None:
             frames.append(self._overlay)
             self._overlay = None
@@ -222,6 +342,8 @@ class Viewer:
             if size >= BATCH:
                 outlet.write(b"".join(frames))
                 frames, size = [], 0
+        if outlet.clear and self._playing is not None and (news := self._playing.news()):
+            frames.append(news)
         if frames:
             outlet.write(b"".join(frames))
 
@@ -232,23 +354,23 @@ class Viewer:
 
     def _announced(self) -> list[bytes]:
         """The framed timeline if it is new, after what says of a new motion what it is."""
-        state, motion = self._timelines.newest, self._motion
-        if state is None or motion is None or (self._shown is not None and self._shown[1] is state):
+        state, playing = self._timelines.newest, self._playing
+        if state is None or playing is None or (self._shown is not None and self._shown[1] is state):
             return []
-        messages = [state.pack()]
+        messages, motion = [state.pack()], playing.motion
         if self._shown is None or self._shown[0] is not motion:
-            channels = sum(map(_channels, motion.tracks))
-            messages[:0] = [ChannelHeader(motion.id, clock(), channels, __version__).pack(), motion.description]
+            held, self._held = self._held, None
+            if not playing.has(held):
+                messages.insert(0, playing.described(self._flow.far))
+            messages.insert(0, ChannelHeader(motion.id, clock(), channels(motion), __version__).pack())
         self._shown = motion, state
         return [frame(message) for message in messages]
 
     def _next_packet(self, now: int) -> bytes | None:
         state = self._timelines.at(now)
-        if state is None or self._pacer is None or self._motion is None or self._rate is None:
+        if state is None or self._playing is None:
             return None
-        step = self._steps[self._rate.rate]
-        due = self._pacer.next(state, now, step.motion, audio=step.audio)
-        return None if due is None else self._motion.packets[due.track][due.rate][due.index]
+        return self._playing.next_packet(state, now, self._flow, self._beside_at)
 
     def _follow(self, now: int) -> bool:
         """Send what all who are in step are sent, where this one is, and nothing else waits; whether it is."""
@@ -257,13 +379,14 @@ class Viewer:
         state, step = self._planned
         if state is not self._timelines.at(now) or self._shown is None or self._shown[1] is not state:
             return False
-        assert self._motion is not None
-        assert self._rate is not None
-        assert self._pacer is not None
-        if step != self._steps[self._rate.rate] or self._pongs or self._control or self._overlay is not None:
+        playing = self._playing
+        assert playing is not None
+        if step != playing.step or playing.unsaid:
             return False
-        plan = self.audience.plans.at(self._following, state, self._motion, step, self._wanted, self._tracks)
-        new = self._pacer.follow(plan.dues)
+        if self._pongs or self._control or self._overlay is not None:
+            return False
+        plan = self.audience.plans.at(self._following, state, playing.motion, step, self._wanted, playing.tracks)
+        new = playing.pacer.follow(plan.dues)
         if new is None:
             return False
         self._following = plan.following
@@ -271,58 +394,76 @@ class Viewer:
             self.outlet.write(plan.framed)
         return True
 
+    def _join_cohort(self) -> None:
+        """Go on with those who are in step, where this one is for a while."""
+        if self.audience is None or self._planned is None or self._following is None:
+            return
+        (state, step), playing = self._planned, self._playing
+        assert playing is not None
+        if state is not self._timelines.newest or playing.unsaid:
+            return
+        # what comes from the next instant on, which may have passed
+        begin = self._following - MARGIN
+        fresh = playing.pacer.fresh(state, begin)
+        if fresh < TOGETHER:
+            return
+        course = Course(state, playing.motion, step, self._wanted)
+        self._cohort = self.audience.cohorts.join(
+            self, self._turns, course, playing.tracks, self._following, self._phase
+        )
+        if self._cohort is not None:
+            self._planned = self._following = None
+            self._until = begin + fresh - SPREAD
+
+    def _stays(self, now: int) -> bool:
+        """Whether this one is still in step, and nothing waits for it."""
+        cohort, playing = self._cohort, self._playing
+        assert cohort is not None
+        assert playing is not None
+        waits = self._pongs or self._control or self._overlay is not None or playing.unsaid
+        return self._flow.free and now < self._until and cohort.course.step == playing.step and not waits
+
+    def _leave_cohort(self) -> None:
+        cohort, self._cohort = self._cohort, None
+        if cohort is None:
+            return
+        assert self._playing is not None
+        for track, index, rate in cohort.leave(self):
+            self._playing.pacer.has(track, index, rate)
+
     def _look_ahead(self, now: int) -> None:
         """All that is within reach was sent: when more will be."""
         self._planned = self._following = None
-        state = self._timelines.at(now)
-        if self.outlet.clear and state is not None and self._pacer is not None and self._rate is not None:
-            wait = self._pacer.wait(state, now)
+        state, flow = self._timelines.at(now), self._flow
+        if self.outlet.clear and state is not None and self._playing is not None:
+            wait = self._playing.pacer.wait(state, now, flow.far or flow.narrow)
             if wait is not None:
                 self._following = now + wait
-                self._planned = state, self._steps[self._rate.rate]
+                self._planned = (state, self._playing.step) if flow.free else None
 
     def _next_turn(self) -> int:
         """Clock time of the next turn: for the next block, or to ask for a sign of life."""
         heard = self.outlet.heard
         due = heard + (GONE if heard == self._asked else SILENT) + 1
-        if self._following is None or not self.outlet.clear:
+        if not self.outlet.clear:
             return due
-        return min(due, self._following + self._phase)
+        if self._cohort is not None:
+            return min(due, self._until)
+        if self._following is not None:
+            # what goes over a narrow line just in time cannot wait so that the server's work is even
+            due = min(due, self._following + (self._phase if self._flow.free else 0))
+        if self._flow.far and self._flow.steady:
+            due = min(due, clock() + LOOK)
+        return due
 
     def _edit(self, edit: Edit) -> None:
         """Edit the viewer's own timeline."""
-        newest, motion = self._timelines.newest, self._motion
-        if newest is not None and motion is not None:
-            state = timeline.edit(newest, clock(), playing=edit.playing, position=edit.position, loop=edit.loop)
-            self.timeline(state, motion)
+        state, playing = self._timelines.newest, self._playing
+        if state is not None and playing is not None:
+            state = timeline.edit(state, clock(), playing=edit.playing, position=edit.position, loop=edit.loop)
+            self.timeline(state, playing.motion)
 
     def refuse(self, refusal: Refusal) -> None:
         """End it, and say why."""
-        self._turns.remove(self)
+        self._end()
         self.outlet.refuse(refusal)
-
-
-def _channels(track: Track) -> int:
-    if isinstance(track, AudioTrack):
-        return track.channels
-    return SCENE_CHANNELS if isinstance(track, SceneTrack) else CHANNEL_COUNT
-
-
-def _paced(motion: StoredMotion, wanted: Sequence[str]) -> list[Paced]:
-    """The tracks of a motion whose blocks a viewer wants."""
-    return [
-        Paced(number, track, len(motion.packets[number]), _kind(track) == "motion", _kind(track) == "audio")
-        for number, track in enumerate(motion.tracks)
-        if _kind(track) in wanted
-    ]
-
-
-def _steps(motion: StoredMotion, wanted: Sequence[str]) -> tuple[sharing.Step, ...]:
-    """The ways in which the tracks that a viewer wants may share its line."""
-    kinds = list(map(_kind, motion.tracks))
-    audio = motion.kbps[kinds.index("audio")] if "audio" in kinds and "audio" in wanted else ()
-    return sharing.steps(motion.kbps[0] if "motion" in wanted or not audio else (), audio)
-
-
-def _kind(track: Track) -> str:
-    return "motion" if isinstance(track, MotionTrack) else track.kind

@@ -58,11 +58,13 @@ class ChannelHeader(_Packed):
 
 @dataclass(frozen=True, slots=True)
 class Description(_Packed):
-    """The type of every track and what its blocks have in common (paper 3)."""
+    """The type of every track and what its blocks have in common (paper 3); of those from index `first` on, where that
+    is not None."""
 
     TYPE = 2
     motion: str
     tracks: list[dict[str, Any]]
+    first: Count | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +140,17 @@ class Notice(_Packed):
     limb: Limb
     reason: str
     detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Choice(_Packed):
+    """Which rate the server chose and why: `reason` is one of SPEC.md's words; `line` bit/s that a narrow line carries,
+    heads included, left out where it is not narrow."""
+
+    TYPE = 13
+    rate: Count
+    reason: str
+    line: Count | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,6 +275,12 @@ class Overlay:
         return cls(sequence, due, frames[-1], tuple(frames[:-1]))
 
 
+def newest(overlay: bytes) -> bytes:
+    """An Overlay's message with its last frame alone, for a line that does not carry all."""
+    limbs = (overlay[1] & 15).bit_count()
+    return bytes((overlay[0], overlay[1] & 15)) + overlay[2:12] + overlay[len(overlay) - 18 * limbs :]
+
+
 @dataclass(frozen=True, slots=True)
 class Ping:
     """Asks for the time; `sent` is the sender's own clock. As long as its answer, so that both ways cost the same."""
@@ -337,15 +356,15 @@ class Input:
 
 Message = (
     ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-    | Notice | Ping | Edit | Report | Claim | Release | Alive | Ask | Input
+    | Notice | Choice | Ping | Edit | Report | Claim | Release | Alive | Ask | Input
 )  # fmt: skip
 
 _FIXED = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)}
 _MAPS: dict[int, TypeAdapter[Any]] = {
     kind.TYPE: TypeAdapter(kind)
     for kind in (
-        ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Edit, Report,
-        Claim, Release, Alive, Ask,
+        ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Choice, Edit,
+        Report, Claim, Release, Alive, Ask,
     )
 }  # fmt: skip
 

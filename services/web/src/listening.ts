@@ -46,6 +46,7 @@ export class Listening {
   enter(viewer: Viewer): void {
     this.#viewer = viewer;
     viewer.addEventListener("figure", () => void this.#play());
+    viewer.addEventListener("tracks", () => void this.#play());
     viewer.addEventListener("timeline", () => this.#player?.retime());
     void this.#play();
   }

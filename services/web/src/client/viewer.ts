@@ -14,13 +14,15 @@ import type { AudioStore } from "../playout/sounds";
 import { positionAt, Timelines } from "../playout/timeline";
 import { Tracks } from "../playout/tracks";
 import {
-  type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState,
+  type Choice, type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState,
 } from "../wire/messages";
 import { Connection } from "./connection";
 import type { LineFigures } from "./line-figures";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
 import { OwnSolver } from "./own-solver";
+import { reasonOf } from "./reasons";
+import { returningUrl } from "./returning";
 import type { ViewerOptions } from "./viewer-options";
 
 export type Timeline = TimelineState;
@@ -36,7 +38,7 @@ const NEWEST = 1 / 8;
 
 const NO_BLOCKS = new Int8Array(0);
 
-/** Events: "figure", "timeline", "presence", "blocks", "open", and "closed" (a CustomEvent whose detail is the reason). */
+/** Events: "figure", "tracks" (more of them are known), "timeline", "presence", "blocks", "open", and "closed" (a CustomEvent whose detail is the reason). */
 export class Viewer extends EventTarget {
   /** The reference clock, in microseconds of local time. */
   readonly clock = new ReferenceClock();
@@ -75,6 +77,7 @@ export class Viewer extends EventTarget {
   private decodeMs = 0;
   private frameMs = 0;
   private rate = -1;
+  private choice: Choice | null = null;
   private closedReason: string | null = null;
   /** The private timeline to go on with when the line comes back. */
   private resume: TimelineState | null = null;
@@ -238,7 +241,10 @@ export class Viewer extends EventTarget {
       playoutDelayMs: this.delay.at(now * 1000) / 1000,
       firstPoseMs: this.firstPoseMs,
       gaps: this.gaps,
-      reason: this.reason(),
+      reason: reasonOf({
+        closed: this.closedReason, damaged: this.damaged, shown: this.shown, missing: this.missing >= 0, choice: this.choice,
+        pinned: this.url.searchParams.has("rate"),
+      }),
     };
   }
 
@@ -253,21 +259,13 @@ export class Viewer extends EventTarget {
   }
 
   private address(): string {
-    const url = new URL(this.url);
-    if (!this.connectsToSession && this.resume) url.searchParams.set("at", String(this.positionAt(this.now())));
-    return url.href;
+    const { tracks, resume } = this;
+    if (!tracks || resume?.motion !== this.motion) return this.url.href;
+    return returningUrl(this.url, tracks, resume, this.clock.at(this.now() * 1000), !this.connectsToSession);
   }
 
   private get connectsToSession(): boolean {
     return this.url.pathname.includes("/sessions/");
-  }
-
-  private reason(): string {
-    if (this.closedReason !== null) return this.closedReason;
-    if (this.damaged > 0) return `${this.damaged} messages could not be read`;
-    if (!this.shown) return "waiting for the first block";
-    if (this.missing >= 0) return "waiting for a block";
-    return this.url.searchParams.has("rate") ? "pinned by the address" : "chosen by the server";
   }
 
   private opened(): void {
@@ -329,6 +327,9 @@ export class Viewer extends EventTarget {
         this.presence = message;
         this.tell("presence");
         break;
+      case "Choice":
+        this.choice = message;
+        break;
       case "Pong":
         this.clock.pong(message.sent, message.received, message.answered, now * 1000);
         break;
@@ -339,7 +340,14 @@ export class Viewer extends EventTarget {
 
   private describe(message: Description): void {
     // what an id names never changes, so the blocks of the same motion are good still
-    if (message.motion === this.motion && this.store) return;
+    if (message.motion === this.motion && this.tracks) {
+      const { told } = this.tracks;
+      this.tracks.add(message.first ?? 0, message.tracks);
+      if (this.tracks.told > told) this.tell("tracks");
+      return;
+    }
+    // the rest of one that was not told of
+    if (message.first) return;
     try {
       this.tracks = new Tracks(message.tracks);
     } catch (error) {

@@ -1,13 +1,20 @@
 /**
  * The reference clock as seen from this end of a line (after NTP, RFC 5905, clock filter: the sample that waited least).
  *
- * Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last 8 the one with the
- * smallest round trip says the offset. The offset in use slews towards it and never steps.
+ * Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last samples the one
+ * that can be off least says the offset: by half its round trip, and by what the clocks have drifted since. The offset in
+ * use slews towards it and never steps.
  */
 
 import { Slew } from "./slew";
 
-const SAMPLES = 8;
+const SAMPLES = 32;
+
+/** So many answers, and the best of them is a good one. */
+const SETTLED = 8;
+
+/** Microseconds a microsecond that two clocks may go apart. */
+const DRIFT = 200e-6;
 
 /** Further off than any greeting is late, microseconds. */
 const ANOTHER = 2e6;
@@ -15,12 +22,14 @@ const ANOTHER = 2e6;
 interface Sample {
   offset: number;
   trip: number;
+  at: number;
 }
 
 /** Local time to reference time; all arguments and results are microseconds. */
 export class ReferenceClock {
   private readonly samples: Sample[] = [];
   private best: Sample | null = null;
+  private bestError = Infinity;
   private readonly slew = new Slew();
   private goal: number | null = null;
 
@@ -29,19 +38,19 @@ export class ReferenceClock {
     return this.goal !== null;
   }
 
-  /** Whether as many answers came as are remembered: it will not change by much any more. */
+  /** Whether so many answers came that the offset will not change by much any more. */
   get settled(): boolean {
-    return this.samples.length === SAMPLES;
+    return this.samples.length >= SETTLED;
   }
 
-  /** Reference minus local, by the sample that waited least; until there is one, by the greeting. */
+  /** Reference minus local, by the sample that can be off least; until there is one, by the greeting. */
   get offset(): number {
     return this.goal ?? 0;
   }
 
-  /** How far the offset may be off at most: half the smallest round trip. Infinite before the first answer. */
+  /** How far the offset may be off at most, when the last answer came. Infinite before the first. */
   get error(): number {
-    return this.best ? this.best.trip / 2 : Infinity;
+    return this.best ? this.bestError : Infinity;
   }
 
   /**
@@ -61,9 +70,11 @@ export class ReferenceClock {
   pong(sent: number, received: number, answered: number, arrived: number): void {
     const trip = arrived - sent - (answered - received);
     if (trip < 0 || answered < received) return;
-    this.samples.push({ offset: (received - sent + (answered - arrived)) / 2, trip });
+    this.samples.push({ offset: (received - sent + (answered - arrived)) / 2, trip, at: arrived });
     if (this.samples.length > SAMPLES) this.samples.shift();
-    this.best = this.samples.reduce((least, sample) => (sample.trip < least.trip ? sample : least));
+    const off = (sample: Sample) => sample.trip / 2 + DRIFT * (arrived - sample.at);
+    this.best = this.samples.reduce((least, sample) => (off(sample) < off(least) ? sample : least));
+    this.bestError = off(this.best);
     this.aim(this.best.offset, arrived);
   }
 

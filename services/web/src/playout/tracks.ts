@@ -13,9 +13,11 @@ type TrackStore = BlockStore | SceneStore | AudioStore;
 export class Tracks {
   readonly dance: BlockStore;
   /** Cameras and lights, in the Description's order. */
-  readonly scenes: readonly SceneStore[];
+  readonly scenes: SceneStore[] = [];
   /** The sound, null where there is none: the first of the Description. */
-  readonly sound: AudioStore | null;
+  sound: AudioStore | null = null;
+  /** How many tracks were told of. */
+  told = 0;
   /** By index in the Description; tracks that are not known here are missing. */
   private readonly stores = new Map<number, TrackStore>();
 
@@ -28,25 +30,29 @@ export class Tracks {
     if (index < 0) throw new DamagedBlock("the stream has no motion in it");
     this.dance = new BlockStore(MotionTrack.fromDescription(described[index]));
     this.stores.set(index, this.dance);
-    const scenes: SceneStore[] = [];
-    let sound: AudioStore | null = null;
-    described.forEach((map, number) => {
+    this.add(0, described);
+  }
+
+  /** Takes in the tracks from index `first` on that were not told of yet: a narrow line may bring them after the first blocks. */
+  add(first: number, described: readonly Track[]): void {
+    described.forEach((map, nth) => {
+      const number = first + nth;
+      if (number < this.told) return;
       try {
         if (map.type === "camera" || map.type === "light") {
           const store = new SceneStore(SceneTrack.fromDescription(map));
           this.stores.set(number, store);
-          scenes.push(store);
-        } else if (map.type === "audio" && !sound) {
-          sound = new AudioStore(AudioTrack.fromDescription(map, this.dance.track));
-          this.stores.set(number, sound);
+          this.scenes.push(store);
+        } else if (map.type === "audio" && !this.sound) {
+          this.sound = new AudioStore(AudioTrack.fromDescription(map, this.dance.track));
+          this.stores.set(number, this.sound);
         }
       } catch (error) {
         if (!(error instanceof DamagedBlock)) throw error;
         console.warn(`the ${map.type} of this motion is left out: ${error.message}`);
       }
     });
-    this.scenes = scenes;
-    this.sound = sound;
+    this.told = Math.max(this.told, first + described.length);
   }
 
   /** What keeps the blocks of the track of this index, null where it is not known here. */

@@ -50,7 +50,7 @@ const asked: Field = (value) => {
 
 const FIELDS: { [name in MapName]: Readonly<Record<string, Field>> } = {
   ChannelHeader: { motion: text, now: count, channels: count, software: text, version: count, clock: text },
-  Description: { motion: text, tracks: list(track) },
+  Description: { motion: text, first: optional(count), tracks: list(track) },
   TimelineState: {
     epoch: count, motion: text, clock: count, position: count, playing: flag, loop: flag, duration: count,
   },
@@ -65,6 +65,7 @@ const FIELDS: { [name in MapName]: Readonly<Record<string, Field>> } = {
   Release: { limb, epoch: count },
   Alive: { limbs: list(limb) },
   Notice: { limb, reason: text, detail: text },
+  Choice: { rate: count, reason: text, line: optional(count) },
   Ask: { limb, wanted: flag },
 };
 

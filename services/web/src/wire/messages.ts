@@ -20,10 +20,11 @@ export interface ChannelHeader {
 /** A track of a Description: its `type`, and what that type says besides. */
 export type Track = { type: string } & Record<string, unknown>;
 
-/** The type of every track and what its blocks have in common. */
+/** The type of every track and what its blocks have in common; of those from index `first` on, where that is not null. */
 export interface Description {
   name: "Description";
   motion: string;
+  first: number | null;
   tracks: Track[];
 }
 
@@ -125,6 +126,14 @@ export interface Notice {
   detail: string;
 }
 
+/** Which rate the server chose, and why, in a word of the contract; `line` bit/s that a narrow line carries, null where it is not. */
+export interface Choice {
+  name: "Choice";
+  rate: number;
+  reason: string;
+  line: number | null;
+}
+
 /** Asks for the time; `sent` is the sender's own clock. As long as its answer, so that both ways cost the same. */
 export interface Ping {
   name: "Ping";
@@ -191,12 +200,12 @@ export interface Input {
 
 export type ServerMessage =
   | ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-  | Notice;
+  | Notice | Choice;
 export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Ask | Input;
 export type Message = ServerMessage | ClientMessage;
 
 /** The type byte of each message. */
 export const TYPES: Readonly<Record<Message["name"], number>> = {
   ChannelHeader: 1, Description: 2, Data: 3, TimelineState: 4, Overlay: 5, Presence: 6, Pong: 7, Problem: 8, Welcome: 9,
-  Grant: 10, Refusal: 11, Notice: 12, Ping: 64, Edit: 65, Report: 66, Claim: 67, Release: 68, Alive: 69, Input: 70, Ask: 71,
+  Grant: 10, Refusal: 11, Notice: 12, Choice: 13, Ping: 64, Edit: 65, Report: 66, Claim: 67, Release: 68, Alive: 69, Input: 70, Ask: 71,
 };

@@ -24,7 +24,7 @@ beforeEach(async () => {
   stream.accept();
   stream.say(
     { name: "ChannelHeader", motion: "d", now: UNIX, channels: 19, software: "0", version: 1, clock: "unix" },
-    { name: "Description", motion: "d", tracks: [goldenDescription()] },
+    { name: "Description", motion: "d", first: null, tracks: [goldenDescription()] },
     { name: "TimelineState", epoch: 1, motion: "d", clock: UNIX, position: 0, playing: false, loop: true, duration: 2_600_000 },
     { name: "Data", track: 0, rate: 1, index: 0, block },
   );

@@ -37,7 +37,7 @@ function header(motion = "dance"): Message {
 }
 
 function description(motion = "dance"): Message {
-  return { name: "Description", motion, tracks: [{ type: "song" }, goldenDescription()] };
+  return { name: "Description", motion, first: null, tracks: [{ type: "song" }, goldenDescription()] };
 }
 
 function timeline(change: Partial<TimelineState> = {}): Message {
@@ -199,7 +199,7 @@ test("reports once a second what is ready and how long drawing takes", () => {
 
 describe("camera and light", () => {
   const filmed = (): Message => ({
-    name: "Description", motion: "filmed", tracks: [goldenScene(1), goldenDescription(), goldenScene(0)],
+    name: "Description", motion: "filmed", first: null, tracks: [goldenScene(1), goldenDescription(), goldenScene(0)],
   });
   const cameraData = (index: number, rate: number): Message => ({
     name: "Data", track: 2, rate, index, block: cameraBlocks[rate][index],
@@ -218,6 +218,20 @@ describe("camera and light", () => {
     expect(viewer.poseAt(now)).not.toBeNull();
     now = (26 / 30) * 1000;
     viewer.cameraAt(now)!.forEach((value, i) => expect(value).toBeCloseTo(cameraNumbers(1)[0][i], 6));
+  });
+
+  test("may be told of after the dance, and are shown from then on", () => {
+    watching();
+    const told: string[] = [];
+    for (const event of ["figure", "tracks"]) viewer.addEventListener(event, () => told.push(event));
+    const rest = (first: number, motion = "filmed"): Message => ({ name: "Description", motion, first, tracks: [goldenScene(1), goldenScene(0)] });
+    Line.last.say(header("filmed"), rest(1), { ...filmed(), tracks: [goldenDescription()] } as Message);
+    Line.last.say(timeline({ epoch: 2, motion: "filmed" }), cameraData(0, 1));
+    expect([viewer.cameraAt(now), viewer.scenes.length]).toEqual([null, 0]);
+    Line.last.say(rest(1, "another"), rest(1), rest(1), cameraData(0, 1));
+    expect(viewer.scenes.map(({ kind }) => kind)).toEqual(["light", "camera"]);
+    expectNear(viewer.cameraAt(now)!, Float64Array.from(cameraNumbers(0)[0]));
+    expect(told).toEqual(["figure", "tracks"]);
   });
 
   test("belong to their motion", () => {
@@ -276,10 +290,20 @@ describe("when the line is lost", () => {
     Line.last.say(timeline({ epoch: 2, clock: UNIX, position: 700_000, playing: false, loop: false }));
     Line.last.end(1006);
     pass(250);
-    expect(Line.last.url).toBe("ws://stage/v1/motions/dance/stream?rate=1&at=0.7");
+    const clock = UNIX + 650_000;
+    expect(Line.last.url).toBe(`ws://stage/v1/motions/dance/stream?rate=1&have=dance.0.1--.2&at=0.700000&clock=${clock}`);
     Line.last.accept();
     Line.last.say(header(), description(), timeline({ position: 700_000 }));
     expect(Line.last.of("Edit")).toEqual([{ name: "Edit", playing: false, position: null, loop: false }]);
+  });
+
+  test("what is held is not asked for again, in a session either", () => {
+    watching();
+    Line.last.say(data(0, 1, best));
+    Line.last.end(1006);
+    pass(250);
+    expect(new URL(Line.last.url).searchParams.get("have")).toBe("dance.0.1--.2");
+    expect(new URL(Line.last.url).searchParams.has("at")).toBe(false);
   });
 
   test("a missing session is the end", () => {
@@ -319,7 +343,7 @@ describe("what cannot be played", () => {
   ])("%s ends it and says why", (_, tracks, why) => {
     viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
     Line.last.accept();
-    Line.last.say(header(), { name: "Description", motion: "dance", tracks });
+    Line.last.say(header(), { name: "Description", motion: "dance", first: null, tracks });
     expect(viewer.ended).toBe(true);
     expect(viewer.line().reason).toContain(why);
   });

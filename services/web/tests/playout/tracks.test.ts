@@ -17,6 +17,18 @@ test("each track is found by its index, the dance and the scenes beside it", () 
   expect([1, 4, 5, 15].map((track) => tracks.store(track))).toEqual([null, null, null, null]);
 });
 
+test("tracks that are told of later are found by their index too, and none is told of twice", () => {
+  const [sound] = vectors<{ tracks: Track[] }>("audio").tracks;
+  const tracks = new Tracks([goldenDescription()]);
+  expect([tracks.told, tracks.scenes.length, tracks.sound]).toEqual([1, 0, null]);
+  tracks.add(1, [sound, goldenScene(1)]);
+  const { dance } = tracks;
+  tracks.add(0, [goldenDescription(), sound, goldenScene(1), goldenScene(0)]);
+  expect(tracks.scenes.map((store) => store.track.kind)).toEqual(["light", "camera"]);
+  expect([0, 1, 2, 3].map((track) => tracks.store(track))).toEqual([dance, tracks.sound, ...tracks.scenes]);
+  expect(tracks.told).toBe(4);
+});
+
 test("a camera that cannot be read is left out, and the dance goes on", () => {
   const warned = vi.spyOn(console, "warn").mockReturnValue();
   const tracks = new Tracks([goldenDescription(), { ...goldenScene(), codec: "bunraku.scene/9" }, goldenScene(1)]);

@@ -1,0 +1,113 @@
+"""One motion as it is sent to one viewer: which block is next and at which rate, and what the viewer is told of it."""
+
+from __future__ import annotations
+
+from bunraku.backing.frames import frame
+from bunraku.backing.library import StoredMotion
+from bunraku.playout import sharing
+from bunraku.playout.held import Held
+from bunraku.playout.pacing import Pacer
+from bunraku.playout.rate import RateChoice
+from bunraku.stream.flow import Flow
+from bunraku.stream.tracks import described, paced, steps, told_of
+from bunraku.wire.messages import Choice, Report, TimelineState
+
+BESIDE = 1_000_000
+"""So long after an overlay the hands share a narrow line with blocks, microseconds."""
+
+
+class Playing:
+    """What one viewer has been sent of `motion`, and at which rate it is sent the rest; times are clock times in
+    microseconds."""
+
+    __slots__ = (
+        "_known",
+        "_pinned",
+        "_tells",
+        "_told",
+        "_wanted",
+        "motion",
+        "pacer",
+        "rate",
+        "steps",
+        "tracks",
+        "unsaid",
+    )
+
+    def __init__(self, motion: StoredMotion, wanted: tuple[str, ...], pinned: int | None) -> None:
+        """`wanted` are the types of tracks whose blocks are sent, `pinned` the motion's rate to keep to, if any."""
+        self.motion = motion
+        self.tracks = paced(motion, wanted)
+        # tracks that the viewer is to be told of, and was
+        self._wanted = told_of(motion, wanted)
+        self._known = self._wanted
+        self.pacer = Pacer(self.tracks)
+        self.steps = sharing.pinned(steps(motion, wanted), pinned)
+        first, safe = sharing.first_step(self.steps), sharing.safe_step(self.steps)
+        self.rate = RateChoice(len(self.steps), None, first, safe, [step.kbps for step in self.steps])
+        self._pinned = pinned is not None
+        self._tells = "motion" in wanted
+        self._told: Choice | None = None
+        self.unsaid = True
+        """Whether `news` may have something to say."""
+
+    @property
+    def step(self) -> sharing.Step:
+        """How motion and sound share the line now."""
+        return self.steps[self.rate.rate]
+
+    def has(self, held: Held | None) -> bool:
+        """What the viewer holds already is not sent again; whether it is of this motion."""
+        if held is None or held.motion != self.motion.id:
+            return False
+        self._told_of(min(len(self.motion.tracks) if held.tracks is None else held.tracks, self._wanted))
+        for nth, rate in enumerate(held.rates):
+            if rate >= 0:
+                self.pacer.has(0, (held.first + nth) % self.motion.track.blocks, rate)
+        return True
+
+    def described(self, far: bool) -> bytes:
+        """The Description that goes before all else: of the motion alone where the line is `far` and there is more."""
+        self._told_of(1 if far and self._tells else self._wanted)
+        return described(self.motion, 0, self._known)
+
+    def _told_of(self, known: int) -> None:
+        self._known = known
+        self.pacer.tracks = [track for track in self.tracks if track.number < known]
+
+    def report(self, report: Report, clock: int) -> bool:
+        """How the viewer fares; whether rate or reason have changed."""
+        before = self.rate.rate, self.rate.reason
+        changed = (self.rate.report(report, clock), self.rate.reason) != before
+        self.unsaid = self.unsaid or changed
+        return changed
+
+    def next_packet(self, state: TimelineState, clock: int, flow: Flow, beside_at: int) -> bytes | None:
+        """The Data to send next, None when enough is on its way; an overlay waited for room at `beside_at`."""
+        narrow = flow.narrow
+        beside = narrow and clock - beside_at < BESIDE
+        self.rate.line(flow.window.rate if narrow else None, clock, beside)
+        step = self.steps[0] if flow.unknown else self.step
+        if self._known < self._wanted:
+            due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=True, spare=False)
+            if due is None:
+                # the motion goes on for a while
+                known = self._known
+                self._told_of(self._wanted)
+                return described(self.motion, known, self._known)
+            return self.motion.packets[due.track][due.rate][due.index]
+        spare = not beside or flow.blocks_turn()
+        due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=narrow or flow.far, spare=spare)
+        return None if due is None else self.motion.packets[due.track][due.rate][due.index]
+
+    def news(self) -> bytes | None:
+        """The framed choice of a rate, where the viewer has not been told yet."""
+        self.unsaid = False
+        if not self._tells:
+            return None
+        reason = "pinned" if self._pinned else self.rate.reason
+        choice = Choice(self.step.motion, reason, self.rate.carried)
+        told, self._told = self._told, choice
+        if told is not None and (told.rate, told.reason) == (choice.rate, choice.reason):
+            return None
+        return frame(choice.pack())

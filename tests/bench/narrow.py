@@ -1,0 +1,471 @@
+"""How Bunraku does on narrow lines: `make bench-narrow`. The last line printed is one JSON object.
+
+The real server in a process of its own at the near end of emulated lines (`network.py`), headless viewers at their far
+ends, real kernel TCP between. Needs root; `--only 28k8,live` runs some cases alone, `make bench-narrow
+ARGUMENTS="--only live"`.
+
+    9k6 28k8 56k   a motion at these kbit/s (round trips of 300, 150, 150 ms): time from the start of the TCP connection
+                   to the first pose (median of five lines side by side), and gaps over 60 s on one of them
+    steps          56 -> 14.4 -> 56 kbit/s under a pulled dancer: gaps, latency of the live overlay
+    live           all four limbs pulled, on 28.8 kbit/s: latency, how much of the line is used, and the same written
+                   naively: each overlay as it comes
+    clock          the same line, a viewer's clock right, and an hour off and 200 ppm fast
+    join           a session that runs already, 64 kbit/s: the right pose, and the difference to one on a quick line
+    cut            28.8 kbit/s, cut for 25 s: what is shown after
+    traces         18 lines of 3G at a mean of 28.8 and of 56 kbit/s: stalls against those of the lowest rate alone, and
+                   the mean rate shown against the best constant one that an oracle sends
+
+All viewers ask for the motion alone. Latency of an overlay is from when the session made its newest frame to when it
+came. Both ends share one kernel's clock, so a viewer's true offset is known.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Awaitable, Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from websockets.asyncio.client import connect
+
+from bunraku.client.api import Client
+from bunraku.client.puppeteer import Puppeteer
+from bunraku.client.viewer import StreamEnded, Viewer
+from bunraku.codec import decode
+from bunraku.motion.skeleton import points
+from bunraku.playout.blocks import Pose
+from bunraku.playout.clock import Sample
+from bunraku.wire.messages import LARGEST_FROM_SERVER, LIMBS, SUBPROTOCOL, Overlay, Ping, Pong, unpack
+from tests.bench.naive import naive_relay
+from tests.bench.network import Far, Link, Network, missing, narrowlink_path, network
+
+PORT = 18352
+LEAD = 60_000
+"""How far ahead of its making an overlay is due, microseconds; a session's Welcome says it."""
+Figures = dict[str, Any]
+
+
+class Screen(Viewer):
+    """A viewer that remembers when what came."""
+
+    def __init__(self, url: str, far: Far | None = None, truth: float = 0.0, **options: Any) -> None:
+        """`truth` is the server's clock minus this machine's monotonic one, microseconds."""
+        super().__init__(url, open_socket=far.open_socket if far else None, **options)
+        self.truth = truth
+        self.came: list[tuple[int, float, int]] = []
+        """When each overlay came, how late after its newest frame was made (ms), and how many frames it had."""
+        self.begun = 0
+        self.clock_errors: list[float] = []
+        self.shown: list[tuple[int, int, int]] = []
+        """Of each picture: local time, reference time, rate of the block shown or -1."""
+
+    def _take(self, data: bytes) -> None:
+        if data and data[0] == Overlay.TYPE:
+            overlay, now = Overlay.unpack(data), time.monotonic_ns() // 1000
+            self.came.append((now, (now + self.truth - (overlay.due - LEAD)) / 1e3, len(overlay.earlier) + 1))
+        super()._take(data)
+
+    async def look(self, seconds: float, **options: Any) -> None:
+        """Watch, and note how far the clock is off at each picture once it was told the time well."""
+
+        def picture(reference: int, _: Any) -> None:
+            now = time.monotonic_ns() // 1000
+            shown = self.clock.at(self._local()) - (now + self.truth)
+            self.clock_errors.append(shown / 1e3)
+            self.shown.append((now, reference, round(self._kbps_at(reference) * 1e3)))
+
+        self.begun = time.monotonic_ns() // 1000
+        while (left := seconds - (time.monotonic_ns() // 1000 - self.begun) / 1e6) > 0.5:
+            try:
+                await self.watch(left, picture, **options)
+            except StreamEnded as ended:
+                print(f"a stream ended: {ended}")
+                self.figures.gaps += 1
+            except (OSError, TimeoutError):
+                # the line does not carry a connection yet
+                continue
+
+
+class Bench:
+    """The server at the near end, a motion in it, and what every case needs."""
+
+    def __init__(self, net: Network, url: str, motion: str, truth: float) -> None:
+        self.net, self.url, self.motion, self.truth = net, url, motion, truth
+
+    def screen(self, far: Far, path: str, **options: Any) -> Screen:
+        """A viewer at a far end."""
+        return Screen(f"ws://{far.host}:{PORT}{path}", far, self.truth, **options)
+
+    def dance(self, far: Far, query: str = "", **options: Any) -> Screen:
+        """A viewer of the motion."""
+        return self.screen(far, f"/v1/motions/{self.motion}/stream{query}", **options)
+
+    async def pulled(self, work: Callable[[str], Awaitable[None]]) -> None:
+        """`work`, told the id of a session whose dancer is pulled about by all four limbs meanwhile."""
+        async with Client(self.url) as client:
+            session = (await client.open_session(self.motion))["id"]
+            async with Puppeteer(client, session, "bench") as puppeteer:
+                for limb in LIMBS:
+                    await puppeteer.claim(limb)
+                pulling = asyncio.create_task(_pull(puppeteer))
+                try:
+                    await work(session)
+                finally:
+                    pulling.cancel()
+                    await asyncio.gather(pulling, return_exceptions=True)
+
+
+async def _pull(puppeteer: Puppeteer) -> None:
+    loop = asyncio.get_running_loop()
+    while True:
+        phase = 2.0 * loop.time()
+        swing, rise = float(np.sin(phase)), float(np.cos(1.3 * phase))
+        for limb, side in zip(LIMBS[:2], (1.0, -1.0), strict=True):
+            await puppeteer.target(limb, side * (0.4 + 0.2 * swing), -0.1 + 0.3 * rise, 0.5)
+        for limb, side in zip(LIMBS[2:], (1.0, -1.0), strict=True):
+            await puppeteer.target(limb, 0.4 + 0.3 * side * swing)
+        await asyncio.sleep(1 / 60)
+
+
+async def first_poses(bench: Bench, only: set[str]) -> Figures:
+    """Cases 9k6, 28k8 and 56k."""
+    cases = [
+        (name, link)
+        for name, link in (
+            ("9k6", Link(9_600, 150)),
+            ("28k8", Link(28_800, 75)),
+            ("56k", Link(56_000, 75)),
+        )
+        if name in only
+    ]
+    figures: Figures = {}
+    with bench.net.lines([link for _, link in cases for _ in range(5)]) as fars:
+        screens = [bench.dance(far, "?tracks=motion") for far in fars]
+        # the first of each stays; one after the other, as they share two cores
+        watching = []
+        for nth in range(5):
+            for case in range(len(cases)):
+                screen = screens[5 * case + nth]
+                watching.append(asyncio.create_task(screen.look(60.0 if nth == 0 else 4.0)))
+                await asyncio.sleep(0.7)
+        await asyncio.gather(*watching)
+        for case, (name, _) in enumerate(cases):
+            mine = screens[5 * case : 5 * case + 5]
+            first = [screen.figures.first_pose_ms or float("inf") for screen in mine]
+            figures[f"first_pose_ms_{name}"] = _whole(float(np.median(first)))
+            figures[f"first_pose_worst_ms_{name}"] = _whole(max(first))
+            figures[f"stalls_{name}"] = sum(screen.figures.gaps for screen in mine)
+            figures[f"shown_kbps_{name}"] = round(mine[0].figures.shown_kbps, 2)
+            figures[f"line_kbps_{name}"] = round(fars[5 * case].received * 8e-3 / 60.0, 2)
+    return figures
+
+
+async def steps(bench: Bench) -> Figures:
+    """Case steps."""
+    figures: Figures = {}
+
+    async def work(session: str) -> None:
+        with bench.net.lines([Link(56_000, 75, step="10:14400,18:56000")]) as (far,):
+            begun = time.monotonic_ns() // 1000
+            screen = bench.screen(far, f"/v1/sessions/{session}/stream?tracks=motion")
+            await screen.look(26.0)
+
+        def late(begin: float, end: float) -> list[float]:
+            return [ms for at, ms, _ in screen.came if begin * 1e6 <= at - begun < end * 1e6]
+
+        def rate(begin: float, end: float) -> float:
+            return sum(frames for at, _, frames in screen.came if begin * 1e6 <= at - begun < end * 1e6) / (end - begin)
+
+        figures["steps_stalls"] = screen.figures.gaps
+        figures["steps_peak_ms"] = round(max(late(4, 26)))
+        figures["steps_after_1500_ms"] = round(_percentile(late(11.5, 18), 95))
+        figures["steps_fps_56k"] = round(rate(4, 10), 1)
+        figures["steps_fps_14k4"] = round(rate(11.5, 18), 1)
+        figures["steps_fps_back"] = round(rate(20, 26), 1)
+
+    await bench.pulled(work)
+    return figures
+
+
+async def live(bench: Bench) -> Figures:
+    """Cases live and clock: one line ours, one naive, one whose viewer's clock is off."""
+    figures: Figures = {}
+    seconds, settle = 60.0, 5.0
+
+    async def work(session: str) -> None:
+        path = f"/v1/sessions/{session}/stream?tracks=motion"
+        link = Link(28_800, 75, queue_bytes=64_000)
+        async with naive_relay(f"ws://127.0.0.1:{PORT}{path}", PORT + 1):
+            with bench.net.lines([link] * 3) as fars:
+                ours, naive = (
+                    bench.screen(fars[0], path),
+                    Screen(f"ws://{fars[1].host}:{PORT + 1}/", fars[1], bench.truth),
+                )
+                off = bench.screen(fars[2], path, now=lambda: round(time.monotonic_ns() * 1.0002e-3) + 3_600_000_000)
+                carried = 0
+
+                async def count() -> None:
+                    nonlocal carried
+                    await asyncio.sleep(settle)
+                    before = fars[0].received
+                    await asyncio.sleep(seconds - settle - 1.0)
+                    carried = fars[0].received - before
+
+                await asyncio.gather(ours.look(seconds), naive.look(seconds), off.look(seconds), count())
+        begun = ours.came[0][0] + settle * 1e6
+        mine = [(ms, frames) for at, ms, frames in ours.came if at > begun]
+        lateness = [ms for ms, _ in mine]
+        written = [ms for at, ms, _ in naive.came if at > begun]
+        span = (ours.came[-1][0] - begun) / 1e6
+        figures["live_p50_ms_28k8"] = round(_percentile(lateness, 50))
+        figures["live_p95_ms_28k8"] = round(_percentile(lateness, 95))
+        figures["live_fps_28k8"] = round(sum(frames for _, frames in mine) / span, 1)
+        figures["live_messages_28k8"] = round(len(mine) / span, 1)
+        figures["live_line_used_28k8"] = round(carried * 8 / (seconds - settle - 1.0) / link.rate, 3)
+        figures["live_stalls_28k8"] = ours.figures.gaps
+        figures["live_shown_kbps_28k8"] = round(ours.figures.shown_kbps, 2)
+        figures["naive_p95_ms_28k8"] = round(_percentile(written, 95))
+        figures["times_naive"] = round(_percentile(written, 95) / _percentile(lateness, 95), 1)
+        for name, screen in (("clock", ours), ("clock_off", off)):
+            # the first second may go by the greeting's guess
+            errors = np.abs(screen.clock_errors[60:])
+            figures[f"{name}_median_ms"] = round(_percentile(errors, 50), 2)
+            figures[f"{name}_p95_ms"] = round(_percentile(errors, 95), 2)
+
+    await bench.pulled(work)
+    return figures
+
+
+async def join(bench: Bench) -> Figures:
+    """Case join."""
+    figures: Figures = {}
+
+    async def work(session: str) -> None:
+        path = f"/v1/sessions/{session}/stream?tracks=motion"
+        with bench.net.lines([Link(64_000, 50)]) as (far,):
+            quick = Screen(f"ws://127.0.0.1:{PORT}{path}", None, bench.truth)
+            seeing = asyncio.create_task(quick.look(8.0))
+            await asyncio.sleep(4.0)
+            late = bench.screen(far, path)
+            apart: list[float] = []
+
+            def picture(at: int, pose: Pose) -> None:
+                other = quick.pose_at(at)
+                if other is not None and late.track is not None:
+                    ours, theirs = (points(late.track.figure, *one) for one in (pose, other))
+                    apart.append(float(np.linalg.norm(ours - theirs, axis=-1).max()) * 1e3)
+
+            await late.watch(4.0, picture)
+            await seeing
+            now = time.monotonic_ns() // 1000
+            figures["join_first_pose_ms_64k"] = _whole(late.figures.first_pose_ms or float("inf"))
+            figures["join_apart_mm_p95"] = round(_percentile(apart[60:], 95), 1)
+            figures["join_clock_apart_ms"] = round(abs(late.clock.at(now) - quick.clock.at(now)) / 1e3, 2)
+
+    await bench.pulled(work)
+    return figures
+
+
+async def cut(bench: Bench) -> Figures:
+    """Case cut."""
+    figures: Figures = {}
+    begin, end = 8.0, 33.0
+    with bench.net.lines([Link(28_800, 75, cut=(begin, end))]) as (far,):
+        screen = bench.dance(far, "?tracks=motion")
+        before = time.monotonic_ns() // 1000
+        received: list[int] = []
+        await asyncio.gather(screen.look(45.0), _counted(far, end - 1.0, received), _counted(far, 44.0, received))
+    shown = [(at - before, reference) for at, reference, _ in screen.shown]
+    steps = [(b - a) / 1e3 for (_, a), (_, b) in pairwise(shown)]
+    figures["cut_reconnects"] = screen.figures.reconnects
+    figures["cut_stalls"] = screen.figures.gaps
+    figures["cut_dark_ms"] = round(screen.figures.dark_ms)
+    figures["cut_shown_twice"] = sum(step < 0 for step in steps)
+    figures["cut_longest_step_ms"] = round(max(steps))
+    figures["cut_kb_after"] = round((received[1] - received[0]) / 1e3, 1)
+    return figures
+
+
+async def _counted(far: Far, after: float, into: list[int]) -> None:
+    await asyncio.sleep(after)
+    into.append(far.received)
+
+
+async def traces(bench: Bench, seconds: float, scaled: list[int]) -> Figures:
+    """Case traces, at these mean rates in bit/s."""
+    figures: Figures = {}
+    files = sorted(narrowlink_path().parent.glob("3Glogs_*.csv"))
+    async with Client(bench.url) as client:
+        motion = await client.motion(bench.motion)
+    costs = [rate["kbps"] for rate in motion["rates"]]
+    for mean in scaled:
+        rows = [_trace(file) for file in files]
+        links = [
+            Link(delay_ms=75, trace=str(file), scale=mean / _mean(row)) for file, row in zip(files, rows, strict=True)
+        ]
+        with bench.net.lines(links * 2) as fars:
+            screens = [
+                bench.dance(far, "?tracks=motion" if nth < len(links) else "?tracks=motion&rate=0")
+                for nth, far in enumerate(fars)
+            ]
+            await asyncio.gather(*(screen.look(seconds, frame=1 / 15) for screen in screens))
+        ours, lowest = screens[: len(links)], screens[len(links) :]
+        watched = seconds * 1e3 * len(links)
+        name = f"{mean / 1000:g}k".replace(".", "k")[:4].rstrip("k") + ("k" if mean % 1000 == 0 else "")
+        mine, theirs = (sum(_dark(screen, seconds) for screen in group) for group in (ours, lowest))
+        figures[f"traces_stalled_percent_{name}"] = round(100 * mine / watched, 3)
+        figures[f"traces_stalled_lowest_percent_{name}"] = round(100 * theirs / watched, 3)
+        best = [oracle(row, link.scale, costs, seconds) for row, link in zip(rows, links, strict=True)]
+        got = [screen.figures.shown_kbps for screen in ours]
+        figures[f"traces_shown_kbps_{name}"] = round(float(np.mean(got)), 2)
+        figures[f"traces_best_kbps_{name}"] = round(float(np.mean(best)), 2)
+        figures[f"traces_share_of_best_{name}"] = round(float(np.mean(got) / np.mean(best)), 3)
+    return figures
+
+
+def oracle(row: list[tuple[float, float]], scale: float, costs: list[float], seconds: float) -> float:
+    """The best constant rate, kbit/s, that one who knows the trace could send: a block a second from the beginning on
+    as fast as the line goes, as far ahead as he likes, in time but for what the lowest rate is late too. Heads are
+    counted as if each block were a packet of its own."""
+    ends = np.cumsum([ms / 1e3 for ms, _ in row])
+    grid = np.arange(0.0, seconds, 0.01)
+    rates = np.array([kbps for _, kbps in row])[
+        np.searchsorted(ends, grid % ends[-1], side="right").clip(0, len(row) - 1)
+    ]
+    carried = np.cumsum(np.maximum(rates * 1e3 * scale, 1.0)) * 0.01
+
+    def late(cost: float) -> float:
+        """Seconds that blocks come after they are due, the first block's wait included for all."""
+        bits = (np.arange(int(seconds)) + 1) * (cost * 1e3 + 60 * 8) + 8_000
+        came = np.searchsorted(carried, bits) * 0.01 + 0.5
+        shift, stalls = came[0], 0.0
+        for nth, at in enumerate(came):
+            wait = max(at - (shift + nth), 0.0)
+            stalls += wait
+            shift += wait
+        return stalls
+
+    least = late(costs[0])
+    return max(cost for cost in costs if late(cost) <= least + 0.001 * seconds)
+
+
+def _trace(file: Path) -> list[tuple[float, float]]:
+    with file.open() as opened:
+        return [(float(ms), float(kbps)) for ms, kbps, *_ in list(csv.reader(opened))[1:]]
+
+
+def _mean(row: list[tuple[float, float]]) -> float:
+    """Mean rate of a trace, bit/s."""
+    return sum(ms * kbps for ms, kbps in row) / sum(ms for ms, _ in row) * 1e3
+
+
+def _dark(screen: Screen, seconds: float) -> float:
+    """Milliseconds without a picture, from the beginning on."""
+    if not screen.shown:
+        return seconds * 1e3
+    return (screen.shown[0][0] - screen.begun) / 1e3 + screen.figures.dark_ms
+
+
+def _whole(value: float) -> int | None:
+    """To the nearest one; None for what did not come."""
+    return round(value) if np.isfinite(value) else None
+
+
+def _percentile(values: Any, share: float) -> float:
+    return float(np.percentile(values, share)) if len(values) else float("nan")
+
+
+async def _truth() -> float:
+    """The server's clock minus this machine's monotonic one, microseconds, over the loopback."""
+    url = f"ws://127.0.0.1:{PORT}"
+    async with Client(url.replace("ws", "http")) as client:
+        motion = (await client.motions())[0]["id"]
+    best = Sample(0.0, 1 << 60)
+    async with connect(
+        f"{url}/v1/motions/{motion}/stream",
+        subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
+        max_size=LARGEST_FROM_SERVER,
+    ) as connection:
+        for sequence in range(100):
+            sent = time.monotonic_ns() // 1000
+            await connection.send(Ping(sequence, sent).pack())
+            while not isinstance(pong := unpack(bytes(await connection.recv(decode=False))), Pong):
+                continue
+            arrived = time.monotonic_ns() // 1000
+            trip = (arrived - sent) - (pong.answered - pong.received)
+            if trip < best.trip:
+                best = Sample(((pong.received - sent) + (pong.answered - arrived)) / 2, trip)
+    return best.offset
+
+
+CASES = ("9k6", "28k8", "56k", "steps", "live", "clock", "join", "cut", "traces")
+
+
+async def run(net: Network, only: set[str], seconds: float) -> Figures:
+    """The cases that were asked for, one after the other, against a server that is up."""
+    url = f"http://127.0.0.1:{PORT}"
+    async with Client(url) as client:
+        motion = (await client.motions())[0]["id"]
+    decode.warm()
+    bench = Bench(net, url, motion, await _truth())
+    figures: Figures = {}
+
+    async def case(names: set[str], made: Callable[[], Awaitable[Figures]]) -> None:
+        if only & names:
+            found = await made()
+            for name, value in found.items():
+                print(f"{name:<40}{value!s:>10}", flush=True)
+            figures.update(found)
+
+    await case({"9k6", "28k8", "56k"}, lambda: first_poses(bench, only))
+    await case({"live", "clock"}, lambda: live(bench))
+    await case({"steps"}, lambda: steps(bench))
+    await case({"join"}, lambda: join(bench))
+    await case({"cut"}, lambda: cut(bench))
+    await case({"traces"}, lambda: traces(bench, seconds, [28_800, 56_000]))
+    return figures
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--only", default=",".join(CASES), help=f"of {', '.join(CASES)}")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of each trace")
+    parser.add_argument("--data", type=Path, help="folder of the server's things; default a new one")
+    given = parser.parse_args()
+    if (reason := missing()) is not None:
+        print(f"skipped: {reason}")
+        print(json.dumps({"skipped": reason}))
+        return
+    only = set(given.only.split(","))
+    if unknown := only - set(CASES):
+        parser.error(f"no such case: {', '.join(sorted(unknown))}")
+    with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder, network() as net:
+        server = net.run(
+            [sys.executable, "-m", "bunraku.cli", "up", "--demo", "--host", "0.0.0.0", "--port", str(PORT), "--data",
+             str(given.data or folder)],
+            stdout=subprocess.PIPE,
+            env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200"},
+        )  # fmt: skip
+        assert server.stdout is not None
+        try:
+            next(line for line in server.stdout if re.search(r"is at http://", line))
+            figures = asyncio.run(run(net, only, given.seconds))
+        finally:
+            server.terminate()
+            server.wait(20)
+    print(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()

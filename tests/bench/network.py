@@ -1,0 +1,234 @@
+"""Emulated narrow lines for benches and tests: network namespaces joined by TUN devices, with real kernel TCP at both
+ends. Needs root, Linux and iproute2, and `links/narrowlink.py` from the folder of shared material: its queue, rate and
+delay are what a line is made of here. Many lines run side by side, each to a far end of its own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import multiprocessing
+import os
+import select
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+_NEW_NETWORK = 0x40000000
+_LIBC = ctypes.CDLL(None, use_errno=True)
+
+
+def narrowlink_path() -> Path:
+    """Where `narrowlink.py` is, or would be."""
+    return Path(os.environ.get("BUNRAKU_SHARED") or REPOSITORY.parent / "shared") / "links" / "narrowlink.py"
+
+
+def missing() -> str | None:
+    """Why lines cannot be emulated here, None where they can."""
+    if not narrowlink_path().is_file():
+        return f"there is no {narrowlink_path()}; set BUNRAKU_SHARED to the folder of shared material"
+    if sys.platform != "linux" or os.geteuid() != 0:
+        return "network namespaces need Linux and root"
+    if shutil.which("ip") is None:
+        return "there is no `ip`: install iproute2"
+    if not Path("/dev/net/tun").exists():
+        return "there is no /dev/net/tun"
+    return None
+
+
+@dataclass(frozen=True)
+class Link:
+    """One line: bit/s both ways, one-way delay, and the router's buffer. `step` is 'seconds:bit/s,...', `trace` a file
+    of milliseconds and kbit/s whose rates are multiplied with `scale`; both begin with `Network.start`. It is cut
+    (nothing passes) between the two times of `cut`, seconds after the start."""
+
+    rate: float = 28_800.0
+    delay_ms: float = 75.0
+    queue_bytes: int = 8192
+    step: str = ""
+    trace: str = ""
+    scale: float = 1.0
+    cut: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass
+class Far:
+    """The far end of a line: sockets opened there reach the near end at `host`."""
+
+    namespace: str
+    host: str
+    link: Link
+    device: str
+    counted: Any = field(default=None, repr=False)
+
+    def open_socket(self) -> socket.socket:
+        """An unconnected TCP socket at the far end; the thread stays where it is."""
+        with _inside(self.namespace):
+            made = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        made.setblocking(False)
+        made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return made
+
+    @property
+    def received(self) -> int:
+        """Bytes of IP packets that the line has carried to the far end."""
+        return int(self.counted[0])
+
+
+class Network:
+    """The near namespace, in which the server runs and this thread too, and the lines made so far."""
+
+    def __init__(self, near: str) -> None:
+        self.near = near
+        self._made = 0
+        self._namespaces: list[str] = []
+
+    def run(self, command: Sequence[str], **options: Any) -> subprocess.Popen[str]:
+        """A process at the near end; options as of `subprocess.Popen`."""
+        return subprocess.Popen(["ip", "netns", "exec", self.near, *command], text=True, **options)
+
+    @contextmanager
+    def lines(self, links: Sequence[Link]) -> Iterator[list[Far]]:
+        """The far ends of these lines, which begin now and last until the block ends."""
+        module = _narrowlink()
+        counted = multiprocessing.Array("q", 2 * len(links))
+        fars: list[Far] = []
+        devices: list[tuple[int, int]] = []
+        begun = self._made
+        try:
+            for nth, link in enumerate(links):
+                number, self._made = self._made, self._made + 1
+                far, near_host, far_host = f"{self.near}f{number}", _host(number, 1), _host(number, 2)
+                names = [f"bn{os.getpid() % 100_000}x{number}{end}" for end in "ab"]
+                devices.append((module.tun(names[0]), module.tun(names[1])))
+                _ip(f"netns add {far}")
+                self._namespaces.append(far)
+                for namespace, name, host, peer in (
+                    (self.near, names[0], near_host, far_host),
+                    (far, names[1], far_host, near_host),
+                ):
+                    _ip(f"link set {name} netns {namespace}")
+                    _ip(f"-n {namespace} addr add {host} peer {peer} dev {name}")
+                    _ip(f"-n {namespace} link set {name} up mtu 1500 txqueuelen 1000")
+                fars.append(Far(far, near_host, link, names[1]))
+                fars[-1].counted = _Counter(counted, 2 * nth)
+            pump = multiprocessing.get_context("fork").Process(
+                target=_pump, args=(module, list(links), devices, counted), daemon=True
+            )
+            pump.start()
+            try:
+                yield fars
+            finally:
+                pump.terminate()
+                pump.join()
+        finally:
+            for pair in devices:
+                for fd in pair:
+                    os.close(fd)
+            for number in range(begun, self._made):
+                self._remove(f"{self.near}f{number}")
+
+    def _remove(self, namespace: str) -> None:
+        if namespace in self._namespaces:
+            self._namespaces.remove(namespace)
+            subprocess.run(["ip", "netns", "del", namespace], check=False, stderr=subprocess.DEVNULL)
+
+
+class _Counter:
+    """One far end's part of the numbers that the pump counts in."""
+
+    def __init__(self, counted: Any, at: int) -> None:
+        self._counted, self._at = counted, at
+
+    def __getitem__(self, nth: int) -> int:
+        return int(self._counted[self._at + nth])
+
+
+@contextmanager
+def network() -> Iterator[Network]:
+    """A near end, which this thread is in until the block ends; threads and processes it starts meanwhile are too."""
+    name = f"bunraku{os.getpid()}"
+    _ip(f"netns add {name}")
+    try:
+        _ip(f"-n {name} link set lo up")
+        with _inside(name):
+            yield Network(name)
+    finally:
+        _ip(f"netns del {name}")
+
+
+def _host(number: int, end: int) -> str:
+    return f"10.{99 + number // 250}.{number % 250}.{end}"
+
+
+def _ip(arguments: str) -> None:
+    subprocess.run(["ip", *arguments.split()], check=True)
+
+
+@contextmanager
+def _inside(namespace: str) -> Iterator[None]:
+    here = os.open(f"/proc/self/task/{threading.get_native_id()}/ns/net", os.O_RDONLY)
+    there = os.open(f"/run/netns/{namespace}", os.O_RDONLY)
+    try:
+        _enter(there)
+        yield
+    finally:
+        _enter(here)
+        os.close(here)
+        os.close(there)
+
+
+def _enter(fd: int) -> None:
+    if _LIBC.setns(fd, _NEW_NETWORK) != 0:
+        raise OSError(ctypes.get_errno(), "the network namespace cannot be entered")
+
+
+def _narrowlink() -> Any:
+    spec = importlib.util.spec_from_file_location("narrowlink", narrowlink_path())
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _pump(module: Any, links: list[Link], devices: list[tuple[int, int]], counted: Any) -> None:
+    """Carries the packets of all lines until it is ended; `counted` is told the bytes that went to each far end and to
+    the near one."""
+    os.nice(-15)
+    begun = time.monotonic()
+    ways: dict[int, Any] = {}
+    cuts: dict[int, tuple[float, float]] = {}
+    for link, (near, far) in zip(links, devices, strict=True):
+        given = Namespace(rate=link.rate, step=link.step, trace=link.trace, scale=link.scale)
+        rate_at = module.rates(given, begun)
+        for source, sink in ((near, far), (far, near)):
+            ways[source] = module.Direction(sink, rate_at, link.delay_ms / 1e3, link.queue_bytes, 0.0)
+            cuts[source] = link.cut
+    order = [fd for pair in devices for fd in pair]
+    while True:
+        now = time.monotonic()
+        due = min(way.step(now) for way in ways.values())
+        for nth, fd in enumerate(order):
+            counted[nth] = ways[fd].sent
+        ready, _, _ = select.select(order, [], [], max(0.0, min(due - time.monotonic(), 0.2)))
+        now = time.monotonic()
+        for fd in ready:
+            begin, end = cuts[fd]
+            for _ in range(64):
+                try:
+                    packet = os.read(fd, 65536)
+                except BlockingIOError:
+                    break
+                if not begin <= now - begun < end:
+                    ways[fd].put(packet, now)

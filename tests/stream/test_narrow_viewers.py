@@ -1,0 +1,178 @@
+"""Viewers whose line is narrow, in virtual time: their timers are run by the test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from bunraku.backing.backing import clock
+from bunraku.backing.frames import frame
+from bunraku.backing.library import StoredMotion, pack, unpack
+from bunraku.backing.line import Reading
+from bunraku.codec.encode import encode_motion
+from bunraku.playout import timeline
+from bunraku.stream import viewers
+from bunraku.stream.turns import Turns
+from bunraku.stream.viewers import Viewer
+from bunraku.wire.messages import Choice, Data, Overlay, Ping, Pong, TimelineState
+from bunraku.wire.messages import unpack as unpack_message
+from tests.playout.virtual_line import VirtualLine
+from tests.stream.lines import Line, frames
+from tests.vectors.blocks import wandering_motion
+
+LIMBS: dict[int, tuple[int, ...]] = dict.fromkeys(range(4), (7,) * 9)
+
+
+@pytest.fixture(scope="module")
+def motion() -> StoredMotion:
+    encoded = encode_motion(wandering_motion(40.0, 30.0, 9), ladder=(30.0, 5.0), grade="live")
+    return unpack("one", pack("one", encoded))
+
+
+class NarrowLine(Line):
+    """A line of so many bytes a second and a way of `delay` microseconds; what was written to it, and when it came."""
+
+    def __init__(self, now: Callable[[], int], rate: float, delay: int) -> None:
+        super().__init__()
+        self.now, self.delay = now, delay
+        self.line = VirtualLine(lambda _: rate, delay)
+        self.came: list[tuple[int, float, bytes]] = []
+        self.held: list[bool] = []
+        self.reads = 0
+
+    def write(self, data: bytes | bytearray | memoryview) -> None:
+        super().write(data)
+        arrives = self.line.write(self.now(), len(data))
+        self.came += [(self.now(), arrives, payload) for _, payload in frames(bytes(data))]
+
+    def read(self) -> Reading:
+        self.reads += 1
+        return Reading(self.line.waiting(self.now()), 2 * self.delay, 2 * self.delay, len(self.sent))
+
+    def hold(self, held: bool) -> None:
+        self.held.append(held)
+
+
+class Watching:
+    """A viewer over such a line, and its time."""
+
+    def __init__(
+        self, motion: StoredMotion, monkeypatch: pytest.MonkeyPatch, rate: float = 3_600.0, delay: int = 75_000
+    ) -> None:
+        self.began = self.at = clock()
+        monkeypatch.setattr(viewers, "clock", lambda: self.at)
+        self.line = NarrowLine(lambda: self.at, rate, delay)
+        self.viewer = Viewer(Turns())
+        self.state: TimelineState = timeline.start(motion.id, motion.track.duration_us, self.at)
+        self.viewer.timeline(self.state, motion)
+        self.viewer.open(self.line.outlet(self.viewer), self.line)
+
+    def go(self, microseconds: int) -> None:
+        """Let time pass, with the turns and timers that come meanwhile."""
+        end = self.at + microseconds
+        while self.at < end:
+            self.at += 5_000
+            self.viewer.outlet.heard = self.at
+            if self.viewer._timer is not None:
+                self.viewer._timer.cancel()
+                self.viewer._again()
+            elif self.viewer._next_turn() <= self.at:
+                self.viewer.advance()
+
+    def of(self, kind: type) -> list[tuple[int, float, object]]:
+        """When messages of a kind were written and came, and what they are."""
+        found = [(written, came, unpack_message(payload)) for written, came, payload in self.line.came]
+        return [each for each in found if isinstance(each[2], kind)]
+
+
+async def test_the_first_block_is_small_and_goes_with_what_says_of_it_and_no_more_until_something_comes_back(
+    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watching = Watching(motion, monkeypatch)
+    blocks = [data for _, _, data in watching.of(Data)]
+    assert next((data.index, data.rate) for data in blocks if isinstance(data, Data)) == (0, 0)
+    assert all(data.rate == 0 for data in blocks if isinstance(data, Data))
+    assert watching.line.held == [False]
+    assert len(watching.line.sent) < 3_000
+    assert watching.viewer._timer is not None
+    watching.viewer.gone()
+
+
+async def test_blocks_and_a_net_of_them_come_in_time_and_the_line_is_not_filled(
+    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watching = Watching(motion, monkeypatch)
+    for _ in range(300):
+        watching.go(100_000)
+        assert watching.line.line.waiting(watching.at) < 6_000
+    blocks = [(came, data) for _, came, data in watching.of(Data) if isinstance(data, Data)]
+    starts = [motion.track.start_us(index) for index in range(motion.track.blocks)]
+    for came, data in blocks[1:]:
+        assert came < watching.began + starts[data.index] or data.index < 2
+    assert {data.index for _, data in blocks} == set(range(motion.track.blocks))
+    assert len(blocks) == len({(data.index, data.rate) for _, data in blocks})
+    # the net is far ahead while the dance is at its beginning
+    assert any(starts[data.index] - (came - watching.began) > 15_000_000 for came, data in blocks)
+    assert watching.of(Choice)
+    watching.viewer.gone()
+
+
+async def test_each_overlay_that_leaves_is_the_newest_and_comes_soon(
+    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watching = Watching(motion, monkeypatch)
+    watching.go(4_000_000)
+    made: dict[int, int] = {}
+    for number in range(1, 600):
+        watching.go(35_000)
+        watching.viewer.overlay(frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
+        made[number] = watching.at
+    overlays = [(w, came, o) for w, came, o in watching.of(Overlay) if isinstance(o, Overlay) and o.sequence > 60]
+    numbers = [overlay.sequence for _, _, overlay in overlays]
+    assert numbers == sorted(set(numbers))
+    assert 100 < len(numbers) < 540
+    # what is written was not waited for longer than until the next was there
+    assert all(written - made[o.sequence] <= 40_000 for written, _, o in overlays)
+    late = sorted(came - made[o.sequence] for _, came, o in overlays)
+    assert late[len(late) * 95 // 100] < 400_000
+    # a narrow line gets the last frame alone
+    assert not overlays[-1][2].earlier
+    assert any(written > watching.began + 8_000_000 for written, _, _ in watching.of(Data))
+    watching.viewer.gone()
+
+
+async def test_what_must_arrive_waits_for_no_room(motion: StoredMotion, monkeypatch: pytest.MonkeyPatch) -> None:
+    watching = Watching(motion, monkeypatch)
+    assert not watching.viewer._flow.room()
+    watching.viewer.hear(Ping(1, 2).pack())
+    assert watching.of(Pong)
+    watching.viewer.gone()
+    assert watching.viewer._timer is None
+
+
+async def test_a_quick_line_is_not_asked_for_overlays_and_one_that_becomes_slow_is_no_longer_written_to_unasked(
+    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watching = Watching(motion, monkeypatch, 1e7, 500)
+    before = watching.line.reads
+    for number in range(100):
+        watching.at += 33_000
+        watching.viewer.overlay(frame(Overlay(number, 5, LIMBS).pack()))
+    assert watching.line.reads == before
+    assert len(watching.of(Overlay)) == 100
+    assert watching.viewer.unasked
+    watching.at += viewers.LOOK_NEAR
+    watching.line.line.write(watching.at, 2_000_000)
+    watching.line.sent += bytes(2_000_000)
+    watching.viewer.advance()
+    steady = watching.viewer.unasked
+    watching.viewer.overlay(frame(Overlay(101, 5, LIMBS).pack()))
+    assert len(watching.of(Overlay)) == 100
+    watching.go(1_000_000)
+    assert len(watching.of(Overlay)) == 101
+    for number in range(102, 600):
+        watching.go(33_000)
+        watching.viewer.overlay(frame(Overlay(number, 5, LIMBS).pack()))
+    assert (steady, watching.viewer.unasked) == (False, True)
+    watching.viewer.gone()

@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import pytest
+
+from bunraku.backing.frames import message
+from bunraku.backing.library import StoredMotion, pack, unpack
+from bunraku.codec.encode import encode_motion
+from bunraku.codec.scene_encode import encode_scene
+from bunraku.playout import timeline
+from bunraku.playout.held import Held
+from bunraku.stream.flow import Flow
+from bunraku.stream.playing import Playing
+from bunraku.stream.tracks import TRACKS
+from bunraku.wire.messages import Choice, Data, Description, Report
+from bunraku.wire.messages import unpack as unpack_message
+from tests.vectors.blocks import wandering_motion
+from tests.vectors.scene import camera
+
+FREE = Flow(None, lambda: 0)
+
+
+@pytest.fixture(scope="module")
+def motion() -> StoredMotion:
+    encoded = encode_motion(wandering_motion(9.2, 30.0, 9), ladder=(30.0, 5.0), grade="live")
+    return unpack("m", pack("m", encoded))
+
+
+def all_packets(playing: Playing, motion: StoredMotion) -> list[tuple[int, int]]:
+    """Index and rate of each block that is sent to one who stands at the beginning."""
+    state = timeline.start("m", motion.track.duration_us, 0, playing=False)
+    found: list[tuple[int, int]] = []
+    while (packet := playing.next_packet(state, 0, FREE, 0)) is not None:
+        data = Data.unpack(packet)
+        found.append((data.index, data.rate))
+    return found
+
+
+def test_what_is_within_reach_is_sent_once(motion: StoredMotion) -> None:
+    playing = Playing(motion, TRACKS, None)
+    found = all_packets(playing, motion)
+    assert found[0] == (0, 0)
+    assert [index for index, _ in found[1:]] == list(range(1, len(found)))
+    assert {rate for _, rate in found[1:]} == {1}
+    assert all_packets(playing, motion) == []
+
+
+def test_what_is_held_of_this_motion_is_not_sent_again(motion: StoredMotion) -> None:
+    playing = Playing(motion, TRACKS, None)
+    assert not playing.has(None)
+    assert not playing.has(Held("another", 0, (1, 1, 1)))
+    blocks = motion.track.blocks
+    # told from the last block on, around the end
+    assert playing.has(Held("m", blocks - 1, (1, 1, -1, 1)))
+    assert [index for index, _ in all_packets(playing, motion)][:2] == [1, 3]
+
+
+def test_a_choice_is_news_once_and_again_when_rate_or_reason_change(motion: StoredMotion) -> None:
+    playing = Playing(motion, TRACKS, None)
+
+    def news() -> Choice | None:
+        framed = playing.news()
+        told = None if framed is None else unpack_message(message(framed))
+        assert told is None or isinstance(told, Choice)
+        return told
+
+    hidden = Report(buffer=3_000_000, hidden=True)
+    unsaid = [playing.unsaid]
+    assert news() == Choice(1, "best")
+    assert news() is None
+    unsaid.append(playing.unsaid)
+    assert playing.report(hidden, 1_000_000)
+    unsaid.append(playing.unsaid)
+    assert news() == Choice(0, "hidden")
+    assert not playing.report(hidden, 2_000_000)
+    unsaid.append(playing.unsaid)
+    assert unsaid == [True, False, True, False]
+
+
+def test_a_rate_that_was_asked_for_is_kept_and_said_so(motion: StoredMotion) -> None:
+    playing = Playing(motion, TRACKS, 0)
+    framed = playing.news()
+    assert framed is not None
+    assert unpack_message(message(framed)) == Choice(0, "pinned")
+    assert {rate for _, rate in all_packets(playing, motion)} == {0}
+
+
+def test_who_wants_no_motion_is_told_of_no_choice(motion: StoredMotion) -> None:
+    assert Playing(motion, ("audio",), None).news() is None
+
+
+def test_over_a_line_that_is_far_the_rest_is_told_of_once_the_motion_goes_on_for_a_while() -> None:
+    encoded = encode_motion(wandering_motion(9.2, 30.0, 9), ladder=(30.0, 5.0), grade="live")
+    motion = unpack("m", pack("m", encoded, [encode_scene(camera(9.2, 30.0), ladder=(20.0, 4.0))]))
+    state = timeline.start("m", motion.track.duration_us, 0, playing=False)
+    whole = Playing(motion, TRACKS, None)
+    assert whole.described(far=False) == motion.description
+    playing = Playing(motion, TRACKS, None)
+    parts = [unpack_message(playing.described(far=True))]
+    before: list[int] = []
+    while isinstance(found := unpack_message(playing.next_packet(state, 0, FREE, 0) or b"\xff"), Data):
+        assert found.track == 0
+        before.append(found.index)
+    parts.append(found)
+    assert before == [0, 1, 2, 3]
+    told = [part for part in parts if isinstance(part, Description)]
+    assert [[track["type"] for track in part.tracks] for part in told] == [["motion"], ["camera"]]
+    assert [part.first for part in told] == [None, 1]
+    rest = [Data.unpack(packet) for packet in iter(lambda: playing.next_packet(state, 0, FREE, 0), None)]
+    assert 1 in {data.track for data in rest}
+
+
+def test_who_comes_back_is_told_of_the_tracks_that_it_was_not_told_of() -> None:
+    encoded = encode_motion(wandering_motion(2.0, 30.0, 9), ladder=(30.0, 5.0), grade="live")
+    motion = unpack("m", pack("m", encoded, [encode_scene(camera(2.0, 30.0), ladder=(20.0, 4.0))]))
+    state = timeline.start("m", motion.track.duration_us, 0, playing=False)
+    for tracks, firsts in ((1, [1]), (2, []), (None, [])):
+        playing = Playing(motion, TRACKS, None)
+        assert playing.has(Held("m", 0, (1, 1, 1), tracks))
+        packets = iter(lambda: playing.next_packet(state, 0, FREE, 0), None)  # noqa: B023 - used at once
+        found = [unpack_message(packet) for packet in packets]
+        assert [part.first for part in found if isinstance(part, Description)] == firsts
+        assert {part.track for part in found if isinstance(part, Data)} == {1}
