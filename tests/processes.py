@@ -66,22 +66,30 @@ class Owned:
         self.stop()
         pytest.fail(f"{self.command[0]} did not start: {log.read_text(errors='replace')[-2000:]}")
 
-    def send(self, number: signal.Signals) -> None:
-        """Send it a signal."""
-        assert self._process is not None
-        self._process.send_signal(number)
+    def pause(self) -> None:
+        """It, and its own processes, stand still; returns when they do."""
+        everyone = self._everyone()
+        for pid in everyone:
+            _send(pid, signal.SIGSTOP)
+        end = time.monotonic() + STARTING
+        while any(_state(pid) not in "TXZ" for pid in everyone):
+            assert time.monotonic() < end, "it does not stand still"
+            time.sleep(0.005)
 
-    def send_to_all(self, number: signal.Signals) -> None:
-        """Send it and its own processes a signal."""
+    def resume(self) -> None:
+        """They go on."""
+        for pid in self._everyone():
+            _send(pid, signal.SIGCONT)
+
+    def _everyone(self) -> list[int]:
         assert self._process is not None
-        for child in Path(f"/proc/{self._process.pid}/task/{self._process.pid}/children").read_text().split():
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(int(child), number)
-        self.send(number)
+        pid = self._process.pid
+        return [pid, *map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())]
 
     def kill(self) -> None:
         """End it, and its own processes, as a power cut does."""
-        self.send_to_all(signal.SIGKILL)
+        for pid in self._everyone():
+            _send(pid, signal.SIGKILL)
         self._end(signal.SIGKILL)
 
     def stop(self) -> None:
@@ -98,6 +106,19 @@ class Owned:
                 self._process.kill()
                 self._process.wait(10)
             self._process = None
+
+
+def _send(pid: int, number: signal.Signals) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(pid, number)
+
+
+def _state(pid: int) -> str:
+    """T: stands still; X: is gone."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0].upper()
+    except (FileNotFoundError, ProcessLookupError):
+        return "X"
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 import tracemalloc
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -112,18 +111,18 @@ async def test_a_server_that_stands_still_is_away_until_it_goes_on(server: Owned
     async with connected(url_of(server)) as (bus,):
         bus.answer("echo", echo)
         await settled(bus)
-        server.send(signal.SIGSTOP)
+        server.pause()
         with pytest.raises(Unavailable):
             await bus.ask("echo", b"1")
         assert not bus.up
-        server.send(signal.SIGCONT)
+        server.resume()
         await until(lambda: bus.up)
         assert await bus.ask("echo", b"2") == b"2"
 
 
 async def test_what_a_server_does_not_take_is_lost_and_not_kept(server: Owned) -> None:
     async with connected(url_of(server)) as (bus,):
-        server.send(signal.SIGSTOP)
+        server.pause()
         link = bus._link
         assert link is not None
         tracemalloc.start()
@@ -283,7 +282,7 @@ def test_it_is_the_same_on_the_loop_that_the_services_have(server: Owned) -> Non
                 two.publish("a", message)
             assert await heard.until(expected[-1]) == expected
             assert await two.ask("echo", b"1") == b"1"
-            server.send(signal.SIGSTOP)
+            server.pause()
             while two.up:
                 two.publish("b", bytes(10_000))
                 assert two._link is None or two._link.waiting <= nats_link.WAITING + 20_000

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 import sqlite3
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
@@ -72,12 +71,12 @@ async def test_it_works_again_when_a_killed_server_is_back(server: Owned, catalo
 
 async def test_a_server_that_stands_still_is_not_waited_for(server: Owned, catalogue: Catalogue) -> None:
     await asyncio.gather(*(catalogue.get("m1") for _ in range(3)))
-    server.send_to_all(signal.SIGSTOP)
+    server.pause()
     try:
         async with asyncio.timeout(30):
             told = await asyncio.gather(*(catalogue.get("m1") for _ in range(30)), return_exceptions=True)
     finally:
-        server.send_to_all(signal.SIGCONT)
+        server.resume()
     assert all(isinstance(error, Unavailable) for error in told)
     await it_heals(catalogue)
 

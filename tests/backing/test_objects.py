@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -88,11 +87,11 @@ async def everything_is_unavailable(objects: Objects) -> None:
 async def test_a_server_that_stands_still_is_not_waited_for(server: Owned, s3: str) -> None:
     objects = Objects(s3)
     await objects.put("kept", b"data")
-    server.send(signal.SIGSTOP)
+    server.pause()
     try:
         await everything_is_unavailable(objects)
     finally:
-        server.send(signal.SIGCONT)
+        server.resume()
     assert await objects.get("kept") == b"data"
 
 

@@ -57,7 +57,8 @@ class SqlCatalogue:
         scheme, rest = url.split(":", 1)
         catalogue = cls(f"{_DRIVERS[scheme]}:{rest}")
         try:
-            if await catalogue._answer(catalogue._version()) != HEAD:
+            # the driver's own limits do: what is loaded at first may take a while
+            if await catalogue._answer(catalogue._version(), hurry=False) != HEAD:
                 await catalogue._answer(asyncio.to_thread(migrate, catalogue._url), hurry=False)
         except BaseException:
             await catalogue.close()
