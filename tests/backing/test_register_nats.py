@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import shutil
-import signal
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -71,13 +70,13 @@ async def test_a_server_that_stands_still_is_given_up(tmp_path: Path) -> None:
             await register.put("sessions.a", b"1")
             returned = asyncio.Event()
             bus.on_return(returned.set)
-            server.send(signal.SIGSTOP)
+            server.pause()
             try:
                 async with asyncio.timeout(20):
                     with pytest.raises(Unavailable):
                         await register.get("sessions.a")
             finally:
-                server.send(signal.SIGCONT)
+                server.resume()
             async with asyncio.timeout(20):
                 while not bus.up:
                     returned.clear()

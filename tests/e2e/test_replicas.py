@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
@@ -178,7 +177,7 @@ async def test_a_session_is_pulled_through_any_replica_and_survives_its_own(hous
         stack.callback(third.stop)
         await asyncio.to_thread(third.start)
         waiting = [asyncio.create_task(viewer.until(alone)) for viewer in (near, far)]
-        house.processes["session 2"].send(signal.SIGINT)
+        await asyncio.to_thread(house.processes["session 2"].stop)
         await asyncio.gather(*waiting)
         three = await stack.enter_async_context(Client(house.url("session 3")))
         assert (await asked_again(lambda: three.session(session)))["epoch"] == 2

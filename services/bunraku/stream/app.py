@@ -16,6 +16,7 @@ from bunraku.backing.line import Line, line_of
 from bunraku.backing.outlet import Outlet
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
+from bunraku.backing.unavailable import Unavailable
 from bunraku.playout import timeline
 from bunraku.playout.held import Held
 from bunraku.stream.sessions import WatchedSessions
@@ -103,6 +104,8 @@ def create_app(backing: Backing) -> FastAPI:
                 watched = await sessions.open(session)
             except NobodyAnswers:
                 raise Refusal(sockets.NOT_FOUND, "No such session", f"there is no session {session[:40]!r}") from None
+            except Unavailable as error:
+                raise Refusal(sockets.TOO_SLOW, "Not now", f"{error.what} does not answer; come again") from None
             try:
                 outlet, line = await _come(socket, viewer)
                 watched.join(viewer)
