@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+import secrets
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -53,7 +54,9 @@ def order(**change: Any) -> bytes:
 
 
 async def ask(backing: Backing, message: bytes) -> dict[str, Any]:
-    said: dict[str, Any] = msgpack.unpackb(await backing.bus.ask(SUBJECT, message, seconds=60))
+    name = f"order-{secrets.token_hex(4)}"
+    await backing.library.put_log(name, message)
+    said: dict[str, Any] = msgpack.unpackb(await backing.bus.ask(SUBJECT, name.encode(), seconds=60))
     return said
 
 
@@ -130,11 +133,18 @@ async def test_one_that_takes_too_long_is_ended(backing: Backing, dance: str, mo
 
 
 async def test_one_who_no_longer_waits_leaves_nothing_behind(backing: Backing, dance: str) -> None:
+    await backing.library.put_log("order", order())
     with pytest.raises(NobodyAnswers):
-        await backing.bus.ask(SUBJECT, order(), seconds=0.1)
+        await backing.bus.ask(SUBJECT, b"order", seconds=0.1)
     assert not multiprocessing.active_children()
     assert [e.id for e in (await backing.catalogue.page(9))[0]] == [dance]
     assert "motion" in await ask(backing, order())
+
+
+@pytest.mark.parametrize("name", [b"none", b"../log", b"\xff", b""])
+async def test_an_order_that_is_not_there_is_said_so(backing: Backing, name: bytes) -> None:
+    problem = msgpack.unpackb(await backing.bus.ask(SUBJECT, name))["problem"]
+    assert (problem["status"], problem["title"]) == (404, "No such order")
 
 
 async def test_nobody_answers_when_the_service_has_ended(tmp_path: Path) -> None:

@@ -1,4 +1,7 @@
-"""What the session service asks for on the bus when a session is to be kept as a motion (subject `ingest.keep`)."""
+"""What the session service asks for on the bus when a session is to be kept as a motion (subject `ingest.keep`).
+
+On the bus goes the name under which the order, MessagePack, lies in the library beside the log that it names.
+"""
 
 from __future__ import annotations
 

@@ -37,10 +37,13 @@ class Recordings:
         self._under_way = 0
 
     async def answer(self, message: bytes) -> bytes:
-        """The answer to a question on the bus: MessagePack of `{"motion": ...}` as `POST /v1/motions` gives it, or of
-        `{"problem": ...}`, the arguments of `ProblemError`."""
+        """The answer to a question on the bus, the name under which an order lies in the library: MessagePack of
+        `{"motion": ...}` as `POST /v1/motions` gives it, or of `{"problem": ...}`, the arguments of `ProblemError`."""
         try:
-            said: dict[str, Any] = {"motion": entry_json(await self.keep(read_order(message)))}
+            order = await self._backing.library.get_log(message.decode("ascii", "replace"))
+            if order is None:
+                raise ProblemError(404, "No such order", f"the library has no order {message[:40]!r}")
+            said: dict[str, Any] = {"motion": entry_json(await self.keep(read_order(order)))}
         except ProblemError as error:
             said = {"problem": error.values()}
         packed: bytes = msgpack.packb(said)

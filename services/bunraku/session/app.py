@@ -14,7 +14,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from bunraku.backing import problems
 from bunraku.backing.backing import Backing
-from bunraku.session import control
+from bunraku.session import control, recordings
 from bunraku.session.recordings import Recording
 from bunraku.session.requests import NewSession, SessionEdit
 from bunraku.session.sessions import Sessions
@@ -71,7 +71,7 @@ def create_app(backing: Backing) -> FastAPI:
     async def record(session: str, recording: Recording) -> JSONResponse:
         """Keep what was shown as a motion in the library: the dance with what was pulled, and the camera if one is
         given."""
-        motion = await sessions.stage(session).keep(recording)
+        motion = await recordings.keep(sessions.stage(session), recording, backing)
         return JSONResponse(motion, 201, {"Location": f"/v1/motions/{motion['id']}"})
 
     @app.websocket("/v1/sessions/{session}/control")

@@ -9,10 +9,11 @@ import msgpack
 from bunraku.backing.bus import Bus, NobodyAnswers, is_word
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.register import Register
-from bunraku.session.recordings import ANSWER, Recording
 from bunraku.session.requests import SessionEdit
 from bunraku.session.visitor import Visitor
 
+LOGGED = 10.0
+"""Seconds to wait for a log of some megabytes to be stored."""
 KEY = "sessions"
 """Of the register: `sessions.{id}` has what another replica needs to go on with a session."""
 
@@ -36,9 +37,10 @@ class DistantStage:
         found: dict[str, Any] = await self._ask("edit", edit.model_dump(exclude_none=True))
         return found
 
-    async def keep(self, recording: Recording) -> dict[str, Any]:
-        """The motion that was made of what the stage showed."""
-        found: dict[str, Any] = await self._ask("keep", recording.model_dump(exclude_none=True), ANSWER + 5.0)
+    async def log(self, seconds: float | None) -> dict[str, Any]:
+        """The session's log of its last seconds, by default of the dance's length: the name under which it lies in the
+        library (`log`), and the clock times `begin` and `end`, microseconds."""
+        found: dict[str, Any] = await self._ask("log", seconds, LOGGED)
         return found
 
     async def end(self) -> None:

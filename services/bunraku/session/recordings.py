@@ -1,18 +1,17 @@
-"""Keeping what a stage showed: the session's log goes to the ingest service, which makes a motion of it."""
+"""Keeping what a stage showed: its log goes to the ingest service, which makes a motion of it."""
 
 from __future__ import annotations
 
-import secrets
 from typing import Annotated, Any
 
 import msgpack
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from bunraku.backing.backing import Backing, clock
+from bunraku.backing.backing import Backing
 from bunraku.backing.bus import NobodyAnswers
 from bunraku.backing.order import MOST_KEYFRAMES, MOST_SECONDS
 from bunraku.backing.problems import ProblemError
-from bunraku.session.stage import Stage
+from bunraku.session.distant import DistantStage
 
 ANSWER = 120.0
 """Seconds to wait for the ingest service."""
@@ -42,28 +41,28 @@ class Recording(BaseModel):
     camera: Annotated[list[Keyframe], Field(max_length=MOST_KEYFRAMES)] = []
 
 
-async def keep(stage: Stage, asked: Recording, backing: Backing) -> dict[str, Any]:
-    """The new motion as the API shows it; raises `ProblemError`."""
-    end = clock()
-    seconds = asked.seconds or min(stage.timeline.duration * 1e-6, MOST_SECONDS)
-    begin = max(end - round(seconds * 1e6), stage.created)
-    name = f"{stage.id[:12]}-{secrets.token_hex(12)}"
-    await backing.library.put_log(name, stage.log.pack())
+async def keep(stage: DistantStage, asked: Recording, backing: Backing) -> dict[str, Any]:
+    """The new motion as the API shows it; raises `ProblemError`.
+
+    Log and order lie in the library meanwhile: both may have more bytes than a bus takes in one message.
+    """
+    library, kept = backing.library, await stage.log(asked.seconds)
     order = {
-        "log": name,
+        **kept,
         "name": asked.name,
-        "begin": begin,
-        "end": end,
         "camera": [[key.time, *key.position, *key.gaze, key.fov] for key in asked.camera],
     }
+    name = f"{kept['log']}-order"
     try:
-        answer = msgpack.unpackb(await backing.bus.ask("ingest.keep", msgpack.packb(order), ANSWER))
+        await library.put_log(name, msgpack.packb(order))
+        answer = msgpack.unpackb(await backing.bus.ask("ingest.keep", name.encode(), ANSWER))
     except NobodyAnswers:
         raise ProblemError(
             503, "Cannot keep now", "the service that makes motions does not answer", hint="try again in a while"
         ) from None
     finally:
-        await backing.library.remove_log(name)
+        await library.remove_log(name)
+        await library.remove_log(kept["log"])
     if "problem" in answer:
         raise ProblemError.of(answer["problem"])
     motion: dict[str, Any] = answer["motion"]

@@ -1,6 +1,6 @@
 """The way to a stage from any replica: what is asked and said on the bus is done here, where the stage is.
 
-On `session.{id}.` the words `describe`, `edit`, `keep`, `end` and `join` are questions, answered with MessagePack of
+On `session.{id}.` the words `describe`, `edit`, `log`, `end` and `join` are questions, answered with MessagePack of
 what the API shows, or of `{"problem": ...}`. On `said` is published what puppeteers say, `[puppeteer, message]`: None
 for one who has left, no bytes for one who is still there. What a puppeteer is told is published on `told.{puppeteer}`,
 one whole message each; one of no bytes says that the stage does not know them.
@@ -9,6 +9,7 @@ one whole message each; one of no bytes says that the stage does not know them.
 from __future__ import annotations
 
 import asyncio
+import secrets
 from collections.abc import Awaitable, Callable
 from typing import Any, Protocol
 
@@ -17,11 +18,10 @@ import msgpack
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.bus import Subscription
 from bunraku.backing.library import StoredMotion
+from bunraku.backing.order import MOST_SECONDS
 from bunraku.backing.problems import ProblemError
 from bunraku.playout.timeline import position_at
-from bunraku.session import recordings
 from bunraku.session.puppeteers import Full
-from bunraku.session.recordings import Recording
 from bunraku.session.requests import SessionEdit
 from bunraku.session.stage import Stage
 from bunraku.wire.messages import unpack
@@ -61,7 +61,7 @@ class StageDoor:
                 for word, answer in (
                     ("describe", self._describe),
                     ("edit", self._edit),
-                    ("keep", self._keep),
+                    ("log", self._log),
                     ("end", self._end),
                     ("join", self._join),
                 )
@@ -102,8 +102,12 @@ class StageDoor:
         await self._owner.note(stage)
         return session_json(stage)
 
-    async def _keep(self, values: dict[str, Any]) -> dict[str, Any]:
-        return await recordings.keep(self.stage, Recording.model_validate(values), self._backing)
+    async def _log(self, seconds: float | None) -> dict[str, Any]:
+        stage, end = self.stage, clock()
+        kept = seconds or min(stage.timeline.duration * 1e-6, MOST_SECONDS)
+        name = f"{stage.id[:12]}-{secrets.token_hex(12)}"
+        await self._backing.library.put_log(name, stage.log.pack())
+        return {"log": name, "begin": max(end - round(kept * 1e6), stage.created), "end": end}
 
     async def _end(self, _: None) -> None:
         # the answer goes out first: with the stage its subscription ends
