@@ -187,6 +187,14 @@ class Window:
         # nothing came back for long: the line has become slower, or stands
         return self.base is None or at - self._flying[0].at <= self.base + 2 * self.late + ahead
 
+    def busy(self, at: int) -> int:
+        """Microseconds until the line will be through with all that is on its way, as far as is known."""
+        if not self._flying or not self.rate or self.base is None:
+            return 0
+        # what was acknowledged last had left by then, and the line went on with what is first of the rest
+        left = self._answered_at - self.base + HEADS / self.rate * 1e6
+        return max(round(max(left, self._flying[0].at) + self.flying / self.rate * 1e6) - at, 0)
+
     def wait(self) -> int:
         """Microseconds after which there may be room."""
         if self.rate is None or self.rate <= 0.0:
