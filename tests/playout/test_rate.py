@@ -83,8 +83,9 @@ def test_a_narrow_line_gets_what_it_carries_and_is_told_so() -> None:
 
 def test_hands_go_before_a_finer_dance() -> None:
     choice = RateChoice(5, costs=COSTS)
-    assert carried(choice, 14_400, 5, beside=True) == 3
+    assert carried(choice, 28_800, 5, beside=True) == 2
     assert choice.reason == "hands"
+    assert carried(RateChoice(5, costs=COSTS), 14_400, 5, beside=True) == 0
 
 
 @given(st.lists(st.floats(100, 1e6), min_size=1, max_size=60))

@@ -18,7 +18,7 @@ SLOW_FRAME = 50_000
 SLOW_DECODE = 20_000
 SHARE = 0.8
 """Of a narrow line that blocks may take."""
-SHARE_BESIDE = 0.3
+SHARE_BESIDE = 0.1
 """The same while limbs are pulled: hands that are late are seen sooner than a coarser dance."""
 STEADY = 3_000_000
 """What a line carries is its mean over about this time, microseconds."""

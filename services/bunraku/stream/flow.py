@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from bunraku.backing.line import Reading
-from bunraku.playout.window import LEAST, Window, on_line
+from bunraku.playout.window import LEAST, PROBE, Window, on_line
 
 CLEAN = 64
 """So many times there was room at once before a line counts as quick."""
@@ -131,6 +131,15 @@ class Flow:
     def narrow(self) -> bool:
         """Whether the line was full of late."""
         return self._line is not None and self.window.narrow(self._now())
+
+    @property
+    def carries(self) -> float | None:
+        """Bytes a second of a line that may be a narrow one, None where it is not or nothing is known."""
+        rate = self.window.rate
+        if rate is None or not (self.far or self.narrow):
+            return None
+        # as long as it was never full it carries more than it was seen to
+        return rate if self.window.full_at is not None else PROBE * rate
 
     @property
     def unknown(self) -> bool:

@@ -22,6 +22,7 @@ class Playing:
 
     __slots__ = (
         "_known",
+        "_narrow",
         "_pinned",
         "_tells",
         "_told",
@@ -47,6 +48,7 @@ class Playing:
         self.rate = RateChoice(len(self.steps), None, first, safe, [step.kbps for step in self.steps])
         self._pinned = pinned is not None
         self._tells = "motion" in wanted
+        self._narrow = False
         self._told: Choice | None = None
         self.unsaid = True
         """Whether `news` may have something to say."""
@@ -86,7 +88,8 @@ class Playing:
         """The Data to send next, None when enough is on its way; an overlay waited for room at `beside_at`."""
         narrow = flow.narrow
         beside = narrow and clock - beside_at < BESIDE
-        self.rate.line(flow.window.rate if narrow else None, clock, beside)
+        self.rate.line(flow.carries, clock, beside)
+        self._narrow = narrow
         step = self.steps[0] if flow.unknown else self.step
         if self._known < self._wanted:
             due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=True, spare=False)
@@ -106,7 +109,7 @@ class Playing:
         if not self._tells:
             return None
         reason = "pinned" if self._pinned else self.rate.reason
-        choice = Choice(self.step.motion, reason, self.rate.carried)
+        choice = Choice(self.step.motion, reason, self.rate.carried if self._narrow else None)
         told, self._told = self._told, choice
         if told is not None and (told.rate, told.reason) == (choice.rate, choice.reason):
             return None

@@ -64,7 +64,7 @@ HUSH = 15_000
 """A line is given so much longer to fall still, microseconds,"""
 MOST_HUSH = 500_000
 """but no longer than this in all,"""
-HUSH_EVERY = 4_000_000
+HUSH_EVERY = 2_000_000
 """and so often at most."""
 BATCH = 16_384
 """Bytes that are written in one piece, about."""
