@@ -20,7 +20,11 @@ PACKET = 1_400
 DELAYED = 40_000
 """A receiver waits so long before it acknowledges, microseconds."""
 QUEUED = 220
-"""Bytes that are to wait in the line's queue: a message or two."""
+"""Bytes that are to wait in the line's queue: a message or two,"""
+QUEUED_TIME = 40_000
+"""but no more than leave in this time, microseconds,"""
+QUEUED_LEAST = 100.0
+"""or than this."""
 LEAST = 1_600
 """The window before anything is known: a first block, its Description, and some more."""
 LARGE = 250
@@ -29,6 +33,10 @@ STEP = 60.0
 """Bytes that a window grows by at least, where it is too small."""
 WATCHED = 40_000
 """A round trip counts only if its end was looked out for as often as this."""
+ROUND = 190
+"""Bytes that go there and back for a message and its acknowledgement."""
+BRIEF = 20_000
+"""What was acknowledged within less time than this says nothing of the line's rate, microseconds."""
 WEIGHT = 0.3
 """Of the newest in the mean of the line's rate."""
 FULL = 2_000_000
@@ -68,6 +76,7 @@ class Window:
         """The least time from writing to acknowledgement so far."""
         self.rate: float | None = None
         """Bytes a second that the line carries, or carried at least while it was never full."""
+        self._quickest = 0.0
         self.full_at: int | None = None
         """When the line's queue was last seen to be filled."""
         self._written = 0
@@ -92,7 +101,18 @@ class Window:
     @property
     def late(self) -> float:
         """How much later than they could acknowledgements are to come, microseconds."""
-        return DELAYED + (QUEUED / self.rate * 1e6 if self.rate else 0.0)
+        if not self.rate:
+            return DELAYED
+        return DELAYED + min(QUEUED, max(self.rate * QUEUED_TIME * 1e-6, QUEUED_LEAST)) / self.rate * 1e6
+
+    @property
+    def least(self) -> float:
+        """The least time from writing to acknowledgement at the present rate, microseconds: a line that has become
+        slower takes longer for the same bytes."""
+        assert self.base is not None
+        if not self.rate or self.rate >= self._quickest:
+            return self.base
+        return self.base + ROUND * (1.0 / self.rate - 1.0 / self._quickest) * 1e6
 
     def wrote(self, at: int, size: int) -> None:
         """`size` bytes were written at once at `at`."""
@@ -142,14 +162,14 @@ class Window:
 
     def _heed(self, at: int, took: int, newest: _Flying) -> None:
         """What was last acknowledged took so long."""
-        assert self.base is not None
         rate = (newest.line_end - newest.acknowledged) * 1e6 / max(at - newest.since, 1)
-        late = took - self.base
+        late = took - self.least
         if self.rate is None:
             self.rate = rate
         elif late > self.late:
             self.rate += WEIGHT * (rate - self.rate)
-        else:
+            self._quickest = max(self._quickest, self.rate)
+        elif at - newest.since >= BRIEF:
             self.rate = max(self.rate, rate)
         if late > self.late:
             self.full_at = at
@@ -158,15 +178,15 @@ class Window:
             self._took = min(self._took or took, took)
             if late > 2 * self.late and not self._large:
                 # the line has become slower
-                self.limit = min(self.limit, self.rate * (self.base + self.late) * 1e-6)
+                self.limit = min(self.limit, self.rate * (self.least + self.late) * 1e-6)
         written = newest.at
         if written < self._turn:
             return
         # a round trip has passed: this was written after the last turn
         if self._took is not None:
-            queued = self._took - self.base
+            queued = self._took - self.least
             if queued > self.late:
-                self.limit *= (self.base + self.late) / self._took
+                self.limit *= (self.least + self.late) / self._took
             elif self._limited:
                 self.limit += max(self.limit * 0.5 * (1.0 - queued / self.late), STEP)
         self.limit = max(self.limit, float(LARGE))
@@ -185,7 +205,7 @@ class Window:
         if at < self._through - ahead:
             return False
         # nothing came back for long: the line has become slower, or stands
-        return self.base is None or at - self._flying[0].at <= self.base + 2 * self.late + ahead
+        return self.base is None or at - self._flying[0].at <= self.least + 2 * self.late + ahead
 
     def busy(self, at: int) -> int:
         """Microseconds until the line will be through with all that is on its way, as far as is known."""
