@@ -21,7 +21,9 @@ HEAP = 16_384
 LATE = 100_000
 """So much longer than the least the round trips of a quick line may take: receivers may wait 40 ms to acknowledge."""
 BLOCKS = 0.3
-"""The share of a narrow line that blocks get beside overlays."""
+"""The share of a narrow line that blocks get beside overlays,"""
+SAVED = 0.2
+"""and for how many seconds they can save it up: several blocks in a row would keep overlays waiting."""
 
 
 class Readable(Protocol):
@@ -159,6 +161,6 @@ class Flow:
         """Whether a block that can wait may take room from overlays: on a narrow line they have a share of it."""
         now, rate = self._now(), self.window.rate or 0.0
         self._credit += BLOCKS * rate * (now - self._credited_at) * 1e-6
-        self._credit = min(self._credit, BLOCKS * rate)
+        self._credit = min(self._credit, BLOCKS * rate * SAVED)
         self._credited_at = now
         return self._credit > 0
