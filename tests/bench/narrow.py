@@ -102,6 +102,13 @@ class Screen(Viewer):
                 continue
 
 
+class Patient(Screen):
+    """One that waits for what comes late, however late."""
+
+    async def _watch_line(self) -> None:
+        await asyncio.Event().wait()
+
+
 class Bench:
     """The server at the near end, a motion in it, and what every case needs."""
 
@@ -239,7 +246,7 @@ async def live(bench: Bench) -> Figures:
             with bench.net.lines([link] * 3) as fars:
                 ours, naive = (
                     bench.screen(fars[0], path),
-                    Screen(f"ws://{fars[1].host}:{PORT + 1}/", fars[1], bench.truth),
+                    Patient(f"ws://{fars[1].host}:{PORT + 1}/", fars[1], bench.truth),
                 )
                 off = bench.screen(fars[2], path, now=lambda: round(time.monotonic_ns() * 1.0002e-3) + 3_600_000_000)
                 carried = 0

@@ -19,6 +19,10 @@ PACKET = 1_400
 """Of a longer message each such part is a packet."""
 DELAYED = 40_000
 """A receiver waits so long before it acknowledges, microseconds."""
+RECEIVER = 60_000
+"""No acknowledgement waits longer at a receiver than this, microseconds."""
+SLOWER = 1.03
+"""The line is taken to be so much slower than it seems: what is thought of its queue is then corrected at once."""
 QUEUED = 220
 """Bytes that are to wait in the line's queue: a message or two,"""
 QUEUED_TIME = 40_000
@@ -55,7 +59,7 @@ def on_line(size: int) -> int:
 class _Flying(NamedTuple):
     """A message on its way: its end in bytes written and in bytes of the line, when it was written, the bytes on their
     way then (of none more than a message has), how much larger it is than a message; what was acknowledged by then, and
-    since when nothing else was."""
+    since when nothing else was; and when the line is through with it, but for `Window._shift`."""
 
     end: int
     line_end: int
@@ -64,6 +68,7 @@ class _Flying(NamedTuple):
     large: int
     acknowledged: int
     since: int
+    through: float
 
 
 class Window:
@@ -87,6 +92,9 @@ class Window:
         # beyond what a message has, of what is on its way; and when the line is through with it
         self._large = 0
         self._through = 0.0
+        # when the line is through with all that was written, and by how much that was corrected so far
+        self._end = 0.0
+        self._shift = 0.0
         self._looked = 0
         self._limited = False
         # the present round trip: since when, and the shortest in it
@@ -101,9 +109,14 @@ class Window:
     @property
     def late(self) -> float:
         """How much later than they could acknowledgements are to come, microseconds."""
+        return DELAYED + self.queued
+
+    @property
+    def queued(self) -> float:
+        """For how long what waits in the line's queue is to be enough, microseconds."""
         if not self.rate:
-            return DELAYED
-        return DELAYED + min(QUEUED, max(self.rate * QUEUED_TIME * 1e-6, QUEUED_LEAST)) / self.rate * 1e6
+            return 0.0
+        return min(QUEUED, max(self.rate * QUEUED_TIME * 1e-6, QUEUED_LEAST)) / self.rate * 1e6
 
     @property
     def least(self) -> float:
@@ -125,11 +138,14 @@ class Window:
             rate = self.rate if self.full_at is not None and at - self.full_at < FULL else PROBE * self.rate
             self._through = max(self._through, at) + on_line(size) / rate * 1e6
         since = max(self._answered_at, self._flying[0].at) if self._flying else at
+        if self.rate:
+            self._end = max(self._end, at) + on_line(size) / self.rate * SLOWER * 1e6
         self._flying.append(
             _Flying(
-                self._written, self._line_written, at, self.flying - self._large, large, self._line_acknowledged, since
+                self._written, self._line_written, at, self.flying - self._large, large, self._line_acknowledged, since,
+                self._end - self._shift,
             )
-        )
+        )  # fmt: skip
 
     @property
     def written(self) -> int:
@@ -157,8 +173,16 @@ class Window:
             self._through = at
         took = max(at - newest.at, 1)
         self.base = min(time for time in (self.base, least, took) if time)
+        if self.rate:
+            self._correct(at - (self.base - HEADS / self.rate * 1e6), newest.through + self._shift)
         if at - max(looked, newest.at) <= WATCHED:
             self._heed(at, took, newest)
+
+    def _correct(self, left: float, thought: float) -> None:
+        """The line was through with a message at `left` at the latest, and no more than `RECEIVER` before."""
+        over = max(thought - left, 0.0) + min(thought - left + RECEIVER, 0.0)
+        self._shift -= over
+        self._end -= over
 
     def _heed(self, at: int, took: int, newest: _Flying) -> None:
         """What was last acknowledged took so long."""
@@ -198,14 +222,18 @@ class Window:
         if not self._flying:
             return True
         ahead = ahead if self.rate else 0
+        if self.base is None:
+            overdue = False
+        else:
+            # nothing came back for long: the line has become slower, or stands
+            overdue = at - self._flying[0].at > self.least + 2 * self.late + ahead
+        if self.rate and self.narrow(at):
+            return not overdue and self._end - at <= self.queued + ahead
         # the line is through with what is large at a time that is known, once its rate is
         if self.flying - (self._large if self.rate else 0) >= self.limit + (self.rate or 0.0) * ahead * 1e-6:
             self._limited = True
             return False
-        if at < self._through - ahead:
-            return False
-        # nothing came back for long: the line has become slower, or stands
-        return self.base is None or at - self._flying[0].at <= self.least + 2 * self.late + ahead
+        return at >= self._through - ahead and not overdue
 
     def busy(self, at: int) -> int:
         """Microseconds until the line will be through with all that is on its way, as far as is known."""
