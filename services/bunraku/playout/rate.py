@@ -21,7 +21,9 @@ SHARE = 0.8
 SHARE_BESIDE = 0.1
 """The same while limbs are pulled: hands that are late are seen sooner than a coarser dance."""
 STEADY = 3_000_000
-"""What a line carries is its mean over about this time, microseconds."""
+"""What a line carries is its mean over about this time, microseconds,"""
+SLOWED = 0.7
+"""but one that carries less than this share of it has become slower."""
 
 
 class RateChoice:
@@ -89,7 +91,7 @@ class RateChoice:
         if carried is None or not self._costs:
             self._carried, self._by_line = None, self._highest
             return
-        if self._carried is None:
+        if self._carried is None or carried < SLOWED * self._carried:
             self._carried = carried
         else:
             self._carried += (carried - self._carried) * -math.expm1(-max(clock - self._carried_at, 0) / STEADY)

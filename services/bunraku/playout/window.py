@@ -19,6 +19,8 @@ PACKET = 1_400
 """Of a longer message each such part is a packet."""
 DELAYED = 40_000
 """A receiver waits so long before it acknowledges, microseconds."""
+SPARE = 20_000
+"""So much later than it should at the latest an acknowledgement may come, microseconds."""
 RECEIVER = 60_000
 """No acknowledgement waits longer at a receiver than this, microseconds."""
 SLOWER = 1.03
@@ -43,6 +45,10 @@ BRIEF = 20_000
 """What was acknowledged within less time than this says nothing of the line's rate, microseconds."""
 WEIGHT = 0.3
 """Of the newest in the mean of the line's rate."""
+SLOWED = 0.6
+"""A line that seems to carry less than this share of what it did has become slower,"""
+SLOWED_WEIGHT = 0.5
+"""and the newest weighs more."""
 FULL = 2_000_000
 """So long after its queue was seen filled what a line carries is known."""
 PROBE = 2.0
@@ -180,9 +186,9 @@ class Window:
 
     def _correct(self, left: float, thought: float) -> None:
         """The line was through with a message at `left` at the latest, and no more than `RECEIVER` before."""
-        over = max(thought - left, 0.0) + min(thought - left + RECEIVER, 0.0)
-        self._shift -= over
-        self._end -= over
+        if not left - RECEIVER <= thought <= left:
+            self._shift += left - thought
+            self._end += left - thought
 
     def _heed(self, at: int, took: int, newest: _Flying) -> None:
         """What was last acknowledged took so long."""
@@ -191,7 +197,7 @@ class Window:
         if self.rate is None:
             self.rate = rate
         elif late > self.late:
-            self.rate += WEIGHT * (rate - self.rate)
+            self.rate += (WEIGHT if rate > SLOWED * self.rate else SLOWED_WEIGHT) * (rate - self.rate)
             self._quickest = max(self._quickest, self.rate)
         elif at - newest.since >= BRIEF:
             self.rate = max(self.rate, rate)
@@ -227,8 +233,10 @@ class Window:
         else:
             # nothing came back for long: the line has become slower, or stands
             overdue = at - self._flying[0].at > self.least + 2 * self.late + ahead
-        if self.rate and self.narrow(at):
-            return not overdue and self._end - at <= self.queued + ahead
+        if self.rate and self.base is not None and self.narrow(at):
+            # when its acknowledgement is to come at the latest
+            latest = self._flying[0].through + self._shift + self.base + RECEIVER
+            return at <= latest + SPARE and self._end - at <= self.queued + ahead
         # the line is through with what is large at a time that is known, once its rate is
         if self.flying - (self._large if self.rate else 0) >= self.limit + (self.rate or 0.0) * ahead * 1e-6:
             self._limited = True
