@@ -228,11 +228,6 @@ class Window:
         if not self._flying:
             return True
         ahead = ahead if self.rate else 0
-        if self.base is None:
-            overdue = False
-        else:
-            # nothing came back for long: the line has become slower, or stands
-            overdue = at - self._flying[0].at > self.least + 2 * self.late + ahead
         if self.rate and self.base is not None and self.narrow(at):
             # when its acknowledgement is to come at the latest
             latest = self._flying[0].through + self._shift + self.base + RECEIVER
@@ -241,7 +236,10 @@ class Window:
         if self.flying - (self._large if self.rate else 0) >= self.limit + (self.rate or 0.0) * ahead * 1e-6:
             self._limited = True
             return False
-        return at >= self._through - ahead and not overdue
+        if at < self._through - ahead:
+            return False
+        # nothing came back for long: the line has become slower, or stands
+        return self.base is None or at - self._flying[0].at <= self.least + 2 * self.late + ahead
 
     def busy(self, at: int) -> int:
         """Microseconds until the line will be through with all that is on its way, as far as is known."""
