@@ -88,6 +88,12 @@ def test_hands_go_before_a_finer_dance() -> None:
     assert carried(RateChoice(5, costs=COSTS), 14_400, 5, beside=True) == 0
 
 
+def test_beside_hands_a_line_that_has_become_slower_gets_a_coarser_dance_at_once() -> None:
+    for beside, rates in ((True, [3, 0]), (False, [4, 4])):
+        choice = RateChoice(5, costs=COSTS)
+        assert [carried(choice, 56_000, 5, beside=beside), carried(choice, 14_400, 1, beside=beside, start=5)] == rates
+
+
 @given(st.lists(st.floats(100, 1e6), min_size=1, max_size=60))
 def test_what_is_chosen_costs_no_more_than_the_most_that_the_line_carried(rates: list[float]) -> None:
     choice = RateChoice(5, costs=COSTS)

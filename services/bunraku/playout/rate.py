@@ -23,7 +23,7 @@ SHARE_BESIDE = 0.1
 STEADY = 3_000_000
 """What a line carries is its mean over about this time, microseconds,"""
 SLOWED = 0.7
-"""but one that carries less than this share of it has become slower."""
+"""but beside hands one that carries less than this share of it counts as slower at once: they would wait."""
 
 
 class RateChoice:
@@ -91,7 +91,7 @@ class RateChoice:
         if carried is None or not self._costs:
             self._carried, self._by_line = None, self._highest
             return
-        if self._carried is None or carried < SLOWED * self._carried:
+        if self._carried is None or (beside and carried < SLOWED * self._carried):
             self._carried = carried
         else:
             self._carried += (carried - self._carried) * -math.expm1(-max(clock - self._carried_at, 0) / STEADY)
