@@ -89,9 +89,13 @@ def test_hands_go_before_a_finer_dance() -> None:
 
 
 def test_beside_hands_a_line_that_has_become_slower_gets_a_coarser_dance_at_once() -> None:
-    for beside, rates in ((True, [3, 0]), (False, [4, 4])):
+    for beside, rates in ((True, [3, 0, 0]), (False, [4, 3, 4])):
         choice = RateChoice(5, costs=COSTS)
-        assert [carried(choice, 56_000, 5, beside=beside), carried(choice, 14_400, 1, beside=beside, start=5)] == rates
+        assert [
+            carried(choice, 56_000, 5, beside=beside),
+            carried(choice, 7_000, 1, beside=beside, start=5),
+            carried(choice, 28_800, 1, beside=beside, start=6),
+        ] == rates
 
 
 @given(st.lists(st.floats(100, 1e6), min_size=1, max_size=60))

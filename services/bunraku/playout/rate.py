@@ -96,7 +96,8 @@ class RateChoice:
         else:
             self._carried += (carried - self._carried) * -math.expm1(-max(clock - self._carried_at, 0) / STEADY)
         self._carried_at, self._beside = clock, beside
-        share = self._carried * (SHARE_BESIDE if beside else SHARE)
+        # a block that is on its way when the line becomes slow keeps all else waiting: no more than it carries now
+        share = min(self._carried, carried) * (SHARE_BESIDE if beside else SHARE)
         best = max((n for n, kbps in enumerate(self._costs) if kbps * 125 + HEADS <= share), default=0)
         # a rate that was left is taken again only when there is some room to spare
         if best <= self._by_line or self._costs[best] * 125 + HEADS <= share * 0.9:
