@@ -27,7 +27,7 @@ AFTER = 3_000_000
 """Over a narrow line the motion goes before sound that is heard this much sooner, microseconds."""
 NET_AHEAD = 10_000_000
 """As `AHEAD`, for better versions where a net is kept: such a line may stand for seconds."""
-SOON = 4_000_000
+SOON = 8_000_000
 """What is shown within this goes before the rest of the net, microseconds."""
 JUST = 2_000_000
 """What is shown within this is bettered before the rest of the net, microseconds."""

@@ -58,7 +58,7 @@ SPREAD = 1_000_000
 what is sent ahead, and the server's work is even."""
 TOGETHER = 4_000_000
 """Who will be in step for less, microseconds, goes on alone."""
-DEEP = 60_000
+DEEP = 200_000
 """So much more of what is not live may wait in the queue of a narrow line, microseconds."""
 HUSH = 15_000
 """A line is given so much longer to fall still, microseconds,"""
