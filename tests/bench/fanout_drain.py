@@ -2,7 +2,7 @@
 
 `python -m tests.bench.fanout_drain PORT VIEWERS SPEECH [PATH]`: connects, says `ready`, and for each line of standard
 input prints one JSON object: the `bytes` and `frames` that came since the line before, and how many sockets are `open`.
-SPEECH is `raw` (frames without a handshake), `bunraku`, `websocket` or `socketio`. Pings are answered.
+SPEECH is `raw` (frames without a handshake), `bunraku`, `websocket`, `socketio` or `nats`. Pings are answered.
 """
 
 from __future__ import annotations
@@ -63,6 +63,8 @@ class Drains:
                 raise ConnectionError(head.decode(errors="replace"))
             if self.speech == "socketio":
                 connection.sendall(masked(1, b"40"))
+            if self.speech == "nats":
+                connection.sendall(masked(2, b'CONNECT {"verbose":false,"pedantic":false}\r\nSUB overlay 1\r\n'))
             self.walk(client, rest)
         connection.setblocking(False)
         self.clients[connection.fileno()] = client

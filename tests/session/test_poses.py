@@ -1,14 +1,18 @@
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
+import pytest
 
 from bunraku.backing.library import Library, StoredMotion, pack
 from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import encode_motion
+from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore
 from bunraku.playout.timeline import Timelines
-from bunraku.session.poses import Poses
+from bunraku.session.poses import AHEAD, Poses
 from bunraku.wire.messages import Data
 from tests.vectors.blocks import wandering_motion
 
@@ -61,3 +65,28 @@ async def test_an_edit_holds_at_once_and_another_motion_has_no_pose_here() -> No
     timelines.put(timeline.change(paused, 600_000, "two", 5_000_000))
     await poses.prepare(700_000)
     assert poses.at(700_000, STEP) is None
+
+
+async def test_stages_work_out_the_dance_at_instants_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    motion = await stored()
+    timelines = Timelines()
+    timelines.put(timeline.start("one", motion.track.duration_us, 0))
+    stages = [Poses(motion, timelines) for _ in range(50)]
+    for poses in stages:
+        for due in (0, 1_000_000):
+            await poses.prepare(due)
+    worked_out: list[int] = []
+    rotations_at = BlockStore.rotations_at
+
+    def counted(store: BlockStore, positions: list[int], loop: bool = True) -> list[Array | None]:
+        worked_out.append(frame)
+        return rotations_at(store, positions, loop)
+
+    monkeypatch.setattr(BlockStore, "rotations_at", counted)
+    for frame in range(2 * AHEAD):
+        for poses in stages:
+            assert poses.at(frame * STEP, STEP) is not None
+    # the first frame is new to all of them
+    later = Counter(worked_out[len(stages) :])
+    assert sum(later.values()) >= len(stages)
+    assert max(later.values()) <= 10

@@ -3,11 +3,13 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator
+from dataclasses import dataclass
 
 import msgpack
 import numpy as np
 import pytest
 
+from bunraku.backing.backing import clock
 from bunraku.backing.bus import MemoryBus
 from bunraku.backing.library import Library, StoredMotion, pack
 from bunraku.codec import decode
@@ -16,6 +18,7 @@ from bunraku.marionette.log import Log
 from bunraku.marionette.merge import Marionette
 from bunraku.marionette.ownership import LOST_AFTER
 from bunraku.motion import rotation
+from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore
 from bunraku.playout.overlays import pack_joints
 from bunraku.playout.timeline import position_at
@@ -86,24 +89,42 @@ async def bus() -> MemoryBus:
 async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
     await asyncio.to_thread(decode.warm)
     motion = await stored("one", 5)
-    opened = Stage("s", motion, Marionette(motion.track.figure), bus, playing=True, loop=True)
+    state = timeline.start("one", motion.track.duration_us, clock())
+    opened = Stage("s", motion, Marionette(motion.track.figure), bus, state, state.clock)
     yield opened
     await opened.close()
 
 
-def granted(puppeteer: Puppeteer) -> Grant:
-    return next(m for m in map(unpack, reversed(puppeteer.waiting)) if isinstance(m, Grant))
+@dataclass
+class Person:
+    """One who came to a stage, and what they were told."""
+
+    at: Puppeteer
+    told: list[bytes]
+
+    @property
+    def id(self) -> str:
+        return self.at.id
+
+
+def enter(stage: Stage, name: str) -> Person:
+    told: list[bytes] = []
+    return Person(stage.join(name.lower(), name, told.append), told)
+
+
+def granted(person: Person) -> Grant:
+    return next(m for m in map(unpack, reversed(person.told)) if isinstance(m, Grant))
 
 
 async def test_overlays_carry_only_pulled_limbs_and_end_with_an_empty_one(stage: Stage, bus: MemoryBus) -> None:
     audience = Audience(bus)
-    aiko = stage.join("Aiko")
-    stage.hear(aiko, Claim(0))
+    aiko = enter(stage, "Aiko")
+    stage.hear(aiko.at, Claim(0))
     epoch = granted(aiko).epoch
     await audience.until(5, Overlay)
-    stage.hear(aiko, Input(0, Input.TARGET, epoch, 1, 0, (0.5, 0.2, 0.4)))
+    stage.hear(aiko.at, Input(0, Input.TARGET, epoch, 1, 0, (0.5, 0.2, 0.4)))
     await audience.until(20, Overlay)
-    stage.hear(aiko, Release(0, epoch))
+    stage.hear(aiko.at, Release(0, epoch))
     await audience.alone()
     overlays = [m for m in audience.heard if isinstance(m, Overlay)]
     assert {tuple(o.limbs) for o in overlays} == {(0,), ()}
@@ -128,8 +149,8 @@ async def test_edits_hold_for_everyone_a_lead_from_now(stage: Stage, bus: Memory
 
 async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: MemoryBus) -> None:
     audience = Audience(bus)
-    aiko = stage.join("Aiko")
-    stage.hear(aiko, Claim(3))
+    aiko = enter(stage, "Aiko")
+    stage.hear(aiko.at, Claim(3))
     await audience.until(2, Overlay)
     await stage.change(await stored("two", 6))
     assert stage.timeline.motion == "two"
@@ -139,18 +160,18 @@ async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: Memory
 
 
 async def test_colours_are_given_in_order_and_again_when_free(stage: Stage) -> None:
-    people = [stage.join(f"p{n}") for n in range(6)]
-    assert [p.colour for p in people] == [0, 1, 2, 3, 4, 0]
-    stage.leave(people[2])
-    assert stage.join("new").colour == 2
+    people = [enter(stage, f"p{n}") for n in range(6)]
+    assert [p.at.colour for p in people] == [0, 1, 2, 3, 4, 0]
+    stage.leave(people[2].at)
+    assert enter(stage, "new").at.colour == 2
 
 
 async def test_a_stage_is_full_some_day(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(puppeteers, "MOST", 2)
-    stage.join("a")
-    stage.join("b")
+    enter(stage, "a")
+    enter(stage, "b")
     with pytest.raises(Full):
-        stage.join("c")
+        enter(stage, "c")
 
 
 @pytest.mark.usefixtures("stage")
@@ -162,42 +183,34 @@ async def test_presence_counts_viewers_of_all_replicas(bus: MemoryBus) -> None:
     assert counts == [3, 7, 6, 2]
 
 
-async def test_one_who_does_not_listen_is_marked(stage: Stage) -> None:
-    aiko = stage.join("Aiko")
-    for _ in range(puppeteers.QUEUE):
-        stage.hear(aiko, Claim(0))
-    assert aiko.overrun
-    assert len(aiko.waiting) == puppeteers.QUEUE
-
-
 async def test_an_asked_limb_goes_to_who_asked_when_it_is_let_go(stage: Stage, bus: MemoryBus) -> None:
     audience = Audience(bus)
-    aiko, ben = stage.join("Aiko"), stage.join("Ben")
-    stage.hear(aiko, Claim(1))
-    stage.hear(ben, Claim(1))
-    assert unpack(ben.waiting[-1]) == Refusal(1, "held", aiko.id)
-    stage.hear(ben, Ask(1, True))
+    aiko, ben = enter(stage, "Aiko"), enter(stage, "Ben")
+    stage.hear(aiko.at, Claim(1))
+    stage.hear(ben.at, Claim(1))
+    assert unpack(ben.told[-1]) == Refusal(1, "held", aiko.id)
+    stage.hear(ben.at, Ask(1, True))
     assert stage.presence.asks == [[], [ben.id], [], []]
-    stage.hear(aiko, Release(1, granted(aiko).epoch))
+    stage.hear(aiko.at, Release(1, granted(aiko).epoch))
     assert granted(ben).limb == 1
     assert stage.presence.limbs[1] == ben.id
     assert stage.presence.asks == [[]] * 4
     presences = [m for m in audience.heard if isinstance(m, Presence)]
     assert [ben.id] in [p.asks[1] for p in presences]
-    stage.leave(ben)
+    stage.leave(ben.at)
     assert stage.presence.limbs[1] is None
 
 
 async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(stage: Stage) -> None:
-    aiko, ben = stage.join("Aiko"), stage.join("Ben")
-    stage.hear(aiko, Claim(0))
+    aiko, ben = enter(stage, "Aiko"), enter(stage, "Ben")
+    stage.hear(aiko.at, Claim(0))
     epoch = granted(aiko).epoch
     for number in range(5):
-        stage.hear(aiko, Input(0, Input.TARGET, epoch, number, 0, (900.0, 0.0, 0.0)))
-        stage.hear(ben, Input(0, Input.TARGET, epoch, number, 0, (0.1, 0.0, 0.0)))
-    told = [m for m in map(unpack, aiko.waiting) if isinstance(m, Notice)]
+        stage.hear(aiko.at, Input(0, Input.TARGET, epoch, number, 0, (900.0, 0.0, 0.0)))
+        stage.hear(ben.at, Input(0, Input.TARGET, epoch, number, 0, (0.1, 0.0, 0.0)))
+    told = [m for m in map(unpack, aiko.told) if isinstance(m, Notice)]
     assert [(m.limb, m.reason) for m in told] == [(0, "reach")]
-    told = [m for m in map(unpack, ben.waiting) if isinstance(m, Notice)]
+    told = [m for m in map(unpack, ben.told) if isinstance(m, Notice)]
     assert [(m.limb, m.reason) for m in told] == [(0, "owner")]
     assert "left hand" in told[0].detail
 
@@ -205,18 +218,18 @@ async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(
 async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -> None:
     """Two people pull, let go, and pull again; every frame that was published comes again from the log's bytes."""
     audience = Audience(bus)
-    aiko, ben = stage.join("Aiko"), stage.join("Ben")
+    aiko, ben = enter(stage, "Aiko"), enter(stage, "Ben")
     for passage in range(2):
-        stage.hear(aiko, Claim(0))
-        stage.hear(ben, Claim(3))
+        stage.hear(aiko.at, Claim(0))
+        stage.hear(ben.at, Claim(3))
         hand, leg = granted(aiko).epoch, granted(ben).epoch
         for number in range(12):
-            stage.hear(aiko, Input(0, Input.TARGET, hand, number, 16_000 * number, (0.4, 0.05 * number - 0.2, 0.3)))
-            stage.hear(ben, Input(3, Input.VELOCITY, leg, number, 16_000 * number, (0.5, 0.0, 0.0)))
+            stage.hear(aiko.at, Input(0, Input.TARGET, hand, number, 16_000 * number, (0.4, 0.05 * number - 0.2, 0.3)))
+            stage.hear(ben.at, Input(3, Input.VELOCITY, leg, number, 16_000 * number, (0.5, 0.0, 0.0)))
             count = len([m for m in audience.heard if isinstance(m, Overlay)])
             await audience.until(count + 1, Overlay)
-        stage.hear(aiko, Release(0, hand))
-        stage.hear(ben, Release(3, leg))
+        stage.hear(aiko.at, Release(0, hand))
+        stage.hear(ben.at, Release(3, leg))
         await audience.alone()
         assert passage == 0 or stage.log.begin is not None
     shown: dict[int, dict[int, tuple[int, ...]]] = {}
@@ -245,12 +258,26 @@ async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -
 
 async def test_a_holder_whom_a_stalled_server_could_not_hear_keeps_the_limb(stage: Stage, bus: MemoryBus) -> None:
     audience = Audience(bus)
-    aiko = stage.join("Aiko")
-    stage.hear(aiko, Claim(0))
+    aiko = enter(stage, "Aiko")
+    stage.hear(aiko.at, Claim(0))
     shown = len(await audience.until(2, Overlay))
     # the machine has something else to do for longer than a lease: what Aiko says meanwhile waits at the socket
     time.sleep(1.5e-6 * LOST_AFTER)  # noqa: ASYNC251 - it is the loop that stands still
     await audience.until(shown + 1, Overlay)
-    stage.hear(aiko, Alive([0]))
+    stage.hear(aiko.at, Alive([0]))
     await audience.until(shown + 8, Overlay)
     assert stage.presence.limbs[0] == aiko.id
+
+
+async def test_one_that_goes_on_here_tells_where_it_is_and_that_nobody_holds_a_limb(
+    stage: Stage, bus: MemoryBus
+) -> None:
+    audience = Audience(bus)
+    stage.appear()
+    state, presence, overlay = audience.heard
+    assert state == stage.timeline
+    assert isinstance(presence, Presence)
+    assert presence.limbs == [None] * 4
+    assert isinstance(overlay, Overlay)
+    assert overlay.limbs == {}
+    assert overlay.due > clock()

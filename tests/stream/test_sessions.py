@@ -107,6 +107,32 @@ async def test_many_who_come_and_go_are_counted_seldom(library: Library, monkeyp
     assert heard[-1] == 0
 
 
+async def test_a_session_that_goes_on_elsewhere_hears_how_many_watch(library: Library) -> None:
+    bus = MemoryBus()
+    heard = stage(bus)
+    watched = WatchedSessions(bus, library)
+    there = [await come(watched) for _ in range(3)]
+    heard.clear()
+    bus.publish("session.s.appear", b"")
+    assert heard == [3]
+    for viewer, _ in there:
+        viewer.gone()
+
+
+@pytest.mark.parametrize("session", ["*", ">", "s.state", ""])
+async def test_what_cannot_be_a_session_is_not_asked_for(library: Library, session: str) -> None:
+    bus, asked = MemoryBus(), []
+
+    async def answer(question: bytes) -> bytes:
+        asked.append(question)
+        return b""
+
+    bus.answer(f"session.{session}.state", answer)
+    with pytest.raises(NobodyAnswers):
+        await WatchedSessions(bus, library).open(session)
+    assert asked == []
+
+
 async def test_another_motion_comes_to_all(library: Library) -> None:
     bus = MemoryBus()
     stage(bus)

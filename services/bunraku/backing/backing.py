@@ -1,4 +1,4 @@
-"""Catalogue, library, bus and clock, opened together: what every service is given."""
+"""Catalogue, library, bus, register and clock, opened together: what every service is given."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from bunraku.backing.bus import Bus, MemoryBus
 from bunraku.backing.catalogue import Catalogue
 from bunraku.backing.library import Library
+from bunraku.backing.register import MemoryRegister, Register
 from bunraku.backing.settings import Settings
 
 _BEGAN = time.time_ns() // 1000 - time.monotonic_ns() // 1000
@@ -28,6 +29,7 @@ class Backing:
     catalogue: Catalogue
     library: Library
     bus: Bus
+    register: Register
 
 
 @asynccontextmanager
@@ -37,9 +39,10 @@ async def open_backing(settings: Settings) -> AsyncIterator[Backing]:
         raise ValueError(f"a bus is at memory:, not {settings.bus!r}")
     settings.data.mkdir(parents=True, exist_ok=True)
     catalogue = Catalogue(settings.catalogue_url())
-    bus = MemoryBus()
+    bus, register = MemoryBus(), MemoryRegister()
     try:
-        yield Backing(settings, catalogue, Library.open(settings.library_url()), bus)
+        yield Backing(settings, catalogue, Library.open(settings.library_url()), bus, register)
     finally:
+        await register.close()
         await bus.close()
         await catalogue.close()

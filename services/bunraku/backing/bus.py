@@ -7,12 +7,19 @@ dots. Handlers of published messages are plain functions that must return at onc
 from __future__ import annotations
 
 import asyncio
+import re
 from collections import defaultdict
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
+_WORD = re.compile(r"[A-Za-z0-9_-]{1,64}")
 Handler = Callable[[bytes], None]
 Answerer = Callable[[bytes], Awaitable[bytes]]
+
+
+def is_word(text: str) -> bool:
+    """Whether a text can be one word of a subject or of a key: what is not could be many (`*`, `>`)."""
+    return _WORD.fullmatch(text) is not None
 
 
 class NobodyAnswers(Exception):
@@ -83,7 +90,9 @@ class MemoryBus:
         self._answerers[subject] = answerer
 
         def end() -> None:
-            self._answerers.pop(subject, None)
+            # another may answer by now
+            if self._answerers.get(subject) is answerer:
+                del self._answerers[subject]
 
         return _End(end)
 

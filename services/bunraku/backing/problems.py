@@ -24,11 +24,20 @@ class ProblemError(Exception):
         self.detail = detail
         self.extra = extra
 
+    def values(self) -> dict[str, Any]:
+        """The problem as services tell it to each other on the bus, plain values; `of` is the way back."""
+        extra = {name: value for name, value in self.extra.items() if value is not None}
+        return {"status": self.status, "title": self.title, "detail": self.detail, **extra}
+
+    @classmethod
+    def of(cls, values: dict[str, Any]) -> ProblemError:
+        """The problem that another service told of."""
+        return cls(**values)
+
 
 def response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:
     """The problem as HTTP says it; fields that are None are left out."""
-    extra = {name: value for name, value in problem.extra.items() if value is not None}
-    body = {"type": "about:blank", "title": problem.title, "status": problem.status, "detail": problem.detail, **extra}
+    body = {"type": "about:blank", **problem.values()}
     return JSONResponse(body, problem.status, headers, MEDIA_TYPE)
 
 

@@ -42,8 +42,7 @@ class Recordings:
         try:
             said: dict[str, Any] = {"motion": entry_json(await self.keep(read_order(message)))}
         except ProblemError as error:
-            extra = {name: value for name, value in error.extra.items() if value is not None}
-            said = {"problem": {"status": error.status, "title": error.title, "detail": error.detail, **extra}}
+            said = {"problem": error.values()}
         packed: bytes = msgpack.packb(said)
         return packed
 

@@ -1,16 +1,23 @@
-"""A puppeteer's socket: what the controller says, and what it is told (SPEC.md, Sockets)."""
+"""A puppeteer's socket: what the controller says, and what it is told (SPEC.md, Sockets).
+
+The stage may be at another replica: whole messages go there and come from there over the bus.
+"""
 
 from __future__ import annotations
 
 import asyncio
+from http import HTTPStatus
 
 from starlette.websockets import WebSocket
 
 from bunraku.backing import sockets
 from bunraku.backing.backing import clock
+from bunraku.backing.bus import Bus
+from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
-from bunraku.session.puppeteers import QUEUE, Full, Puppeteer
-from bunraku.session.stage import Stage
+from bunraku.session.distant import DistantStage
+from bunraku.session.stage_door import PRESENT
+from bunraku.session.visitor import QUEUE, Visitor
 from bunraku.wire.messages import Input, MalformedMessage, Ping, Pong, unpack
 
 EXCESS = 0.004
@@ -19,25 +26,35 @@ NAME = 40
 """Characters of a puppeteer's name."""
 
 
-async def serve(socket: WebSocket, stage: Stage | None, name: str) -> None:
-    """Bring a puppeteer to the stage until either ends; None where there is no such session."""
+async def serve(socket: WebSocket, stage: DistantStage, bus: Bus, name: str) -> None:
+    """Bring a puppeteer to the stage until either ends."""
     try:
         await sockets.accept(socket)
-        if stage is None:
-            raise Refusal(sockets.NOT_FOUND, "No such session", "there is no such session; it may have ended")
+        visitor = Visitor()
+        listening = bus.subscribe(stage.told(visitor), visitor.tell)
         try:
-            puppeteer = stage.join(_shown(name))
-        except Full as error:
-            raise Refusal(sockets.TOO_SLOW, "Full", str(error)) from None
-        try:
-            await sockets.converse(_listen(socket, stage, puppeteer), _tell(socket, puppeteer))
+            await _join(stage, visitor, name)
+            try:
+                await sockets.converse(_listen(socket, stage, visitor), _tell(socket, visitor), _remind(stage, visitor))
+            finally:
+                stage.say(visitor, None)
         finally:
-            stage.leave(puppeteer)
+            listening.end()
     except Refusal as refusal:
         await sockets.close(socket, refusal)
 
 
-async def _listen(socket: WebSocket, stage: Stage, puppeteer: Puppeteer) -> None:
+async def _join(stage: DistantStage, visitor: Visitor, name: str) -> None:
+    try:
+        await stage.join(visitor, _shown(name))
+    except ProblemError as error:
+        if error.status == HTTPStatus.NOT_FOUND:
+            detail = "there is no such session; it may have ended"
+            raise Refusal(sockets.NOT_FOUND, error.title, detail) from None
+        raise Refusal(sockets.TOO_SLOW, error.title, error.detail) from None
+
+
+async def _listen(socket: WebSocket, stage: DistantStage, visitor: Visitor) -> None:
     while True:
         data = await sockets.receive(socket)
         try:
@@ -45,26 +62,35 @@ async def _listen(socket: WebSocket, stage: Stage, puppeteer: Puppeteer) -> None
         except MalformedMessage as error:
             raise Refusal(sockets.BROKEN, "Malformed message", str(error)) from None
         now = clock()
-        if not puppeteer.may_speak(now):
+        if not visitor.may_speak(now):
             if isinstance(message, Input):
-                puppeteer.notice(message.limb, "rate", now)
+                visitor.notice(message.limb, "rate", now)
                 await asyncio.sleep(EXCESS)
                 continue
             await asyncio.sleep(EXCESS)
         if isinstance(message, Ping):
-            puppeteer.tell(Pong(message.sequence, message.sent, now, now).pack())
+            visitor.tell(Pong(message.sequence, message.sent, now, now).pack())
         else:
-            stage.hear(puppeteer, message)
+            stage.say(visitor, data)
 
 
-async def _tell(socket: WebSocket, puppeteer: Puppeteer) -> None:
+async def _tell(socket: WebSocket, visitor: Visitor) -> None:
     while True:
-        await puppeteer.wake.wait()
-        puppeteer.wake.clear()
-        if puppeteer.overrun:
+        await visitor.wake.wait()
+        visitor.wake.clear()
+        if visitor.overrun:
             raise Refusal(sockets.TOO_SLOW, "Too slow", f"{QUEUE} messages waited; come again")
-        while puppeteer.waiting:
-            await socket.send_bytes(puppeteer.waiting.popleft())
+        while visitor.waiting:
+            await socket.send_bytes(visitor.waiting.popleft())
+        if visitor.gone:
+            raise Refusal(sockets.TOO_SLOW, "Session elsewhere", "the session went on at another server; come again")
+
+
+async def _remind(stage: DistantStage, visitor: Visitor) -> None:
+    """The stage hears that its puppeteer is still there."""
+    while True:
+        await asyncio.sleep(PRESENT)
+        stage.say(visitor, b"")
 
 
 def _shown(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import secrets
 
 from bunraku.backing.library import StoredMotion
 from bunraku.codec.decode import decode_block
@@ -25,6 +26,7 @@ class Poses:
         self._blocks = BlockStore(motion.track)
         self._known: dict[int, Array] = {}
         self._epoch = -1
+        self._share = secrets.randbelow(AHEAD)
 
     async def prepare(self, due: int) -> None:
         """Decode what is needed about clock time `due`, in a thread: it takes milliseconds, the first time seconds."""
@@ -41,15 +43,17 @@ class Poses:
     def at(self, due: int, step: int) -> Array | None:
         """The rotations (18, 4) at clock time `due`, None where the block is missing or another motion is on.
 
-        Those of the next `AHEAD` frames, `step` µs apart, are worked out with it, and hold until the timeline is
-        edited.
+        Those of the next frames, `step` µs apart, at most `AHEAD`, are worked out with it, and hold until the timeline
+        is edited. Stages do so at instants of their own: fifty at once would keep all from working for a tenth of a
+        second.
         """
         newest = self._timelines.newest
         if newest is None:
             return None
         if newest.epoch != self._epoch or due not in self._known:
             self._epoch = newest.epoch
-            self._known = self._work_out([due + step * k for k in range(AHEAD)])
+            frames = AHEAD - (due // step + self._share) % AHEAD
+            self._known = self._work_out([due + step * k for k in range(frames)])
         return self._known.get(due)
 
     def _work_out(self, dues: list[int]) -> dict[int, Array]:

@@ -65,7 +65,6 @@ async def keep(stage: Stage, asked: Recording, backing: Backing) -> dict[str, An
     finally:
         await backing.library.remove_log(name)
     if "problem" in answer:
-        problem = answer["problem"]
-        raise ProblemError(problem.pop("status"), problem.pop("title"), problem.pop("detail"), **problem)
+        raise ProblemError.of(answer["problem"])
     motion: dict[str, Any] = answer["motion"]
     return motion

@@ -1,8 +1,9 @@
 """One session: its timeline, its puppeteers, and the merge of their limbs into the dance (paper 5).
 
-The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5); it listens to
-`viewers` and answers `state`. Overlays are computed for the instant when they are due, `LEAD` ahead of now, so that
-every viewer can lay them over the dance in time and at the same time.
+The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5), and `appear`
+where it goes on with a session of another replica; it listens to `viewers` and answers `state`. Overlays are computed
+for the instant when they are due, `LEAD` ahead of now, so that every viewer can lay them over the dance in time and at
+the same time.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import secrets
+from collections.abc import Callable
 
 import msgpack
 
@@ -57,15 +59,22 @@ class Stage:
     """A motion on a shared timeline, and those who pull at it."""
 
     def __init__(
-        self, session: str, motion: StoredMotion, marionette: Marionette, bus: Bus, *, playing: bool, loop: bool
+        self,
+        session: str,
+        motion: StoredMotion,
+        marionette: Marionette,
+        bus: Bus,
+        state: TimelineState,
+        created: int,
     ) -> None:
-        """`marionette` is of the motion's figure; the caller builds it, which takes a tenth of a second."""
+        """`marionette` is of the motion's figure; the caller builds it, which takes a tenth of a second. `state` is of
+        this motion; `created` a clock time, microseconds."""
         self.id = session
-        self.created = clock()
+        self.created = created
         self._bus = bus
         self._timelines = timeline.Timelines()
-        self._timelines.put(timeline.start(motion.id, motion.track.duration_us, clock(), playing=playing, loop=loop))
-        self._puppeteers = Puppeteers()
+        self._timelines.put(state)
+        self.puppeteers = Puppeteers()
         self._viewers: dict[str, int] = {}
         self._engaged = asyncio.Event()
         self._sequence = 0
@@ -98,15 +107,23 @@ class Stage:
         assert newest is not None
         return newest
 
+    def appear(self) -> None:
+        """Tell those who watched when the session was another replica's where it goes on: nobody holds a limb."""
+        self._bus.publish(f"session.{self.id}.appear", b"")
+        self._bus.publish(f"session.{self.id}.timeline", self.timeline.pack())
+        self._announce()
+        self._sequence += 1
+        self._bus.publish(f"session.{self.id}.overlay", Overlay(self._sequence, clock() + LEAD, {}).pack())
+
     @property
     def people(self) -> int:
         """Viewers and puppeteers."""
-        return sum(self._viewers.values()) + len(self._puppeteers)
+        return sum(self._viewers.values()) + len(self.puppeteers)
 
     @property
     def presence(self) -> Presence:
         """Who is here, who holds what, and who asks for it."""
-        puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self._puppeteers]
+        puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
         puppet = self._marionette.puppet
         asks = [list(limb) for limb in puppet.asks()]
         return Presence(sum(self._viewers.values()), puppeteers, list(puppet.holders()), asks)
@@ -124,16 +141,16 @@ class Stage:
         self._set(motion)
         return self._put(timeline.change(self.timeline, clock() + EDIT_LEAD, motion.id, motion.track.duration_us))
 
-    def join(self, name: str) -> Puppeteer:
-        """A puppeteer comes; raises `Full`."""
-        puppeteer = self._puppeteers.join(name)
+    def join(self, who: str, name: str, tell: Callable[[bytes], None]) -> Puppeteer:
+        """A puppeteer comes, of the id `who`, and is told what there is with `tell`; raises `Full`."""
+        puppeteer = self.puppeteers.join(who, name, tell, clock())
         puppeteer.tell(Welcome(puppeteer.id, puppeteer.colour, LEAD).pack())
         self._announce()
         return puppeteer
 
     def leave(self, puppeteer: Puppeteer) -> None:
         """A puppeteer goes; what they held goes to who asked for it, or back to the dance."""
-        self._puppeteers.leave(puppeteer)
+        self.puppeteers.leave(puppeteer)
         now = clock()
         self._marionette.leave(puppeteer.id, now)
         self._settle(now)
@@ -166,7 +183,7 @@ class Stage:
                 puppeteer.notice(message.limb, outcome.value, now)
 
     def _granted(self, who: str, grant: Granted) -> None:
-        self._puppeteers.tell(who, Grant(grant.limb, grant.epoch).pack())
+        self.puppeteers.tell(who, Grant(grant.limb, grant.epoch).pack())
         self._engaged.set()
 
     def _settle(self, now: int) -> bool:
@@ -189,7 +206,7 @@ class Stage:
         self.seen = clock()
         packed = self.presence.pack()
         self._bus.publish(f"session.{self.id}.presence", packed)
-        for puppeteer in self._puppeteers:
+        for puppeteer in self.puppeteers:
             puppeteer.tell(packed)
 
     async def _state(self, _: bytes) -> bytes:
@@ -241,7 +258,7 @@ class Stage:
         now = clock()
         lost = self._marionette.expire(now - max(late, 0))
         for limb, holder in lost:
-            self._puppeteers.tell(holder, Refusal(limb, "lost").pack())
+            self.puppeteers.tell(holder, Refusal(limb, "lost").pack())
         if self._settle(now) or lost:
             self._announce()
         shown: list[Pulled | None] = []

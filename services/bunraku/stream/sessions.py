@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import msgpack
 
-from bunraku.backing.bus import Bus, Subscription
+from bunraku.backing.bus import Bus, NobodyAnswers, Subscription, is_word
 from bunraku.backing.frames import frame
 from bunraku.backing.library import Library, StoredMotion
 from bunraku.backing.sockets import FAULT, NOT_FOUND, Refusal
@@ -58,6 +58,7 @@ class WatchedSession:
             bus.subscribe(f"{self._subject}.timeline", self._on_timeline),
             bus.subscribe(f"{self._subject}.presence", self._on_presence),
             bus.subscribe(f"{self._subject}.overlay", self._on_overlay),
+            bus.subscribe(f"{self._subject}.appear", self._on_appear),
         ]
 
     async def ready(self) -> None:
@@ -166,6 +167,11 @@ class WatchedSession:
         for viewer in self._viewers:
             viewer.control(self._presence)
 
+    def _on_appear(self, _: bytes) -> None:
+        """Another replica goes on with the session: it has not heard how many watch."""
+        self._counted = 0
+        self._publish(len(self._viewers))
+
     def _on_overlay(self, message: bytes) -> None:
         framed = frame(message)
         # who joins while a limb is pulled starts from here; an empty mask says that none is
@@ -191,6 +197,8 @@ class WatchedSessions:
     async def open(self, session: str) -> WatchedSession:
         """A session, to be joined before anything else is awaited, or closed again; raises `NobodyAnswers` where there
         is none, and `Refusal` where it cannot be watched."""
+        if not is_word(session):
+            raise NobodyAnswers(session)
         if session not in self._sessions:
             state = await self._bus.ask(f"session.{session}.state")
             # another viewer may have opened it while this one asked

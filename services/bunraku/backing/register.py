@@ -1,0 +1,80 @@
+"""What replicas must agree on: small values under keys, each changed only by who has seen its newest revision.
+
+The shape is that of a key-value bucket of NATS JetStream, so that a broker can take the place of this process's own.
+Keys are words of A-Z a-z 0-9 _ - joined by dots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import count
+from typing import Protocol
+
+
+class Conflict(Exception):
+    """The value has changed since it was read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Registered:
+    """A value and its revision, a number that each change makes greater."""
+
+    value: bytes
+    revision: int
+
+
+class Register(Protocol):
+    """The register as the services see it."""
+
+    async def get(self, key: str) -> Registered | None:
+        """What is under a key."""
+
+    async def all(self, prefix: str) -> dict[str, Registered]:
+        """Everything under keys that begin with `prefix` and a dot, in the order in which keys were made."""
+
+    async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
+        """Its new revision. With `revision` only where that is still the newest, 0 where nothing is there; raises
+        `Conflict`."""
+
+    async def remove(self, key: str, revision: int | None = None) -> None:
+        """Remove a key; nothing happens where there is none. `revision` as in `put`."""
+
+    async def close(self) -> None:
+        """Nothing is asked after this."""
+
+
+class MemoryRegister:
+    """The register within one process."""
+
+    def __init__(self) -> None:
+        self._values: dict[str, Registered] = {}
+        self._revisions = count(1)
+
+    async def get(self, key: str) -> Registered | None:
+        """As `Register.get`."""
+        return self._values.get(key)
+
+    async def all(self, prefix: str) -> dict[str, Registered]:
+        """As `Register.all`."""
+        return {key: value for key, value in self._values.items() if key.startswith(f"{prefix}.")}
+
+    async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
+        """As `Register.put`."""
+        self._check(key, revision)
+        new = next(self._revisions)
+        self._values[key] = Registered(value, new)
+        return new
+
+    async def remove(self, key: str, revision: int | None = None) -> None:
+        """As `Register.remove`."""
+        self._check(key, revision)
+        self._values.pop(key, None)
+
+    async def close(self) -> None:
+        """As `Register.close`."""
+        self._values.clear()
+
+    def _check(self, key: str, revision: int | None) -> None:
+        here = self._values.get(key)
+        if revision is not None and revision != (here.revision if here else 0):
+            raise Conflict(key)

@@ -1,0 +1,102 @@
+"""nats-server with its WebSocket, as a sender of `make bench-fanout`: `python -m tests.bench.fanout_nats BYTES HERTZ`.
+
+Speaks as `fanout_senders` does. What is published goes through one TCP connection of this process, as from a service;
+`cpu` is the server's alone.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+SUBJECT = "overlay"
+
+
+def ports() -> tuple[int, int, int]:
+    """Three ports that nobody has."""
+    taken = [socket.create_server(("127.0.0.1", 0)) for _ in range(3)]
+    first, second, third = (one.getsockname()[1] for one in taken)
+    for one in taken:
+        one.close()
+    return first, second, third
+
+
+def settings(client: int, websocket: int, monitor: int) -> str:
+    """A server that asks nothing of its clients while a bench runs."""
+    return f"""
+host: "127.0.0.1"
+port: {client}
+http: "127.0.0.1:{monitor}"
+ping_interval: "1h"
+websocket {{
+  host: "127.0.0.1"
+  port: {websocket}
+  no_tls: true
+  compression: false
+}}
+"""
+
+
+def connected(port: int) -> socket.socket:
+    """A client of the server that may publish, once the server listens."""
+    for _ in range(200):
+        try:
+            client = socket.create_connection(("127.0.0.1", port), timeout=10)
+        except ConnectionRefusedError:
+            time.sleep(0.05)
+            continue
+        client.sendall(b'CONNECT {"verbose":false,"pedantic":false}\r\nPING\r\n')
+        said = b""
+        while b"PONG\r\n" not in said:
+            said += client.recv(4096)
+        return client
+    raise RuntimeError("nats-server does not listen")
+
+
+def sent(monitor: int) -> int:
+    """How many messages it has sent to clients, as the server counts them."""
+    with socket.create_connection(("127.0.0.1", monitor), timeout=10) as asked:
+        asked.sendall(b"GET /varz HTTP/1.0\r\n\r\n")
+        said = b"".join(iter(lambda: asked.recv(1 << 16), b""))
+    found: Any = json.loads(said.partition(b"\r\n\r\n")[2])
+    return int(found["out_msgs"])
+
+
+def used(pid: int) -> float:
+    """Seconds of processor that the server has had, to the nanosecond, threads that have ended aside."""
+    return sum(int(one.read_text().split()[0]) for one in Path(f"/proc/{pid}/task").glob("*/schedstat")) / 1e9
+
+
+def main() -> None:
+    size, hertz = int(sys.argv[1]), int(sys.argv[2])
+    with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
+        client, websocket, monitor = ports()
+        config = Path(folder) / "nats.conf"
+        config.write_text(settings(client, websocket, monitor))
+        server = subprocess.Popen(["nats-server", "-c", str(config)], stderr=subprocess.DEVNULL)
+        try:
+            publisher = connected(client)
+            print(websocket, flush=True)
+            message = f"PUB {SUBJECT} {size}\r\n".encode() + os.urandom(size) + b"\r\n"
+            while line := sys.stdin.readline():
+                messages, before, begun = sent(monitor), used(server.pid), time.monotonic()
+                for tick in range(round(float(line) * hertz)):
+                    time.sleep(max(begun + tick / hertz - time.monotonic(), 0.0))
+                    publisher.sendall(message)
+                time.sleep(1 / hertz)
+                cpu = used(server.pid) - before
+                print(json.dumps({"messages": sent(monitor) - messages, "cpu": round(cpu, 6)}), flush=True)
+        finally:
+            server.terminate()
+            server.wait(20)
+
+
+if __name__ == "__main__":
+    main()
