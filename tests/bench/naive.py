@@ -38,5 +38,5 @@ async def naive_relay(url: str, port: int) -> AsyncIterator[None]:
                 if isinstance(end, Exception) and not isinstance(end, ConnectionClosed):
                     raise end
 
-    async with serve(relay, "0.0.0.0", port, subprotocols=[SUBPROTOCOL], compression=None):  # type: ignore[list-item]
+    async with serve(relay, "0.0.0.0", port, subprotocols=[SUBPROTOCOL], compression=None, ping_interval=None):  # type: ignore[list-item]
         yield

@@ -6,6 +6,8 @@ ARGUMENTS="--only live"`.
 
     9k6 28k8 56k   a motion at these kbit/s (round trips of 300, 150, 150 ms): time from the start of the TCP connection
                    to the first pose (median of five lines side by side), and gaps over 60 s on one of them
+    audio          the same lines with all that the dance has: its music, camera and lights; also for which share of the
+                   last 30 s there was sound, and at which rate it came last
     steps          56 -> 14.4 -> 56 kbit/s under a pulled dancer: gaps, latency of the live overlay
     live           all four limbs pulled, on 28.8 kbit/s: latency, how much of the line is used, and the same written
                    naively: each overlay as it comes
@@ -15,8 +17,8 @@ ARGUMENTS="--only live"`.
     traces         18 lines of 3G at a mean of 28.8 and of 56 kbit/s: stalls against those of the lowest rate alone, and
                    the mean rate shown against the best constant one that an oracle sends
 
-All viewers ask for the motion alone. Latency of an overlay is from when the session made its newest frame to when it
-came. Both ends share one kernel's clock, so a viewer's true offset is known.
+But for `audio` all viewers ask for the motion alone. Latency of an overlay is from when the session made its newest
+frame to when it came. Both ends share one kernel's clock, so a viewer's true offset is known.
 """
 
 from __future__ import annotations
@@ -69,6 +71,8 @@ class Screen(Viewer):
         self.clock_errors: list[float] = []
         self.shown: list[tuple[int, int, int]] = []
         """Of each picture: local time, reference time, rate of the block shown or -1."""
+        self.heard: list[bool] = []
+        """Of each picture: whether the sound that goes with it was there."""
 
     def _take(self, data: bytes) -> None:
         if data and data[0] == Overlay.TYPE:
@@ -84,6 +88,7 @@ class Screen(Viewer):
             shown = self.clock.at(self._local()) - (now + self.truth)
             self.clock_errors.append(shown / 1e3)
             self.shown.append((now, reference, round(self._kbps_at(reference) * 1e3)))
+            self.heard.append(self.audio_ahead(reference) > 0)
 
         self.begun = time.monotonic_ns() // 1000
         while (left := seconds - (time.monotonic_ns() // 1000 - self.begun) / 1e6) > 0.5:
@@ -95,6 +100,13 @@ class Screen(Viewer):
             except (OSError, TimeoutError):
                 # the line does not carry a connection yet
                 continue
+
+
+class Patient(Screen):
+    """One that waits for what comes late, however late."""
+
+    async def _watch_line(self) -> None:
+        await asyncio.Event().wait()
 
 
 class Bench:
@@ -171,6 +183,30 @@ async def first_poses(bench: Bench, only: set[str]) -> Figures:
     return figures
 
 
+async def audio(bench: Bench) -> Figures:
+    """Case audio."""
+    figures: Figures = {}
+    lines = {"9k6": Link(9_600, 150), "28k8": Link(28_800, 75), "56k": Link(56_000, 75)}
+    with bench.net.lines(list(lines.values())) as fars:
+        screens = [bench.dance(far) for far in fars]
+        watching = []
+        for screen in screens:
+            watching.append(asyncio.create_task(screen.look(60.0)))
+            await asyncio.sleep(0.7)
+        await asyncio.gather(*watching)
+        for name, screen, far in zip(lines, screens, fars, strict=True):
+            late = [
+                heard for (at, _, _), heard in zip(screen.shown, screen.heard, strict=True) if at > screen.begun + 30e6
+            ]
+            figures[f"audio_first_pose_ms_{name}"] = _whole(screen.figures.first_pose_ms or float("inf"))
+            figures[f"audio_stalls_{name}"] = screen.figures.gaps
+            figures[f"audio_share_{name}"] = round(float(np.mean(late)), 3)
+            figures[f"audio_rate_{name}"] = screen.figures.audio_rate
+            figures[f"audio_shown_kbps_{name}"] = round(screen.figures.shown_kbps, 2)
+            figures[f"audio_line_kbps_{name}"] = round(far.received * 8e-3 / 60.0, 2)
+    return figures
+
+
 async def steps(bench: Bench) -> Figures:
     """Case steps."""
     figures: Figures = {}
@@ -210,7 +246,7 @@ async def live(bench: Bench) -> Figures:
             with bench.net.lines([link] * 3) as fars:
                 ours, naive = (
                     bench.screen(fars[0], path),
-                    Screen(f"ws://{fars[1].host}:{PORT + 1}/", fars[1], bench.truth),
+                    Patient(f"ws://{fars[1].host}:{PORT + 1}/", fars[1], bench.truth),
                 )
                 off = bench.screen(fars[2], path, now=lambda: round(time.monotonic_ns() * 1.0002e-3) + 3_600_000_000)
                 carried = 0
@@ -409,7 +445,7 @@ async def _truth() -> float:
     return best.offset
 
 
-CASES = ("9k6", "28k8", "56k", "steps", "live", "clock", "join", "cut", "traces")
+CASES = ("9k6", "28k8", "56k", "audio", "steps", "live", "clock", "join", "cut", "traces")
 
 
 async def run(net: Network, only: set[str], seconds: float) -> Figures:
@@ -430,6 +466,7 @@ async def run(net: Network, only: set[str], seconds: float) -> Figures:
 
     await case({"9k6", "28k8", "56k"}, lambda: first_poses(bench, only))
     await case({"live", "clock"}, lambda: live(bench))
+    await case({"audio"}, lambda: audio(bench))
     await case({"steps"}, lambda: steps(bench))
     await case({"join"}, lambda: join(bench))
     await case({"cut"}, lambda: cut(bench))

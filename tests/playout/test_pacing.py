@@ -6,7 +6,20 @@ from hypothesis import strategies as st
 
 from bunraku.codec.timing import Timing, even_blocks
 from bunraku.codec.track import MotionTrack, plan
-from bunraku.playout.pacing import AHEAD, JUST, MARGIN, NET, NET_AHEAD, SOON, UPGRADE, Due, Paced, Pacer, arrivals
+from bunraku.playout.pacing import (
+    AFTER,
+    AHEAD,
+    JUST,
+    MARGIN,
+    NET,
+    NET_AHEAD,
+    SOON,
+    UPGRADE,
+    Due,
+    Paced,
+    Pacer,
+    arrivals,
+)
 from bunraku.playout.timeline import edit, start
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import wandering_motion
@@ -275,3 +288,17 @@ def test_arrivals_are_what_one_who_has_all_before_is_sent(
     clock = begin + (Pacer(tracks).wait(state, begin) or 0)
     told = [(due.track, due.index, due.rate) for due in arrivals(tracks, state, clock, rate, audio)]
     assert told == told_by_next(tracks, state, clock, rate, audio)
+
+
+def test_over_a_narrow_line_the_motion_goes_a_while_ahead_of_sound_and_late_sound_is_left_out() -> None:
+    pacer = Pacer([Paced(0, LONG, 4, True), Paced(1, LONG, 3, False, audio=True)])
+    state = start("m", LONG.duration_us, 0)
+    sent: list[tuple[int, int]] = []
+    while (due := pacer.next(state, 500_000, 2, 1, net=True)) is not None and not due.far:
+        if not due.better:
+            sent.append((due.track, LONG.start_us(due.index)))
+    sound = [at for track, at in sent if track == 1]
+    assert SECOND <= min(sound) < 2 * SECOND
+    for at in sound:
+        before = [there for track, there in sent[: sent.index((1, at))] if track == 0]
+        assert max(before) > min(at + AFTER, 500_000 + SOON) - 2 * SECOND

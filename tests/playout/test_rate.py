@@ -83,8 +83,19 @@ def test_a_narrow_line_gets_what_it_carries_and_is_told_so() -> None:
 
 def test_hands_go_before_a_finer_dance() -> None:
     choice = RateChoice(5, costs=COSTS)
-    assert carried(choice, 14_400, 5, beside=True) == 3
+    assert carried(choice, 28_800, 5, beside=True) == 2
     assert choice.reason == "hands"
+    assert carried(RateChoice(5, costs=COSTS), 14_400, 5, beside=True) == 0
+
+
+def test_beside_hands_a_line_that_has_become_slower_gets_a_coarser_dance_at_once() -> None:
+    for beside, rates in ((True, [3, 0, 0]), (False, [4, 3, 4])):
+        choice = RateChoice(5, costs=COSTS)
+        assert [
+            carried(choice, 56_000, 5, beside=beside),
+            carried(choice, 7_000, 1, beside=beside, start=5),
+            carried(choice, 28_800, 1, beside=beside, start=6),
+        ] == rates
 
 
 @given(st.lists(st.floats(100, 1e6), min_size=1, max_size=60))

@@ -1,11 +1,16 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
 import pytest
 
 from bunraku.backing.frames import message
-from bunraku.backing.library import StoredMotion, pack, unpack
+from bunraku.backing.library import StoredMotion, pack, unpack, with_audio
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
+from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.playout.held import Held
 from bunraku.stream.flow import Flow
@@ -101,7 +106,7 @@ def test_over_a_line_that_is_far_the_rest_is_told_of_once_the_motion_goes_on_for
         assert found.track == 0
         before.append(found.index)
     parts.append(found)
-    assert before == [0, 1, 2, 3]
+    assert before == list(range(8))
     told = [part for part in parts if isinstance(part, Description)]
     assert [[track["type"] for track in part.tracks] for part in told] == [["motion"], ["camera"]]
     assert [part.first for part in told] == [None, 1]
@@ -120,3 +125,24 @@ def test_who_comes_back_is_told_of_the_tracks_that_it_was_not_told_of() -> None:
         found = [unpack_message(packet) for packet in packets]
         assert [part.first for part in found if isinstance(part, Description)] == firsts
         assert {part.track for part in found if isinstance(part, Data)} == {1}
+
+
+def test_a_line_too_narrow_for_sound_gets_a_better_motion() -> None:
+    encoded = encode_motion(wandering_motion(4.0, 30.0, 9), ladder=(60.0, 20.0, 8.0), grade="live")
+    dance = unpack("m", pack("m", encoded))
+    noise = np.random.default_rng(2).normal(0, 0.2, (192_000, 1)).astype(np.float32)
+    motion = unpack("m", with_audio("m", dance, encode_audio([noise], dance.track, 1))[0])
+    state = timeline.start("m", motion.track.duration_us, 0, playing=False)
+
+    def chosen(bps: float) -> tuple[int, int]:
+        playing = Playing(motion, TRACKS, None)
+        carrying = SimpleNamespace(narrow=True, carries=bps / 8, unknown=False, far=True, blocks_turn=lambda: True)
+        playing.next_packet(state, 0, cast(Flow, carrying), -10_000_000)
+        return playing.step.motion, playing.step.audio
+
+    lowest, best, sound = motion.kbps[0][0], motion.kbps[0][-1], motion.kbps[1][0]
+    assert chosen(900 * lowest) == (0, -1)
+    between = 1_000 * (best + 0.5) / 0.8
+    assert between < 1_000 * (lowest + sound)
+    assert chosen(between) == (2, -1)
+    assert chosen(2_000 * (best + sound))[1] >= 0

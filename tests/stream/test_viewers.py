@@ -267,7 +267,7 @@ async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(mot
 async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dict[str, StoredMotion]) -> None:
     viewer, line, _ = watching(motions["sung"], private=True)
     assert viewer._playing is not None
-    choice = viewer._playing.rate
+    choice = viewer._playing
     for second in range(1, 6):
         choice.report(Report(buffer=0), clock() + second * 2_000_000)
     before = len(sent_of(line))

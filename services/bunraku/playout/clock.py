@@ -1,8 +1,10 @@
-"""The reference clock as seen from this end of a line (the clock filter of NTP, RFC 5905: who waited least knows best).
+"""The reference clock as seen from this end of a line.
 
-Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last samples the one
-that can be off least says the offset: by half its round trip, and by what the clocks have drifted since. What is shown
-slews towards it and never steps, so the picture does not jump.
+Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Each answer says between
+which bounds the offset lies: it is off by half its round trip at most, and by what the clocks have drifted since. The
+offset is the middle of what the last samples leave (Marzullo and Owicki 1983): one that waited least on its way there
+and another that waited least on its way back say it together. What is shown slews towards it and never steps, so the
+picture does not jump.
 """
 
 from __future__ import annotations
@@ -41,6 +43,7 @@ class ReferenceClock:
 
     def __init__(self) -> None:
         self._samples: deque[Sample] = deque(maxlen=SAMPLES)
+        self._low = self._high = 0.0
         self._shown = 0.0
         self._shown_at: int | None = None
 
@@ -53,6 +56,7 @@ class ReferenceClock:
         if trip < 0 or answered < received:
             return
         self._samples.append(Sample(((received - sent) + (answered - arrived)) / 2, trip, arrived))
+        self._bound(arrived)
         if self._shown_at is None or abs(self.offset - self._shown) > STEP:
             self._shown, self._shown_at = self.offset, arrived
 
@@ -68,21 +72,26 @@ class ReferenceClock:
 
     @property
     def offset(self) -> float:
-        """Reference minus local, by the sample that can be off least."""
-        return self._best().offset if self._samples else 0.0
+        """Reference minus local, as far as the samples say."""
+        return (self._low + self._high) / 2 if self._samples else 0.0
 
     @property
     def error(self) -> float:
         """How far the offset may be off at most, when the last answer came."""
-        return self._best().error(self._samples[-1].at) if self._samples else float("inf")
+        return (self._high - self._low) / 2 if self._samples else float("inf")
 
     def restart(self) -> None:
         """A new connection, perhaps to another machine: older answers say nothing about it. The offset in use stays."""
         self._samples.clear()
 
-    def _best(self) -> Sample:
-        now = self._samples[-1].at
-        return min(self._samples, key=lambda sample: sample.error(now))
+    def _bound(self, now: int) -> None:
+        while True:
+            self._low = max(sample.offset - sample.error(now) for sample in self._samples)
+            self._high = min(sample.offset + sample.error(now) for sample in self._samples)
+            if self._low <= self._high or len(self._samples) == 1:
+                return
+            # a clock was set anew: what was said before is no longer true
+            self._samples.popleft()
 
     @property
     def shown_offset(self) -> float:

@@ -23,9 +23,11 @@ AHEAD = 4_000_000
 """How far ahead of the play position blocks are pushed, microseconds."""
 MARGIN = 1_000
 """So long after a block comes within reach it is looked for, microseconds."""
+AFTER = 3_000_000
+"""Over a narrow line the motion goes before sound that is heard this much sooner, microseconds."""
 NET_AHEAD = 10_000_000
 """As `AHEAD`, for better versions where a net is kept: such a line may stand for seconds."""
-SOON = 4_000_000
+SOON = 8_000_000
 """What is shown within this goes before the rest of the net, microseconds."""
 JUST = 2_000_000
 """What is shown within this is bettered before the rest of the net, microseconds."""
@@ -65,8 +67,8 @@ class Paced:
 @dataclass(frozen=True, slots=True, order=True)
 class Due:
     """A block to be sent, those to be sent first being the least: whether it lies far ahead where a net is kept,
-    whether it only betters one that was sent, how long until it is shown in microseconds, its place among others of the
-    same instant, and which one it is."""
+    whether it only betters one that was sent, how long until it is shown in microseconds (of sound over a narrow line
+    `AFTER` longer), its place among others of the same instant, and which one it is."""
 
     far: bool
     better: bool
@@ -114,7 +116,7 @@ class Pacer:
         found = [
             due
             for track, wanted in rates
-            if wanted >= 0 and (due := self._due(track, state, position, wanted, net and not track.audio)) is not None
+            if wanted >= 0 and (due := self._due(track, state, position, wanted, net)) is not None
         ]
         if not found:
             self._filling = False
@@ -169,6 +171,8 @@ class Pacer:
         first = min(timing.block_at(position), blocks - 1)
         place = track.place
         soonest = AGAIN if track.audio and state.duration > AHEAD + 1_000_000 else UPGRADE
+        # sound is in no net
+        net, after = (False, AFTER) if net and track.audio else (net, 0)
         ahead = NET_AHEAD if net else AHEAD
         found: list[Due] = []
         for count in range(blocks):
@@ -177,17 +181,20 @@ class Pacer:
             if distance > (NET if net else AHEAD) or (turn and not state.loop):
                 break
             sent = self._sent.get((track.number, index))
+            if after and sent is None and state.playing and distance == 0:
+                # sound that would come after it has begun
+                continue
             far = net and distance > (SOON if sent is None else JUST)
             if sent is None:
                 if far and distance <= REFILL:
                     self._filling = True
                 if not far or self._filling:
                     low = net or (place < 2 and count == 0)
-                    found.append(Due(far, False, distance, place, track.number, index, 0 if low else rate))
+                    found.append(Due(far, False, distance + after, place, track.number, index, 0 if low else rate))
                 if not far:
                     break
             elif sent < rate and soonest < distance <= ahead:
-                found.append(Due(far, True, distance, place, track.number, index, rate))
+                found.append(Due(far, True, distance + after, place, track.number, index, rate))
         return min(found, default=None)
 
 

@@ -18,10 +18,12 @@ SLOW_FRAME = 50_000
 SLOW_DECODE = 20_000
 SHARE = 0.8
 """Of a narrow line that blocks may take."""
-SHARE_BESIDE = 0.3
+SHARE_BESIDE = 0.1
 """The same while limbs are pulled: hands that are late are seen sooner than a coarser dance."""
 STEADY = 3_000_000
-"""What a line carries is its mean over about this time, microseconds."""
+"""What a line carries is its mean over about this time, microseconds,"""
+SLOWED = 0.7
+"""but beside hands one that carries less than this share of it counts as slower at once: they would wait."""
 
 
 class RateChoice:
@@ -89,12 +91,13 @@ class RateChoice:
         if carried is None or not self._costs:
             self._carried, self._by_line = None, self._highest
             return
-        if self._carried is None:
+        if self._carried is None or (beside and carried < SLOWED * self._carried):
             self._carried = carried
         else:
             self._carried += (carried - self._carried) * -math.expm1(-max(clock - self._carried_at, 0) / STEADY)
         self._carried_at, self._beside = clock, beside
-        share = self._carried * (SHARE_BESIDE if beside else SHARE)
+        # a block that is on its way when the line becomes slow keeps all else waiting: no more than it carries now
+        share = min(self._carried, carried) * (SHARE_BESIDE if beside else SHARE)
         best = max((n for n, kbps in enumerate(self._costs) if kbps * 125 + HEADS <= share), default=0)
         # a rate that was left is taken again only when there is some room to spare
         if best <= self._by_line or self._costs[best] * 125 + HEADS <= share * 0.9:

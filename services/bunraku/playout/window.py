@@ -19,8 +19,18 @@ PACKET = 1_400
 """Of a longer message each such part is a packet."""
 DELAYED = 40_000
 """A receiver waits so long before it acknowledges, microseconds."""
+SPARE = 20_000
+"""So much later than it should at the latest an acknowledgement may come, microseconds."""
+RECEIVER = 60_000
+"""No acknowledgement waits longer at a receiver than this, microseconds."""
+SLOWER = 1.03
+"""The line is taken to be so much slower than it seems: what is thought of its queue is then corrected at once."""
 QUEUED = 220
-"""Bytes that are to wait in the line's queue: a message or two."""
+"""Bytes that are to wait in the line's queue: a message or two,"""
+QUEUED_TIME = 40_000
+"""but no more than leave in this time, microseconds,"""
+QUEUED_LEAST = 100.0
+"""or than this."""
 LEAST = 1_600
 """The window before anything is known: a first block, its Description, and some more."""
 LARGE = 250
@@ -29,8 +39,16 @@ STEP = 60.0
 """Bytes that a window grows by at least, where it is too small."""
 WATCHED = 40_000
 """A round trip counts only if its end was looked out for as often as this."""
+ROUND = 190
+"""Bytes that go there and back for a message and its acknowledgement."""
+BRIEF = 20_000
+"""What was acknowledged within less time than this says nothing of the line's rate, microseconds."""
 WEIGHT = 0.3
 """Of the newest in the mean of the line's rate."""
+SLOWED = 0.6
+"""A line that seems to carry less than this share of what it did has become slower,"""
+SLOWED_WEIGHT = 0.5
+"""and the newest weighs more."""
 FULL = 2_000_000
 """So long after its queue was seen filled what a line carries is known."""
 PROBE = 2.0
@@ -47,7 +65,7 @@ def on_line(size: int) -> int:
 class _Flying(NamedTuple):
     """A message on its way: its end in bytes written and in bytes of the line, when it was written, the bytes on their
     way then (of none more than a message has), how much larger it is than a message; what was acknowledged by then, and
-    since when nothing else was."""
+    since when nothing else was; and when the line is through with it, but for `Window._shift`."""
 
     end: int
     line_end: int
@@ -56,6 +74,7 @@ class _Flying(NamedTuple):
     large: int
     acknowledged: int
     since: int
+    through: float
 
 
 class Window:
@@ -68,6 +87,7 @@ class Window:
         """The least time from writing to acknowledgement so far."""
         self.rate: float | None = None
         """Bytes a second that the line carries, or carried at least while it was never full."""
+        self._quickest = 0.0
         self.full_at: int | None = None
         """When the line's queue was last seen to be filled."""
         self._written = 0
@@ -78,6 +98,9 @@ class Window:
         # beyond what a message has, of what is on its way; and when the line is through with it
         self._large = 0
         self._through = 0.0
+        # when the line is through with all that was written, and by how much that was corrected so far
+        self._end = 0.0
+        self._shift = 0.0
         self._looked = 0
         self._limited = False
         # the present round trip: since when, and the shortest in it
@@ -92,7 +115,23 @@ class Window:
     @property
     def late(self) -> float:
         """How much later than they could acknowledgements are to come, microseconds."""
-        return DELAYED + (QUEUED / self.rate * 1e6 if self.rate else 0.0)
+        return DELAYED + self.queued
+
+    @property
+    def queued(self) -> float:
+        """For how long what waits in the line's queue is to be enough, microseconds."""
+        if not self.rate:
+            return 0.0
+        return min(QUEUED, max(self.rate * QUEUED_TIME * 1e-6, QUEUED_LEAST)) / self.rate * 1e6
+
+    @property
+    def least(self) -> float:
+        """The least time from writing to acknowledgement at the present rate, microseconds: a line that has become
+        slower takes longer for the same bytes."""
+        assert self.base is not None
+        if not self.rate or self.rate >= self._quickest:
+            return self.base
+        return self.base + ROUND * (1.0 / self.rate - 1.0 / self._quickest) * 1e6
 
     def wrote(self, at: int, size: int) -> None:
         """`size` bytes were written at once at `at`."""
@@ -105,11 +144,14 @@ class Window:
             rate = self.rate if self.full_at is not None and at - self.full_at < FULL else PROBE * self.rate
             self._through = max(self._through, at) + on_line(size) / rate * 1e6
         since = max(self._answered_at, self._flying[0].at) if self._flying else at
+        if self.rate:
+            self._end = max(self._end, at) + on_line(size) / self.rate * SLOWER * 1e6
         self._flying.append(
             _Flying(
-                self._written, self._line_written, at, self.flying - self._large, large, self._line_acknowledged, since
+                self._written, self._line_written, at, self.flying - self._large, large, self._line_acknowledged, since,
+                self._end - self._shift,
             )
-        )
+        )  # fmt: skip
 
     @property
     def written(self) -> int:
@@ -137,19 +179,27 @@ class Window:
             self._through = at
         took = max(at - newest.at, 1)
         self.base = min(time for time in (self.base, least, took) if time)
+        if self.rate:
+            self._correct(at - (self.base - HEADS / self.rate * 1e6), newest.through + self._shift)
         if at - max(looked, newest.at) <= WATCHED:
             self._heed(at, took, newest)
 
+    def _correct(self, left: float, thought: float) -> None:
+        """The line was through with a message at `left` at the latest, and no more than `RECEIVER` before."""
+        if not left - RECEIVER <= thought <= left:
+            self._shift += left - thought
+            self._end += left - thought
+
     def _heed(self, at: int, took: int, newest: _Flying) -> None:
         """What was last acknowledged took so long."""
-        assert self.base is not None
         rate = (newest.line_end - newest.acknowledged) * 1e6 / max(at - newest.since, 1)
-        late = took - self.base
+        late = took - self.least
         if self.rate is None:
             self.rate = rate
         elif late > self.late:
-            self.rate += WEIGHT * (rate - self.rate)
-        else:
+            self.rate += (WEIGHT if rate > SLOWED * self.rate else SLOWED_WEIGHT) * (rate - self.rate)
+            self._quickest = max(self._quickest, self.rate)
+        elif at - newest.since >= BRIEF:
             self.rate = max(self.rate, rate)
         if late > self.late:
             self.full_at = at
@@ -158,15 +208,15 @@ class Window:
             self._took = min(self._took or took, took)
             if late > 2 * self.late and not self._large:
                 # the line has become slower
-                self.limit = min(self.limit, self.rate * (self.base + self.late) * 1e-6)
+                self.limit = min(self.limit, self.rate * (self.least + self.late) * 1e-6)
         written = newest.at
         if written < self._turn:
             return
         # a round trip has passed: this was written after the last turn
         if self._took is not None:
-            queued = self._took - self.base
+            queued = self._took - self.least
             if queued > self.late:
-                self.limit *= (self.base + self.late) / self._took
+                self.limit *= (self.least + self.late) / self._took
             elif self._limited:
                 self.limit += max(self.limit * 0.5 * (1.0 - queued / self.late), STEP)
         self.limit = max(self.limit, float(LARGE))
@@ -178,6 +228,10 @@ class Window:
         if not self._flying:
             return True
         ahead = ahead if self.rate else 0
+        if self.rate and self.base is not None and self.narrow(at):
+            # when its acknowledgement is to come at the latest
+            latest = self._flying[0].through + self._shift + self.base + RECEIVER
+            return at <= latest + SPARE and self._end - at <= self.queued + ahead
         # the line is through with what is large at a time that is known, once its rate is
         if self.flying - (self._large if self.rate else 0) >= self.limit + (self.rate or 0.0) * ahead * 1e-6:
             self._limited = True
@@ -185,7 +239,15 @@ class Window:
         if at < self._through - ahead:
             return False
         # nothing came back for long: the line has become slower, or stands
-        return self.base is None or at - self._flying[0].at <= self.base + 2 * self.late + ahead
+        return self.base is None or at - self._flying[0].at <= self.least + 2 * self.late + ahead
+
+    def busy(self, at: int) -> int:
+        """Microseconds until the line will be through with all that is on its way, as far as is known."""
+        if not self._flying or not self.rate or self.base is None:
+            return 0
+        # what was acknowledged last had left by then, and the line went on with what is first of the rest
+        left = self._answered_at - self.base + HEADS / self.rate * 1e6
+        return max(round(max(left, self._flying[0].at) + self.flying / self.rate * 1e6) - at, 0)
 
     def wait(self) -> int:
         """Microseconds after which there may be room."""

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from bunraku.backing.line import Reading
-from bunraku.playout.window import LEAST, Window, on_line
+from bunraku.playout.window import LEAST, PROBE, Window, on_line
 
 CLEAN = 64
 """So many times there was room at once before a line counts as quick."""
@@ -21,7 +21,9 @@ HEAP = 16_384
 LATE = 100_000
 """So much longer than the least the round trips of a quick line may take: receivers may wait 40 ms to acknowledge."""
 BLOCKS = 0.3
-"""The share of a narrow line that blocks get beside overlays."""
+"""The share of a narrow line that blocks get beside overlays,"""
+SAVED = 0.2
+"""and for how many seconds they can save it up: several blocks in a row would keep overlays waiting."""
 
 
 class Readable(Protocol):
@@ -133,6 +135,15 @@ class Flow:
         return self._line is not None and self.window.narrow(self._now())
 
     @property
+    def carries(self) -> float | None:
+        """Bytes a second of a line that may be a narrow one, None where it is not or nothing is known."""
+        rate = self.window.rate
+        if rate is None or not (self.far or self.narrow):
+            return None
+        # as long as it was never full it carries more than it was seen to
+        return rate if self.window.full_at is not None else PROBE * rate
+
+    @property
     def unknown(self) -> bool:
         """Whether the line may be narrow: nothing was acknowledged yet."""
         return self.far and self.window.rate is None
@@ -150,6 +161,6 @@ class Flow:
         """Whether a block that can wait may take room from overlays: on a narrow line they have a share of it."""
         now, rate = self._now(), self.window.rate or 0.0
         self._credit += BLOCKS * rate * (now - self._credited_at) * 1e-6
-        self._credit = min(self._credit, BLOCKS * rate)
+        self._credit = min(self._credit, BLOCKS * rate * SAVED)
         self._credited_at = now
         return self._credit > 0

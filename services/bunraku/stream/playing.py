@@ -8,6 +8,7 @@ from bunraku.playout import sharing
 from bunraku.playout.held import Held
 from bunraku.playout.pacing import Pacer
 from bunraku.playout.rate import RateChoice
+from bunraku.playout.sharing import Step
 from bunraku.stream.flow import Flow
 from bunraku.stream.tracks import described, paced, steps, told_of
 from bunraku.wire.messages import Choice, Report, TimelineState
@@ -21,8 +22,11 @@ class Playing:
     microseconds."""
 
     __slots__ = (
+        "_alone",
         "_known",
+        "_narrow",
         "_pinned",
+        "_silent",
         "_tells",
         "_told",
         "_wanted",
@@ -45,8 +49,12 @@ class Playing:
         self.steps = sharing.pinned(steps(motion, wanted), pinned)
         first, safe = sharing.first_step(self.steps), sharing.safe_step(self.steps)
         self.rate = RateChoice(len(self.steps), None, first, safe, [step.kbps for step in self.steps])
+        # where no sound is sent all is the motion's
+        self._silent = [Step(nth, -1, kbps) for nth, kbps in enumerate(motion.kbps[0])]
+        self._alone = RateChoice(len(self._silent), costs=motion.kbps[0])
         self._pinned = pinned is not None
         self._tells = "motion" in wanted
+        self._narrow = False
         self._told: Choice | None = None
         self.unsaid = True
         """Whether `news` may have something to say."""
@@ -54,7 +62,13 @@ class Playing:
     @property
     def step(self) -> sharing.Step:
         """How motion and sound share the line now."""
-        return self.steps[self.rate.rate]
+        chosen = self._choosing
+        return self._silent[chosen.rate] if chosen is self._alone else self.steps[chosen.rate]
+
+    @property
+    def _choosing(self) -> RateChoice:
+        silent = len(self.steps) > 1 and self.steps[0].audio < 0 <= self.steps[-1].audio
+        return self._alone if silent and not self._pinned and self.rate.rate == 0 else self.rate
 
     def has(self, held: Held | None) -> bool:
         """What the viewer holds already is not sent again; whether it is of this motion."""
@@ -77,8 +91,10 @@ class Playing:
 
     def report(self, report: Report, clock: int) -> bool:
         """How the viewer fares; whether rate or reason have changed."""
-        before = self.rate.rate, self.rate.reason
-        changed = (self.rate.report(report, clock), self.rate.reason) != before
+        before = self.step, self._choosing.reason
+        for choice in (self.rate, self._alone):
+            choice.report(report, clock)
+        changed = (self.step, self._choosing.reason) != before
         self.unsaid = self.unsaid or changed
         return changed
 
@@ -86,7 +102,9 @@ class Playing:
         """The Data to send next, None when enough is on its way; an overlay waited for room at `beside_at`."""
         narrow = flow.narrow
         beside = narrow and clock - beside_at < BESIDE
-        self.rate.line(flow.window.rate if narrow else None, clock, beside)
+        for choice in (self.rate, self._alone):
+            choice.line(flow.carries, clock, beside)
+        self._narrow = narrow
         step = self.steps[0] if flow.unknown else self.step
         if self._known < self._wanted:
             due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=True, spare=False)
@@ -105,8 +123,9 @@ class Playing:
         self.unsaid = False
         if not self._tells:
             return None
-        reason = "pinned" if self._pinned else self.rate.reason
-        choice = Choice(self.step.motion, reason, self.rate.carried)
+        chosen = self._choosing
+        reason = "pinned" if self._pinned else chosen.reason
+        choice = Choice(self.step.motion, reason, chosen.carried if self._narrow else None)
         told, self._told = self._told, choice
         if told is not None and (told.rate, told.reason) == (choice.rate, choice.reason):
             return None

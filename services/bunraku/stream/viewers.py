@@ -60,6 +60,14 @@ TOGETHER = 4_000_000
 """Who will be in step for less, microseconds, goes on alone."""
 DEEP = 200_000
 """So much more of what is not live may wait in the queue of a narrow line, microseconds."""
+HUSH = 15_000
+"""A line is given so much longer to fall still, microseconds,"""
+MOST_HUSH = 500_000
+"""but no longer than this in all,"""
+HUSH_EVERY = 2_000_000
+"""and so often at most,"""
+HUSHES = 4
+"""the first ones four times as often."""
 BATCH = 16_384
 """Bytes that are written in one piece, about."""
 LOOK = 250_000
@@ -97,9 +105,9 @@ class Viewer:
     """What one viewer has been sent and is still to be sent. Until `open` is called everything waits."""
 
     __slots__ = (
-        "_asked", "_beside_at", "_cohort", "_control", "_flow", "_following", "_held", "_look_at", "_overlay", "_phase",
-        "_pinned", "_planned", "_playing", "_pongs", "_private", "_shown", "_timelines", "_timer", "_turns", "_until",
-        "_wanted", "audience", "outlet",
+        "_asked", "_beside_at", "_cohort", "_control", "_flow", "_following", "_held", "_hush", "_hush_again",
+        "_hushes", "_look_at", "_overlay", "_phase", "_pinned", "_planned", "_playing", "_pongs", "_private", "_shown",
+        "_timelines", "_timer", "_turns", "_until", "_wanted", "audience", "outlet",
     )  # fmt: skip
 
     def __init__(
@@ -136,6 +144,8 @@ class Viewer:
         self._asked = 0
         self._flow = _UNKNOWN
         self._look_at = 0
+        # until when nothing is written, and when it may be so again
+        self._hush = self._hush_again = self._hushes = 0
         self._timer: asyncio.TimerHandle | None = None
         self.audience: Audience | None = None
         self.outlet: Outlet = _SHUT
@@ -200,9 +210,10 @@ class Viewer:
         except MalformedMessage as error:
             raise Refusal(BROKEN, "Malformed message", str(error)) from None
         if isinstance(said, Ping):
+            now = clock()
             if len(self._pongs) < PINGS:
-                self._pongs.append((said, clock()))
-            if self.outlet.clear:
+                self._pongs.append((said, now))
+            if self.outlet.clear and not self._hushed(now):
                 self._put(b"".join(self._answers()))
         elif isinstance(said, Report) and self._playing is not None:
             now = clock()
@@ -291,10 +302,27 @@ class Viewer:
             self._timer.cancel()
             self._timer = None
 
+    def _hushed(self, now: int) -> bool:
+        """Whether nothing is written until the line is through with all that is on its way: now and then the time is
+        told over a line that is otherwise never still, as an answer that waits there tells it wrong."""
+        flow = self._flow
+        if now >= self._hush and now >= self._hush_again and not flow.steady and flow.window.rate is not None:
+            self._hush_again = now + (HUSH_EVERY if self._hushes >= HUSHES else HUSH_EVERY // 4)
+            self._hushes += 1
+            self._hush = now + min(flow.window.busy(now) + HUSH, MOST_HUSH)
+            self._act(now)
+        return now < self._hush
+
     def _send_for_room(self, now: int) -> None:
         """Send what must arrive, then the rest as long as the line has room; look again when it may have some."""
         outlet, flow = self.outlet, self._flow
+        if now < self._hush:
+            self._timer = asyncio.get_running_loop().call_later((self._hush - now) * 1e-6, self._again)
+            return
         self._planned = self._following = None
+        # each answer is a packet of its own, as the question was: both ways take equally long
+        for answer in self._answers():
+            self._put(answer)
         if first := b"".join(self._first()):
             self._put(first)
         while outlet.clear:

@@ -1,9 +1,10 @@
 /**
- * The reference clock as seen from this end of a line (after NTP, RFC 5905, clock filter: the sample that waited least).
+ * The reference clock as seen from this end of a line.
  *
- * Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Of the last samples the one
- * that can be off least says the offset: by half its round trip, and by what the clocks have drifted since. The offset in
- * use slews towards it and never steps.
+ * Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Each answer says between which
+ * bounds the offset lies: it is off by half its round trip at most, and by what the clocks have drifted since. The offset is the
+ * middle of what the last samples leave (Marzullo and Owicki 1983): one that waited least on its way there and another that
+ * waited least on its way back say it together. The offset in use slews towards it and never steps.
  */
 
 import { Slew } from "./slew";
@@ -28,8 +29,7 @@ interface Sample {
 /** Local time to reference time; all arguments and results are microseconds. */
 export class ReferenceClock {
   private readonly samples: Sample[] = [];
-  private best: Sample | null = null;
-  private bestError = Infinity;
+  private bound = Infinity;
   private readonly slew = new Slew();
   private goal: number | null = null;
 
@@ -43,14 +43,14 @@ export class ReferenceClock {
     return this.samples.length >= SETTLED;
   }
 
-  /** Reference minus local, by the sample that can be off least; until there is one, by the greeting. */
+  /** Reference minus local, as far as the samples say; until there is one, by the greeting. */
   get offset(): number {
     return this.goal ?? 0;
   }
 
   /** How far the offset may be off at most, when the last answer came. Infinite before the first. */
   get error(): number {
-    return this.best ? this.bestError : Infinity;
+    return this.bound;
   }
 
   /**
@@ -60,7 +60,7 @@ export class ReferenceClock {
   greeting(now: number, arrived: number): void {
     const offset = now - arrived;
     const another = this.goal === null || Math.abs(offset - this.goal) > ANOTHER;
-    if (this.best === null && another) this.aim(offset, arrived);
+    if (this.samples.length === 0 && another) this.aim(offset, arrived);
   }
 
   /**
@@ -73,15 +73,23 @@ export class ReferenceClock {
     this.samples.push({ offset: (received - sent + (answered - arrived)) / 2, trip, at: arrived });
     if (this.samples.length > SAMPLES) this.samples.shift();
     const off = (sample: Sample) => sample.trip / 2 + DRIFT * (arrived - sample.at);
-    this.best = this.samples.reduce((least, sample) => (off(sample) < off(least) ? sample : least));
-    this.bestError = off(this.best);
-    this.aim(this.best.offset, arrived);
+    for (;;) {
+      const low = Math.max(...this.samples.map((sample) => sample.offset - off(sample)));
+      const high = Math.min(...this.samples.map((sample) => sample.offset + off(sample)));
+      if (low <= high || this.samples.length === 1) {
+        this.bound = (high - low) / 2;
+        this.aim(low + (high - low) / 2, arrived);
+        return;
+      }
+      // a clock was set anew: what was said before is no longer true
+      this.samples.shift();
+    }
   }
 
   /** A new connection, perhaps to another machine: older answers say nothing about it. The offset in use stays. */
   restart(): void {
     this.samples.length = 0;
-    this.best = null;
+    this.bound = Infinity;
   }
 
   /** The offset in use at `local`: on its way to `offset`. */
