@@ -84,7 +84,7 @@ class Sessions:
                 503, "Too many sessions", f"{MOST} sessions are open", hint="end one, or try again later"
             )
         marionette = await asyncio.to_thread(Marionette, stored.track.figure)
-        now, session = clock(), secrets.token_urlsafe(9)
+        now, session = clock(), secrets.token_hex(9)
         state = timeline.start(motion, stored.track.duration_us, now, playing=playing, loop=loop)
         self._opening.add(session)
         try:
