@@ -13,8 +13,9 @@ from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.playout.held import Held
 from bunraku.stream import viewers
+from bunraku.stream.pending import PINGS, QUEUE
 from bunraku.stream.turns import Turns
-from bunraku.stream.viewers import PINGS, QUEUE, Viewer
+from bunraku.stream.viewers import Viewer
 from bunraku.wire.messages import (
     ChannelHeader,
     Choice,

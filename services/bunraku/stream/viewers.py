@@ -29,6 +29,8 @@ from bunraku.playout.held import Held
 from bunraku.playout.pacing import MARGIN
 from bunraku.stream.cohorts import Cohort, Cohorts, Course
 from bunraku.stream.flow import Flow, Readable
+from bunraku.stream.hush import Hush
+from bunraku.stream.pending import QUEUE, Pending
 from bunraku.stream.plans import Plans
 from bunraku.stream.playing import BESIDE, Playing
 from bunraku.stream.tracks import TRACKS, channels
@@ -38,17 +40,12 @@ from bunraku.wire.messages import (
     Edit,
     MalformedMessage,
     Ping,
-    Pong,
     Report,
     TimelineState,
     newest,
     unpack,
 )
 
-QUEUE = 64
-"""Messages that may wait for a viewer."""
-PINGS = 8
-"""Pings whose answers may wait; more are not answered."""
 SILENT = 8_000_000
 """A viewer of whom nothing was heard for this long, microseconds, is asked for a sign of life."""
 GONE = 16_000_000
@@ -60,14 +57,6 @@ TOGETHER = 4_000_000
 """Who will be in step for less, microseconds, goes on alone."""
 DEEP = 200_000
 """So much more of what is not live may wait in the queue of a narrow line, microseconds."""
-HUSH = 15_000
-"""A line is given so much longer to fall still, microseconds,"""
-MOST_HUSH = 500_000
-"""but no longer than this in all,"""
-HUSH_EVERY = 2_000_000
-"""and so often at most,"""
-HUSHES = 4
-"""the first ones four times as often."""
 BATCH = 16_384
 """Bytes that are written in one piece, about."""
 LOOK = 250_000
@@ -105,9 +94,9 @@ class Viewer:
     """What one viewer has been sent and is still to be sent. Until `open` is called everything waits."""
 
     __slots__ = (
-        "_asked", "_beside_at", "_cohort", "_control", "_flow", "_following", "_held", "_hush", "_hush_again",
-        "_hushes", "_look_at", "_overlay", "_phase", "_pinned", "_planned", "_playing", "_pongs", "_private", "_shown",
-        "_timelines", "_timer", "_turns", "_until", "_wanted", "audience", "outlet",
+        "_asked", "_beside_at", "_cohort", "_flow", "_following", "_held", "_hush", "_look_at", "_pending", "_phase",
+        "_pinned", "_planned", "_playing", "_private", "_shown", "_timelines", "_timer", "_turns", "_until", "_wanted",
+        "audience", "outlet",
     )  # fmt: skip
 
     def __init__(
@@ -127,10 +116,7 @@ class Viewer:
         self._private = private
         self._held = held
         self._phase = random.randrange(SPREAD)
-        # what waits, framed, but for pings: their answers tell when they leave
-        self._pongs: list[tuple[Ping, int]] = []
-        self._control: list[bytes] = []
-        self._overlay: bytes | None = None
+        self._pending = Pending()
         self._beside_at = 0
         self._timelines = timeline.Timelines()
         self._shown: tuple[StoredMotion, TimelineState] | None = None
@@ -144,8 +130,7 @@ class Viewer:
         self._asked = 0
         self._flow = _UNKNOWN
         self._look_at = 0
-        # until when nothing is written, and when it may be so again
-        self._hush = self._hush_again = self._hushes = 0
+        self._hush = Hush()
         self._timer: asyncio.TimerHandle | None = None
         self.audience: Audience | None = None
         self.outlet: Outlet = _SHUT
@@ -171,9 +156,7 @@ class Viewer:
         """A framed message that must arrive."""
         if self.outlet.clear:
             self._put(framed)
-        elif len(self._control) < QUEUE:
-            self._control.append(framed)
-        else:
+        elif not self._pending.put(framed):
             self.refuse(Refusal(TOO_SLOW, "Too slow", f"{QUEUE} messages waited; come again"))
 
     def overlay(self, framed: bytes) -> None:
@@ -188,7 +171,7 @@ class Viewer:
                 self._turned()
                 self._turns.put(self, 0)
         else:
-            self._overlay = framed
+            self._pending.overlay = framed
             self._beside_at = clock()
             if clear and self._timer is None:
                 self._act(self._beside_at)
@@ -211,10 +194,9 @@ class Viewer:
             raise Refusal(BROKEN, "Malformed message", str(error)) from None
         if isinstance(said, Ping):
             now = clock()
-            if len(self._pongs) < PINGS:
-                self._pongs.append((said, now))
+            self._pending.ask(said, now)
             if self.outlet.clear and not self._hushed(now):
-                self._put(b"".join(self._answers()))
+                self._put(b"".join(self._pending.answers()))
         elif isinstance(said, Report) and self._playing is not None:
             now = clock()
             if self._playing.report(said, now) or now >= self._look_at:
@@ -303,25 +285,20 @@ class Viewer:
             self._timer = None
 
     def _hushed(self, now: int) -> bool:
-        """Whether nothing is written until the line is through with all that is on its way: now and then the time is
-        told over a line that is otherwise never still, as an answer that waits there tells it wrong."""
-        flow = self._flow
-        if now >= self._hush and now >= self._hush_again and not flow.steady and flow.window.rate is not None:
-            self._hush_again = now + (HUSH_EVERY if self._hushes >= HUSHES else HUSH_EVERY // 4)
-            self._hushes += 1
-            self._hush = now + min(flow.window.busy(now) + HUSH, MOST_HUSH)
+        """Whether nothing is written until the line is through with all that is on its way."""
+        if self._hush.begin(now, self._flow):
             self._act(now)
-        return now < self._hush
+        return now < self._hush.until
 
     def _send_for_room(self, now: int) -> None:
         """Send what must arrive, then the rest as long as the line has room; look again when it may have some."""
         outlet, flow = self.outlet, self._flow
-        if now < self._hush:
-            self._timer = asyncio.get_running_loop().call_later((self._hush - now) * 1e-6, self._again)
+        if now < self._hush.until:
+            self._timer = asyncio.get_running_loop().call_later((self._hush.until - now) * 1e-6, self._again)
             return
         self._planned = self._following = None
         # each answer is a packet of its own, as the question was: both ways take equally long
-        for answer in self._answers():
+        for answer in self._pending.answers():
             self._put(answer)
         if first := b"".join(self._first()):
             self._put(first)
@@ -333,12 +310,11 @@ class Viewer:
             if told and self._playing is not None and (news := self._playing.news()):
                 # before what is sent far ahead, which may take long
                 self._put(news)
-            elif (self._overlay is None or narrow) and (packet := self._next_packet(now)) is not None:
+            elif (self._pending.overlay is None or narrow) and (packet := self._next_packet(now)) is not None:
                 self._put(frame(packet))
                 flow.block_went(len(packet))
                 flow.begun()
-            elif self._overlay is not None:
-                overlay, self._overlay = self._overlay, None
+            elif (overlay := self._pending.take_overlay()) is not None:
                 self._put(frame(newest(unframed(overlay))) if narrow else overlay)
             elif self._playing is not None and (news := self._playing.news()):
                 self._put(news)
@@ -353,16 +329,13 @@ class Viewer:
 
     def _first(self) -> list[bytes]:
         """What goes before all else, framed."""
-        frames = [*self._answers(), *self._announced(), *self._control]
-        self._control.clear()
-        return frames
+        return [*self._pending.answers(), *self._announced(), *self._pending.control()]
 
     def _send(self, now: int) -> None:
         """Send all that there is."""
         frames = self._first()
-        if self._overlay is not None:
-            frames.append(self._overlay)
-            self._overlay = None
+        if (overlay := self._pending.take_overlay()) is not None:
+            frames.append(overlay)
         outlet, size = self.outlet, 0
         while outlet.clear and (packet := self._next_packet(now)) is not None:
             frames.append(frame(packet))
@@ -374,11 +347,6 @@ class Viewer:
             frames.append(news)
         if frames:
             outlet.write(b"".join(frames))
-
-    def _answers(self) -> list[bytes]:
-        """The framed answers to the pings."""
-        pongs, self._pongs = self._pongs, []
-        return [frame(Pong(ping.sequence, ping.sent, received, clock()).pack()) for ping, received in pongs]
 
     def _announced(self) -> list[bytes]:
         """The framed timeline if it is new, after what says of a new motion what it is."""
@@ -409,9 +377,7 @@ class Viewer:
             return False
         playing = self._playing
         assert playing is not None
-        if step != playing.step or playing.unsaid:
-            return False
-        if self._pongs or self._control or self._overlay is not None:
+        if step != playing.step or playing.unsaid or self._pending:
             return False
         plan = self.audience.plans.at(self._following, state, playing.motion, step, self._wanted, playing.tracks)
         new = playing.pacer.follow(plan.dues)
@@ -448,7 +414,7 @@ class Viewer:
         cohort, playing = self._cohort, self._playing
         assert cohort is not None
         assert playing is not None
-        waits = self._pongs or self._control or self._overlay is not None or playing.unsaid
+        waits = self._pending or playing.unsaid
         return self._flow.free and now < self._until and cohort.course.step == playing.step and not waits
 
     def _leave_cohort(self) -> None:
