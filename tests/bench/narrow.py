@@ -123,14 +123,15 @@ class Bench:
         """A viewer of the motion."""
         return self.screen(far, f"/v1/motions/{self.motion}/stream{query}", **options)
 
-    async def pulled(self, work: Callable[[str], Awaitable[None]]) -> None:
-        """`work`, told the id of a session whose dancer is pulled about by all four limbs meanwhile."""
+    async def pulled(self, work: Callable[[str], Awaitable[None]], pace: float = 2.0) -> None:
+        """`work`, told the id of a session whose dancer is pulled about by all four limbs meanwhile, at `pace` radians
+        of their swing a second."""
         async with Client(self.url) as client:
             session = (await client.open_session(self.motion))["id"]
             async with Puppeteer(client, session, "bench") as puppeteer:
                 for limb in LIMBS:
                     await puppeteer.claim(limb)
-                pulling = asyncio.create_task(_pull(puppeteer))
+                pulling = asyncio.create_task(_pull(puppeteer, pace))
                 try:
                     await work(session)
                 finally:
@@ -138,10 +139,10 @@ class Bench:
                     await asyncio.gather(pulling, return_exceptions=True)
 
 
-async def _pull(puppeteer: Puppeteer) -> None:
+async def _pull(puppeteer: Puppeteer, pace: float) -> None:
     loop = asyncio.get_running_loop()
     while True:
-        phase = 2.0 * loop.time()
+        phase = pace * loop.time()
         swing, rise = float(np.sin(phase)), float(np.cos(1.3 * phase))
         for limb, side in zip(LIMBS[:2], (1.0, -1.0), strict=True):
             await puppeteer.target(limb, side * (0.4 + 0.2 * swing), -0.1 + 0.3 * rise, 0.5)
@@ -279,7 +280,8 @@ async def live(bench: Bench) -> Figures:
             figures[f"{name}_median_ms"] = round(_percentile(errors, 50), 2)
             figures[f"{name}_p95_ms"] = round(_percentile(errors, 95), 2)
 
-    await bench.pulled(work)
+    # briskly, so that a stage sends all its frames: of slower hands it sends every second one
+    await bench.pulled(work, 5.0)
     return figures
 
 
