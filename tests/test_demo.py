@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -8,6 +10,15 @@ from bunraku import demo
 from bunraku.backing.backing import open_backing
 from bunraku.backing.settings import Settings
 from bunraku.motion import choreography
+from bunraku.music import sanbaso
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _music_is_made_once() -> Iterator[None]:
+    """It takes seconds, and is the same each time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sanbaso, "music", cache(sanbaso.music))
+        yield
 
 
 async def test_the_dance_is_taken_in_once_and_again_when_it_was_removed(
