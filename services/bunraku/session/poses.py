@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+from weakref import WeakValueDictionary
 
 from bunraku.backing.library import StoredMotion
 from bunraku.codec.decode import decode_block
+from bunraku.codec.track import MotionTrack
 from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore
@@ -16,6 +18,17 @@ from bunraku.wire.messages import Data
 AHEAD = 60
 """Frames that are worked out at once: many cost little more than one."""
 
+_decoded: WeakValueDictionary[int, BlockStore] = WeakValueDictionary()
+
+
+def blocks_of(track: MotionTrack) -> BlockStore:
+    """The decoded blocks of a dance: one store for all stages that dance it, as long as any does."""
+    # a store holds its track, so that no other has this number meanwhile
+    store = _decoded.get(id(track))
+    if store is None:
+        store = _decoded[id(track)] = BlockStore(track)
+    return store
+
 
 class Poses:
     """The dance of one stage."""
@@ -23,7 +36,7 @@ class Poses:
     def __init__(self, motion: StoredMotion, timelines: Timelines) -> None:
         self._motion = motion
         self._timelines = timelines
-        self._blocks = BlockStore(motion.track)
+        self._blocks = blocks_of(motion.track)
         self._known: dict[int, Array] = {}
         self._epoch = -1
         self._share = secrets.randbelow(AHEAD)
