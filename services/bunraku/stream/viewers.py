@@ -278,7 +278,10 @@ class Viewer:
             self.audience.turned()
 
     def _end(self) -> None:
-        self._leave_cohort()
+        cohort, self._cohort = self._cohort, None
+        if cohort is not None:
+            # what it was sent there matters no more: a crowd that goes at once must not be waited for
+            cohort.leave(self)
         self._turns.remove(self)
         if self._timer is not None:
             self._timer.cancel()
