@@ -141,9 +141,13 @@ class StageDoor:
     async def _sweep(self) -> None:
         """Those who have vanished leave."""
         while True:
+            begun = clock()
             await asyncio.sleep(PRESENT)
             now = clock()
+            # while this process stood still nobody could be heard: that is not their silence
+            deaf = max(now - begun - round(PRESENT * 1e6), 0)
             for puppeteer in self.stage.puppeteers:
+                puppeteer.heard += deaf
                 if now - puppeteer.heard > VANISHED:
                     puppeteer.tell(b"")
                     self.stage.leave(puppeteer)
