@@ -33,11 +33,16 @@ class Told:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.wait(20)
-        for stream in (self.process.stdin, self.process.stdout):
-            assert stream is not None
-            stream.close()
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        # nothing more will be said: one that has a server of its own ends it
+        self.process.stdin.close()
+        try:
+            self.process.wait(3)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait(20)
+        self.process.stdout.close()
 
     def line(self) -> str:
         """Its next line; raises RuntimeError where it has ended."""
