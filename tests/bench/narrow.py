@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import csv
 import json
 import os
 import re
@@ -36,119 +35,17 @@ import time
 from collections.abc import Awaitable, Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from websockets.asyncio.client import connect
 
 from bunraku.client.api import Client
-from bunraku.client.puppeteer import Puppeteer
-from bunraku.client.viewer import StreamEnded, Viewer
 from bunraku.codec import decode
 from bunraku.motion.skeleton import points
 from bunraku.playout.blocks import Pose
-from bunraku.playout.clock import Sample
-from bunraku.wire.messages import LARGEST_FROM_SERVER, LIMBS, SUBPROTOCOL, Overlay, Ping, Pong, unpack
 from tests.bench.naive import naive_relay
-from tests.bench.network import Far, Link, Network, missing, narrowlink_path, network
-
-PORT = 18352
-LEAD = 60_000
-"""How far ahead of its making an overlay is due, microseconds; a session's Welcome says it."""
-Figures = dict[str, Any]
-
-
-class Screen(Viewer):
-    """A viewer that remembers when what came."""
-
-    def __init__(self, url: str, far: Far | None = None, truth: float = 0.0, **options: Any) -> None:
-        """`truth` is the server's clock minus this machine's monotonic one, microseconds."""
-        super().__init__(url, open_socket=far.open_socket if far else None, **options)
-        self.truth = truth
-        self.came: list[tuple[int, float, int]] = []
-        """When each overlay came, how late after its newest frame was made (ms), and how many frames it had."""
-        self.begun = 0
-        self.clock_errors: list[float] = []
-        self.shown: list[tuple[int, int, int]] = []
-        """Of each picture: local time, reference time, rate of the block shown or -1."""
-        self.heard: list[bool] = []
-        """Of each picture: whether the sound that goes with it was there."""
-
-    def _take(self, data: bytes) -> None:
-        if data and data[0] == Overlay.TYPE:
-            overlay, now = Overlay.unpack(data), time.monotonic_ns() // 1000
-            self.came.append((now, (now + self.truth - (overlay.due - LEAD)) / 1e3, len(overlay.earlier) + 1))
-        super()._take(data)
-
-    async def look(self, seconds: float, **options: Any) -> None:
-        """Watch, and note how far the clock is off at each picture once it was told the time well."""
-
-        def picture(reference: int, _: Any) -> None:
-            now = time.monotonic_ns() // 1000
-            shown = self.clock.at(self._local()) - (now + self.truth)
-            self.clock_errors.append(shown / 1e3)
-            self.shown.append((now, reference, round(self._kbps_at(reference) * 1e3)))
-            self.heard.append(self.audio_ahead(reference) > 0)
-
-        self.begun = time.monotonic_ns() // 1000
-        while (left := seconds - (time.monotonic_ns() // 1000 - self.begun) / 1e6) > 0.5:
-            try:
-                await self.watch(left, picture, **options)
-            except StreamEnded as ended:
-                print(f"a stream ended: {ended}")
-                self.figures.gaps += 1
-            except (OSError, TimeoutError):
-                # the line does not carry a connection yet
-                continue
-
-
-class Patient(Screen):
-    """One that waits for what comes late, however late."""
-
-    async def _watch_line(self) -> None:
-        await asyncio.Event().wait()
-
-
-class Bench:
-    """The server at the near end, a motion in it, and what every case needs."""
-
-    def __init__(self, net: Network, url: str, motion: str, truth: float) -> None:
-        self.net, self.url, self.motion, self.truth = net, url, motion, truth
-
-    def screen(self, far: Far, path: str, **options: Any) -> Screen:
-        """A viewer at a far end."""
-        return Screen(f"ws://{far.host}:{PORT}{path}", far, self.truth, **options)
-
-    def dance(self, far: Far, query: str = "", **options: Any) -> Screen:
-        """A viewer of the motion."""
-        return self.screen(far, f"/v1/motions/{self.motion}/stream{query}", **options)
-
-    async def pulled(self, work: Callable[[str], Awaitable[None]], pace: float = 2.0) -> None:
-        """`work`, told the id of a session whose dancer is pulled about by all four limbs meanwhile, at `pace` radians
-        of their swing a second."""
-        async with Client(self.url) as client:
-            session = (await client.open_session(self.motion))["id"]
-            async with Puppeteer(client, session, "bench") as puppeteer:
-                for limb in LIMBS:
-                    await puppeteer.claim(limb)
-                pulling = asyncio.create_task(_pull(puppeteer, pace))
-                try:
-                    await work(session)
-                finally:
-                    pulling.cancel()
-                    await asyncio.gather(pulling, return_exceptions=True)
-
-
-async def _pull(puppeteer: Puppeteer, pace: float) -> None:
-    loop = asyncio.get_running_loop()
-    while True:
-        phase = pace * loop.time()
-        swing, rise = float(np.sin(phase)), float(np.cos(1.3 * phase))
-        for limb, side in zip(LIMBS[:2], (1.0, -1.0), strict=True):
-            await puppeteer.target(limb, side * (0.4 + 0.2 * swing), -0.1 + 0.3 * rise, 0.5)
-        for limb, side in zip(LIMBS[2:], (1.0, -1.0), strict=True):
-            await puppeteer.target(limb, 0.4 + 0.3 * side * swing)
-        await asyncio.sleep(1 / 60)
+from tests.bench.narrow_traces import traces
+from tests.bench.narrow_viewing import PORT, Bench, Figures, Patient, Screen, percentile, truth_of_the_clock, whole
+from tests.bench.network import Far, Link, Network, missing, network
 
 
 async def first_poses(bench: Bench, only: set[str]) -> Figures:
@@ -176,8 +73,8 @@ async def first_poses(bench: Bench, only: set[str]) -> Figures:
         for case, (name, _) in enumerate(cases):
             mine = screens[5 * case : 5 * case + 5]
             first = [screen.figures.first_pose_ms or float("inf") for screen in mine]
-            figures[f"first_pose_ms_{name}"] = _whole(float(np.median(first)))
-            figures[f"first_pose_worst_ms_{name}"] = _whole(max(first))
+            figures[f"first_pose_ms_{name}"] = whole(float(np.median(first)))
+            figures[f"first_pose_worst_ms_{name}"] = whole(max(first))
             figures[f"stalls_{name}"] = sum(screen.figures.gaps for screen in mine)
             figures[f"shown_kbps_{name}"] = round(mine[0].figures.shown_kbps, 2)
             figures[f"line_kbps_{name}"] = round(fars[5 * case].received * 8e-3 / 60.0, 2)
@@ -199,7 +96,7 @@ async def audio(bench: Bench) -> Figures:
             late = [
                 heard for (at, _, _), heard in zip(screen.shown, screen.heard, strict=True) if at > screen.begun + 30e6
             ]
-            figures[f"audio_first_pose_ms_{name}"] = _whole(screen.figures.first_pose_ms or float("inf"))
+            figures[f"audio_first_pose_ms_{name}"] = whole(screen.figures.first_pose_ms or float("inf"))
             figures[f"audio_stalls_{name}"] = screen.figures.gaps
             figures[f"audio_share_{name}"] = round(float(np.mean(late)), 3)
             figures[f"audio_rate_{name}"] = screen.figures.audio_rate
@@ -226,7 +123,7 @@ async def steps(bench: Bench) -> Figures:
 
         figures["steps_stalls"] = screen.figures.gaps
         figures["steps_peak_ms"] = round(max(late(4, 26)))
-        figures["steps_after_1500_ms"] = round(_percentile(late(11.5, 18), 95))
+        figures["steps_after_1500_ms"] = round(percentile(late(11.5, 18), 95))
         figures["steps_fps_56k"] = round(rate(4, 10), 1)
         figures["steps_fps_14k4"] = round(rate(11.5, 18), 1)
         figures["steps_fps_back"] = round(rate(20, 26), 1)
@@ -265,20 +162,20 @@ async def live(bench: Bench) -> Figures:
         lateness = [ms for ms, _ in mine]
         written = [ms for at, ms, _ in naive.came if at > begun]
         span = (ours.came[-1][0] - begun) / 1e6
-        figures["live_p50_ms_28k8"] = round(_percentile(lateness, 50))
-        figures["live_p95_ms_28k8"] = round(_percentile(lateness, 95))
+        figures["live_p50_ms_28k8"] = round(percentile(lateness, 50))
+        figures["live_p95_ms_28k8"] = round(percentile(lateness, 95))
         figures["live_fps_28k8"] = round(sum(frames for _, frames in mine) / span, 1)
         figures["live_messages_28k8"] = round(len(mine) / span, 1)
         figures["live_line_used_28k8"] = round(carried * 8 / (seconds - settle - 1.0) / link.rate, 3)
         figures["live_stalls_28k8"] = ours.figures.gaps
         figures["live_shown_kbps_28k8"] = round(ours.figures.shown_kbps, 2)
-        figures["naive_p95_ms_28k8"] = round(_percentile(written, 95))
-        figures["times_naive"] = round(_percentile(written, 95) / _percentile(lateness, 95), 1)
+        figures["naive_p95_ms_28k8"] = round(percentile(written, 95))
+        figures["times_naive"] = round(percentile(written, 95) / percentile(lateness, 95), 1)
         for name, screen in (("clock", ours), ("clock_off", off)):
             # the first second may go by the greeting's guess
             errors = np.abs(screen.clock_errors[60:])
-            figures[f"{name}_median_ms"] = round(_percentile(errors, 50), 2)
-            figures[f"{name}_p95_ms"] = round(_percentile(errors, 95), 2)
+            figures[f"{name}_median_ms"] = round(percentile(errors, 50), 2)
+            figures[f"{name}_p95_ms"] = round(percentile(errors, 95), 2)
 
     # briskly, so that a stage sends all its frames: of slower hands it sends every second one
     await bench.pulled(work, 5.0)
@@ -307,8 +204,8 @@ async def join(bench: Bench) -> Figures:
             await late.watch(4.0, picture)
             await seeing
             now = time.monotonic_ns() // 1000
-            figures["join_first_pose_ms_64k"] = _whole(late.figures.first_pose_ms or float("inf"))
-            figures["join_apart_mm_p95"] = round(_percentile(apart[60:], 95), 1)
+            figures["join_first_pose_ms_64k"] = whole(late.figures.first_pose_ms or float("inf"))
+            figures["join_apart_mm_p95"] = round(percentile(apart[60:], 95), 1)
             figures["join_clock_apart_ms"] = round(abs(late.clock.at(now) - quick.clock.at(now)) / 1e3, 2)
 
     await bench.pulled(work)
@@ -340,113 +237,6 @@ async def _counted(far: Far, after: float, into: list[int]) -> None:
     into.append(far.received)
 
 
-async def traces(bench: Bench, seconds: float, scaled: list[int]) -> Figures:
-    """Case traces, at these mean rates in bit/s."""
-    figures: Figures = {}
-    files = sorted(narrowlink_path().parent.glob("3Glogs_*.csv"))
-    async with Client(bench.url) as client:
-        motion = await client.motion(bench.motion)
-    costs = [rate["kbps"] for rate in motion["rates"]]
-    for mean in scaled:
-        rows = [_trace(file) for file in files]
-        links = [
-            Link(delay_ms=75, trace=str(file), scale=mean / _mean(row)) for file, row in zip(files, rows, strict=True)
-        ]
-        with bench.net.lines(links * 2) as fars:
-            screens = [
-                bench.dance(far, "?tracks=motion" if nth < len(links) else "?tracks=motion&rate=0")
-                for nth, far in enumerate(fars)
-            ]
-            await asyncio.gather(*(screen.look(seconds, frame=1 / 15) for screen in screens))
-        ours, lowest = screens[: len(links)], screens[len(links) :]
-        watched = seconds * 1e3 * len(links)
-        name = f"{mean / 1000:g}k".replace(".", "k")[:4].rstrip("k") + ("k" if mean % 1000 == 0 else "")
-        mine, theirs = (sum(_dark(screen, seconds) for screen in group) for group in (ours, lowest))
-        figures[f"traces_stalled_percent_{name}"] = round(100 * mine / watched, 3)
-        figures[f"traces_stalled_lowest_percent_{name}"] = round(100 * theirs / watched, 3)
-        best = [oracle(row, link.scale, costs, seconds) for row, link in zip(rows, links, strict=True)]
-        got = [screen.figures.shown_kbps for screen in ours]
-        figures[f"traces_shown_kbps_{name}"] = round(float(np.mean(got)), 2)
-        figures[f"traces_best_kbps_{name}"] = round(float(np.mean(best)), 2)
-        figures[f"traces_share_of_best_{name}"] = round(float(np.mean(got) / np.mean(best)), 3)
-    return figures
-
-
-def oracle(row: list[tuple[float, float]], scale: float, costs: list[float], seconds: float) -> float:
-    """The best constant rate, kbit/s, that one who knows the trace could send: a block a second from the beginning on
-    as fast as the line goes, as far ahead as he likes, in time but for what the lowest rate is late too. Heads are
-    counted as if each block were a packet of its own."""
-    ends = np.cumsum([ms / 1e3 for ms, _ in row])
-    grid = np.arange(0.0, seconds, 0.01)
-    rates = np.array([kbps for _, kbps in row])[
-        np.searchsorted(ends, grid % ends[-1], side="right").clip(0, len(row) - 1)
-    ]
-    carried = np.cumsum(np.maximum(rates * 1e3 * scale, 1.0)) * 0.01
-
-    def late(cost: float) -> float:
-        """Seconds that blocks come after they are due, the first block's wait included for all."""
-        bits = (np.arange(int(seconds)) + 1) * (cost * 1e3 + 60 * 8) + 8_000
-        came = np.searchsorted(carried, bits) * 0.01 + 0.5
-        shift, stalls = came[0], 0.0
-        for nth, at in enumerate(came):
-            wait = max(at - (shift + nth), 0.0)
-            stalls += wait
-            shift += wait
-        return stalls
-
-    least = late(costs[0])
-    return max(cost for cost in costs if late(cost) <= least + 0.001 * seconds)
-
-
-def _trace(file: Path) -> list[tuple[float, float]]:
-    with file.open() as opened:
-        return [(float(ms), float(kbps)) for ms, kbps, *_ in list(csv.reader(opened))[1:]]
-
-
-def _mean(row: list[tuple[float, float]]) -> float:
-    """Mean rate of a trace, bit/s."""
-    return sum(ms * kbps for ms, kbps in row) / sum(ms for ms, _ in row) * 1e3
-
-
-def _dark(screen: Screen, seconds: float) -> float:
-    """Milliseconds without a picture, from the beginning on."""
-    if not screen.shown:
-        return seconds * 1e3
-    return (screen.shown[0][0] - screen.begun) / 1e3 + screen.figures.dark_ms
-
-
-def _whole(value: float) -> int | None:
-    """To the nearest one; None for what did not come."""
-    return round(value) if np.isfinite(value) else None
-
-
-def _percentile(values: Any, share: float) -> float:
-    return float(np.percentile(values, share)) if len(values) else float("nan")
-
-
-async def _truth() -> float:
-    """The server's clock minus this machine's monotonic one, microseconds, over the loopback."""
-    url = f"ws://127.0.0.1:{PORT}"
-    async with Client(url.replace("ws", "http")) as client:
-        motion = (await client.motions())[0]["id"]
-    best = Sample(0.0, 1 << 60)
-    async with connect(
-        f"{url}/v1/motions/{motion}/stream",
-        subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
-        max_size=LARGEST_FROM_SERVER,
-    ) as connection:
-        for sequence in range(100):
-            sent = time.monotonic_ns() // 1000
-            await connection.send(Ping(sequence, sent).pack())
-            while not isinstance(pong := unpack(bytes(await connection.recv(decode=False))), Pong):
-                continue
-            arrived = time.monotonic_ns() // 1000
-            trip = (arrived - sent) - (pong.answered - pong.received)
-            if trip < best.trip:
-                best = Sample(((pong.received - sent) + (pong.answered - arrived)) / 2, trip)
-    return best.offset
-
-
 CASES = ("9k6", "28k8", "56k", "audio", "steps", "live", "clock", "join", "cut", "traces")
 
 
@@ -456,7 +246,7 @@ async def run(net: Network, only: set[str], seconds: float) -> Figures:
     async with Client(url) as client:
         motion = (await client.motions())[0]["id"]
     decode.warm()
-    bench = Bench(net, url, motion, await _truth())
+    bench = Bench(net, url, motion, await truth_of_the_clock())
     figures: Figures = {}
 
     async def case(names: set[str], made: Callable[[], Awaitable[Figures]]) -> None:
