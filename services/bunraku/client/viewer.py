@@ -7,7 +7,6 @@ import contextlib
 import socket
 import time
 from collections.abc import Callable
-from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 import numpy as np
@@ -16,12 +15,12 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from bunraku.client.figures import Figures
 from bunraku.codec import decode
-from bunraku.codec.audio import AudioTrack, Packet, read_audio
+from bunraku.codec.audio import AudioTrack, Packet
 from bunraku.codec.decode import decode_block
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.scene import SceneTrack, read_scene
+from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decode import decode_scene
-from bunraku.codec.track import MotionTrack, read_track
+from bunraku.codec.track import MotionTrack
 from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore, Pose, SceneStore
@@ -30,6 +29,7 @@ from bunraku.playout.delay import PlayoutDelay
 from bunraku.playout.held import MOST, Held
 from bunraku.playout.overlays import Overlays
 from bunraku.playout.sounds import AudioStore
+from bunraku.playout.tracks import Tracks
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
     SUBPROTOCOL,
@@ -85,16 +85,9 @@ class Viewer:
         self.figures = Figures()
         self.clock = ReferenceClock()
         self.timelines = timeline.Timelines()
-        self.track: MotionTrack | None = None
         self.presence: Presence | None = None
         self.motion: str | None = None
-        self.scenes: list[SceneTrack] = []
-        self._blocks: BlockStore | None = None
-        self._track_number = 0
-        self._scene_stores: dict[int, SceneStore] = {}
-        self._sound: AudioStore | None = None
-        self._sound_number = -1
-        self._told = 0
+        self._tracks: Tracks | None = None
         self._overlays = Overlays()
         self._delay = PlayoutDelay()
         self._early: list[float] = []
@@ -102,7 +95,6 @@ class Viewer:
         self._began = 0.0
         self._heard_at = 0.0
         self._lit = 0.0
-        self._rates: list[float] = []
 
     async def watch(
         self, seconds: float, on_frame: Callable[[int, Pose], None] | None = None, *, frame: float = FRAME
@@ -166,14 +158,14 @@ class Viewer:
     def _address(self) -> str:
         """Where to connect: after the first time with what is here already, and where a private timeline goes on."""
         state = self.timelines.newest
-        if state is None or self._blocks is None or self.motion is None:
+        if state is None or self._tracks is None or self.motion is None:
             return self.url
         now = self.clock.at(self._local())
         position = timeline.position_at(state, now)
-        track = self._blocks.track
+        track = self._tracks.dance.track
         first = track.block_at(position)
-        ahead = [self._blocks.rate((first + nth) % track.blocks) for nth in range(min(track.blocks, MOST))]
-        query = {"have": Held(self.motion, first, ahead, self._told).text()}
+        ahead = [self._tracks.dance.rate((first + nth) % track.blocks) for nth in range(min(track.blocks, MOST))]
+        query = {"have": Held(self.motion, first, ahead, self._tracks.told).text()}
         if "/sessions/" not in self.url:
             query |= {"at": f"{position / 1e6:.6f}", "clock": str(now)}
         parts = urlsplit(self.url)
@@ -191,6 +183,24 @@ class Viewer:
             raise
         return made
 
+    @property
+    def track(self) -> MotionTrack | None:
+        """The dance, None until it is told of."""
+        return self._blocks.track if self._blocks is not None else None
+
+    @property
+    def scenes(self) -> list[SceneTrack]:
+        """Cameras and lights that are told of."""
+        return [store.track for store in self._tracks.scenes] if self._tracks is not None else []
+
+    @property
+    def _blocks(self) -> BlockStore | None:
+        return self._tracks.dance if self._tracks is not None else None
+
+    @property
+    def _sound(self) -> AudioStore | None:
+        return self._tracks.sound if self._tracks is not None else None
+
     def pose_at(self, reference: int) -> Pose | None:
         """The merged pose at clock time `reference`, None where nothing is there to be shown."""
         state = self.timelines.at(reference)
@@ -205,9 +215,9 @@ class Viewer:
         """The seven numbers (7,) of the camera or light `scenes[scene]` at clock time `reference` (SPEC.md, Scene
         block), None where nothing is there to be shown."""
         state = self.timelines.at(reference)
-        if state is None or state.motion != self.motion or not 0 <= scene < len(self.scenes):
+        if state is None or self._tracks is None or state.motion != self.motion or not 0 <= scene < len(self.scenes):
             return None
-        store = list(self._scene_stores.values())[scene]
+        store = self._tracks.scenes[scene]
         return store.scene_at(timeline.position_at(state, reference), state.loop, state.duration)
 
     def camera_at(self, reference: int) -> Array | None:
@@ -287,61 +297,35 @@ class Viewer:
     def _describe(self, description: Description) -> None:
         """Take in the tracks that can be read here: the motion must, and of others what is not known is skipped."""
         first = description.first or 0
-        if description.motion == self.motion:
+        if description.motion == self.motion and self._tracks is not None:
             # what an id names never changes: the blocks that are here are good
-            self._add_tracks(first, description.tracks)
+            self._tracks.add(first, description.tracks)
             return
         if first:
             # the rest of one that was not told of
             return
-        numbers = [n for n, track in enumerate(description.tracks) if track.get("type") == "motion"]
-        if not numbers:
-            kinds = ", ".join(str(track.get("type")) for track in description.tracks) or "nothing"
-            raise StreamEnded(f"the stream has no motion track in it, only {kinds}: there is no dance to show")
         try:
-            self.track = read_track(description.tracks[numbers[0]])
+            self._tracks = Tracks(description.tracks)
         except DamagedBlock as error:
             raise StreamEnded(str(error)) from None
-        self.motion, self._track_number = description.motion, numbers[0]
-        self._blocks = BlockStore(self.track)
-        rates = description.tracks[numbers[0]].get("rates", [])
-        self._rates = [float(rate.get("kbps", 0.0)) for rate in rates]
-        self._scene_stores = {}
-        self._sound, self._sound_number = None, -1
-        self._told = 0
-        self._add_tracks(0, description.tracks)
-
-    def _add_tracks(self, first: int, described: list[dict[str, Any]]) -> None:
-        """Take in the tracks beside the motion from number `first` on that were not told of yet."""
-        assert self.track is not None
-        for number, track in enumerate(described, first):
-            if number < self._told:
-                continue
-            if track.get("type") in ("camera", "light"):
-                with contextlib.suppress(DamagedBlock):
-                    self._scene_stores[number] = SceneStore(read_scene(track))
-            elif track.get("type") == "audio" and self._sound is None:
-                with contextlib.suppress(DamagedBlock):
-                    self._sound, self._sound_number = AudioStore(read_audio(track, self.track)), number
-        self._told = max(self._told, first + len(described))
-        self.scenes = [store.track for store in self._scene_stores.values()]
+        self.motion = description.motion
 
     def _keep(self, data: Data) -> None:
         """Decode a block of a track that is known, and keep it."""
         began = time.perf_counter()
-        if data.track in self._scene_stores:
-            store = self._scene_stores[data.track]
+        store = self._tracks.store(data.track) if self._tracks is not None else None
+        if isinstance(store, SceneStore):
             store.put(data.index, data.rate, decode_scene(store.track, data.block))
             if store.track.kind == "camera":
                 self.figures.camera_blocks += 1
             else:
                 self.figures.light_blocks += 1
-        elif data.track == self._sound_number and self._sound is not None:
-            self._sound.keep(data.index, data.rate, data.block)
+        elif isinstance(store, AudioStore):
+            store.keep(data.index, data.rate, data.block)
             self.figures.audio_blocks += 1
             self.figures.audio_rate = data.rate
-        elif data.track == self._track_number and self._blocks is not None:
-            self._blocks.put(data.index, data.rate, decode_block(self._blocks.track, data.block))
+        elif isinstance(store, BlockStore):
+            store.put(data.index, data.rate, decode_block(store.track, data.block))
             self._decode = time.perf_counter() - began
             self.figures.blocks += 1
             self.figures.rate = data.rate
@@ -391,11 +375,11 @@ class Viewer:
     def _kbps_at(self, reference: int) -> float:
         """What the rate shown at `reference` costs, nothing where the block is missing."""
         state = self.timelines.at(reference)
-        if state is None or self._blocks is None:
+        if state is None or self._tracks is None:
             return 0.0
-        track = self._blocks.track
-        rate = self._blocks.rate(track.block_at(timeline.position_at(state, reference)))
-        return self._rates[rate] if 0 <= rate < len(self._rates) else 0.0
+        dance, kbps = self._tracks.dance, self._tracks.kbps
+        rate = dance.rate(dance.track.block_at(timeline.position_at(state, reference)))
+        return kbps[rate] if 0 <= rate < len(kbps) else 0.0
 
     def _settled(self) -> Figures:
         figures = self.figures
