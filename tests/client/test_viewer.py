@@ -5,6 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from websockets.asyncio.client import connect
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.typing import Subprotocol
 
 from bunraku.backing.library import Library, pack, with_audio
 from bunraku.backing.library import unpack as unpack_motion
@@ -14,11 +17,13 @@ from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.motion.skeleton import points
 from bunraku.playout.blocks import Pose
-from bunraku.wire.messages import Data, Description, TimelineState
+from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
 from tests.servers import running
 from tests.sounds import click, decode, onset
 from tests.vectors.blocks import wandering_motion
 from tests.vectors.scene import camera, light
+
+PROTOCOL = Subprotocol(SUBPROTOCOL)
 
 
 async def test_it_shows_the_dance_that_was_uploaded(server: str, tmp_path: Path) -> None:
@@ -160,3 +165,48 @@ def test_a_stream_without_a_dance_says_so() -> None:
         told([])
     with pytest.raises(StreamEnded, match=r"bunraku\.motion/9"):
         told([{"type": "motion", "codec": "bunraku.motion/9"}])
+
+
+async def test_who_is_told_to_come_again_does(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        motion = (await client.upload(clip_file))["id"]
+        behind = client.socket_url(f"/v1/motions/{motion}/stream")
+        came, cut = 0, asyncio.Event()
+
+        async def door(viewer: ServerConnection) -> None:
+            nonlocal came
+            came += 1
+            if came == 2:
+                await viewer.send(Problem("Not now", "the bus does not answer; come again").pack())
+                await viewer.close(1013, "Not now")
+                return
+            query = viewer.request.path.partition("?")[2] if viewer.request else ""
+            async with connect(f"{behind}?{query}", subprotocols=[PROTOCOL], compression=None) as line:
+
+                async def there() -> None:
+                    async for said in viewer:
+                        await line.send(said)
+
+                async def back() -> None:
+                    async for said in line:
+                        await viewer.send(said)
+
+                ways = [asyncio.create_task(way) for way in (there(), back(), cut.wait())]
+                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+                for way in ways:
+                    way.cancel()
+            cut.clear()
+            await viewer.close(1012, "the server ends")
+
+        async with serve(door, "127.0.0.1", 0, subprotocols=[PROTOCOL], compression=None) as opened:
+            port = next(iter(opened.sockets)).getsockname()[1]
+            viewer = Viewer(f"ws://127.0.0.1:{port}/")
+            shown = asyncio.Event()
+            watching = asyncio.create_task(viewer.watch(4.0, lambda _, __: shown.set()))
+            async with asyncio.timeout(30):
+                await shown.wait()
+            cut.set()
+            figures = await watching
+    assert came == 3
+    assert figures.reconnects == 2
+    assert figures.gaps == 0

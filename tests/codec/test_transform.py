@@ -35,3 +35,15 @@ def test_fewer_coefficients_are_a_smoother_track() -> None:
     track = np.random.default_rng(0).normal(size=(30, 1))
     cut = transform.inverse(transform.forward(track)[:, :8], 30, np.arange(30, dtype=np.float64))
     assert np.abs(np.diff(cut, axis=0)).sum() < np.abs(np.diff(track, axis=0)).sum()
+
+
+@given(st.integers(0, 40), st.integers(1, 20), st.integers(2, 60), st.integers(0, 1 << 30))
+def test_an_instant_is_the_same_to_the_last_bit_whatever_others_are_asked_for_with_it(
+    begin: int, count: int, frames: int, seed: int
+) -> None:
+    values = np.random.default_rng(seed).normal(size=(19, 3, min(frames, 30)))
+    instants = np.linspace(0.0, frames - 1.0, 60)
+    whole = transform.inverse(values, frames, instants)
+    np.testing.assert_array_equal(
+        transform.inverse(values, frames, instants[begin : begin + count]), whole[begin : begin + count]
+    )

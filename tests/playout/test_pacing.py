@@ -13,6 +13,7 @@ from bunraku.playout.pacing import (
     MARGIN,
     NET,
     NET_AHEAD,
+    SAFE,
     SOON,
     UPGRADE,
     Due,
@@ -221,6 +222,8 @@ def test_a_net_goes_before_what_is_not_shown_at_once_and_is_filled_again_in_one_
     last = sent.index((max(net), 0))
     bettered = [LONG.start_us(index) for index, rate in sent[:last] if rate == 4]
     assert max(bettered) <= JUST
+    first = sent.index((0, 4)) if (0, 4) in sent else sent.index((1, 4))
+    assert max(LONG.start_us(index) for index, _ in sent[:first]) > SAFE - 2 * SECOND
     assert max(LONG.start_us(index) for index, rate in sent if rate == 4) <= NET_AHEAD
     # it is left until it reaches less far than it should, and then filled up
     fills = []
@@ -232,6 +235,18 @@ def test_a_net_goes_before_what_is_not_shown_at_once_and_is_filled_again_in_one_
             fills.append(low)
     assert min(fills) >= 9
     assert len(fills) <= 3
+
+
+@given(st.integers(0, 59 * SECOND), st.integers(1, 4))
+def test_until_something_may_be_bettered_the_net_alone_is_sent(position: int, rate: int) -> None:
+    state = start("m", 60 * SECOND, 0, position=position)
+    pacer = Pacer([Paced(0, LONG, 5, True)])
+    sent = list(iter(lambda: pacer.next(state, 0, rate, net=True, better=False), None))
+    assert {due.rate for due in sent} == {0}
+    assert len({due.index for due in sent}) == len(sent) >= NET // SECOND
+    better = list(iter(lambda: pacer.next(state, 0, rate, net=True), None))
+    assert better
+    assert all(due.better and due.rate == rate for due in better)
 
 
 @given(st.integers(0, 59 * SECOND), st.integers(1, 4))

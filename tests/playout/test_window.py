@@ -138,6 +138,18 @@ def test_what_nobody_looked_out_for_says_nothing() -> None:
     assert not window.narrow(5 * SECOND)
 
 
+def test_what_has_come_is_told_by_its_bytes() -> None:
+    window = Window()
+    assert window.came(0)
+    for _ in range(3):
+        window.wrote(0, 100)
+    assert [window.came(written) for written in (0, 99, 100)] == [True, True, False]
+    window.acknowledged(50_000, 150)
+    assert [window.came(written) for written in (100, 199, 200)] == [True, True, False]
+    window.acknowledged(60_000, 0)
+    assert window.came(300)
+
+
 def test_what_was_written_besides_is_waited_for_but_not_counted() -> None:
     window = Window()
     window.wrote(0, 1_000)

@@ -4,70 +4,31 @@ from __future__ import annotations
 
 import random
 
-import numpy as np
 import pytest
 
 from bunraku.backing.backing import clock
 from bunraku.backing.frames import frame
-from bunraku.backing.library import StoredMotion, pack, unpack, with_audio
-from bunraku.codec.encode import encode_motion
-from bunraku.codec.scene_encode import encode_scene
-from bunraku.ingest.opus import encode_audio
+from bunraku.backing.library import StoredMotion
 from bunraku.playout import timeline
 from bunraku.stream import viewers
-from bunraku.stream.cohorts import Cohorts
-from bunraku.stream.plans import Plans
-from bunraku.stream.turns import Turns
-from bunraku.stream.viewers import Viewer
-from bunraku.wire.messages import Data, Presence, Report, TimelineState
-from tests.stream.lines import Line
-from tests.vectors.blocks import wandering_motion
-from tests.vectors.scene import camera
+from bunraku.wire.messages import Presence, Report
+from tests.stream.watching import Audience, Watched, filmed
 
 SECOND = 1_000_000
 
 
 @pytest.fixture(scope="module")
 def motion() -> StoredMotion:
-    encoded = encode_motion(wandering_motion(20.3, 30.0, 9), ladder=(30.0, 5.0), grade="live")
-    filmed = unpack("m", pack("m", encoded, [encode_scene(camera(17.1, 25.0), ladder=(20.0, 4.0))]))
-    noise = np.random.default_rng(2).normal(0, 0.2, (900_000, 1)).astype(np.float32)
-    return unpack("m", with_audio("m", filmed, encode_audio([noise], filmed.track, 1))[0])
+    return filmed(20.3, 17.1, 18.75)
 
 
-class Audience:
-    """Some who watch a session; without cohorts each goes on alone."""
-
-    def __init__(self) -> None:
-        self.plans = Plans()
-        self.cohorts = Cohorts(self.plans)
-        self.left: list[Viewer] = []
-
-    def turned(self) -> None: ...
-
-    def leave(self, viewer: Viewer) -> None:
-        self.left.append(viewer)
-
-
-class Watched:
-    """One viewer, its turns taken by the test."""
-
-    def __init__(self, motion: StoredMotion, state: TimelineState, audience: Audience | None) -> None:
-        self.viewer, self.line = Viewer(Turns()), Line()
-        self.viewer.audience = audience
-        self.viewer.timeline(state, motion)
-        self.viewer.open(self.line.outlet(self.viewer))
-
-    def sent(self) -> list[tuple[int, int, int]]:
-        return sorted((m.track, m.index, m.rate) for m in self.line.messages if isinstance(m, Data))
-
-    def turn(self, now: int) -> None:
-        """Its own turn, where it has one."""
-        self.viewer.outlet.heard = now
-        while (due := self.viewer._next_turn()) <= now and due < now + 8 * SECOND:
-            self.viewer.advance()
-            if self.viewer._next_turn() <= due:
-                return
+def turn(one: Watched, now: int) -> None:
+    """Its own turn, where it has one."""
+    one.viewer.outlet.heard = now
+    while (due := one.viewer._next_turn()) <= now and due < now + 8 * SECOND:
+        one.viewer.advance()
+        if one.viewer._next_turn() <= due:
+            return
 
 
 def turns(audience: Audience, now: int) -> None:
@@ -106,9 +67,9 @@ async def test_each_is_sent_what_it_would_be_sent_alone(
                     one.viewer.hear(Report(buffer=3_000_000, hidden=step == 20).pack())
                 if step in (20, 25, 120):
                     one.viewer.advance()
-                one.turn(now[0])
+                turn(one, now[0])
         turns(audience, now[0])
-        together += sum(one.viewer._cohort is not None for one, _ in pairs)
+        together += sum(one.viewer._in_step.cohort is not None for one, _ in pairs)
         for one, alone in pairs:
             assert one.sent() == alone.sent()
     assert together > 300
@@ -136,7 +97,7 @@ async def test_who_leaves_has_what_it_was_sent_and_a_cohort_ends_with_its_last(
     assert not list(audience.cohorts)
     one.line.drain()
     assert one.sent() == sent
-    assert [one.viewer._cohort] == list(audience.cohorts)
+    assert [one.viewer._in_step.cohort] == list(audience.cohorts)
     one.viewer.gone()
     assert not list(audience.cohorts)
     assert audience.left == [one.viewer]
@@ -157,7 +118,7 @@ async def test_one_who_comes_between_two_instants_is_sent_the_next_and_not_the_l
     now[0] = cohort.following + 1_000
     monkeypatch.setattr(random, "randrange", lambda _: one.viewer._phase)
     two = Watched(motion, state, audience)
-    assert [one.viewer._cohort, two.viewer._cohort] == [cohort, cohort]
+    assert [one.viewer._in_step.cohort, two.viewer._in_step.cohort] == [cohort, cohort]
     for _ in range(3):
         cohort.advance()
     assert len(two.sent()) == len(set(two.sent()))

@@ -35,8 +35,8 @@ class NarrowLine(Line):
 
     def __init__(self, now: Callable[[], int], rate: float, delay: int) -> None:
         super().__init__()
-        self.now, self.delay = now, delay
-        self.line = VirtualLine(lambda _: rate, delay)
+        self.now, self.delay, self.rate = now, delay, rate
+        self.line = VirtualLine(lambda _: self.rate, delay)
         self.came: list[tuple[int, float, bytes]] = []
         self.held: list[bool] = []
         self.reads = 0
@@ -49,6 +49,11 @@ class NarrowLine(Line):
     def read(self) -> Reading:
         self.reads += 1
         return Reading(self.line.waiting(self.now()), 2 * self.delay, 2 * self.delay, len(self.sent))
+
+    def asking(self, _: int) -> bytes:
+        return b""
+
+    def echoed(self, payload: bytes) -> None: ...
 
     def hold(self, held: bool) -> None:
         self.held.append(held)
@@ -139,6 +144,32 @@ async def test_each_overlay_that_leaves_is_the_newest_and_comes_soon(
     # a narrow line gets the last frame alone
     assert not overlays[-1][2].earlier
     assert any(written > watching.began + 8_000_000 for written, _, _ in watching.of(Data))
+    watching.viewer.gone()
+
+
+async def test_while_a_line_turns_out_slower_no_word_on_the_rate_takes_room_from_overlays(
+    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watching = Watching(motion, monkeypatch, 7_000.0)
+    watching.go(4_000_000)
+    number, slowing, told = 0, 0, len(watching.of(Choice))
+    while watching.at < watching.began + 14_000_000:
+        if watching.at > watching.began + 9_000_000:
+            watching.line.rate = 1_800.0
+        number += 1
+        if watching.viewer._flow.slowing and watching.viewer._playing is not None:
+            # as if another rate had been chosen
+            watching.viewer._playing.unsaid, watching.viewer._playing._told = True, None
+        watching.viewer.overlay(frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
+        for _ in range(7):
+            slower = watching.viewer._flow.slowing
+            watching.go(5_000)
+            # what waits is more than should, so the newest overlay has the room
+            assert not (slower and watching.viewer._flow.slowing and len(watching.of(Choice)) > told)
+            slowing += slower
+            told = len(watching.of(Choice))
+    assert slowing > 20
+    assert any(written > watching.began + 9_000_000 for written, _, _ in watching.of(Choice))
     watching.viewer.gone()
 
 

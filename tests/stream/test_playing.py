@@ -13,11 +13,13 @@ from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.playout.held import Held
+from bunraku.playout.pacing import SAFE
 from bunraku.stream.flow import Flow
 from bunraku.stream.playing import Playing
 from bunraku.stream.tracks import TRACKS
 from bunraku.wire.messages import Choice, Data, Description, Report
 from bunraku.wire.messages import unpack as unpack_message
+from tests.stream.sender import Sender
 from tests.vectors.blocks import wandering_motion
 from tests.vectors.scene import camera
 
@@ -127,6 +129,25 @@ def test_who_comes_back_is_told_of_the_tracks_that_it_was_not_told_of() -> None:
         assert {part.track for part in found if isinstance(part, Data)} == {1}
 
 
+def test_over_a_far_line_nothing_is_bettered_before_the_net_has_come() -> None:
+    motion = unpack("m", pack("m", encode_motion(wandering_motion(40.0, 10.0, 9), ladder=(30.0, 5.0), grade="live")))
+    state = timeline.start("m", motion.track.duration_us, 0)
+    sender = Sender(7_000.0, 75_000)
+    playing = Playing(motion, TRACKS, 1)
+    came: list[int] = []
+    while not came:
+        sender.at += 5_000
+        assert sender.at < 4_000_000
+        while sender.flow.room() and (packet := playing.next_packet(state, sender.at, sender.flow, 0)) is not None:
+            if Data.unpack(packet).rate == 1:
+                came.append(sender.written - sender.line.waiting(sender.at))
+            sender.write(len(packet))
+    # the net begins where the dance is by then
+    assert sender.at > 1_000_000
+    net = motion.packets[0][0][: (SAFE + 1_000_000) // 1_000_000 + 1]
+    assert came[0] >= sum(map(len, net))
+
+
 def test_a_line_too_narrow_for_sound_gets_a_better_motion() -> None:
     encoded = encode_motion(wandering_motion(4.0, 30.0, 9), ladder=(60.0, 20.0, 8.0), grade="live")
     dance = unpack("m", pack("m", encoded))
@@ -136,7 +157,9 @@ def test_a_line_too_narrow_for_sound_gets_a_better_motion() -> None:
 
     def chosen(bps: float) -> tuple[int, int]:
         playing = Playing(motion, TRACKS, None)
-        carrying = SimpleNamespace(narrow=True, carries=bps / 8, unknown=False, far=True, blocks_turn=lambda: True)
+        carrying = SimpleNamespace(
+            narrow=True, net_came=True, carries=bps / 8, unknown=False, far=True, blocks_turn=lambda: True
+        )
         playing.next_packet(state, 0, cast(Flow, carrying), -10_000_000)
         return playing.step.motion, playing.step.audio
 

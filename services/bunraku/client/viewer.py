@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import socket
 import time
 from collections.abc import Callable
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 import numpy as np
-from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed, WebSocketException
 
+from bunraku.client.api import authorization
+from bunraku.client.asking import Asking
 from bunraku.client.figures import Figures
+from bunraku.client.line import SILENT, Line, StreamEnded
 from bunraku.codec import decode
 from bunraku.codec.audio import AudioTrack, Packet
 from bunraku.codec.decode import decode_block
@@ -31,14 +31,11 @@ from bunraku.playout.overlays import Overlays
 from bunraku.playout.sounds import AudioStore
 from bunraku.playout.tracks import Tracks
 from bunraku.wire.messages import (
-    LARGEST_FROM_SERVER,
-    SUBPROTOCOL,
     ChannelHeader,
     Choice,
     Data,
     Description,
     Overlay,
-    Ping,
     Pong,
     Presence,
     Problem,
@@ -48,40 +45,34 @@ from bunraku.wire.messages import (
 )
 
 FRAME = 1 / 60
-BURST = 8
-SILENT = 4.0
-"""Seconds without a word after which a line counts as lost: the time is asked every second."""
-ANSWER = 3.0
-"""Seconds that a new connection may take before another is tried."""
-AGAIN = 0.5
-"""Seconds from one try to the next."""
-
-
-class StreamEnded(Exception):
-    """The server closed the stream; the text says why."""
-
-
-class LineLost(StreamEnded):
-    """The line broke, or the server was too busy: it may be tried again."""
 
 
 class Viewer:
-    """One viewer of a stream at a WebSocket `url` (`.../stream`).
+    """One viewer of a stream at a WebSocket `url` (`.../stream`), which a `token` lets in if its server asks for one.
 
-    `now` is the local clock in microseconds; `open_socket` makes the unconnected, non-blocking socket of a connection
-    where the machine's own way is not the one meant.
+    `now` is the local clock in microseconds; `silent` and `open_socket` are as of `bunraku.client.line.Line`.
     """
 
     def __init__(
         self,
         url: str,
         *,
+        token: str | None = None,
         now: Callable[[], int] | None = None,
+        silent: float = SILENT,
         open_socket: Callable[[], socket.socket] | None = None,
     ) -> None:
         self.url = url
         self._local = now or _local
-        self._open_socket = open_socket
+        self._line = Line(
+            self._address,
+            self._opened,
+            self._heard,
+            silent=silent,
+            open_socket=open_socket,
+            headers=authorization(token),
+        )
+        self._asking = Asking(self._line.send, self._local, self._fares)
         self.figures = Figures()
         self.clock = ReferenceClock()
         self.timelines = timeline.Timelines()
@@ -93,7 +84,6 @@ class Viewer:
         self._early: list[float] = []
         self._decode = 0.0
         self._began = 0.0
-        self._heard_at = 0.0
         self._lit = 0.0
 
     async def watch(
@@ -107,53 +97,27 @@ class Viewer:
         """
         await asyncio.to_thread(decode.warm)
         self._began = time.monotonic()
-        showing = asyncio.create_task(self._show(seconds, on_frame, frame))
+        work = (self._show(seconds, on_frame, frame), self._line.run(), self._asking.run())
+        tasks = [asyncio.create_task(way) for way in work]
         try:
-            while not showing.done():
-                await self._converse(showing)
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            showing.cancel()
-            await asyncio.gather(showing, return_exceptions=True)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+        for task in done:
+            task.result()
         return self._settled()
 
-    async def _converse(self, showing: asyncio.Task[None]) -> None:
-        """One connection, until the show or the line is over; a line that is lost after something was shown ends
-        quietly, and the next connection goes on where it was."""
-        resumed = self.figures.first_pose_ms is not None
-        tasks = [showing]
-        try:
-            async with (
-                asyncio.timeout(ANSWER if resumed else None) as opening,
-                connect(
-                    self._address(),
-                    sock=await self._connected(),
-                    subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
-                    compression=None,
-                    max_size=LARGEST_FROM_SERVER,
-                    open_timeout=10,
-                    close_timeout=0.5 if resumed else 2,
-                    ping_interval=None,
-                ) as connection,
-            ):
-                opening.reschedule(None)
-                self.clock.restart()
-                self.timelines.restart()
-                self._heard_at = time.monotonic()
-                work = (self._receive(connection), self._ask_time(connection), self._watch_line())
-                tasks += [asyncio.create_task(way) for way in work]
-                try:
-                    done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-                finally:
-                    for task in tasks[1:]:
-                        task.cancel()
-                    await asyncio.gather(*tasks[1:], return_exceptions=True)
-                for task in done:
-                    task.result()
-        except (LineLost, OSError, TimeoutError, WebSocketException):
-            if self.figures.first_pose_ms is None:
-                raise
-            self.figures.reconnects += 1
-            await asyncio.wait((showing,), timeout=AGAIN)
+    def _opened(self) -> None:
+        """There is a line, or another one."""
+        self.clock.restart()
+        self.timelines.restart()
+        self._asking.begin()
+
+    def _heard(self, data: bytes) -> None:
+        self.figures.bytes += len(data)
+        self._take(data)
 
     def _address(self) -> str:
         """Where to connect: after the first time with what is here already, and where a private timeline goes on."""
@@ -171,17 +135,6 @@ class Viewer:
         parts = urlsplit(self.url)
         kept = [(key, value) for key, value in parse_qsl(parts.query) if key not in query]
         return parts._replace(query=urlencode([*kept, *query.items()])).geturl()
-
-    async def _connected(self) -> socket.socket | None:
-        if self._open_socket is None:
-            return None
-        made, parts = self._open_socket(), urlsplit(self.url)
-        try:
-            await asyncio.get_running_loop().sock_connect(made, (parts.hostname, parts.port or 80))
-        except BaseException:
-            made.close()
-            raise
-        return made
 
     @property
     def track(self) -> MotionTrack | None:
@@ -245,27 +198,6 @@ class Viewer:
             return []
         return self._sound.packets_from(timeline.position_at(state, reference))
 
-    async def _receive(self, connection: ClientConnection) -> None:
-        try:
-            async for data in connection:
-                self._heard_at = time.monotonic()
-                if isinstance(data, bytes):
-                    self.figures.bytes += len(data)
-                    self._take(data)
-        except ConnectionClosed:
-            pass
-        if connection.close_code in (None, 1001, 1006, 1011, 1012, 1013):
-            raise LineLost(f"the line to the server was lost ({connection.close_code})")
-        raise StreamEnded(connection.close_reason or f"the server closed the stream ({connection.close_code})")
-
-    async def _watch_line(self) -> None:
-        """Ends a connection over which nothing was heard for long, though the time was asked."""
-        quiet = 0.0
-        while quiet < SILENT:
-            await asyncio.sleep(SILENT - quiet)
-            quiet = time.monotonic() - self._heard_at
-        raise LineLost(f"nothing was heard for {SILENT:g} s")
-
     def _take(self, data: bytes) -> None:
         message = unpack(data)
         if isinstance(message, Data):
@@ -281,6 +213,7 @@ class Viewer:
             self._overlays.put(message)
         elif isinstance(message, Pong):
             self.clock.pong(message.sent, message.received, message.answered, self._local())
+            self._asking.answered(message.sequence)
         elif isinstance(message, TimelineState):
             self.timelines.put(message)
         elif isinstance(message, ChannelHeader):
@@ -292,7 +225,8 @@ class Viewer:
         elif isinstance(message, Choice):
             self.figures.reason = message.reason
         elif isinstance(message, Problem):
-            raise StreamEnded(f"{message.title}: {message.detail}")
+            # the close that follows says whether to come again
+            self._line.reason = f"{message.title}: {message.detail}"
 
     def _describe(self, description: Description) -> None:
         """Take in the tracks that can be read here: the motion must, and of others what is not known is skipped."""
@@ -330,16 +264,12 @@ class Viewer:
             self.figures.blocks += 1
             self.figures.rate = data.rate
 
-    async def _ask_time(self, connection: ClientConnection) -> None:
-        for sequence in range(1 << 32):
-            with contextlib.suppress(ConnectionClosed):
-                await connection.send(Ping(sequence, self._local()).pack())
-                state = self.timelines.at(self.clock.at(self._local()))
-                if sequence >= BURST and state is not None and self._blocks is not None:
-                    position = timeline.position_at(state, self.clock.at(self._local()))
-                    ahead = self._blocks.ahead(position, state.loop)
-                    await connection.send(Report(ahead, round(self._decode * 1e6)).pack())
-            await asyncio.sleep(0.06 if sequence < BURST else 1.0)
+    def _fares(self) -> Report | None:
+        state = self.timelines.at(self.clock.at(self._local()))
+        if state is None or self._blocks is None:
+            return None
+        position = timeline.position_at(state, self.clock.at(self._local()))
+        return Report(self._blocks.ahead(position, state.loop), round(self._decode * 1e6))
 
     async def _show(self, seconds: float, on_frame: Callable[[int, Pose], None] | None, frame: float) -> None:
         loop = asyncio.get_running_loop()
@@ -384,6 +314,7 @@ class Viewer:
     def _settled(self) -> Figures:
         figures = self.figures
         figures.seconds = time.monotonic() - self._began
+        figures.reconnects = self._line.renewed
         figures.kbps = figures.bytes * 8e-3 / figures.seconds
         figures.clock_offset_ms = self.clock.offset / 1e3 - (time.time_ns() // 1000 - self._local()) / 1e3
         figures.clock_error_ms = self.clock.error / 1e3 if self.clock.ready else None

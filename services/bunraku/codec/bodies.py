@@ -128,17 +128,31 @@ def reconstructed(q: int) -> float:
 
 
 @njit(cache=True)
+def spectrum(basis: Array, v: Array) -> Array:
+    """The coefficients (K, 3) of values `v` (n, 3) over the rows of `basis` (K, n). Written out, as numba's own product
+    of matrices asks for SciPy."""
+    found = np.zeros((basis.shape[0], 3))
+    for k in range(basis.shape[0]):
+        for t in range(basis.shape[1]):
+            for x in range(3):
+                found[k, x] += basis[k, t] * v[t, x]
+    return found
+
+
+@njit(cache=True)
 def values(q: Integers, channel: int, size: float, unweight: Array, basis: Array) -> Array:
     """The values (n, 3) of a channel with coefficients `q` (19, 3, K) at steps of `size`, over the rows of `basis`
     (K, n)."""
-    count = basis.shape[0]
-    coefficients = np.zeros((count, 3))
-    v = np.zeros(3)
-    for k in range(count):
+    found = np.zeros((basis.shape[1], 3))
+    v, coefficient = np.zeros(3), np.zeros(3)
+    for k in range(basis.shape[0]):
         for axis in range(3):
             v[axis] = reconstructed(q[channel, axis, k]) * size
-        transform(unweight, v, coefficients[k])
-    return basis.T @ coefficients
+        transform(unweight, v, coefficient)
+        for t in range(basis.shape[1]):
+            for x in range(3):
+                found[t, x] += basis[k, t] * coefficient[x]
+    return found
 
 
 @njit(cache=True)

@@ -21,6 +21,7 @@ from bunraku.codec.bodies import (
     place_children,
     reconstructed,
     rotate,
+    spectrum,
     transform,
     turn,
     values,
@@ -136,7 +137,7 @@ def first_pass(
     weighted = np.zeros((frames, 3))
     for t in range(frames):
         transform(body.weight[0], true_points[0, t], weighted[t])
-    _choose(prior, costs, seen, q, 0, basis @ weighted, size, step, length)
+    _choose(prior, costs, seen, q, 0, spectrum(basis, weighted), size, step, length)
     points[0] = values(q, 0, size, body.unweight[0], basis)
     aimed, v, before, off = np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(3)
     for joint in range(18):
@@ -158,7 +159,7 @@ def first_pass(
                     v[x] += v[x] / angle * whole
             before[:] = v
             transform(body.weight[joint + 1], v, weighted[t])
-        _choose(prior, costs, seen, q, joint + 1, basis @ weighted, size, step, length)
+        _choose(prior, costs, seen, q, joint + 1, spectrum(basis, weighted), size, step, length)
         turn(body, joint, values(q, joint + 1, size, body.unweight[joint + 1], basis), orientation)
         place_children(body, joint, orientation, points)
     return points

@@ -132,7 +132,10 @@ def _descend(
             if q[channel, x, k] != 0:
                 reach = max(reach, k + 1)
     reach = min(used, reach + _MORE)
-    gradient = basis[:reach] @ slope
+    gradient = np.zeros(reach)
+    for k in range(reach):
+        for t in range(frames):
+            gradient[k] += basis[k, t] * slope[t]
     moved = False
     change[:] = 0
     for k in range(reach):

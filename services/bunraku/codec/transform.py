@@ -6,6 +6,8 @@ s_k = sqrt(2/n). It is a function of continuous time, so a viewer draws at its o
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from bunraku.motion.rotation import Array
@@ -30,6 +32,10 @@ def forward(track: Array) -> Array:
 
 
 def inverse(coefficients: Array, frames: int, instants: Array) -> Array:
-    """Tracks (m, ...) at `instants` (m,), in frames, of coefficients (..., count) of a block of `frames` frames."""
-    track: Array = np.tensordot(basis(frames, coefficients.shape[-1], instants), coefficients, (1, -1))
-    return track
+    """Tracks (m, ...) at `instants` (m,), in frames, of coefficients (..., count) of a block of `frames` frames; each
+    to the last bit the same, whatever other instants are asked for with it: a log replays to what was shown."""
+    *shape, count = coefficients.shape
+    flat = np.ascontiguousarray(coefficients.reshape(math.prod(shape), count))
+    # not by BLAS, whose sums depend on how many there are
+    tracks: Array = np.einsum("mk,ck->mc", basis(frames, count, instants), flat)
+    return tracks.reshape(len(instants), *shape)

@@ -28,7 +28,9 @@ AFTER = 3_000_000
 NET_AHEAD = 10_000_000
 """As `AHEAD`, for better versions where a net is kept: such a line may stand for seconds."""
 SOON = 8_000_000
-"""What is shown within this goes before the rest of the net, microseconds."""
+"""What is shown within this goes though overlays share the line, microseconds."""
+SAFE = 15_000_000
+"""Nothing is bettered before the net reaches this far, microseconds."""
 JUST = 2_000_000
 """What is shown within this is bettered before the rest of the net, microseconds."""
 NET = 30_000_000
@@ -104,39 +106,30 @@ class Pacer:
         *,
         net: bool = False,
         spare: bool = True,
+        better: bool = True,
     ) -> Due | None:
         """The block to send now, None when enough is on its way.
 
         A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has, and
         `audio` that of sound where it is another, -1 for none of it. `net` says that one is kept, as over a narrow
-        line; sound is in none. Without `spare` room only what is missing soon is sent.
+        line; sound is in none. Without `spare` room only what is missing soon is sent, and without `better` nothing
+        that a viewer has at another rate.
         """
         position = position_at(state, clock)
         rates = ((track, track.wanted(rate, audio)) for track in self.tracks)
         found = [
             due
             for track, wanted in rates
-            if wanted >= 0 and (due := self._due(track, state, position, wanted, net)) is not None
+            if wanted >= 0 and (due := self._due(track, state, position, wanted, net, better)) is not None
         ]
         if not found:
             self._filling = False
             return None
         due = min(found)
-        if not spare and (due.far or due.better):
+        if not spare and (due.far or due.better or (net and due.distance > SOON)):
             return None
         self._sent[due.track, due.index] = due.rate
         return due
-
-    def follow(self, dues: Sequence[Due]) -> bool | None:
-        """Take `dues`, the `arrivals` for one who has been sent all before them, as sent: True. False where all of them
-        had been sent before, None where some had: then `next` tells. For those without a net."""
-        sent = [self._sent.get((due.track, due.index)) for due in dues]
-        if all(rate is None for rate in sent):
-            self._sent.update({(due.track, due.index): due.rate for due in dues})
-            return True
-        if all(rate is not None and rate >= due.rate for rate, due in zip(sent, dues, strict=True)):
-            return False
-        return None
 
     def fresh(self, state: TimelineState, clock: int) -> int:
         """Microseconds for which nothing comes within reach that was sent before, for those without a net: at most as
@@ -163,7 +156,7 @@ class Pacer:
         reach = (position_at(state, clock) + (NET_AHEAD if net else AHEAD)) % state.duration
         return min(_following(track.timing, reach, state.duration) for track in self.tracks) - reach + MARGIN
 
-    def _due(self, track: Paced, state: TimelineState, position: int, rate: int, net: bool) -> Due | None:
+    def _due(self, track: Paced, state: TimelineState, position: int, rate: int, net: bool, better: bool) -> Due | None:
         """What is to be sent first of one track."""
         timing, rate = track.timing, min(rate, track.rates - 1)
         # a track may be shorter or longer than the motion, and turns with it
@@ -184,7 +177,7 @@ class Pacer:
             if after and sent is None and state.playing and distance == 0:
                 # sound that would come after it has begun
                 continue
-            far = net and distance > (SOON if sent is None else JUST)
+            far = net and distance > (SAFE if sent is None else JUST)
             if sent is None:
                 if far and distance <= REFILL:
                     self._filling = True
@@ -193,7 +186,7 @@ class Pacer:
                     found.append(Due(far, False, distance + after, place, track.number, index, 0 if low else rate))
                 if not far:
                     break
-            elif sent < rate and soonest < distance <= ahead:
+            elif better and sent < rate and soonest < distance <= ahead:
                 found.append(Due(far, True, distance + after, place, track.number, index, rate))
         return min(found, default=None)
 

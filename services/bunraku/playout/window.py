@@ -29,7 +29,7 @@ QUEUED = 220
 """Bytes that are to wait in the line's queue: a message or two,"""
 QUEUED_TIME = 40_000
 """but no more than leave in this time, microseconds,"""
-QUEUED_LEAST = 100.0
+QUEUED_LEAST = 75.0
 """or than this."""
 LEAST = 1_600
 """The window before anything is known: a first block, its Description, and some more."""
@@ -47,8 +47,10 @@ WEIGHT = 0.3
 """Of the newest in the mean of the line's rate."""
 SLOWED = 0.6
 """A line that seems to carry less than this share of what it did has become slower,"""
-SLOWED_WEIGHT = 0.5
+SLOWED_WEIGHT = 0.8
 """and the newest weighs more."""
+SLOWING = 400_000
+"""So long after it was last later than thought a line's queue may be too full, microseconds."""
 FULL = 2_000_000
 """So long after its queue was seen filled what a line carries is known."""
 PROBE = 2.0
@@ -90,6 +92,7 @@ class Window:
         self._quickest = 0.0
         self.full_at: int | None = None
         """When the line's queue was last seen to be filled."""
+        self._slowed_at: int | None = None
         self._written = 0
         self._line_written = 0
         self._line_acknowledged = 0
@@ -158,6 +161,10 @@ class Window:
         """Bytes that were written."""
         return self._written
 
+    def came(self, written: int) -> bool:
+        """Whether the first `written` bytes are acknowledged."""
+        return not self._flying or self._flying[0].end > written
+
     def passed(self, size: int) -> None:
         """`size` bytes were written besides; they are not counted among those on their way."""
         self._written += size
@@ -180,12 +187,15 @@ class Window:
         took = max(at - newest.at, 1)
         self.base = min(time for time in (self.base, least, took) if time)
         if self.rate:
-            self._correct(at - (self.base - HEADS / self.rate * 1e6), newest.through + self._shift)
+            self._correct(at, at - (self.base - HEADS / self.rate * 1e6), newest.through + self._shift)
         if at - max(looked, newest.at) <= WATCHED:
             self._heed(at, took, newest)
 
-    def _correct(self, left: float, thought: float) -> None:
-        """The line was through with a message at `left` at the latest, and no more than `RECEIVER` before."""
+    def _correct(self, at: int, left: float, thought: float) -> None:
+        """At `at` it is known that the line was through with a message at `left` at the latest, and no more than
+        `RECEIVER` before."""
+        if thought < left - RECEIVER:
+            self._slowed_at = at
         if not left - RECEIVER <= thought <= left:
             self._shift += left - thought
             self._end += left - thought
@@ -258,3 +268,7 @@ class Window:
     def narrow(self, at: int) -> bool:
         """Whether the line's queue was filled of late."""
         return self.full_at is not None and at - self.full_at < FORGET
+
+    def slowing(self, at: int) -> bool:
+        """Whether the line turned out slower than thought just now: more than should waits in its queue."""
+        return self._slowed_at is not None and at - self._slowed_at < SLOWING

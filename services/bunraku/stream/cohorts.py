@@ -18,6 +18,7 @@ from bunraku.backing.together import Together
 from bunraku.playout.pacing import Paced
 from bunraku.playout.sharing import Step
 from bunraku.playout.wheel import SPOKE
+from bunraku.stream.attendance import Attendance
 from bunraku.stream.plans import Plans
 from bunraku.stream.turns import Turns
 from bunraku.wire.messages import TimelineState
@@ -113,14 +114,18 @@ class Cohort:
         else:
             together = self._together
         if plan.framed:
-            together.write(plan.framed)
+            attendance = self._cohorts.attendance
+            attendance.bytes += together.write(plan.framed)
+            attendance.blocks += len(plan.dues) * len(together)
 
 
 class Cohorts:
     """The cohorts of one session."""
 
-    def __init__(self, plans: Plans) -> None:
+    def __init__(self, plans: Plans, attendance: Attendance | None = None) -> None:
+        """`attendance` counts what is sent."""
         self.plans = plans
+        self.attendance = attendance or Attendance()
         self._cohorts: dict[tuple[object, ...], Cohort] = {}
 
     def join(

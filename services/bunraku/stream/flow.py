@@ -27,10 +27,16 @@ SAVED = 0.2
 
 
 class Readable(Protocol):
-    """A line that can be read, as `bunraku.backing.line.Line`."""
+    """A line that can be read, as those of `bunraku.backing.line`."""
 
     def read(self) -> Reading:
         """How it stands now; raises OSError once it is closed."""
+
+    def asking(self, size: int, /) -> bytes:
+        """What is to be written right behind `size` bytes so that it can be read."""
+
+    def echoed(self, payload: bytes) -> None:
+        """What was asked has come back."""
 
     def hold(self, held: bool) -> None:
         """Keep what is written together in packets as full as can be, or let it go."""
@@ -41,7 +47,7 @@ class Flow:
     and need not be told of."""
 
     __slots__ = (
-        "_before", "_clean", "_credit", "_credited_at", "_line", "_now", "beginning", "far", "steady", "window",
+        "_before", "_clean", "_credit", "_credited_at", "_line", "_net", "_now", "beginning", "far", "steady", "window",
     )  # fmt: skip
 
     def __init__(self, line: Readable | None, now: Callable[[], int]) -> None:
@@ -53,6 +59,8 @@ class Flow:
         self.window = Window()
         # what had been written before the window was told of anything
         self._before = reading.written
+        # of what the window was told, how much was written when the net reached far enough
+        self._net: int | None = None
         self._clean = 0
         self._credit = 0.0
         self._credited_at = now()
@@ -78,6 +86,20 @@ class Flow:
         if self._line is not None and not self.free:
             self.window.wrote(self._now(), size)
 
+    def asking(self, size: int, /) -> bytes:
+        """What is to be written right behind `size` bytes, in one go with them; of none before a look."""
+        return b"" if self._line is None or (self.free and size) else self._line.asking(size)
+
+    def answered(self, payload: bytes) -> None:
+        """The other end has answered a Ping that asked."""
+        if self._line is None:
+            return
+        unknown = self.unknown
+        self._line.echoed(payload)
+        if unknown and 0 < self._line.read().round_trip <= FAR:
+            # it is near, as far as the proxy is
+            self.far, self.steady = False, True
+
     def look(self) -> None:
         """Now and then, and not for each overlay: whether the line still counts as quick, or does again."""
         if self._line is None:
@@ -98,6 +120,7 @@ class Flow:
         if untold:
             # it was filled by what the window knows nothing of
             self.window = Window()
+            self._net = None if self._net is None else 0
             self.window.wrote(self._now(), reading.waiting)
             self._before = reading.written - reading.waiting
 
@@ -135,6 +158,11 @@ class Flow:
         return self._line is not None and self.window.narrow(self._now())
 
     @property
+    def slowing(self) -> bool:
+        """Whether the line turned out slower than thought just now: what can wait would make it worse."""
+        return self._line is not None and self.window.slowing(self._now())
+
+    @property
     def carries(self) -> float | None:
         """Bytes a second of a line that may be a narrow one, None where it is not or nothing is known."""
         rate = self.window.rate
@@ -151,16 +179,27 @@ class Flow:
     @property
     def learning(self) -> bool:
         """Whether something is on its way that will tell of the line."""
-        return self.unknown and self.window.flying > 0
+        return self.window.flying > 0 and (self.unknown or (self._net is not None and not self.net_came))
+
+    def net_went(self) -> None:
+        """What was written by now is a net that reaches far enough."""
+        if self._net is None:
+            self._net = self.window.written
+
+    @property
+    def net_came(self) -> bool:
+        """Whether such a net is at the other end."""
+        return self._line is None or (self._net is not None and self.window.came(self._net))
 
     def block_went(self, size: int) -> None:
         """A block was written."""
         self._credit -= on_line(size)
 
     def blocks_turn(self) -> bool:
-        """Whether a block that can wait may take room from overlays: on a narrow line they have a share of it."""
+        """Whether a block that can wait may take room from overlays: on a narrow line they have a share of it, but not
+        while too much is on its way as it is."""
         now, rate = self._now(), self.window.rate or 0.0
         self._credit += BLOCKS * rate * (now - self._credited_at) * 1e-6
         self._credit = min(self._credit, BLOCKS * rate * SAVED)
         self._credited_at = now
-        return self._credit > 0
+        return self._credit > 0 and not self.slowing

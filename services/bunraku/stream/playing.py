@@ -66,6 +66,11 @@ class Playing:
         return self._silent[chosen.rate] if chosen is self._alone else self.steps[chosen.rate]
 
     @property
+    def choice(self) -> tuple[int, str]:
+        """The motion's rate now, and why."""
+        return self.step.motion, "pinned" if self._pinned else self._choosing.reason
+
+    @property
     def _choosing(self) -> RateChoice:
         silent = len(self.steps) > 1 and self.steps[0].audio < 0 <= self.steps[-1].audio
         return self._alone if silent and not self._pinned and self.rate.rate == 0 else self.rate
@@ -115,7 +120,11 @@ class Playing:
                 return described(self.motion, known, self._known)
             return self.motion.packets[due.track][due.rate][due.index]
         spare = not beside or flow.blocks_turn()
-        due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=narrow or flow.far, spare=spare)
+        net = narrow or flow.far
+        better = not net or flow.net_came
+        due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=net, spare=spare, better=better)
+        if not better and spare and (due is None or due.far):
+            flow.net_went()
         return None if due is None else self.motion.packets[due.track][due.rate][due.index]
 
     def news(self) -> bytes | None:

@@ -4,6 +4,7 @@ gets in between."""
 from __future__ import annotations
 
 import asyncio
+from contextvars import copy_context
 from typing import Protocol
 
 from bunraku.backing.backing import clock
@@ -27,6 +28,8 @@ class Turns:
         self._wheel: Wheel[Takes] = Wheel()
         self._timer: asyncio.Handle | None = None
         self._due = 0
+        # a turn is nobody's request, whoever came when the timer was set
+        self._context = copy_context()
 
     def put(self, who: Takes, due: int) -> None:
         """`who` has a turn at clock time `due`, or a little after; one turn each, the one asked for last."""
@@ -45,7 +48,8 @@ class Turns:
         due = self._wheel.next()
         if due is not None:
             self._due = due
-            self._timer = asyncio.get_running_loop().call_later(max(due - clock(), 0) * 1e-6, self._run)
+            wait = max(due - clock(), 0) * 1e-6
+            self._timer = asyncio.get_running_loop().call_later(wait, self._run, context=self._context)
 
     def _run(self) -> None:
         self._timer = None
