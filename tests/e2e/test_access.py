@@ -1,0 +1,341 @@
+"""Every route and socket of a real server with a secret, tried with all that should not let in, and with what does."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx2
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+
+from bunraku.backing.access import Role
+from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Problem, Welcome, unpack
+from tests.guests import OTHER, SECRET, headers, signed, token, unsigned
+from tests.servers import clip, running
+
+PATIENCE = 20
+NONE = "x" * 20
+"""An id of nothing."""
+
+ROUTES: dict[tuple[str, str], Role | None] = {
+    ("GET", "/livez"): None,
+    ("GET", "/readyz"): None,
+    ("GET", "/v1/health"): None,
+    ("GET", "/v1/openapi.json"): None,
+    ("GET", "/v1/docs"): None,
+    ("GET", "/v1/motions"): Role.VIEW,
+    ("GET", "/v1/motions/{motion}"): Role.VIEW,
+    ("GET", "/v1/motions/{motion}/description"): Role.VIEW,
+    ("GET", "/v1/motions/{motion}/blocks/{rate}/{index}"): Role.VIEW,
+    ("GET", "/v1/sessions"): Role.VIEW,
+    ("GET", "/v1/sessions/{session}"): Role.VIEW,
+    ("GET", "/v1/arms/{proportions}/table"): Role.VIEW,
+    ("GET", "/v1/arms/{proportions}/figures/{name}"): Role.VIEW,
+    ("POST", "/v1/solve"): Role.VIEW,
+    ("POST", "/v1/tickets"): Role.VIEW,
+    ("POST", "/v1/sessions"): Role.CONTROL,
+    ("PATCH", "/v1/sessions/{session}"): Role.CONTROL,
+    ("DELETE", "/v1/sessions/{session}"): Role.CONTROL,
+    ("POST", "/v1/shares"): Role.CONTROL,
+    ("GET", "/v1/shares"): Role.CONTROL,
+    ("DELETE", "/v1/shares/{share}"): Role.CONTROL,
+    ("POST", "/v1/sessions/{session}/recordings"): Role.INGEST,
+    ("POST", "/v1/motions"): Role.INGEST,
+    ("POST", "/v1/motions/{motion}/audio"): Role.INGEST,
+    ("POST", "/v1/motions/{motion}/scene"): Role.INGEST,
+    ("GET", "/v1/uploads/{upload}"): Role.INGEST,
+    ("DELETE", "/v1/motions/{motion}"): Role.INGEST,
+}
+SOCKETS: dict[str, Role] = {
+    "/v1/motions/{motion}/stream": Role.VIEW,
+    "/v1/sessions/{session}/stream": Role.VIEW,
+    "/v1/sessions/{session}/control": Role.CONTROL,
+}
+BAD: dict[str, Callable[[], str | None]] = {
+    "none": lambda: None,
+    "malformed": lambda: "not.a.token",
+    "empty": lambda: ".",
+    "expired": lambda: signed(exp=int(time.time()) - 1),
+    "wrong audience": lambda: signed(aud="elsewhere"),
+    "wrong issuer": lambda: signed(iss="elsewhere"),
+    "wrong signature": lambda: signed(OTHER),
+    "alg none": unsigned,
+    "other algorithm": lambda: signed(algorithm="HS512"),
+    "no expiry": lambda: signed(exp=None),
+    "expiry of text": lambda: signed(exp="2999"),
+    "unknown role": lambda: signed(role="owner"),
+    "no role": lambda: signed(role=None),
+    "admin bound to a session": lambda: signed(session="s"),
+    "too long": lambda: signed(more="x" * 3_000),
+}
+
+
+def unnamed(answer: httpx2.Response) -> str:
+    """What is answered, but for what the request is called."""
+    return answer.text.replace(answer.headers["x-request-id"], "")
+
+
+@dataclass
+class House:
+    """A server with a secret, a motion, a session of it, and a link that was revoked."""
+
+    url: str
+    motion: str
+    session: str
+    revoked: str
+
+    def address(self, path: str) -> str:
+        """A path with what is there in its places."""
+        places = {
+            "motion": self.motion,
+            "session": self.session,
+            "rate": "0",
+            "index": "0",
+            "proportions": "393-351-256-560-320-120",
+            "name": "circle",
+            "upload": "unknown-upload",
+            "share": "0" * 18,
+        }
+        return path.format(**places)
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
+    with running(tmp_path_factory.mktemp("guarded"), secret=SECRET, connects=0) as url:
+        with httpx2.Client(base_url=url, headers=headers(token(subject="host")), timeout=60) as http:
+            motion = http.post("/v1/motions?filename=a.bvh", content=clip(2.0, 5)).json()["id"]
+            session = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
+            share = http.post("/v1/shares", json={"session": session}).json()
+            assert http.get("/v1/sessions", headers=headers(share["token"])).status_code == 200
+            assert http.delete(f"/v1/shares/{share['id']}").status_code == 204
+        yield House(url, motion, session, share["token"])
+
+
+def test_the_table_has_every_route_and_socket_of_the_server(house: House) -> None:
+    described = httpx2.get(f"{house.url}/v1/openapi.json").json()
+    told = {(method.upper(), path) for path, methods in described["paths"].items() for method in methods}
+    assert told == {key for key in ROUTES if key[1] not in ("/v1/openapi.json", "/v1/docs")}
+    roles = {
+        (method.upper(), path): said.get("x-role")
+        for path, methods in described["paths"].items()
+        for method, said in methods.items()
+    }
+    assert roles == {key: None if ROUTES[key] is None else ROUTES[key].word for key in told}  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("bad", [*BAD, "revoked"])
+def test_what_is_no_good_token_opens_nothing(house: House, bad: str) -> None:
+    held = house.revoked if bad == "revoked" else BAD[bad]()
+    with httpx2.Client(base_url=house.url, headers=headers(held)) as http:
+        for (method, path), role in ROUTES.items():
+            answer = http.request(method, house.address(path))
+            if role is None:
+                assert answer.status_code == 200, path
+                continue
+            assert answer.status_code == 401, (method, path)
+            assert answer.headers["www-authenticate"].startswith("Bearer realm=")
+            assert answer.headers["content-type"] == "application/problem+json"
+            # the same about what is there and what is not
+            other = http.request(method, house.address(path).replace(house.motion, NONE).replace(house.session, NONE))
+            assert (other.status_code, unnamed(other)) == (401, unnamed(answer))
+            title = {"none": "A link is needed", "expired": "Link expired", "revoked": "Link revoked"}
+            assert answer.json()["title"] == title.get(bad, "Link not valid")
+
+
+@pytest.mark.parametrize("role", Role)
+def test_each_role_may_do_what_the_table_says(house: House, role: Role) -> None:
+    with httpx2.Client(base_url=house.url, headers=headers(token(role)), timeout=60) as http:
+        for (method, path), needs in ROUTES.items():
+            if method == "DELETE" and role >= (needs or Role.VIEW):
+                continue  # below, of things that may go
+            answer = http.request(method, house.address(path))
+            if needs is None or role >= needs:
+                assert answer.status_code not in (401, 403), (method, path, answer.text)
+                assert answer.status_code < 500
+            else:
+                assert answer.status_code == 403, (method, path)
+                assert answer.json()["needed"] == needs.word
+                assert f'scope="{needs.word}"' in answer.headers["www-authenticate"]
+                other = http.request(method, house.address(path).replace(house.motion, NONE))
+                assert (other.status_code, unnamed(other)) == (403, unnamed(answer))
+
+
+async def to_its_end(socket: ClientConnection) -> None:
+    """Read until there is nothing more."""
+    async with asyncio.timeout(PATIENCE):
+        while True:
+            await socket.recv()
+
+
+async def said(url: str, given: dict[str, str]) -> tuple[object, int | None]:
+    """The first message of a socket, and the code with which it was closed if it was."""
+    async with connect(url, subprotocols=[SUBPROTOCOL], compression=None, additional_headers=given) as socket:  # type: ignore[list-item]
+        data = await socket.recv()
+        assert isinstance(data, bytes)
+        message = unpack(data)
+        if not isinstance(message, Problem):
+            return message, None
+        try:
+            await socket.recv()
+        except ConnectionClosed as closed:
+            return message, closed.rcvd.code if closed.rcvd else None
+        raise AssertionError("a problem is the last word")
+
+
+@pytest.mark.parametrize("bad", [*BAD, "revoked"])
+async def test_no_socket_opens_with_what_is_no_good_token(house: House, bad: str) -> None:
+    held = house.revoked if bad == "revoked" else BAD[bad]()
+    for path in SOCKETS:
+        address = house.url.replace("http", "ws") + house.address(path)
+        there = await said(address, headers(held))
+        assert isinstance(there[0], Problem)
+        assert there[1] == 4401
+        away = await said(address.replace(house.motion, NONE).replace(house.session, NONE), headers(held))
+        assert away == there
+
+
+@pytest.mark.parametrize("role", Role)
+async def test_sockets_open_by_role_with_a_token_or_a_ticket_and_a_ticket_is_good_once(
+    house: House, role: Role
+) -> None:
+    async with httpx2.AsyncClient(base_url=house.url, headers=headers(token(role))) as http:
+        for path, needs in SOCKETS.items():
+            address = house.url.replace("http", "ws") + house.address(path)
+            ticket = (await http.post("/v1/tickets")).json()["ticket"]
+            assert len(ticket) < 64
+            by_token = await said(address, headers(token(role)))
+            by_ticket = await said(f"{address}?ticket={ticket}", {})
+            if role >= needs:
+                for message, _ in (by_token, by_ticket):
+                    assert isinstance(message, ChannelHeader | Welcome)
+                again = await said(f"{address}?ticket={ticket}", {})
+                assert again[1] == 4401
+            else:
+                assert by_token[1] == by_ticket[1] == 4403
+
+
+async def test_one_who_speaks_another_protocol_is_told_that_first(house: House) -> None:
+    for path in SOCKETS:
+        async with connect(house.url.replace("http", "ws") + house.address(path)) as socket:
+            with pytest.raises(ConnectionClosed) as closed:
+                await to_its_end(socket)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 4406
+
+
+async def test_one_who_is_bound_sees_that_alone_and_of_the_rest_not_whether_it_is_there(house: House) -> None:
+    async with httpx2.AsyncClient(base_url=house.url, headers=headers(token()), timeout=60) as host:
+        other = (await host.post("/v1/motions?filename=b.bvh", content=clip(1.0, 6))).json()["id"]
+        elsewhere = (await host.post("/v1/sessions", json={"motion": other})).json()["id"]
+        for bound, shown in (("session", house.session), ("motion", house.motion)):
+            guest = token(
+                Role.CONTROL, session=shown if bound == "session" else None, motion=shown if bound == "motion" else None
+            )
+            async with httpx2.AsyncClient(base_url=house.url, headers=headers(guest)) as http:
+                motions = (await http.get("/v1/motions")).json()["items"]
+                assert [one["id"] for one in motions] == [house.motion]
+                sessions = (await http.get("/v1/sessions")).json()["items"]
+                assert [one["id"] for one in sessions] == ([house.session] if bound == "session" else [])
+                assert (await http.get(f"/v1/motions/{house.motion}")).status_code == 200
+                there = (await http.get(f"/v1/sessions/{house.session}")).status_code
+                assert there == (200 if bound == "session" else 404)
+                for path, hidden in (
+                    ("/v1/motions/{}", other),
+                    ("/v1/motions/{}/description", other),
+                    ("/v1/motions/{}/blocks/0/0", other),
+                    ("/v1/sessions/{}", elsewhere),
+                ):
+                    seen, missing = await http.get(path.format(hidden)), await http.get(path.format(NONE))
+                    assert seen.status_code == missing.status_code == 404
+                    assert unnamed(seen).replace(hidden, NONE) == unnamed(missing)
+                for asked in ({"session": elsewhere}, {"motion": other}):
+                    ((name, hidden),) = asked.items()
+                    seen, missing = [await http.post("/v1/shares", json={name: one}) for one in (hidden, NONE)]
+                    assert seen.status_code == missing.status_code == 404
+                    assert unnamed(seen).replace(hidden, NONE) == unnamed(missing)
+                # a guest neither opens, ends, nor changes a session
+                assert (await http.post("/v1/sessions", json={"motion": house.motion})).status_code == 403
+                edited = [await http.patch(f"/v1/sessions/{house.session}", json={"motion": m}) for m in (other, NONE)]
+                assert unnamed(edited[0]) == unnamed(edited[1])
+                assert edited[0].status_code == (403 if bound == "session" else 404)
+            for path, hidden in (("motions", other), ("sessions", elsewhere)):
+                address = house.url.replace("http", "ws") + f"/v1/{path}/{{}}/stream"
+                seen_there = await said(address.format(hidden), headers(guest))
+                seen_not = await said(address.format(NONE), headers(guest))
+                assert seen_there[1] == seen_not[1] == 4404
+                assert str(seen_there[0]).replace(hidden, NONE) == str(seen_not[0])
+
+
+def test_who_stores_removes_their_own_and_an_admin_all(house: House) -> None:
+    with httpx2.Client(base_url=house.url, timeout=60) as http:
+        mine, theirs = (headers(token(Role.INGEST, name)) for name in ("aiko", "ben"))
+        made = http.post("/v1/motions?filename=c.bvh", content=clip(1.0, 7), headers=mine).json()["id"]
+        assert http.delete(f"/v1/motions/{made}", headers=theirs).status_code == 403
+        assert http.delete(f"/v1/motions/{made}", headers=mine).status_code == 204
+        again = http.post("/v1/motions?filename=c.bvh", content=clip(1.0, 7), headers=mine).json()["id"]
+        assert http.delete(f"/v1/motions/{again}", headers=headers(token())).status_code == 204
+
+
+def test_links_are_their_makers_and_the_admin_s(house: House) -> None:
+    with httpx2.Client(base_url=house.url) as http:
+        mine, theirs = (headers(token(Role.CONTROL, name)) for name in ("aiko", "ben"))
+        share = http.post("/v1/shares", json={"session": house.session, "seconds": 60}, headers=mine).json()
+        assert "token" not in http.get("/v1/shares", headers=mine).text
+        assert [one["id"] for one in http.get("/v1/shares", headers=mine).json()["items"]] == [share["id"]]
+        assert http.get("/v1/shares", headers=theirs).json()["items"] == []
+        assert share["id"] in http.get("/v1/shares", headers=headers(token())).text
+        hidden = http.delete(f"/v1/shares/{share['id']}", headers=theirs)
+        missing = http.delete(f"/v1/shares/{'0' * 18}", headers=theirs)
+        assert hidden.status_code == missing.status_code == 404
+        assert unnamed(hidden).replace(share["id"], "0" * 18) == unnamed(missing)
+        viewer = headers(share["token"])
+        assert http.get(f"/v1/sessions/{house.session}", headers=viewer).status_code == 200
+        assert http.patch(f"/v1/sessions/{house.session}", json={"playing": False}, headers=viewer).status_code == 403
+        assert http.delete(f"/v1/shares/{share['id']}", headers=mine).status_code == 204
+        assert http.get(f"/v1/sessions/{house.session}", headers=viewer).json()["title"] == "Link revoked"
+
+
+async def test_what_is_open_with_a_link_that_is_revoked_is_ended(house: House) -> None:
+    async with httpx2.AsyncClient(base_url=house.url, headers=headers(token())) as http:
+        share = (await http.post("/v1/shares", json={"session": house.session})).json()
+        ticket = (await http.post("/v1/tickets", headers=headers(share["token"]))).json()["ticket"]
+        unused = (await http.post("/v1/tickets", headers=headers(share["token"]))).json()["ticket"]
+        address = house.url.replace("http", "ws") + f"/v1/sessions/{house.session}/stream"
+        async with connect(f"{address}?ticket={ticket}", subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
+            await socket.recv()
+            assert (await http.delete(f"/v1/shares/{share['id']}")).status_code == 204
+            with pytest.raises(ConnectionClosed) as closed:
+                await to_its_end(socket)
+            assert closed.value.rcvd is not None
+            assert (closed.value.rcvd.code, closed.value.rcvd.reason[:12]) == (4401, "Link revoked")
+        # a ticket that was given before is good no more
+        assert (await said(f"{address}?ticket={unused}", {}))[1] == 4401
+
+
+async def test_an_open_socket_ends_with_its_token(house: House) -> None:
+    for path in ("stream", "control"):
+        address = house.url.replace("http", "ws") + f"/v1/sessions/{house.session}/{path}"
+        held = headers(token(Role.CONTROL, seconds=2))
+        async with connect(address, subprotocols=[SUBPROTOCOL], additional_headers=held) as socket:  # type: ignore[list-item]
+            with pytest.raises(ConnectionClosed) as closed:
+                await to_its_end(socket)
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 4401
+
+
+async def test_what_needs_a_token_is_kept_by_no_cache_on_the_way(house: House) -> None:
+    async with httpx2.AsyncClient(base_url=house.url, headers=headers(token())) as http:
+        for path in (f"/v1/motions/{house.motion}/blocks/0/0", "/v1/arms/393-351-256-560-320-120/table"):
+            assert "private" in (await http.get(path)).headers["cache-control"]
+
+
+def test_a_server_that_is_open_lets_everybody_do_everything(tmp_path: Path) -> None:
+    with running(tmp_path) as url, httpx2.Client(base_url=url, headers=headers("whatever")) as http:
+        assert http.post("/v1/motions?filename=a.bvh", content=clip(1.0, 8)).status_code == 201
+        assert http.post("/v1/tickets").status_code == 201
+        assert http.post("/v1/shares", json={"motion": "a"}).status_code == 404

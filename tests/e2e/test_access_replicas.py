@@ -1,0 +1,74 @@
+"""Two replicas that share a secret, a catalogue and a real nats-server: what one gives is good once at either."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import ExitStack
+from pathlib import Path
+
+import httpx2
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+from bunraku.backing.access import Role
+from bunraku.client import Client
+from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Problem, unpack
+from tests.guests import SECRET, headers, token
+from tests.processes import jetstream, url_of
+from tests.servers import clip, running
+
+PATIENCE = 20
+
+
+async def first(url: str) -> object:
+    """The first message of a socket."""
+    async with connect(url, subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
+        data = await socket.recv()
+        assert isinstance(data, bytes)
+        return unpack(data)
+
+
+async def test_tickets_and_links_hold_across_replicas(tmp_path: Path) -> None:
+    (tmp_path / "nats").mkdir()
+    source = tmp_path / "a.bvh"
+    source.write_bytes(clip(2.0, 5))
+    with ExitStack() as stack:
+        nats = stack.enter_context(jetstream(tmp_path / "nats"))
+        given = {"bus": url_of(nats), "secret": SECRET}
+        one, two = [stack.enter_context(running(tmp_path / "data", **given)) for _ in range(2)]  # type: ignore[arg-type]
+        async with Client(one, token(Role.ADMIN)) as host, httpx2.AsyncClient(base_url=two) as other:
+            motion = (await host.upload(source))["id"]
+            session = (await host.open_session(motion))["id"]
+            share = await host.share(session=session)
+            stream = f"/v1/sessions/{session}/stream"
+            for giver, taker in ((one, two), (two, one)):
+                async with httpx2.AsyncClient(base_url=giver, headers=headers(share["token"])) as viewer:
+                    ticket = (await viewer.post("/v1/tickets")).json()["ticket"]
+                address = taker.replace("http", "ws") + f"{stream}?ticket={ticket}"
+                assert isinstance(await first(address), ChannelHeader)
+                for again in (address, address.replace(taker.replace("http", "ws"), giver.replace("http", "ws"))):
+                    refused = await first(again)
+                    assert isinstance(refused, Problem)
+                    assert refused.title == "Ticket not valid"
+            # a link that is revoked at one replica is good no more at the other, and what is open there ends
+            watching = two.replace("http", "ws") + stream
+            async with connect(
+                watching,
+                subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
+                additional_headers=headers(share["token"]),
+            ) as socket:
+                await socket.recv()
+                await host.revoke_share(share["id"])
+
+                async def to_its_end() -> None:
+                    async with asyncio.timeout(PATIENCE):
+                        while True:
+                            await socket.recv()
+
+                with pytest.raises(ConnectionClosed) as closed:
+                    await to_its_end()
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 4401
+            answer = await other.get(f"/v1/sessions/{session}", headers=headers(share["token"]))
+            assert answer.json()["title"] == "Link revoked"
