@@ -24,6 +24,10 @@ HARM: dict[str, Callable[[], bytes]] = {
     "nothing": lambda: b"",
     "zeros": lambda: bytes(1_000_000),
     "a million joints": lambda: joints(1_000_000),
+    "a million frames": lambda: (
+        b"HIERARCHY\nROOT r\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
+        b"End Site\n{\nOFFSET 0 1 0\n}\n}\nMOTION\nFrames: 1000000\nFrame Time: 0.01\n" + b"0 1 0\n" * 1_000_000
+    ),
     "a line of 60 MB": lambda: HEAD + b"MOTION\nFrames: 1\nFrame Time: 0.03\n" + b"0" * 60_000_000,
     "numbers without end": lambda: HEAD + b"MOTION\nFrames: 2\nFrame Time: 0.03\n" + b"1e999 " * 1_000_000,
     "not a number": lambda: GOOD.replace(b"MOTION", b"MOTION\n", 1)[:-6] + b"NaN\n",

@@ -35,3 +35,15 @@ async def test_a_failed_upload_leaves_nothing_and_a_good_one_everything(tmp_path
         assert "/" not in entry.description["name"]
         assert await backing.library.get("m1") is not None
         assert (await uploads.add("m1", source, "x.bvh")) == (entry, False)
+
+
+async def test_a_job_that_another_replica_takes_up_is_still_its_sender_s(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(clip(0.4))
+    async with open_backing(Settings(data=tmp_path / "data")) as backing:
+        uploads = Uploads(backing)
+        await uploads.queue.kinds["motion"]({"motion": "m1", "filename": "a.bvh", "subject": "aiko"}, source)
+        found = await backing.catalogue.get("m1")
+        assert found is not None
+        assert found.subject == "aiko"
+        assert found.bytes > 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Annotated, Any
@@ -11,10 +12,13 @@ from fastapi.responses import JSONResponse
 from starlette.requests import ClientDisconnect
 
 from bunraku.backing import problems
+from bunraku.backing.access import Role, access_of, needs
 from bunraku.backing.backing import Backing
 from bunraku.backing.catalogue import BadCursor
+from bunraku.backing.missing import no_such_motion
 from bunraku.backing.problems import ProblemError
-from bunraku.ingest.entry import entry_json, no_such_motion
+from bunraku.ingest import metrics
+from bunraku.ingest.entry import entry_json
 from bunraku.ingest.keyframes import Staging
 from bunraku.ingest.progress import Progress
 from bunraku.ingest.recordings import SUBJECT, Recordings
@@ -22,6 +26,8 @@ from bunraku.ingest.soundtracks import Soundtracks
 from bunraku.ingest.stagings import Stagings
 from bunraku.ingest.uploads import Uploads
 
+KEYFRAMES = 16 << 20
+"""Bytes of a camera and lights."""
 NAME = r"^[A-Za-z0-9_-]{8,64}$"
 """Of an upload, chosen at random by its sender."""
 
@@ -35,16 +41,22 @@ def create_app(backing: Backing) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        metrics.register(backing.metrics, uploads)
         answering = backing.bus.answer(SUBJECT, recordings.answer)
+        looking = asyncio.create_task(uploads.queue.run(), name="jobs of this replica")
         try:
             yield
         finally:
             answering.end()
+            looking.cancel()
+            await asyncio.wait((looking,))
+            await uploads.queue.close()
 
     app = FastAPI(title="Bunraku ingest", lifespan=lifespan)
     problems.install(app)
 
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BODY)
+    @needs(Role.INGEST, body=None)
     async def upload(
         request: Request,
         filename: Annotated[str, Query(min_length=1, max_length=255)],
@@ -60,6 +72,7 @@ def create_app(backing: Backing) -> FastAPI:
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
     @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=_BODY)
+    @needs(Role.INGEST, body=None)
     async def add_audio(
         request: Request,
         motion: str,
@@ -77,14 +90,16 @@ def create_app(backing: Backing) -> FastAPI:
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
     @app.post("/v1/motions/{motion}/scene", status_code=201, tags=["motions"])
-    async def add_scene(motion: str, asked: Staging) -> Response:
+    @needs(Role.INGEST, body=KEYFRAMES)
+    async def add_scene(motion: str, asked: Staging, request: Request) -> Response:
         """Make a motion that is another with a camera and lights, given as keyframes in motion time. What is left out
         stays as that motion has it. The motion itself stays as it is; the same keyframes again give the same new
         motion, with 200."""
-        entry, new = await stagings.add(motion, asked)
+        entry, new = await stagings.add(motion, asked, access_of(request).subject)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
     @app.get("/v1/uploads/{upload}", tags=["motions"])
+    @needs(Role.INGEST)
     async def progress(upload: Annotated[str, Path(pattern=NAME)], response: Response) -> Progress:
         """How far an upload is that is under way: what is being done, and the share of that which is done. 404 before
         and after."""
@@ -95,10 +110,18 @@ def create_app(backing: Backing) -> FastAPI:
         return found
 
     @app.get("/v1/motions", tags=["motions"])
+    @needs(Role.VIEW, all=True)
     async def page(
-        limit: Annotated[int, Query(ge=1, le=200)] = 50, cursor: Annotated[str | None, Query(max_length=200)] = None
+        request: Request,
+        limit: Annotated[int, Query(ge=1, le=200)] = 50,
+        cursor: Annotated[str | None, Query(max_length=200)] = None,
     ) -> dict[str, Any]:
-        """Motions, newest first; `next` is the cursor of the next page."""
+        """Motions, newest first; `next` is the cursor of the next page. Who is bound to one sees that alone."""
+        by = access_of(request)
+        if by.bound:
+            shown = by.motion if by.session is None else await backing.gate.on_show(by.session)
+            found = None if shown is None else await backing.catalogue.get(shown)
+            return {"items": [] if found is None else [entry_json(found)], "next": None}
         try:
             entries, following = await backing.catalogue.page(limit, cursor)
         except BadCursor as error:
@@ -106,6 +129,7 @@ def create_app(backing: Backing) -> FastAPI:
         return {"items": [entry_json(entry) for entry in entries], "next": following}
 
     @app.get("/v1/motions/{motion}", tags=["motions"])
+    @needs(Role.VIEW)
     async def describe(motion: str) -> dict[str, Any]:
         """One motion."""
         entry = await backing.catalogue.get(motion)
@@ -114,8 +138,13 @@ def create_app(backing: Backing) -> FastAPI:
         return entry_json(entry)
 
     @app.delete("/v1/motions/{motion}", status_code=204, tags=["motions"])
-    async def remove(motion: str) -> None:
-        """Remove one motion; sessions that play it go on with what they have."""
+    @needs(Role.INGEST)
+    async def remove(motion: str, request: Request) -> None:
+        """Remove one motion; sessions that play it go on with what they have. Who is no admin removes their own."""
+        by, found = access_of(request), await backing.catalogue.get(motion)
+        if found is not None and by.role < Role.ADMIN and found.subject != by.subject:
+            detail = f"{motion} was stored by another; this needs the role admin"
+            raise ProblemError(403, "Not allowed", detail, needed="admin")
         if not await backing.catalogue.remove(motion):
             raise no_such_motion(motion)
         await backing.library.remove(motion)

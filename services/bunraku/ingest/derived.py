@@ -6,12 +6,13 @@ import hashlib
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from bunraku.backing.backing import Backing, clock
+from bunraku.backing.backing import Backing
 from bunraku.backing.catalogue import Entry
 from bunraku.backing.library import StoredMotion
+from bunraku.backing.missing import no_such_motion
 from bunraku.backing.problems import ProblemError
-from bunraku.ingest.entry import no_such_motion
 from bunraku.ingest.results import Made, Refused
+from bunraku.ingest.storing import check_room, store
 from bunraku.ingest.uploads import Uploads, motion_id
 
 Job = Callable[[str, StoredMotion], Awaitable[Made | Refused]]
@@ -34,15 +35,18 @@ class Derived:
             raise no_such_motion(motion)
         return entry
 
-    async def add(self, motion: str, with_what: bytes, job: Job, describe: Describe, **told: str) -> tuple[Entry, bool]:
+    async def add(
+        self, motion: str, with_what: bytes, job: Job, describe: Describe, *, subject: str = "", **told: str
+    ) -> tuple[Entry, bool]:
         """The motion `motion` with something, and whether it is new; `with_what` says with what exactly: the same gives
-        the same motion. Raises `ProblemError`, with `told` where the job refuses."""
+        the same motion. `subject` is who stores it. Raises `ProblemError`, with `told` where the job refuses."""
         backing = self._backing
         before = await self.known(motion)
         made_id = motion_id(hashlib.sha256(motion.encode() + with_what).digest())
         known = await backing.catalogue.get(made_id)
         if known is not None and await backing.library.get(made_id) is not None:
             return known, False
+        await check_room(backing, subject)
         async with self._uploads.places:
             # it may have been removed while this waited
             stored = await backing.library.get(motion)
@@ -54,9 +58,4 @@ class Derived:
         if known is not None:
             # stored in a codec that is no longer spoken: made anew
             await backing.catalogue.remove(made_id)
-        described = await describe(before, made)
-        # the object first: a row always has its object, and an object without a row is harmless
-        await backing.library.put(made_id, made.packed)
-        entry = Entry(made_id, clock(), described)
-        new = await backing.catalogue.add(entry)
-        return (entry if new else (await backing.catalogue.get(made_id) or entry)), new
+        return await store(backing, made_id, made, await describe(before, made), subject)

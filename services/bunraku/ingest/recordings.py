@@ -9,14 +9,15 @@ from typing import Any
 import msgpack
 from pydantic import ValidationError
 
-from bunraku.backing.backing import Backing, clock
+from bunraku.backing.backing import Backing
 from bunraku.backing.catalogue import Entry
 from bunraku.backing.library import StoredMotion
 from bunraku.backing.order import FPS, MOST_SECONDS, Order
 from bunraku.backing.problems import ProblemError, invalid_field
-from bunraku.ingest import jobs
 from bunraku.ingest.entry import entry_json
+from bunraku.ingest.places import Places
 from bunraku.ingest.results import Made, Refused
+from bunraku.ingest.storing import check_room, store
 from bunraku.ingest.uploads import motion_id
 
 SUBJECT = "ingest.keep"
@@ -31,7 +32,7 @@ INHERITED = ("profile", "joints", "rest_pose", "unit", "guessed", "fit")
 class Recordings:
     """The orders of one replica. `places` bounds the jobs at work, those of uploads among them."""
 
-    def __init__(self, backing: Backing, places: asyncio.Semaphore) -> None:
+    def __init__(self, backing: Backing, places: Places) -> None:
         self._backing = backing
         self._places = places
         self._under_way = 0
@@ -68,16 +69,15 @@ class Recordings:
         log = await self._backing.library.get_log(order.log)
         if log is None:
             raise ProblemError(404, "No such log", f"the library has no log {order.log[:40]!r}", field="log")
+        await check_room(self._backing, order.subject)
         dances = await self._dances(log)
         motion = motion_id(secrets.token_bytes(32))
         async with self._places:
-            made = await jobs.run("keep", (motion, order, log, dances), SECONDS)
+            made = await self._places.run("keep", (motion, order, log, dances), SECONDS)
         if isinstance(made, Refused):
             raise ProblemError(422, made.title, made.detail, field=made.field, hint=made.hint)
-        entry = Entry(motion, clock(), await self._described(order, made, len(log)))
-        # the object first: a row always has its object, and an object without a row is harmless
-        await self._backing.library.put(motion, made.packed)
-        await self._backing.catalogue.add(entry)
+        described = await self._described(order, made, len(log))
+        entry, _ = await store(self._backing, motion, made, described, order.subject)
         return entry
 
     async def _dances(self, log: bytes) -> dict[str, StoredMotion]:

@@ -8,7 +8,6 @@ from bunraku.backing.backing import Backing
 from bunraku.backing.catalogue import Entry
 from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
-from bunraku.ingest import jobs
 from bunraku.ingest.derived import Derived
 from bunraku.ingest.keyframes import OutOfOrder, Staging, check
 from bunraku.ingest.results import Made, Refused
@@ -20,11 +19,13 @@ class Stagings:
 
     def __init__(self, backing: Backing, uploads: Uploads) -> None:
         self._derived = Derived(backing, uploads)
+        self._places = uploads.places
         self._seconds = backing.settings.upload_seconds
         self._under_way = 0
 
-    async def add(self, motion: str, asked: Staging) -> tuple[Entry, bool]:
-        """The motion `motion` with what is asked for, and whether it is new; raises `ProblemError`."""
+    async def add(self, motion: str, asked: Staging, subject: str = "") -> tuple[Entry, bool]:
+        """The motion `motion` with what is asked for, stored by `subject`, and whether it is new; raises
+        `ProblemError`."""
         if asked.camera is None and asked.lights is None:
             raise ProblemError(422, "Nothing to add", "neither a camera nor lights are in it", field="camera")
         try:
@@ -35,7 +36,7 @@ class Stagings:
             raise ProblemError(503, "Busy", f"{WAITING} stagings are under way", hint="try again in a few seconds")
 
         async def dress(made: str, stored: StoredMotion) -> Made | Refused:
-            return await jobs.run("dress", (made, stored, asked), self._seconds)
+            return await self._places.run("dress", (made, stored, asked), self._seconds)
 
         async def described(before: Entry, made: Made) -> dict[str, Any]:
             return {**before.description, **made.described}
@@ -43,6 +44,6 @@ class Stagings:
         self._under_way += 1
         try:
             staged = f" staged {asked.model_dump_json()}".encode()
-            return await self._derived.add(motion, staged, dress, described)
+            return await self._derived.add(motion, staged, dress, described, subject=subject)
         finally:
             self._under_way -= 1
