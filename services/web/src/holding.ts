@@ -18,6 +18,8 @@ export interface Theatre {
 export class Holding {
   theatre: Theatre | null = null;
   connected = false;
+  /** Whether this page only watches: nothing can be taken. */
+  watching = false;
   #room: Room | null = null;
   /** The limb that was reached for in vain: what "ask" asks for. */
   #wished: number | null = null;
@@ -63,12 +65,12 @@ export class Holding {
   }
 
   free(limb: number): boolean {
-    return !this.limbs()[limb].holder;
+    return !this.watching && !this.limbs()[limb].holder;
   }
 
   render(): void {
     const limbs = this.limbs();
-    this.page.strings.render(limbs, this.connected && this.#room !== null);
+    this.page.strings.render(limbs, this.connected && this.#room !== null && !this.watching);
     this.page.asks.render(limbs, this.#key("give"));
   }
 
@@ -83,6 +85,7 @@ export class Holding {
 
   /** The page's button of a limb: takes it, or lets it go. */
   toggle(limb: number): void {
+    if (this.watching) return;
     const { hands, velocity } = this.theatre ?? {};
     if (hands?.source(limb)) hands.letGo(limb);
     else velocity?.hold(limb);
@@ -90,6 +93,7 @@ export class Holding {
 
   /** A limb that was reached for is another's. */
   refused(limb: number): void {
+    if (this.watching) return;
     this.theatre?.shake(limb);
     const { holder, asked } = this.limbs()[limb];
     if (!holder || holder.mine) {
@@ -104,6 +108,7 @@ export class Holding {
 
   /** Asks the holder for a limb; without one, for that which was reached for last. */
   ask(limb = this.#wished): void {
+    if (this.watching) return;
     const holder = limb === null ? null : this.limbs()[limb].holder;
     if (limb === null || !holder || holder.mine) {
       this.page.toast("Reach for a string that another holds, then ask for it");
@@ -122,6 +127,7 @@ export class Holding {
 
   /** Gives a limb to the first who asks for it; without one, the selected limb if it is asked for, else any that is. */
   give(limb = this.#askedOfMe()): void {
+    if (this.watching) return;
     if (limb === null) this.page.toast("Nobody asks for a string of yours");
     else this.theatre?.hands.letGo(limb);
   }

@@ -1,7 +1,9 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
-import { createSession, keep, ProblemError, type CameraKeyframe, type Motion } from "./client/library";
+import { bound, comeIn, guarded, may, ownRole, whenDenied } from "./client/access";
+import { createSession, keep, shareSession, type CameraKeyframe, type Motion } from "./client/library";
+import { ProblemError } from "./client/problem";
 import { Holding } from "./holding";
 import type { Commands } from "./input/commands";
 import type { GamepadInput } from "./input/gamepad";
@@ -17,13 +19,20 @@ import { PHONE } from "./page/panels";
 import { Pieces } from "./page/pieces";
 import { createTheme, type ThemeChoice } from "./page/theme";
 import { tell, uploadAll } from "./page/uploads";
-import { findSession, Room } from "./room";
+import { findSession, Room, type Place } from "./room";
 import type { Stage } from "./stage/stage";
 import type { StringState } from "./stage/strings";
+import { browserStore } from "./storage/store";
 
 const INVITED = "bunraku.invited";
 const INVITATION = 6_000;
 const SAMPLE_EVERY = 500;
+
+// first of all: the link's token leaves the address
+comeIn();
+addEventListener("hashchange", () => comeIn() && location.reload());
+document.documentElement.dataset.role = ownRole();
+if (bound()) document.documentElement.dataset.bound = "";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvasElement;
 const query = new URLSearchParams(location.search);
@@ -52,7 +61,7 @@ const page = createPage(document.body, {
   camera: () => stage?.follow(!stage.following),
   sound: () => listening.toggle(),
   volume: (volume) => (listening.volume = volume),
-  keep: keepThis({
+  ...(may("ingest") ? { keep: keepThis({
     keep: (session, called) => keep(session, { name: called, camera: cameraMoves() }),
     toast: (message, action) => page.toast(message, action),
     session: () => room && { id: room.id, piece: pieces.find(room.viewer.motion)?.name ?? "" },
@@ -62,8 +71,9 @@ const page = createPage(document.body, {
       renderPieces();
     },
     choose: (motion) => void choose(motion),
-  }),
+  }) } : {}),
   files: (files) => {
+    if (!may("ingest")) return;
     page.panels.open("library");
     void uploadAll(files, page.library, uploaded);
   },
@@ -90,6 +100,12 @@ const page = createPage(document.body, {
   reframe: resize,
 });
 const holding = new Holding(page, () => mapping);
+holding.watching = !may("control");
+let denied = false;
+whenDenied(({ title, detail, hint }) => {
+  denied = true;
+  page.notice(title, hint ? `${detail}; ${hint}.` : detail);
+});
 const listening = new Listening((state) => page.transport.sound.render(state), page.transport.sound.element);
 theme = createTheme((now) => {
   page.header.theme(now);
@@ -116,9 +132,20 @@ function step(blocks: number): void {
 async function share(): Promise<void> {
   const url = new URL(location.href);
   url.search = room ? `?session=${encodeURIComponent(room.id)}` : "";
+  let copied = "Link copied";
+  if (guarded() && room) {
+    try {
+      url.href = new URL(await shareSession(room.id), location.href).href;
+      copied = "Link copied: who has it may watch, for a week";
+    } catch (error) {
+      if (!(error instanceof ProblemError)) throw error;
+      page.toast(`${error.title}: ${error.detail}`);
+      return;
+    }
+  }
   try {
     await navigator.clipboard.writeText(url.href);
-    page.toast("Link copied");
+    page.toast(copied);
   } catch {
     page.toast(`Copy this link: ${url.href}`);
   }
@@ -132,6 +159,7 @@ async function uploaded(motion: Motion): Promise<void> {
 
 /** Puts a dance on the stage: for everyone in the session, or in a session of its own where there is none. */
 async function choose(id: string): Promise<void> {
+  if (!may("control")) return;
   try {
     if (room) {
       room.edit({ motion: id, position: 0 });
@@ -154,33 +182,22 @@ function renderPieces(): void {
 function endInvitation(): void {
   invitedAt = -Infinity;
   page.tags.invite(null);
-  try {
-    localStorage.setItem(INVITED, "yes");
-  } catch {
-    // Storage may be forbidden; then the invitation comes again.
-  }
-}
-
-function wasInvited(): boolean {
-  try {
-    return localStorage.getItem(INVITED) !== null;
-  } catch {
-    return false;
-  }
+  browserStore.put(INVITED, "yes");
 }
 
 /** Watches a session, leaving the one before. */
-function enter(id: string): Room {
+function enter(id: string, place: Place = "sessions"): Room {
   room?.close();
   stage?.trail.clear();
   room = new Room(id, name, (error) => {
     page.toast(error instanceof ProblemError ? `${error.title}: ${error.detail}` : String(error));
-  });
+  }, place);
+  document.documentElement.toggleAttribute("data-own", place === "motions");
   const { viewer, puppeteer } = room;
   holding.enter(room);
   listening.enter(viewer);
   const url = new URL(location.href);
-  url.searchParams.set("session", id);
+  url.searchParams.set(place === "motions" ? "motion" : "session", id);
   history.replaceState(null, "", url);
   page.notice(null);
   viewer.addEventListener("figure", () => {
@@ -204,7 +221,8 @@ function enter(id: string): Room {
     holding.connected = false;
     holding.render();
     const reason = String((event as CustomEvent<string>).detail);
-    if (viewer.ended) page.notice("The session has ended", reason);
+    if (denied) return;
+    if (viewer.ended) page.notice(place === "motions" ? "The dance has ended" : "The session has ended", reason);
     else if (wasConnected) page.toast(`The line was lost: ${reason}`);
   });
   renderTimeline();
@@ -315,7 +333,8 @@ function screenPlace(at: Vector3 | null): { x: number; y: number } | null {
 
 /** On a first visit, six seconds of invitation by the hand nearer to the audience. */
 function invite(now: number): void {
-  if (invitedAt === null) invitedAt = wasInvited() ? -Infinity : now;
+  if (holding.watching) return;
+  if (invitedAt === null) invitedAt = browserStore.get(INVITED) === null ? now : -Infinity;
   if (invitedAt === -Infinity || !stage?.puppet) return;
   if (now - invitedAt > INVITATION) {
     endInvitation();
@@ -328,21 +347,28 @@ async function start(): Promise<void> {
   try {
     // The stage waits for no list: the library is read meanwhile.
     const library = pieces.refresh().then(renderPieces);
+    const newest = library.then(() => pieces.all[0]?.id ?? null);
+    // what fails before these are waited for is told of
+    for (const waiting of [library, newest]) waiting.catch(() => undefined);
     const asked = query.get("session");
+    const alone = asked ? null : query.get("motion");
     if (asked) enter(asked);
-    const session = asked ? null : await findSession(library.then(() => pieces.all[0]?.id ?? null));
+    else if (alone) enter(alone, "motions");
+    const session = asked || alone ? null : await findSession(newest);
     if (session) {
       const entered = enter(session.id);
       if (calm.matches && session.viewers === 0) entered.edit({ playing: false });
     }
     await library;
-    if (!room) {
+    if (!room && !may("ingest")) {
+      page.notice("The stage is empty", "Nobody dances here now. Come again when somebody does.");
+    } else if (!room) {
       page.notice("The stage is empty", "Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it.");
       page.panels.open("library");
     }
   } catch (error) {
     if (!(error instanceof ProblemError)) throw error;
-    page.notice(error.title, `${error.detail}. ${error.hint ?? ""}`);
+    if (!denied) page.notice(error.title, `${error.detail}. ${error.hint ?? ""}`);
   }
 }
 

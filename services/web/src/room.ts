@@ -1,4 +1,5 @@
-/** The session being watched: its viewer and puppeteer, and the edits of its timeline. */
+/** The session, or the motion alone, being watched: its viewer and puppeteer, and the edits of its timeline. */
+import { may } from "./client/access";
 import { createSession, editSession, listSessions, type Session, type SessionEdit } from "./client/library";
 import { Puppeteer } from "./client/puppeteer";
 import { Viewer } from "./client/viewer";
@@ -6,13 +7,16 @@ import { Viewer } from "./client/viewer";
 /** After a seek the bar stands where it was put until the line has followed, at most this long. Milliseconds. */
 const SEEK_GRACE = 1200;
 
-/** The first session there is, else a new one over the `newest` motion; null when there is nothing to dance. */
+/** The first session there is, else, for who may open one, a new one over the `newest` motion; null when there is nothing to dance. */
 export async function findSession(newest: Promise<string | null>): Promise<Session | null> {
   const { items } = await listSessions();
   if (items.length > 0) return items[0];
-  const motion = await newest;
+  const motion = may("control") ? await newest : null;
   return motion ? createSession(motion) : null;
 }
+
+/** What is watched: a session, shared by all, or a motion, on a timeline of one's own. */
+export type Place = "sessions" | "motions";
 
 export class Room {
   readonly viewer: Viewer;
@@ -22,10 +26,11 @@ export class Room {
   #sought: { seconds: number; at: number; epoch: number } | null = null;
 
   /** `failed` is told when an edit of the timeline was refused. */
-  constructor(readonly id: string, name: string, private readonly failed: (error: unknown) => void) {
-    const base = `${location.origin.replace(/^http/, "ws")}/v1/sessions/${encodeURIComponent(id)}`;
+  constructor(readonly id: string, name: string, private readonly failed: (error: unknown) => void, readonly place: Place = "sessions") {
+    const base = `${location.origin.replace(/^http/, "ws")}/v1/${place}/${encodeURIComponent(id)}`;
+    const control = place === "sessions" && may("control") ? `${base}/control?name=${encodeURIComponent(name)}` : null;
     this.viewer = new Viewer({ url: `${base}/stream` });
-    this.puppeteer = new Puppeteer({ url: `${base}/control?name=${encodeURIComponent(name)}`, viewer: this.viewer });
+    this.puppeteer = new Puppeteer({ url: control, viewer: this.viewer });
     this.viewer.attach(this.puppeteer);
   }
 
@@ -39,12 +44,24 @@ export class Room {
   }
 
   seek(seconds: number, now: number): void {
+    if (!this.editable) return;
     this.#sought = { seconds, at: now, epoch: this.viewer.timeline?.epoch ?? 0 };
     this.edit({ position: Math.round(seconds * 1e6) });
   }
 
-  /** Edits the timeline for everyone. One edit is under way at a time; those made meanwhile are sent as one. */
+  /** Whether the timeline may be edited from here. */
+  get editable(): boolean {
+    return this.place === "motions" || may("control");
+  }
+
+  /** Edits the timeline, of a session for everyone. One edit is under way at a time; those made meanwhile are sent as one. */
   edit(change: SessionEdit): void {
+    if (!this.editable) return;
+    if (this.place === "motions") {
+      const { position, motion: _, ...rest } = change;
+      this.viewer.edit(position === undefined ? rest : { ...rest, position: position / 1e6 });
+      return;
+    }
     this.#waiting = { ...this.#waiting, ...change };
     if (!this.#sending) void this.#send();
   }

@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 import type { Viewer } from "../src/client/viewer";
 import { Listening, type SoundState } from "../src/listening";
+import { stubStorage } from "./storage/stubs";
 
 const { players, speakers } = vi.hoisted(() => ({
   players: [] as { store: unknown; retimed: number; closed: boolean }[],
@@ -53,7 +54,6 @@ class Watched extends EventTarget {
   }
 }
 
-const stored = new Map<string, string>();
 let page: EventTarget;
 let viewer: Watched;
 let listening: Listening;
@@ -62,12 +62,11 @@ const button = { contains: (target: unknown) => target === button } as unknown a
 
 beforeEach(() => {
   players.length = speakers.length = 0;
-  stored.clear();
   page = new EventTarget();
   vi.stubGlobal("addEventListener", page.addEventListener.bind(page));
   vi.stubGlobal("Node", EventTarget);
   vi.stubGlobal("KeyboardEvent", class {});
-  vi.stubGlobal("localStorage", { getItem: (key: string) => stored.get(key) ?? null, setItem: (key: string, value: string) => void stored.set(key, value) });
+  stubStorage("localStorage");
   states = [];
   start();
 });

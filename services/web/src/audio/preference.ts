@@ -1,4 +1,5 @@
 /** Whether the sound is wanted, and how loud; remembered. */
+import { browserStore } from "../storage/store";
 
 const KEY = "bunraku.sound";
 
@@ -11,19 +12,11 @@ export interface SoundPreference {
 const DEFAULT: SoundPreference = { on: true, volume: 0.8 };
 
 export function loadPreference(): SoundPreference {
-  try {
-    const { on, volume } = JSON.parse(localStorage.getItem(KEY) ?? "{}") as Partial<SoundPreference>;
-    const good = typeof volume === "number" && volume >= 0 && volume <= 1;
-    return { on: typeof on === "boolean" ? on : DEFAULT.on, volume: good ? volume : DEFAULT.volume };
-  } catch {
-    return DEFAULT; // Storage may be forbidden or hold what is none.
-  }
+  const { on, volume } = (browserStore.getJson(KEY) ?? {}) as Partial<Record<keyof SoundPreference, unknown>>;
+  const good = typeof volume === "number" && volume >= 0 && volume <= 1;
+  return { on: typeof on === "boolean" ? on : DEFAULT.on, volume: good ? volume : DEFAULT.volume };
 }
 
 export function savePreference(preference: SoundPreference): void {
-  try {
-    localStorage.setItem(KEY, JSON.stringify(preference));
-  } catch {
-    // As above: the choice then lasts as long as the page.
-  }
+  browserStore.putJson(KEY, preference);
 }

@@ -1,5 +1,8 @@
 /** Motions and sessions over HTTP (`proto/SPEC.md`, HTTP). */
 
+import { authorization, refusedWith, request } from "./access";
+import { ProblemError } from "./problem";
+
 /** A motion as the server describes it; what more it says is kept. */
 export interface Motion {
   id: string;
@@ -63,42 +66,6 @@ export interface Page<T> {
   next: string | null;
 }
 
-/** What went wrong, in words for the person who gets it (RFC 9457). `status` is 0 where no server answered. */
-export class ProblemError extends Error {
-  override readonly name = "ProblemError";
-
-  constructor(
-    readonly status: number,
-    readonly title: string,
-    readonly detail: string,
-    readonly hint: string | null = null,
-    readonly line: number | null = null,
-    readonly field: string | null = null,
-  ) {
-    super(`${title}: ${detail}`);
-  }
-
-  /** The problem in the body of an answer of `status`, of whatever form. */
-  static from(status: number, body: string): ProblemError {
-    let said: Record<string, unknown> = {};
-    try {
-      const parsed: unknown = JSON.parse(body);
-      if (typeof parsed === "object" && parsed !== null) said = parsed as Record<string, unknown>;
-    } catch {
-      // a proxy's page, or nothing: the status has to do
-    }
-    const text = (value: unknown) => (typeof value === "string" ? value : null);
-    return new ProblemError(
-      status, text(said.title) ?? "The server refused", text(said.detail) ?? `it answered ${status}`, text(said.hint),
-      typeof said.line === "number" ? said.line : null, text(said.field),
-    );
-  }
-
-  static unreachable(): ProblemError {
-    return new ProblemError(0, "No answer", "the server cannot be reached", "look at the line, then try again");
-  }
-}
-
 /** Motions, newest first. */
 export function listMotions(cursor?: string): Promise<Page<Motion>> {
   return ask("GET", `/v1/motions${page(cursor)}`) as Promise<Page<Motion>>;
@@ -134,6 +101,11 @@ export function keep(session: string, recording: Recording = {}): Promise<Motion
   return ask("POST", `/v1/sessions/${encodeURIComponent(session)}/recordings`, recording) as Promise<Motion>;
 }
 
+/** A link by which others may watch a session, as what follows the page's address. */
+export async function shareSession(session: string): Promise<string> {
+  return ((await ask("POST", "/v1/shares", { session })) as { link: string }).link;
+}
+
 /** Where an upload is: on its way, or in the server's hands; and the share of that which is done, 0..1. */
 export interface UploadProgress {
   stage: "sending" | "waiting" | "reading" | "encoding";
@@ -153,29 +125,30 @@ export function uploadMotion(file: File, onProgress?: (progress: UploadProgress)
   return new Promise((resolve, reject) => {
     signal?.throwIfAborted();
     const upload = randomName();
-    const request = new XMLHttpRequest();
+    const sending = new XMLHttpRequest();
     const ended = new AbortController();
-    const cancel = () => request.abort();
+    const cancel = () => sending.abort();
     signal?.addEventListener("abort", cancel, { once: true });
-    request.upload.addEventListener("progress", ({ loaded, total }) => {
+    sending.upload.addEventListener("progress", ({ loaded, total }) => {
       onProgress?.({ stage: "sending", share: total > 0 ? loaded / total : 0 });
     });
-    request.upload.addEventListener("load", () => {
+    sending.upload.addEventListener("load", () => {
       if (onProgress) void follow(upload, onProgress, ended.signal);
     });
-    request.addEventListener("loadend", () => {
+    sending.addEventListener("loadend", () => {
       ended.abort();
       signal?.removeEventListener("abort", cancel);
     });
-    request.addEventListener("abort", () => reject(signal?.reason as Error));
-    request.addEventListener("error", () => reject(ProblemError.unreachable()));
-    request.addEventListener("load", () => {
-      if (request.status >= 300) reject(ProblemError.from(request.status, request.responseText));
-      else resolve(JSON.parse(request.responseText) as Motion);
+    sending.addEventListener("abort", () => reject(signal?.reason as Error));
+    sending.addEventListener("error", () => reject(ProblemError.unreachable()));
+    sending.addEventListener("load", () => {
+      if (sending.status >= 300) reject(refusedWith(ProblemError.from(sending.status, sending.responseText)));
+      else resolve(JSON.parse(sending.responseText) as Motion);
     });
-    request.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${upload}`);
-    request.setRequestHeader("Content-Type", "application/octet-stream");
-    request.send(file);
+    sending.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${upload}`);
+    sending.setRequestHeader("Content-Type", "application/octet-stream");
+    for (const [name, value] of Object.entries(authorization())) sending.setRequestHeader(name, value);
+    sending.send(file);
   });
 }
 
@@ -199,18 +172,7 @@ function page(cursor: string | undefined): string {
 }
 
 async function ask(method: string, path: string, body?: unknown): Promise<unknown> {
-  const options: RequestInit = { method };
-  if (body !== undefined) {
-    options.body = JSON.stringify(body);
-    options.headers = { "Content-Type": "application/json" };
-  }
-  let answer: Response;
-  try {
-    answer = await fetch(path, options);
-  } catch {
-    throw ProblemError.unreachable();
-  }
-  const said = await answer.text();
-  if (!answer.ok) throw ProblemError.from(answer.status, said);
+  const sent = body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
+  const said = await (await request(path, { method, ...sent })).text();
   return said === "" ? null : JSON.parse(said);
 }

@@ -4,7 +4,7 @@ import { readTable } from "../marionette/arm";
 import { armProportions } from "../marionette/limbs";
 import { PulledHand, PulledLeg } from "../marionette/pulled";
 import type { Figure } from "../motion/skeleton";
-import { ProblemError } from "./library";
+import { request } from "./access";
 import type { Solver } from "./solver";
 
 /** The limbs of `figure`; `tables` are what `readTable` gave for the left and the right arm. */
@@ -25,12 +25,6 @@ export async function fetchMarionette(figure: Figure, origin: string): Promise<S
 
 async function fetchTable(figure: Figure, limb: 0 | 1, origin: string): Promise<Float64Array> {
   const { identity } = armProportions(figure, limb);
-  let answer: Response;
-  try {
-    answer = await fetch(`${origin}/v1/arms/${identity}/table`);
-  } catch {
-    throw ProblemError.unreachable();
-  }
-  if (!answer.ok) throw ProblemError.from(answer.status, await answer.text());
+  const answer = await request(`${origin}/v1/arms/${identity}/table`);
   return readTable(new Uint8Array(await answer.arrayBuffer()));
 }

@@ -2,6 +2,7 @@
 
 import { LIMBS, type Pose } from "../motion/skeleton";
 import { type Grant, type Message, type Notice, type Presence, type Refusal, TARGET, VELOCITY } from "../wire/messages";
+import { ticketed } from "./access";
 import { Connection } from "./connection";
 import { OwnLimb } from "./own-limb";
 import { HAND_SPEED, LEG_SPEED, REACH, THIGH } from "./pull";
@@ -16,6 +17,9 @@ const ALIVE_EVERY = 100;
 const CROWDED = 512;
 /** An ask for a held limb ends after this, milliseconds (SPEC, Ownership). */
 export const ASK_LASTS = 20_000;
+
+/** The line of one who only watches. */
+const NO_LINE = { send: () => false, close: () => undefined, renew: () => undefined, waiting: 0 };
 
 /** One limb as the session knows it. */
 interface Hold {
@@ -40,8 +44,8 @@ interface Hold {
 }
 
 export interface PuppeteerOptions {
-  /** `ws(s)://.../control` of a session. */
-  url: string;
+  /** `ws(s)://.../control` of a session; null for one who only watches. */
+  url: string | null;
   /** The viewer of the same session: it has the clock, and shows one's own limbs at once. */
   viewer: Viewer;
   /** Local milliseconds, the viewer's. */
@@ -63,9 +67,10 @@ export class Puppeteer extends EventTarget {
 
   private readonly viewer: Viewer;
   private readonly now: () => number;
-  private readonly connection: Connection;
+  private readonly connection: Pick<Connection, "send" | "close" | "waiting" | "renew">;
   private readonly holdings: readonly Hold[];
   private readonly speaking: ReturnType<typeof setInterval>;
+  private readonly renew = () => this.connection.renew();
 
   constructor(options: PuppeteerOptions) {
     super();
@@ -75,13 +80,16 @@ export class Puppeteer extends EventTarget {
       limb: new OwnLimb(limb), holder: null, wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], anchored: false, inputAt: 0, heardAt: 0,
       ask: "none", askedAt: 0,
     }));
-    this.connection = new Connection({
-      url: () => options.url,
+    const { url } = options;
+    this.connection = url === null ? NO_LINE : new Connection({
+      url: () => ticketed(url),
       onOpen: () => undefined,
       onMessage: (message) => this.receive(message),
       onMalformed: () => undefined,
       onClosed: (reason, final) => this.lost(reason, final),
     });
+    // over the same way, this line may be lost too
+    this.viewer.addEventListener("replaced", this.renew);
     this.speaking = setInterval(() => this.speak(), INPUT_EVERY);
   }
 
@@ -270,7 +278,10 @@ export class Puppeteer extends EventTarget {
       hold.ask = "none";
       if (final) this.drop(hold);
     }
-    if (final) clearInterval(this.speaking);
+    if (final) {
+      clearInterval(this.speaking);
+      this.viewer.removeEventListener("replaced", this.renew);
+    }
     this.dispatchEvent(new CustomEvent("closed", { detail: reason }));
   }
 

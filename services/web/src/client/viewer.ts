@@ -14,8 +14,10 @@ import type { AudioStore } from "../playout/sounds";
 import { positionAt, Timelines } from "../playout/timeline";
 import { Tracks } from "../playout/tracks";
 import {
-  type Choice, type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type TimelineState,
+  type Choice, type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type Report, type TimelineState,
 } from "../wire/messages";
+import { ticketed } from "./access";
+import { Asking } from "./asking";
 import { Connection } from "./connection";
 import type { LineFigures } from "./line-figures";
 import { Meter } from "./meter";
@@ -28,17 +30,12 @@ import type { ViewerOptions } from "./viewer-options";
 export type Timeline = TimelineState;
 export type { LineFigures, Presence, ViewerOptions };
 
-const PING_BURST = 8;
-const PING_BURST_EVERY = 60;
-const PING_EVERY = 2_000;
-const REPORT_EVERY = 1_000;
-
 /** Weight of the newest in running means. */
 const NEWEST = 1 / 8;
 
 const NO_BLOCKS = new Int8Array(0);
 
-/** Events: "figure", "tracks" (more of them are known), "timeline", "presence", "blocks", "open", and "closed" (a CustomEvent whose detail is the reason). */
+/** Events: "figure", "tracks" (more of them are known), "timeline", "presence", "blocks", "open", "replaced" (by another line, as the one before fell silent), and "closed" (a CustomEvent whose detail is the reason). */
 export class Viewer extends EventTarget {
   /** The reference clock, in microseconds of local time. */
   readonly clock = new ReferenceClock();
@@ -63,9 +60,7 @@ export class Viewer extends EventTarget {
   private readonly delay = new PlayoutDelay();
   private readonly following = new Following();
   private readonly meter = new Meter();
-  private readonly reporting: ReturnType<typeof setInterval>;
-  private pinging: ReturnType<typeof setTimeout> | undefined;
-  private pings = 0;
+  private readonly asking: Asking;
   private tracks: Tracks | null = null;
   private readonly dance = restPose();
   private readonly merged = restPose();
@@ -89,13 +84,14 @@ export class Viewer extends EventTarget {
     this.solver = new OwnSolver(this.url.origin.replace(/^ws/, "http"), options.solver);
     this.started = this.now();
     this.connection = new Connection({
-      url: () => this.address(),
-      onOpen: () => this.opened(),
+      url: () => ticketed(this.address()),
+      answered: true,
+      onOpen: (replaced) => this.opened(replaced),
       onMessage: (message, bytes) => this.receive(message, bytes),
       onMalformed: () => void this.damaged++,
       onClosed: (reason, final) => this.lost(reason, final),
     });
-    this.reporting = setInterval(() => this.report(), REPORT_EVERY);
+    this.asking = new Asking((message) => this.connection.send(message), this.now, () => this.fares());
   }
 
   private get store(): BlockStore | null {
@@ -259,49 +255,42 @@ export class Viewer extends EventTarget {
   }
 
   private address(): string {
-    const { tracks, resume } = this;
-    if (!tracks || resume?.motion !== this.motion) return this.url.href;
-    return returningUrl(this.url, tracks, resume, this.clock.at(this.now() * 1000), !this.connectsToSession);
+    const { tracks } = this;
+    const timeline = this.timelines.newest;
+    if (!tracks || !timeline || timeline.motion !== this.motion) return this.url.href;
+    return returningUrl(this.url, tracks, timeline, this.clock.at(this.now() * 1000), !this.connectsToSession);
   }
 
   private get connectsToSession(): boolean {
     return this.url.pathname.includes("/sessions/");
   }
 
-  private opened(): void {
+  private opened(replaced: boolean): void {
     this.closedReason = null;
+    this.resume = this.timelines.newest;
     this.clock.restart();
     this.timelines.restart();
-    this.pings = 0;
-    this.ping();
+    this.asking.begin();
     this.solver.prepare(this.figure);
     this.tell("open");
+    if (replaced) this.tell("replaced");
   }
 
   private lost(reason: string, final: boolean): void {
     this.closedReason = reason;
     this.ended = final;
-    this.resume = this.timelines.newest;
-    clearTimeout(this.pinging);
-    if (final) clearInterval(this.reporting);
+    if (final) this.asking.end();
+    else this.asking.pause();
     this.dispatchEvent(new CustomEvent("closed", { detail: reason }));
   }
 
-  private ping(): void {
-    const sent = Math.round(this.now() * 1000);
-    if (!this.connection.send({ name: "Ping", sequence: this.pings, sent })) return;
-    this.pings++;
-    this.pinging = setTimeout(() => this.ping(), this.pings < PING_BURST ? PING_BURST_EVERY : PING_EVERY);
-  }
-
-  private report(): void {
-    this.connection.send({
-      name: "Report",
+  private fares(): Omit<Report, "name"> {
+    return {
       buffer: Math.round(this.line().bufferSeconds * 1e6),
       decode: Math.round(this.decodeMs * 1000),
       frame: Math.round(this.frameMs * 1000),
       hidden: typeof document !== "undefined" && document.hidden,
-    });
+    };
   }
 
   private receive(message: Message, bytes: number): void {
@@ -332,6 +321,7 @@ export class Viewer extends EventTarget {
         break;
       case "Pong":
         this.clock.pong(message.sent, message.received, message.answered, now * 1000);
+        this.asking.answered(message.sequence);
         break;
       default:
         break;

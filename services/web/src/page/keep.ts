@@ -1,5 +1,6 @@
 /** "Keep this": the performance on the stage, with what was pulled, becomes a dance of its own. */
-import { ProblemError, type Motion } from "../client/library";
+import type { Motion } from "../client/library";
+import { ProblemError } from "../client/problem";
 import type { Toast } from "./toast";
 
 /** Keeps a session's performance as a new motion of a name. Rejects with ProblemError. */

@@ -1,5 +1,6 @@
 /** Everything of the page that is not the stage, put together: one call of `render...` per kind of news. */
 import type { Mapping } from "../input/mapping";
+import { may } from "../client/access";
 import { createAsks, type Asks } from "./asks";
 import { createHeader, type Header } from "./header";
 import { createKeys } from "./keys";
@@ -75,7 +76,7 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
     while (panels.closeLast());
     on.reframe();
   });
-  acceptDrops(root, on.files);
+  if (may("ingest")) acceptDrops(root, on.files);
   return {
     header, transport, library, strings, line, keys, tags, asks, panels, toast,
     notice(title, text = "") {

@@ -60,7 +60,8 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
       const mine = holder?.mine ?? false;
       glyph.disabled = !mine || !ready;
       setAttribute(glyph, "aria-pressed", mine ? String(selected) : null);
-      pad.show(mine && selected && ready);
+      // also while the line is away: what is held is asked for again, and who presses goes on
+      pad.show(mine && selected);
     };
     return { limb, row, render };
   });

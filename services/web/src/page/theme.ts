@@ -1,5 +1,6 @@
 /** Night or day: the system's wish, until the toggle says otherwise; remembered. */
 import type { Theme } from "../stage/look";
+import { browserStore } from "../storage/store";
 
 const KEY = "bunraku.theme";
 
@@ -25,25 +26,13 @@ export function createTheme(changed: (theme: Theme) => void): ThemeChoice {
     },
     toggle() {
       chosen = current() === "night" ? "day" : "night";
-      store(chosen);
+      browserStore.put(KEY, chosen);
       apply();
     },
   };
 }
 
 function stored(): Theme | null {
-  try {
-    const value = localStorage.getItem(KEY);
-    return value === "night" || value === "day" ? value : null;
-  } catch {
-    return null; // Storage may be forbidden; the choice then lasts as long as the page.
-  }
-}
-
-function store(theme: Theme): void {
-  try {
-    localStorage.setItem(KEY, theme);
-  } catch {
-    // As above.
-  }
+  const value = browserStore.get(KEY);
+  return value === "night" || value === "day" ? value : null;
 }

@@ -1,5 +1,6 @@
 /** Sends files one after another, with true progress, and tells problems in the server's own plain words. */
-import { ProblemError, uploadMotion, type Motion } from "../client/library";
+import { uploadMotion, type Motion } from "../client/library";
+import { ProblemError } from "../client/problem";
 import type { Library } from "./library";
 
 /** Uploads `files` in turn; `done` gets each motion as it is stored. */

@@ -1,12 +1,10 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { loadPreference, savePreference } from "../../src/audio/preference";
+import { forbidStorage, stubStorage } from "../storage/stubs";
 
-const stored = new Map<string, string>();
+let stored: Map<string, string>;
 
-beforeEach(() => {
-  stored.clear();
-  vi.stubGlobal("localStorage", { getItem: (key: string) => stored.get(key) ?? null, setItem: (key: string, value: string) => void stored.set(key, value) });
-});
+beforeEach(() => void (stored = stubStorage("localStorage")));
 afterEach(() => void vi.unstubAllGlobals());
 
 test("sound is wanted unless told otherwise, and what was told is remembered", () => {
@@ -21,7 +19,7 @@ test.each(["{", "null", '"loud"', '{"on":"yes","volume":3}', '{"volume":-1}', '{
 });
 
 test("where storage is forbidden it lasts as long as the page", () => {
-  vi.stubGlobal("localStorage", { getItem: () => { throw new Error("forbidden"); }, setItem: () => { throw new Error("forbidden"); } });
+  forbidStorage("localStorage");
   expect(loadPreference().on).toBe(true);
   expect(() => savePreference({ on: false, volume: 1 })).not.toThrow();
 });

@@ -1,8 +1,15 @@
 /** Chromium drawing in software, so that it runs where there is no graphics processor. */
-import { chromium, type Browser } from "playwright-core";
+import { existsSync } from "node:fs";
+import { chromium as playwright, type Browser } from "playwright-core";
+
+/** The Chromium of this machine, if it has one. */
+export function chromium(): string | null {
+  const places = [process.env["CHROMIUM"], "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+  return places.find((place): place is string => place !== undefined && existsSync(place)) ?? null;
+}
 
 export function launch(executablePath: string, ...more: string[]): Promise<Browser> {
-  return chromium.launch({
+  return playwright.launch({
     executablePath,
     args: [
       "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",

@@ -1,41 +1,15 @@
 /** A file dropped on the page in a real browser. */
-import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { bowing } from "./bowing";
-import { launch } from "./chromium";
-import { chromium, startServer, type RunningServer } from "./server";
-
-const PATIENCE = 90_000;
+import { describeInBrowser } from "./in-browser";
 
 /** Two seconds. */
 const DANCE = bowing(60);
 
-const path = chromium();
-if (!path && process.env["CI"]) throw new Error("the browser tests must run in CI: install Chromium");
-if (!path) console.warn("browser test of dropping skipped: Chromium is not installed");
-
-describe.skipIf(!path)("a drop on the page", { timeout: 2 * PATIENCE }, () => {
-  let server: RunningServer;
-  let browser: Browser;
-  let page: Page;
-
-  beforeAll(async () => {
-    [server, browser] = await Promise.all([startServer({ demo: false }), launch(path ?? "")]);
-    // Small, as the picture is drawn in software.
-    page = await browser.newPage({ viewport: { width: 500, height: 400 }, reducedMotion: "reduce" });
-    page.setDefaultTimeout(PATIENCE);
-    page.on("pageerror", (error) => {
-      throw error;
-    });
-    await page.goto(server.url);
-    await page.getByRole("complementary", { name: "Library" }).waitFor();
-  }, PATIENCE);
-  afterAll(async () => {
-    await browser?.close();
-    await server?.stop();
-  }, PATIENCE);
-
+describeInBrowser("a drop on the page", {}, ({ open }) => {
   test("a file dropped anywhere on the page is uploaded and danced", async () => {
+    const page = await open("", { viewport: { width: 500, height: 400 }, reducedMotion: "reduce" });
+    await page.getByRole("complementary", { name: "Library" }).waitFor();
     await page.evaluate(drag, { type: "dragover", name: "dropped.bvh", text: DANCE });
     await page.locator(".drop-frame").waitFor();
     await page.evaluate(drag, { type: "drop", name: "dropped.bvh", text: DANCE });

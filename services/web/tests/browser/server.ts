@@ -1,23 +1,30 @@
 /** Real servers for browser tests: `bunraku up` on a free port, keeping its things in a folder of its own. */
-import { spawn } from "node:child_process";
+import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 
 const REPOSITORY = resolve(import.meta.dirname, "../../../..");
 
+export interface ServerOptions {
+  /** Whether our own dance is on its stage. */
+  demo?: boolean;
+  /** What its tokens are signed with; without one it lets everybody in. */
+  secret?: string;
+}
+
 export interface RunningServer {
   url: string;
   stop(): Promise<void>;
 }
 
-/** Start a server, with our own dance on its stage if `demo`; resolves once it answers. */
-export async function startServer({ demo = true } = {}): Promise<RunningServer> {
+/** Start a server; resolves once it answers. */
+export async function startServer({ demo = false, secret = "" }: ServerOptions = {}): Promise<RunningServer> {
   const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
   const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
   const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
     stdio: ["ignore", "pipe", "inherit"],
-    env: { ...process.env, COLUMNS: "200", NO_COLOR: "1" },
+    env: { ...process.env, COLUMNS: "200", NO_COLOR: "1", BUNRAKU_SECRET: secret },
   });
   const ended = new Promise<void>((done) => server.once("exit", () => done()));
   const url = await new Promise<string>((found, failed) => {
@@ -39,14 +46,15 @@ export async function startServer({ demo = true } = {}): Promise<RunningServer> 
   };
 }
 
+/** A token of a server with this secret, as its operator makes them. */
+export function makeToken(secret: string, role: string): string {
+  const made = spawnSync(join(REPOSITORY, ".venv/bin/bunraku"), ["token", "--role", role], { env: { ...process.env, BUNRAKU_SECRET: secret }, encoding: "utf8" });
+  if (made.status !== 0) throw new Error(`no token: ${made.stderr}`);
+  return made.stdout.trim();
+}
+
 /** The folder of real clips beside the project, if it is there. */
 export function sharedFolder(): string | null {
   const folder = process.env["BUNRAKU_SHARED"] ?? resolve(REPOSITORY, "../shared");
   return existsSync(join(folder, "mocap/bvh")) ? folder : null;
-}
-
-/** The Chromium of this machine, if it has one. */
-export function chromium(): string | null {
-  const places = [process.env["CHROMIUM"], "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
-  return places.find((place): place is string => place !== undefined && existsSync(place)) ?? null;
 }

@@ -6,17 +6,21 @@ import { Line } from "./line";
 beforeEach(() => Line.install());
 afterEach(() => Line.remove());
 
-function connect() {
+function connect(answered = false) {
   const heard: Message[] = [], closed: [string, boolean][] = [], malformed: string[] = [];
-  let open = 0;
+  let open = 0, replacements = 0;
   const connection = new Connection({
     url: () => "ws://stage/stream",
-    onOpen: () => open++,
+    answered,
+    onOpen: (replaced) => {
+      open++;
+      if (replaced) replacements++;
+    },
     onMessage: (message) => heard.push(message),
     onMalformed: (error) => malformed.push(error.message),
     onClosed: (reason, final) => closed.push([reason, final]),
   });
-  return { connection, heard, closed, malformed, opened: () => open };
+  return { connection, heard, closed, malformed, opened: () => open, replaced: () => replacements };
 }
 
 test("offers the subprotocol, takes bytes, and sends only over an open line", () => {
@@ -95,4 +99,72 @@ test("closed here it stays closed, and says so once", () => {
   expect(closed).toEqual([["closed here", true]]);
   expect(heard).toEqual([]);
   expect(Line.opened).toHaveLength(1);
+});
+
+const ASKED: Message = { name: "Ping", sequence: 0, sent: 1 };
+const HEARD: Message = { name: "Grant", limb: 0, epoch: 4 };
+
+test("another line is tried once nothing was heard for four seconds after something was said, and is the line once it is heard", () => {
+  const { connection, heard, closed, opened, replaced } = connect(true);
+  const silent = Line.last;
+  silent.accept();
+  silent.say(HEARD);
+  // nothing was asked since
+  vi.advanceTimersByTime(30_000);
+  expect(Line.opened).toHaveLength(1);
+  connection.send({ ...ASKED } as never);
+  vi.advanceTimersByTime(3_999);
+  expect(Line.opened).toHaveLength(1);
+  vi.advanceTimersByTime(1);
+  expect(Line.opened).toHaveLength(2);
+  const other = Line.last;
+  other.accept();
+  expect([opened(), silent.readyState]).toEqual([1, 1]);
+  other.say(HEARD);
+  expect([opened(), replaced(), silent.readyState, other.readyState]).toEqual([2, 1, 3, 1]);
+  connection.send({ ...ASKED } as never);
+  expect(other.sent).toHaveLength(1);
+  // what the old one says still, and its end, are nothing to anybody
+  silent.say(HEARD);
+  silent.end(1006);
+  expect([heard.length, closed.length]).toEqual([2, 0]);
+});
+
+test("a silent line that is heard first stays, and the other is let go", () => {
+  const { connection, heard, opened } = connect(true);
+  const silent = Line.last;
+  silent.accept();
+  connection.send({ ...ASKED } as never);
+  vi.advanceTimersByTime(4_000);
+  const other = Line.last;
+  silent.say(HEARD);
+  expect([Line.opened.length, other.readyState, silent.readyState, opened(), heard.length]).toEqual([2, 3, 1, 1, 1]);
+  other.end(1006);
+  silent.say(HEARD);
+  expect(heard).toHaveLength(2);
+});
+
+test("a line that does not come about is tried beside too, again and again, one at a time", () => {
+  const { closed } = connect(true);
+  vi.advanceTimersByTime(12_000);
+  expect(Line.opened.map(({ readyState }) => readyState)).toEqual([0, 3, 3, 0]);
+  Line.opened[0].end(1006);
+  expect(closed).toEqual([["the line was lost", false]]);
+  expect(Line.last.readyState).toBe(3);
+  vi.advanceTimersByTime(250);
+  expect(Line.opened).toHaveLength(5);
+});
+
+test("without answers to be expected silence means nothing; another line can be asked for", () => {
+  const { connection, replaced } = connect();
+  Line.last.accept();
+  connection.send({ name: "Claim", limb: 0 });
+  vi.advanceTimersByTime(60_000);
+  expect(Line.opened).toHaveLength(1);
+  connection.renew();
+  Line.last.say(HEARD);
+  expect([Line.opened.length, replaced()]).toEqual([2, 1]);
+  connection.close();
+  connection.renew();
+  expect([Line.opened.length, Line.last.readyState]).toEqual([2, 3]);
 });

@@ -63,12 +63,6 @@ describe("problems", () => {
     });
   });
 
-  test.each(["", "<html>502</html>", "null", "[1]", '{"title": 5}'])("from a proxy that says %j have the status", (body) => {
-    const problem = library.ProblemError.from(502, body);
-    expect([problem.status, problem.title, problem.detail]).toEqual([502, "The server refused", "it answered 502"]);
-    expect([problem.hint, problem.line]).toEqual([null, null]);
-  });
-
   test("where nobody answers", async () => {
     vi.stubGlobal("fetch", () => Promise.reject(new TypeError("fetch failed")));
     await expect(library.listMotions()).rejects.toMatchObject({ name: "ProblemError", status: 0, title: "No answer" });

@@ -72,6 +72,23 @@ test("is welcomed", () => {
   expect(puppeteer.limits).toMatchObject({ reach: 1, handSpeed: 1, legSpeed: 2 });
 });
 
+test("where the viewer's silent line is replaced it tries another too, and asks again for what it holds", () => {
+  puppeteer.claim(0);
+  line.say({ name: "Grant", limb: 0, epoch: 3 });
+  viewer.dispatchEvent(new Event("replaced"));
+  const other = Line.last;
+  expect(other).not.toBe(line);
+  other.accept();
+  expect(puppeteer.id).toBe("a1");
+  other.say({ name: "Welcome", id: "b2", colour: 3, lead: 100_000 });
+  expect([puppeteer.id, line.readyState]).toEqual(["b2", 3]);
+  expect(other.of("Claim")).toEqual([{ name: "Claim", limb: 0 }]);
+  puppeteer.close();
+  const count = Line.opened.length;
+  viewer.dispatchEvent(new Event("replaced"));
+  expect(Line.opened).toHaveLength(count);
+});
+
 describe("a limb", () => {
   test("is claimed, granted and let go with its epoch", () => {
     const granted: unknown[] = [];

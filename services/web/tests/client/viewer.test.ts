@@ -15,11 +15,13 @@ const golden = vectors<BlockVectors>("blocks").valid;
 const [best, lowest, , last] = golden.map((vector) => bytes(vector.block));
 
 let now = 0;
+/** Questions for the time that were answered. */
+let answered = 0;
 let viewer: Viewer;
 
 beforeEach(() => {
   Line.install();
-  now = 0;
+  now = answered = 0;
 });
 afterEach(() => {
   viewer.close();
@@ -49,6 +51,18 @@ function timeline(change: Partial<TimelineState> = {}): Message {
 
 function data(index: number, rate: number, block: Uint8Array): Message {
   return { name: "Data", track: 1, rate, index, block };
+}
+
+/** `ms` pass, and the server answers each question after 40 ms at the latest. */
+function passAnswered(ms: number): void {
+  for (const end = now + ms; now < end; ) {
+    pass(Math.min(20, end - now));
+    for (const { sequence, sent } of Line.last.of("Ping")) {
+      if (sequence < answered || now * 1000 - sent < 40_000) continue;
+      answered = sequence + 1;
+      Line.last.say({ name: "Pong", sequence, sent, received: UNIX + sent + 20_000, answered: UNIX + sent + 20_000 });
+    }
+  }
 }
 
 /** A viewer whose server has greeted it, described the dance, and started it now. */
@@ -168,18 +182,15 @@ test("overlays that come late are shown as much later, and the dance with them",
 
 test("pings in a burst, then every two seconds, and takes the smallest round trip", () => {
   watching();
-  pass(60 * 7);
+  passAnswered(60 * 7);
   expect(Line.last.of("Ping")).toHaveLength(8);
-  pass(1_999);
+  passAnswered(1_999);
   expect(Line.last.of("Ping")).toHaveLength(8);
-  pass(1);
+  passAnswered(1);
   const pings = Line.last.of("Ping");
   expect(pings).toHaveLength(9);
   expect(new Set(pings.map((ping) => ping.sequence)).size).toBe(9);
-  const { sequence, sent } = pings[8];
-  pass(40);
-  const at = UNIX + sent + 20_000;
-  Line.last.say({ name: "Pong", sequence, sent, received: at, answered: at });
+  passAnswered(40);
   expect(viewer.line().clockErrorMs).toBe(20);
   expect(viewer.clockTime(now)).toBeCloseTo(UNIX + now * 1000, -1);
 });
@@ -188,12 +199,12 @@ test("reports once a second what is ready and how long drawing takes", () => {
   watching();
   Line.last.say(data(0, 1, best), data(1, 0, lowest));
   for (let frame = 0; frame < 200; frame++) viewer.drawn(8);
-  pass(1_000);
+  passAnswered(1_000);
   const [report] = Line.last.of("Report");
   expect(report.buffer).toBe(1_000_000);
   expect(report.frame).toBeCloseTo(8_000, -1);
   expect(report.hidden).toBe(false);
-  pass(2_000);
+  passAnswered(2_000);
   expect(Line.last.of("Report")).toHaveLength(3);
 });
 
@@ -304,6 +315,25 @@ describe("when the line is lost", () => {
     pass(250);
     expect(new URL(Line.last.url).searchParams.get("have")).toBe("dance.0.1--.2");
     expect(new URL(Line.last.url).searchParams.has("at")).toBe(false);
+  });
+
+  test("a line that falls silent is replaced by another, where the dance goes on as it was", () => {
+    watching(MOTION);
+    Line.last.say(data(0, 1, best), timeline({ epoch: 2, clock: UNIX, position: 700_000, playing: false, loop: false }));
+    const told: string[] = [];
+    for (const event of ["open", "replaced", "closed"]) viewer.addEventListener(event, () => told.push(event));
+    const silent = Line.last;
+    // it is asked for the time now and then, and does not answer
+    pass(6_500);
+    expect(Line.opened.length).toBeGreaterThan(1);
+    expect(Line.last.url).toContain("have=dance.0.1--.2&at=0.700000");
+    Line.last.accept();
+    expect([told, silent.readyState]).toEqual([[], 1]);
+    Line.last.say(header(), description(), timeline({ position: 700_000 }));
+    expect([told, silent.readyState]).toEqual([["open", "replaced"], 3]);
+    expect(Line.last.of("Edit")).toEqual([{ name: "Edit", playing: false, position: null, loop: false }]);
+    expect(Line.last.of("Ping")).toHaveLength(1);
+    expect([...viewer.blocks]).toEqual([1, -1, -1]);
   });
 
   test("a missing session is the end", () => {

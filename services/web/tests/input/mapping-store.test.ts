@@ -1,18 +1,12 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { bind, DEFAULT_MAPPING } from "../../src/input/mapping";
 import { loadMapping, saveMapping } from "../../src/input/mapping-store";
+import { forbidStorage, stubStorage } from "../storage/stubs";
 
 let kept: Map<string, string>;
 
-beforeEach(() => {
-  kept = new Map();
-  vi.stubGlobal("localStorage", {
-    getItem: (key: string) => kept.get(key) ?? null,
-    setItem: (key: string, value: string) => kept.set(key, value),
-    removeItem: (key: string) => kept.delete(key),
-  });
-});
-afterEach(() => vi.unstubAllGlobals());
+beforeEach(() => void (kept = stubStorage("localStorage")));
+afterEach(() => void vi.unstubAllGlobals());
 
 test("what is kept comes back; the default is kept by keeping nothing", () => {
   const mine = { ...bind(DEFAULT_MAPPING, "KeyZ", "keep"), deadZone: 0.3 };
@@ -33,10 +27,7 @@ test.each([
 });
 
 test("storage that is forbidden is no error", () => {
-  const forbidden = () => {
-    throw new Error("forbidden");
-  };
-  vi.stubGlobal("localStorage", { getItem: forbidden, setItem: forbidden, removeItem: forbidden });
+  forbidStorage("localStorage");
   expect(loadMapping()).toBe(DEFAULT_MAPPING);
   expect(() => saveMapping({ ...DEFAULT_MAPPING })).not.toThrow();
 });

@@ -1,5 +1,6 @@
 import { describe, expect, test } from "vitest";
-import { ProblemError, type Motion } from "../../src/client/library";
+import type { Motion } from "../../src/client/library";
+import { ProblemError } from "../../src/client/problem";
 import { keepThis, keptName, type Keep } from "../../src/page/keep";
 import type { ToastAction } from "../../src/page/toast";
 

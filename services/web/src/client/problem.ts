@@ -1,0 +1,35 @@
+/** What went wrong over HTTP, in words for the person who gets it (RFC 9457). `status` is 0 where no server answered. */
+export class ProblemError extends Error {
+  override readonly name = "ProblemError";
+
+  constructor(
+    readonly status: number,
+    readonly title: string,
+    readonly detail: string,
+    readonly hint: string | null = null,
+    readonly line: number | null = null,
+    readonly field: string | null = null,
+  ) {
+    super(`${title}: ${detail}`);
+  }
+
+  /** The problem in the body of an answer of `status`, of whatever form. */
+  static from(status: number, body: string): ProblemError {
+    let said: Record<string, unknown> = {};
+    try {
+      const parsed: unknown = JSON.parse(body);
+      if (typeof parsed === "object" && parsed !== null) said = parsed as Record<string, unknown>;
+    } catch {
+      // a proxy's page, or nothing: the status has to do
+    }
+    const text = (value: unknown) => (typeof value === "string" ? value : null);
+    return new ProblemError(
+      status, text(said.title) ?? "The server refused", text(said.detail) ?? `it answered ${status}`, text(said.hint),
+      typeof said.line === "number" ? said.line : null, text(said.field),
+    );
+  }
+
+  static unreachable(): ProblemError {
+    return new ProblemError(0, "No answer", "the server cannot be reached", "look at the line, then try again");
+  }
+}
