@@ -25,8 +25,7 @@ def test_colours_are_the_first_free_ones_and_a_stage_is_full_some_day(monkeypatc
     assert here.get(three.id) is three
     assert here.join("e", "e", print, 5).colour == 1
     assert len(here) == 3
-    here.tell(one.id, b"x")
-    here.tell(two.id, b"y")
+    one.tell(b"x")
     assert told == [("a", b"x")]
 
 

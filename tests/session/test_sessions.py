@@ -154,6 +154,8 @@ async def test_another_replica_goes_on_with_the_sessions_of_one_that_died(
     stage.say(ben, Claim(0).pack())
     assert ben.gone
     assert len(told(ben, Grant)) == 1
+    assert dead.sessions.tally.sessions == {("opened",): 1, ("taken over",): 0, ("handed on",): 0}
+    assert living.sessions.tally.sessions == {("opened",): 0, ("taken over",): 1, ("handed on",): 0}
 
 
 async def test_one_that_ends_in_order_leaves_its_sessions_at_once(
@@ -168,6 +170,7 @@ async def test_one_that_ends_in_order_leaves_its_sessions_at_once(
     assert ben.gone
     await heard.first(TimelineState)
     assert (await staying.sessions.stage(opened["id"]).describe())["motion"] == "one"
+    assert ending.sessions.tally.sessions["handed on",] == staying.sessions.tally.sessions["taken over",] == 1
 
 
 async def test_one_that_stood_still_finds_its_sessions_elsewhere(backing: Backing, replicas: list[Replica]) -> None:

@@ -179,8 +179,12 @@ async def test_presence_counts_viewers_of_all_replicas(bus: MemoryBus) -> None:
     audience = Audience(bus)
     for replica, count in (("a", 3), ("b", 4), ("a", 2), ("b", 0)):
         bus.publish("session.s.viewers", msgpack.packb([replica, count]))
-    counts = [p.viewers for p in await audience.until(4, Presence) if isinstance(p, Presence)]
-    assert counts == [3, 7, 6, 2]
+    # the first at once; then those of half a second together, however many replicas there are
+    counts = [p.viewers for p in await audience.until(2, Presence) if isinstance(p, Presence)]
+    assert counts == [3, 2]
+    bus.publish("session.s.viewers", msgpack.packb(["b", 1]))
+    counts = [p.viewers for p in await audience.until(3, Presence) if isinstance(p, Presence)]
+    assert counts == [3, 2, 3]
 
 
 async def test_an_asked_limb_goes_to_who_asked_when_it_is_let_go(stage: Stage, bus: MemoryBus) -> None:
@@ -199,6 +203,24 @@ async def test_an_asked_limb_goes_to_who_asked_when_it_is_let_go(stage: Stage, b
     assert [ben.id] in [p.asks[1] for p in presences]
     stage.leave(ben.at)
     assert stage.presence.limbs[1] is None
+
+
+@pytest.mark.parametrize("said", [Alive([0]), Input(0, Input.TARGET, 1, 5, 0, (0.1, 0.0, 0.0))])
+async def test_who_missed_that_a_limb_was_lost_is_told_again(stage: Stage, said: Alive | Input) -> None:
+    aiko = enter(stage, "Aiko")
+    ben = enter(stage, "Ben")
+    stage.hear(aiko.at, Claim(0))
+    # it is taken from her while nothing can be said
+    stage._marionette.release(0, aiko.id, granted(aiko).epoch, clock())
+    for _ in range(5):
+        stage.hear(aiko.at, said)
+        stage.hear(ben.at, said)
+    assert not [m for m in map(unpack, ben.told) if isinstance(m, Refusal)]
+    assert [m for m in map(unpack, aiko.told) if isinstance(m, Refusal)] == [Refusal(0, "lost")]
+    stage.hear(aiko.at, Claim(0))
+    told = len(aiko.told)
+    stage.hear(aiko.at, Alive([0]))
+    assert not [m for m in map(unpack, aiko.told[told:]) if isinstance(m, Refusal)]
 
 
 async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(stage: Stage) -> None:

@@ -60,7 +60,7 @@ async def door(backing: Backing, owner: Owner) -> AsyncIterator[StageDoor]:
     assert stored is not None
     state = timeline.start("one", stored.track.duration_us, clock())
     stage = Stage("s", stored, Marionette(stored.track.figure), backing.bus, state, state.clock)
-    opened = StageDoor(stage, backing, owner)
+    opened = StageDoor(stage, backing, owner, 1)
     yield opened
     await opened.close()
 

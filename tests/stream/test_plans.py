@@ -2,57 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from bunraku.backing.backing import clock
-from bunraku.backing.library import StoredMotion, pack, unpack, with_audio
-from bunraku.codec.encode import encode_motion
-from bunraku.codec.scene_encode import encode_scene
-from bunraku.ingest.opus import encode_audio
+from bunraku.backing.library import StoredMotion
 from bunraku.playout import timeline
 from bunraku.stream import viewers
-from bunraku.stream.cohorts import Cohorts
-from bunraku.stream.plans import Plans
-from bunraku.stream.turns import Turns
-from bunraku.stream.viewers import Viewer
-from bunraku.wire.messages import Data, Report, TimelineState
-from tests.stream.lines import Line
-from tests.vectors.blocks import wandering_motion
-from tests.vectors.scene import camera
+from bunraku.wire.messages import Report
+from tests.stream.watching import Audience, Watched, filmed
 
 
 @pytest.fixture(scope="module")
 def motion() -> StoredMotion:
-    encoded = encode_motion(wandering_motion(9.2, 30.0, 9), ladder=(30.0, 5.0), grade="live")
-    filmed = unpack("m", pack("m", encoded, [encode_scene(camera(7.1, 25.0), ladder=(20.0, 4.0))]))
-    noise = np.random.default_rng(2).normal(0, 0.2, (441_600, 1)).astype(np.float32)
-    return unpack("m", with_audio("m", filmed, encode_audio([noise], filmed.track, 1))[0])
-
-
-class Audience:
-    """Some who are in step."""
-
-    def __init__(self) -> None:
-        self.plans = Plans()
-        self.cohorts = Cohorts(self.plans)
-
-    def turned(self) -> None: ...
-
-    def leave(self, viewer: Viewer) -> None: ...
-
-
-class Watched:
-    """One viewer, its turns taken by the test."""
-
-    def __init__(self, motion: StoredMotion, state: TimelineState, audience: Audience | None) -> None:
-        self.viewer, self.line = Viewer(Turns()), Line()
-        self.viewer.audience = audience
-        self.viewer.timeline(state, motion)
-        self.viewer.open(self.line.outlet(self.viewer))
-
-    def sent(self) -> list[tuple[int, int, int]]:
-        return sorted((m.track, m.index, m.rate) for m in self.line.messages if isinstance(m, Data))
+    return filmed(9.2, 7.1, 9.2)
 
 
 @pytest.mark.parametrize("loop", [True, False])

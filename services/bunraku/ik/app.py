@@ -12,6 +12,7 @@ from fastapi import FastAPI, Header, Request, Response
 
 from bunraku import __version__
 from bunraku.backing import problems
+from bunraku.backing.access import Role, needs
 from bunraku.backing.problems import ProblemError
 from bunraku.ik import batch
 from bunraku.marionette import figures, table
@@ -77,6 +78,7 @@ def create_app() -> FastAPI:
             422: {"content": {problems.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
         },
     )
+    @needs(Role.VIEW, all=True)
     async def arm_table(proportions: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
         """The table of bends of an arm with these proportions: `L0-L1-L2-M0-M1-M2` in thousandths or
         ten-thousandths."""
@@ -93,6 +95,7 @@ def create_app() -> FastAPI:
             422: {"content": {problems.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
         },
     )
+    @needs(Role.VIEW, all=True)
     async def arm_figure(
         proportions: str, name: str, if_none_match: Annotated[str | None, Header()] = None
     ) -> Response:
@@ -107,6 +110,7 @@ def create_app() -> FastAPI:
         return _resource(stored, "image/svg+xml", if_none_match)
 
     @app.post("/v1/solve", response_model=batch.SolveAnswer, openapi_extra=batch.OPENAPI)
+    @needs(Role.VIEW, all=True, body=batch.LARGEST_BODY)
     async def solve(request: Request) -> Response:
         """Arms for hand targets and legs for thigh angles, in a batch; JSON or MessagePack."""
         kind = batch.content_kind(request.headers.get("content-type"))

@@ -11,13 +11,14 @@ from http import HTTPStatus
 from starlette.websockets import WebSocket
 
 from bunraku.backing import sockets
-from bunraku.backing.backing import clock
-from bunraku.backing.bus import Bus
+from bunraku.backing.access import access_of
+from bunraku.backing.backing import Backing, clock
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.sockets import Refusal
 from bunraku.backing.unavailable import Unavailable
 from bunraku.session.distant import DistantStage
 from bunraku.session.stage_door import PRESENT
+from bunraku.session.tally import RATE, Tally
 from bunraku.session.visitor import QUEUE, Visitor
 from bunraku.wire.messages import Input, MalformedMessage, Ping, Pong, unpack
 
@@ -27,20 +28,24 @@ NAME = 40
 """Characters of a puppeteer's name."""
 
 
-async def serve(socket: WebSocket, stage: DistantStage, bus: Bus, name: str) -> None:
-    """Bring a puppeteer to the stage until either ends."""
+async def serve(socket: WebSocket, stage: DistantStage, backing: Backing, name: str, tally: Tally) -> None:
+    """Bring a puppeteer to the stage until either ends, or what they came with; `tally` counts what is dropped here."""
     try:
         await sockets.accept(socket)
         visitor = Visitor()
-        listening = bus.subscribe(stage.told(visitor), visitor.tell)
+        ended = backing.gate.stay(access_of(socket), visitor.turn_out)
+        listening = backing.bus.subscribe(stage.told(visitor), visitor.tell)
         try:
             await _join(stage, visitor, name)
             try:
-                await sockets.converse(_listen(socket, stage, visitor), _tell(socket, visitor), _remind(stage, visitor))
+                await sockets.converse(
+                    _listen(socket, stage, visitor, tally), _tell(socket, visitor), _remind(stage, visitor)
+                )
             finally:
                 stage.say(visitor, None)
         finally:
             listening.end()
+            ended()
     except Refusal as refusal:
         await sockets.close(socket, refusal)
 
@@ -57,7 +62,7 @@ async def _join(stage: DistantStage, visitor: Visitor, name: str) -> None:
         raise Refusal(sockets.TOO_SLOW, "Not now", f"{error.what} cannot be used now; come again") from None
 
 
-async def _listen(socket: WebSocket, stage: DistantStage, visitor: Visitor) -> None:
+async def _listen(socket: WebSocket, stage: DistantStage, visitor: Visitor, tally: Tally) -> None:
     while True:
         data = await sockets.receive(socket)
         try:
@@ -68,6 +73,7 @@ async def _listen(socket: WebSocket, stage: DistantStage, visitor: Visitor) -> N
         if not visitor.may_speak(now):
             if isinstance(message, Input):
                 visitor.notice(message.limb, "rate", now)
+                tally.inputs[RATE] += 1
                 await asyncio.sleep(EXCESS)
                 continue
             await asyncio.sleep(EXCESS)
@@ -85,6 +91,8 @@ async def _tell(socket: WebSocket, visitor: Visitor) -> None:
             raise Refusal(sockets.TOO_SLOW, "Too slow", f"{QUEUE} messages waited; come again")
         while visitor.waiting:
             await socket.send_bytes(visitor.waiting.popleft())
+        if visitor.turned_out is not None:
+            raise visitor.turned_out
         if visitor.gone:
             raise Refusal(sockets.TOO_SLOW, "Session elsewhere", "the session went on at another server; come again")
 

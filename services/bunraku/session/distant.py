@@ -8,14 +8,12 @@ import msgpack
 
 from bunraku.backing.bus import Bus, NobodyAnswers, is_word
 from bunraku.backing.problems import ProblemError
-from bunraku.backing.register import Register
+from bunraku.backing.register import SESSIONS, Register
 from bunraku.session.requests import SessionEdit
 from bunraku.session.visitor import Visitor
 
 LOGGED = 10.0
 """Seconds to wait for a log of some megabytes to be stored."""
-KEY = "sessions"
-"""Of the register: `sessions.{id}` has what another replica needs to go on with a session."""
 
 
 class DistantStage:
@@ -66,7 +64,7 @@ class DistantStage:
         try:
             answer = await self._bus.ask(f"{self._subject}.{word}", msgpack.packb(question), seconds)
         except NobodyAnswers:
-            if await self._register.get(f"{KEY}.{self._session}") is None:
+            if await self._register.get(f"{SESSIONS}.{self._session}") is None:
                 raise nobody from None
             raise ProblemError(
                 503, "Session not here yet", "its server is gone, another takes it over", hint="try again in a second"

@@ -6,10 +6,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from bunraku.session.notices import Notices
+from bunraku.wire.messages import Refusal
 
 COLOURS = 5
 MOST = 32
 """Puppeteers of one session."""
+REMINDED = 1_000_000
+"""Microseconds after which one who still takes a limb for theirs is told again."""
 
 
 class Full(Exception):
@@ -19,20 +22,29 @@ class Full(Exception):
 @dataclass(eq=False, slots=True)
 class Puppeteer:
     """One who may take limbs, and how they are told something: `tell` takes one whole message, and returns at once.
-    `heard` is the clock time when something came from them last, microseconds."""
+    `heard` is the clock time when something came from them last, microseconds; `granted` are the limbs that were theirs
+    and that they have not let go."""
 
     id: str
     name: str
     colour: int
     tell: Callable[[bytes], None]
     heard: int
+    granted: set[int] = field(default_factory=set)
     _notices: Notices = field(default_factory=Notices)
+    _lost: dict[int, int] = field(default_factory=dict)
 
     def notice(self, limb: int, reason: str, now: int) -> None:
         """Say why an input was not taken as it came."""
         notice = self._notices.due(limb, reason, now)
         if notice is not None:
             self.tell(notice)
+
+    def lost(self, limb: int, now: int) -> None:
+        """Say that a limb is not theirs any more, at most once a second: what was said before may not have come."""
+        if limb in self.granted and now - self._lost.get(limb, -REMINDED) >= REMINDED:
+            self._lost[limb] = now
+            self.tell(Refusal(limb, "lost").pack())
 
 
 class Puppeteers:
@@ -63,8 +75,3 @@ class Puppeteers:
     def leave(self, puppeteer: Puppeteer) -> None:
         """One goes."""
         self._here.pop(puppeteer.id, None)
-
-    def tell(self, who: str, message: bytes) -> None:
-        """A message for one of them, if still here."""
-        if who in self._here:
-            self._here[who].tell(message)

@@ -41,8 +41,8 @@ class Recording(BaseModel):
     camera: Annotated[list[Keyframe], Field(max_length=MOST_KEYFRAMES)] = []
 
 
-async def keep(stage: DistantStage, asked: Recording, backing: Backing) -> dict[str, Any]:
-    """The new motion as the API shows it; raises `ProblemError`.
+async def keep(stage: DistantStage, asked: Recording, backing: Backing, subject: str = "") -> dict[str, Any]:
+    """The new motion, stored by `subject`, as the API shows it; raises `ProblemError`.
 
     Log and order lie in the library meanwhile: both may have more bytes than a bus takes in one message.
     """
@@ -50,6 +50,7 @@ async def keep(stage: DistantStage, asked: Recording, backing: Backing) -> dict[
     order = {
         **kept,
         "name": asked.name,
+        "subject": subject,
         "camera": [[key.time, *key.position, *key.gaze, key.fov] for key in asked.camera],
     }
     name = f"{kept['log']}-order"

@@ -17,16 +17,18 @@ from typing import Any, NamedTuple
 
 import msgpack
 
+from bunraku.backing import request_id
 from bunraku.backing.backing import Backing, clock
 from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
-from bunraku.backing.register import Conflict, Registered
+from bunraku.backing.register import SESSIONS, Conflict, Registered
 from bunraku.backing.unavailable import Unavailable
 from bunraku.marionette.merge import Marionette
 from bunraku.playout import timeline
-from bunraku.session.distant import KEY, DistantStage
+from bunraku.session.distant import DistantStage
 from bunraku.session.stage import Stage
 from bunraku.session.stage_door import StageDoor, session_json
+from bunraku.session.tally import Tally
 from bunraku.wire.messages import TimelineState, unpack
 
 MOST = 1_000
@@ -65,9 +67,9 @@ class Sessions:
         self._backing = backing
         self._replica = secrets.token_hex(6)
         self._doors: dict[str, StageDoor] = {}
-        self._revisions: dict[str, int] = {}
         self._opening: set[str] = set()
         self._count = 0
+        self.tally = Tally()
         self._beaten = time.monotonic()
         # of each replica the newest revision of its count, and when that was new
         self._seen: dict[str, tuple[int, float]] = {}
@@ -76,32 +78,56 @@ class Sessions:
         """A session, of whichever replica."""
         return DistantStage(session, self._backing.bus, self._backing.register)
 
-    async def open(self, motion: str, *, playing: bool = True, loop: bool = True) -> dict[str, Any]:
-        """A new session over a motion, as the API shows it; raises `ProblemError`."""
+    async def open(
+        self, motion: str, *, playing: bool = True, loop: bool = True, session: str | None = None
+    ) -> dict[str, Any]:
+        """A new session over a motion, as the API shows it; raises `ProblemError`. One with a name of its own,
+        `session`, raises `Conflict` where there is one of that name, at this replica or another."""
         stored = await self.motion(motion)
         if len(self._doors) >= MOST:
             raise ProblemError(
                 503, "Too many sessions", f"{MOST} sessions are open", hint="end one, or try again later"
             )
         marionette = await asyncio.to_thread(Marionette, stored.track.figure)
-        now, session = clock(), secrets.token_hex(9)
+        now, session = clock(), session or secrets.token_hex(9)
         state = timeline.start(motion, stored.track.duration_us, now, playing=playing, loop=loop)
         self._opening.add(session)
         try:
             record = Record(self._replica, now, state.pack())
-            self._revisions[session] = await self._backing.register.put(_key(session), record.pack(), 0)
-            stage = Stage(session, stored, marionette, self._backing.bus, state, now)
-            self._doors[session] = StageDoor(stage, self._backing, self)
+            revision = await self._backing.register.put(_key(session), record.pack(), 0)
+            stage = self._set(session, stored, marionette, state, now, revision)
+            self.tally.sessions["opened",] += 1
+            _log.info("session %s plays motion %s", session, motion)
         finally:
             self._opening.discard(session)
         return session_json(stage)
 
+    @property
+    def stages(self) -> list[Stage]:
+        """Those that are this replica's own."""
+        return [door.stage for door in tuple(self._doors.values())]
+
+    def _set(
+        self,
+        session: str,
+        motion: StoredMotion,
+        marionette: Marionette,
+        state: TimelineState,
+        created: int,
+        revision: int,
+    ) -> Stage:
+        """A stage of this replica's, with its door."""
+        # it stays when the request that opens it has its answer
+        with request_id.at_work(""):
+            stage = Stage(session, motion, marionette, self._backing.bus, state, created, self.tally)
+            self._doors[session] = StageDoor(stage, self._backing, self, revision)
+        return stage
+
     async def page(self, limit: int, cursor: str | None) -> tuple[list[dict[str, Any]], str | None]:
         """At most `limit` sessions of all replicas, oldest first, and the cursor of the next page; raises
         `ProblemError`."""
-        records = {
-            key: Record(*msgpack.unpackb(one.value)) for key, one in (await self._backing.register.all(KEY)).items()
-        }
+        registered = await self._backing.register.all(SESSIONS)
+        records = {key: Record(*msgpack.unpackb(one.value)) for key, one in registered.items()}
         ids = [key.partition(".")[2] for key in sorted(records, key=lambda key: (records[key].created, key))]
         if cursor is not None and cursor not in ids:
             raise ProblemError(422, "Bad cursor", "the session at the cursor has ended; start anew", field="cursor")
@@ -122,12 +148,12 @@ class Sessions:
         """As `Owner`; raises `ProblemError` where the session has become another's."""
         record = Record(self._replica, stage.created, stage.timeline.pack())
         try:
-            revision = await self._backing.register.put(_key(stage.id), record.pack(), self._revisions[stage.id])
+            door = self._doors[stage.id]
+            door.revision = await self._backing.register.put(_key(stage.id), record.pack(), door.revision)
         except (Conflict, KeyError):
             raise ProblemError(
                 503, "Session elsewhere", "another server has taken this session over", hint="try again"
             ) from None
-        self._revisions[stage.id] = revision
 
     async def end(self, session: str) -> None:
         """As `Owner`."""
@@ -151,10 +177,10 @@ class Sessions:
         register = self._backing.register
         for session, door in tuple(self._doors.items()):
             record = Record(NOBODY, door.stage.created, door.stage.timeline.pack())
-            revision = self._revisions.get(session)
             await self._let_go(session)
             with contextlib.suppress(Conflict, Unavailable):
-                await register.put(_key(session), record.pack(), revision)
+                await register.put(_key(session), record.pack(), door.revision)
+                self.tally.sessions["handed on",] += 1
         with contextlib.suppress(Unavailable):
             await register.remove(f"{REPLICAS}.{self._replica}")
 
@@ -162,7 +188,7 @@ class Sessions:
         register = self._backing.register
         self._count += 1
         await register.put(f"{REPLICAS}.{self._replica}", str(self._count).encode())
-        counts, sessions, now = await register.all(REPLICAS), await register.all(KEY), time.monotonic()
+        counts, sessions, now = await register.all(REPLICAS), await register.all(SESSIONS), time.monotonic()
         late, self._beaten = now - self._beaten > 2.0 * BEAT, now
         for replica, count in counts.items():
             revision, since = self._seen.get(replica, (0, now))
@@ -188,9 +214,7 @@ class Sessions:
         assert isinstance(state, TimelineState)
         taken = Record(self._replica, record.created, record.timeline)
         try:
-            self._revisions[session] = await self._backing.register.put(
-                _key(session), taken.pack(), registered.revision
-            )
+            revision = await self._backing.register.put(_key(session), taken.pack(), registered.revision)
         except Conflict:
             return
         stored = await self._backing.library.get(state.motion)
@@ -199,9 +223,9 @@ class Sessions:
             await self._backing.register.remove(_key(session))
             return
         marionette = await asyncio.to_thread(Marionette, stored.track.figure)
-        stage = Stage(session, stored, marionette, self._backing.bus, state, record.created)
-        self._doors[session] = StageDoor(stage, self._backing, self)
+        stage = self._set(session, stored, marionette, state, record.created, revision)
         stage.appear()
+        self.tally.sessions["taken over",] += 1
         _log.warning("session %s was left by its server and goes on here", session)
 
     async def _end_idle(self) -> None:
@@ -210,11 +234,10 @@ class Sessions:
                 await self.end(session)
 
     async def _let_go(self, session: str) -> None:
-        self._revisions.pop(session, None)
         door = self._doors.pop(session, None)
         if door is not None:
             await door.close()
 
 
 def _key(session: str) -> str:
-    return f"{KEY}.{session}"
+    return f"{SESSIONS}.{session}"

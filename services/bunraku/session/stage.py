@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import secrets
+import time
 from collections.abc import Callable
 
 import msgpack
@@ -29,6 +30,7 @@ from bunraku.playout.overlays import pack_joints
 from bunraku.session.pace import Pace
 from bunraku.session.poses import Poses
 from bunraku.session.puppeteers import Puppeteer, Puppeteers
+from bunraku.session.tally import Tally
 from bunraku.wire import messages
 from bunraku.wire.messages import (
     Alive,
@@ -53,6 +55,8 @@ FRAMES = 2
 """Frames in one message: on a narrow line packets count, not bytes."""
 LONGEST_PAUSE = 6
 """Frames: a stage that was kept from working for longer leaves them out."""
+COUNTED = 0.5
+"""Seconds between two tellings of how many watch."""
 
 
 class Stage:
@@ -66,16 +70,19 @@ class Stage:
         bus: Bus,
         state: TimelineState,
         created: int,
+        tally: Tally | None = None,
     ) -> None:
         """`marionette` is of the motion's figure; the caller builds it, which takes a tenth of a second. `state` is of
-        this motion; `created` a clock time, microseconds."""
+        this motion; `created` a clock time, microseconds; `tally` counts what goes on at all stages of a replica."""
         self.id = session
         self.created = created
         self._bus = bus
+        self._tally = tally or Tally()
         self._timelines = timeline.Timelines()
         self._timelines.put(state)
         self.puppeteers = Puppeteers()
         self._viewers: dict[str, int] = {}
+        self._counting: asyncio.TimerHandle | None = None
         self._engaged = asyncio.Event()
         self._sequence = 0
         self._phase = secrets.randbelow(FRAMES * FRAME)
@@ -94,6 +101,8 @@ class Stage:
 
     async def close(self) -> None:
         """End the session; its puppeteers are told nothing more."""
+        if self._counting is not None:
+            self._counting.cancel()
         self._ticking.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._ticking
@@ -119,6 +128,11 @@ class Stage:
     def people(self) -> int:
         """Viewers and puppeteers."""
         return sum(self._viewers.values()) + len(self.puppeteers)
+
+    @property
+    def holders(self) -> tuple[str | None, ...]:
+        """The holder's id of each limb, or None."""
+        return self._marionette.puppet.holders()
 
     @property
     def presence(self) -> Presence:
@@ -168,22 +182,32 @@ class Stage:
             else:
                 puppeteer.tell(Refusal(message.limb, answer.reason, answer.holder).pack())
         elif isinstance(message, Release):
+            puppeteer.granted.discard(message.limb)
             if self._marionette.release(message.limb, who, message.epoch, now):
                 self._settle(now)
                 self._announce()
         elif isinstance(message, Alive):
             self._marionette.alive(who, message.limbs, now)
+            holders = self._marionette.puppet.holders()
+            for limb in set(message.limbs) & set(range(len(holders))):
+                if holders[limb] != who:
+                    puppeteer.lost(limb, now)
         elif isinstance(message, Ask):
             if self._marionette.ask(message.limb, who, message.wanted, now):
                 self._announce()
         elif isinstance(message, Input):
             given = Given(message.limb, message.kind, message.epoch, message.sequence, message.sampled, message.values)
             outcome = self._marionette.input(who, given, now)
+            self._tally.inputs[outcome.value] += 1
             if outcome in (Outcome.REACH, Outcome.OWNER):
                 puppeteer.notice(message.limb, outcome.value, now)
+            if outcome is Outcome.OWNER:
+                puppeteer.lost(message.limb, now)
 
     def _granted(self, who: str, grant: Granted) -> None:
-        self.puppeteers.tell(who, Grant(grant.limb, grant.epoch).pack())
+        if (puppeteer := self.puppeteers.get(who)) is not None:
+            puppeteer.granted.add(grant.limb)
+            puppeteer.tell(Grant(grant.limb, grant.epoch).pack())
         self._engaged.set()
 
     def _settle(self, now: int) -> bool:
@@ -191,6 +215,7 @@ class Stage:
         grants, changed = self._marionette.settle(now)
         for who, grant in grants:
             self._granted(who, grant)
+        self._tally.hand_overs += len(grants)
         return changed
 
     def _set(self, motion: StoredMotion) -> None:
@@ -218,7 +243,19 @@ class Stage:
         self._viewers[replica] = count
         if count == 0:
             del self._viewers[replica]
-        self._announce()
+        self._recount()
+
+    def _recount(self) -> None:
+        """Tell how many watch, now or before long: each replica counts for itself, and each count goes to everybody."""
+        if self._counting is None:
+            self._announce()
+            told = self._viewers.copy()
+            self._counting = asyncio.get_running_loop().call_later(COUNTED, self._count_again, told)
+
+    def _count_again(self, told: dict[str, int]) -> None:
+        self._counting = None
+        if told != self._viewers:
+            self._recount()
 
     async def _run(self) -> None:
         while True:
@@ -238,6 +275,7 @@ class Stage:
                 await asyncio.sleep((planned - clock()) * 1e-6)
                 late = clock() - planned
                 pace.late(late)
+                self._tally.late.add(max(late, 0) * 1e-6)
                 await self._poses.prepare(self._time(frame) + LEAD)
 
     def _every_frame(self, pace: Pace) -> bool:
@@ -255,10 +293,11 @@ class Stage:
     def _frames(self, frames: range, late: int = 0) -> bool:
         """Publish what lies over the dance in some frames, each due `LEAD` after its time; whether any limb is
         pulled. It is `late` by so many microseconds, in which nobody could be heard: they are not taken for silence."""
-        now = clock()
+        now, begun = clock(), time.perf_counter()
         lost = self._marionette.expire(now - max(late, 0))
         for limb, holder in lost:
-            self.puppeteers.tell(holder, Refusal(limb, "lost").pack())
+            if (puppeteer := self.puppeteers.get(holder)) is not None:
+                puppeteer.lost(limb, now)
         if self._settle(now) or lost:
             self._announce()
         shown: list[Pulled | None] = []
@@ -269,6 +308,7 @@ class Stage:
         self._sequence += 1
         message = _overlay(self._sequence, self._time(frames[-1]) + LEAD, shown)
         self._overlay = message if shown[-1] is not None else None
+        self._tally.solving.add(time.perf_counter() - begun)
         self._bus.publish(f"session.{self.id}.overlay", message)
         return not self._marionette.puppet.at_rest
 

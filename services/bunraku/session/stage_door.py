@@ -9,6 +9,7 @@ one whole message each; one of no bytes says that the stage does not know them.
 from __future__ import annotations
 
 import asyncio
+import logging
 import secrets
 from collections.abc import Awaitable, Callable
 from typing import Any, Protocol
@@ -32,6 +33,9 @@ VANISHED = 7_000_000
 """Microseconds after which one of whom nothing is heard has gone: their replica did not live to say so."""
 
 
+_log = logging.getLogger(__name__)
+
+
 class Owner(Protocol):
     """Who keeps the stages of a replica."""
 
@@ -48,8 +52,10 @@ class Owner(Protocol):
 class StageDoor:
     """One stage's."""
 
-    def __init__(self, stage: Stage, backing: Backing, owner: Owner) -> None:
+    def __init__(self, stage: Stage, backing: Backing, owner: Owner, revision: int) -> None:
         self.stage = stage
+        self.revision = revision
+        """Of what stands in the register of the session, as its owner knows it."""
         self._backing = backing
         self._owner = owner
         self._subject = f"session.{stage.id}"
@@ -57,7 +63,7 @@ class StageDoor:
         self._subscriptions: list[Subscription] = [
             bus.subscribe(f"{self._subject}.said", self._hear),
             *(
-                bus.answer(f"{self._subject}.{word}", self._answering(answer))
+                bus.answer(f"{self._subject}.{word}", self._answering(word, answer))
                 for word, answer in (
                     ("describe", self._describe),
                     ("edit", self._edit),
@@ -79,8 +85,10 @@ class StageDoor:
             puppeteer.tell(b"")
         await self.stage.close()
 
-    def _answering(self, answer: Callable[[Any], Awaitable[Any]]) -> Callable[[bytes], Awaitable[bytes]]:
+    def _answering(self, word: str, answer: Callable[[Any], Awaitable[Any]]) -> Callable[[bytes], Awaitable[bytes]]:
         async def answered(question: bytes) -> bytes:
+            # who may see a session is asked for each of its guests' requests
+            _log.log(logging.DEBUG if word == "describe" else logging.INFO, "session %s: %s", self.stage.id, word)
             try:
                 said = {"answer": await answer(msgpack.unpackb(question))}
             except ProblemError as error:
@@ -110,10 +118,7 @@ class StageDoor:
         return {"log": name, "begin": max(end - round(kept * 1e6), stage.created), "end": end}
 
     async def _end(self, _: None) -> None:
-        # the answer goes out first: with the stage its subscription ends
-        session, loop = self.stage.id, asyncio.get_running_loop()
-        ended = loop.create_task(self._owner.end(session), name=f"end of {session}")
-        await asyncio.wait((ended,))
+        await self._owner.end(self.stage.id)
 
     async def _join(self, values: list[str]) -> dict[str, Any]:
         who, name = values

@@ -6,6 +6,8 @@ import asyncio
 import secrets
 from collections import deque
 
+from bunraku.backing.bucket import Bucket
+from bunraku.backing.sockets import Refusal
 from bunraku.session.notices import RATE, Notices
 
 QUEUE = 64
@@ -23,9 +25,10 @@ class Visitor:
         """Whether more waited than may."""
         self.gone = False
         """Whether the stage knows this puppeteer no more."""
+        self.turned_out: Refusal | None = None
+        """Why they may not be here any more."""
         self._notices = Notices()
-        self._allowed = float(RATE)
-        self._counted = 0
+        self._speech = Bucket(RATE, RATE)
 
     def tell(self, message: bytes) -> None:
         """Queue a message; none, of no bytes, says that the stage knows this puppeteer no more."""
@@ -39,12 +42,12 @@ class Visitor:
 
     def may_speak(self, now: int) -> bool:
         """Whether one more message at `now` (µs) is within `RATE`: a bucket that a second's worth fits into."""
-        self._allowed = min(self._allowed + (now - self._counted) * RATE * 1e-6, RATE)
-        self._counted = now
-        if self._allowed < 1.0:
-            return False
-        self._allowed -= 1.0
-        return True
+        return self._speech.take(now * 1e-6)
+
+    def turn_out(self, why: Refusal) -> None:
+        """They may not be here any more."""
+        self.turned_out = why
+        self.wake.set()
 
     def notice(self, limb: int, reason: str, now: int) -> None:
         """Say why an input was not taken as it came."""

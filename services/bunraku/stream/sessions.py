@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import msgpack
 
+from bunraku.backing import request_id
 from bunraku.backing.backing import clock
 from bunraku.backing.bus import Bus, NobodyAnswers, Subscription, is_word
 from bunraku.backing.frames import frame
@@ -17,6 +18,7 @@ from bunraku.backing.library import Library, StoredMotion
 from bunraku.backing.sockets import FAULT, NOT_FOUND, Refusal
 from bunraku.backing.together import Together
 from bunraku.backing.unavailable import Unavailable
+from bunraku.stream.attendance import Attendance
 from bunraku.stream.cohorts import Cohorts
 from bunraku.stream.plans import Plans
 from bunraku.stream.viewers import Viewer
@@ -33,16 +35,25 @@ class WatchedSession:
     """One session as this replica's viewers see it."""
 
     def __init__(
-        self, session: str, bus: Bus, library: Library, replica: str, state: bytes, left: Callable[[], None]
+        self,
+        session: str,
+        bus: Bus,
+        library: Library,
+        replica: str,
+        state: bytes,
+        left: Callable[[], None],
+        attendance: Attendance,
     ) -> None:
-        """`state` is the session's answer; `left` is told when the last viewer has gone."""
+        """`state` is the session's answer; `left` is told when the last viewer has gone; `attendance` counts what is
+        sent."""
         self._left = left
         self._bus = bus
         self._library = library
         self._subject = f"session.{session}"
         self._replica = replica
         self.plans = Plans()
-        self.cohorts = Cohorts(self.plans)
+        self._attendance = attendance
+        self.cohorts = Cohorts(self.plans, attendance)
         self._viewers: set[Viewer] = set()
         # to those whose line has room the same bytes are written, with nothing asked in between
         self._ready: Together | None = None
@@ -198,13 +209,16 @@ class WatchedSession:
             self._behind = [viewer for viewer in self._viewers if not viewer.unasked]
         for viewer in self._behind:
             viewer.overlay(framed)
-        ready.write(framed)
+        self._attendance.bytes += ready.write(framed)
+        self._attendance.overlays += len(ready)
 
 
 class WatchedSessions:
     """The sessions watched here, opened with their first viewer and closed with their last."""
 
-    def __init__(self, bus: Bus, library: Library) -> None:
+    def __init__(self, bus: Bus, library: Library, attendance: Attendance | None = None) -> None:
+        """`attendance` counts what is sent."""
+        self._attendance = attendance or Attendance()
         self._bus = bus
         self._library = library
         self._replica = secrets.token_hex(6)
@@ -221,11 +235,11 @@ class WatchedSessions:
             state = await self._bus.ask(f"session.{session}.state")
             # another viewer may have opened it while this one asked
             if session not in self._sessions:
-                self._sessions[session] = WatchedSession(
-                    session, self._bus, self._library, self._replica, state, lambda: self.close(session)
-                )
-                # something may have changed before it was listened to
-                self._renew(self._sessions[session])
+                # it stays when the request of its first viewer has its answer
+                with request_id.at_work(""):
+                    self._sessions[session] = self._watched(session, state)
+                    # something may have changed before it was listened to
+                    self._renew(self._sessions[session])
         watched = self._sessions[session]
         try:
             await watched.ready()
@@ -233,6 +247,21 @@ class WatchedSessions:
             self.close(session)
             raise
         return watched
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._sessions)
+
+    def _watched(self, session: str, state: bytes) -> WatchedSession:
+        return WatchedSession(
+            session,
+            self._bus,
+            self._library,
+            self._replica,
+            state,
+            lambda: self.close(session),
+            self._attendance,
+        )
 
     def _renew(self, *watched: WatchedSession) -> None:
         async def renew() -> None:

@@ -15,46 +15,28 @@ from __future__ import annotations
 import asyncio
 import logging
 import random
-from typing import Protocol, cast
 
-from bunraku import __version__
 from bunraku.backing.backing import clock
 from bunraku.backing.frames import frame
 from bunraku.backing.frames import message as unframed
 from bunraku.backing.library import StoredMotion
-from bunraku.backing.outlet import Outlet
+from bunraku.backing.outlet import SHUT, Outlet
 from bunraku.backing.sockets import BROKEN, FAULT, TOO_SLOW, Refusal
-from bunraku.playout import sharing, timeline
+from bunraku.playout import timeline
 from bunraku.playout.held import Held
-from bunraku.playout.pacing import MARGIN
-from bunraku.stream.cohorts import Cohort, Cohorts, Course
+from bunraku.stream.announcing import Announcing
+from bunraku.stream.attendance import SILENT, Attendance
+from bunraku.stream.audience import Audience
 from bunraku.stream.flow import Flow, Readable
 from bunraku.stream.hush import Hush
+from bunraku.stream.in_step import SPREAD, InStep
+from bunraku.stream.liveness import Liveness
 from bunraku.stream.pending import QUEUE, Pending
-from bunraku.stream.plans import Plans
 from bunraku.stream.playing import BESIDE, Playing
-from bunraku.stream.tracks import TRACKS, channels
+from bunraku.stream.tracks import TRACKS
 from bunraku.stream.turns import Turns
-from bunraku.wire.messages import (
-    ChannelHeader,
-    Edit,
-    MalformedMessage,
-    Ping,
-    Report,
-    TimelineState,
-    newest,
-    unpack,
-)
+from bunraku.wire.messages import Data, Edit, MalformedMessage, Ping, Report, TimelineState, newest, unpack
 
-SILENT = 8_000_000
-"""A viewer of whom nothing was heard for this long, microseconds, is asked for a sign of life."""
-GONE = 16_000_000
-"""One of whom nothing was heard for this long is there no more."""
-SPREAD = 1_000_000
-"""Blocks are due to all viewers of a session at once, and sent to each up to this much later, microseconds: little of
-what is sent ahead, and the server's work is even."""
-TOGETHER = 4_000_000
-"""Who will be in step for less, microseconds, goes on alone."""
 DEEP = 200_000
 """So much more of what is not live may wait in the queue of a narrow line, microseconds."""
 BATCH = 16_384
@@ -67,26 +49,6 @@ LOOK_NEAR = 4_000_000
 _log = logging.getLogger(__name__)
 
 
-class Audience(Protocol):
-    """Those who watch a session, as one of them sees it."""
-
-    plans: Plans
-    cohorts: Cohorts
-
-    def turned(self) -> None:
-        """Of one of them the line has room again, or no more."""
-
-    def leave(self, viewer: Viewer) -> None:
-        """A viewer goes."""
-
-
-class _Shut:
-    """The outlet of a viewer that has none yet: everything waits."""
-
-    clear = False
-
-
-_SHUT = cast(Outlet, _Shut())
 _UNKNOWN = Flow(None, clock)
 
 
@@ -94,8 +56,8 @@ class Viewer:
     """What one viewer has been sent and is still to be sent. Until `open` is called everything waits."""
 
     __slots__ = (
-        "_asked", "_beside_at", "_cohort", "_flow", "_following", "_held", "_hush", "_look_at", "_pending", "_phase",
-        "_pinned", "_planned", "_playing", "_private", "_shown", "_timelines", "_timer", "_turns", "_until", "_wanted",
+        "_announcing", "_attendance", "_beside_at", "_flow", "_following", "_hush", "_in_step", "_liveness", "_look_at",
+        "_pending", "_phase", "_pinned", "_playing", "_private", "_timelines", "_timer", "_turns", "_wanted",
         "audience", "outlet",
     )  # fmt: skip
 
@@ -107,33 +69,33 @@ class Viewer:
         *,
         private: bool = False,
         held: Held | None = None,
+        attendance: Attendance | None = None,
     ) -> None:
         """`pinned` is the rate to keep to, if any; `wanted` the types of tracks whose blocks are sent; a `private`
-        viewer may edit its timeline; `held` is what the viewer has and is not sent again."""
+        viewer may edit its timeline; `held` is what the viewer has and is not sent again; `attendance`
+        counts what is sent."""
         self._turns = turns
+        self._attendance = attendance or Attendance()
         self._pinned = pinned
         self._wanted = wanted
         self._private = private
-        self._held = held
+        self._announcing = Announcing(held)
         self._phase = random.randrange(SPREAD)
         self._pending = Pending()
         self._beside_at = 0
         self._timelines = timeline.Timelines()
-        self._shown: tuple[StoredMotion, TimelineState] | None = None
         self._playing: Playing | None = None
-        # when the next block comes within reach, and of which timeline at which step; None while some are to be sent
+        # when the next block comes within reach; None while some are to be sent
         self._following: int | None = None
-        self._planned: tuple[TimelineState, sharing.Step] | None = None
-        # those it is in step with, until then at the latest; while there are any it has nothing to follow itself
-        self._cohort: Cohort | None = None
-        self._until = 0
-        self._asked = 0
+        # while it is in step it has nothing to follow itself
+        self._in_step = InStep(self)
+        self._liveness = Liveness()
         self._flow = _UNKNOWN
         self._look_at = 0
         self._hush = Hush()
         self._timer: asyncio.TimerHandle | None = None
         self.audience: Audience | None = None
-        self.outlet: Outlet = _SHUT
+        self.outlet: Outlet = SHUT
 
     def open(self, outlet: Outlet, line: Readable | None = None) -> None:
         """The line is there: what waits is sent, in one piece, and the first blocks. `line` tells how much is on its
@@ -152,6 +114,11 @@ class Viewer:
         """Whether overlays may be written to the outlet as they come, with nothing asked and nothing told."""
         return self.outlet.clear and self._flow.steady
 
+    @property
+    def choice(self) -> tuple[int, str] | None:
+        """As `attendance.Present`."""
+        return None if self._playing is None else self._playing.choice
+
     def control(self, framed: bytes) -> None:
         """A framed message that must arrive."""
         if self.outlet.clear:
@@ -165,12 +132,15 @@ class Viewer:
         clear, flow = self.outlet.clear, self._flow
         if clear and flow.steady:
             self.outlet.write(framed)
+            self._attendance.overlays += 1
         elif clear and self._timer is None and flow.quick():
             self._put(framed)
+            self._attendance.overlays += 1
             if flow.steady:
                 self._turned()
                 self._turns.put(self, 0)
         else:
+            self._attendance.skipped += self._pending.overlay is not None
             self._pending.overlay = framed
             self._beside_at = clock()
             if clear and self._timer is None:
@@ -178,7 +148,7 @@ class Viewer:
 
     def timeline(self, state: TimelineState, motion: StoredMotion) -> None:
         """A new timeline of the stage, and the motion that it names. It is sent at once, blocks at the next turn."""
-        self._leave_cohort()
+        self._in_step.leave(self._playing)
         self._timelines.put(state)
         if self._playing is None or self._playing.motion is not motion:
             self._playing = Playing(motion, self._wanted, self._pinned)
@@ -204,9 +174,15 @@ class Viewer:
         elif isinstance(said, Edit) and self._private:
             self._edit(said)
 
+    def answered(self, payload: bytes) -> None:
+        """The viewer's end has answered a Ping."""
+        self._flow.answered(payload)
+        if self.outlet.clear:
+            self._act(clock())
+
     def pause(self) -> None:
         """The line has no room."""
-        self._leave_cohort()
+        self._in_step.leave(self._playing)
         self._turned()
 
     def resume(self) -> None:
@@ -222,14 +198,12 @@ class Viewer:
 
     def advance(self) -> None:
         """Have a turn: send what waits and the blocks that are due, and say when the next turn is."""
-        now, outlet = clock(), self.outlet
-        if now - outlet.heard > GONE:
-            outlet.abort()
-            return
-        if now - outlet.heard > SILENT and outlet.heard != self._asked:
-            self._asked = outlet.heard
-            outlet.ping()
-        self._act(now, look=True)
+        now = clock()
+        if self._liveness.look(self.outlet, now):
+            self._act(now, look=True)
+        else:
+            self._attendance.dropped[(SILENT,)] += 1
+            self.outlet.abort()
 
     def _act(self, now: int, look: bool = False) -> None:
         """Send what the line has room for, and say when the next turn is; `look` whether the line is a quick one."""
@@ -241,15 +215,14 @@ class Viewer:
             if self.outlet.clear:
                 if look and now >= self._look_at:
                     self._look(now)
-                if self._cohort is not None and not self._stays(now):
-                    self._leave_cohort()
+                if self._in_step.cohort is not None and not self._stays(now):
+                    self._in_step.leave(self._playing)
                 if not flow.free:
                     self._send_for_room(now)
-                elif self._cohort is None:
-                    if not self._follow(now):
-                        self._send(now)
-                        self._look_ahead(now)
-                    self._join_cohort()
+                elif self._in_step.cohort is None:
+                    self._send(now)
+                    self._look_ahead(now)
+                    self._join_cohort(now)
             self._turns.put(self, self._next_turn())
         except Exception:
             _log.exception("a viewer's turn failed")
@@ -259,6 +232,8 @@ class Viewer:
         """See whether the line is a quick one still, or has become one."""
         flow = self._flow
         steady = flow.steady
+        if asking := flow.asking(0):
+            self.outlet.write(asking)
         flow.look()
         if flow.steady != steady:
             self._turned()
@@ -270,7 +245,7 @@ class Viewer:
 
     def _put(self, data: bytes) -> None:
         """Write, and count it."""
-        self.outlet.write(data)
+        self.outlet.write(data + self._flow.asking(len(data)))
         self._flow.wrote(len(data))
 
     def _turned(self) -> None:
@@ -278,10 +253,8 @@ class Viewer:
             self.audience.turned()
 
     def _end(self) -> None:
-        cohort, self._cohort = self._cohort, None
-        if cohort is not None:
-            # what it was sent there matters no more: a crowd that goes at once must not be waited for
-            cohort.leave(self)
+        # what it was sent there matters no more: a crowd that goes at once must not be waited for
+        self._in_step.leave(None)
         self._turns.remove(self)
         if self._timer is not None:
             self._timer.cancel()
@@ -299,7 +272,7 @@ class Viewer:
         if now < self._hush.until:
             self._timer = asyncio.get_running_loop().call_later((self._hush.until - now) * 1e-6, self._again)
             return
-        self._planned = self._following = None
+        self._following = None
         # each answer is a packet of its own, as the question was: both ways take equally long
         for answer in self._pending.answers():
             self._put(answer)
@@ -309,7 +282,7 @@ class Viewer:
             if not flow.room(0 if now - self._beside_at < BESIDE else DEEP):
                 break
             narrow = flow.narrow
-            told = self._playing is not None and self._playing.unsaid and not flow.unknown
+            told = self._playing is not None and self._playing.unsaid and not (flow.unknown or flow.slowing)
             if told and self._playing is not None and (news := self._playing.news()):
                 # before what is sent far ahead, which may take long
                 self._put(news)
@@ -319,6 +292,7 @@ class Viewer:
                 flow.begun()
             elif (overlay := self._pending.take_overlay()) is not None:
                 self._put(frame(newest(unframed(overlay))) if narrow else overlay)
+                self._attendance.overlays += 1
             elif self._playing is not None and (news := self._playing.news()):
                 self._put(news)
             else:
@@ -339,6 +313,7 @@ class Viewer:
         frames = self._first()
         if (overlay := self._pending.take_overlay()) is not None:
             frames.append(overlay)
+            self._attendance.overlays += 1
         outlet, size = self.outlet, 0
         while outlet.clear and (packet := self._next_packet(now)) is not None:
             frames.append(frame(packet))
@@ -352,100 +327,49 @@ class Viewer:
             outlet.write(b"".join(frames))
 
     def _announced(self) -> list[bytes]:
-        """The framed timeline if it is new, after what says of a new motion what it is."""
         state, playing = self._timelines.newest, self._playing
-        if state is None or playing is None or (self._shown is not None and self._shown[1] is state):
-            return []
-        messages, motion = [state.pack()], playing.motion
-        if self._shown is None or self._shown[0] is not motion:
-            held, self._held = self._held, None
-            if not playing.has(held):
-                messages.insert(0, playing.described(self._flow.far))
-            messages.insert(0, ChannelHeader(motion.id, clock(), channels(motion), __version__).pack())
-        self._shown = motion, state
-        return [frame(message) for message in messages]
+        return [] if state is None or playing is None else self._announcing.news(state, playing, self._flow.far)
 
     def _next_packet(self, now: int) -> bytes | None:
         state = self._timelines.at(now)
         if state is None or self._playing is None:
             return None
-        return self._playing.next_packet(state, now, self._flow, self._beside_at)
+        packet = self._playing.next_packet(state, now, self._flow, self._beside_at)
+        self._attendance.blocks += packet is not None and packet[0] == Data.TYPE
+        return packet
 
-    def _follow(self, now: int) -> bool:
-        """Send what all who are in step are sent, where this one is, and nothing else waits; whether it is."""
-        if self.audience is None or self._planned is None or self._following is None or self._following > now:
-            return False
-        state, step = self._planned
-        if state is not self._timelines.at(now) or self._shown is None or self._shown[1] is not state:
-            return False
-        playing = self._playing
-        assert playing is not None
-        if step != playing.step or playing.unsaid or self._pending:
-            return False
-        plan = self.audience.plans.at(self._following, state, playing.motion, step, self._wanted, playing.tracks)
-        new = playing.pacer.follow(plan.dues)
-        if new is None:
-            return False
-        self._following = plan.following
-        if new and plan.framed:
-            self.outlet.write(plan.framed)
-        return True
-
-    def _join_cohort(self) -> None:
-        """Go on with those who are in step, where this one is for a while."""
-        if self.audience is None or self._planned is None or self._following is None:
+    def _join_cohort(self, now: int) -> None:
+        """Go on with those who are in step, where this one will be for a while."""
+        audience, playing, state, following = self.audience, self._playing, self._timelines.newest, self._following
+        if audience is None or playing is None or following is None or playing.unsaid:
             return
-        (state, step), playing = self._planned, self._playing
-        assert playing is not None
-        if state is not self._timelines.newest or playing.unsaid:
+        if state is None or state is not self._timelines.at(now):
             return
-        # what comes from the next instant on, which may have passed
-        begin = self._following - MARGIN
-        fresh = playing.pacer.fresh(state, begin)
-        if fresh < TOGETHER:
-            return
-        course = Course(state, playing.motion, step, self._wanted)
-        self._cohort = self.audience.cohorts.join(
-            self, self._turns, course, playing.tracks, self._following, self._phase
-        )
-        if self._cohort is not None:
-            self._planned = self._following = None
-            self._until = begin + fresh - SPREAD
+        cohorts, phase = audience.cohorts, self._phase
+        if self._in_step.join(cohorts, self._turns, state, playing, self._wanted, following, phase):
+            self._following = None
 
     def _stays(self, now: int) -> bool:
         """Whether this one is still in step, and nothing waits for it."""
-        cohort, playing = self._cohort, self._playing
-        assert cohort is not None
+        playing = self._playing
         assert playing is not None
-        waits = self._pending or playing.unsaid
-        return self._flow.free and now < self._until and cohort.course.step == playing.step and not waits
-
-    def _leave_cohort(self) -> None:
-        cohort, self._cohort = self._cohort, None
-        if cohort is None:
-            return
-        assert self._playing is not None
-        for track, index, rate in cohort.leave(self):
-            self._playing.pacer.has(track, index, rate)
+        return self._flow.free and self._in_step.lasts(now, playing.step) and not (self._pending or playing.unsaid)
 
     def _look_ahead(self, now: int) -> None:
         """All that is within reach was sent: when more will be."""
-        self._planned = self._following = None
+        self._following = None
         state, flow = self._timelines.at(now), self._flow
         if self.outlet.clear and state is not None and self._playing is not None:
             wait = self._playing.pacer.wait(state, now, flow.far or flow.narrow)
-            if wait is not None:
-                self._following = now + wait
-                self._planned = (state, self._playing.step) if flow.free else None
+            self._following = None if wait is None else now + wait
 
     def _next_turn(self) -> int:
         """Clock time of the next turn: for the next block, or to ask for a sign of life."""
-        heard = self.outlet.heard
-        due = heard + (GONE if heard == self._asked else SILENT) + 1
+        due = self._liveness.due(self.outlet)
         if not self.outlet.clear:
             return due
-        if self._cohort is not None:
-            return min(due, self._until)
+        if self._in_step.cohort is not None:
+            return min(due, self._in_step.until)
         if self._following is not None:
             # what goes over a narrow line just in time cannot wait so that the server's work is even
             due = min(due, self._following + (self._phase if self._flow.free else 0))
@@ -463,4 +387,5 @@ class Viewer:
     def refuse(self, refusal: Refusal) -> None:
         """End it, and say why."""
         self._end()
+        self._attendance.dropped[(refusal.title,)] += not self.outlet.closing
         self.outlet.refuse(refusal)

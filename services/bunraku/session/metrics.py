@@ -1,0 +1,28 @@
+"""What the session service tells of itself."""
+
+from __future__ import annotations
+
+from bunraku.backing.metrics import Metrics
+from bunraku.session.sessions import Sessions
+
+
+def register(metrics: Metrics, sessions: Sessions) -> None:
+    """Have the stages of this replica counted."""
+    tally = sessions.tally
+
+    def held() -> int:
+        return sum(holder is not None for stage in sessions.stages for holder in stage.holders)
+
+    metrics.gauge("sessions", "Sessions that this replica owns", lambda: len(sessions.stages))
+    metrics.gauge("puppeteers", "Puppeteers on its stages", lambda: sum(len(s.puppeteers) for s in sessions.stages))
+    metrics.gauge("limbs_held", "Limbs in somebody's hands", held)
+    metrics.counter("sessions_moved_total", "Sessions by how they came or went", tally.sessions.copy, ("how",))
+    metrics.counter("hand_overs_total", "Limbs that went to who had asked for them", lambda: tally.hand_overs)
+    metrics.counter(
+        "inputs_total",
+        "Inputs by outcome: taken, reach (taken, brought within reach), owner, late, rate (dropped at the door)",
+        lambda: {(outcome,): number for outcome, number in tally.inputs.copy().items()},
+        ("outcome",),
+    )
+    metrics.distribution("solve_duration_seconds", "What one tick of a stage takes: limbs of all frames", tally.solving)
+    metrics.distribution("stage_late_seconds", "How much later than planned a tick began", tally.late)

@@ -1,0 +1,129 @@
+"""One request through several processes, upon a real nats-server: the same name in the log of each, and no secret."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+from bunraku.wire.messages import SUBPROTOCOL, Welcome, unpack
+from tests.guests import SECRET, headers, token
+from tests.processes import Owned, free_port, jetstream, url_of
+from tests.servers import clip
+
+PATIENCE = 20
+SERVICES = ("ingest", "session 1", "session 2")
+
+
+class House:
+    """Processes that log as in the stack, and more."""
+
+    def __init__(self, folder: Path) -> None:
+        self.processes: dict[str, Owned] = {}
+        for name in SERVICES:
+            port, service = free_port(), name.partition(" ")[0]
+            command = [sys.executable, "-m", "bunraku.cli", "up", "--port", str(port), "--data", str(folder / "data")]
+            (folder / name).mkdir()
+            self.processes[name] = Owned([*command, "--service", service], port, folder / name)
+
+    def url(self, name: str) -> str:
+        return f"http://127.0.0.1:{self.processes[name].port}"
+
+    def text(self, name: str) -> str:
+        return (self.processes[name].folder / "log").read_text()
+
+    def lines(self, name: str, request: str | None = None) -> list[dict[str, Any]]:
+        """Those of a process, of one request."""
+        every = [json.loads(line) for line in self.text(name).splitlines() if line.startswith("{")]
+        return [line for line in every if request in (None, line.get("request_id"))]
+
+    async def told(self, name: str, request: str, event: str, **more: Any) -> None:
+        """Wait until a process has told of a request."""
+        wanted = {"event": event, **more}
+        async with asyncio.timeout(PATIENCE):
+            while not any(wanted.items() <= line.items() for line in self.lines(name, request)):  # noqa: ASYNC110
+                await asyncio.sleep(0.05)
+
+
+@pytest.fixture
+def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
+    (tmp_path / "nats").mkdir()
+    with ExitStack() as stack, jetstream(tmp_path / "nats") as nats:
+        for name, value in {
+            "NO_COLOR": "1", "BUNRAKU_BUS": url_of(nats), "BUNRAKU_LOGS": "json", "BUNRAKU_LOG_LEVEL": "debug",
+            "BUNRAKU_SECRET": SECRET,
+        }.items():  # fmt: skip
+            monkeypatch.setenv(name, value)
+        built = House(tmp_path)
+        for process in built.processes.values():
+            stack.callback(process.stop)
+            process.start()
+        yield built
+
+
+async def test_one_request_has_one_name_in_every_process_and_nothing_secret_is_told(house: House) -> None:
+    held = token()
+    async with httpx2.AsyncClient(headers=headers(held), timeout=60) as http:
+
+        async def ask(method: str, name: str, path: str, request: str, **more: Any) -> Any:
+            answer = await http.request(method, house.url(name) + path, headers={"X-Request-Id": request}, **more)
+            assert answer.headers["x-request-id"] == request
+            return answer.json()
+
+        motion = (await ask("POST", "ingest", "/v1/motions?filename=a.bvh", "upload-01", content=clip(4.0, 1)))["id"]
+        await house.told("ingest", "upload-01", "job", job="make", motion=motion, outcome="made", service="ingest")
+        await house.told("ingest", "upload-01", "request", route="/v1/motions", status=201, path="/v1/motions")
+
+        session = (await ask("POST", "session 1", "/v1/sessions", "opening-01", json={"motion": motion}))["id"]
+        await ask("PATCH", "session 2", f"/v1/sessions/{session}", "editing-01", json={"loop": False})
+        await house.told("session 1", "editing-01", f"session {session}: edit", level="info", service="session")
+        await house.told("session 2", "editing-01", "request", method="PATCH", route="/v1/sessions/{session}")
+
+        # through three of them: asked here, logged there, made at a third
+        await ask("POST", "session 2", f"/v1/sessions/{session}/recordings", "keeping-01", json={"seconds": 0.5})
+        await house.told("session 1", "keeping-01", f"session {session}: log")
+        await house.told("ingest", "keeping-01", "job", job="keep", outcome="made")
+        await house.told("session 2", "keeping-01", "request", status=201)
+
+        # a problem says it, too, whoever's it is
+        wrong = await ask("PATCH", "session 2", f"/v1/sessions/{session}", "wrong-001", json={"motion": "none"})
+        assert (wrong["title"], wrong["request_id"]) == ("No such motion", "wrong-001")
+
+        ticket = (await ask("POST", "session 1", "/v1/tickets", "ticketing"))["ticket"]
+        address = house.url("session 2").replace("http", "ws") + f"/v1/sessions/{session}/control?ticket={ticket}"
+        for request, taken in (("pulling-01", True), ("pulling-02", False)):
+            named = {"X-Request-Id": request}
+            async with connect(address, subprotocols=[SUBPROTOCOL], additional_headers=named) as socket:  # type: ignore[list-item]
+                first = await socket.recv()
+                assert isinstance(first, bytes)
+                assert isinstance(unpack(first), Welcome) == taken
+                if not taken:
+                    with pytest.raises(ConnectionClosed):
+                        await socket.recv()
+        await house.told("session 1", "pulling-01", f"session {session}: join")
+        await house.told("session 2", "pulling-01", "request", method="WEBSOCKET", status=101)
+        await house.told("session 2", "pulling-02", f"refused '/v1/sessions/{session}/control': Ticket not valid")
+
+        expired = token(seconds=-5)
+        refused = await http.get(house.url("ingest") + "/v1/motions", headers=headers(expired))
+        assert refused.status_code == 401
+        assert refused.json()["request_id"] == refused.headers["x-request-id"]
+        await house.told("ingest", refused.json()["request_id"], "refused '/v1/motions': Link expired", level="info")
+
+    for name in SERVICES:
+        text = house.text(name)
+        for secret in (SECRET, held, expired, ticket, "ticket="):
+            assert secret not in text, name
+        # what goes on by itself is nobody's request, and what a process does for one has no other's name
+        requests = {line.get("request_id") for line in house.lines(name)}
+        assert "pulling-02" not in requests or name == "session 2"
+        assert {"time", "level", "logger", "event", "service"} <= set.intersection(*map(set, house.lines(name)))

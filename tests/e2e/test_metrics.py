@@ -1,0 +1,200 @@
+"""What a server says of itself, against what its clients counted."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import os
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from bunraku.backing.frames import Opcode
+from bunraku.backing.settings import Settings
+from bunraku.client import Client, Puppeteer
+from bunraku.wire.messages import SUBPROTOCOL, Overlay, unpack
+from tests.guests import SECRET, headers, token
+from tests.processes import free_port
+from tests.scrape import scrape, until
+from tests.servers import clip, running
+
+PATIENCE = 20
+
+
+class Raw:
+    """A viewer who counts every byte behind the handshake, and what the frames hold."""
+
+    def __init__(self) -> None:
+        self.bytes = 0
+        self.types: list[int] = []
+        self.limbs: list[int] = []
+        self._reading: asyncio.Task[None]
+        self._writer: asyncio.StreamWriter
+        self._more = asyncio.Event()
+
+    async def open(self, url: str, path: str) -> None:
+        host, _, port = url.partition("//")[2].partition(":")
+        reader, self._writer = await asyncio.open_connection(host, int(port))
+        key = base64.b64encode(os.urandom(16)).decode()
+        self._writer.write(
+            f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
+            f"Sec-WebSocket-Protocol: {SUBPROTOCOL}\r\n\r\n".encode()
+        )
+        head = await reader.readuntil(b"\r\n\r\n")
+        assert b" 101 " in head.splitlines()[0]
+        # of each byte on a narrow line there is a wait
+        assert b"x-request-id" not in head.lower()
+        self._reading = asyncio.create_task(self._read(reader))
+
+    async def _read(self, reader: asyncio.StreamReader) -> None:
+        while True:
+            try:
+                first, size = await reader.readexactly(2)
+                wide = {126: 2, 127: 8}.get(size, 0)
+                size = int.from_bytes(await reader.readexactly(wide)) if wide else size
+                payload = await reader.readexactly(size)
+            except (asyncio.IncompleteReadError, ConnectionError):
+                return
+            self.bytes += 2 + wide + size
+            if first & 15 == Opcode.PING:
+                self._say(Opcode.PONG, payload)
+            if first & 15 == Opcode.BINARY:
+                self.types.append(payload[0])
+                if payload[0] == Overlay.TYPE:
+                    overlay = unpack(payload)
+                    assert isinstance(overlay, Overlay)
+                    self.limbs.append(len(overlay.limbs))
+            self._more.set()
+
+    async def until(self, kind: int, number: int) -> None:
+        """So many messages of a type are there."""
+        async with asyncio.timeout(PATIENCE):
+            while self.types.count(kind) < number:
+                self._more.clear()
+                await self._more.wait()
+
+    def _say(self, opcode: Opcode, payload: bytes) -> None:
+        # a client's frames are masked, and a mask may be nought
+        self._writer.write(bytes([0x80 | opcode, 0x80 | len(payload), 0, 0, 0, 0]) + payload)
+
+    async def close(self) -> None:
+        """Say so, and read what still comes."""
+        self._say(Opcode.CLOSE, (1000).to_bytes(2))
+        async with asyncio.timeout(PATIENCE):
+            await self._reading
+        self._writer.close()
+
+
+async def test_the_numbers_are_those_that_the_clients_counted(tmp_path: Path) -> None:
+    port = free_port()
+    source = tmp_path / "one.bvh"
+    source.write_bytes(clip(4.0, 1))
+    with running(tmp_path / "data", metrics=f"127.0.0.1:{port}") as url:
+
+        async def look(**wanted: float) -> None:
+            """Wait for numbers, given as `name` or `name__label__value`."""
+
+            def is_so() -> dict[str, float]:
+                found = scrape(port)
+                told = {}
+                for key in wanted:
+                    name, *labels = key.split("__")
+                    told[key] = found.sum(name, **dict(zip(labels[::2], labels[1::2], strict=True)))
+                return told
+
+            end = asyncio.get_running_loop().time() + PATIENCE
+            while (told := await asyncio.to_thread(is_so)) != wanted:
+                assert asyncio.get_running_loop().time() < end, f"{told}, not {wanted}"
+
+        async with Client(url) as client:
+            motion = (await client.upload(source))["id"]
+            await look(job_duration_seconds_count__kind__make__outcome__made=1, jobs_running=0, jobs_waiting=0)
+            source.write_text("no motion at all")
+            with pytest.raises(Exception, match="HIERARCHY"):
+                await client.upload(source)
+            await look(job_duration_seconds_count__kind__make__outcome__refused=1, uploads_under_way=0)
+
+            session = (await client.open_session(motion))["id"]
+            await look(sessions=1, sessions_moved_total__how__opened=1, puppeteers=0, bus_up=1)
+
+            alone, crowd = Raw(), [Raw() for _ in range(12)]
+            await alone.open(url, f"/v1/motions/{motion}/stream?rate=1")
+            for viewer in crowd:
+                await viewer.open(url, f"/v1/sessions/{session}/stream?rate=0")
+            await look(
+                viewers__of__motion=1, viewers__of__session=12, viewers_joined_total__of__session=12,
+                watched_sessions=1, viewer_rates__rate__0__reason__pinned=12, viewer_rates__rate__1__reason__pinned=1,
+            )  # fmt: skip
+
+            async with Puppeteer(client, session, "Aiko") as puppeteer:
+                await look(puppeteers=1, limbs_held=0)
+                await puppeteer.claim("left_hand")
+                await look(limbs_held=1)
+                for step in range(20):
+                    await puppeteer.target("left_hand", 0.3 + 0.005 * step, 0.1, 0.4)
+                await look(inputs_total=20)
+                await crowd[-1].until(Overlay.TYPE, 5)
+            # they have gone, and the limb goes back to the dance
+            await look(puppeteers=0, limbs_held=0)
+            async with asyncio.timeout(PATIENCE):
+                while crowd[0].limbs[-1]:  # noqa: ASYNC110
+                    await asyncio.sleep(0.02)
+
+            # nothing is written any more: the dance stands, and nobody comes or goes
+            await client.edit_session(session, playing=False)
+            for viewer in crowd:
+                await viewer.close()
+            await alone.close()
+            everyone = [alone, *crowd]
+            await look(viewers=0, viewers_joined_total=13, watched_sessions=0)
+            found = scrape(port)
+            assert found.sum("sent_bytes_total") == sum(viewer.bytes for viewer in everyone)
+            assert found.sum("sent_blocks_total") == sum(viewer.types.count(3) for viewer in everyone)
+            assert found.sum("sent_overlays_total") == sum(viewer.types.count(5) for viewer in everyone)
+            assert found.sum("sent_overlays_total") >= 12 * 5
+            assert found.sum("solve_duration_seconds_count") >= 5
+            assert 0 < found.sum("solve_duration_seconds_sum") < PATIENCE
+            assert found.sum("slow_viewers") == found.sum("held_bytes") == found.sum("skipped_overlays_total") == 0
+
+            # requests by their route, none by a path or an id
+            asked = "request_duration_seconds_count"
+            assert found.sum(asked, route="/v1/motions", method="POST", status="201") == 1
+            assert found.sum(asked, route="/v1/motions", method="POST", status="422") == 1
+            assert found.sum(asked, route="/v1/sessions/{session}/stream", method="WEBSOCKET", status="101") == 12
+            assert found.sum(asked, route="/v1/sessions/{session}/control", method="WEBSOCKET", status="101") == 1
+            assert found.sum(asked, route="/v1/sessions/{session}", method="PATCH", status="200") == 1
+            text = "".join(str(family.samples) for family in found.families.values())
+            assert motion not in text
+            assert session not in text
+
+            # the numbers are not where everybody comes
+            async with httpx2.AsyncClient(base_url=url) as http:
+                assert "bunraku_" not in (await http.get("/metrics")).text
+
+
+def test_who_is_turned_away_is_counted_by_why(tmp_path: Path) -> None:
+    port = free_port()
+    with running(tmp_path, metrics=f"127.0.0.1:{port}", secret=SECRET) as url:
+        with httpx2.Client(base_url=url) as http:
+            assert http.get("/v1/motions").status_code == 401
+            assert http.get("/v1/motions", headers=headers(token(seconds=-5))).status_code == 401
+            assert http.get("/v1/motions", headers=headers("nonsense")).status_code == 401
+            assert http.get("/v1/nothing/here", headers=headers(token())).status_code == 404
+            assert http.request("BREW", "/v1/nothing", headers=headers(token())).status_code == 404
+            assert http.get("/v1/motions", headers=headers(token())).status_code == 200
+        found = until(port, lambda found: found.sum("request_duration_seconds_count") == 6)
+        assert found.sum("refusals_total") == 5
+        assert found.sum("refusals_total", reason="A link is needed", status="401") == 1
+        assert found.sum("refusals_total", reason="Link expired", status="401") == 1
+        assert found.sum("refusals_total", reason="Link not valid", status="401") == 1
+        assert found.sum("refusals_total", reason="Not Found", status="404") == 2
+        assert found.sum("request_duration_seconds_count", route="elsewhere", method="OTHER", status="404") == 1
+        assert found.sum("request_duration_seconds_count", route="/v1/motions", status="401") == 3
+
+
+@pytest.mark.parametrize("address", ["9100", "localhost:http", "0.0.0.0:0"])
+def test_a_wrong_address_is_refused(address: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="metrics are at host:port"):
+        Settings(data=tmp_path, metrics=address)
