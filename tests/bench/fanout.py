@@ -17,7 +17,6 @@ Everything is on loopback, each server and each crowd in a process of its own. P
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import json
 import re
@@ -36,8 +35,10 @@ from shutil import which
 from typing import Any
 
 from bunraku.client.api import Client
+from bunraku.client.message_socket import upgrade
 from bunraku.client.puppeteer import Puppeteer, Refused
 from tests.bench.fanout_processes import Told, ceiling
+from tests.bench.parts import asked
 
 LEAD_MS = 60.0
 """How far ahead of their publishing overlays are due."""
@@ -136,7 +137,7 @@ def blocks(viewers: int = 4000, sample: int = 200, seconds: float = 12.0) -> Fig
             time.sleep(seconds)
             passed, cores = time.monotonic() - begun, sender.processor_seconds() - before
             came, seen = drain.ask(""), crowd.ask("figures")
-    # pings of the silent are frames too, one in eight seconds
+    # pings of the silent are frames too, one in twelve seconds
     sent = came["frames"] + seen["blocks"]
     return {
         "blocks_viewers": came["open"] + seen["joined"],
@@ -289,12 +290,7 @@ def _viewer(port: int, buffer: int | None = None) -> socket.socket:
         viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
     viewer.settimeout(20)
     viewer.connect(("127.0.0.1", port))
-    lines = (
-        f"GET {STREAM} HTTP/1.1", f"Host: 127.0.0.1:{port}", "Upgrade: websocket", "Connection: Upgrade",
-        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==", "Sec-WebSocket-Version: 13",
-        "Sec-WebSocket-Protocol: bunraku.v1", "", "",
-    )  # fmt: skip
-    viewer.sendall("\r\n".join(lines).encode())
+    viewer.sendall(upgrade(f"ws://127.0.0.1:{port}{STREAM}"))
     return viewer
 
 
@@ -327,19 +323,14 @@ PARTS: dict[str, Callable[[], Figures]] = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; default: all")
-    given = parser.parse_args()
-    unknown = [part for part in given.parts if part not in PARTS]
-    if unknown:
-        parser.error(f"parts are {', '.join(PARTS)}, not {unknown[0]}")
+    parts = asked(__doc__, PARTS)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft < 16_384:
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 16_384), hard))
         if hard < 16_384:
             print(f"only {hard} files may be open (ulimit -Hn): parts with more viewers will fail")
     figures: Figures = {}
-    for part in given.parts or PARTS:
+    for part in parts:
         begun = time.monotonic()
         found = PARTS[part]()
         figures |= found

@@ -9,23 +9,15 @@ from __future__ import annotations
 import json
 import os
 import socket
-import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
+from tests.processes import Owned, free_port, needed
+
 SUBJECT = "overlay"
-
-
-def ports() -> tuple[int, int, int]:
-    """Three ports that nobody has."""
-    taken = [socket.create_server(("127.0.0.1", 0)) for _ in range(3)]
-    first, second, third = (one.getsockname()[1] for one in taken)
-    for one in taken:
-        one.close()
-    return first, second, third
 
 
 def settings(client: int, websocket: int, monitor: int) -> str:
@@ -45,19 +37,13 @@ websocket {{
 
 
 def connected(port: int) -> socket.socket:
-    """A client of the server that may publish, once the server listens."""
-    for _ in range(200):
-        try:
-            client = socket.create_connection(("127.0.0.1", port), timeout=10)
-        except ConnectionRefusedError:
-            time.sleep(0.05)
-            continue
-        client.sendall(b'CONNECT {"verbose":false,"pedantic":false}\r\nPING\r\n')
-        said = b""
-        while b"PONG\r\n" not in said:
-            said += client.recv(4096)
-        return client
-    raise RuntimeError("nats-server does not listen")
+    """A client of the server that may publish."""
+    client = socket.create_connection(("127.0.0.1", port), timeout=10)
+    client.sendall(b'CONNECT {"verbose":false,"pedantic":false}\r\nPING\r\n')
+    said = b""
+    while b"PONG\r\n" not in said:
+        said += client.recv(4096)
+    return client
 
 
 def sent(monitor: int) -> int:
@@ -77,10 +63,11 @@ def used(pid: int) -> float:
 def main() -> None:
     size, hertz = int(sys.argv[1]), int(sys.argv[2])
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
-        client, websocket, monitor = ports()
+        client, websocket, monitor = free_port(), free_port(), free_port()
         config = Path(folder) / "nats.conf"
         config.write_text(settings(client, websocket, monitor))
-        server = subprocess.Popen(["nats-server", "-c", str(config)], stderr=subprocess.DEVNULL)
+        server = Owned([needed("nats-server"), "-c", str(config)], client, Path(folder))
+        server.start()
         try:
             publisher = connected(client)
             print(websocket, flush=True)
@@ -94,8 +81,7 @@ def main() -> None:
                 cpu = used(server.pid) - before
                 print(json.dumps({"messages": sent(monitor) - messages, "cpu": round(cpu, 6)}), flush=True)
         finally:
-            server.terminate()
-            server.wait(20)
+            server.stop()
 
 
 if __name__ == "__main__":

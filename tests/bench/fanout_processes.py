@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
+from tests.processes import processor_seconds
+
 HERE = Path(__file__).parent
 
 
@@ -64,9 +66,8 @@ class Told:
         return json.loads(self.line())
 
     def processor_seconds(self) -> float:
-        """What it has used of a processor, in user and kernel mode."""
-        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        """As `processes.processor_seconds`."""
+        return processor_seconds(self.process.pid)
 
     def resident_kilobytes(self) -> int:
         """Its memory."""

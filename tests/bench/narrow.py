@@ -11,6 +11,7 @@ ARGUMENTS="--only live"`.
     steps          56 -> 14.4 -> 56 kbit/s under a pulled dancer: gaps, latency of the live overlay
     live           all four limbs pulled, on 28.8 kbit/s: latency, how much of the line is used, and the same written
                    naively: each overlay as it comes
+    proxied        the same dancer on the same line, with a proxy between server and line: latency, and use of the line
     clock          the same line, a viewer's clock right, and an hour off and 200 ppm fast
     join           a session that runs already, 64 kbit/s: the right pose, and the difference to one on a quick line
     cut            28.8 kbit/s, cut for 25 s: what is shown after
@@ -44,23 +45,26 @@ from bunraku.motion.skeleton import points
 from bunraku.playout.blocks import Pose
 from tests.bench.naive import naive_relay
 from tests.bench.narrow_traces import traces
-from tests.bench.narrow_viewing import PORT, Bench, Figures, Patient, Screen, percentile, truth_of_the_clock, whole
+from tests.bench.narrow_viewing import (
+    LINES,
+    PORT,
+    Bench,
+    Figures,
+    Patient,
+    Screen,
+    percentile,
+    truth_of_the_clock,
+    whole,
+)
 from tests.bench.network import Far, Link, Network, missing, network
+from tests.proxies import proxy
 
 
 async def first_poses(bench: Bench, only: set[str]) -> Figures:
     """Cases 9k6, 28k8 and 56k."""
-    cases = [
-        (name, link)
-        for name, link in (
-            ("9k6", Link(9_600, 150)),
-            ("28k8", Link(28_800, 75)),
-            ("56k", Link(56_000, 75)),
-        )
-        if name in only
-    ]
+    cases = [name for name in LINES if name in only]
     figures: Figures = {}
-    with bench.net.lines([link for _, link in cases for _ in range(5)]) as fars:
+    with bench.net.lines([LINES[name] for name in cases for _ in range(5)]) as fars:
         screens = [bench.dance(far, "?tracks=motion") for far in fars]
         # the first of each stays; one after the other, as they share two cores
         watching = []
@@ -70,7 +74,7 @@ async def first_poses(bench: Bench, only: set[str]) -> Figures:
                 watching.append(asyncio.create_task(screen.look(60.0 if nth == 0 else 4.0)))
                 await asyncio.sleep(0.7)
         await asyncio.gather(*watching)
-        for case, (name, _) in enumerate(cases):
+        for case, name in enumerate(cases):
             mine = screens[5 * case : 5 * case + 5]
             first = [screen.figures.first_pose_ms or float("inf") for screen in mine]
             figures[f"first_pose_ms_{name}"] = whole(float(np.median(first)))
@@ -84,15 +88,14 @@ async def first_poses(bench: Bench, only: set[str]) -> Figures:
 async def audio(bench: Bench) -> Figures:
     """Case audio."""
     figures: Figures = {}
-    lines = {"9k6": Link(9_600, 150), "28k8": Link(28_800, 75), "56k": Link(56_000, 75)}
-    with bench.net.lines(list(lines.values())) as fars:
+    with bench.net.lines(list(LINES.values())) as fars:
         screens = [bench.dance(far) for far in fars]
         watching = []
         for screen in screens:
             watching.append(asyncio.create_task(screen.look(60.0)))
             await asyncio.sleep(0.7)
         await asyncio.gather(*watching)
-        for name, screen, far in zip(lines, screens, fars, strict=True):
+        for name, screen, far in zip(LINES, screens, fars, strict=True):
             late = [
                 heard for (at, _, _), heard in zip(screen.shown, screen.heard, strict=True) if at > screen.begun + 30e6
             ]
@@ -102,6 +105,29 @@ async def audio(bench: Bench) -> Figures:
             figures[f"audio_rate_{name}"] = screen.figures.audio_rate
             figures[f"audio_shown_kbps_{name}"] = round(screen.figures.shown_kbps, 2)
             figures[f"audio_line_kbps_{name}"] = round(far.received * 8e-3 / 60.0, 2)
+    return figures
+
+
+async def proxied(bench: Bench) -> Figures:
+    """Case proxied: the proxy is at the near end."""
+    figures: Figures = {}
+    seconds, settle = 40.0, 5.0
+
+    async def work(session: str) -> None:
+        async with proxy(PORT, host="0.0.0.0", at=PORT + 2):
+            with bench.net.lines([Link(28_800, 75, queue_bytes=64_000)]) as (far,):
+                screen = Screen(
+                    f"ws://{far.host}:{PORT + 2}/v1/sessions/{session}/stream?tracks=motion", far, bench.truth
+                )
+                await screen.look(seconds)
+                late = [ms for at, ms, _ in screen.came if at - screen.begun > settle * 1e6]
+                figures["proxied_p50_ms_28k8"] = round(percentile(late, 50))
+                figures["proxied_p95_ms_28k8"] = round(percentile(late, 95))
+                figures["proxied_fps_28k8"] = round(len(late) / (seconds - settle), 1)
+                figures["proxied_stalls_28k8"] = screen.figures.gaps
+                figures["proxied_line_used_28k8"] = round(far.received * 8 / 28_800 / seconds, 3)
+
+    await bench.pulled(work, 5.0)
     return figures
 
 
@@ -237,7 +263,7 @@ async def _counted(far: Far, after: float, into: list[int]) -> None:
     into.append(far.received)
 
 
-CASES = ("9k6", "28k8", "56k", "audio", "steps", "live", "clock", "join", "cut", "traces")
+CASES = (*LINES, "audio", "steps", "live", "clock", "proxied", "join", "cut", "traces")
 
 
 async def run(net: Network, only: set[str], seconds: float) -> Figures:
@@ -256,13 +282,14 @@ async def run(net: Network, only: set[str], seconds: float) -> Figures:
                 print(f"{name:<40}{value!s:>10}", flush=True)
             figures.update(found)
 
-    await case({"9k6", "28k8", "56k"}, lambda: first_poses(bench, only))
+    await case(set(LINES), lambda: first_poses(bench, only))
     await case({"live", "clock"}, lambda: live(bench))
+    await case({"proxied"}, lambda: proxied(bench))
     await case({"audio"}, lambda: audio(bench))
     await case({"steps"}, lambda: steps(bench))
     await case({"join"}, lambda: join(bench))
     await case({"cut"}, lambda: cut(bench))
-    await case({"traces"}, lambda: traces(bench, seconds, [28_800, 56_000]))
+    await case({"traces"}, lambda: traces(bench, seconds, "28k8", "56k"))
     return figures
 
 
@@ -284,7 +311,7 @@ def main() -> None:
             [sys.executable, "-m", "bunraku.cli", "up", "--demo", "--host", "0.0.0.0", "--port", str(PORT), "--data",
              str(given.data or folder)],
             stdout=subprocess.PIPE,
-            env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200"},
+            env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200", "BUNRAKU_PUBLISHED": "127.0.0.1"},
         )  # fmt: skip
         assert server.stdout is not None
         try:

@@ -9,21 +9,22 @@ from pathlib import Path
 import numpy as np
 
 from bunraku.client.api import Client
-from tests.bench.narrow_viewing import Bench, Figures, Screen
+from tests.bench.narrow_viewing import LINES, Bench, Figures, Screen
 from tests.bench.network import Link, narrowlink_path
 
 
-async def traces(bench: Bench, seconds: float, scaled: list[int]) -> Figures:
-    """Case traces, at these mean rates in bit/s."""
+async def traces(bench: Bench, seconds: float, *means: str) -> Figures:
+    """Case traces, at the mean rates of these of `LINES`."""
     figures: Figures = {}
     files = sorted(narrowlink_path().parent.glob("3Glogs_*.csv"))
     async with Client(bench.url) as client:
         motion = await client.motion(bench.motion)
     costs = [rate["kbps"] for rate in motion["rates"]]
-    for mean in scaled:
+    for name in means:
         rows = [_trace(file) for file in files]
         links = [
-            Link(delay_ms=75, trace=str(file), scale=mean / _mean(row)) for file, row in zip(files, rows, strict=True)
+            Link(delay_ms=75, trace=str(file), scale=LINES[name].rate / _mean(row))
+            for file, row in zip(files, rows, strict=True)
         ]
         with bench.net.lines(links * 2) as fars:
             screens = [
@@ -33,7 +34,6 @@ async def traces(bench: Bench, seconds: float, scaled: list[int]) -> Figures:
             await asyncio.gather(*(screen.look(seconds, frame=1 / 15) for screen in screens))
         ours, lowest = screens[: len(links)], screens[len(links) :]
         watched = seconds * 1e3 * len(links)
-        name = f"{mean / 1000:g}k".replace(".", "k")[:4].rstrip("k") + ("k" if mean % 1000 == 0 else "")
         mine, theirs = (sum(_dark(screen, seconds) for screen in group) for group in (ours, lowest))
         figures[f"traces_stalled_percent_{name}"] = round(100 * mine / watched, 3)
         figures[f"traces_stalled_lowest_percent_{name}"] = round(100 * theirs / watched, 3)

@@ -10,16 +10,18 @@ from typing import Any
 import numpy as np
 from websockets.asyncio.client import connect
 
+from bunraku.client import StreamEnded, Viewer
 from bunraku.client.api import Client
 from bunraku.client.puppeteer import Puppeteer
-from bunraku.client.viewer import StreamEnded, Viewer
 from bunraku.playout.clock import Sample
 from bunraku.wire.messages import LARGEST_FROM_SERVER, LIMBS, SUBPROTOCOL, Overlay, Ping, Pong, unpack
-from tests.bench.network import Far, Network
+from tests.bench.network import Far, Link, Network
 
 PORT = 18352
 LEAD = 60_000
 """How far ahead of its making an overlay is due, microseconds; a session's Welcome says it."""
+LINES = {"9k6": Link(9_600, 150), "28k8": Link(28_800, 75), "56k": Link(56_000, 75)}
+"""The lines of old telephones, by their kbit/s."""
 Figures = dict[str, Any]
 
 
@@ -70,8 +72,8 @@ class Screen(Viewer):
 class Patient(Screen):
     """One that waits for what comes late, however late."""
 
-    async def _watch_line(self) -> None:
-        await asyncio.Event().wait()
+    def __init__(self, url: str, far: Far | None = None, truth: float = 0.0) -> None:
+        super().__init__(url, far, truth, silent=float("inf"))
 
 
 class Bench:

@@ -13,12 +13,10 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import base64
 import gc
 import json
 import os
 import re
-import secrets
 import subprocess
 import sys
 import tempfile
@@ -27,8 +25,6 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import cast
-from urllib.parse import urlsplit
 
 import httpx2
 import numpy as np
@@ -36,6 +32,7 @@ import uvloop
 
 from bunraku.backing.backing import clock
 from bunraku.client.api import Client
+from bunraku.client.message_socket import MessageSocket
 from bunraku.client.puppeteer import Puppeteer, Refused
 from bunraku.codec.track import read_track
 from bunraku.marionette import vector
@@ -44,7 +41,8 @@ from bunraku.marionette.vector import Quaternion, Vector
 from bunraku.motion.skeleton import Figure
 from bunraku.playout.overlays import UNIT
 from bunraku.serve import LOAD_AFTER
-from bunraku.wire.messages import SUBPROTOCOL, Description, Overlay, unpack
+from bunraku.wire.messages import Description, Overlay, unpack
+from tests.processes import processor_seconds
 
 FRAME = 1e6 / 60.0
 WARM = 4.0
@@ -61,62 +59,20 @@ LOST = 1_000_000
 """Microseconds: a pull that nobody saw by then is lost."""
 
 
-_PING, _PONG = 9, 10
-"""Opcodes of WebSocket frames."""
-
-
-class Screen(asyncio.Protocol):
+class Screen(MessageSocket):
     """One viewer's socket: messages are kept with the clock time at which they came."""
 
-    _transport: asyncio.Transport
-
-    def __init__(self, path: str, host: str) -> None:
+    def __init__(self, url: str) -> None:
+        super().__init__(url)
         self.messages: list[tuple[int, bytes]] = []
-        self.open = asyncio.get_running_loop().create_future()
-        self.closed = False
-        self._path, self._host = path, host
-        self._buffer = b""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = cast(asyncio.Transport, transport)
-        key = base64.b64encode(secrets.token_bytes(16)).decode()
-        lines = (
-            f"GET {self._path} HTTP/1.1", f"Host: {self._host}", "Upgrade: websocket", "Connection: Upgrade",
-            f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Protocol: {SUBPROTOCOL}", "", "",
-        )  # fmt: skip
-        self._transport.write("\r\n".join(lines).encode())
+        self._now = 0
 
     def data_received(self, data: bytes) -> None:
-        now = clock()
-        self._buffer += data
-        if not self.open.done():
-            head, found, rest = self._buffer.partition(b"\r\n\r\n")
-            if not found:
-                return
-            if b" 101 " not in head.split(b"\r\n", 1)[0]:
-                self.open.set_exception(ConnectionError(head.decode(errors="replace")))
-                return
-            self.open.set_result(None)
-            self._buffer = rest
-        buffer, at = self._buffer, 0
-        while len(buffer) - at >= 2:
-            size, body = buffer[at + 1], at + 2
-            if size == 126:
-                size, body = int.from_bytes(buffer[at + 2 : at + 4], "big"), at + 4
-            elif size == 127:
-                size, body = int.from_bytes(buffer[at + 2 : at + 10], "big"), at + 10
-            if body + size > len(buffer):
-                break
-            if buffer[at] & 0x0F == _PING:
-                # with a mask of zeros, which leaves it as it is
-                self._transport.write(bytes((0x80 | _PONG, 0x80 | size)) + bytes(4) + buffer[body : body + size])
-            else:
-                self.messages.append((now, buffer[body : body + size]))
-            at = body + size
-        self._buffer = buffer[at:]
+        self._now = clock()
+        super().data_received(data)
 
-    def connection_lost(self, _: Exception | None) -> None:
-        self.closed = True
+    def take(self, message: bytes) -> None:
+        self.messages.append((self._now, message))
 
 
 @dataclass
@@ -132,15 +88,10 @@ class Played:
 async def watch(client: Client, motion: str, viewers: int) -> tuple[str, Played]:
     """One session with its viewers."""
     session = (await client.open_session(motion))["id"]
-    parts = urlsplit(client.socket_url(f"/v1/sessions/{session}/stream"))
-    loop = asyncio.get_running_loop()
-    screens: list[Screen] = []
-    for _ in range(viewers):
-        _, screen = await loop.create_connection(
-            lambda: Screen(f"{parts.path}?rate=0", parts.netloc), parts.hostname or "", parts.port or 0
-        )
-        await asyncio.wait_for(screen.open, 30)
-        screens.append(screen)
+    url = client.socket_url(f"/v1/sessions/{session}/stream?rate=0")
+    screens = [Screen(url) for _ in range(viewers)]
+    for screen in screens:
+        await asyncio.wait_for(screen.open(), 30)
     return session, Played(screens)
 
 
@@ -215,12 +166,6 @@ def _place(frames: list[tuple[int, int, Vector]], dues: list[int], shown: float)
     (_, begin, one), (_, end, other) = frames[after - 1], frames[after]
     share = (shown - begin) / (end - begin)
     return vector.add(one, vector.scale(vector.subtract(other, one), share))
-
-
-def processor_seconds(pid: int) -> float:
-    """Of a process and all it waited for."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def settled(pid: int) -> None:
