@@ -66,6 +66,12 @@ class Owned:
         self.stop()
         pytest.fail(f"{self.command[0]} did not start: {log.read_text(errors='replace')[-2000:]}")
 
+    @property
+    def pid(self) -> int:
+        """Of the process that runs."""
+        assert self._process is not None
+        return self._process.pid
+
     def pause(self) -> None:
         """It, and its own processes, stand still; returns when they do."""
         everyone = self._everyone()
@@ -82,8 +88,7 @@ class Owned:
             _send(pid, signal.SIGCONT)
 
     def _everyone(self) -> list[int]:
-        assert self._process is not None
-        pid = self._process.pid
+        pid = self.pid
         return [pid, *map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())]
 
     def kill(self) -> None:
@@ -106,6 +111,12 @@ class Owned:
                 self._process.kill()
                 self._process.wait(10)
             self._process = None
+
+
+def processor_seconds(pid: int) -> float:
+    """What a process has used of a processor in user and kernel mode, seconds, without its children's."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _send(pid: int, number: signal.Signals) -> None:

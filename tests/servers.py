@@ -5,19 +5,26 @@ from __future__ import annotations
 import asyncio
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from bunraku.backing.settings import Settings
 from bunraku.motion.skeleton import Motion
 from bunraku.motion.writers import write_bvh
-from bunraku.serve import serve
+from bunraku.serve import SERVICES, serve
 from tests.vectors.blocks import wandering_motion
 
 
 @contextmanager
-def running(data: Path, *, demo: bool = False, host: str = "127.0.0.1", **settings: object) -> Iterator[str]:
+def running(
+    data: Path,
+    *,
+    demo: bool = False,
+    host: str = "127.0.0.1",
+    services: Collection[str] = SERVICES,
+    **settings: object,
+) -> Iterator[str]:
     """The address of a server that runs in a thread until the block ends; it listens at `host`."""
     listening = socket.create_server((host, 0))
     url = f"http://127.0.0.1:{listening.getsockname()[1]}"
@@ -27,7 +34,7 @@ def running(data: Path, *, demo: bool = False, host: str = "127.0.0.1", **settin
     def run() -> None:
         async def until_ended() -> None:
             given = Settings(data=data, **settings)  # type: ignore[arg-type]
-            serving = asyncio.create_task(serve(given, listening, demo=demo, ready=started.set))
+            serving = asyncio.create_task(serve(given, listening, demo=demo, ready=started.set, services=services))
             ending = asyncio.create_task(asyncio.to_thread(ended.wait))
             await asyncio.wait((serving, ending), return_when=asyncio.FIRST_COMPLETED)
             ended.set()

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import resource
 from pathlib import Path
 
 import httpx2
@@ -29,6 +30,34 @@ async def test_everything_is_at_one_address_and_described(server: str) -> None:
         ("/v1/solve", "post"),
         ("/v1/health", "get"),
     }
+
+
+async def test_the_page_alone_describes_the_whole_interface(tmp_path: Path, server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server) as http:
+        whole = (await http.get("/v1/openapi.json")).json()["paths"]
+    async with serve.compose(Settings(data=tmp_path), services=("page",)) as app:
+        transport = httpx2.ASGITransport(app)
+        async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
+            assert (await http.get("/v1/openapi.json")).json()["paths"] == whole
+            assert (await http.get("/readyz")).json() == {"status": "ready"}
+            assert (await http.get("/v1/motions")).status_code != 200
+
+
+def test_a_server_may_have_as_many_viewers_as_its_system_lets_it(tmp_path: Path) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    few = min(512, hard)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (few, hard))
+    try:
+        with running(tmp_path / "data", services=("stream",)):
+            assert resource.getrlimit(resource.RLIMIT_NOFILE) == (hard, hard)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+async def test_a_process_with_everything_is_ready(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server) as http:
+        assert (await http.get("/livez")).json() == {"status": "ok"}
+        assert (await http.get("/readyz")).json() == {"status": "ready"}
 
 
 @pytest.mark.parametrize("path", ["/v1/nothing", "/v1/motions/none", "/v1/sessions/none"])

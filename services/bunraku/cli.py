@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-import re
 import socket
 import sys
 import webbrowser
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Annotated, Any
-from urllib.parse import unquote, urlsplit
+from urllib.parse import urlsplit
 
 import typer
-from rich.console import Console
 
 from bunraku import __version__
+from bunraku.cli_access import HOURS, operator_link, secure, share, token, wrong_setting
+from bunraku.terminal import HERE, Json, Server, Token, ask, err, kind_of, out, read_address, say, show_figures
 
 app = typer.Typer(
     help="A humanoid dances in the browser, and the people watching pull its strings.", no_args_is_help=True
 )
-out = Console()
-err = Console(stderr=True)
-
-Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Server = Annotated[str, typer.Option("--server", envvar="BUNRAKU_SERVER", help="Address of a running Bunraku.")]
-HERE = "http://127.0.0.1:8000"
+app.command()(token)
+app.command()(share)
 
 
 @app.command()
@@ -40,6 +36,8 @@ def up(
     open_page: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
     """Run everything in one process, until Ctrl-C. Several processes meet over a bus: BUNRAKU_BUS=nats://..."""
+    from bunraku.backing import logs
+    from bunraku.backing.metrics import CannotListen
     from bunraku.backing.settings import Settings
     from bunraku.serve import SERVICES, serve
 
@@ -49,7 +47,13 @@ def up(
     if demo and "session" not in services:
         raise typer.BadParameter("the demo's stage is opened where sessions are", param_hint="--demo")
 
-    settings = Settings() if data is None else Settings(data=data)
+    try:
+        settings = Settings() if data is None else Settings(data=data)
+    except ValueError as error:
+        err.print(wrong_setting(error), markup=False)
+        raise typer.Exit(1) from None
+    logs.configure(settings.logs, settings.log_level, "all" if service is None else ",".join(services))
+    own = secure(settings, host)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         listening = socket.create_server((host, port), family=family, backlog=1024)
@@ -62,17 +66,27 @@ def up(
     def ready() -> None:
         out.print(f"Bunraku {__version__} is at [link={url}]{url}[/link]", soft_wrap=True)
         out.print(f"It keeps its motions in {settings.data}. Ctrl-C ends it.", soft_wrap=True)
+        guarded = bool(settings.secret.get_secret_value()) and "page" in services
+        link = operator_link(settings, url) if guarded else url
+        if guarded and (own or out.is_terminal):
+            say(f"Who comes needs a link. Yours, for {HOURS:g} hours:\n{link}")
+        elif guarded:
+            out.print(f"Who comes needs a link: `bunraku token --server {url}` makes one.", soft_wrap=True)
         if open_page:
-            webbrowser.open(url)
+            webbrowser.open(link)
 
     out.print("Setting the stage ..." if demo else "Starting ...")
     serving = serve(settings, listening, demo=demo, ready=ready, services=services)
-    if sys.platform == "win32":
-        asyncio.run(serving)
-    else:
-        import uvloop
+    try:
+        if sys.platform == "win32":
+            asyncio.run(serving)
+        else:
+            import uvloop
 
-        uvloop.run(serving)
+            uvloop.run(serving)
+    except CannotListen as error:
+        err.print(str(error), markup=False)
+        raise typer.Exit(1) from None
     out.print("The curtain falls.")
 
 
@@ -80,12 +94,13 @@ def up(
 def upload(
     file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True)],
     server: Server = HERE,
+    token: Token = None,
     as_json: Json = False,
 ) -> None:
     """Upload a motion file, and say what was made of it."""
     from rich.table import Table
 
-    motion = _send(file, server, as_json, lambda client, *told: client.upload(file, *told))
+    motion = _send(file, server, token, as_json, lambda client, *told: client.upload(file, *told))
     if as_json:
         out.print_json(data=motion)
         return
@@ -105,19 +120,19 @@ def audio(
     motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
     file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="WAV, FLAC, MP3 or Ogg.")],
     server: Server = HERE,
+    token: Token = None,
     as_json: Json = False,
 ) -> None:
     """Make a new motion of one and a sound, which begins with it."""
-    base, kind, identity = _address(motion)
+    base, kind, identity = read_address(motion)
     if kind == "sessions":
         raise typer.BadParameter("sound is added to a motion: give one", param_hint="MOTION")
-    made = _send(file, base or server, as_json, lambda client, *told: client.add_audio(identity, file, *told))
+    made = _send(file, base or server, token, as_json, lambda client, *told: client.add_audio(identity, file, *told))
     if as_json:
         out.print_json(data=made)
         return
     rates = ", ".join(f"{rate['kbps']:.0f}" for rate in made["audio"]["rates"])
-    said = f"{made['audio']['seconds']:.1f} s of sound at {rates} kbit/s beside {made['name']}: {made['id']}"
-    out.print(said, markup=False, highlight=False, soft_wrap=True)
+    say(f"{made['audio']['seconds']:.1f} s of sound at {rates} kbit/s beside {made['name']}: {made['id']}")
 
 
 @app.command()
@@ -125,6 +140,7 @@ def scene(
     motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
     file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="JSON: camera, lights.")],
     server: Server = HERE,
+    token: Token = None,
     as_json: Json = False,
 ) -> None:
     """Make a new motion of one with a camera and lights, from keyframes."""
@@ -132,7 +148,7 @@ def scene(
 
     from bunraku.client.api import Client
 
-    base, kind, identity = _address(motion)
+    base, kind, identity = read_address(motion)
     if kind == "sessions":
         raise typer.BadParameter("a scene is added to a motion: give one", param_hint="MOTION")
     try:
@@ -141,29 +157,28 @@ def scene(
         raise typer.BadParameter(f"{file.name} is no JSON: {error}", param_hint="FILE") from None
 
     async def run() -> dict[str, Any]:
-        async with Client(base or server) as client:
+        async with Client(base or server, token) as client:
             return await client.add_scene(identity, staging)
 
-    made = _ask(run, base or server)
+    made = ask(run, base or server)
     if as_json:
         out.print_json(data=made)
         return
-    said = f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}"
-    out.print(said, markup=False, highlight=False, soft_wrap=True)
+    say(f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}")
 
 
 @app.command(name="list")
-def list_motions(server: Server = HERE, as_json: Json = False) -> None:
+def list_motions(server: Server = HERE, token: Token = None, as_json: Json = False) -> None:
     """List the motions of a server."""
     from rich.table import Table
 
     from bunraku.client.api import Client
 
     async def run() -> list[dict[str, Any]]:
-        async with Client(server) as client:
+        async with Client(server, token) as client:
             return await client.motions()
 
-    motions = _ask(run, server)
+    motions = ask(run, server)
     if as_json:
         out.print_json(data=motions)
         return
@@ -180,30 +195,23 @@ def watch(
     url: Annotated[str, typer.Argument(help="A motion or session: its id, its page, or its API address.")],
     seconds: Annotated[float, typer.Option(help="How long.", min=0.1, max=86400)] = 10.0,
     server: Server = HERE,
+    token: Token = None,
     as_json: Json = False,
 ) -> None:
     """Watch without a screen, and print how it went."""
-    from rich.table import Table
-
     from bunraku.client import Client, StreamEnded, Viewer
 
     async def run() -> dict[str, Any]:
-        async with Client(server) as client:
-            viewer = Viewer(await _stream_url(client, url))
+        async with Client(server, token) as client:
+            viewer = Viewer(await _stream_url(client, url), token=token)
         return (await viewer.watch(seconds)).as_json()
 
     try:
-        figures = _ask(run, server)
+        figures = ask(run, server)
     except StreamEnded as error:
         err.print(f"The stream ended: {error}")
         raise typer.Exit(1) from None
-    if as_json:
-        out.print_json(data=figures)
-        return
-    table = Table(show_header=False, box=None)
-    for key, value in figures.items():
-        table.add_row(key.replace("_", " "), str(value))
-    out.print(table)
+    show_figures(figures, as_json)
 
 
 @app.command()
@@ -216,23 +224,24 @@ def keep(
         float | None, typer.Option(help="How much of what was shown last; default: all that can be kept.", min=0.1)
     ] = None,
     server: Server = HERE,
+    token: Token = None,
     as_json: Json = False,
 ) -> None:
     """Keep what a session has shown as a new motion, pulled limbs and all."""
     from bunraku.client.api import Client
 
     async def run() -> dict[str, Any]:
-        base, kind, identity = _address(session)
+        base, kind, identity = read_address(session)
         if kind == "motions":
             raise typer.BadParameter("a motion is kept already: give a session", param_hint="SESSION")
-        async with Client(base or server) as client:
+        async with Client(base or server, token) as client:
             return await client.keep(identity, name, seconds)
 
-    motion = _ask(run, server)
+    motion = ask(run, server)
     if as_json:
         out.print_json(data=motion)
         return
-    out.print(f"Kept {motion['duration']:.1f} s as {motion['id']}: {motion['name']}", markup=False, highlight=False)
+    say(f"Kept {motion['duration']:.1f} s as {motion['id']}: {motion['name']}")
 
 
 bench = typer.Typer(help="Load-test a server.", no_args_is_help=True)
@@ -254,17 +263,17 @@ def bench_viewers(
     seconds: Annotated[float, typer.Option(help="How long they watch.", min=0.1, max=86400)] = 20.0,
     joins: Annotated[float, typer.Option(help="How many join in a second.", min=0.1, max=10_000)] = 200.0,
     server: Server = HERE,
+    token: Token = None,
     as_json: Json = False,
 ) -> None:
     """Have many viewers watch at once, and print how they fared."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-    from rich.table import Table
 
     from bunraku.client.api import Client
     from bunraku.client.crowd import TooMany, watch_together
 
     async def run() -> dict[str, Any]:
-        async with Client(server) as client:
+        async with Client(server, token) as client:
             found = url or await client.first_session()
             if found is None:
                 raise typer.BadParameter(f"no session is open at {server}: name a motion", param_hint="--url")
@@ -276,20 +285,14 @@ def bench_viewers(
             def told(stage: str, share: float) -> None:
                 progress.update(task, description=stage, completed=share)
 
-            return (await watch_together(stream, viewers, seconds, joins=joins, told=told)).as_json()
+            return (await watch_together(stream, viewers, seconds, joins=joins, token=token, told=told)).as_json()
 
     try:
-        figures = _ask(run, server)
+        figures = ask(run, server)
     except TooMany as error:
         err.print(f"Too many viewers for one process: {error}")
         raise typer.Exit(1) from None
-    if as_json:
-        out.print_json(data=figures)
-    else:
-        table = Table(show_header=False, box=None)
-        for key, value in figures.items():
-            table.add_row(key.replace("_", " "), "-" if value is None else str(value))
-        out.print(table)
+    show_figures(figures, as_json)
     if figures["joined"] == 0:
         raise typer.Exit(1)
 
@@ -303,14 +306,15 @@ def version(as_json: Json = False) -> None:
 @app.command()
 def warm() -> None:
     """Compile reader, codec and what moves limbs once, so that nobody waits for it (done by `make setup`)."""
-    from bunraku.backing.cache import cache_of
     from bunraku.ingest import making  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
-    from bunraku.marionette import compiled
+    from bunraku.session import solving
 
-    compiled.load(cache_of("marionette"))
+    solving.warm()
 
 
-def _send(file: Path, server: str, quiet: bool, send: Callable[..., Awaitable[dict[str, Any]]]) -> dict[str, Any]:
+def _send(
+    file: Path, server: str, token: str | None, quiet: bool, send: Callable[..., Awaitable[dict[str, Any]]]
+) -> dict[str, Any]:
     """What the server makes of a file; `send` is told the client, and what to tell how far it is."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
@@ -329,62 +333,24 @@ def _send(file: Path, server: str, quiet: bool, send: Callable[..., Awaitable[di
             def at(stage: str, share: float) -> None:
                 progress.update(task, description=stage, completed=share)
 
-            async with Client(server) as client:
+            async with Client(server, token) as client:
                 return await send(client, lambda sent, size: at("sending", sent / size), at)
 
-    made: dict[str, Any] = _ask(run, server)
+    made: dict[str, Any] = ask(run, server)
     return made
 
 
 async def _stream_url(client: Any, address: str) -> str:
     """The socket of a motion or session, given by its address, its page or its id."""
-    from bunraku.client.api import Client, ServerProblem
+    from bunraku.client.api import Client
 
     if urlsplit(address).scheme in ("ws", "wss"):
         return address
-    base, kind, identity = _address(address)
+    base, kind, identity = read_address(address)
     if base is not None:
         return Client(base).socket_url(f"/v1/{kind}/{identity}/stream")
-    try:
-        await client.session(identity)
-        kind = "sessions"
-    except ServerProblem:
-        await client.motion(identity)
-        kind = "motions"
-    socket_url: str = client.socket_url(f"/v1/{kind}/{identity}/stream")
+    socket_url: str = client.socket_url(f"/v1/{await kind_of(client, identity)}/{identity}/stream")
     return socket_url
-
-
-def _address(address: str) -> tuple[str | None, str | None, str]:
-    """Server, kind (`motions` or `sessions`) and id of what is given by its page or its API address; of a mere id only
-    that. Raises `typer.BadParameter` for an address of something else."""
-    parts = urlsplit(address)
-    if parts.scheme not in ("http", "https", "ws", "wss"):
-        return None, None, address
-    base = f"{parts.scheme.replace('ws', 'http')}://{parts.netloc}"
-    query = dict(pair.partition("=")[::2] for pair in parts.query.split("&"))
-    if "session" in query:
-        return base, "sessions", unquote(query["session"])
-    found = re.fullmatch(r"(.*)/v1/(motions|sessions)/([^/]+)(?:/(?:stream)?)?", parts.path)
-    if found is None:
-        raise typer.BadParameter(f"no motion and no session is at {address}")
-    return base + found[1], found[2], unquote(found[3])
-
-
-def _ask(run: Any, server: str) -> Any:
-    """The result of `run`, its failures said in words."""
-    import httpx2
-    from websockets.exceptions import WebSocketException
-
-    from bunraku.client.api import ServerProblem
-
-    try:
-        return asyncio.run(run())
-    except ServerProblem as problem:
-        err.print(str(problem))
-    except (httpx2.TransportError, OSError, WebSocketException) as error:
-        err.print(f"No Bunraku answers at {server}: {error}. Is `bunraku up` running?")
-    raise typer.Exit(1)
 
 
 if __name__ == "__main__":

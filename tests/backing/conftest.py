@@ -1,4 +1,4 @@
-"""What the tests of catalogues share: a place for a new one, in SQLite and in PostgreSQL."""
+"""Servers that the tests of one process share: a bus, and places for new catalogues in SQLite and in PostgreSQL."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import asyncpg
 import pytest
 
-from tests.processes import Owned, postgres
+from tests.processes import Owned, jetstream, postgres, url_of
 
 
 @pytest.fixture(scope="session")
@@ -18,6 +18,13 @@ def postgres_server() -> Iterator[Owned]:
     """A server that the tests of one process share."""
     with postgres() as server:
         yield server
+
+
+@pytest.fixture(scope="session")
+def nats_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a nats-server with JetStream."""
+    with jetstream(tmp_path_factory.mktemp("nats")) as server:
+        yield url_of(server)
 
 
 async def _create(port: int, name: str) -> None:

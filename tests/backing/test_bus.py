@@ -4,20 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 
 import pytest
 
 from bunraku.backing.bus import AnswerFailed, Bus, MemoryBus, NobodyAnswers, sayable
 from bunraku.backing.bus_nats import NatsBus
 from bunraku.backing.unavailable import Unavailable
-from tests.processes import nats_server, url_of
-
-
-@pytest.fixture(scope="module")
-def nats_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with nats_server(tmp_path_factory.mktemp("nats")) as server:
-        yield url_of(server)
 
 
 @pytest.fixture(params=["memory", "nats"])

@@ -107,7 +107,12 @@ async def test_a_stream_through_a_restart_has_a_gap_and_no_message_twice(server:
         assert heard.messages == sorted(set(heard.messages))
 
 
-async def test_a_server_that_stands_still_is_away_until_it_goes_on(server: Owned) -> None:
+@pytest.mark.parametrize("beats", [nats_link.BEATS, 1_000])
+async def test_a_server_that_stands_still_is_away_until_it_goes_on(
+    server: Owned, beats: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # found out by its beats, or by a question over which nothing at all came
+    monkeypatch.setattr(nats_link, "BEATS", beats)
     async with connected(url_of(server)) as (bus,):
         bus.answer("echo", echo)
         await settled(bus)

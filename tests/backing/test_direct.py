@@ -35,6 +35,8 @@ class Heard:
         self.messages.append(message)
         self.outlet.write(frame(b"heard " + message))
 
+    def answered(self, payload: bytes) -> None: ...
+
     def pause(self) -> None:
         self.events.append("pause")
 
@@ -50,7 +52,9 @@ class Heard:
 @asynccontextmanager
 async def serving(talk: Callable[[WebSocket], Awaitable[None]]) -> AsyncIterator[tuple[str, uvicorn.Server]]:
     app = Starlette(routes=[WebSocketRoute("/", talk)])
-    config = uvicorn.Config(app, ws=DirectProtocol, lifespan="off", log_level="warning", ws_per_message_deflate=False)
+    config = uvicorn.Config(
+        app, ws=DirectProtocol, lifespan="off", log_config=None, log_level="warning", ws_per_message_deflate=False
+    )
     server = uvicorn.Server(config)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         serving = asyncio.create_task(server.serve(sockets=[listening]))

@@ -6,8 +6,11 @@ import sys
 from collections.abc import AsyncIterator
 
 import pytest
+from starlette.websockets import WebSocket
 
-from bunraku.backing.line import Line
+from bunraku.backing.frames import Opcode
+from bunraku.backing.line import EXTENSION, UNKNOWN, EchoedLine, Line, line_of
+from tests.stream.lines import frames
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what is on its way")
 Ends = tuple[asyncio.Transport, socket.socket]
@@ -70,3 +73,54 @@ async def test_what_is_held_goes_in_one_piece(ends: Ends) -> None:
     transport.write(b"two")
     line.hold(False)
     assert await asyncio.to_thread(client.recv, 100) == b"one two"
+
+
+def pongs(asked: bytes) -> list[bytes]:
+    """What a client answers to the Pings in what was written."""
+    return [payload for opcode, payload in frames(asked) if opcode == Opcode.PING]
+
+
+def test_behind_a_proxy_what_was_echoed_has_come() -> None:
+    now = [10**9]
+    line = EchoedLine(lambda: now[0])
+    assert line.read() == (0, UNKNOWN, 0, 0)
+    first, second = pongs(line.asking(500)), pongs(line.asking(90))
+    assert line.read().waiting == 590
+    now[0] += 180_000
+    line.echoed(first[0])
+    assert line.read() == (90, 180_000, 180_000, 0)
+    # one that is late is known to be before it comes
+    now[0] += 400_000
+    assert line.read().round_trip == 580_000
+    line.echoed(second[0])
+    assert line.read() == (0, 580_000, 180_000, 0)
+    # answers to nothing say nothing
+    for payload in (second[0], b"", b"\xff\xff\xff\xff", b"more than it was asked"):
+        line.echoed(payload)
+    assert line.read() == (0, 580_000, 180_000, 0)
+
+
+def test_behind_a_proxy_an_answer_stands_for_those_before_it_and_one_ping_alone_is_on_its_way() -> None:
+    now = [10**9]
+    line = EchoedLine(lambda: now[0])
+    asked = b"".join(line.asking(size) for size in (10, 20, 30))
+    assert line.asking(0) == b""
+    now[0] += 5_000
+    line.echoed(pongs(asked)[1])
+    assert line.read().waiting == 30
+    line.echoed(pongs(asked)[2])
+    assert line.read().waiting == 0
+    assert len(pongs(line.asking(0))) == 1
+    assert line.asking(0) == b""
+
+
+@pytest.mark.parametrize("head", ["x-forwarded-for", "forwarded", "via"])
+async def test_a_viewer_behind_a_proxy_is_known_by_what_the_proxy_says(ends: Ends, head: str) -> None:
+    transport, _ = ends
+
+    def come(headers: list[tuple[bytes, bytes]]) -> object:
+        scope = {"type": "websocket", "headers": headers, "extensions": {EXTENSION: {"transport": transport}}}
+        return line_of(WebSocket(scope, None, None))  # type: ignore[arg-type]
+
+    assert isinstance(come([(b"host", b"stage")]), Line)
+    assert isinstance(come([(head.encode(), b"192.0.2.1")]), EchoedLine)

@@ -18,8 +18,9 @@ from sqlalchemy.ext.asyncio import create_async_engine
 
 from bunraku.backing import migrate
 from bunraku.backing.catalogue import Entry
-from bunraku.backing.catalogue_sql import METADATA, SqlCatalogue
+from bunraku.backing.catalogue_sql import SqlCatalogue
 from bunraku.backing.migrate import HEAD, UnknownVersion, version
+from bunraku.backing.tables import METADATA
 from tests.conftest import REPOSITORY
 
 
@@ -53,7 +54,8 @@ async def test_a_new_catalogue_has_the_tables_that_the_statements_are_for(url: s
 
 async def test_a_catalogue_from_before_versions_is_taken_over_as_it_is(url: str) -> None:
     def before(connection: Connection) -> None:
-        METADATA.create_all(connection)
+        connection.execute(text("CREATE TABLE motions (id VARCHAR(32) PRIMARY KEY, created BIGINT, description TEXT)"))
+        connection.execute(text("CREATE INDEX ix_motions_created ON motions (created)"))
         connection.execute(text("INSERT INTO motions VALUES ('m1', 5, '{\"a\": 1}')"))
 
     await within(url, before)

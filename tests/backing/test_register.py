@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 
 import pytest
 
 from bunraku.backing.bus_nats import NatsBus
 from bunraku.backing.register import Conflict, MemoryRegister, Register
 from bunraku.backing.register_nats import NatsRegister
-from tests.processes import jetstream, url_of
-
-
-@pytest.fixture(scope="module")
-def nats_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with jetstream(tmp_path_factory.mktemp("nats")) as server:
-        yield url_of(server)
 
 
 @pytest.fixture(params=["memory", "nats"])

@@ -15,8 +15,9 @@ import pytest
 from bunraku.backing.bus import MemoryBus
 from bunraku.client import Client, Puppeteer
 from bunraku.client.crowd import Crowd
-from bunraku.stream import viewers
-from bunraku.wire.messages import SUBPROTOCOL, Overlay
+from bunraku.client.message_socket import upgrade
+from bunraku.stream import liveness
+from bunraku.wire.messages import Overlay
 
 
 async def open_session(server: str, clip_file: Path) -> tuple[str, str]:
@@ -36,12 +37,7 @@ async def plain_viewer(url: str, buffer: int | None = None) -> AsyncIterator[soc
             viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
         viewer.setblocking(False)
         await loop.sock_connect(viewer, (parts.hostname, parts.port))
-        lines = (
-            f"GET {parts.path} HTTP/1.1", f"Host: {parts.netloc}", "Upgrade: websocket", "Connection: Upgrade",
-            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==", "Sec-WebSocket-Version: 13",
-            f"Sec-WebSocket-Protocol: {SUBPROTOCOL}", "", "",
-        )  # fmt: skip
-        await loop.sock_sendall(viewer, "\r\n".join(lines).encode())
+        await loop.sock_sendall(viewer, upgrade(url))
         head = b""
         while b"\r\n\r\n" not in head:
             head += await loop.sock_recv(viewer, 1)
@@ -118,8 +114,8 @@ async def test_one_who_stops_reading_skips_to_the_newest_and_holds_up_nobody(
 async def test_one_that_is_no_longer_there_is_let_go(
     server: str, clip_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewers, "SILENT", 200_000)
-    monkeypatch.setattr(viewers, "GONE", 1_200_000)
+    monkeypatch.setattr(liveness, "SILENT", 200_000)
+    monkeypatch.setattr(liveness, "GONE", 1_200_000)
     session, url = await open_session(server, clip_file)
     # one that answers is there as long as it likes
     crowd = Crowd(url, quiet=True)

@@ -9,7 +9,7 @@ from bunraku.marionette.log import MAGIC, DamagedLog, Log, LoggedMarionette
 from bunraku.marionette.merge import Marionette
 from bunraku.marionette.ownership import Grant, Input
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import standard_figure
+from bunraku.motion.skeleton import JOINTS, standard_figure
 from bunraku.wire.messages import Claim, TimelineState
 from tests.marionette.arms import dance
 
@@ -163,3 +163,37 @@ def test_records_that_are_cut_or_name_nobody_are_refused(names: list[str], recor
     log = Log.unpack(MAGIC + msgpack.packb(values))
     with pytest.raises(DamagedLog):
         list(log.replay(lambda _: FIGURE, pose_at))
+
+
+def test_a_leg_that_the_dance_has_taken_over_the_top_replays_as_it_was_shown() -> None:
+    """What a limb has been through before a passage is not in the log."""
+    log = Log()
+    puppet = LoggedMarionette(Marionette(FIGURE), "one", log)
+    hip = JOINTS.index("l_hip")
+
+    def turned(frame: int) -> Array:
+        pose = np.tile([1.0, 0.0, 0.0, 0.0], (len(JOINTS), 1))
+        half = 0.5 * min(0.04 * frame, 3.5)
+        pose[hip] = [np.cos(half), -np.sin(half), 0.0, 0.0]
+        return pose
+
+    shown: dict[int, bytes | None] = {}
+    epoch = 0
+    for begin, end in ((1, 200), (200, 400)):
+        for frame in range(begin, end):
+            now = frame * FRAME
+            if frame == begin + 1:
+                grant = puppet.claim(2, "ada", now)
+                assert isinstance(grant, Grant)
+                epoch = grant.epoch
+                for before in (frame - 2, frame - 1):
+                    puppet.see(turned(before), before * FRAME, before * FRAME)
+            if begin + 1 < frame < begin + 100:
+                puppet.input("ada", Input(2, 0, epoch, frame, now, (0.3, 0.0, 0.0)), now)
+            if frame == begin + 100:
+                puppet.release(2, "ada", epoch, now)
+            overlay = puppet.overlay(turned(frame), now, now)
+            shown[now] = overlay.rotations.tobytes() if overlay else None
+    replayed = Log.unpack(log.pack()).replay(lambda _: FIGURE, lambda due: turned(due // FRAME))
+    again = {due: over.rotations.tobytes() if over else None for due, over in replayed}
+    assert {due: again.get(due) for due in shown} == shown

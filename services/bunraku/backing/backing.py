@@ -1,15 +1,17 @@
-"""Catalogue, library, bus, register and clock, opened together: what every service is given."""
+"""Catalogue, library, bus, register, gate and clock, opened together: what every service is given."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from bunraku.backing.bus import Bus, MemoryBus
 from bunraku.backing.catalogue import Catalogue
+from bunraku.backing.gate import Gate
 from bunraku.backing.library import Library
+from bunraku.backing.metrics import Metrics
 from bunraku.backing.register import MemoryRegister, Register
 from bunraku.backing.settings import Settings
 
@@ -30,6 +32,8 @@ class Backing:
     library: Library
     bus: Bus
     register: Register
+    gate: Gate
+    metrics: Metrics = field(default_factory=Metrics)
 
 
 @asynccontextmanager
@@ -41,16 +45,21 @@ async def open_backing(settings: Settings) -> AsyncIterator[Backing]:
     settings.data.mkdir(parents=True, exist_ok=True)
     catalogue = Catalogue(settings.catalogue_url())
     library = Library.open(settings.library_url())
-    bus, register = await _open_bus(settings.bus)
+    bus, register = await _open_bus(settings.bus, settings.register_replicas)
+    gate = Gate(settings, catalogue, bus)
+    backing = Backing(settings, catalogue, library, bus, register, gate)
+    backing.metrics.gauge("bus_up", "Whether the bus can be used now", lambda: bus.up)
+    backing.metrics.counter("bus_reconnects_total", "Times that the bus came back", lambda: bus.returns)
     try:
-        yield Backing(settings, catalogue, library, bus, register)
+        yield backing
     finally:
+        gate.close()
         await register.close()
         await bus.close()
         await catalogue.close()
 
 
-async def _open_bus(url: str) -> tuple[Bus, Register]:
+async def _open_bus(url: str, replicas: int) -> tuple[Bus, Register]:
     """The bus and the register at one address."""
     if url == "memory:":
         return MemoryBus(), MemoryRegister()
@@ -60,4 +69,4 @@ async def _open_bus(url: str) -> tuple[Bus, Register]:
 
     bus = NatsBus(url)
     await bus.open()
-    return bus, NatsRegister(bus)
+    return bus, NatsRegister(bus, replicas)

@@ -85,6 +85,10 @@ class Bus(Protocol):
     def up(self) -> bool:
         """Whether messages can be sent now."""
 
+    @property
+    def returns(self) -> int:
+        """How often the bus was away and came back."""
+
     def on_return(self, handler: Callable[[], None]) -> Subscription:
         """Call `handler` whenever the bus is up again after it was away, with all subscriptions in place. What was
         published meanwhile is lost: who keeps something up to date asks for it anew."""
@@ -124,6 +128,7 @@ class MemoryBus:
     """The bus within one process: never away."""
 
     up = True
+    returns = 0
 
     def __init__(self) -> None:
         self._handlers: dict[str, list[Handler]] = defaultdict(list)

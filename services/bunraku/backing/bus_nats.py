@@ -12,6 +12,7 @@ import secrets
 from collections.abc import Callable, Mapping, Set
 from itertools import count, cycle
 
+from bunraku.backing import request_id
 from bunraku.backing.bus import (
     Answerer,
     AnswerFailed,
@@ -24,7 +25,7 @@ from bunraku.backing.bus import (
     hand,
     sayable,
 )
-from bunraku.backing.nats_link import CONNECTING, Link, read_servers
+from bunraku.backing.nats_link import BEAT, BEATS, CONNECTING, Link, read_servers
 from bunraku.backing.unavailable import ANSWERED, Unavailable
 
 AGAIN = (0.1, 0.4)
@@ -32,6 +33,8 @@ AGAIN = (0.1, 0.4)
 _INBOX = 0
 """The number of the subscription that answers come to."""
 _NOBODY, _FAILED = b"503", b"500"
+_Heard = Callable[[str, bytes, bytes], None]
+"""Takes the reply's subject, the message, and its headers as they came."""
 
 _log = logging.getLogger(__name__)
 
@@ -45,12 +48,14 @@ class NatsBus:
         self._servers = read_servers(url)
         self._inbox = f"_INBOX.{secrets.token_hex(12)}"
         self._numbers = count(_INBOX + 1)
-        self._subscriptions: dict[int, tuple[bytes, Callable[[str, bytes], None]]] = {}
+        self._subscriptions: dict[int, tuple[bytes, _Heard]] = {}
         self._questions: dict[str, asyncio.Future[bytes]] = {}
         self._on_return: dict[int, Callable[[], None]] = {}
         self._link: Link | None = None
         self._came = asyncio.Event()
         self._missed = False
+        self.returns = 0
+        """As `Bus.returns`."""
         self._running: asyncio.Task[None] | None = None
         self._replying: set[asyncio.Task[None]] = set()
 
@@ -101,21 +106,24 @@ class NatsBus:
 
     def subscribe(self, subject: str, handler: Handler) -> Subscription:
         """As `Bus.subscribe`. Order holds for all subjects of one publisher."""
-        return self._listen(subject, "", lambda _, data: hand(handler, subject, data))
+        return self._listen(subject, "", lambda _, data, __: hand(handler, subject, data))
 
     def answer(self, subject: str, answerer: Answerer) -> Subscription:
         """As `Bus.answer`."""
 
-        async def answer(reply: str, data: bytes) -> None:
+        async def answer(reply: str, data: bytes, request: str) -> None:
             try:
-                self.publish(reply, await answered(answerer, subject, data))
+                with request_id.at_work(request):
+                    said = await answered(answerer, subject, data)
+                self.publish(reply, said)
             except (AnswerFailed, Unavailable) as error:
                 if self._link is not None:
                     self._link.fail(reply, error.what if isinstance(error, Unavailable) else "")
 
-        def asked(reply: str, data: bytes) -> None:
+        def asked(reply: str, data: bytes, head: bytes) -> None:
             if reply:
-                replying = asyncio.create_task(answer(reply, data), name=f"answer to {subject}")
+                request = request_id.of_head(head)
+                replying = asyncio.create_task(answer(reply, data, request), name=f"answer to {subject}")
                 self._replying.add(replying)
                 replying.add_done_callback(self._replying.discard)
 
@@ -125,7 +133,8 @@ class NatsBus:
     async def ask(
         self, subject: str, data: bytes = b"", seconds: float = ANSWERED, headers: Mapping[str, str] | None = None
     ) -> bytes:
-        """As `Bus.ask`; raises ValueError for more bytes than the server takes in one message."""
+        """As `Bus.ask`; `headers` are by default the name of the request that is at work. Raises ValueError for more
+        bytes than the server takes in one message."""
         if not sayable(subject):
             raise NobodyAnswers(subject)
         link = self._link
@@ -136,22 +145,33 @@ class NatsBus:
         token = str(next(self._numbers))
         answer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
         self._questions[token] = answer
+        heard = link.heard
         try:
-            if not link.publish(subject, data, f"{self._inbox}.{token}", headers):
+            if not link.publish(
+                subject, data, f"{self._inbox}.{token}", request_id.headers() if headers is None else headers
+            ):
                 raise Unavailable("the bus", "the server does not keep up")
             async with asyncio.timeout(seconds):
                 return await answer
         except TimeoutError:
+            # what came while this process stood still is not looked at yet
+            await asyncio.sleep(0)
+            if link.heard == heard and seconds > BEATS * BEAT:
+                # beats in between were not answered either
+                link.abort("the server is silent")
+                if self._link is link:
+                    self._link = None
+                raise Unavailable("the bus", "the server is silent") from None
             raise NobodyAnswers(subject) from None
         finally:
             del self._questions[token]
 
-    def hear(self, number: int, subject: str, reply: str, data: bytes, status: bytes) -> None:
+    def hear(self, number: int, subject: str, reply: str, data: bytes, head: bytes, status: bytes) -> None:
         """As `Listener`."""
         if number != _INBOX:
             # one that has ended may still hear what was on the way
             if number in self._subscriptions:
-                self._subscriptions[number][1](reply, data)
+                self._subscriptions[number][1](reply, data, head)
             return
         question = self._questions.get(subject.rpartition(".")[2])
         if question is None or question.done():
@@ -165,7 +185,7 @@ class NatsBus:
         else:
             question.set_result(data)
 
-    def _listen(self, subject: str, group: str, heard: Callable[[str, bytes], None]) -> Subscription:
+    def _listen(self, subject: str, group: str, heard: _Heard) -> Subscription:
         number = next(self._numbers)
         command = f"SUB {checked(subject)} {group} {number}\r\n".encode()
         self._subscriptions[number] = command, heard
@@ -215,6 +235,7 @@ class NatsBus:
         self._came.set()
         if not self._missed:
             return
+        self.returns += 1
         _log.warning("the bus is back")
         for handler in tuple(self._on_return.values()):
             try:

@@ -1,4 +1,4 @@
-"""What motions there are: one row each."""
+"""What motions there are, what links for viewers, and the jobs of which there will be more motions: one row each."""
 
 from __future__ import annotations
 
@@ -16,13 +16,53 @@ class BadCursor(ValueError):
     """A cursor that this catalogue did not give."""
 
 
+class QuotaUsedUp(Exception):
+    """One motion more than may be kept; the text says of what there is too much."""
+
+
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A motion as the catalogue knows it: `created` in microseconds since 1970, `description` as JSON says it."""
+    """A motion as the catalogue knows it: `created` in microseconds since 1970, `description` as JSON says it, the
+    `subject` who stored it, and the `bytes` that are kept of it."""
 
     id: str
     created: int
     description: dict[str, Any]
+    subject: str = ""
+    bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """How much may be kept: motions and bytes of one subject, and of all; 0 is any number."""
+
+    motions: int = 0
+    bytes: int = 0
+    total_motions: int = 0
+    total_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """A link for viewers of a session or a motion, made by `subject`; times in seconds since 1970."""
+
+    id: str
+    created: int
+    expires: int
+    subject: str
+    session: str | None = None
+    motion: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is to be made a motion of: `created` in microseconds since 1970, `details` as JSON says them, `tries` how
+    often it was taken up after its first replica had left it."""
+
+    id: str
+    created: int
+    details: dict[str, Any]
+    tries: int = 0
 
 
 class Catalogue:
@@ -52,9 +92,13 @@ class Catalogue:
             if self._opening.exception() is None:
                 await self._opening.result().close()
 
-    async def add(self, entry: Entry) -> bool:
-        """Add a motion; whether it was new."""
-        return await (await self.open()).add(entry)
+    async def add(self, entry: Entry, quota: Quota | None = None) -> bool:
+        """Add a motion; whether it was new. Raises `QuotaUsedUp` where it is one too many, and nothing is added."""
+        return await (await self.open()).add(entry, quota)
+
+    async def check(self, subject: str, quota: Quota) -> None:
+        """Whether `subject` may add one more motion, if it is small; raises `QuotaUsedUp`."""
+        await (await self.open()).check(subject, quota)
 
     async def get(self, motion: str) -> Entry | None:
         """The motion of this id."""
@@ -67,6 +111,39 @@ class Catalogue:
     async def remove(self, motion: str) -> bool:
         """Remove a motion; whether it was there."""
         return await (await self.open()).remove(motion)
+
+    async def add_job(self, job: Job, holder: str, until: int) -> None:
+        """Add a job, held by a replica until clock time `until`; one of the same id is taken over."""
+        await (await self.open()).jobs.add(job, holder, until)
+
+    async def claim_job(self, holder: str, now: int, until: int) -> Job | None:
+        """The oldest job that nobody holds at clock time `now`, held by this replica until `until`; None where there is
+        none."""
+        return await (await self.open()).jobs.claim(holder, now, until)
+
+    async def hold_jobs(self, holder: str, until: int) -> None:
+        """All jobs that a replica holds are held until clock time `until`."""
+        await (await self.open()).jobs.hold(holder, until)
+
+    async def remove_job(self, job: str) -> None:
+        """A job is done, or given up."""
+        await (await self.open()).jobs.remove(job)
+
+    async def add_share(self, share: Share) -> None:
+        """Add a link; those that have expired before it was created are removed."""
+        await (await self.open()).shares.add(share)
+
+    async def share(self, share: str) -> Share | None:
+        """The link of this id, None where it was revoked."""
+        return await (await self.open()).shares.get(share)
+
+    async def shares(self, subject: str | None, limit: int) -> list[Share]:
+        """At most `limit` links, newest first, of one subject or, for None, of all."""
+        return await (await self.open()).shares.list(subject, limit)
+
+    async def remove_share(self, share: str) -> bool:
+        """Revoke a link; whether it was there."""
+        return await (await self.open()).shares.remove(share)
 
     async def _open(self) -> SqlCatalogue:
         def load() -> type[SqlCatalogue]:

@@ -10,33 +10,33 @@ import sqlite3
 from collections.abc import Coroutine
 from typing import Any, TypeVar
 
-from sqlalchemy import BigInteger, Column, MetaData, Row, String, Table, Text, delete, select, tuple_
+from sqlalchemy import Row, delete, func, select, text, tuple_
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnection
-from sqlalchemy.ext.asyncio import AsyncEngine, create_async_engine
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
 
-from bunraku.backing.catalogue import BadCursor, Entry
+from bunraku.backing.catalogue import BadCursor, Entry, Quota, QuotaUsedUp
+from bunraku.backing.full import full
+from bunraku.backing.jobs_sql import SqlJobs
 from bunraku.backing.migrate import HEAD, migrate, version
+from bunraku.backing.shares_sql import SqlShares
+from bunraku.backing.tables import MOTIONS
 from bunraku.backing.unavailable import ANSWERED, Patience, Unavailable
 
-METADATA = MetaData()
-MOTIONS = Table(
-    "motions",
-    METADATA,
-    Column("id", String(32), primary_key=True),
-    Column("created", BigInteger, nullable=False, index=True),
-    Column("description", Text, nullable=False),
-)
+_COUNTING = 0x636F756E74
+"""The name of PostgreSQL's advisory lock under which motions are counted and added."""
 _DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg"}
 _OURS = ("22", "23", "42", "53100")
 """SQLSTATEs of PostgreSQL that are not its own trouble: of data, constraints and statements, and the full disk."""
+_FULL = "53100"
 
 Found = TypeVar("Found")
 
 
 class SqlCatalogue:
-    """The table of motions. Every method raises `Unavailable` where the database is away, and PostgreSQL's also where
-    it does not answer within `ANSWERED`; once it is back they work again."""
+    """The tables of motions and jobs. Every method raises `Unavailable` where the database is away, and PostgreSQL's
+    also where it does not answer within `ANSWERED`; once it is back they work again. Where its disk is full what adds
+    something raises `ProblemError`, 507."""
 
     def __init__(self, url: str) -> None:
         """`url` is SQLAlchemy's, of an async driver."""
@@ -49,6 +49,8 @@ class SqlCatalogue:
             "connect_args": {"timeout": ANSWERED, "command_timeout": ANSWERED},
         }
         self._engine: AsyncEngine = create_async_engine(url, **(limits if self._postgres else {}))
+        self.jobs = SqlJobs(self._engine, self._answer)
+        self.shares = SqlShares(self._engine, self._answer)
 
     @classmethod
     async def open(cls, url: str) -> SqlCatalogue:
@@ -70,9 +72,13 @@ class SqlCatalogue:
         await self._patience.end()
         await self._engine.dispose()
 
-    async def add(self, entry: Entry) -> bool:
-        """Add a motion; whether it was new."""
-        return await self._answer(self._add(entry))
+    async def add(self, entry: Entry, quota: Quota | None = None) -> bool:
+        """Add a motion; whether it was new. Raises `QuotaUsedUp` where it is one too many, and nothing is added."""
+        return await self._answer(self._add(entry, quota))
+
+    async def check(self, subject: str, quota: Quota) -> None:
+        """Whether `subject` may add one more motion, if it is small; raises `QuotaUsedUp`."""
+        await self._answer(self._check(subject, quota))
 
     async def get(self, motion: str) -> Entry | None:
         """The motion of this id."""
@@ -86,14 +92,30 @@ class SqlCatalogue:
         """Remove a motion; whether it was there."""
         return _is_id(motion) and await self._answer(self._remove(motion))
 
-    async def _add(self, entry: Entry) -> bool:
-        row = {"id": entry.id, "created": entry.created, "description": json.dumps(entry.description)}
+    async def _add(self, entry: Entry, quota: Quota | None) -> bool:
+        row = {
+            "id": entry.id,
+            "created": entry.created,
+            "description": json.dumps(entry.description),
+            "subject": entry.subject,
+            "bytes": entry.bytes,
+        }
         try:
             async with self._engine.begin() as connection:
+                if quota is not None and self._postgres:
+                    # SQLite has one writer at a time from the insert on
+                    await connection.execute(text(f"SELECT pg_advisory_xact_lock({_COUNTING})"))
                 await connection.execute(MOTIONS.insert().values(row))
+                if quota is not None:
+                    # with the new one counted; what is raised here takes it back
+                    await _count(connection, entry.subject, quota)
         except IntegrityError:
             return False
         return True
+
+    async def _check(self, subject: str, quota: Quota) -> None:
+        async with self._engine.connect() as connection:
+            await _count(connection, subject, quota, 1)
 
     async def _get(self, motion: str) -> Entry | None:
         async with self._engine.connect() as connection:
@@ -124,6 +146,8 @@ class SqlCatalogue:
         try:
             return await self._patience.wait(asking, ANSWERED if self._postgres and hurry else None)
         except (DBAPIError, NoConnection, OSError) as error:
+            if isinstance(error, DBAPIError) and _is_full(error):
+                raise full("the catalogue") from error
             if isinstance(error, DBAPIError) and not _is_away(error):
                 raise
             cause = error.orig if isinstance(error, DBAPIError) else error
@@ -137,13 +161,37 @@ def _is_away(error: DBAPIError) -> bool:
     return not str(getattr(error.orig, "sqlstate", "")).startswith(_OURS)
 
 
+def _is_full(error: DBAPIError) -> bool:
+    if isinstance(error.orig, sqlite3.Error):
+        return getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+    return str(getattr(error.orig, "sqlstate", "")) == _FULL
+
+
 def _is_id(motion: str) -> bool:
     """Whether this could be an id: not all text is to all databases."""
     return motion.isascii() and motion.isalnum()
 
 
 def _entry(row: Row[Any]) -> Entry:
-    return Entry(row.id, row.created, json.loads(row.description))
+    # rows from before there were quotas say neither whose they are nor how large
+    return Entry(row.id, row.created, json.loads(row.description), row.subject or "", row.bytes or 0)
+
+
+async def _count(connection: AsyncConnection, subject: str, quota: Quota, more: int = 0) -> None:
+    """Raise `QuotaUsedUp` where what is kept, and `more` motions, are beyond a quota."""
+    counted = select(func.count(), func.coalesce(func.sum(MOTIONS.c.bytes), 0))
+    limits = (
+        (counted.where(MOTIONS.c.subject == subject), quota.motions, quota.bytes, "you may keep"),
+        (counted, quota.total_motions, quota.total_bytes, "this server keeps"),
+    )
+    for statement, most_motions, most_bytes, who in limits:
+        if not most_motions and not most_bytes:
+            continue
+        motions, size = (await connection.execute(statement)).one()
+        if most_motions and motions + more > most_motions:
+            raise QuotaUsedUp(f"{who} {most_motions} motions at most")
+        if most_bytes and size + more > most_bytes:
+            raise QuotaUsedUp(f"{who} {most_bytes} bytes of motions at most")
 
 
 def _read_cursor(cursor: str) -> tuple[int, str]:

@@ -1,7 +1,8 @@
 """Encoded motions as objects: written once, never changed, in a folder or an object store by URL.
 
 An object holds one motion whole: its Description and every Data message of every track and rate, ready to be sent.
-Beside the motions lie the logs of sessions that are about to become motions, each as long as that takes.
+Beside the motions lie what is about to become one, files that were sent and logs of sessions, each as long as that
+takes, and notes of what replicas share.
 """
 
 from __future__ import annotations
@@ -177,6 +178,30 @@ class Library:
         dropped = self._cache.pop(motion, None)
         self._cached -= dropped.size if dropped else 0
         await self._objects.delete(_path(motion))
+
+    async def check(self) -> None:
+        """Raises `Unavailable` where the store cannot be used now."""
+        await self._objects.check()
+
+    async def put_note(self, name: str, data: bytes) -> None:
+        """Store a note under a name that the code gives it, a word."""
+        await self._objects.put(f"notes/{name}", data)
+
+    async def get_note(self, name: str) -> bytes | None:
+        """The note of this name, None where there is none."""
+        return await self._objects.get(f"notes/{name}")
+
+    async def put_source(self, name: str, data: bytes) -> None:
+        """Store a file that was sent, under a name that the code gives it, a word."""
+        await self._objects.put(f"sources/{name}", data)
+
+    async def get_source(self, name: str) -> bytes | None:
+        """The file of this name, None where there is none."""
+        return await self._objects.get(f"sources/{name}")
+
+    async def remove_source(self, name: str) -> None:
+        """Remove a file that was sent; nothing happens where there is none."""
+        await self._objects.delete(f"sources/{name}")
 
     async def put_log(self, name: str, data: bytes) -> None:
         """Store a session's log under a random name of 1..64 of A-Z a-z 0-9 _ -; raises ValueError for another."""

@@ -1,4 +1,8 @@
-"""What the system knows of a socket's line: how much is not acknowledged, and its round trips (Linux, tcp(7))."""
+"""What is known of a socket's line: how much is not acknowledged, and its round trips.
+
+The system tells it of its own connection (Linux, tcp(7)). Behind a proxy that is the way to the proxy, so what is
+written there is followed by a Ping, which the viewer's end answers by itself (RFC 6455, 5.5.2).
+"""
 
 from __future__ import annotations
 
@@ -7,15 +11,25 @@ import contextlib
 import socket
 import struct
 import sys
+from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 from starlette.websockets import WebSocket
+
+from bunraku.backing.backing import clock
+from bunraku.backing.frames import Opcode, frame
 
 if sys.platform == "linux":
     import fcntl
 
 EXTENSION = "bunraku.line"
 """The ASGI extension by which the server's protocol hands its transport to `line_of`."""
+PROXIED = ("x-forwarded-for", "forwarded", "via")
+"""Headers that say that a proxy is between."""
+UNKNOWN = 1_000_000
+"""The round trip of a line of which nothing was heard yet, microseconds."""
+_ECHO = struct.Struct(">I")
 _OUTQ = 0x5411
 """SIOCOUTQ: bytes that were written and are not acknowledged."""
 _NOUGHT = bytes(4)
@@ -64,6 +78,13 @@ class Line:
         round_trip, acknowledged, least = _INFO.unpack(info)
         return Reading(waiting, round_trip, least, acknowledged + waiting)
 
+    def asking(self, size: int) -> bytes:  # noqa: ARG002
+        """Nothing need be written behind `size` bytes: the system knows what is acknowledged."""
+        return b""
+
+    def echoed(self, payload: bytes) -> None:
+        """Nothing was asked."""
+
     def hold(self, held: bool) -> None:
         """Keep what is written until a packet is full (for 200 ms at most), or let it go: at the start each packet of
         its own costs a narrow line the time of its heads."""
@@ -71,8 +92,54 @@ class Line:
             self._socket.setsockopt(socket.IPPROTO_TCP, _CORK, held)
 
 
-def line_of(ws: WebSocket) -> Line | None:
+class EchoedLine:
+    """The line of a viewer behind a proxy: what was echoed has come. Nobody but the viewer itself suffers from echoes
+    of what has not."""
+
+    __slots__ = ("_asked", "_clock", "_echoed", "_least", "_round_trip", "_written")
+
+    def __init__(self, clock: Callable[[], int]) -> None:
+        """`clock` tells microseconds."""
+        self._clock = clock
+        self._written = self._echoed = 0
+        # bytes written by then, and when, of each Ping that is on its way
+        self._asked: deque[tuple[int, int]] = deque()
+        # until something is echoed it is taken for a far one
+        self._round_trip = UNKNOWN
+        self._least = 0
+
+    def read(self) -> Reading:
+        """How it stands now: bytes of which `asking` was told."""
+        late = self._clock() - self._asked[0][1] if self._asked else 0
+        return Reading(self._written - self._echoed, max(self._round_trip, late), self._least)
+
+    def hold(self, held: bool) -> None:
+        """Nothing is held: the proxy sends as it likes."""
+
+    def asking(self, size: int) -> bytes:
+        """What is to be written right behind `size` bytes; of none a Ping alone, where none is on its way."""
+        if not size and self._asked:
+            return b""
+        self._written += size
+        self._asked.append((self._written, self._clock()))
+        return frame(_ECHO.pack(self._written & 0xFFFF_FFFF), Opcode.PING)
+
+    def echoed(self, payload: bytes) -> None:
+        """A Pong came; one that answers nothing that is on its way says nothing."""
+        for nth, (written, at) in enumerate(self._asked):
+            if payload == _ECHO.pack(written & 0xFFFF_FFFF):
+                for _ in range(nth + 1):
+                    self._asked.popleft()
+                self._echoed = written
+                self._round_trip = max(self._clock() - at, 1)
+                self._least = min(self._least or self._round_trip, self._round_trip)
+                return
+
+
+def line_of(ws: WebSocket) -> Line | EchoedLine | None:
     """The line of a WebSocket, None where its server or the system does not tell of it."""
+    if any(name in ws.headers for name in PROXIED):
+        return EchoedLine(clock)
     offered = (ws.scope.get("extensions") or {}).get(EXTENSION)
     if not offered:
         return None

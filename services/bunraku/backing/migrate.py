@@ -15,7 +15,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection, create_async_engine
 
 from bunraku.backing.unavailable import ANSWERED, Unavailable
 
-HEAD = "0001"
+HEAD = "0003"
 """The version that this code is written for."""
 BEFORE_VERSIONS = "0001"
 """The version of a catalogue that has the table of motions and says none."""

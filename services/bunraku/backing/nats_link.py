@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
@@ -60,9 +61,9 @@ def read_servers(url: str) -> list[Server]:
 class Listener(Protocol):
     """Who a connection belongs to."""
 
-    def hear(self, number: int, subject: str, reply: str, data: bytes, status: bytes) -> None:
-        """A message to subscription `number`; `status` is empty, 500 where an answer failed, or the
-        server's own 503 where nobody listens."""
+    def hear(self, number: int, subject: str, reply: str, data: bytes, head: bytes, status: bytes) -> None:
+        """A message to subscription `number`; `head` are its headers as they came, empty where it has none; `status` is
+        empty, 500 where an answer failed, or the server's own 503 where nobody listens."""
 
 
 class Link(asyncio.Protocol):
@@ -80,14 +81,15 @@ class Link(asyncio.Protocol):
         self._unread = bytearray()
         self._why = "the server has ended the connection"
         self.max_payload = 0
+        self.heard = 0
+        """How often anything came."""
 
     @classmethod
     async def open(cls, server: Server, listener: Listener, first: list[bytes]) -> Link:
         """Connect, with the commands `first` said and taken; raises OSError where that does not succeed."""
         try:
             async with asyncio.timeout(CONNECTING):
-                loop = asyncio.get_running_loop()
-                _, link = await loop.create_connection(lambda: cls(listener), server.host, server.port)
+                link = await cls._connect(server, listener)
                 try:
                     await link._greet(server, first)
                 except BaseException:
@@ -96,6 +98,21 @@ class Link(asyncio.Protocol):
                 return link
         except TimeoutError:
             raise ConnectionError("the server does not answer") from None
+
+    @classmethod
+    async def _connect(cls, server: Server, listener: Listener) -> Link:
+        loop = asyncio.get_running_loop()
+        # looked up here: within `create_connection` one that fails when nobody waits any more is logged as a fault
+        found = await loop.getaddrinfo(server.host, server.port, type=socket.SOCK_STREAM)
+        refused = OSError("its name has no address")
+        for *_, address in found:
+            try:
+                _, link = await loop.create_connection(lambda: cls(listener), str(address[0]), server.port)
+            except OSError as error:
+                refused = error
+            else:
+                return link
+        raise refused
 
     async def _greet(self, server: Server, first: list[bytes]) -> None:
         await self._or_end(self._told)
@@ -178,6 +195,7 @@ class Link(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """As asyncio has it."""
         self._unanswered = 0
+        self.heard += 1
         self._unread += data
         start = 0
         while not self.ended.done():
@@ -210,10 +228,11 @@ class Link(asyncio.Protocol):
                 payload = bytes(self._unread[at : at + size])
                 header = int(words[-2]) if headed else 0
                 # the first line is NATS/1.0, then the status, where there is one
-                status = payload[:header].split(b"\r\n", 1)[0].split()[1:2]
+                head = payload[:header]
+                status = head.split(b"\r\n", 1)[0].split()[1:2]
                 reply = words[2].decode() if len(words) == (5 if headed else 4) else ""
                 number, subject = int(words[1]), words[0].decode()
-                self._listener.hear(number, subject, reply, payload[header:], status[0] if status else b"")
+                self._listener.hear(number, subject, reply, payload[header:], head, status[0] if status else b"")
                 return at + size + 2
             case b"PING":
                 self._transport.write(b"PONG\r\n")

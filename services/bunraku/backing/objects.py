@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
 from collections.abc import Awaitable
 from datetime import timedelta
 from typing import Any, TypeVar
@@ -10,6 +12,7 @@ import obstore
 from obstore.exceptions import BaseError
 from obstore.store import LocalStore, ObjectStore, from_url
 
+from bunraku.backing.full import full, is_full
 from bunraku.backing.unavailable import ANSWERED, Patience, Unavailable
 
 SLOW = 1 << 20
@@ -31,7 +34,8 @@ class Objects:
         self._local = url.startswith("file://")
         self._store: ObjectStore
         if self._local:
-            self._store = LocalStore(url.removeprefix("file://"), mkdir=True)
+            self._folder = url.removeprefix("file://")
+            self._store = LocalStore(self._folder, mkdir=True)
         elif url.startswith("memory:"):
             self._store = from_url(url)
         else:
@@ -41,7 +45,8 @@ class Objects:
             self._store = from_url(url, client_options=patience, retry_config=again)
 
     async def put(self, path: str, data: bytes) -> None:
-        """Store an object; once this returns it is there."""
+        """Store an object; once this returns it is there. Raises `ProblemError`, 507, where there is no room for it:
+        what was there under its name stays."""
         try:
             await self._answer(obstore.put_async(self._store, path, data), len(data))
         except FileNotFoundError as error:
@@ -64,9 +69,22 @@ class Objects:
         except FileNotFoundError:
             return
 
+    async def check(self) -> None:
+        """Raises `Unavailable` where the store cannot be used now."""
+        if self._local:
+            if not await asyncio.to_thread(os.access, self._folder, os.R_OK | os.W_OK | os.X_OK):
+                raise Unavailable("the library", f"there is no folder {self._folder} to write in")
+        else:
+            await self.get("readyz")
+
     async def _answer(self, asked: Awaitable[Found], size: int = 0) -> Found:
         if self._local:
-            return await asked
+            try:
+                return await asked
+            except BaseError as error:
+                if is_full(error):
+                    raise full("the library") from error
+                raise
         try:
             return await self._patience.wait(asked, ANSWERED + size / SLOW)
         except BaseError as error:

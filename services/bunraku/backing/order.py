@@ -23,13 +23,14 @@ Keyframe = Annotated[list[FiniteFloat], Field(min_length=8, max_length=8)]
 class Order(BaseModel):
     """What to keep: clock times `begin` to `end`, microseconds, of the session whose log is the library's object `log`.
 
-    `camera` are keyframes in ascending order of clock time: time, position and the point gazed at in metres, vertical
-    field of view in radians. Without a `name` the motion has that of the dance.
+    `subject` is who stores it. `camera` are keyframes in ascending order of clock time: time, position and the point
+    gazed at in metres, vertical field of view in radians. Without a `name` the motion has that of the dance.
     """
 
     model_config = ConfigDict(extra="ignore")
     log: str
     name: Annotated[str | None, Field(max_length=200)] = None
+    subject: Annotated[str, Field(max_length=64)] = ""
     begin: Clock
     end: Clock
     camera: Annotated[list[Keyframe], Field(max_length=MOST_KEYFRAMES)] = []

@@ -10,7 +10,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-from typing import Protocol
+from collections.abc import Callable
+from typing import Protocol, cast
 
 from bunraku.backing.backing import clock
 from bunraku.backing.frames import BrokenFrame, ClientFrames, Opcode, close_code, close_frame, frame
@@ -30,6 +31,9 @@ class Listener(Protocol):
     def hear(self, message: bytes) -> None:
         """A binary message came; raises `Refusal`, with which the outlet is closed."""
 
+    def answered(self, payload: bytes) -> None:
+        """A Ping that had something to say came back."""
+
     def pause(self) -> None:
         """Something stays behind: the outlet is not `clear` any more."""
 
@@ -44,7 +48,18 @@ class Outlet(asyncio.Protocol):
     """One open socket; it is the transport's protocol. `clear` says that all that was written has left the process, and
     `heard`, clock time in microseconds, when the other end last said anything."""
 
-    __slots__ = ("_closing", "_connections", "_frames", "_listener", "_transport", "clear", "heard", "number", "write")
+    __slots__ = (
+        "_closing",
+        "_connections",
+        "_frames",
+        "_listener",
+        "_transport",
+        "clear",
+        "ended",
+        "heard",
+        "number",
+        "write",
+    )
 
     def __init__(self, transport: asyncio.Transport, listener: Listener, connections: set[object]) -> None:
         """`connections` are the server's, which shuts them down when it ends."""
@@ -55,6 +70,8 @@ class Outlet(asyncio.Protocol):
         self._closing: asyncio.TimerHandle | None = None
         self.clear = True
         self.heard = clock()
+        self.ended: Callable[[], None] | None = None
+        """Told once the connection has ended, beside its listener."""
         self.write = transport.write
         """Writes whole frames. Who writes only while `clear` keeps what waits to one write."""
         self.number: int | None = None
@@ -76,6 +93,11 @@ class Outlet(asyncio.Protocol):
     def waiting(self) -> int:
         """Bytes that were written and are still in the process."""
         return self._transport.get_write_buffer_size()
+
+    @property
+    def closing(self) -> bool:
+        """Whether the other end was told that this is the end."""
+        return self._closing is not None
 
     def ping(self) -> None:
         """Ask for a sign of life; it changes `heard`."""
@@ -132,6 +154,8 @@ class Outlet(asyncio.Protocol):
             raise Refusal(BROKEN, "Text", "messages are binary")
         elif opcode == Opcode.PING and self.clear:
             self.write(frame(payload, Opcode.PONG))
+        elif opcode == Opcode.PONG and payload:
+            self._listener.answered(payload)
 
     def pause_writing(self) -> None:
         """As asyncio has it."""
@@ -150,4 +174,14 @@ class Outlet(asyncio.Protocol):
         self._connections.discard(self)
         if self._closing is not None:
             self._closing.cancel()
+        if self.ended is not None:
+            self.ended()
         self._listener.gone()
+
+
+class _Shut:
+    clear = False
+
+
+SHUT = cast(Outlet, _Shut())
+"""In place of an outlet that is not there yet: it is never clear."""

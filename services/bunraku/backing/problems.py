@@ -11,6 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
+from bunraku.backing import request_id
 from bunraku.backing.unavailable import Unavailable
 
 MEDIA_TYPE = "application/problem+json"
@@ -43,9 +44,19 @@ class ProblemError(Exception):
 
 
 def response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:
-    """The problem as HTTP says it; fields that are None are left out."""
+    """The problem as HTTP says it, with the name under which the logs have the request; fields that are None are left
+    out."""
     body = {"type": "about:blank", **problem.values()}
+    if request := request_id.current():
+        body["request_id"] = request
     return JSONResponse(body, problem.status, headers, MEDIA_TYPE)
+
+
+def unavailable(error: Unavailable) -> JSONResponse:
+    """The answer while something is away."""
+    detail = f"{error.what} does not answer now; nothing is lost by sending the request again"
+    problem = ProblemError(503, "Not available now", detail, hint="try again in a while")
+    return response(problem, {"Retry-After": str(RETRY_AFTER)})
 
 
 def install(app: FastAPI) -> None:
@@ -57,11 +68,9 @@ def install(app: FastAPI) -> None:
         return response(error, {"Connection": "close"} if error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE else None)
 
     @app.exception_handler(Unavailable)
-    async def unavailable(request: Request, error: Unavailable) -> JSONResponse:
+    async def away(request: Request, error: Unavailable) -> JSONResponse:
         _log.warning("%s %s: %s", request.method, request.url.path, error)
-        detail = f"{error.what} does not answer now; nothing is lost by sending the request again"
-        problem = ProblemError(503, "Not available now", detail, hint="try again in a while")
-        return response(problem, {"Retry-After": str(RETRY_AFTER)})
+        return unavailable(error)
 
     @app.exception_handler(RequestValidationError)
     async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:

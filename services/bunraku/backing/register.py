@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Protocol
 
+SESSIONS = "sessions"
+"""`sessions.{id}` has what another replica needs to go on with a session, as long as it is open."""
+
 
 class Conflict(Exception):
     """The value has changed since it was read."""

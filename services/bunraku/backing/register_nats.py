@@ -53,8 +53,10 @@ class _Refused(Exception):
 class NatsRegister:
     """The register upon a bus to servers with JetStream."""
 
-    def __init__(self, bus: NatsBus) -> None:
+    def __init__(self, bus: NatsBus, replicas: int = 1) -> None:
+        """`replicas` servers of a cluster keep it, where it is not there yet."""
         self._bus = bus
+        self._replicas = replicas
         self._made = False
 
     async def get(self, key: str) -> Registered | None:
@@ -131,7 +133,7 @@ class NatsRegister:
 
     async def _make(self) -> None:
         try:
-            await self._ask(f"{_API}.CREATE.{_STREAM}", json.dumps(_CONFIG).encode())
+            await self._ask(f"{_API}.CREATE.{_STREAM}", json.dumps(_CONFIG | {"num_replicas": self._replicas}).encode())
         except _Refused as refused:
             # one that was made with other settings, more replicas say, is as good
             if refused.number != _OTHER_STREAM:
@@ -140,7 +142,7 @@ class NatsRegister:
 
     async def _ask(self, subject: str, data: bytes, headers: Mapping[str, str] | None = None) -> dict[str, Any]:
         try:
-            told: dict[str, Any] = json.loads(await self._bus.ask(subject, data, headers=headers))
+            told: dict[str, Any] = json.loads(await self._bus.ask(subject, data, headers=headers or {}))
         except NobodyAnswers:
             # the server is there, and what keeps things is not: off, or without a leader; a stream that is gone too
             self._made = False

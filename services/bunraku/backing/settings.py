@@ -6,8 +6,15 @@ docs/settings.md says it for people.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
+from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from bunraku.backing import metrics
+from bunraku.backing.catalogue import Quota
+from bunraku.backing.origins import read_origins
+from bunraku.backing.tokens import Tokens
 
 
 class Settings(BaseSettings):
@@ -23,10 +30,71 @@ class Settings(BaseSettings):
     """URL of the library, `file:///...`, `s3://...` and what else obstore knows; empty: a folder in `data`."""
     bus: str = "memory:"
     """URL of the bus, `memory:` for one process or `nats://...`, more servers after commas."""
+    register_replicas: int = Field(default=1, ge=1, le=5)
+    """Servers of the bus that each keep the register, when it is made: 1, or 3 or 5 of a cluster."""
     upload_bytes: int = 64 << 20
     """The largest upload."""
     upload_seconds: float = 60.0
     """The longest that reading, analysing and encoding one upload may take."""
+
+    secret: SecretStr = SecretStr("")
+    """What tokens are signed with, the same at all replicas; empty: everybody may do everything."""
+    secret_before: SecretStr = SecretStr("")
+    """A secret whose tokens are still good, while the secret is changed."""
+    published: str = ""
+    """The address at which people reach the port, where that is not the one listened at: a container's."""
+    origins: str = ""
+    """Pages elsewhere that may open sockets and change things, `https://dance.example`, more after commas."""
+    connects: float = 50.0
+    """Sockets that one address may open in a second, ten times as many at once; 0: any number."""
+    body_seconds: float = 30.0
+    """The longest that the body of a request may take, beside a second for each 1,000 bytes of it."""
+    quota_motions: int = 500
+    """Motions that one subject may keep; 0: any number. Where there is a secret."""
+    quota_bytes: int = 1 << 30
+    """Bytes of motions that one subject may keep; 0: any number. Where there is a secret."""
+    total_motions: int = 0
+    """Motions that all may keep; 0: any number."""
+    total_bytes: int = 0
+    """Bytes of motions that all may keep; 0: any number."""
+
+    metrics: str = ""
+    """`host:port` of a listener that answers `/metrics` and nothing else; empty: none."""
+    logs: Literal["plain", "json"] = "plain"
+    """How the log is written."""
+    log_level: Literal["", "debug", "info", "warning", "error"] = ""
+    """From which level on; empty: INFO where it is JSON, else WARNING."""
+
+    @field_validator("metrics")
+    @classmethod
+    def _an_address(cls, address: str) -> str:
+        if address:
+            metrics.read_address(address)
+        return address
+
+    @field_validator("logs", "log_level", mode="before")
+    @classmethod
+    def _by_word(cls, word: object, known: ValidationInfo) -> object:
+        # what is set and empty, as compose sets it, is as if it were not
+        return (word.lower() or cls.model_fields[known.field_name or ""].default) if isinstance(word, str) else word
+
+    @field_validator("secret", "secret_before")
+    @classmethod
+    def _long_enough(cls, secret: SecretStr) -> SecretStr:
+        if secret.get_secret_value():
+            Tokens(secret.get_secret_value())
+        return secret
+
+    @field_validator("origins")
+    @classmethod
+    def _readable(cls, origins: str) -> str:
+        read_origins(origins)
+        return origins
+
+    def quota(self) -> Quota:
+        """How much may be kept; of one subject there is a limit only where subjects are known."""
+        one = (self.quota_motions, self.quota_bytes) if self.secret.get_secret_value() else (0, 0)
+        return Quota(*one, self.total_motions, self.total_bytes)
 
     def catalogue_url(self) -> str:
         """The catalogue's URL, the default filled in."""

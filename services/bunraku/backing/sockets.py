@@ -11,6 +11,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from bunraku.wire.messages import LARGEST_FROM_CLIENT, SUBPROTOCOL, Problem
 
+DENIED = 4401
+NOT_ALLOWED = 4403
 NOT_FOUND = 4404
 NOT_SPOKEN = 4406
 BROKEN = 1008
@@ -53,7 +55,10 @@ async def close(socket: WebSocket, refusal: Refusal) -> None:
     """Tell the client why, and close; a client that is gone already is no trouble."""
     with contextlib.suppress(WebSocketDisconnect, RuntimeError):
         if socket.application_state is WebSocketState.CONNECTING:
-            await accept(socket)
+            try:
+                await accept(socket)
+            except Refusal as other:
+                refusal = other
         await socket.send_bytes(Problem(refusal.title, refusal.detail).pack())
         await socket.close(refusal.code, f"{refusal.title}: {refusal.detail}"[:120])
 

@@ -40,14 +40,23 @@ class Together:
         self._sent = np.empty(len(outlets) if plain else 0, np.int64)
         self._writes: list[Callable[[bytes], None]] = [] if plain else [outlet.write for outlet in outlets]
 
-    def write(self, data: bytes) -> None:
-        """Write to each; what a socket has no room for waits in its transport, as `Outlet.write` has it."""
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._outlets)
+
+    def write(self, data: bytes) -> int:
+        """Write to each; what a socket has no room for waits in its transport, as `Outlet.write` has it. The answer is
+        how many bytes went without that."""
         if self._numbers is None:
             for write in self._writes:
                 write(data)
-            return
+            return 0
+        went = len(self._outlets) * len(data)
         library = _compiled[0]
         if library.send_all(self._numbers, np.frombuffer(data, np.uint8), library.FLAGS, self._sent):
             for place in np.flatnonzero(self._sent != len(data)).tolist():
                 # one that is broken finds out by itself
-                self._outlets[place].write(data[max(int(self._sent[place]), 0) :])
+                left = data[max(int(self._sent[place]), 0) :]
+                went -= len(left)
+                self._outlets[place].write(left)
+        return went

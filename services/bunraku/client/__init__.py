@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bunraku.client.api import Client, ServerProblem
     from bunraku.client.figures import Figures
+    from bunraku.client.line import StreamEnded
     from bunraku.client.one_euro import OneEuro
     from bunraku.client.puppeteer import Puppeteer, Refused
-    from bunraku.client.viewer import StreamEnded, Viewer
+    from bunraku.client.viewer import Viewer
 
 _HOMES = {
     "Client": "api",
@@ -20,7 +21,7 @@ _HOMES = {
     "Puppeteer": "puppeteer",
     "Refused": "puppeteer",
     "Figures": "figures",
-    "StreamEnded": "viewer",
+    "StreamEnded": "line",
     "Viewer": "viewer",
 }
 __all__ = ["Client", "Figures", "OneEuro", "Puppeteer", "Refused", "ServerProblem", "StreamEnded", "Viewer"]

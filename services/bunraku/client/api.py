@@ -20,6 +20,11 @@ EVERY = 0.25
 """Seconds between two questions how far an upload is."""
 
 
+def authorization(token: str | None) -> dict[str, str]:
+    """The header that says by what one comes in, none without a token."""
+    return {} if token is None else {"Authorization": f"Bearer {token}"}
+
+
 class ServerProblem(Exception):
     """What the server answered in place of what was asked: an RFC 9457 problem, `body`, with its `status`."""
 
@@ -32,14 +37,16 @@ class ServerProblem(Exception):
 
 
 class Client:
-    """A server of Bunraku at `url` (http or https). Use as an async context manager.
+    """A server of Bunraku at `url` (http or https), which a `token` lets in if it asks for one. Use as an async context
+    manager.
 
     Methods raise `ServerProblem` where the server refuses, and `httpx2.TransportError` where there is none.
     """
 
-    def __init__(self, url: str = "http://127.0.0.1:8000") -> None:
+    def __init__(self, url: str = "http://127.0.0.1:8000", token: str | None = None) -> None:
         self.url = url.rstrip("/")
-        self._http = httpx2.AsyncClient(base_url=self.url, timeout=TIMEOUT)
+        self.token = token
+        self._http = httpx2.AsyncClient(base_url=self.url, timeout=TIMEOUT, headers=authorization(token))
 
     async def __aenter__(self) -> Self:
         return self
@@ -123,6 +130,24 @@ class Client:
         given = {"name": name, "seconds": seconds, "camera": [dict(key) for key in camera] or None}
         asked = {key: value for key, value in given.items() if value is not None}
         return await self._ask("POST", f"/v1/sessions/{quote(session, safe='')}/recordings", json=asked)
+
+    async def share(
+        self, *, session: str | None = None, motion: str | None = None, seconds: int | None = None
+    ) -> dict[str, Any]:
+        """A link for viewers of a session or a motion, good for `seconds` or a week: `link` goes behind the server's
+        address, `id` is what it is revoked by."""
+        given = {"session": session, "motion": motion, "seconds": seconds}
+        asked = {key: value for key, value in given.items() if value is not None}
+        return await self._ask("POST", "/v1/shares", json=asked)
+
+    async def shares(self) -> list[dict[str, Any]]:
+        """The newest links for viewers that one has made, or, as admin, all."""
+        items: list[dict[str, Any]] = (await self._ask("GET", "/v1/shares", params={"limit": 200}))["items"]
+        return items
+
+    async def revoke_share(self, share: str) -> None:
+        """Revoke a link: who watches by it is ended."""
+        await self._ask("DELETE", f"/v1/shares/{quote(share, safe='')}")
 
     def socket_url(self, path: str) -> str:
         """The WebSocket address of a path of this server."""

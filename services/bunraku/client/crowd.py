@@ -15,10 +15,10 @@ from array import array
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
-from urllib.parse import urlsplit
 
 import numpy as np
 
+from bunraku.client.api import authorization
 from bunraku.client.crowd_viewer import CrowdViewer, Shared
 
 BEATS = 50
@@ -62,9 +62,9 @@ class CrowdFigures:
 
 
 class Crowd:
-    """A crowd of viewers of the stream at `url` (a WebSocket's, `.../stream`)."""
+    """A crowd of viewers of the stream at `url` (a WebSocket's, `.../stream`), let in by a `token` if there is one."""
 
-    def __init__(self, url: str, *, quiet: bool = False) -> None:
+    def __init__(self, url: str, *, quiet: bool = False, token: str | None = None) -> None:
         """Of a `quiet` crowd one alone speaks; the others answer what WebSockets ask of them."""
         self.url = url
         self.shared = Shared()
@@ -72,6 +72,7 @@ class Crowd:
         self.joins = array("d")
         self.refused = 0
         self._quiet = quiet
+        self._headers = authorization(token)
         self._asked = 0
         self._began = self._counted = 0.0
         self._octets = 0
@@ -143,17 +144,10 @@ class Crowd:
         )
 
     async def _come(self, told: Callable[[int], None] | None) -> None:
-        parts, begun = urlsplit(self.url), time.monotonic()
-        secure = parts.scheme == "wss"
+        begun, viewer = time.monotonic(), CrowdViewer(self.url, self.shared, self._headers)
         try:
             async with asyncio.timeout(20):
-                _, viewer = await asyncio.get_running_loop().create_connection(
-                    lambda: CrowdViewer(parts, self.shared),
-                    parts.hostname or "",
-                    parts.port or (443 if secure else 80),
-                    ssl=secure or None,
-                )
-                await viewer.opened
+                await viewer.open()
         except (OSError, TimeoutError) as error:
             self.refused += 1
             self.shared.why = self.shared.why or str(error) or type(error).__name__
@@ -179,14 +173,15 @@ async def watch_together(
     seconds: float,
     *,
     joins: float = 200.0,
+    token: str | None = None,
     told: Callable[[str, float], None] | None = None,
 ) -> CrowdFigures:
     """Have `viewers` join the stream at `url`, `joins` a second, and watch for `seconds`; `told` hears what is done
-    (`joining`, `watching`) and the share done, 0..1.
+    (`joining`, `watching`) and the share done, 0..1. A `token` lets them in.
 
     Raises `TooMany`.
     """
-    crowd = Crowd(url)
+    crowd = Crowd(url, token=token)
     try:
         await crowd.join(viewers, joins, lambda joined: told("joining", joined / viewers) if told else None)
         crowd.count()

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import asyncio
-import base64
-import secrets
 import time
 from array import array
-from typing import cast
-from urllib.parse import SplitResult
+from collections.abc import Mapping
 
+from bunraku.client.message_socket import MessageSocket
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.timing import Timing, read_timing
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.timeline import Timelines, position_at
 from bunraku.wire.messages import (
-    SUBPROTOCOL,
     ChannelHeader,
     Data,
     Description,
@@ -94,93 +90,36 @@ class Shared:
                 self.why = str(error)
 
 
-class CrowdViewer(asyncio.Protocol):
-    """One viewer, from its connection on; `opened` is done when the server has agreed to talk."""
+class CrowdViewer(MessageSocket):
+    """One viewer, from its connection on."""
 
-    __slots__ = (
-        "_blocks", "_buffer", "_held", "_last", "_parts", "_pulled", "_ready", "_shared", "_transport", "closed",
-        "opened",
-    )  # fmt: skip
+    __slots__ = ("_blocks", "_held", "_last", "_now", "_pulled", "_ready", "_shared")
 
-    def __init__(self, parts: SplitResult, shared: Shared) -> None:
-        """`parts` of the stream's URL."""
-        self._parts = parts
+    def __init__(self, url: str, shared: Shared, headers: Mapping[str, str] | None = None) -> None:
+        """Of the stream at `url`, with what `headers` its request has beside its own."""
+        super().__init__(url, headers)
         self._shared = shared
-        self._buffer = b""
+        self._now = 0
         self._held: set[int] = set()
         self._blocks = 0
         self._ready = 0
         self._last = 0
         self._pulled = False
-        self.closed = False
-        self.opened: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As asyncio has it."""
-        self._transport = cast(asyncio.Transport, transport)
-        key = base64.b64encode(secrets.token_bytes(16)).decode()
-        target = self._parts.path + (f"?{self._parts.query}" if self._parts.query else "")
-        lines = (
-            f"GET {target} HTTP/1.1", f"Host: {self._parts.netloc}", "Upgrade: websocket", "Connection: Upgrade",
-            f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13", f"Sec-WebSocket-Protocol: {SUBPROTOCOL}", "", "",
-        )  # fmt: skip
-        self._transport.write("\r\n".join(lines).encode())
 
     def speak(self, sequence: int) -> None:
         """Say what a viewer says each second."""
-        if not self.closed and not self._transport.is_closing():
-            now = self._shared.now()
-            ping = Ping(sequence & 0xFFFFFFFF, time.monotonic_ns() // 1000).pack()
-            self._transport.write(_masked(2, ping) + _masked(2, Report(max(self._ready - now, 0)).pack()))
-
-    def close(self) -> None:
-        """Go."""
-        if not self._transport.is_closing():
-            self._transport.write(_masked(8, (1001).to_bytes(2, "big")))
-            self._transport.close()
+        ping = Ping(sequence & 0xFFFFFFFF, time.monotonic_ns() // 1000)
+        self.send(ping.pack(), Report(max(self._ready - self._shared.now(), 0)).pack())
 
     def data_received(self, data: bytes) -> None:
         """As asyncio has it."""
-        shared = self._shared
-        now = shared.now()
-        shared.octets += len(data)
-        if self._buffer:
-            data, self._buffer = self._buffer + data, b""
-        at, end = 0, len(data)
-        if not self.opened.done():
-            head, found, _ = data.partition(b"\r\n\r\n")
-            if not found:
-                self._buffer = data
-                return
-            first = head.split(b"\r\n", 1)[0]
-            if b" 101 " not in first + b" ":
-                self.opened.set_exception(ConnectionError(f"the server answered {first.decode(errors='replace')}"))
-                self._transport.close()
-                return
-            self.opened.set_result(None)
-            at = len(head) + 4
-        while end - at >= 2:
-            size, body = data[at + 1], at + 2
-            if size >= 126:
-                wide = 2 if size == 126 else 8
-                size, body = int.from_bytes(data[body : body + wide], "big"), body + wide
-            if body + size > end:
-                break
-            if data[at] == 0x82 and size:
-                if data[body] == ChannelHeader.TYPE:
-                    shared.know(data[body : body + size])
-                    now = shared.now()
-                self._take(data[body : body + size], now)
-            elif data[at] == 0x89:
-                self._transport.write(_masked(10, data[body : body + size]))
-            elif data[at] == 0x88 and not self.closed:
-                self.closed = True
-                self.close()
-            at = body + size
-        self._buffer = data[at:]
+        self._shared.octets += len(data)
+        self._now = self._shared.now()
+        super().data_received(data)
 
-    def _take(self, message: bytes, now: int) -> None:
-        kind, shared = message[0], self._shared
+    def take(self, message: bytes) -> None:
+        """Count what has come."""
+        kind, shared, now = message[0], self._shared, self._now
         if kind == Overlay.TYPE:
             shared.overlays.append(_kept(now - int.from_bytes(message[4:12], "little")))
             if self._pulled:
@@ -192,6 +131,8 @@ class CrowdViewer(asyncio.Protocol):
             shared.heard(Pong.unpack(message))
         else:
             shared.know(message)
+            # the first of these tells the time
+            self._now = shared.now()
 
     def _block(self, message: bytes, now: int) -> None:
         shared = self._shared
@@ -212,17 +153,6 @@ class CrowdViewer(asyncio.Protocol):
         if self._blocks > 1 and state.playing:
             shared.blocks.append(_kept(-ahead))
             shared.stalls += ahead < 0
-
-    def connection_lost(self, error: Exception | None) -> None:
-        """As asyncio has it."""
-        self.closed = True
-        if not self.opened.done():
-            self.opened.set_exception(error or ConnectionError("the server closed the connection"))
-
-
-def _masked(opcode: int, payload: bytes) -> bytes:
-    """A client's frame of less than 126 bytes (RFC 6455, section 5.2); its mask is zero."""
-    return bytes((0x80 | opcode, 0x80 | len(payload), 0, 0, 0, 0)) + payload
 
 
 def _kept(microseconds: int) -> int:

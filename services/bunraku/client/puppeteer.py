@@ -11,7 +11,7 @@ from urllib.parse import quote
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from bunraku.client.api import Client
+from bunraku.client.api import Client, authorization
 from bunraku.client.one_euro import OneEuro
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
@@ -50,6 +50,7 @@ class Puppeteer:
 
     def __init__(self, client: Client, session: str, name: str = "Someone") -> None:
         self._url = client.socket_url(f"/v1/sessions/{quote(session, safe='')}/control") + f"?name={quote(name)}"
+        self._headers = authorization(client.token)
         self.id: str | None = None
         self.presence: Presence | None = None
         self.notice: Notice | None = None
@@ -66,6 +67,7 @@ class Puppeteer:
         self._connection = await connect(
             self._url,
             subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
+            additional_headers=self._headers,
             compression=None,
             max_size=LARGEST_FROM_SERVER,
             open_timeout=ANSWER,

@@ -36,6 +36,7 @@ def load(cache: str | None = None) -> None:
 
     With `cache`, a folder for these very sources and no others, what was compiled is kept there, and the next time
     takes a moment. (By itself numba looks at the date of one file, and would miss a change in what that one calls.)
+    One at a time: where numba keeps things is a setting of the whole process.
     """
     before = config.CACHE_DIR  # type: ignore[attr-defined]
     done: dict[object, Any] = {}

@@ -227,6 +227,8 @@ class LoggedMarionette:
             if kind != _CLAIM:
                 # at rest nothing else has a consequence
                 return
+            # as the passage will be replayed
+            self.puppet.begin_anew()
             self.log.open(self.puppet.epochs, self._motion, now)
         self.log.note(kind, now, *values)
 

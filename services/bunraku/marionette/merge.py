@@ -73,6 +73,14 @@ class Marionette:
             PulledHand(figure, limb) if limb.is_hand else PulledLeg(figure, limb) for limb in Limb
         ]
         self._limbs = limbs
+        self._figure = figure
+
+    def begin_anew(self) -> None:
+        """Of one that is at rest: its limbs remember nothing of what was before, as those of a new one."""
+        self._handovers = [Handover() for _ in Limb]
+        self._last = None
+        self._recent.clear()
+        self.set_figure(self._figure)
 
     def holders(self) -> tuple[str | None, ...]:
         """The holder's id of each limb, or None."""
