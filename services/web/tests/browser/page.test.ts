@@ -48,10 +48,11 @@ describeInBrowser("the page", {}, ({ open }) => {
     const danceAt = await standing(second, "l_wrist");
 
     const ring = await ringOf(page, LEFT_HAND);
+    const pull = (await upHasRoom(page, danceAt)) ? -120 : 120;
     await page.mouse.move(ring.x, ring.y);
     await page.mouse.down();
-    await page.mouse.move(ring.x + 30, ring.y - 60, { steps: 3 });
-    await page.mouse.move(ring.x + 60, ring.y - 120, { steps: 3 });
+    await page.mouse.move(ring.x + 30, ring.y + pull / 2, { steps: 3 });
+    await page.mouse.move(ring.x + 60, ring.y + pull, { steps: 3 });
     await holds(page, LEFT_HAND);
     await second.waitForFunction((limb) => Boolean(window.bunraku.viewer.presence?.limbs[limb]), LEFT_HAND);
     await moved(second, "l_wrist", danceAt, 0.15, Infinity);
@@ -82,8 +83,7 @@ describeInBrowser("the page", {}, ({ open }) => {
     await page.getByRole("button", { name: "Release the left hand" }).waitFor();
     await holds(page, LEFT_HAND);
     const from = await standing(page, "l_wrist");
-    // Wherever the dance stood still, there is room towards the shoulder's height.
-    const key = from[1] < (await placeOf(page, "l_shoulder"))[1] ? "KeyW" : "KeyS";
+    const key = (await upHasRoom(page, from)) ? "KeyW" : "KeyS";
     await page.keyboard.down(key);
     await moved(page, "l_wrist", from, 0.1, Infinity);
     await page.keyboard.up(key);
@@ -103,6 +103,11 @@ async function moved(page: Page, joint: string, from: Place, least: number, most
     },
     { joint, from, least, most: Math.min(most, Number.MAX_VALUE) },
   );
+}
+
+/** Whether the left hand, whose wrist is there, has room upwards: wherever a dance stood still, it has some towards the shoulder's height. */
+async function upHasRoom(page: Page, wrist: Place): Promise<boolean> {
+  return wrist[1] < (await placeOf(page, "l_shoulder"))[1];
 }
 
 /** Where a joint is once it stands still, metres. */
