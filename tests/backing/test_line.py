@@ -63,6 +63,14 @@ async def test_a_closed_line_is_an_error_to_read_and_none_to_let_go(ends: Ends) 
     with pytest.raises(OSError, match="closed"):
         line.read()
     line.hold(False)
+    line.plain()
+
+
+async def test_a_plain_line_is_held_back_by_loss_alone(ends: Ends) -> None:
+    transport, _ = ends
+    Line(transport).plain()
+    chosen = transport.get_extra_info("socket").getsockopt(socket.IPPROTO_TCP, socket.TCP_CONGESTION, 16)
+    assert chosen.rstrip(b"\0") == b"reno"
 
 
 async def test_what_is_held_goes_in_one_piece(ends: Ends) -> None:

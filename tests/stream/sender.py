@@ -18,6 +18,7 @@ class Sender:
         self.line = VirtualLine(lambda _: self.slow or rate, delay)
         self.round_trip = 2 * delay
         self.closed = False
+        self.made_plain = False
         self.flow = Flow(self, lambda: self.at)
 
     def read(self) -> Reading:
@@ -33,6 +34,9 @@ class Sender:
 
     def hold(self, held: bool) -> None:
         assert not held
+
+    def plain(self) -> None:
+        self.made_plain = True
 
     def write(self, size: int) -> None:
         self.write_untold(size)

@@ -70,6 +70,10 @@ def test_a_narrow_line_is_noticed_and_not_written_to_unasked() -> None:
     assert not sender.flow.quick()
 
 
+def test_of_lines_far_away_the_system_is_asked_to_hold_nothing_back_but_for_loss() -> None:
+    assert [Sender(1e7, delay).made_plain for delay in (500, 40_000)] == [False, True]
+
+
 def test_a_line_of_which_nothing_is_known_always_has_room() -> None:
     flow = Flow(None, lambda: 0)
     for _ in range(2 * CLEAN):

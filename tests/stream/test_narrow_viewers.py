@@ -58,6 +58,8 @@ class NarrowLine(Line):
     def hold(self, held: bool) -> None:
         self.held.append(held)
 
+    def plain(self) -> None: ...
+
 
 class Watching:
     """A viewer over such a line, and its time."""

@@ -34,6 +34,7 @@ _OUTQ = 0x5411
 """SIOCOUTQ: bytes that were written and are not acknowledged."""
 _NOUGHT = bytes(4)
 _CORK = getattr(socket, "TCP_CORK", 3)
+_CONGESTION = getattr(socket, "TCP_CONGESTION", 13)
 _TCP_INFO = getattr(socket, "TCP_INFO", 11)
 _INFO = struct.Struct("=68xI48xQ20xI")
 """Where `tcpi_rtt`, `tcpi_bytes_acked` and `tcpi_min_rtt` stand in `struct tcp_info`, to whose end the kernel adds."""
@@ -91,6 +92,13 @@ class Line:
         with contextlib.suppress(OSError):
             self._socket.setsockopt(socket.IPPROTO_TCP, _CORK, held)
 
+    def plain(self) -> None:
+        """Have the system hold back no more than loss asks for (Reno, RFC 5681, which every Linux has and allows): how
+        much is on its way is ours to keep small, and BBR would hold what is newest for a round trip and 200 ms every
+        10 s, to see the line with its queue empty (Cardwell et al. 2016, ProbeRTT)."""
+        with contextlib.suppress(OSError):
+            self._socket.setsockopt(socket.IPPROTO_TCP, _CONGESTION, b"reno")
+
 
 class EchoedLine:
     """The line of a viewer behind a proxy: what was echoed has come. Nobody but the viewer itself suffers from echoes
@@ -115,6 +123,9 @@ class EchoedLine:
 
     def hold(self, held: bool) -> None:
         """Nothing is held: the proxy sends as it likes."""
+
+    def plain(self) -> None:
+        """As the proxy likes."""
 
     def asking(self, size: int) -> bytes:
         """What is to be written right behind `size` bytes; of none a Ping alone, where none is on its way."""

@@ -41,6 +41,9 @@ class Readable(Protocol):
     def hold(self, held: bool) -> None:
         """Keep what is written together in packets as full as can be, or let it go."""
 
+    def plain(self) -> None:
+        """Have the system hold back no more than it must."""
+
 
 class Flow:
     """What one viewer's line can take now. `steady` says that it counts as quick: overlays are written to it unasked,
@@ -69,6 +72,8 @@ class Flow:
         self.far = reading.round_trip > FAR
         """Whether answers take their time: the line may be a narrow one, or one that stands now and then."""
         self.steady = not self.far
+        if self.far and line is not None:
+            line.plain()
 
     @property
     def free(self) -> bool:
