@@ -191,7 +191,7 @@ function enter(id: string, place: Place = "sessions"): Room {
   stage?.trail.clear();
   room = new Room(id, name, (error) => {
     page.toast(error instanceof ProblemError ? `${error.title}: ${error.detail}` : String(error));
-  }, place);
+  }, { place });
   document.documentElement.toggleAttribute("data-own", place === "motions");
   const { viewer, puppeteer } = room;
   holding.enter(room);
