@@ -34,13 +34,16 @@ export interface Face {
   remove(): void;
 }
 
+/** The page's day, with the quotes that a build may leave out. */
+const DAY = /:root\[data-theme=["']?day["']?\]/g;
+
 let sheet: CSSStyleSheet | null = null;
 
 /** One sheet for all elements. A sheet that is made so stands under any content security policy. */
 function styles(): CSSStyleSheet {
   if (!sheet) {
     sheet = new CSSStyleSheet();
-    sheet.replaceSync(tokens.replaceAll(':root[data-theme="day"]', ':host([data-shown="day"])').replaceAll(":root", ":host") + own);
+    sheet.replaceSync(tokens.replace(DAY, ':host([data-shown="day"])').replaceAll(":root", ":host") + own);
   }
   return sheet;
 }

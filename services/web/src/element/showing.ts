@@ -81,6 +81,7 @@ export class Showing {
     const asked = ++this.#asked;
     this.#controls = controls;
     this.#leave();
+    this.#resize();
     this.#face.notice(null);
     if (src === null) return;
     const source = readSource(src, document.baseURI);
@@ -239,7 +240,10 @@ export class Showing {
 
   #resize(): void {
     const { clientWidth: width, clientHeight: height } = this.#face.frame;
-    if (width > 0 && height > 0) this.performing?.stage.resize(width, height, width < PORTRAIT * height ? "phone" : "alone", devicePixelRatio);
+    if (width === 0 || height === 0) return;
+    // the bar stands where the page's does
+    const framing = width < PORTRAIT * height ? "phone" : this.#controls ? "desktop" : "alone";
+    this.performing?.stage.resize(width, height, framing, devicePixelRatio);
   }
 
   #step(blocks: number): void {
