@@ -31,6 +31,6 @@ const written = new DOMParser().parseFromString(await textAt("./"), "text/html")
 for (const code of document.querySelectorAll<HTMLElement>("code[data-of]")) {
   const stages = written.querySelector(`#${code.dataset["of"]}`)?.innerHTML ?? "";
   const bare = stages.replaceAll('=""', "").trim();
-  code.textContent = fromElsewhere(`<script type="module" src="/embed/bunraku-stage.js"></script>\n\n${bare}`);
+  code.textContent = fromElsewhere(`<script type="module" src="/embed/bunraku-stage.js"></script>\n${bare}`);
 }
 for (const code of document.querySelectorAll<HTMLElement>("code[data-from]")) code.textContent = fromElsewhere(await textAt(code.dataset["from"] ?? ""));

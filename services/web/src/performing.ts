@@ -51,10 +51,10 @@ export class Performing {
     holding.theatre = { hands: this.hands, velocity: this.velocity, shake: (limb) => this.stage.strings.refuse(limb) };
   }
 
-  /** The room it is about from now on: its dancer comes on, if one is there already. */
-  enter(room: Room): void {
+  /** The room it is about from now on: its dancer comes on, if one is there already. With none the last one stands still. */
+  enter(room: Room | null): void {
     this.#room = room;
-    this.hands.puppeteer = room.puppeteer;
+    this.hands.puppeteer = room?.puppeteer ?? null;
     this.cast();
   }
 

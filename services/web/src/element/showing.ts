@@ -1,36 +1,34 @@
 /** One stage at work: from when its element comes into a document until it has left it. The element's wiring. */
 import { Access, tabToken } from "../client/access";
 import { ProblemError } from "../client/problem";
-import { whyUnreached } from "../client/reach";
+import { type Unreached, whyUnreached } from "../client/reach";
 import { Holding } from "../holding";
-import { loadMapping } from "../input/mapping-store";
 import { ownName } from "../page/name";
-import type { Performing } from "../performing";
 import { findSession, Room } from "../room";
-import type { Theme } from "../stage/look";
+import { Drawing } from "./drawing";
 import { createFace, type Face } from "./face";
 import { readSource, type Source } from "./source";
 
 /** What its element is told: the name of an event, and its detail. */
 export type Tell = (event: "ready" | "welcome" | "presence" | "closed" | "error", detail?: unknown) => void;
 
-/** Narrower than this share of its height, a picture is framed as a phone's. */
-const PORTRAIT = 0.7;
+/** A server that is away is asked again after this, milliseconds. */
+const AGAIN = 4_000;
+/** The status of one that says so itself. */
+const AWAY = 503;
+/** Where the server can be reached, but what was asked of it cannot be had. */
+const NOT_NOW: Unreached = { title: "The stage does not answer", text: "Its server cannot show it now. It is tried again and again.", final: false };
 
 export class Showing {
   room: Room | null = null;
-  performing: Performing | null = null;
+  readonly drawing: Drawing;
   readonly #face: Face;
   readonly #holding: Holding;
-  readonly #observers: { disconnect(): void }[] = [];
-  #theme: Theme = "night";
-  #still = false;
   #controls = false;
-  #focused: number | null = null;
-  #inSight = true;
-  #ready = false;
   #closed = false;
-  #frame = 0;
+  #blind = false;
+  #said: string | null = null;
+  #again: ReturnType<typeof setTimeout> | undefined;
   /** Counts what was asked for: what comes too late is not shown. */
   #asked = 0;
 
@@ -38,19 +36,20 @@ export class Showing {
     this.#face = createFace(root, {
       play: () => this.play(!this.playing),
       toggle: (limb) => this.#holding.toggle(limb),
-      focus: (limb) => (this.#focused = limb),
+      focus: (limb) => (this.drawing.focused = limb),
       ask: (limb) => this.#holding.ask(limb),
       give: (limb) => this.#holding.give(limb),
     });
     const { toast, asks } = this.#face;
-    const mapping = loadMapping();
     this.#holding = new Holding({
       asks,
       toast,
       strings: { render: (limbs, ready) => this.#face.limbs(limbs, this.#hands, ready), notice: (text) => toast(text) },
-    }, () => mapping);
+    }, () => this.drawing.mapping);
     this.#holding.watching = true;
-    void this.#open();
+    this.drawing = new Drawing(this.#face, this.#holding);
+    this.drawing.begun = () => this.tell("ready");
+    void this.#draw();
   }
 
   get playing(): boolean {
@@ -66,28 +65,37 @@ export class Showing {
     this.room?.seek(seconds, performance.now());
   }
 
-  set theme(theme: Theme) {
-    this.#theme = theme;
-    this.performing?.stage.setTheme(theme);
-  }
-
-  set still(still: boolean) {
-    this.#still = still;
-    if (this.performing) this.performing.stage.still = still;
-  }
-
   /** Shows what `src` names (null: nothing), with controls or only to be watched. */
   async show(src: string | null, controls: boolean): Promise<void> {
     const asked = ++this.#asked;
     this.#controls = controls;
     this.#leave();
-    this.#resize();
-    this.#face.notice(null);
+    this.drawing.controls = controls;
+    // without graphics nothing is asked for
+    if (this.#blind) return;
+    this.#clear();
     if (src === null) return;
     const source = readSource(src, document.baseURI);
     if (!source) return this.#fail("No stage is here", `${JSON.stringify(src)} is no address of a stage.`);
     const own = source.server === location.origin ? tabToken() : null;
-    const access = new Access(source.server, source.token ?? own);
+    await this.#find(source, new Access(source.server, source.token ?? own), asked);
+  }
+
+  /** Ends it for good: its sockets, its listening and its graphics. */
+  close(): void {
+    this.#closed = true;
+    this.#leave();
+    this.drawing.close();
+    this.#face.remove();
+  }
+
+  /** Whether limbs can be taken from here. */
+  get #hands(): boolean {
+    return this.#controls && this.room?.place === "sessions" && this.room.access.may("control");
+  }
+
+  /** Enters what a source names, and tries again while its server is away. */
+  async #find(source: Source, access: Access, asked: number): Promise<void> {
     try {
       const id = source.id ?? (await findSession(Promise.resolve(null), access))?.id ?? null;
       if (asked !== this.#asked || this.#closed) return;
@@ -96,26 +104,11 @@ export class Showing {
     } catch (error) {
       if (asked !== this.#asked || this.#closed) return;
       if (!(error instanceof ProblemError)) throw error;
-      if (error.status === 0) await this.#unreached(source.server, asked, error);
-      else this.#problem(error);
+      const final = error.status === 0 ? await this.#unreached(source.server, asked) : error.status !== AWAY;
+      if (error.status !== 0) this.#problem(error);
+      if (final || asked !== this.#asked || this.#closed) return;
+      this.#again = setTimeout(() => void this.#find(source, access, asked), AGAIN);
     }
-  }
-
-  /** Ends it for good: its sockets, its listening and its graphics. */
-  close(): void {
-    this.#closed = true;
-    cancelAnimationFrame(this.#frame);
-    for (const observer of this.#observers) observer.disconnect();
-    document.removeEventListener("visibilitychange", this.#hidden);
-    this.#leave();
-    this.performing?.stage.dispose();
-    this.performing = null;
-    this.#face.remove();
-  }
-
-  /** Whether limbs can be taken from here. */
-  get #hands(): boolean {
-    return this.#controls && this.room?.place === "sessions" && this.room.access.may("control");
   }
 
   #enter({ place, query, server }: Source, id: string, access: Access): void {
@@ -128,27 +121,27 @@ export class Showing {
     let opened = false;
     access.whenDenied((problem) => {
       denied = true;
-      this.#problem(problem);
+      if (this.room === room) this.#problem(problem);
     });
     this.#holding.watching = !this.#hands;
     this.#holding.enter(room);
-    this.performing?.enter(room);
+    this.drawing.enter(room);
     (this.root.host as HTMLElement).toggleAttribute("data-hands", this.#hands);
     const during = (target: EventTarget, event: string, then: (event: Event) => void) =>
       target.addEventListener(event, (told) => {
         if (this.room === room) then(told);
       });
-    during(viewer, "figure", () => this.performing?.cast());
+    during(viewer, "figure", () => this.drawing.performing?.cast());
     during(viewer, "timeline", () => this.#bar());
     during(viewer, "presence", () => this.tell("presence", viewer.presence));
     during(puppeteer, "welcome", () => this.tell("welcome", { id: puppeteer.id, colour: puppeteer.colour }));
     during(viewer, "open", () => {
       // asked for less motion, a dance of one's own waits
-      if (this.#still && !opened && place === "motions") room.edit({ playing: false });
+      if (this.drawing.still && !opened && place === "motions") room.edit({ playing: false });
       opened = true;
       this.#holding.connected = true;
       this.#holding.render();
-      this.#face.notice(null);
+      this.#clear();
     });
     during(viewer, "closed", (event) => {
       const reason = String((event as CustomEvent<string>).detail);
@@ -157,7 +150,7 @@ export class Showing {
       this.tell("closed", { reason, final: viewer.ended });
       if (denied) return;
       if (viewer.ended) this.#face.notice(place === "motions" ? "The dance has ended" : "The session has ended", reason);
-      else if (!opened) void this.#unreached(server, asked, ProblemError.unreachable());
+      else if (!opened) void this.#unreached(server, asked);
       else this.#face.toast(`The line was lost: ${reason}`);
     });
     this.#bar();
@@ -166,30 +159,40 @@ export class Showing {
 
   #leave(): void {
     const { room } = this;
+    clearTimeout(this.#again);
     this.room = null;
-    this.#ready = false;
+    this.drawing.enter(null);
     this.#holding.connected = false;
     room?.close();
     (this.root.host as HTMLElement).removeAttribute("data-hands");
     this.#face.bar(false, null);
   }
 
-  /** Says why no word comes from a server, and gives up where it will not. */
-  async #unreached(server: string, asked: number, problem: ProblemError): Promise<void> {
-    const why = await whyUnreached(server, location.origin);
-    if (asked !== this.#asked || this.#closed || this.#holding.connected) return;
-    if (why?.final) this.#leave();
-    if (why) this.#fail(why.title, why.text);
-    else if (!this.room) this.#problem(problem);
+  /** Says why no word comes from a server, and gives up, and returns true, where none will. */
+  async #unreached(server: string, asked: number): Promise<boolean> {
+    const { title, text, final } = (await whyUnreached(server, location.origin)) ?? NOT_NOW;
+    if (asked !== this.#asked || this.#closed || this.#holding.connected) return false;
+    if (final) this.#leave();
+    this.#fail(title, text);
+    return final;
   }
 
   #problem({ title, detail, hint }: ProblemError): void {
     this.#fail(title, hint ? `${detail}; ${hint}.` : detail);
   }
 
+  /** Says what is in the way: once, however often it is met. */
   #fail(title: string, text: string): void {
+    const said = `${title}: ${text}`;
+    if (said === this.#said) return;
+    this.#said = said;
     this.#face.notice(title, text);
-    this.tell("error", `${title}: ${text}`);
+    this.tell("error", said);
+  }
+
+  #clear(): void {
+    this.#said = null;
+    this.#face.notice(null);
   }
 
   #bar(): void {
@@ -198,52 +201,16 @@ export class Showing {
     this.#face.bar(this.#controls && room !== null && (editable || this.#hands), editable ? this.playing : null);
   }
 
-  async #open(): Promise<void> {
-    const theatre = await import("../theatre").catch(() => null);
-    if (this.#closed) return;
-    if (!theatre) return this.#fail("The stage does not answer", "What draws it could not be loaded. Load this page again.");
-    const { listenToKeyboard, listenToMouse, Performing } = theatre;
-    const { canvas, frame } = this.#face;
-    const nothing = () => undefined;
-    const mapping = loadMapping();
-    const actions = {
-      ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing),
-      back: () => this.#step(-1), forward: () => this.#step(1),
-      sound: nothing, keep: nothing, library: nothing, strings: nothing, line: nothing,
-    };
-    try {
-      this.performing = new Performing(canvas, this.#holding, { mapping: () => mapping, actions, changed: () => this.#holding.render() });
-    } catch {
-      return this.#fail("This browser cannot draw the stage", "It needs WebGL 2. Try another browser, or switch on hardware acceleration.");
-    }
-    const { stage, commands, velocity } = this.performing;
-    stage.still = this.#still;
-    stage.setTheme(this.#theme);
-    listenToKeyboard(frame, commands, velocity, () => (this.#controls ? mapping : { ...mapping, bindings: {} }), { keys: nothing, escape: nothing });
-    listenToMouse(canvas, frame, commands, () => mapping);
-    // a finger on a ring pulls it; elsewhere it turns over the page
-    canvas.addEventListener("touchstart", (event) => "pulling" in canvas.dataset && event.preventDefault(), { passive: false });
-    document.addEventListener("visibilitychange", this.#hidden);
-    const sizes = new ResizeObserver(() => this.#resize());
-    sizes.observe(frame);
-    const sight = new IntersectionObserver((entries) => (this.#inSight = entries.at(-1)?.isIntersecting ?? true));
-    sight.observe(frame);
-    this.#observers.push(sizes, sight);
-    this.#resize();
-    if (this.room) this.performing.enter(this.room);
-    this.#frame = requestAnimationFrame(() => this.#draw());
-  }
-
-  readonly #hidden = () => {
-    if (document.hidden) this.performing?.rest();
-  };
-
-  #resize(): void {
-    const { clientWidth: width, clientHeight: height } = this.#face.frame;
-    if (width === 0 || height === 0) return;
-    // the bar stands where the page's does
-    const framing = width < PORTRAIT * height ? "phone" : this.#controls ? "desktop" : "alone";
-    this.performing?.stage.resize(width, height, framing, devicePixelRatio);
+  async #draw(): Promise<void> {
+    const missing = await this.drawing.open({
+      ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing), back: () => this.#step(-1), forward: () => this.#step(1),
+    });
+    if (!missing) return;
+    this.#blind = true;
+    this.#asked++;
+    this.#leave();
+    if (missing === "not loaded") this.#fail("The stage does not answer", "What draws it could not be loaded. Load this page again.");
+    else this.#fail("This browser cannot draw the stage", "It needs WebGL 2. Try another browser, or switch on hardware acceleration.");
   }
 
   #step(blocks: number): void {
@@ -251,24 +218,5 @@ export class Showing {
     if (!this.room || !viewer || viewer.blocks.length === 0) return;
     const block = viewer.duration / viewer.blocks.length;
     this.seek(Math.min(viewer.duration, Math.max(0, this.room.position(performance.now()) + blocks * block)));
-  }
-
-  #draw(): void {
-    this.#frame = requestAnimationFrame(() => this.#draw());
-    const { performing } = this;
-    if (!performing || !this.#inSight) return;
-    const now = performance.now();
-    const { pose, limbs } = performing.draw(now, this.#focused);
-    const { stage } = performing;
-    const places = limbs.map((_, limb) => {
-      const bar = pose && stage.strings.bar(limb);
-      return bar ? stage.toScreen(bar) : null;
-    });
-    this.#face.tags.render(limbs, places);
-    this.room?.viewer.drawn(performance.now() - now);
-    if (pose && !this.#ready) {
-      this.#ready = true;
-      this.tell("ready");
-    }
   }
 }

@@ -83,7 +83,7 @@ export class BunrakuStage extends Base {
 
   /** What draws; null before it is there, and where the browser cannot. */
   get stage(): Stage | null {
-    return this.#showing?.performing?.stage ?? null;
+    return this.#showing?.drawing.performing?.stage ?? null;
   }
 
   get playing(): boolean {
@@ -163,8 +163,8 @@ export class BunrakuStage extends Base {
     const shown = theme === "auto" ? (this.#day.matches ? "day" : "night") : theme;
     this.setAttribute("data-shown", shown);
     if (!this.#showing) return;
-    this.#showing.theme = shown;
-    this.#showing.still = this.still || this.#calm.matches;
+    this.#showing.drawing.theme = shown;
+    this.#showing.drawing.still = this.still || this.#calm.matches;
   }
 }
 

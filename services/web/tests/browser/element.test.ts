@@ -98,6 +98,11 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     expect(openLines().sort()).toEqual(["control", "stream"]);
 
     // a dance alone, on a timeline of one's own
+    await page.evaluate(() => {
+      const begun: string[] = [];
+      document.querySelector("bunraku-stage")!.addEventListener("ready", () => begun.push(document.querySelector("bunraku-stage")!.viewer!.motion!));
+      Object.assign(window, { begun });
+    });
     await page.evaluate((src) => (document.querySelector("bunraku-stage")!.src = src), `${own.url}/v1/motions/${motion}#token=${token}`);
     await danced(page);
     await page.getByRole("button", { name: "Take the left hand" }).waitFor({ state: "hidden" });
@@ -110,6 +115,8 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
       const stage = document.querySelector("bunraku-stage")!;
       return !stage.playing && Math.abs(stage.position - 12) < 0.1 && stage.duration > 20 && stage.viewer?.motion !== null && Math.abs(stage.viewer!.positionAt(performance.now()) - 12) < 0.1;
     });
+
+    expect(await page.evaluate(() => (window as unknown as { begun: string[] }).begun)).toEqual([motion]);
 
     const kept = await page.evaluate(() => {
       const stage = document.querySelector("bunraku-stage")!;
@@ -190,6 +197,13 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     await said(page, 1).getByText("No stage is here").waitFor();
     await said(page, 2).getByText("The stage does not answer").waitFor();
     expect(await page.evaluate(() => (window as unknown as { errors: string[] }).errors.length)).toBe(3);
+
+    // away at first, it is there later
+    const late = await open(small(`${own.url}/#token=${token}`), site.origin, { before: (page) => page.route("**/v1/sessions", (request) => request.abort()) });
+    await said(late).getByText("It is tried again").waitFor();
+    await late.unroute("**/v1/sessions");
+    await danced(late);
+    await said(late).waitFor({ state: "hidden" });
 
     const blind = await open(small(`${own.url}/#token=${token}`), site.origin, {
       before: (page) => page.addInitScript(() => (HTMLCanvasElement.prototype.getContext = () => null)),

@@ -107,6 +107,18 @@ describe("with a string held", () => {
     expect(told).toEqual([]);
   });
 
+  test("of an element they are up when the focus leaves it", () => {
+    const commands = new Commands(hands, velocity, deeds(told));
+    target = Object.assign(new EventTarget(), { tagName: "DIV" });
+    listenToKeyboard(target as unknown as HTMLElement, commands, velocity, () => mapping, { keys: () => undefined, escape: () => undefined });
+    down("ArrowUp");
+    velocity.update(0);
+    expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 1, 0]]);
+    target.dispatchEvent(new Event("focusout"));
+    velocity.update(16);
+    expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 0, 0]]);
+  });
+
   test("Escape lets go and shuts nothing; a key still down does nothing else then", () => {
     down("KeyS");
     tap("Escape");
