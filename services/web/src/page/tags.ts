@@ -17,8 +17,11 @@ export interface Tags {
 /** Tags keep out of the header's way. */
 const TOP = 60;
 
-/** `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. */
-export function createTags(root: HTMLElement, ask: (limb: number) => void): Tags {
+/**
+ * `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. They keep in a
+ * picture of `width` CSS pixels and below `top`.
+ */
+export function createTags(root: ParentNode & Node, ask: (limb: number) => void, width: () => number = () => innerWidth, top = TOP): Tags {
   const layer = element("div", { class: "tags", "aria-hidden": "true" });
   root.append(layer);
   const tags = [0, 1, 2, 3].map((i) => {
@@ -41,14 +44,14 @@ export function createTags(root: HTMLElement, ask: (limb: number) => void): Tags
         setText(limb, asked ? "asked" : LIMB_NAMES[i].toLowerCase());
         button.hidden = holder.mine || asked;
         tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
-        const x = Math.min(innerWidth - 80, Math.max(80, place.x));
-        tag.style.transform = `translate(${x.toFixed(1)}px, ${Math.max(TOP, place.y - 12).toFixed(1)}px) translate(-50%, -100%)`;
+        const x = Math.min(width() - 80, Math.max(80, place.x));
+        tag.style.transform = `translate(${x.toFixed(1)}px, ${Math.max(top, place.y - 12).toFixed(1)}px) translate(-50%, -100%)`;
       });
     },
     invite(place) {
       invitation.hidden = !place;
       if (!place) return;
-      const right = place.x + 150 < innerWidth;
+      const right = place.x + 150 < width();
       const move = right ? `translate(${(place.x + 26).toFixed(1)}px, ${place.y.toFixed(1)}px) translate(0, -50%)` : `translate(${(place.x - 26).toFixed(1)}px, ${place.y.toFixed(1)}px) translate(-100%, -50%)`;
       invitation.style.transform = move;
     },

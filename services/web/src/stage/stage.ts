@@ -20,8 +20,9 @@ import { CameraTrail } from "./trail";
 
 /** Pixel ratios above these cost more than they show. */
 const SHARPEST = { desktop: 2, phone: 1.75 };
-/** Pixels at the top that belong to the header and a bar's name. */
+/** Pixels at the top that belong to the header and a bar's name, and the share of a low picture's height that they have at most. */
 const HEADROOM = 120;
+const HEADROOM_SHARE = 0.2;
 
 /** Movements of the stage's own take no longer step than this, seconds. */
 const LONGEST_STEP = 0.1;
@@ -171,6 +172,15 @@ export class Stage {
     }
   }
 
+  /** Gives back all that the graphics hold; the stage and its canvas draw no more. */
+  dispose(): void {
+    this.puppet?.dispose();
+    this.scene.environment?.dispose();
+    this.renderer.dispose();
+    // with the context goes what is in it; browsers keep a few only, and would take an old one from another stage
+    this.renderer.forceContextLoss();
+  }
+
   /** CSS pixels of a world place. */
   toScreen(at: Vector3): { x: number; y: number } {
     const clip = at.clone().project(this.audience.camera);
@@ -209,7 +219,7 @@ export class Stage {
 
   /** The disc keeps its proportion to the dancer. */
   #placeDisc(): void {
-    const [radius, height] = this.#framing === "desktop" ? [1.06, 1.3] : [0.98, 1.36];
+    const [radius, height] = this.#framing === "desktop" || this.#framing === "alone" ? [1.06, 1.3] : [0.98, 1.36];
     this.#backdrop.discRadius.value = radius * this.audience.scale;
     this.#backdrop.discCentre.value.set(0, height * this.audience.scale);
   }
@@ -235,7 +245,7 @@ export class Stage {
 
   #ceiling(): number {
     const middle = this.rig.group.localToWorld(new Vector3(0, 1, 0));
-    return this.fromScreen(this.#width / 2, HEADROOM, middle)?.y ?? 2.2;
+    return this.fromScreen(this.#width / 2, Math.min(HEADROOM, HEADROOM_SHARE * this.#height), middle)?.y ?? 2.2;
   }
 }
 
