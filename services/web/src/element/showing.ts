@@ -260,11 +260,7 @@ export class Showing {
     const now = performance.now();
     const { pose, limbs } = performing.draw(now, this.#focused);
     const { stage } = performing;
-    const places = limbs.map((_, limb) => {
-      const bar = pose && stage.strings.bar(limb);
-      return bar ? stage.toScreen(bar) : null;
-    });
-    this.#face.tags.render(limbs, places);
+    this.#face.tags.render(limbs, pose ? limbs.map((_, limb) => stage.bar(limb)) : [], stage.face);
     this.room?.viewer.drawn(performance.now() - now);
     if (pose && !this.#ready) {
       this.#ready = true;
