@@ -247,6 +247,7 @@ async function openStage(): Promise<void> {
     play,
     back: () => step(-1),
     forward: () => step(1),
+    camera: () => stage?.follow(!stage.following),
     sound: () => listening.toggle(),
     keep: () => page.transport.keep(),
     library: () => page.panels.toggle("library"),

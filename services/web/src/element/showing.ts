@@ -209,6 +209,7 @@ export class Showing {
     const actions = {
       ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing),
       back: () => this.#step(-1), forward: () => this.#step(1),
+      camera: () => this.performing?.stage.follow(!this.performing.stage.following),
       sound: nothing, keep: nothing, library: nothing, strings: nothing, line: nothing,
     };
     try {
