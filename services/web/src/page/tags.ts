@@ -1,6 +1,7 @@
 /** Names over the strings, with "Ask" where another holds one, and once the invitation by the nearer hand. */
 import { element, setText } from "./dom";
 import { LIMB_NAMES, type LimbState } from "./model";
+import { say } from "../words/say";
 
 export interface Place {
   x: number;
@@ -24,12 +25,12 @@ export function createTags(root: HTMLElement, ask: (limb: number) => void): Tags
   const tags = [0, 1, 2, 3].map((i) => {
     const name = document.createTextNode("");
     const limb = element("span");
-    const button = element("button", { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => ask(i) }, "Ask");
+    const button = element("button", { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => ask(i) }, say("Ask"));
     const tag = element("div", { class: "tag", hidden: true }, name, limb, button);
     layer.append(tag);
     return { name, limb, button, tag };
   });
-  const invitation = element("div", { class: "tag invitation", hidden: true }, "Take a hand");
+  const invitation = element("div", { class: "tag invitation", hidden: true }, say("Take a hand"));
   layer.append(invitation);
   return {
     render(limbs, places) {
@@ -38,7 +39,7 @@ export function createTags(root: HTMLElement, ask: (limb: number) => void): Tags
         tag.hidden = !holder || !place;
         if (!holder || !place) return;
         setText(name, holder.name);
-        setText(limb, asked ? "asked" : LIMB_NAMES[i].toLowerCase());
+        setText(limb, asked ? say("asked") : say(LIMB_NAMES[i]).toLowerCase());
         button.hidden = holder.mine || asked;
         tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
         const x = Math.min(innerWidth - 80, Math.max(80, place.x));
