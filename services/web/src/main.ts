@@ -11,6 +11,7 @@ import type { Hands } from "./input/hands";
 import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { PointerInput } from "./input/pointer";
 import type { VelocityInputs } from "./input/velocity";
+import { goOn, leave } from "./left";
 import { Listening } from "./listening";
 import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
@@ -60,6 +61,7 @@ let mapping = loadMapping();
 const page = createPage(document.body, {
   share: () => void share(),
   language: () => {
+    if (room) leave(room, performance.now());
     history.replaceState(history.state, "", chooseOther(location.href));
     location.reload();
   },
@@ -362,7 +364,7 @@ async function start(): Promise<void> {
     const asked = query.get("session");
     const alone = asked ? null : query.get("motion");
     if (asked) enter(asked);
-    else if (alone) enter(alone, "motions");
+    else if (alone) goOn(enter(alone, "motions"));
     const session = asked || alone ? null : await findSession(newest);
     if (session) {
       const entered = enter(session.id);

@@ -8,8 +8,8 @@ import type { Theme } from "../stage/look";
 import { decimal } from "../words/numbers";
 import { language, series, say } from "../words/say";
 
-/** The other language's own name, and a letter of it for the eye. */
-const OTHER = { en: { lang: "ja", name: "日本語", letter: "あ" }, ja: { lang: "en", name: "English", letter: "A" } } as const;
+/** The other language's own name, and as few letters of it as can be known by. */
+const OTHER = { en: { lang: "ja", name: "日本語", letter: "あ" }, ja: { lang: "en", name: "English", letter: "EN" } } as const;
 
 export interface Header {
   piece(name: string): void;

@@ -247,7 +247,8 @@ export const JAPANESE = {
 /** What the server says that people meet most, by its own English; a value in it may be such a text too. */
 export const HEARD = {
   "Not a BVH file": "BVHファイルではありません",
-  "it begins with {word}": "先頭が{word}です",
+  "it begins with {word}": "先頭が{word}になっています",
+  "a BVH file begins with the word HIERARCHY; export the motion as BVH": "BVHファイルはHIERARCHYで始まります。BVH形式で書き出してください",
   "Empty file": "空のファイルです",
   "there is nothing in it": "中身がありません",
   "export the motion again and send that file": "モーションを書き出し直して、そのファイルを送ってください",
