@@ -47,4 +47,11 @@ describeInBrowser("Japanese", { demo: true }, ({ open }) => {
     await page.getByRole("button", { name: "日本語" }).press("Enter");
     await page.getByRole("button", { name: "演目", exact: true }).waitFor();
   });
+
+  test("is English where the words cannot be fetched", async () => {
+    const page = await open("?lang=ja", { before: (page) => page.route(/\/japanese-[^/]*\.js$/, (route) => route.abort()) });
+    await page.getByRole("button", { name: "Library", exact: true }).waitFor();
+    expect(await page.evaluate(() => document.documentElement.lang)).toBe("en");
+    await danced(page);
+  });
 });
