@@ -1,6 +1,7 @@
 /** Names over the strings, with "Ask" where another holds one, and once the invitation by the nearer hand. */
 import { element, setText } from "./dom";
 import type { Box } from "../stage/boxes";
+import { say } from "../words/say";
 import { LIMB_NAMES, type LimbState } from "./model";
 import { layLabels, type Laid } from "./tag-layout";
 
@@ -29,13 +30,13 @@ export function createTags(root: ParentNode & Node, ask: (limb: number) => void,
   const tags = [0, 1, 2, 3].map((i) => {
     const name = document.createTextNode("");
     const limb = element("span");
-    const button = element("button", { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => ask(i) }, "Ask");
+    const button = element("button", { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => ask(i) }, say("Ask"));
     const tag = element("div", { class: "tag", hidden: true }, name, limb, button);
     layer.append(tag);
     return { name, limb, button, tag, says: "", width: 0, height: 0 };
   });
   let laid: (Laid | null)[] = [];
-  const invitation = element("div", { class: "tag invitation", hidden: true }, "Take a hand");
+  const invitation = element("div", { class: "tag invitation", hidden: true }, say("Take a hand"));
   layer.append(invitation);
   return {
     render(limbs, bars, face) {
@@ -45,7 +46,7 @@ export function createTags(root: ParentNode & Node, ask: (limb: number) => void,
         const { holder, asked } = limbs[i];
         if (!one || !holder) return;
         setText(one.name, holder.name);
-        setText(one.limb, asked ? "asked" : LIMB_NAMES[i].toLowerCase());
+        setText(one.limb, asked ? say("asked") : say(LIMB_NAMES[i]).toLowerCase());
         one.button.hidden = holder.mine || asked;
         one.tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
         // asking for its size lays the page out: only where what it says is new
