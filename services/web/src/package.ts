@@ -2,7 +2,7 @@
 export { BunrakuStage, type BunrakuStageEvents, type ThemeWish } from "./element/stage-element";
 export { readSource, type Source } from "./element/source";
 
-export { Access, type Role } from "./client/access";
+export { Access, tabToken, type Role } from "./client/access";
 export { ProblemError } from "./client/problem";
 export { Puppeteer, type PuppeteerOptions } from "./client/puppeteer";
 export { Viewer, type LineFigures, type Presence, type Timeline, type ViewerOptions } from "./client/viewer";

@@ -143,6 +143,33 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     await danced(page, 2);
   });
 
+  test("the page of examples shows each beside its source, under the server's own policy", async () => {
+    const broken: string[] = [];
+    const before = async (page: Page) => {
+      await page.exposeFunction("broke", (what: string) => void broken.push(what));
+      await page.addInitScript(() => document.addEventListener("securitypolicyviolation", (event) => void (window as unknown as { broke(what: string): void }).broke(event.violatedDirective)));
+    };
+    const page = await own.open(`/examples#token=${token}`, { before, colorScheme: "light" });
+    expect(page.url()).toBe(`${own.url}/examples/`);
+    await page.waitForFunction(() => document.querySelector("bunraku-stage")?.stage?.puppet?.group.visible);
+    expect(await page.locator("bunraku-stage").evaluateAll((all) => all.map((one) => one.getAttribute("data-shown")))).toEqual(["day", "night", "day", "day"]);
+    const sources = await page.locator("pre").allInnerTexts();
+    for (const html of sources.slice(0, 3)) {
+      expect(html).toContain(`<script type="module" src="${own.url}/embed/bunraku-stage.js"></script>`);
+      expect(html).toContain(`<bunraku-stage src="${own.url}/"`);
+      expect(html).not.toMatch(/data-|=""/);
+    }
+    expect(sources[0]).toContain(" controls>");
+    expect(sources[3]).toContain(`from "${own.url}/embed/bunraku.js"`);
+    const canvas = page.locator("#own-camera");
+    await canvas.scrollIntoViewIfNeeded();
+    const first = await canvas.screenshot();
+    await expect.poll(async () => first.equals(await canvas.screenshot()), { timeout: PATIENCE }).toBe(false);
+    await page.getByRole("button", { name: "Dark theme" }).click();
+    await page.getByRole("button", { name: "Light theme" }).waitFor();
+    expect(broken).toEqual([]);
+  });
+
   test("it says calmly why nothing is to be seen", async () => {
     const said = (page: Page, nth = 0) => page.locator("bunraku-stage .notice:not([hidden])").nth(nth);
     // the same page under a name that the server does not know
