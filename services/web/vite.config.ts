@@ -20,6 +20,8 @@ export default defineConfig({
     emptyOutDir: true,
     target: "es2023",
     assetsInlineLimit: 0,
+    // what is needed at first stays in one chunk, though main.ts waits for its words
+    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } } },
     // three.js is one chunk, loaded while the page is already there
     chunkSizeWarningLimit: 700,
   },

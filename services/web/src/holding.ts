@@ -6,6 +6,7 @@ import { controlName } from "./page/control-names";
 import { askers, holders, LIMB_NAMES, LIMB_ORDER, type LimbState } from "./page/model";
 import type { Page } from "./page/page";
 import type { Room } from "./room";
+import { heard, say } from "./words/say";
 
 /** What stands on the stage's chunk, and comes after the page. */
 export interface Theatre {
@@ -52,10 +53,10 @@ export class Holding {
       if (asked) this.#given(limb);
     });
     on<{ limb: number; free: boolean }>("lapsed", ({ limb, free }) => {
-      this.page.toast(free ? `The ${limbName(limb)} is free now` : `The ${limbName(limb)} was not given`);
+      this.page.toast(say(free ? "The {limb} is free now" : "The {limb} was not given", { limb: limbName(limb) }));
       this.render();
     });
-    on<{ detail: string }>("notice", ({ detail }) => this.page.strings.notice(detail));
+    on<{ detail: string }>("notice", ({ detail }) => this.page.strings.notice(heard(detail)));
   }
 
   /** The four limbs as the session says, and one's own at once, before it has answered. */
@@ -66,7 +67,7 @@ export class Holding {
     const asking = askers(viewer?.presence ?? null, puppeteer?.id ?? null);
     return told.map((one, limb) => {
       const mine = Boolean(hands?.source(limb));
-      const holder = mine ? { id: puppeteer?.id ?? "", name: "You", colour: puppeteer?.colour ?? 0, mine } : one?.mine ? null : one;
+      const holder = mine ? { id: puppeteer?.id ?? "", name: say("You"), colour: puppeteer?.colour ?? 0, mine } : one?.mine ? null : one;
       return { holder, askers: asking[limb], asked: puppeteer?.asks(limb) ?? false, selected: velocity?.selected === limb && velocity.holds(limb) };
     });
   }
@@ -104,12 +105,12 @@ export class Holding {
     this.theatre?.shake(limb);
     const { holder, asked } = this.limbs()[limb];
     if (!holder || holder.mine) {
-      this.page.toast(`The ${limbName(limb)} was let go`);
+      this.page.toast(say("The {limb} was let go", { limb: limbName(limb) }));
     } else if (asked) {
-      this.page.toast(`You ask ${holder.name} for the ${limbName(limb)}`);
+      this.page.toast(say("You ask {name} for the {limb}", { name: holder.name, limb: limbName(limb) }));
     } else {
       this.#wished = limb;
-      this.page.toast(`${holder.name} holds the ${limbName(limb)}`, { label: "Ask", key: this.#key("ask"), act: () => this.ask(limb) });
+      this.page.toast(say("{name} holds the {limb}", { name: holder.name, limb: limbName(limb) }), { label: say("Ask"), key: this.#key("ask"), act: () => this.ask(limb) });
     }
   }
 
@@ -118,12 +119,12 @@ export class Holding {
     if (this.watching) return;
     const holder = limb === null ? null : this.limbs()[limb].holder;
     if (limb === null || !holder || holder.mine) {
-      this.page.toast("Reach for a string that another holds, then ask for it");
+      this.page.toast(say("Reach for a string that another holds, then ask for it"));
       return;
     }
     this.#wished = null;
     this.#room?.puppeteer.ask(limb);
-    this.page.toast(this.#room?.puppeteer.asks(limb) ? `You ask ${holder.name} for the ${limbName(limb)}` : "The line is lost; ask again when it is back");
+    this.page.toast(this.#room?.puppeteer.asks(limb) ? say("You ask {name} for the {limb}", { name: holder.name, limb: limbName(limb) }) : say("The line is lost; ask again when it is back"));
     this.render();
   }
 
@@ -135,7 +136,7 @@ export class Holding {
   /** Gives a limb to the first who asks for it; without one, the selected limb if it is asked for, else any that is. */
   give(limb = this.#askedOfMe()): void {
     if (this.watching) return;
-    if (limb === null) this.page.toast("Nobody asks for a string of yours");
+    if (limb === null) this.page.toast(say("Nobody asks for a string of yours"));
     else this.theatre?.hands.letGo(limb);
   }
 
@@ -152,7 +153,7 @@ export class Holding {
       return;
     }
     velocity?.hold(limb);
-    this.page.toast(`The ${limbName(limb)} is yours`);
+    this.page.toast(say("The {limb} is yours", { limb: limbName(limb) }));
     this.render();
   }
 
@@ -163,5 +164,5 @@ export class Holding {
 }
 
 function limbName(limb: number): string {
-  return LIMB_NAMES[limb].toLowerCase();
+  return say(LIMB_NAMES[limb]).toLowerCase();
 }

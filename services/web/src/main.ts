@@ -9,6 +9,7 @@ import type { GamepadInput } from "./input/gamepad";
 import type { Hands } from "./input/hands";
 import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { VelocityInputs } from "./input/velocity";
+import { goOn, leave } from "./left";
 import { Listening } from "./listening";
 import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
@@ -21,6 +22,8 @@ import type { Performing } from "./performing";
 import { findSession, Room, type Place } from "./room";
 import type { Stage } from "./stage/stage";
 import { browserStore } from "./storage/store";
+import { chooseOther, learnLanguage } from "./words/language";
+import { say } from "./words/say";
 
 const INVITED = "bunraku.invited";
 const INVITATION = 6_000;
@@ -34,6 +37,9 @@ if (bound()) document.documentElement.dataset.bound = "";
 
 const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvasElement;
 const query = new URLSearchParams(location.search);
+// before anything is said
+document.documentElement.lang = await learnLanguage(query);
+canvas.ariaLabel = say("A wooden puppet dancing on a stage before a disc of gold leaf. Take its hands and legs with the strings' buttons or the keys 1 to 4.");
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const pieces = new Pieces();
 const name = ownName(query, Math.random());
@@ -51,6 +57,11 @@ let mapping = loadMapping();
 
 const page = createPage(document.body, {
   share: () => void share(),
+  language: () => {
+    if (room) leave(room, performance.now());
+    history.replaceState(history.state, "", chooseOther(location.href));
+    location.reload();
+  },
   theme: () => theme?.toggle(),
   play,
   loop: () => room?.edit({ loop: !room.viewer.timeline?.loop }),
@@ -76,7 +87,7 @@ const page = createPage(document.body, {
   },
   choose: (id) => void choose(id),
   remove: (piece) => {
-    if (confirm(`Remove "${piece.name}" from the library?`)) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
+    if (confirm(say("Remove \"{name}\" from the library?", piece))) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
   },
   toggle: (limb) => holding.toggle(limb),
   ask: (limb) => holding.ask(limb),
@@ -101,7 +112,7 @@ holding.watching = !may("control");
 let denied = false;
 whenDenied(({ title, detail, hint }) => {
   denied = true;
-  page.notice(title, hint ? `${detail}; ${hint}.` : detail);
+  page.notice(title, hint ? say("{detail}; {hint}.", { detail, hint }) : detail);
 });
 const listening = new Listening((state) => page.transport.sound.render(state), page.transport.sound.element);
 theme = createTheme((now) => {
@@ -129,14 +140,14 @@ function step(blocks: number): void {
 async function share(): Promise<void> {
   const url = new URL(location.href);
   url.search = room ? `?session=${encodeURIComponent(room.id)}` : "";
-  let copied = "Link copied";
+  let copied = say("Link copied");
   if (guarded() && room) {
     try {
       url.href = new URL(await shareSession(room.id), location.href).href;
-      copied = "Link copied: who has it may watch, for a week";
+      copied = say("Link copied: who has it may watch, for a week");
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
-      page.toast(`${error.title}: ${error.detail}`);
+      page.toast(say("{title}: {detail}", error));
       return;
     }
   }
@@ -144,7 +155,7 @@ async function share(): Promise<void> {
     await navigator.clipboard.writeText(url.href);
     page.toast(copied);
   } catch {
-    page.toast(`Copy this link: ${url.href}`);
+    page.toast(say("Copy this link: {link}", { link: url.href }));
   }
 }
 
@@ -167,7 +178,7 @@ async function choose(id: string): Promise<void> {
     }
     if (PHONE.matches) page.panels.close("library");
   } catch (error) {
-    tell(page.library, pieces.find(id)?.name ?? "This dance", error);
+    tell(page.library, pieces.find(id)?.name ?? say("This dance"), error);
   }
 }
 
@@ -187,7 +198,7 @@ function enter(id: string, place: Place = "sessions"): Room {
   room?.close();
   stage?.trail.clear();
   room = new Room(id, name, (error) => {
-    page.toast(error instanceof ProblemError ? `${error.title}: ${error.detail}` : String(error));
+    page.toast(error instanceof ProblemError ? say("{title}: {detail}", error) : String(error));
   }, { place });
   document.documentElement.toggleAttribute("data-own", place === "motions");
   const { viewer, puppeteer } = room;
@@ -220,8 +231,8 @@ function enter(id: string, place: Place = "sessions"): Room {
     holding.render();
     const reason = String((event as CustomEvent<string>).detail);
     if (denied) return;
-    if (viewer.ended) page.notice(place === "motions" ? "The dance has ended" : "The session has ended", reason);
-    else if (wasConnected) page.toast(`The line was lost: ${reason}`);
+    if (viewer.ended) page.notice(say(place === "motions" ? "The dance has ended" : "The session has ended"), reason);
+    else if (wasConnected) page.toast(say("The line was lost: {reason}", { reason }));
   });
   renderTimeline();
   renderPieces();
@@ -247,6 +258,7 @@ async function openStage(): Promise<void> {
     play,
     back: () => step(-1),
     forward: () => step(1),
+    camera: () => stage?.follow(!stage.following),
     sound: () => listening.toggle(),
     keep: () => page.transport.keep(),
     library: () => page.panels.toggle("library"),
@@ -260,7 +272,7 @@ async function openStage(): Promise<void> {
   try {
     performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, best: query.get("quality") === "best" });
   } catch {
-    page.notice("This browser cannot draw the stage", "It needs WebGL 2. Try another browser, or switch on hardware acceleration.");
+    page.notice(say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
     return;
   }
   const { commands } = performing;
@@ -292,7 +304,7 @@ function frame(): void {
   pad?.update(now, !page.keys.listening);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
   const { pose, limbs } = performing.draw(now, focused);
-  page.tags.render(limbs, pose ? limbs.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
+  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.face);
   if (pose) invite(now);
   page.transport.camera(stage.hasShow, stage.following);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);
@@ -331,7 +343,7 @@ async function start(): Promise<void> {
     const asked = query.get("session");
     const alone = asked ? null : query.get("motion");
     if (asked) enter(asked);
-    else if (alone) enter(alone, "motions");
+    else if (alone) goOn(enter(alone, "motions"));
     const session = asked || alone ? null : await findSession(newest);
     if (session) {
       const entered = enter(session.id);
@@ -339,14 +351,14 @@ async function start(): Promise<void> {
     }
     await library;
     if (!room && !may("ingest")) {
-      page.notice("The stage is empty", "Nobody dances here now. Come again when somebody does.");
+      page.notice(say("The stage is empty"), say("Nobody dances here now. Come again when somebody does."));
     } else if (!room) {
-      page.notice("The stage is empty", "Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it.");
+      page.notice(say("The stage is empty"), say("Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it."));
       page.panels.open("library");
     }
   } catch (error) {
     if (!(error instanceof ProblemError)) throw error;
-    if (!denied) page.notice(error.title, `${error.detail}. ${error.hint ?? ""}`);
+    if (!denied) page.notice(error.title, say("{detail}. {hint}", { detail: error.detail, hint: error.hint ?? "" }));
   }
 }
 

@@ -7,6 +7,7 @@ import { pack, unpack } from "../wire/codec";
 import { MalformedMessage } from "../wire/errors";
 import { type ClientMessage, type Message, SUBPROTOCOL } from "../wire/messages";
 import { ProblemError } from "./problem";
+import { heard, say, type Plain } from "../words/say";
 
 const FIRST_WAIT = 250;
 const LONGEST_WAIT = 4_000;
@@ -19,7 +20,7 @@ const FINAL = new Set([1000, 1008, 1009, 4403, 4404, 4406]);
 const DENIED = 4401;
 
 /** Plain words for closes that bring none of their own. */
-const REASONS: Readonly<Record<number, string>> = {
+const REASONS: Readonly<Record<number, Plain>> = {
   1000: "the server has ended it",
   1006: "the line was lost",
   1011: "the server failed",
@@ -102,7 +103,7 @@ export class Connection {
   }
 
   /** Ends it for good. */
-  close(reason = "closed here"): void {
+  close(reason = say("closed here")): void {
     if (this.ended) return;
     this.ended = true;
     clearTimeout(this.timer);
@@ -192,7 +193,7 @@ export class Connection {
     }
     this.wait = FIRST_WAIT;
     if (message === null) return;
-    if (message.name === "Problem") this.problem = `${message.title}: ${message.detail}`;
+    if (message.name === "Problem") this.problem = say("{title}: {detail}", { title: heard(message.title), detail: heard(message.detail) });
     this.options.onMessage(message, data.byteLength);
   }
 
@@ -200,7 +201,7 @@ export class Connection {
     this.attempt++;
     this.beside?.close(1000);
     this.socket = this.beside = this.askedAt = null;
-    const reason = this.problem ?? (said || (REASONS[code] ?? `closed with code ${code}`));
+    const reason = this.problem ?? (heard(said) || (code in REASONS ? say(REASONS[code]) : say("closed with code {code}", { code })));
     this.ended = FINAL.has(code) || (code === DENIED && !this.ticketed);
     if (!this.ended) {
       this.timer = setTimeout(() => this.connect(), this.wait);

@@ -1,3 +1,5 @@
+import { heard, say } from "../words/say";
+
 /** What went wrong over HTTP, in words for the person who gets it (RFC 9457). `status` is 0 where no server answered. */
 export class ProblemError extends Error {
   override readonly name = "ProblemError";
@@ -10,7 +12,7 @@ export class ProblemError extends Error {
     readonly line: number | null = null,
     readonly field: string | null = null,
   ) {
-    super(`${title}: ${detail}`);
+    super(say("{title}: {detail}", { title, detail }));
   }
 
   /** The problem in the body of an answer of `status`, of whatever form. */
@@ -22,14 +24,14 @@ export class ProblemError extends Error {
     } catch {
       // a proxy's page, or nothing: the status has to do
     }
-    const text = (value: unknown) => (typeof value === "string" ? value : null);
+    const text = (value: unknown) => (typeof value === "string" ? heard(value) : null);
     return new ProblemError(
-      status, text(said.title) ?? "The server refused", text(said.detail) ?? `it answered ${status}`, text(said.hint),
-      typeof said.line === "number" ? said.line : null, text(said.field),
+      status, text(said.title) ?? say("The server refused"), text(said.detail) ?? say("it answered {status}", { status }), text(said.hint),
+      typeof said.line === "number" ? said.line : null, typeof said.field === "string" ? said.field : null,
     );
   }
 
   static unreachable(): ProblemError {
-    return new ProblemError(0, "No answer", "the server cannot be reached", "look at the line, then try again");
+    return new ProblemError(0, say("No answer"), say("the server cannot be reached"), say("look at the line, then try again"));
   }
 }

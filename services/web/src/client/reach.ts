@@ -1,4 +1,5 @@
 /** Why a page has no word from a server: browsers say of every such failure only that it failed. */
+import { say } from "../words/say";
 
 /** In words for a person; `final` where to try again would not help. */
 export interface Unreached {
@@ -18,16 +19,16 @@ export async function whyUnreached(server: string, origin: string): Promise<Unre
   const health = `${server}/v1/health`;
   if (await answers(health, "cors")) return null;
   if (origin.startsWith("https:") && server.startsWith("http:") && !LOCAL.test(new URL(server).hostname)) {
-    return { title: "The stage cannot be shown here", text: "This page came over https, and browsers let it speak with no server that has none.", final: true };
+    return { title: say("The stage cannot be shown here"), text: say("This page came over https, and browsers let it speak with no server that has none."), final: true };
   }
   if (await answers(health, "no-cors")) {
     const text =
       origin === "null"
-        ? "This page was opened from a file. The stage's server lets such pages in only if BUNRAKU_ORIGINS has null in it."
-        : `The stage's server does not know this site. Its host can let it in: BUNRAKU_ORIGINS=${origin}`;
-    return { title: "The stage cannot be shown here", text, final: true };
+        ? say("This page was opened from a file. The stage's server lets such pages in only if BUNRAKU_ORIGINS has null in it.")
+        : say("The stage's server does not know this site. Its host can let it in: BUNRAKU_ORIGINS={origin}", { origin });
+    return { title: say("The stage cannot be shown here"), text, final: true };
   }
-  return { title: "The stage does not answer", text: "Its server cannot be reached now. It is tried again and again.", final: false };
+  return { title: say("The stage does not answer"), text: say("Its server cannot be reached now. It is tried again and again."), final: false };
 }
 
 /** Whether an answer comes at all. */

@@ -1,7 +1,9 @@
 /** Why a viewer shows what it shows, in words for a person (`proto/SPEC.md`, Choice). */
 import type { Choice } from "../wire/messages";
+import { decimal } from "../words/numbers";
+import { say, type Plain } from "../words/say";
 
-const REASONS: Readonly<Record<string, string>> = {
+const REASONS: Readonly<Record<string, Plain>> = {
   best: "the best there is",
   line: "as much as the line carries",
   hands: "so that pulled limbs come in time",
@@ -26,10 +28,10 @@ export interface Standing {
 export function reasonOf(standing: Standing): string {
   const { closed, damaged, shown, missing, choice, pinned } = standing;
   if (closed !== null) return closed;
-  if (damaged > 0) return `${damaged} messages could not be read`;
-  if (!shown) return "waiting for the first block";
-  if (missing) return "waiting for a block";
-  if (!choice) return pinned ? REASONS.pinned : "chosen by the server";
-  const reason = REASONS[choice.reason] ?? "chosen by the server";
-  return choice.line === null ? reason : `${reason} (${(choice.line / 1000).toFixed(1)} kbit/s)`;
+  if (damaged > 0) return damaged === 1 ? say("1 message could not be read") : say("{count} messages could not be read", { count: decimal(damaged, 0) });
+  if (!shown) return say("waiting for the first block");
+  if (missing) return say("waiting for a block");
+  if (!choice) return say(pinned ? REASONS.pinned : "chosen by the server");
+  const reason = say(REASONS[choice.reason] ?? "chosen by the server");
+  return choice.line === null ? reason : say("{reason} ({rate} kbit/s)", { reason, rate: decimal(choice.line / 1000, 1) });
 }

@@ -229,7 +229,7 @@ export class Viewer extends EventTarget {
     const ahead = store && timeline ? store.ahead(this.positionAt(now) * 1e6, timeline.loop) : 0;
     const known = Number.isFinite(clock.error);
     return {
-      rate: this.rate,
+      rate: this.rate < 0 ? -1 : (this.choice?.rate ?? this.rate),
       kbps: this.meter.kbps(now),
       bufferSeconds: ahead / 1e6,
       clockOffsetMs: known ? clock.offset / 1000 - performance.timeOrigin : null,

@@ -71,8 +71,10 @@ export class Drawing {
     const { canvas, frame } = this.face;
     const nothing = () => undefined;
     const idle = Object.fromEntries(ACTIONS.map((action) => [action, nothing])) as PageActions;
+    const camera = () => this.performing?.stage.follow(!this.performing.stage.following);
+    const actions: PageActions = { ...idle, camera, ...deeds };
     try {
-      this.performing = new Performing(canvas, this.holding, { mapping: () => this.mapping, actions: { ...idle, ...deeds }, changed: () => this.holding.render() });
+      this.performing = new Performing(canvas, this.holding, { mapping: () => this.mapping, actions, changed: () => this.holding.render() });
     } catch {
       return "no graphics";
     }
@@ -124,11 +126,7 @@ export class Drawing {
     const now = performance.now();
     const { pose, limbs } = performing.draw(now, this.focused);
     const { stage } = performing;
-    const places = limbs.map((_, limb) => {
-      const bar = pose && stage.strings.bar(limb);
-      return bar ? stage.toScreen(bar) : null;
-    });
-    this.face.tags.render(limbs, places);
+    this.face.tags.render(limbs, pose ? limbs.map((_, limb) => stage.bar(limb)) : [], stage.face);
     this.#room?.viewer.drawn(performance.now() - now);
     if (!pose || this.#told) return;
     this.#told = true;

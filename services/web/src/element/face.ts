@@ -9,7 +9,7 @@ import tokens from "../style/tokens.css?inline";
 import own from "./element.css?inline";
 
 /** Names keep so far from the element's upper edge, pixels. */
-const TOP = 34;
+const TOP = 8;
 
 export interface FaceActions {
   play(): void;

@@ -1,6 +1,7 @@
 /** What others ask of one's own limbs, standing until it is given, withdrawn or lapsed. Read out politely; nothing is taken by force. */
 import { element } from "./dom";
 import { LIMB_NAMES, LIMB_ORDER, type LimbState } from "./model";
+import { say } from "../words/say";
 
 export interface Asks {
   /** `key` gives the first of them. */
@@ -21,10 +22,10 @@ export function createAsks(root: HTMLElement, give: (limb: number) => void): Ask
       live.replaceChildren(
         ...asked.map((limb, i) => {
           const { name, colour } = limbs[limb].askers[0];
-          const limbName = LIMB_NAMES[limb].toLowerCase();
-          const button = element("button", { class: "toast-action", type: "button", "aria-label": `Give the ${limbName} to ${name}`, onClick: () => give(limb) }, "Give");
+          const limbName = say(LIMB_NAMES[limb]).toLowerCase();
+          const button = element("button", { class: "toast-action", type: "button", "aria-label": say("Give the {limb} to {name}", { limb: limbName, name }), onClick: () => give(limb) }, say("Give"));
           if (key && i === 0) button.append(element("kbd", { class: "key-hint" }, key));
-          return element("div", { class: "toast ask", style: `--colour: var(--holder-${colour})` }, `${name} asks for the ${limbName}`, button);
+          return element("div", { class: "toast ask", style: `--colour: var(--holder-${colour})` }, say("{name} asks for the {limb}", { limb: limbName, name }), button);
         }),
       );
       if (within) live.querySelector("button")?.focus();

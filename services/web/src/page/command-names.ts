@@ -2,16 +2,17 @@
 import { DIGITAL_INPUTS, effectOf, HELD_INPUTS, isInput } from "../input/inputs";
 import { limbTaken, type Action, type Command } from "../input/mapping";
 import { LIMB_NAMES } from "./model";
+import { series, say, type Plain } from "../words/say";
 
 const WAYS = [["left", "right"], ["down", "up"], ["further", "nearer"]] as const;
-const ACTIONS: Readonly<Record<Exclude<Action, `take_${string}`>, string>> = {
+const ACTIONS: Readonly<Record<Exclude<Action, `take_${string}`>, Plain>> = {
   ask: "ask for the string that another holds", give: "give the string that is asked for",
-  play: "play or pause", back: "seek back by one block", forward: "seek forward by one block", sound: "sound on or off", keep: "keep this as a new dance",
+  play: "play or pause", back: "seek back by one block", forward: "seek forward by one block", camera: "the show's camera, or your own seat", sound: "sound on or off", keep: "keep this as a new dance",
   library: "library", strings: "strings", line: "line",
 };
 
-/** "right", "nearer": which way an input goes. */
-export function wayName(input: Parameters<typeof effectOf>[0]): string {
+/** "right", "nearer": which way an input goes, to be said. */
+export function wayName(input: Parameters<typeof effectOf>[0]): (typeof WAYS)[number][number] {
   const { axis, sign } = effectOf(input);
   return WAYS[axis][sign > 0 ? 1 : 0];
 }
@@ -20,10 +21,11 @@ export function wayName(input: Parameters<typeof effectOf>[0]): string {
 export function commandName(command: Command): string {
   if (isInput(command)) {
     const { limb } = effectOf(command);
-    return limb === null ? `pull the held string ${wayName(command)}` : `${LIMB_NAMES[limb].toLowerCase()} ${wayName(command)}`;
+    const way = say(wayName(command));
+    return limb === null ? say("pull the held string {way}", { way }) : say("{limb} {way}", { limb: say(LIMB_NAMES[limb]).toLowerCase(), way });
   }
   const limb = limbTaken(command);
-  return limb === null ? ACTIONS[command as keyof typeof ACTIONS] : `take or let go the ${LIMB_NAMES[limb].toLowerCase()}`;
+  return limb === null ? say(ACTIONS[command as keyof typeof ACTIONS]) : say("take or let go the {limb}", { limb: say(LIMB_NAMES[limb]).toLowerCase() });
 }
 
 /**
@@ -35,16 +37,16 @@ export function summary(commands: readonly Command[], own: number | null = null)
     if (!isInput(command)) return commandName(command);
     const { limb } = effectOf(command);
     const ways = commands.filter((other) => isInput(other) && effectOf(other).limb === limb);
-    if (ways.length > 1) return limb === null ? "held string" : LIMB_NAMES[limb].toLowerCase();
-    return limb === own && limb !== null ? wayName(command) : commandName(command);
+    if (ways.length > 1) return limb === null ? say("held string") : say(LIMB_NAMES[limb]).toLowerCase();
+    return limb === own && limb !== null ? say(wayName(command)) : commandName(command);
   });
-  const text = [...new Set(words)].join(", ");
+  const text = series([...new Set(words)]);
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 /** The commands in the order of the list of keys, in three groups. */
 export const GROUPS: readonly (readonly Command[])[] = [
   ["take_right_hand", "take_left_hand", "take_right_leg", "take_left_leg", ...[2, 3, 1, 0, 4, 5].map((i) => HELD_INPUTS[i]), "ask", "give"],
-  ["play", "back", "forward", "sound", "keep", "library", "strings", "line"],
+  ["play", "back", "forward", "camera", "sound", "keep", "library", "strings", "line"],
   DIGITAL_INPUTS,
 ];

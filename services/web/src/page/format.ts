@@ -1,6 +1,8 @@
 /** Numbers as people read them. */
 
 import type { UploadProgress } from "../client/library";
+import { decimal } from "../words/numbers";
+import { series, say } from "../words/say";
 
 /** Seconds as m:ss, or h:mm:ss. */
 export function clockTime(seconds: number): string {
@@ -12,27 +14,27 @@ export function clockTime(seconds: number): string {
 
 /** Bytes as kB or MB with one decimal, powers of 1000. */
 export function byteCount(bytes: number): string {
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+  return bytes < 1e6 ? `${decimal(bytes / 1e3, bytes < 1e4 ? 1 : 0)} kB` : `${decimal(bytes / 1e6, 1)} MB`;
 }
 
 /** What an upload's last row says: how far it is, and how long it will take at the speed so far. */
 export function uploadProgress(loaded: number, total: number, seconds: number): string {
-  const share = `${byteCount(loaded)} of ${byteCount(total)}`;
-  if (loaded >= total) return `${share}, reading the dance`;
+  const share = say("{part} of {whole}", { part: byteCount(loaded), whole: byteCount(total) });
+  if (loaded >= total) return series([share, say("reading the dance")]);
   if (seconds < 0.5 || loaded <= 0) return share;
-  return `${share}, ${Math.max(1, Math.round(((total - loaded) / loaded) * seconds))} s left`;
+  return series([share, say("{seconds} s left", { seconds: decimal(Math.max(1, ((total - loaded) / loaded) * seconds), 0) })]);
 }
 
 /** What the server does with an upload, in words. */
 export function makingProgress(stage: UploadProgress["stage"]): string {
-  return { sending: "sending", waiting: "waiting for its turn", reading: "reading the dance", encoding: "encoding the dance" }[stage];
+  return say(({ sending: "sending", waiting: "waiting for its turn", reading: "reading the dance", encoding: "encoding the dance" } as const)[stage]);
 }
 
 /** A number with a sensible count of digits: 3.45, 12.3, 184. */
 export function figure(value: number): string {
   if (!Number.isFinite(value)) return "-";
   const size = Math.abs(value);
-  return value.toFixed(size < 10 ? 2 : size < 100 ? 1 : 0);
+  return decimal(value, size < 10 ? 2 : size < 100 ? 1 : 0);
 }
 
 /** First letter of a name, for an avatar. */

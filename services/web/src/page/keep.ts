@@ -2,6 +2,7 @@
 import type { Motion } from "../client/library";
 import { ProblemError } from "../client/problem";
 import type { Toast } from "./toast";
+import { say } from "../words/say";
 
 /** Keeps a session's performance as a new motion of a name. Rejects with ProblemError. */
 export type Keep = (session: string, name: string) => Promise<Motion>;
@@ -26,15 +27,18 @@ export function keepThis({ keep, toast, session, puppeteer, kept, choose }: Keep
     try {
       const motion = await keep(now.id, keptName(now.piece, puppeteer));
       await kept(motion);
-      toast(`Kept: ${motion.name}`, { label: "Dance it", act: () => choose(motion.id) });
+      toast(say("Kept: {name}", { name: motion.name }), { label: say("Dance it"), act: () => choose(motion.id) });
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
-      toast(`${error.title}: ${error.detail}`);
+      toast(say("{title}: {detail}", error));
     }
   };
 }
 
+/** Those that `keptName` gives, in each language. */
+const ENDINGS = [/, as .+ pulled it$/, /（.+の操演）$/];
+
 /** "Sanbaso, as Aiko pulled it"; what was pulled once more keeps one such ending. */
 export function keptName(piece: string, puppeteer: string): string {
-  return `${piece.replace(/, as .+ pulled it$/, "") || "A dance"}, as ${puppeteer} pulled it`;
+  return say("{piece}, as {puppeteer} pulled it", { piece: ENDINGS.reduce((name, ending) => name.replace(ending, ""), piece) || say("A dance"), puppeteer });
 }

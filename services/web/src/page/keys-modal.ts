@@ -5,6 +5,8 @@ import { element, setText } from "./dom";
 import { icon } from "./icons";
 import { createMappingEditor } from "./mapping-editor";
 import { createPadDrawing } from "./pad-drawing";
+import { percent } from "../words/numbers";
+import { say } from "../words/say";
 
 export interface KeysModal {
   show(): void;
@@ -25,20 +27,21 @@ const SLIDERS = [
 /** `change` is told the new mapping whenever it is edited, and shall bring it back by `mapping`. */
 export function createKeysModal(root: HTMLElement, change: (mapping: Mapping) => void): KeysModal {
   let mapping = DEFAULT_MAPPING;
-  const dialog = element("dialog", { class: "modal", "aria-label": "Keys and gamepad" });
-  const close = element("button", { class: "round-button", type: "button", "aria-label": "Close", onClick: () => dialog.close() }, icon("close"));
+  const dialog = element("dialog", { class: "modal", "aria-label": say("Keys and gamepad") });
+  const close = element("button", { class: "round-button", type: "button", "aria-label": say("Close"), onClick: () => dialog.close() }, icon("close"));
   const drawing = createPadDrawing();
   const editor = createMappingEditor(change);
   const state = element("p", { class: "pad-state" });
-  const sliders = SLIDERS.map(({ name, label, most }) => {
+  const sliders = SLIDERS.map(({ name, label: english, most }) => {
+    const label = say(english);
     const value = element("span", { class: "value", "aria-hidden": "true" });
     const input = element("input", { type: "range", "aria-label": label, min: 0, max: most, step: 0.01, onInput: () => change({ ...mapping, [name]: Number(input.value) }) });
     return { name, value, input, row: element("label", { class: "slider" }, element("span", {}, label), value, input) };
   });
-  const reset = element("button", { class: "text-button", type: "button", onClick: () => change(DEFAULT_MAPPING) }, "Back to the default");
+  const reset = element("button", { class: "text-button", type: "button", onClick: () => change(DEFAULT_MAPPING) }, say("Back to the default"));
   const left = element("div", { class: "pad" });
   left.append(drawing.element, state, ...sliders.map(({ row }) => row), reset);
-  dialog.append(element("div", { class: "panel-head" }, element("h2", {}, "Keys and gamepad"), close), element("div", { class: "modal-columns" }, left, editor.element));
+  dialog.append(element("div", { class: "panel-head" }, element("h2", {}, say("Keys and gamepad")), close), element("div", { class: "modal-columns" }, left, editor.element));
   dialog.addEventListener("click", (event) => {
     if (event.target === dialog) dialog.close();
   });
@@ -64,7 +67,7 @@ export function createKeysModal(root: HTMLElement, change: (mapping: Mapping) =>
       return editor.listening;
     },
     pad(now) {
-      setText(state, now ? `${now.id.replace(/\s*\(.*\)$/, "")} is connected` : "Press any button of a gamepad to connect it");
+      setText(state, now ? say("{pad} is connected", { pad: now.id.replace(/\s*\(.*\)$/, "") }) : say("Press any button of a gamepad to connect it"));
       drawing.light(now, mapping.deadZone);
       editor.see(now ? pressedControls(now, mapping.deadZone) : new Map());
     },
@@ -74,7 +77,7 @@ export function createKeysModal(root: HTMLElement, change: (mapping: Mapping) =>
       drawing.label(now);
       for (const { name, value, input } of sliders) {
         input.value = String(now[name]);
-        const told = now[name] > 0 ? `${Math.round(now[name] * 100)} %` : "off";
+        const told = now[name] > 0 ? percent(now[name]) : say("off");
         setText(value, told);
         input.setAttribute("aria-valuetext", told);
       }

@@ -4,6 +4,8 @@ import { element, setAttribute, setText } from "./dom";
 import { clockTime, makingProgress, uploadProgress } from "./format";
 import { icon, motionGlyph } from "./icons";
 import { createPanel, type Panel } from "./panels";
+import { percent } from "../words/numbers";
+import { series, say } from "../words/say";
 
 export interface Piece {
   id: string;
@@ -31,18 +33,18 @@ export interface Library {
 export const ACCEPTED = ".bvh";
 
 export function createLibrary(root: HTMLElement, on: { files(files: readonly File[]): void; choose(id: string): void; remove(piece: Piece): void; close(): void }): Library {
-  const panel = createPanel(root, "library", "Library", on.close);
+  const panel = createPanel(root, "library", say("Library"), on.close);
   const picker = element("input", { type: "file", accept: ACCEPTED, multiple: true, hidden: true });
   picker.addEventListener("change", () => {
     on.files([...(picker.files ?? [])]);
     picker.value = ""; // The same file may be chosen again.
   });
-  const drop = element("button", { class: "drop", type: "button", onClick: () => picker.click() }, icon("upload"), element("b", {}, "Drop a dance here"));
-  drop.append(element("span", {}, "motion .bvh, up to 64 MB, or press to choose"));
-  const doing = element("div", { role: "group", "aria-label": "Uploads" });
+  const drop = element("button", { class: "drop", type: "button", onClick: () => picker.click() }, icon("upload"), element("b", {}, say("Drop a dance here")));
+  drop.append(element("span", {}, say("motion .bvh, up to 64 MB, or press to choose")));
+  const doing = element("div", { role: "group", "aria-label": say("Uploads") });
   const said = element("div", { role: "alert" });
   const list = element("ul", { class: "motions" });
-  const empty = element("p", { class: "empty", hidden: true }, "No dances yet. Drop a motion capture file anywhere on this page and the puppet dances it.");
+  const empty = element("p", { class: "empty", hidden: true }, say("No dances yet. Drop a motion capture file anywhere on this page and the puppet dances it."));
   panel.body.append(drop, picker, doing, said, list, empty);
   return {
     panel,
@@ -56,27 +58,27 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
           glyph.append(motionGlyph(piece.id));
           const text = element("span", { class: "motion-text" }, element("b", {}, piece.name), element("small", {}, piece.detail));
           choose.append(glyph, text, element("span", { class: "motion-length" }, clockTime(piece.seconds)));
-          const remove = element("button", { class: "round-button motion-remove", type: "button", "aria-label": `Remove ${piece.name}`, onClick: () => on.remove(piece) }, icon("bin"));
+          const remove = element("button", { class: "round-button motion-remove", type: "button", "aria-label": say("Remove {name}", { name: piece.name }), onClick: () => on.remove(piece) }, icon("bin"));
           return element("li", {}, choose, remove);
         }),
       );
     },
     upload(name, cancel) {
-      const share = element("span", {}, "0 %");
+      const share = element("span", {}, percent(0));
       const fill = element("i", { style: "width: 0" });
-      const bar = element("div", { class: "progress", role: "progressbar", "aria-label": `Upload of ${name}`, "aria-valuemin": 0, "aria-valuemax": 100 }, fill);
-      const state = element("span", {}, "waiting");
-      const stop = element("button", { class: "text-button", type: "button", "aria-label": `Cancel the upload of ${name}`, onClick: cancel }, "Cancel");
+      const bar = element("div", { class: "progress", role: "progressbar", "aria-label": say("Upload of {name}", { name }), "aria-valuemin": 0, "aria-valuemax": 100 }, fill);
+      const state = element("span", {}, say("waiting"));
+      const stop = element("button", { class: "text-button", type: "button", "aria-label": say("Cancel the upload of {name}", { name }), onClick: cancel }, say("Cancel"));
       const row = element("div", { class: "upload" }, element("div", { class: "upload-row" }, element("span", { class: "upload-name" }, name), share), bar);
       row.append(element("div", { class: "upload-row" }, state, stop));
       doing.append(row);
       const show = (done: number, words: string) => {
-        const percent = Math.floor(done * 100);
-        setText(share, `${percent} %`);
+        const hundredths = Math.floor(done * 100);
+        setText(share, percent(hundredths / 100));
         setText(state, words);
-        fill.style.width = `${percent}%`;
-        bar.setAttribute("aria-valuenow", String(percent));
-        bar.setAttribute("aria-valuetext", `${words}, ${percent} %`);
+        fill.style.width = `${hundredths}%`;
+        bar.setAttribute("aria-valuenow", String(hundredths));
+        bar.setAttribute("aria-valuetext", series([words, percent(hundredths / 100)]));
       };
       return {
         sending: (loaded, total, seconds) => show(total > 0 ? loaded / total : 0, uploadProgress(loaded, total, seconds)),
@@ -85,9 +87,9 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
       };
     },
     problem(name, title, detail, hint) {
-      const box = element("div", { class: "problem" }, element("b", {}, `${name}: ${title}`), element("p", {}, detail));
+      const box = element("div", { class: "problem" }, element("b", {}, say("{name}: {title}", { name, title })), element("p", {}, detail));
       if (hint) box.append(element("p", { class: "muted" }, hint));
-      box.append(element("button", { class: "text-button", type: "button", onClick: () => box.remove() }, "Dismiss"));
+      box.append(element("button", { class: "text-button", type: "button", onClick: () => box.remove() }, say("Dismiss")));
       said.replaceChildren(box);
     },
   };
@@ -95,7 +97,7 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
 
 /** Files dropped anywhere on the page; a gold frame shows that they may be. */
 export function acceptDrops(root: HTMLElement, on: (files: readonly File[]) => void): void {
-  const frame = element("div", { class: "drop-frame", hidden: true }, element("span", {}, "Drop to add this dance"));
+  const frame = element("div", { class: "drop-frame", hidden: true }, element("span", {}, say("Drop to add this dance")));
   root.append(frame);
   const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
   addEventListener("dragover", (event) => {

@@ -5,6 +5,8 @@ import type { LineFigures } from "./model";
 import { createPanel, type Panel } from "./panels";
 import { createPlot, History } from "./plot";
 import type { Health } from "./transport";
+import { decimal } from "../words/numbers";
+import { say } from "../words/say";
 
 /** Two samples a second for a minute. */
 const SLOTS = 120;
@@ -19,21 +21,21 @@ export interface LineCard {
 }
 
 export function createLineCard(root: HTMLElement, close: () => void): LineCard {
-  const panel = createPanel(root, "line-card", "Line", close);
+  const panel = createPanel(root, "line-card", say("Line"), close);
   const chosen = element("b");
   const reason = element("span");
   const plots = {
-    rate: createPlot({ label: "Rate", ink: "var(--gold)", least: 5, filled: true }),
-    buffer: createPlot({ label: "Buffer", ink: "var(--gold)", least: 5 }),
-    clock: createPlot({ label: "Clock error", ink: "var(--holder-3)", least: 2 }),
-    latency: createPlot({ label: "Latency", ink: "var(--holder-2)", least: 50 }),
+    rate: createPlot({ label: say("Rate"), ink: "var(--gold)", least: 5, filled: true }),
+    buffer: createPlot({ label: say("Buffer"), ink: "var(--gold)", least: 5 }),
+    clock: createPlot({ label: say("Clock error"), ink: "var(--holder-3)", least: 2 }),
+    latency: createPlot({ label: say("Latency"), ink: "var(--holder-2)", least: 50 }),
   };
   const histories = { rate: new History(SLOTS), buffer: new History(SLOTS), clock: new History(SLOTS), latency: new History(SLOTS) };
   panel.body.append(
     element("p", { class: "why" }, chosen, reason),
     element("div", { class: "plots" }, ...Object.values(plots).map((plot) => plot.element)),
   );
-  const milliseconds = (value: number | null) => (value === null ? "-" : `${value.toFixed(Math.abs(value) < 10 ? 1 : 0)} ms`);
+  const milliseconds = (value: number | null) => (value === null ? "-" : `${decimal(value, Math.abs(value) < 10 ? 1 : 0)} ms`);
   return {
     panel,
     sample(line, rates) {
@@ -42,13 +44,13 @@ export function createLineCard(root: HTMLElement, close: () => void): LineCard {
       histories.clock.push(line.clockErrorMs ?? Number.NaN);
       histories.latency.push(line.latencyMs ?? Number.NaN);
       if (panel.element.hidden) return;
-      setText(chosen, line.rate < 0 ? "No dance yet" : `Rate ${line.rate + 1} of ${rates}`);
-      setText(reason, line.reason ? `, ${line.reason}` : "");
-      plots.rate.render(histories.rate, SLOTS, `${figure(line.kbps)} kbit/s`, line.gaps > 0 ? `${line.gaps} gap${line.gaps === 1 ? "" : "s"}` : "no gaps");
-      plots.buffer.render(histories.buffer, SLOTS, `${line.bufferSeconds.toFixed(1)} s`, `goal ${BUFFER_GOAL} s`, BUFFER_GOAL);
-      const offset = line.clockOffsetMs !== null ? `offset ${line.clockOffsetMs.toFixed(1)} ms` : "measuring";
+      setText(chosen, line.rate < 0 ? say("No dance yet") : say("Rate {rate} of {rates}", { rate: line.rate + 1, rates }));
+      setText(reason, line.reason ? say(", {reason}", { reason: line.reason }) : "");
+      plots.rate.render(histories.rate, SLOTS, `${figure(line.kbps)} kbit/s`, line.gaps > 1 ? say("{count} gaps", { count: decimal(line.gaps, 0) }) : say(line.gaps === 1 ? "1 gap" : "no gaps"));
+      plots.buffer.render(histories.buffer, SLOTS, say("{seconds} s", { seconds: decimal(line.bufferSeconds, 1) }), say("goal {seconds} s", { seconds: BUFFER_GOAL }), BUFFER_GOAL);
+      const offset = line.clockOffsetMs !== null ? say("offset {time}", { time: milliseconds(line.clockOffsetMs) }) : say("measuring");
       plots.clock.render(histories.clock, SLOTS, line.clockErrorMs !== null ? `±${milliseconds(line.clockErrorMs)}` : "-", offset);
-      plots.latency.render(histories.latency, SLOTS, milliseconds(line.latencyMs), `first pose ${milliseconds(line.firstPoseMs)}`);
+      plots.latency.render(histories.latency, SLOTS, milliseconds(line.latencyMs), say("first pose {time}", { time: milliseconds(line.firstPoseMs) }));
     },
     health(line, connected) {
       if (!connected) return "lost";

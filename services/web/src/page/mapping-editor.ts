@@ -6,6 +6,7 @@ import { commandName, GROUPS } from "./command-names";
 import { controlName } from "./control-names";
 import { element, setAttribute, setText } from "./dom";
 import { icon } from "./icons";
+import { series, say, sayAround } from "../words/say";
 
 export interface MappingEditor {
   readonly element: HTMLElement;
@@ -41,7 +42,7 @@ export function createMappingEditor(change: (mapping: Mapping) => void): Mapping
     stop();
     if (same) return;
     awaited = { command, capture: new PadCapture() };
-    setText(live, `Press a key or a button of the gamepad for: ${commandName(command)}. Escape for none.`);
+    setText(live, say("Press a key or a button of the gamepad for: {command}. Escape for none.", { command: commandName(command) }));
     render(command);
   };
   const found = (control: Control) => {
@@ -49,7 +50,8 @@ export function createMappingEditor(change: (mapping: Mapping) => void): Mapping
     const { command } = awaited;
     awaited = null;
     const also = conflictsOf(bind(mapping, control, command), control, command);
-    setText(live, `${controlName(control)}: ${commandName(command)}${also.length > 0 ? `. It does this too: ${also.map(commandName).join(", ")}` : ""}`);
+    const bound = { control: controlName(control), command: commandName(command) };
+    setText(live, also.length > 0 ? say("{control}: {command}. It does this too: {others}", { ...bound, others: series(also.map(commandName)) }) : say("{control}: {command}", bound));
     change(bind(mapping, control, command));
     rows.get(command)?.add.focus();
   };
@@ -57,21 +59,21 @@ export function createMappingEditor(change: (mapping: Mapping) => void): Mapping
     const row = rows.get(command);
     if (!row) return;
     const controls = controlsOf(mapping, command);
-    const clashes = controls.flatMap((control) => conflictsOf(mapping, control, command).map((other) => `${controlName(control)} also: ${commandName(other)}`));
+    const clashes = controls.flatMap((control) => conflictsOf(mapping, control, command).map((other) => say("{control} also: {command}", { control: controlName(control), command: commandName(other) })));
     row.chips.replaceChildren(
       ...controls.map((control) => {
         const name = controlName(control);
-        const chip = element("button", { class: "chip", type: "button", "aria-label": `${name}: ${commandName(command)}. Take away`, title: "Take away", onClick: () => remove(control, command) }, name);
+        const chip = element("button", { class: "chip", type: "button", "aria-label": say("{control}: {command}. Take away", { control: name, command: commandName(command) }), title: say("Take away"), onClick: () => remove(control, command) }, name);
         setAttribute(chip, "data-pad", isPadControl(control));
         setAttribute(chip, "data-clash", conflictsOf(mapping, control, command).length > 0);
         return chip;
       }),
     );
-    setText(row.clash, clashes.join("; "));
+    setText(row.clash, clashes.join(say("; ")));
     row.clash.hidden = clashes.length === 0;
     const waiting = awaited?.command === command;
     setAttribute(row.add, "aria-pressed", waiting);
-    row.add.replaceChildren(waiting ? "press a key" : icon("add"));
+    row.add.replaceChildren(waiting ? say("press a key") : icon("add"));
   };
   const remove = (control: Control, command: Command) => {
     change(unbind(mapping, control, command));
@@ -81,15 +83,15 @@ export function createMappingEditor(change: (mapping: Mapping) => void): Mapping
     const made = element("ul", { class: "bindings" });
     for (const command of commands) {
       const [chips, clash] = [element("span", { class: "chips" }), element("small", { class: "clash" })];
-      const add = element("button", { class: "add", type: "button", "aria-label": `Bind a key or button: ${commandName(command)}`, onClick: () => start(command) });
+      const add = element("button", { class: "add", type: "button", "aria-label": say("Bind a key or button: {command}", { command: commandName(command) }), onClick: () => start(command) });
       rows.set(command, { chips, clash, add });
       made.append(element("li", {}, element("span", { class: "what" }, commandName(command), clash), chips, add));
     }
     return made;
   };
   const [strings, stage, each] = GROUPS.map(list);
-  const fixed = element("p", { class: "fixed-keys" }, element("kbd", {}, "Esc"), " lets go and closes, ", element("kbd", {}, "?"), " opens this page.");
-  const more = element("details", {}, element("summary", {}, "The 14 inputs, each by itself"), element("p", { class: "muted" }, "A hand has six, a leg its angle: as buttons, up and down. Right, up and nearer are yours, not the puppet's."), each);
+  const fixed = element("p", { class: "fixed-keys" }, ...sayAround("{escape} lets go and closes, {question} opens this page.", { escape: element("kbd", {}, "Esc"), question: element("kbd", {}, "?") }));
+  const more = element("details", {}, element("summary", {}, say("The 14 inputs, each by itself")), element("p", { class: "muted" }, say("A hand has six, a leg its angle: as buttons, up and down. Right, up and nearer are yours, not the puppet's.")), each);
   return {
     element: element("div", { class: "editor" }, strings, stage, fixed, more, live),
     get listening() {

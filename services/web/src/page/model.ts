@@ -1,13 +1,14 @@
 /** What the page shows of a session, in the words of the contract. */
 import type { Viewer } from "../client/viewer";
+import { say, type Plain } from "../words/say";
 
 export type Presence = NonNullable<Viewer["presence"]>;
 export type Timeline = NonNullable<Viewer["timeline"]>;
 export type LineFigures = ReturnType<Viewer["line"]>;
 
-/** Limbs as people read them: the puppet's right first, in the order of keys 1 to 4. */
+/** Limbs as people read them, to be said: the puppet's right first, in the order of keys 1 to 4. */
 export const LIMB_ORDER: readonly number[] = [1, 0, 3, 2];
-export const LIMB_NAMES: readonly string[] = ["Left hand", "Right hand", "Left leg", "Right leg"];
+export const LIMB_NAMES = ["Left hand", "Right hand", "Left leg", "Right leg"] as const satisfies readonly Plain[];
 
 /** The key (1 to 4) that takes a limb. */
 export function limbKey(limb: number): number {
@@ -46,7 +47,7 @@ export function askers(presence: Presence | null, self: string | null): Asker[][
   return [0, 1, 2, 3].map((limb) =>
     (presence?.asks[limb] ?? []).filter((id) => id !== self).map((id) => {
       const person = presence?.puppeteers.find((one) => one.id === id);
-      return { id, name: person?.name || "Someone", colour: person?.colour ?? 0 };
+      return { id, name: person?.name || say("Someone"), colour: person?.colour ?? 0 };
     }),
   );
 }
@@ -58,6 +59,6 @@ export function holders(presence: Presence | null, self: string | null): (Holder
     if (!id) return null;
     const person = presence?.puppeteers.find((one) => one.id === id);
     const mine = id === self;
-    return { id, mine, name: mine ? "You" : person?.name || "Someone", colour: person?.colour ?? 0 };
+    return { id, mine, name: mine ? say("You") : person?.name || say("Someone"), colour: person?.colour ?? 0 };
   });
 }

@@ -4,6 +4,7 @@ import { wayName } from "./command-names";
 import { element } from "./dom";
 import { icon } from "./icons";
 import { LIMB_NAMES } from "./model";
+import { say } from "../words/say";
 
 /** As they stand, three in a row. */
 const WAYS = ["nearer", "up", "further", "left", "down", "right"];
@@ -24,7 +25,7 @@ export function createMovePad(limb: number, press: (input: DigitalInput, down: b
     else down.delete(input);
     press(input, to);
   };
-  const pad = element("div", { class: "move-pad", role: "group", "aria-label": `Move the ${LIMB_NAMES[limb].toLowerCase()}`, "data-leg": limb >= 2, hidden: true });
+  const pad = element("div", { class: "move-pad", role: "group", "aria-label": say("Move the {limb}", { limb: say(LIMB_NAMES[limb]).toLowerCase() }), "data-leg": limb >= 2, hidden: true });
   const inputs = DIGITAL_INPUTS.filter((one) => effectOf(one).limb === limb);
   for (const way of WAYS) for (const input of inputs) if (wayName(input) === way) pad.append(button(input, set));
   return {
@@ -38,8 +39,9 @@ export function createMovePad(limb: number, press: (input: DigitalInput, down: b
 
 function button(input: DigitalInput, set: (input: DigitalInput, down: boolean) => void): HTMLButtonElement {
   const way = wayName(input);
-  const made = element("button", { class: "move", type: "button", "aria-label": way.charAt(0).toUpperCase() + way.slice(1) });
-  made.append(way === "nearer" ? "Near" : way === "further" ? "Far" : icon(way as "left"));
+  const said = say(way);
+  const made = element("button", { class: "move", type: "button", "aria-label": said.charAt(0).toUpperCase() + said.slice(1) });
+  made.append(way === "nearer" ? say("Near") : way === "further" ? say("Far") : icon(way));
   let pressed = false;
   const change = (to: boolean) => {
     pressed = to;

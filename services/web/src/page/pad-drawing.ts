@@ -3,6 +3,7 @@ import { HALF_WAY } from "../input/gamepad-reading";
 import type { Command, Control, Mapping } from "../input/mapping";
 import { summary } from "./command-names";
 import { setAttribute, setText, shape } from "./dom";
+import { series, say, type Plain } from "../words/say";
 
 /** Buttons of the standard layout by their place. */
 const BUTTON = { a: 0, b: 1, x: 2, y: 3, left1: 4, right1: 5, left2: 6, right2: 7, up: 12, down: 13, left: 14, right: 15 } as const;
@@ -66,17 +67,17 @@ export function createPadDrawing(): PadDrawing {
         const held = `button:${BUTTON.left1 + side} `;
         const chords = summary(of(...Object.keys(mapping.bindings).filter((control) => control.startsWith(held))), side);
         const alone = summary(of(held.trim()));
-        setText(labels.chords[side], chords ? `hold ${name}1: ${chords.toLowerCase()}` : alone ? `${name}1 ${alone.toLowerCase()}` : "");
+        setText(labels.chords[side], chords ? say("hold {button}: {commands}", { button: `${name}1`, commands: chords.toLowerCase() }) : alone ? `${name}1 ${alone.toLowerCase()}` : "");
       });
       const rest = [["A", 0], ["B", 1], ["X", 2], ["Y", 3], ["←", 14], ["→", 15], ["↑", 12], ["↓", 13]] as const;
-      const short: Readonly<Record<string, string>> = { play: "play", back: "seek back", forward: "forward", ask: "ask", give: "give", keep: "keep" };
+      const short: Readonly<Record<string, Plain>> = { play: "play", back: "seek back", forward: "forward", ask: "ask", give: "give", keep: "keep" };
       const told = rest.flatMap(([name, index]) => {
         const commands = of(`button:${index}`);
-        return commands.length > 0 ? [`${name} ${commands.map((command) => short[command] ?? summary([command]).toLowerCase()).join(", ")}`] : [];
+        return commands.length > 0 ? [`${name} ${series(commands.map((command) => (short[command] ? say(short[command]) : summary([command]).toLowerCase())))}`] : [];
       });
       setText(labels.rest, told.join("   "));
       const all = [...labels.sticks, ...labels.triggers, ...labels.chords, labels.rest].map(({ textContent }) => textContent).filter(Boolean);
-      svg.setAttribute("aria-label", `Gamepad: ${all.join("; ")}`);
+      svg.setAttribute("aria-label", say("Gamepad: {parts}", { parts: all.join(say("; ")) }));
     },
     light(pad, deadZone) {
       for (const [index, part] of buttons) setAttribute(part, "data-on", (pad?.buttons[index]?.value ?? 0) > HALF_WAY / 10);

@@ -14,9 +14,12 @@ import { createTags, type Tags } from "./tags";
 import { createToast, type Toast } from "./toast";
 import type { SoundActions } from "./sound-control";
 import { createTransport, type PanelName, type Transport } from "./transport";
+import { say } from "../words/say";
 
 export interface PageActions extends StringsActions, SoundActions {
   share(): void;
+  /** Speaks the other language. */
+  language(): void;
   theme(): void;
   play(): void;
   loop(): void;
@@ -52,8 +55,8 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   const tags = createTags(root, on.ask);
   const notice = element("div", { class: "notice", role: "status", hidden: true });
   root.append(notice);
-  const keys = createKeys(root, on.mapping, () => toast("The list of keys could not be fetched; try again when the line is back"));
-  const header = createHeader(root, { share: on.share, theme: on.theme, keys: () => keys.show() });
+  const keys = createKeys(root, on.mapping, () => toast(say("The list of keys could not be fetched; try again when the line is back")));
+  const header = createHeader(root, { share: on.share, language: on.language, theme: on.theme, keys: () => keys.show() });
   const messages = element("div", { class: "messages" });
   root.append(messages);
   const asks = createAsks(messages, on.give);

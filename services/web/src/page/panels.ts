@@ -2,6 +2,7 @@
 import { element } from "./dom";
 import { icon } from "./icons";
 import type { PanelName } from "./transport";
+import { say } from "../words/say";
 
 export const PHONE = matchMedia("(max-width: 720px)");
 
@@ -10,10 +11,10 @@ export interface Panel {
   readonly body: HTMLElement;
 }
 
-/** A panel with its title and close button. */
+/** A panel with its title, as it is said, and close button. */
 export function createPanel(root: HTMLElement, kind: string, title: string, close: () => void): Panel {
   const body = element("div");
-  const shut = element("button", { class: "round-button", type: "button", "aria-label": `Close ${title.toLowerCase()}`, onClick: close }, icon("close"));
+  const shut = element("button", { class: "round-button", type: "button", "aria-label": say("Close {panel}", { panel: title.toLowerCase() }), onClick: close }, icon("close"));
   const panel = element("aside", { class: `panel ${kind}`, "aria-label": title, hidden: true }, element("div", { class: "panel-head" }, element("h2", {}, title), shut), body);
   root.append(panel);
   return { element: panel, body };

@@ -2,6 +2,7 @@
 import { deleteMotion, listMotions, type Motion } from "../client/library";
 import { figure, pieceName } from "./format";
 import type { Piece } from "./library";
+import { series, say } from "../words/say";
 
 /** Pages of the list that are read; beyond them the newest are enough to choose from. */
 const MOST_PAGES = 5;
@@ -13,8 +14,8 @@ export function asPiece(motion: Motion): Piece {
 /** "BVH, 120 Hz, with music". */
 function kind({ filename, fps, tracks }: Motion): string {
   const ending = /\.([^.]+)$/.exec(filename)?.[1];
-  const music = tracks?.includes("audio") ? "with music" : null;
-  return [ending?.toUpperCase(), `${Number.isInteger(fps) ? fps : figure(fps)} Hz`, music].filter(Boolean).join(", ");
+  const music = tracks?.includes("audio") ? say("with music") : null;
+  return series([ending?.toUpperCase(), `${Number.isInteger(fps) ? fps : figure(fps)} Hz`, music].filter((word) => word != null));
 }
 
 export class Pieces {

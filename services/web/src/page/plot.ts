@@ -1,5 +1,6 @@
 /** A minute of one quantity as a small line or area. The path is pure; the element shows it. */
 import { element, setAttribute, setText, shape } from "./dom";
+import { say } from "../words/say";
 
 /** Keeps the newest `length` samples; NaN marks a gap. */
 export class History {
@@ -87,7 +88,7 @@ export function createPlot({ label, ink, least, filled = false }: PlotOptions): 
       const top = niceTop(history.values.filter(Number.isFinite), Math.max(least, goal ?? 0));
       trace.setAttribute("d", (filled ? areaPath : tracePath)(history.values, slots, top));
       setAttribute(goalLine, "d", goal === undefined ? null : tracePath(Array.from({ length: slots }, () => goal), slots, top));
-      svg.setAttribute("aria-label", `${label} over the last minute, now ${shown}, scale to ${top}`);
+      svg.setAttribute("aria-label", say("{label} over the last minute, now {shown}, scale to {top}", { label, shown, top }));
     },
   };
 }

@@ -2,8 +2,9 @@
 import { element, setAttribute, setText } from "./dom";
 import { clockTime } from "./format";
 import { bufferedTo, seekCells, type Cell } from "./seek-cells";
+import { series, say } from "../words/say";
 
-const QUALITY_NAMES = ["lowest detail", "low detail", "good detail", "full detail"];
+const QUALITY_NAMES = ["lowest detail", "low detail", "good detail", "full detail"] as const;
 const MOST = { desktop: 68, phone: 44 };
 
 export interface Seek {
@@ -16,7 +17,7 @@ export interface Seek {
 export function createSeek(onSeek: (seconds: number) => void): Seek {
   const head = element("span", { class: "seek-head", hidden: true });
   const hint = element("span", { class: "seek-hint", hidden: true });
-  const bar = element("div", { class: "seek", role: "slider", tabindex: 0, "aria-label": "Seek", "aria-valuemin": 0 });
+  const bar = element("div", { class: "seek", role: "slider", tabindex: 0, "aria-label": say("Seek"), "aria-valuemin": 0 });
   let cells: Cell[] = [];
   let marks: HTMLElement[] = [];
   let held: ArrayLike<number> = [];
@@ -31,7 +32,7 @@ export function createSeek(onSeek: (seconds: number) => void): Seek {
     if (length <= 0) return;
     const seconds = secondsAt(event);
     const cell = cells.find(({ start, end }) => seconds / length >= start && seconds / length < end);
-    setText(hint, `${clockTime(seconds)}, ${cell && cell.quality >= 0 ? QUALITY_NAMES[cell.quality] : "not here yet"}`);
+    setText(hint, series([clockTime(seconds), say(cell && cell.quality >= 0 ? QUALITY_NAMES[cell.quality] : "not here yet")]));
     hint.style.left = `${(seconds / length) * 100}%`;
     hint.hidden = false;
   };
@@ -85,7 +86,7 @@ export function createSeek(onSeek: (seconds: number) => void): Seek {
       setAttribute(bar, "aria-valuemax", Math.round(duration));
       setAttribute(bar, "aria-valuenow", Math.round(seconds));
       const buffered = clockTime(bufferedTo(held, seconds, duration));
-      setAttribute(bar, "aria-valuetext", `${clockTime(seconds)} of ${clockTime(duration)}, buffered to ${buffered}`);
+      setAttribute(bar, "aria-valuetext", say("{time} of {whole}, buffered to {buffered}", { time: clockTime(seconds), whole: clockTime(duration), buffered }));
       setAttribute(bar, "aria-disabled", duration > 0 ? null : "true");
     },
   };

@@ -1,6 +1,7 @@
 /** The sound's button and how loud it is; shown only where the dance has sound. */
 import { element, setAttribute } from "./dom";
 import { icon } from "./icons";
+import { say } from "../words/say";
 
 /** Steps of the slider, from silent to full. */
 const STEPS = 20;
@@ -18,9 +19,9 @@ export interface SoundControl {
 }
 
 export function createSoundControl(on: SoundActions): SoundControl {
-  const button = element("button", { class: "round-button", type: "button", "aria-label": "Sound", "aria-pressed": "false", onClick: on.sound }, icon("silent"));
+  const button = element("button", { class: "round-button", type: "button", "aria-label": say("Sound"), "aria-pressed": "false", onClick: on.sound }, icon("silent"));
   const volume = element("input", {
-    type: "range", min: 0, max: STEPS, step: 1, "aria-label": "Volume", onInput: () => on.volume(Number(volume.value) / STEPS),
+    type: "range", min: 0, max: STEPS, step: 1, "aria-label": say("Volume"), onInput: () => on.volume(Number(volume.value) / STEPS),
   });
   const control = element("span", { class: "sound", hidden: true }, button, volume);
   let shown: boolean | null = null;
@@ -31,7 +32,7 @@ export function createSoundControl(on: SoundActions): SoundControl {
       volume.value = String(Math.round(loud * STEPS));
       if (heard === shown) return;
       shown = heard;
-      button.title = heard ? "Sound off" : "Sound on";
+      button.title = say(heard ? "Sound off" : "Sound on");
       setAttribute(button, "aria-pressed", String(heard));
       button.replaceChildren(icon(heard ? "sound" : "silent"));
     },

@@ -5,6 +5,7 @@ import { limbIcon } from "./icons";
 import { LIMB_NAMES, LIMB_ORDER, limbKey, type Holder, type LimbState } from "./model";
 import { createMovePad } from "./move-pad";
 import { createPanel, type Panel } from "./panels";
+import { say, sayAround } from "../words/say";
 
 /** A notice stands so long, milliseconds. */
 const NOTICE = 5_000;
@@ -32,7 +33,7 @@ export interface StringsActions {
 type Doing = "toggle" | "ask" | "withdraw" | "give";
 
 export function createStringsCard(root: HTMLElement, on: StringsActions & { close(): void; keys(): void }): StringsCard {
-  const panel = createPanel(root, "strings", "Strings", on.close);
+  const panel = createPanel(root, "strings", say("Strings"), on.close);
   const lights = (limb: number) => ({
     onFocus: () => on.focus(limb),
     onBlur: () => on.focus(null),
@@ -41,20 +42,20 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
   });
   const rows = LIMB_ORDER.map((limb) => {
     const state = element("small");
-    const glyph = element("button", { class: "limb-glyph", type: "button", disabled: true, "aria-label": `Move the ${LIMB_NAMES[limb].toLowerCase()}`, onClick: () => on.select(limb) }, limbIcon(limb));
+    const glyph = element("button", { class: "limb-glyph", type: "button", disabled: true, "aria-label": say("Move the {limb}", { limb: say(LIMB_NAMES[limb]).toLowerCase() }), onClick: () => on.select(limb) }, limbIcon(limb));
     let doing: Doing = "toggle";
     const action = element("button", { class: "limb-action", type: "button", onClick: () => on[doing](limb), ...lights(limb) });
     const pad = createMovePad(limb, on.press);
-    const row = element("li", {}, glyph, element("span", {}, element("b", {}, LIMB_NAMES[limb]), state), action, pad.element);
+    const row = element("li", {}, glyph, element("span", {}, element("b", {}, say(LIMB_NAMES[limb])), state), action, pad.element);
     const render = (limbState: LimbState, ready: boolean) => {
       const { holder, askers, asked, selected } = limbState;
       setAttribute(row, "style", colour(holder));
       setText(state, said(limbState));
-      if (!holder) state.append(element("span", { class: "key-hint" }, `, key ${limbKey(limb)}`));
+      if (!holder) state.append(element("span", { class: "key-hint" }, say(", key {key}", { key: limbKey(limb) })));
       doing = !holder ? "toggle" : holder.mine ? (askers.length > 0 ? "give" : "toggle") : asked ? "withdraw" : "ask";
-      const word = doing === "toggle" ? (holder ? "Release" : "Take") : { give: "Give", ask: "Ask", withdraw: "Withdraw" }[doing];
-      setText(action, word);
-      action.setAttribute("aria-label", ACTION_NAMES[word](LIMB_NAMES[limb].toLowerCase()));
+      const word = doing === "toggle" ? (holder ? "Release" : "Take") : ({ give: "Give", ask: "Ask", withdraw: "Withdraw" } as const)[doing];
+      setText(action, say(word));
+      action.setAttribute("aria-label", say(ACTION_NAMES[word], { limb: say(LIMB_NAMES[limb]).toLowerCase() }));
       action.disabled = !ready;
       setAttribute(action, "data-mine", holder?.mine ?? false);
       const mine = holder?.mine ?? false;
@@ -70,12 +71,12 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
     const disc = element("button", { type: "button", onClick: () => on.toggle(limb), ...lights(limb) }, limbIcon(limb), name);
     return { limb, disc, name };
   });
-  const hint = element("p", { class: "strings-hint" }, "Drag a ring on the stage, or press ", element("kbd", {}, "1"), " to ", element("kbd", {}, "4"), ".");
+  const hint = element("p", { class: "strings-hint" }, ...sayAround("Drag a ring on the stage, or press {first} to {last}.", { first: element("kbd", {}, "1"), last: element("kbd", {}, "4") }));
   const notice = element("p", { class: "strings-notice", role: "status", "aria-live": "polite" });
   // on a phone the header has no room for it
-  const keys = element("button", { class: "text-button", type: "button", onClick: on.keys }, "Touch, gamepad and keys");
+  const keys = element("button", { class: "text-button", type: "button", onClick: on.keys }, say("Touch, gamepad and keys"));
   panel.body.append(element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)), hint, notice, keys);
-  const dock = element("nav", { class: "dock", "aria-label": "Take a string" }, ...discs.map(({ disc }) => disc));
+  const dock = element("nav", { class: "dock", "aria-label": say("Take a string") }, ...discs.map(({ disc }) => disc));
   root.append(dock);
   let fading: ReturnType<typeof setTimeout> | undefined;
   return {
@@ -96,10 +97,10 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
       for (const { limb, render } of rows) render(limbs[limb], ready);
       for (const { limb, disc, name } of discs) {
         const { holder, asked } = limbs[limb];
-        const limbName = LIMB_NAMES[limb].toLowerCase();
+        const limbName = say(LIMB_NAMES[limb]).toLowerCase();
         setAttribute(disc, "style", colour(holder));
         setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute("aria-label", !holder ? `Take the ${limbName}` : holder.mine ? `Release the ${limbName}` : `${LIMB_NAMES[limb]}, held by ${holder.name}${asked ? ", asked for" : ""}`);
+        disc.setAttribute("aria-label", !holder ? say("Take the {limb}", { limb: limbName }) : holder.mine ? say("Release the {limb}", { limb: limbName }) : say(asked ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", { limb: say(LIMB_NAMES[limb]), name: holder.name }));
         disc.disabled = !ready;
         name.hidden = !holder;
         setText(name, holder?.name ?? "");
@@ -108,20 +109,20 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
   };
 }
 
-const ACTION_NAMES: Readonly<Record<string, (limb: string) => string>> = {
-  Take: (limb) => `Take ${limb}`,
-  Release: (limb) => `Release ${limb}`,
-  Give: (limb) => `Give ${limb}`,
-  Ask: (limb) => `Ask for ${limb}`,
-  Withdraw: (limb) => `Ask no longer for ${limb}`,
-};
+const ACTION_NAMES = {
+  Take: "Take {limb}",
+  Release: "Release {limb}",
+  Give: "Give {limb}",
+  Ask: "Ask for {limb}",
+  Withdraw: "Ask no longer for {limb}",
+} as const;
 
 function colour(holder: Holder | null): string | null {
   return holder ? `--colour: var(--holder-${holder.colour})` : null;
 }
 
 function said({ holder, askers, asked }: LimbState): string {
-  if (!holder) return "Free";
-  if (holder.mine) return askers.length > 0 ? `${askers[0].name} asks for it` : "You hold this";
-  return asked ? `You ask ${holder.name} for it` : `${holder.name} holds this`;
+  if (!holder) return say("Free");
+  if (holder.mine) return askers.length > 0 ? say("{name} asks for it", { name: askers[0].name }) : say("You hold this");
+  return say(asked ? "You ask {name} for it" : "{name} holds this", { name: holder.name });
 }

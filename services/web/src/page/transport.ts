@@ -4,6 +4,7 @@ import { clockTime } from "./format";
 import { icon, type IconName } from "./icons";
 import { createSeek } from "./seek";
 import { createSoundControl, type SoundActions, type SoundControl } from "./sound-control";
+import { say, type Plain } from "../words/say";
 
 export type PanelName = "library" | "strings" | "line";
 export type Health = "good" | "poor" | "lost" | "none";
@@ -21,14 +22,14 @@ export interface Transport {
   camera(there: boolean, followed: boolean): void;
 }
 
-const PANELS: readonly { name: PanelName; label: string; icon: IconName }[] = [
+const PANELS: readonly { name: PanelName; label: Plain; icon: IconName }[] = [
   { name: "library", label: "Library", icon: "library" },
   { name: "strings", label: "Strings", icon: "strings" },
   { name: "line", label: "Line", icon: "line" },
 ];
 const KEEP = "Keep this";
 const KEEPING = "Keeping";
-const HEALTH: Readonly<Record<Health, string>> = { good: "good", poor: "short of data", lost: "not connected", none: "no dance yet" };
+const HEALTH: Readonly<Record<Health, Plain>> = { good: "good", poor: "short of data", lost: "not connected", none: "no dance yet" };
 
 export interface TransportActions extends SoundActions {
   play(): void;
@@ -45,18 +46,18 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
   const play = element("button", { class: "play", type: "button", disabled: true, onClick: on.play }, icon("play"));
   const [now, end] = [element("span"), element("span")];
   const seek = createSeek(on.seek);
-  const loop = element("button", { class: "round-button loop", type: "button", "aria-label": "Loop", onClick: on.loop }, icon("loop"));
-  const camera = element("button", { class: "round-button camera", type: "button", "aria-label": "Show's camera", hidden: true, onClick: on.camera }, icon("camera"));
+  const loop = element("button", { class: "round-button loop", type: "button", "aria-label": say("Loop"), onClick: on.loop }, icon("loop"));
+  const camera = element("button", { class: "round-button camera", type: "button", "aria-label": say("Show's camera"), hidden: true, onClick: on.camera }, icon("camera"));
   const sound = createSoundControl(on);
-  const keepName = element("span", {}, KEEP);
-  const keep = element("button", { class: "pill keep", type: "button", "aria-label": KEEP, disabled: true, hidden: !on.keep, onClick: () => void keepNow() }, icon("keep"), keepName);
+  const keepName = element("span", {}, say(KEEP));
+  const keep = element("button", { class: "pill keep", type: "button", "aria-label": say(KEEP), disabled: true, hidden: !on.keep, onClick: () => void keepNow() }, icon("keep"), keepName);
   let ready = false;
   let keeping = false;
   const showKeep = () => {
     keep.disabled = !ready;
     setAttribute(keep, "aria-busy", keeping);
-    setText(keepName, keeping ? KEEPING : KEEP);
-    keep.setAttribute("aria-label", keeping ? KEEPING : KEEP);
+    setText(keepName, say(keeping ? KEEPING : KEEP));
+    keep.setAttribute("aria-label", say(keeping ? KEEPING : KEEP));
   };
   const keepNow = async () => {
     if (!ready || keeping || !on.keep) return;
@@ -71,7 +72,8 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
   };
   const dot = element("span", { class: "health", role: "img" });
   const pills = new Map(
-    PANELS.map(({ name, label, icon: glyph }) => {
+    PANELS.map(({ name, label: english, icon: glyph }) => {
+      const label = say(english);
       const pill = element("button", { class: "pill", type: "button", "data-panel": name, "aria-label": label, "aria-expanded": "false", onClick: () => on.panel(name) });
       pill.append(icon(glyph), element("span", {}, label));
       if (name === "line") pill.append(dot);
@@ -80,7 +82,7 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
   );
   const tools = element("div", { class: "tools" }, loop, camera, sound.element, keep, element("span", { class: "tools-rule" }), ...pills.values());
   const area = element("div", { class: "seek-area" }, element("div", { class: "times" }, now, end), seek.element);
-  root.append(element("section", { class: "transport", "aria-label": "Transport" }, play, area, tools));
+  root.append(element("section", { class: "transport", "aria-label": say("Transport") }, play, area, tools));
   let shown = "";
   return {
     sound,
@@ -88,7 +90,7 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
       ready = known;
       play.disabled = !ready;
       showKeep();
-      const state = playing ? "Pause" : "Play";
+      const state = say(playing ? "Pause" : "Play");
       setAttribute(loop, "aria-pressed", String(looping));
       if (shown === state) return;
       shown = state;
@@ -111,7 +113,7 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
     },
     health(health) {
       dot.dataset.state = health;
-      dot.setAttribute("aria-label", HEALTH[health]);
+      dot.setAttribute("aria-label", say(HEALTH[health]));
     },
   };
 }

@@ -2,6 +2,7 @@
 import { uploadMotion, type Motion } from "../client/library";
 import { ProblemError } from "../client/problem";
 import type { Library } from "./library";
+import { say } from "../words/say";
 
 /** Uploads `files` in turn; `done` gets each motion as it is stored. */
 export async function uploadAll(files: readonly File[], library: Library, done: (motion: Motion) => Promise<void>): Promise<void> {
@@ -28,6 +29,6 @@ export async function uploadAll(files: readonly File[], library: Library, done: 
 /** Shows what went wrong with something named `name`. */
 export function tell(library: Library, name: string, error: unknown): void {
   if (!(error instanceof ProblemError)) throw error;
-  const where = error.line === null ? "" : ` (line ${error.line})`;
-  library.problem(name, error.title, `${error.detail}${where}`, error.hint);
+  const { title, detail, line, hint } = error;
+  library.problem(name, title, line === null ? detail : say("{detail} (line {line})", { detail, line }), hint);
 }

@@ -3,6 +3,7 @@ import { ACESFilmicToneMapping, PCFShadowMap, Plane, Raycaster, Scene, Vector2, 
 import type { Figure, Pose } from "../motion/skeleton";
 import type { LightState } from "../playout/scenes";
 import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
+import { boxAround, type Box, type Extent } from "./boxes";
 import { AudienceCamera, type Framing } from "./camera";
 import { createFloor, type Floor } from "./floor";
 import { FrameGate } from "./frame-gate";
@@ -23,6 +24,10 @@ const SHARPEST = { desktop: 2, phone: 1.75 };
 /** Pixels at the top that belong to the header and a bar's name, and the share of a low picture's height that they have at most. */
 const HEADROOM = 120;
 const HEADROOM_SHARE = 0.2;
+
+/** What a bar and a face take on the standard figure. */
+const BAR: Extent = { across: 0.17, up: 0.07, down: 0.05 };
+const FACE: Extent = { across: 0.1, up: 0.16, down: 0.14 };
 
 /** Movements of the stage's own take no longer step than this, seconds. */
 const LONGEST_STEP = 0.1;
@@ -187,6 +192,17 @@ export class Stage {
     return { x: (clip.x * 0.5 + 0.5) * this.#width, y: (0.5 - clip.y * 0.5) * this.#height };
   }
 
+  /** Where a limb's bar is on the screen, CSS pixels; null while there is none. */
+  bar(limb: number): Box | null {
+    const at = this.strings.bar(limb);
+    return at && this.#box(at, BAR);
+  }
+
+  /** Where the face is on the screen, CSS pixels; null without a puppet. */
+  get face(): Box | null {
+    return this.puppet && this.#box(new Vector3().setFromMatrixPosition(this.puppet.joint("skullbase")), FACE);
+  }
+
   /** World place under a pixel, on the plane through `through` that faces the camera; null behind the camera. */
   fromScreen(x: number, y: number, through: Vector3): Vector3 | null {
     const { camera } = this.audience;
@@ -215,6 +231,11 @@ export class Stage {
     const eye = this.audience.camera.getWorldPosition(new Vector3());
     const [left, right] = [0, 1].map((limb) => puppet.handle(limb, new Vector3()));
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
+  }
+
+  #box(at: Vector3, { across, up, down }: Extent): Box {
+    const { camera, scale } = this.audience;
+    return boxAround(at, { across: across * scale, up: up * scale, down: down * scale }, camera, this.#width, this.#height);
   }
 
   /** The disc keeps its proportion to the dancer. */

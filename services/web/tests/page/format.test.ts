@@ -8,7 +8,7 @@ describe("figures for people", () => {
   });
 
   test("bytes", () => {
-    expect([950, 12_345, 999_999, 8_100_000].map(byteCount)).toEqual(["0.9 kB", "12 kB", "1000 kB", "8.1 MB"]);
+    expect([950, 12_345, 999_999, 8_100_000].map(byteCount)).toEqual(["1.0 kB", "12 kB", "1000 kB", "8.1 MB"]);
   });
 
   test("an upload says how far it is and how long it will take", () => {
