@@ -16,6 +16,8 @@ export function element<K extends keyof HTMLElementTagNameMap>(tag: K, attribute
 /** Sets, or for `false`, `null` and `undefined` removes, an attribute. */
 export function setAttribute(target: Element, name: string, value: string | number | boolean | null | undefined): void {
   if (value === false || value === null || value === undefined) target.removeAttribute(name);
+  // so, no content security policy of the page about it stands against it
+  else if (name === "style") (target as HTMLElement).style.cssText = String(value);
   else target.setAttribute(name, value === true ? "" : String(value));
 }
 

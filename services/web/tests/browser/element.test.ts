@@ -31,9 +31,10 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     return (await (await fetch(own.url + path, { method, headers, ...(body ? { body: JSON.stringify(body) } : {}) })).json()) as { items: { id: string }[]; link: string };
   }
 
-  /** The whole of such a page. */
+  /** The whole of such a page, under a policy that allows the server's scripts and sockets, and no style but the page's own sizes. */
   function plain(stages: string): string {
-    return `<!doctype html><title>Elsewhere</title><script type="module" src="${own.url}/embed/bunraku-stage.js"></script><h1>Elsewhere</h1>${stages}`;
+    const policy = `default-src 'none'; script-src ${own.url}; connect-src * ${own.url.replace("http", "ws")}; style-src-elem 'none'; style-src-attr 'unsafe-inline'`;
+    return `<!doctype html><title>Elsewhere</title><meta http-equiv="Content-Security-Policy" content="${policy}"><script type="module" src="${own.url}/embed/bunraku-stage.js"></script><h1>Elsewhere</h1>${stages}`;
   }
 
   /** A page of the site. */
