@@ -87,6 +87,35 @@ async def test_the_page_is_asked_for_anew_and_its_parts_are_kept(
     assert missing.status_code == 404
 
 
+async def test_pages_of_every_site_may_load_the_element_and_only_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "page"
+    (page / "assets").mkdir(parents=True)
+    (page / "embed" / "parts").mkdir(parents=True)
+    for name in ("index.html", "assets/index-abc.js", "embed/bunraku-stage.js", "embed/parts/stage-abc.js"):
+        (page / name).write_text("export {};" * 500)
+    monkeypatch.setattr(serve, "PAGE", page)
+    lasting = "public, max-age=31536000, immutable"
+    for origins, known in (("", "*"), ("https://dance.example", "https://dance.example")):
+        with running(tmp_path / "data", origins=origins) as url:
+            async with httpx2.AsyncClient(base_url=url) as http:
+                for asking, told in ((None, "*"), ("https://dance.example", known), ("https://other.example", "*")):
+                    headers = {"Origin": asking} if asking else {}
+                    entry = await http.get("/embed/bunraku-stage.js", headers=headers)
+                    part = await http.get("/embed/parts/stage-abc.js", headers=headers)
+                    for answer, kept in ((entry, "no-cache"), (part, lasting)):
+                        assert answer.status_code == 200
+                        assert answer.headers["cache-control"] == kept
+                        # both name the origin, which the page that asked is of
+                        assert answer.headers["access-control-allow-origin"] == told
+                        assert "javascript" in answer.headers["content-type"]
+                again = await http.get("/embed/bunraku-stage.js", headers={"If-None-Match": entry.headers["etag"]})
+                assert again.status_code == 304
+                own = await http.get("/assets/index-abc.js", headers={"Origin": "https://other.example"})
+                assert "access-control-allow-origin" not in own.headers
+
+
 async def test_without_a_built_page_it_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serve, "PAGE", tmp_path / "nowhere")
     async with serve.compose(Settings(data=tmp_path / "data")) as app:

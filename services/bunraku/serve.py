@@ -16,7 +16,6 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
-from starlette.middleware.cors import CORSMiddleware
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import PlainTextResponse, Response
 from starlette.staticfiles import StaticFiles
@@ -32,11 +31,11 @@ from bunraku.backing import problems, readiness, together
 from bunraku.backing.access import needs
 from bunraku.backing.backing import Backing, open_backing
 from bunraku.backing.direct import DirectProtocol
+from bunraku.backing.elsewhere import Elsewhere
 from bunraku.backing.guard import Guard, describe, ways
 from bunraku.backing.hasty import HEAD_BYTES, HastyProtocol
 from bunraku.backing.origins import read_origins
 from bunraku.backing.readiness import Need, Readiness
-from bunraku.backing.request_id import HEADER
 from bunraku.backing.requests import Requests
 from bunraku.backing.settings import Settings
 from bunraku.backing.unavailable import Unavailable
@@ -55,6 +54,10 @@ PAGE_HEADERS = {
     "X-Content-Type-Options": "nosniff",
 }
 """The page runs what this server has, stands in no other page's frame, and tells no other site where it is from."""
+LASTING = ("assets/", "embed/parts/")
+"""Where the page's files have their content's hash in their names."""
+SHARED = "embed/"
+"""The page's scripts that pages of every site may load: they are public, and what they then ask for is not."""
 COLLECT = (20_000, 20, 50)
 """When the collector looks for cycles: vectors are many and short-lived, cycles few."""
 SERVICES = ("stream", "ingest", "ik", "session", "page")
@@ -77,9 +80,12 @@ class Page(StaticFiles):
     async def get_response(self, path: str, scope: Scope) -> Response:
         """As `StaticFiles`, with caching."""
         response = await super().get_response(path, scope)
-        lasting = path.startswith("assets/")
-        response.headers["Cache-Control"] = "public, max-age=31536000, immutable" if lasting else "no-cache"
+        response.headers["Cache-Control"] = (
+            "public, max-age=31536000, immutable" if path.startswith(LASTING) else "no-cache"
+        )
         response.headers.update(PAGE_HEADERS)
+        if path.startswith(SHARED):
+            response.headers["Access-Control-Allow-Origin"] = "*"
         return response
 
 
@@ -120,13 +126,7 @@ async def compose(
         describe(app)
         app.add_middleware(Guard, gate=backing.gate, ways=ways(known), settings=settings, metrics=backing.metrics)
         if origins := read_origins(settings.origins):
-            app.add_middleware(
-                CORSMiddleware,
-                allow_origins=sorted(origins),
-                allow_methods=["*"],
-                allow_headers=["Authorization", "Content-Type"],
-                expose_headers=["Location", "Retry-After", "WWW-Authenticate", HEADER],
-            )
+            app.add_middleware(Elsewhere, origins=origins)
         app.add_middleware(Requests, metrics=backing.metrics)
         if "page" in services:
             # the page goes with an account of the whole interface, whoever serves it

@@ -55,6 +55,11 @@ def test_what_is_no_origin_is_refused(text: str) -> None:
         read_origins(text)
 
 
+def test_pages_without_an_origin_may_where_that_is_said() -> None:
+    assert allowed("null", "stage.example", read_origins("https://dance.example,null"))
+    assert not allowed("null", "stage.example", MORE)
+
+
 def test_none_are_none() -> None:
     assert read_origins("") == read_origins(" , ") == frozenset()
 

@@ -9,11 +9,14 @@ import ipaddress
 from collections.abc import Collection
 from urllib.parse import urlsplit
 
+OPAQUE = "null"
+"""What a browser says of pages that have no origin: of files, and of frames in a sandbox, whosever they are."""
+
 _PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
 
 
 def read_origins(text: str) -> frozenset[str]:
-    """Origins with commas between them, as `https://dance.example`; raises ValueError for what is none."""
+    """Origins with commas between them, as `https://dance.example`, or `null`; raises ValueError for what is none."""
     return frozenset(_checked(one.strip()) for one in text.split(",") if one.strip())
 
 
@@ -49,6 +52,8 @@ def local(host: str, more: Collection[str]) -> bool:
 
 
 def _checked(origin: str) -> str:
+    if origin == OPAQUE:
+        return OPAQUE
     parts = urlsplit(origin)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.path.strip("/") or parts.query:
         raise ValueError(f"an origin is like https://dance.example, not {origin!r}")

@@ -13,7 +13,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from bunraku.backing import metrics
 from bunraku.backing.catalogue import Quota
-from bunraku.backing.origins import read_origins
+from bunraku.backing.origins import OPAQUE, read_origins
 from bunraku.backing.tokens import Tokens
 
 
@@ -44,7 +44,8 @@ class Settings(BaseSettings):
     published: str = ""
     """The address at which people reach the port, where that is not the one listened at: a container's."""
     origins: str = ""
-    """Pages elsewhere that may open sockets and change things, `https://dance.example`, more after commas."""
+    """Pages elsewhere that may read answers, open sockets and change things, `https://dance.example`, more after
+    commas; `null`: pages from files, and frames in a sandbox, of whatever site: only with a secret."""
     connects: float = 50.0
     """Sockets that one address may open in a second, ten times as many at once; 0: any number."""
     body_seconds: float = 30.0
@@ -87,8 +88,10 @@ class Settings(BaseSettings):
 
     @field_validator("origins")
     @classmethod
-    def _readable(cls, origins: str) -> str:
-        read_origins(origins)
+    def _readable(cls, origins: str, known: ValidationInfo) -> str:
+        secret = known.data.get("secret")
+        if OPAQUE in read_origins(origins) and not (secret and secret.get_secret_value()):
+            raise ValueError("null lets in frames of whatever site, so that it takes a secret to tell who comes")
         return origins
 
     def quota(self) -> Quota:

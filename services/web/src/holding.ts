@@ -16,6 +16,13 @@ export interface Theatre {
   shake(limb: number): void;
 }
 
+/** Where it is shown: the page, or as much of one as there is. */
+export interface HoldingPage {
+  readonly toast: Page["toast"];
+  readonly strings: Pick<Page["strings"], "render" | "notice">;
+  readonly asks: Page["asks"];
+}
+
 export class Holding {
   theatre: Theatre | null = null;
   connected = false;
@@ -25,7 +32,7 @@ export class Holding {
   /** The limb that was reached for in vain: what "ask" asks for. */
   #wished: number | null = null;
 
-  constructor(private readonly page: Page, private readonly mapping: () => Mapping) {}
+  constructor(private readonly page: HoldingPage, private readonly mapping: () => Mapping) {}
 
   /** The session it is about from now on. */
   enter(room: Room): void {

@@ -5,11 +5,9 @@ import { bound, comeIn, guarded, may, ownRole, whenDenied } from "./client/acces
 import { createSession, keep, shareSession, type CameraKeyframe, type Motion } from "./client/library";
 import { ProblemError } from "./client/problem";
 import { Holding } from "./holding";
-import type { Commands } from "./input/commands";
 import type { GamepadInput } from "./input/gamepad";
 import type { Hands } from "./input/hands";
 import { loadMapping, saveMapping } from "./input/mapping-store";
-import type { PointerInput } from "./input/pointer";
 import type { VelocityInputs } from "./input/velocity";
 import { goOn, leave } from "./left";
 import { Listening } from "./listening";
@@ -20,9 +18,9 @@ import { PHONE } from "./page/panels";
 import { Pieces } from "./page/pieces";
 import { createTheme, type ThemeChoice } from "./page/theme";
 import { tell, uploadAll } from "./page/uploads";
+import type { Performing } from "./performing";
 import { findSession, Room, type Place } from "./room";
 import type { Stage } from "./stage/stage";
-import type { StringState } from "./stage/strings";
 import { browserStore } from "./storage/store";
 import { chooseOther, learnLanguage } from "./words/language";
 import { say } from "./words/say";
@@ -46,11 +44,10 @@ const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const pieces = new Pieces();
 const name = ownName(query, Math.random());
 
+let performing: Performing | null = null;
 let stage: Stage | null = null;
 let hands: Hands | null = null;
-let pointer: PointerInput | null = null;
 let velocity: VelocityInputs | null = null;
-let commands: Commands | null = null;
 let pad: GamepadInput | null = null;
 let room: Room | null = null;
 let focused: number | null = null;
@@ -98,8 +95,8 @@ const page = createPage(document.body, {
   give: (limb) => holding.give(limb),
   select: (limb) => velocity?.hold(limb),
   press: (input, down) => {
-    if (down) commands?.press(`page ${input}`, [input], 1, performance.now());
-    else commands?.release(`page ${input}`, performance.now());
+    if (down) performing?.commands.press(`page ${input}`, [input], 1, performance.now());
+    else performing?.commands.release(`page ${input}`, performance.now());
   },
   mapping: (now) => {
     mapping = now;
@@ -202,17 +199,18 @@ function enter(id: string, place: Place = "sessions"): Room {
   stage?.trail.clear();
   room = new Room(id, name, (error) => {
     page.toast(error instanceof ProblemError ? say("{title}: {detail}", error) : String(error));
-  }, place);
+  }, { place });
   document.documentElement.toggleAttribute("data-own", place === "motions");
   const { viewer, puppeteer } = room;
   holding.enter(room);
+  performing?.enter(room);
   listening.enter(viewer);
   const url = new URL(location.href);
   url.searchParams.set(place === "motions" ? "motion" : "session", id);
   history.replaceState(null, "", url);
   page.notice(null);
   viewer.addEventListener("figure", () => {
-    if (viewer.figure) stage?.setFigure(viewer.figure, viewer.front);
+    performing?.cast();
     if (!pieces.find(viewer.motion)) void pieces.refresh().then(renderPieces, () => undefined);
     renderPieces();
   });
@@ -253,79 +251,60 @@ function expose(): void {
 }
 
 async function openStage(): Promise<void> {
-  const { Commands, createGamepad, createPointer, Hands, listenToKeyboard, listenToMouse, Stage, VelocityInputs } = await import("./theatre");
-  try {
-    stage = new Stage(canvas, query.get("quality") === "best");
-  } catch {
-    page.notice(say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
-    return;
-  }
-  stage.still = calm.matches;
-  calm.addEventListener("change", () => stage && (stage.still = calm.matches));
-  if (theme) stage.setTheme(theme.theme);
-  hands = new Hands(stage);
-  hands.changed = () => {
-    if (invitedAt !== -Infinity && [0, 1, 2, 3].some((limb) => hands?.source(limb))) endInvitation();
-    holding.render();
-  };
-  const may = (limb: number) => holding.free(limb);
-  pointer = createPointer(canvas, stage, hands, { may, refused: (limb) => holding.refused(limb), smoothing: () => mapping.pointerSmoothing, nearer: (limb) => velocity?.nearer(limb) ?? 0 });
-  velocity = new VelocityInputs(hands, { take: (limb) => holding.take(limb, "velocity"), free: may });
-  commands = new Commands(hands, velocity, {
+  const { createGamepad, listenToKeyboard, listenToMouse, Performing } = await import("./theatre");
+  const actions = {
     ask: () => holding.ask(),
     give: () => holding.give(),
     play,
     back: () => step(-1),
     forward: () => step(1),
+    camera: () => stage?.follow(!stage.following),
     sound: () => listening.toggle(),
     keep: () => page.transport.keep(),
     library: () => page.panels.toggle("library"),
     strings: () => page.panels.toggle("strings"),
     line: () => page.panels.toggle("line"),
-  });
+  };
+  const changed = () => {
+    if (invitedAt !== -Infinity && [0, 1, 2, 3].some((limb) => hands?.source(limb))) endInvitation();
+    holding.render();
+  };
+  try {
+    performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, best: query.get("quality") === "best" });
+  } catch {
+    page.notice(say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
+    return;
+  }
+  const { commands } = performing;
+  ({ stage, hands, velocity } = performing);
+  stage.still = calm.matches;
+  calm.addEventListener("change", () => stage && (stage.still = calm.matches));
+  if (theme) stage.setTheme(theme.theme);
   listenToKeyboard(window, commands, velocity, () => mapping, { keys: () => page.keys.show(), escape: () => page.panels.closeLast() });
   listenToMouse(canvas, window, commands, () => mapping);
   pad = createGamepad(commands, () => mapping, () => navigator.getGamepads());
-  holding.theatre = { hands, velocity, shake: (limb) => stage?.strings.refuse(limb) };
-  if (room) {
-    hands.puppeteer = room.puppeteer;
-    if (room.viewer.figure) stage.setFigure(room.viewer.figure, room.viewer.front);
-  }
+  if (room) performing.enter(room);
   expose();
   resize();
   addEventListener("resize", resize);
   // hidden, no frame comes that would let up what was pressed
   document.addEventListener("visibilitychange", () => {
-    if (!document.hidden) return;
-    commands?.forget();
-    velocity?.update(performance.now());
+    if (document.hidden) performing?.rest();
   });
   requestAnimationFrame(frame);
 }
 
-let before = 0;
 let sampled = 0;
 
 function frame(): void {
   requestAnimationFrame(frame);
-  if (!stage || !hands) return;
+  if (!stage || !performing) return;
   const now = performance.now();
-  const seconds = (now - before) / 1000;
-  before = now;
   const { viewer } = room ?? {};
-  pointer?.update(now);
   pad?.update(now, !page.keys.listening);
-  velocity?.update(now);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
-  const pose = viewer?.poseAt(now) ?? null;
-  const limbs = holding.limbs();
-  const states = limbs.map(({ holder, selected }, limb): StringState => ({
-    holder: holder?.colour ?? null,
-    lit: pointer?.near === limb || focused === limb || selected,
-    pull: hands?.pull(limb) ?? null,
-  }));
-  stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.shownTime(now));
-  page.tags.render(limbs, pose ? states.map((_, limb) => screenPlace(stage?.strings.bar(limb) ?? null)) : []);
+  const { pose, limbs } = performing.draw(now, focused);
+  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.face);
   if (pose) invite(now);
   page.transport.camera(stage.hasShow, stage.following);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);

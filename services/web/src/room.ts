@@ -1,5 +1,5 @@
 /** The session, or the motion alone, being watched: its viewer and puppeteer, and the edits of its timeline. */
-import { may } from "./client/access";
+import { type Access, pageAccess } from "./client/access";
 import { createSession, editSession, listSessions, type Session, type SessionEdit } from "./client/library";
 import { Puppeteer } from "./client/puppeteer";
 import { Viewer } from "./client/viewer";
@@ -8,17 +8,27 @@ import { Viewer } from "./client/viewer";
 const SEEK_GRACE = 1200;
 
 /** The first session there is, else, for who may open one, a new one over the `newest` motion; null when there is nothing to dance. */
-export async function findSession(newest: Promise<string | null>): Promise<Session | null> {
-  const { items } = await listSessions();
+export async function findSession(newest: Promise<string | null>, access = pageAccess): Promise<Session | null> {
+  const { items } = await listSessions(undefined, access);
   if (items.length > 0) return items[0];
-  const motion = may("control") ? await newest : null;
+  const motion = access.may("control") ? await newest : null;
   return motion ? createSession(motion) : null;
 }
 
 /** What is watched: a session, shared by all, or a motion, on a timeline of one's own. */
 export type Place = "sessions" | "motions";
 
+export interface RoomOptions {
+  place?: Place;
+  /** How one comes in, and at which server. */
+  access?: Access;
+  /** Only to be watched: no limb is to be taken from here. */
+  watching?: boolean;
+}
+
 export class Room {
+  readonly place: Place;
+  readonly access: Access;
   readonly viewer: Viewer;
   readonly puppeteer: Puppeteer;
   #sending = false;
@@ -26,11 +36,13 @@ export class Room {
   #sought: { seconds: number; at: number; epoch: number } | null = null;
 
   /** `failed` is told when an edit of the timeline was refused. */
-  constructor(readonly id: string, name: string, private readonly failed: (error: unknown) => void, readonly place: Place = "sessions") {
-    const base = `${location.origin.replace(/^http/, "ws")}/v1/${place}/${encodeURIComponent(id)}`;
-    const control = place === "sessions" && may("control") ? `${base}/control?name=${encodeURIComponent(name)}` : null;
-    this.viewer = new Viewer({ url: `${base}/stream` });
-    this.puppeteer = new Puppeteer({ url: control, viewer: this.viewer });
+  constructor(readonly id: string, name: string, private readonly failed: (error: unknown) => void, options: RoomOptions = {}) {
+    const { place = "sessions", access = pageAccess, watching = false } = options;
+    [this.place, this.access] = [place, access];
+    const base = `${(access.server || location.origin).replace(/^http/, "ws")}/v1/${place}/${encodeURIComponent(id)}`;
+    const control = place === "sessions" && !watching && access.may("control") ? `${base}/control?name=${encodeURIComponent(name)}` : null;
+    this.viewer = new Viewer({ url: `${base}/stream`, access });
+    this.puppeteer = new Puppeteer({ url: control, viewer: this.viewer, access });
     this.viewer.attach(this.puppeteer);
   }
 
@@ -51,7 +63,7 @@ export class Room {
 
   /** Whether the timeline may be edited from here. */
   get editable(): boolean {
-    return this.place === "motions" || may("control");
+    return this.place === "motions" || this.access.may("control");
   }
 
   /** Edits the timeline, of a session for everyone. One edit is under way at a time; those made meanwhile are sent as one. */
@@ -77,7 +89,7 @@ export class Room {
       const edit = this.#waiting;
       this.#waiting = null;
       try {
-        await editSession(this.id, edit);
+        await editSession(this.id, edit, this.access);
       } catch (error) {
         this.failed(error);
       }

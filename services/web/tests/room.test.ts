@@ -1,5 +1,7 @@
 import { afterEach, expect, test, vi } from "vitest";
-import { findSession } from "../src/room";
+import { Access } from "../src/client/access";
+import { findSession, Room } from "../src/room";
+import { Line } from "./client/line";
 
 const asked: string[] = [];
 
@@ -30,4 +32,22 @@ test("with nothing to dance there is no session", async () => {
   server({ "GET /v1/sessions": { items: [], next: null } });
   expect(await findSession(Promise.resolve(null))).toBeNull();
   expect(asked).toEqual(["GET /v1/sessions"]);
+});
+
+test("a room of another server is asked for, entered and edited there", async () => {
+  Line.install();
+  const access = new Access("https://stage.example");
+  server({ "GET https://stage.example/v1/sessions": { items: [{ id: "on" }], next: null }, "PATCH https://stage.example/v1/sessions/on": {} });
+  expect(await findSession(Promise.resolve(null), access)).toEqual({ id: "on" });
+  const lines = () => Line.opened.map(({ url }) => url);
+  const room = new Room("on", "Aiko", () => undefined, { access });
+  expect(lines()).toEqual(["wss://stage.example/v1/sessions/on/stream", "wss://stage.example/v1/sessions/on/control?name=Aiko"]);
+  room.edit({ playing: false });
+  expect(asked.at(-1)).toBe("PATCH https://stage.example/v1/sessions/on");
+  room.close();
+  Line.opened.length = 0;
+  const watched = new Room("on", "Aiko", () => undefined, { access, watching: true });
+  expect(lines()).toEqual(["wss://stage.example/v1/sessions/on/stream"]);
+  watched.close();
+  Line.remove();
 });

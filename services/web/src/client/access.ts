@@ -1,6 +1,6 @@
 /**
- * What this page may do, and how it says so: by the token of the link it was opened with, if the server asks for one
- * (`docs/safety.md`). The token comes in the URL's fragment, which no server sees, and is kept for this tab alone.
+ * What may be done at a server, and how that is said: by the token of a link, if the server asks for one (`docs/safety.md`).
+ * The token comes in the URL's fragment, which no server sees; that of the page's own address is kept for this tab alone.
  */
 
 import { tabStore } from "../storage/store";
@@ -22,91 +22,124 @@ interface Claims {
 
 const EVERYTHING: Claims = { role: "admin", session: null, motion: null };
 
-let token: string | null = null;
-let claims = EVERYTHING;
-let denied: ((problem: ProblemError) => void) | null = null;
+/** What may be done at one server, and how that is said there. */
+export class Access {
+  #token: string | null = null;
+  #claims = EVERYTHING;
+  #denied: ((problem: ProblemError) => void) | null = null;
+
+  /** At `server`, an origin such as `https://stage.example`, or "" for that of this page; with a token, or without. */
+  constructor(readonly server = "", token: string | null = null) {
+    this.hold(token);
+  }
+
+  /** Comes in with a token, or without. */
+  hold(held: string | null): void {
+    this.#token = held;
+    this.#claims = held === null ? EVERYTHING : read(held);
+  }
+
+  /** Whether there is a token: the server asks for it. */
+  get guarded(): boolean {
+    return this.#token !== null;
+  }
+
+  /** What may be done. */
+  get role(): Role {
+    return this.#claims.role;
+  }
+
+  /** Whether this is for one session or motion. */
+  get bound(): boolean {
+    return this.#claims.session !== null || this.#claims.motion !== null;
+  }
+
+  /** Whether what needs a role may be done: only what is offered goes by it, the server decides. */
+  may(role: Role): boolean {
+    return ROLES.indexOf(this.#claims.role) >= ROLES.indexOf(role);
+  }
+
+  /** The header by which a request comes in. */
+  authorization(): Record<string, string> {
+    return this.#token === null ? {} : { Authorization: `Bearer ${this.#token}` };
+  }
+
+  /**
+   * The answer to a request that comes in with what is held here.
+   *
+   * @throws ProblemError where none comes, or another than was asked for.
+   */
+  async request(url: string, options: RequestInit & { headers?: Record<string, string> } = {}): Promise<Response> {
+    let answer: Response;
+    try {
+      answer = await fetch(url, { ...options, headers: { ...this.authorization(), ...options.headers } });
+    } catch {
+      throw ProblemError.unreachable();
+    }
+    if (!answer.ok) throw this.refusedWith(ProblemError.from(answer.status, await answer.text()));
+    return answer;
+  }
+
+  /** Calls `told` when the server does not let in what is held here, any more. */
+  whenDenied(told: (problem: ProblemError) => void): void {
+    this.#denied = told;
+  }
+
+  /** What the server answered in place of what was asked, told to whoever wants to know. */
+  refusedWith(problem: ProblemError): ProblemError {
+    if (problem.status === 401) this.#denied?.(problem);
+    return problem;
+  }
+
+  /** The address of a socket, with a ticket where there is a token: it is good for one connection. Rejects with ProblemError. */
+  ticketed(url: string): string | Promise<string> {
+    return this.#token === null ? url : this.#withTicket(url);
+  }
+
+  async #withTicket(url: string): Promise<string> {
+    const address = new URL(url);
+    const answer = await this.request(`${address.origin.replace(/^ws/, "http")}/v1/tickets`, { method: "POST", signal: AbortSignal.timeout(ANSWER) });
+    address.searchParams.set("ticket", ((await answer.json()) as { ticket: string }).ticket);
+    return address.href;
+  }
+}
+
+/** This page's own, at the server that it is from. */
+export const pageAccess = new Access();
 
 /** Takes the token out of the address, or that of this tab from before. Returns whether one came with the address. */
 export function comeIn(): boolean {
-  const found = /^#(?:token|share)=([\w.-]+)$/.exec(location.hash)?.[1] ?? null;
+  const found = tokenIn(location.hash);
   if (found !== null) {
     // at once, so that it is not seen, copied or kept in the history
     history.replaceState(history.state, "", location.pathname + location.search);
     tabStore.put(KEY, found);
   }
-  hold(found ?? tabStore.get(KEY));
+  hold(found ?? tabToken());
   return found !== null;
 }
 
-/** Comes in with a token, or without. */
-export function hold(held: string | null): void {
-  token = held;
-  claims = held === null ? EVERYTHING : read(held);
+/** The token in the fragment of a link, or null. */
+export function tokenIn(hash: string): string | null {
+  return /^#(?:token|share)=([\w.-]+)$/.exec(hash)?.[1] ?? null;
 }
 
-/** Whether this page has a token: the server asks for it. */
-export function guarded(): boolean {
-  return token !== null;
+/** The token that this tab came in with to the server of its page, or null. */
+export function tabToken(): string | null {
+  return tabStore.get(KEY);
 }
 
-/** Whether this page may do what needs a role: only what is offered goes by it, the server decides. */
-export function may(role: Role): boolean {
-  return ROLES.indexOf(claims.role) >= ROLES.indexOf(role);
-}
-
-/** What this page may do. */
-export function ownRole(): Role {
-  return claims.role;
-}
-
-/** Whether this page is for one session or motion. */
-export function bound(): boolean {
-  return claims.session !== null || claims.motion !== null;
-}
-
-/** The header by which a request comes in. */
-export function authorization(): Record<string, string> {
-  return token === null ? {} : { Authorization: `Bearer ${token}` };
-}
-
-/**
- * The answer to a request that comes in with what this page has.
- *
- * @throws ProblemError where none comes, or another than was asked for.
- */
-export async function request(url: string, options: RequestInit & { headers?: Record<string, string> } = {}): Promise<Response> {
-  let answer: Response;
-  try {
-    answer = await fetch(url, { ...options, headers: { ...authorization(), ...options.headers } });
-  } catch {
-    throw ProblemError.unreachable();
-  }
-  if (!answer.ok) throw refusedWith(ProblemError.from(answer.status, await answer.text()));
-  return answer;
-}
-
-/** Calls `told` when the server does not let this page in, any more. */
-export function whenDenied(told: (problem: ProblemError) => void): void {
-  denied = told;
-}
-
-/** What the server answered in place of what was asked, told to whoever wants to know. */
-export function refusedWith(problem: ProblemError): ProblemError {
-  if (problem.status === 401) denied?.(problem);
-  return problem;
-}
-
-/** The address of a socket, with a ticket where this page has a token: it is good for one connection. Rejects with ProblemError. */
-export function ticketed(url: string): string | Promise<string> {
-  return token === null ? url : withTicket(url);
-}
-
-async function withTicket(url: string): Promise<string> {
-  const address = new URL(url);
-  const answer = await request(`${address.origin.replace(/^ws/, "http")}/v1/tickets`, { method: "POST", signal: AbortSignal.timeout(ANSWER) });
-  address.searchParams.set("ticket", ((await answer.json()) as { ticket: string }).ticket);
-  return address.href;
-}
+/** As `Access` has them, for this page. */
+export const hold = (held: string | null): void => pageAccess.hold(held);
+export const guarded = (): boolean => pageAccess.guarded;
+export const may = (role: Role): boolean => pageAccess.may(role);
+export const ownRole = (): Role => pageAccess.role;
+export const bound = (): boolean => pageAccess.bound;
+export const authorization = (): Record<string, string> => pageAccess.authorization();
+export const request: Access["request"] = (url, options) => pageAccess.request(url, options);
+export const whenDenied: Access["whenDenied"] = (told) => pageAccess.whenDenied(told);
+export const refusedWith: Access["refusedWith"] = (problem) => pageAccess.refusedWith(problem);
+export const ticketed: Access["ticketed"] = (url) => pageAccess.ticketed(url);
 
 /** What a token says of itself; one that cannot be read lets see, and the server says what is wrong with it. */
 function read(held: string): Claims {

@@ -1,6 +1,6 @@
 /** Motions and sessions over HTTP (`proto/SPEC.md`, HTTP). */
 
-import { authorization, refusedWith, request } from "./access";
+import { type Access, authorization, pageAccess, refusedWith } from "./access";
 import { ProblemError } from "./problem";
 
 /** A motion as the server describes it; what more it says is kept. */
@@ -82,8 +82,8 @@ export function createSession(motion: string): Promise<Session> {
 }
 
 /** Sessions. */
-export function listSessions(cursor?: string): Promise<Page<Session>> {
-  return ask("GET", `/v1/sessions${page(cursor)}`) as Promise<Page<Session>>;
+export function listSessions(cursor?: string, access = pageAccess): Promise<Page<Session>> {
+  return ask("GET", `/v1/sessions${page(cursor)}`, undefined, access) as Promise<Page<Session>>;
 }
 
 /** One session. */
@@ -92,8 +92,8 @@ export function getSession(id: string): Promise<Session> {
 }
 
 /** Plays, pauses, seeks, loops, or changes the motion, for everyone. */
-export function editSession(id: string, edit: SessionEdit): Promise<Session> {
-  return ask("PATCH", `/v1/sessions/${encodeURIComponent(id)}`, edit) as Promise<Session>;
+export function editSession(id: string, edit: SessionEdit, access = pageAccess): Promise<Session> {
+  return ask("PATCH", `/v1/sessions/${encodeURIComponent(id)}`, edit, access) as Promise<Session>;
 }
 
 /** Keeps what a session has shown as a new motion; resolves when it can be watched, with seconds of work done. */
@@ -171,8 +171,8 @@ function page(cursor: string | undefined): string {
   return cursor === undefined ? "" : `?cursor=${encodeURIComponent(cursor)}`;
 }
 
-async function ask(method: string, path: string, body?: unknown): Promise<unknown> {
+async function ask(method: string, path: string, body?: unknown, access: Access = pageAccess): Promise<unknown> {
   const sent = body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
-  const said = await (await request(path, { method, ...sent })).text();
+  const said = await (await access.request(access.server + path, { method, ...sent })).text();
   return said === "" ? null : JSON.parse(said);
 }

@@ -1,6 +1,6 @@
 /** How the line fares. Numbers that nothing is known of yet are null. */
 export interface LineFigures {
-  /** Index of the rate shown, -1 before the first block. */
+  /** Index of the rate chosen, of the one shown where none was told of; -1 before the first block. */
   rate: number;
   /** Kilobits a second that come, all messages counted. */
   kbps: number;

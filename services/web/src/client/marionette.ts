@@ -4,7 +4,7 @@ import { readTable } from "../marionette/arm";
 import { armProportions } from "../marionette/limbs";
 import { PulledHand, PulledLeg } from "../marionette/pulled";
 import type { Figure } from "../motion/skeleton";
-import { request } from "./access";
+import { type Access, pageAccess } from "./access";
 import type { Solver } from "./solver";
 
 /** The limbs of `figure`; `tables` are what `readTable` gave for the left and the right arm. */
@@ -18,13 +18,13 @@ export function marionette(figure: Figure, tables: readonly [Float64Array, Float
 }
 
 /** The solver of `figure`, its tables from the service at `origin`; rejects with `ProblemError` where there are none. */
-export async function fetchMarionette(figure: Figure, origin: string): Promise<Solver> {
-  const tables = await Promise.all(([0, 1] as const).map((limb) => fetchTable(figure, limb, origin)));
+export async function fetchMarionette(figure: Figure, origin: string, access = pageAccess): Promise<Solver> {
+  const tables = await Promise.all(([0, 1] as const).map((limb) => fetchTable(figure, limb, origin, access)));
   return marionette(figure, [tables[0], tables[1]]);
 }
 
-async function fetchTable(figure: Figure, limb: 0 | 1, origin: string): Promise<Float64Array> {
+async function fetchTable(figure: Figure, limb: 0 | 1, origin: string, access: Access): Promise<Float64Array> {
   const { identity } = armProportions(figure, limb);
-  const answer = await request(`${origin}/v1/arms/${identity}/table`);
+  const answer = await access.request(`${origin}/v1/arms/${identity}/table`);
   return readTable(new Uint8Array(await answer.arrayBuffer()));
 }

@@ -1,10 +1,13 @@
 /** What a puppeteer's own limbs are solved with: made once for each figure that comes on. */
 
 import type { Figure } from "../motion/skeleton";
+import { type Access, pageAccess } from "./access";
 import type { Solver, SolverOf } from "./solver";
 
-/** The marionette comes after the first picture: nobody pulls before. */
-const marionette: SolverOf = async (figure, origin) => (await import("./marionette")).fetchMarionette(figure, origin);
+/** The marionette, fetched by this access. It comes after the first picture: nobody pulls before. */
+export function marionetteBy(access: Access): SolverOf {
+  return async (figure, origin) => (await import("./marionette")).fetchMarionette(figure, origin, access);
+}
 
 export class OwnSolver {
   /** Null until it is there. */
@@ -15,7 +18,7 @@ export class OwnSolver {
    * @param origin of the server, `http(s)://...`
    * @param solverOf makes a figure's; null where there is to be none
    */
-  constructor(private readonly origin: string, private readonly solverOf: SolverOf | null = marionette) {}
+  constructor(private readonly origin: string, private readonly solverOf: SolverOf | null = marionetteBy(pageAccess)) {}
 
   /** Makes `figure`'s, unless it is there. A failure is told, and tried again with the next call. */
   prepare(figure: Figure | null): void {

@@ -2,7 +2,7 @@
 
 import { LIMBS, type Pose } from "../motion/skeleton";
 import { type Grant, type Message, type Notice, type Presence, type Refusal, TARGET, VELOCITY } from "../wire/messages";
-import { ticketed } from "./access";
+import { type Access, pageAccess } from "./access";
 import { Connection } from "./connection";
 import { OwnLimb } from "./own-limb";
 import { HAND_SPEED, LEG_SPEED, REACH, THIGH } from "./pull";
@@ -50,6 +50,8 @@ export interface PuppeteerOptions {
   viewer: Viewer;
   /** Local milliseconds, the viewer's. */
   now?: () => number;
+  /** How it comes in at the server: this page's own, if nothing else is said. */
+  access?: Access;
 }
 
 /**
@@ -80,9 +82,9 @@ export class Puppeteer extends EventTarget {
       limb: new OwnLimb(limb), holder: null, wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], anchored: false, inputAt: 0, heardAt: 0,
       ask: "none", askedAt: 0,
     }));
-    const { url } = options;
+    const { url, access = pageAccess } = options;
     this.connection = url === null ? NO_LINE : new Connection({
-      url: () => ticketed(url),
+      url: () => access.ticketed(url),
       onOpen: () => undefined,
       onMessage: (message) => this.receive(message),
       onMalformed: () => undefined,

@@ -1,3 +1,4 @@
+import type { Access } from "./access";
 import type { SolverOf } from "./solver";
 
 /** What a viewer watches, and with what. */
@@ -11,4 +12,6 @@ export interface ViewerOptions {
    * there, they are seen as everyone sees them.
    */
   solver?: SolverOf | null;
+  /** How it comes in at the server: this page's own, if nothing else is said. */
+  access?: Access;
 }

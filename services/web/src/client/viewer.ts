@@ -16,13 +16,13 @@ import { Tracks } from "../playout/tracks";
 import {
   type Choice, type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type Report, type TimelineState,
 } from "../wire/messages";
-import { ticketed } from "./access";
+import { pageAccess } from "./access";
 import { Asking } from "./asking";
 import { Connection } from "./connection";
 import type { LineFigures } from "./line-figures";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
-import { OwnSolver } from "./own-solver";
+import { marionetteBy, OwnSolver } from "./own-solver";
 import { reasonOf } from "./reasons";
 import { returningUrl } from "./returning";
 import type { ViewerOptions } from "./viewer-options";
@@ -81,10 +81,11 @@ export class Viewer extends EventTarget {
     super();
     this.url = new URL(options.url);
     this.now = options.now ?? (() => performance.now());
-    this.solver = new OwnSolver(this.url.origin.replace(/^ws/, "http"), options.solver);
+    const { access = pageAccess, solver = marionetteBy(access) } = options;
+    this.solver = new OwnSolver(this.url.origin.replace(/^ws/, "http"), solver);
     this.started = this.now();
     this.connection = new Connection({
-      url: () => ticketed(this.address()),
+      url: () => access.ticketed(this.address()),
       answered: true,
       onOpen: (replaced) => this.opened(replaced),
       onMessage: (message, bytes) => this.receive(message, bytes),
@@ -228,7 +229,7 @@ export class Viewer extends EventTarget {
     const ahead = store && timeline ? store.ahead(this.positionAt(now) * 1e6, timeline.loop) : 0;
     const known = Number.isFinite(clock.error);
     return {
-      rate: this.rate,
+      rate: this.rate < 0 ? -1 : (this.choice?.rate ?? this.rate),
       kbps: this.meter.kbps(now),
       bufferSeconds: ahead / 1e6,
       clockOffsetMs: known ? clock.offset / 1000 - performance.timeOrigin : null,

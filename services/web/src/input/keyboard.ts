@@ -10,7 +10,8 @@ export interface KeyboardActions {
   escape(): void;
 }
 
-export function listenToKeyboard(target: Window, commands: Commands, velocity: VelocityInputs, mapping: () => Mapping, actions: KeyboardActions): void {
+/** Listens to the keys of a window, or of an element that has the focus or something in it that has. */
+export function listenToKeyboard(target: GlobalEventHandlers, commands: Commands, velocity: VelocityInputs, mapping: () => Mapping, actions: KeyboardActions): void {
   target.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || typing(event.target) || document.querySelector("dialog[open]")) return;
     if (press(event)) event.preventDefault();
@@ -37,7 +38,7 @@ export function listenToKeyboard(target: Window, commands: Commands, velocity: V
     return commands.press(code, mapping().bindings[code] ?? [], 1, event.timeStamp);
   };
   target.addEventListener("keyup", (event) => commands.release(event.code, event.timeStamp));
-  target.addEventListener("blur", () => commands.forget((control) => !isPadControl(control)));
+  target.addEventListener("tagName" in target ? "focusout" : "blur", () => commands.forget((control) => !isPadControl(control)));
 }
 
 function typing(target: EventTarget | null): boolean {

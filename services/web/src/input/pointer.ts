@@ -52,6 +52,11 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
   let orbiting: { id: number; x: number; y: number } | null = null;
   const handle = new Vector3();
 
+  /** Where in the picture an event is, CSS pixels: the canvas may stand anywhere in a page. */
+  const placeOf = (event: PointerEvent): { x: number; y: number } => {
+    const { left, top } = canvas.getBoundingClientRect();
+    return { x: event.clientX - left, y: event.clientY - top };
+  };
   const nearest = (x: number, y: number): number | null => {
     if (!stage.puppet) return null;
     let best: number | null = null;
@@ -96,7 +101,8 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
 
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
-    const { clientX: x, clientY: y, pointerId } = event;
+    const { pointerId } = event;
+    const { x, y } = placeOf(event);
     const limb = nearest(x, y);
     canvas.setPointerCapture(pointerId);
     if (limb === null) {
@@ -115,13 +121,14 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
   canvas.addEventListener("pointermove", (event) => {
     const drag = drags.get(event.pointerId);
     if (drag) {
-      [drag.x, drag.y] = [event.clientX, event.clientY];
+      Object.assign(drag, placeOf(event));
       pull(drag, event.timeStamp);
     } else if (orbiting?.id === event.pointerId) {
       stage.audience.orbit((orbiting.x - event.clientX) * ORBIT, (event.clientY - orbiting.y) * ORBIT);
       orbiting = { id: event.pointerId, x: event.clientX, y: event.clientY };
     } else if (event.pointerType !== "touch") {
-      light(nearest(event.clientX, event.clientY));
+      const { x, y } = placeOf(event);
+      light(nearest(x, y));
     }
   });
   const end = (event: PointerEvent) => {

@@ -1,6 +1,8 @@
 /** Names over the strings, with "Ask" where another holds one, and once the invitation by the nearer hand. */
 import { element, setText } from "./dom";
+import type { Box } from "../stage/boxes";
 import { LIMB_NAMES, type LimbState } from "./model";
+import { layLabels, type Laid } from "./tag-layout";
 import { say } from "../words/say";
 
 export interface Place {
@@ -9,17 +11,20 @@ export interface Place {
 }
 
 export interface Tags {
-  /** Puts each holder's tag where its bar is on the screen, CSS pixels; null hides it. */
-  render(limbs: readonly LimbState[], places: readonly (Place | null)[]): void;
+  /** Puts each holder's tag by its bar on the screen, CSS pixels, where it covers nothing; null hides it. `face` is kept free too. */
+  render(limbs: readonly LimbState[], bars: readonly (Box | null)[], face: Box | null): void;
   /** Puts the invitation beside a place; null takes it away. */
   invite(place: Place | null): void;
 }
 
-/** Tags keep out of the header's way. */
-const TOP = 60;
+/** Tags begin below this, in the middle of the header. */
+const TOP = 32;
 
-/** `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. */
-export function createTags(root: HTMLElement, ask: (limb: number) => void): Tags {
+/**
+ * `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. They keep in a
+ * picture of `width` CSS pixels and below `top`.
+ */
+export function createTags(root: ParentNode & Node, ask: (limb: number) => void, width: () => number = () => innerWidth, top = TOP): Tags {
   const layer = element("div", { class: "tags", "aria-hidden": "true" });
   root.append(layer);
   const tags = [0, 1, 2, 3].map((i) => {
@@ -28,28 +33,35 @@ export function createTags(root: HTMLElement, ask: (limb: number) => void): Tags
     const button = element("button", { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => ask(i) }, say("Ask"));
     const tag = element("div", { class: "tag", hidden: true }, name, limb, button);
     layer.append(tag);
-    return { name, limb, button, tag };
+    return { name, limb, button, tag, says: "", width: 0, height: 0 };
   });
+  let laid: (Laid | null)[] = [];
   const invitation = element("div", { class: "tag invitation", hidden: true }, say("Take a hand"));
   layer.append(invitation);
   return {
-    render(limbs, places) {
-      tags.forEach(({ name, limb, button, tag }, i) => {
-        const [{ holder, asked }, place] = [limbs[i], places[i]];
-        tag.hidden = !holder || !place;
-        if (!holder || !place) return;
-        setText(name, holder.name);
-        setText(limb, asked ? say("asked") : say(LIMB_NAMES[i]).toLowerCase());
-        button.hidden = holder.mine || asked;
-        tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
-        const x = Math.min(innerWidth - 80, Math.max(80, place.x));
-        tag.style.transform = `translate(${x.toFixed(1)}px, ${Math.max(TOP, place.y - 12).toFixed(1)}px) translate(-50%, -100%)`;
+    render(limbs, bars, face) {
+      const shown = tags.map((one, i) => (limbs[i].holder && bars[i] ? one : null));
+      shown.forEach((one, i) => {
+        tags[i].tag.hidden = !one;
+        const { holder, asked } = limbs[i];
+        if (!one || !holder) return;
+        setText(one.name, holder.name);
+        setText(one.limb, asked ? say("asked") : say(LIMB_NAMES[i]).toLowerCase());
+        one.button.hidden = holder.mine || asked;
+        one.tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
+        // asking for its size lays the page out: only where what it says is new
+        const says = `${holder.name}\n${asked}\n${holder.mine}`;
+        if (one.says !== says || one.width === 0) [one.says, one.width, one.height] = [says, one.tag.offsetWidth, one.tag.offsetHeight];
+      });
+      laid = layLabels(shown.map((one, i) => one && { bar: bars[i] as Box, width: one.width, height: one.height }), face ? [face] : [], laid, width(), top);
+      laid.forEach((place, i) => {
+        if (place) tags[i].tag.style.transform = `translate(${place.box.left.toFixed(1)}px, ${place.box.top.toFixed(1)}px)`;
       });
     },
     invite(place) {
       invitation.hidden = !place;
       if (!place) return;
-      const right = place.x + 150 < innerWidth;
+      const right = place.x + 150 < width();
       const move = right ? `translate(${(place.x + 26).toFixed(1)}px, ${place.y.toFixed(1)}px) translate(0, -50%)` : `translate(${(place.x - 26).toFixed(1)}px, ${place.y.toFixed(1)}px) translate(-100%, -50%)`;
       invitation.style.transform = move;
     },

@@ -5,13 +5,15 @@
 import { MathUtils, PerspectiveCamera } from "three";
 import { createView, fovIn, mixViews, readView, type View } from "./view";
 
-export type Framing = "desktop" | "phone" | "sheet";
+/** `alone`: a stage without a page about it, so that nothing stands before it. */
+export type Framing = "desktop" | "phone" | "sheet" | "alone";
 
 /** Visible height and the height looked at, metres for the standard figure. */
 const FRAMINGS: Readonly<Record<Framing, readonly [visible: number, look: number]>> = {
   desktop: [3.1, 1.005],
   phone: [3.95, 0.81],
   sheet: [4.7, 0.26],
+  alone: [3.1, 1.005],
 };
 /** Pixels from the bottom that the transport takes, and the window height the desktop framing was drawn for. */
 const TRANSPORT = 110;

@@ -3,6 +3,7 @@ import { ACESFilmicToneMapping, PCFShadowMap, Plane, Raycaster, Scene, Vector2, 
 import type { Figure, Pose } from "../motion/skeleton";
 import type { LightState } from "../playout/scenes";
 import { backdropUniforms, createBackdrop, dressBackdrop } from "./backdrop";
+import { boxAround, type Box, type Extent } from "./boxes";
 import { AudienceCamera, type Framing } from "./camera";
 import { createFloor, type Floor } from "./floor";
 import { FrameGate } from "./frame-gate";
@@ -20,8 +21,13 @@ import { CameraTrail } from "./trail";
 
 /** Pixel ratios above these cost more than they show. */
 const SHARPEST = { desktop: 2, phone: 1.75 };
-/** Pixels at the top that belong to the header and a bar's name. */
+/** Pixels at the top that belong to the header and a bar's name, and the share of a low picture's height that they have at most. */
 const HEADROOM = 120;
+const HEADROOM_SHARE = 0.2;
+
+/** What a bar and a face take on the standard figure. */
+const BAR: Extent = { across: 0.17, up: 0.07, down: 0.05 };
+const FACE: Extent = { across: 0.1, up: 0.16, down: 0.14 };
 
 /** Movements of the stage's own take no longer step than this, seconds. */
 const LONGEST_STEP = 0.1;
@@ -171,10 +177,30 @@ export class Stage {
     }
   }
 
+  /** Gives back all that the graphics hold; the stage and its canvas draw no more. */
+  dispose(): void {
+    this.puppet?.dispose();
+    this.scene.environment?.dispose();
+    this.renderer.dispose();
+    // with the context goes what is in it; browsers keep a few only, and would take an old one from another stage
+    this.renderer.forceContextLoss();
+  }
+
   /** CSS pixels of a world place. */
   toScreen(at: Vector3): { x: number; y: number } {
     const clip = at.clone().project(this.audience.camera);
     return { x: (clip.x * 0.5 + 0.5) * this.#width, y: (0.5 - clip.y * 0.5) * this.#height };
+  }
+
+  /** Where a limb's bar is on the screen, CSS pixels; null while there is none. */
+  bar(limb: number): Box | null {
+    const at = this.strings.bar(limb);
+    return at && this.#box(at, BAR);
+  }
+
+  /** Where the face is on the screen, CSS pixels; null without a puppet. */
+  get face(): Box | null {
+    return this.puppet && this.#box(new Vector3().setFromMatrixPosition(this.puppet.joint("skullbase")), FACE);
   }
 
   /** World place under a pixel, on the plane through `through` that faces the camera; null behind the camera. */
@@ -207,9 +233,14 @@ export class Stage {
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
+  #box(at: Vector3, { across, up, down }: Extent): Box {
+    const { camera, scale } = this.audience;
+    return boxAround(at, { across: across * scale, up: up * scale, down: down * scale }, camera, this.#width, this.#height);
+  }
+
   /** The disc keeps its proportion to the dancer. */
   #placeDisc(): void {
-    const [radius, height] = this.#framing === "desktop" ? [1.06, 1.3] : [0.98, 1.36];
+    const [radius, height] = this.#framing === "desktop" || this.#framing === "alone" ? [1.06, 1.3] : [0.98, 1.36];
     this.#backdrop.discRadius.value = radius * this.audience.scale;
     this.#backdrop.discCentre.value.set(0, height * this.audience.scale);
   }
@@ -235,7 +266,7 @@ export class Stage {
 
   #ceiling(): number {
     const middle = this.rig.group.localToWorld(new Vector3(0, 1, 0));
-    return this.fromScreen(this.#width / 2, HEADROOM, middle)?.y ?? 2.2;
+    return this.fromScreen(this.#width / 2, Math.min(HEADROOM, HEADROOM_SHARE * this.#height), middle)?.y ?? 2.2;
   }
 }
 

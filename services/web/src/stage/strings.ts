@@ -1,5 +1,6 @@
 /** What the audience sees of the strings: rings, threads and bars, from who holds what (section 5). */
 import { Group, Vector3 } from "three";
+import { apart } from "./apart";
 import { Bars, HOOK, type Bar } from "./bars";
 import type { Look } from "./look";
 import type { Puppet } from "./puppet";
@@ -19,6 +20,9 @@ export interface StringState {
 const TAUT = 0.25;
 /** Heights over the floor that bars keep at least: of hands, of legs. Metres for the standard figure. */
 const OVERHEAD = [2.14, 1.98];
+/** Bars at heights nearer than this hang as far apart as this, so that none covers another. Metres for the standard figure. */
+const LEVEL = 0.2;
+const APART = 0.36;
 const LEAN = (12 * Math.PI) / 180;
 
 interface Motion {
@@ -38,7 +42,6 @@ export class Strings {
   readonly #rings = new Rings();
   readonly #bars = new Bars();
   readonly #motions: Motion[];
-  readonly #handle = new Vector3();
 
   constructor() {
     this.group.name = "strings";
@@ -62,9 +65,12 @@ export class Strings {
     this.group.visible = true;
     this.#threads.dark = look.dark;
     const bars: Bar[] = [];
+    const handles = states.map((_, limb) => puppet.handle(limb, new Vector3()));
+    const goals = states.map((state, limb) => (state.holder === null ? null : goalOf(state, handles[limb], limb, ground, ceiling, puppet.scale)));
+    hangApart(goals.flatMap((goal) => goal ?? []), right, puppet.scale);
     states.forEach((state, limb) => {
       const motion = this.#motions[limb];
-      const handle = puppet.handle(limb, this.#handle).clone();
+      const handle = handles[limb];
       const held = state.holder !== null;
       if (state.holder !== null) {
         if (motion.held < 0.02) motion.bar.copy(handle).y += 0.2;
@@ -76,7 +82,7 @@ export class Strings {
       const shake = motion.shake > 0 ? Math.sin(motion.shake * 4 * Math.PI) * 0.01 * puppet.scale : 0;
       const shown = handle.clone().addScaledVector(right, shake);
       const tension = state.pull ? Math.min(1, 0.35 + state.pull.distanceTo(handle) / TAUT) : held ? 0.75 : 0;
-      if (motion.held > 0.01) bars.push(this.#bar(motion, state, handle, limb, held, ground, ceiling, seconds, puppet.scale));
+      if (motion.held > 0.01) bars.push(this.#bar(motion, goals[limb], limb, seconds, puppet.scale));
       this.#ring(limb, shown, motion, state, look, puppet.scale);
       if (held) {
         const hook = motion.bar.clone().setY(motion.bar.y - HOOK);
@@ -90,18 +96,11 @@ export class Strings {
     this.#bars.set(bars);
   }
 
-  #bar(motion: Motion, state: StringState, handle: Vector3, limb: number, held: boolean, ground: number, ceiling: number, seconds: number, scale: number): Bar {
-    const aside = (limb % 2 === 0 ? 1 : -1) * (limb < 2 ? 0.08 : 0.16) * scale;
-    const goal = handle.clone();
-    goal.x += aside;
-    // Above the head, so that neither bar nor name stands before the face.
-    const clear = Math.max(handle.y + (limb < 2 ? 0.32 : 0.5) * scale, ground + OVERHEAD[limb < 2 ? 0 : 1] * scale);
-    goal.y = Math.min(Math.max(clear, state.pull ? state.pull.y : -Infinity), ceiling);
-    // A bar never meets the hand; where the picture ends too soon it slips above the edge instead.
-    goal.y = Math.max(goal.y, handle.y + 0.12 * scale);
-    if (!held) goal.y = motion.bar.y + 0.3;
+  /** `goal` is where the bar is to hang; null where it was let go, and rises. */
+  #bar(motion: Motion, goal: Vector3 | null, limb: number, seconds: number, scale: number): Bar {
+    const held = goal !== null;
     const before = motion.bar.x;
-    motion.bar.lerp(goal, this.still ? 1 : 1 - Math.exp(-(held ? 9 : 2) * seconds));
+    motion.bar.lerp(goal ?? motion.bar.clone().setY(motion.bar.y + 0.3), this.still ? 1 : 1 - Math.exp(-(held ? 9 : 2) * seconds));
     const lean = seconds > 0 && !this.still ? Math.max(-LEAN, Math.min(LEAN, -0.16 * ((motion.bar.x - before) / seconds))) : 0;
     motion.roll += ((limb % 2 === 0 ? -0.1 : 0.1) + lean - motion.roll) * Math.min(1, 8 * seconds || 1);
     return { at: motion.bar.clone(), roll: motion.roll, size: (held ? 1.1 : motion.held * 1.1) * scale };
@@ -123,5 +122,31 @@ export class Strings {
     if (this.still) return goal;
     const step = seconds / over;
     return value < goal ? Math.min(goal, value + step) : Math.max(goal, value - step);
+  }
+}
+
+/** Where a held limb's bar hangs by itself. */
+function goalOf({ pull }: StringState, handle: Vector3, limb: number, ground: number, ceiling: number, scale: number): Vector3 {
+  const goal = handle.clone();
+  goal.x += (limb % 2 === 0 ? 1 : -1) * (limb < 2 ? 0.08 : 0.16) * scale;
+  // Above the head, so that neither bar nor name stands before the face.
+  const clear = Math.max(handle.y + (limb < 2 ? 0.32 : 0.5) * scale, ground + OVERHEAD[limb < 2 ? 0 : 1] * scale);
+  goal.y = Math.min(Math.max(clear, pull ? pull.y : -Infinity), ceiling);
+  // A bar never meets the hand; where the picture ends too soon it slips above the edge instead.
+  goal.y = Math.max(goal.y, handle.y + 0.12 * scale);
+  return goal;
+}
+
+/** Moves bars of about one height aside along the camera's `right`. */
+function hangApart(goals: readonly Vector3[], right: Vector3, scale: number): void {
+  const level: Vector3[][] = [];
+  for (const goal of [...goals].sort((a, b) => a.y - b.y)) {
+    const last = level.at(-1);
+    if (last && goal.y - last[last.length - 1].y < LEVEL * scale) last.push(goal);
+    else level.push([goal]);
+  }
+  for (const bars of level) {
+    const places = bars.map((bar) => bar.dot(right));
+    apart(places, APART * scale).forEach((place, nth) => bars[nth].addScaledVector(right, place - places[nth]));
   }
 }

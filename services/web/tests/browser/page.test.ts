@@ -74,6 +74,11 @@ describeInBrowser("the page", {}, ({ open }) => {
     await danced(page);
     await page.keyboard.press("Space");
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
+    await page.waitForFunction(() => window.bunraku.stage.hasShow);
+    const followed = await page.evaluate(() => window.bunraku.stage.following);
+    await page.keyboard.press("KeyC");
+    await page.waitForFunction((followed) => window.bunraku.stage.following === !followed, followed);
+    await page.getByRole("button", { name: "Show's camera", pressed: !followed }).waitFor();
     await page.keyboard.press("KeyN");
     await page.getByRole("complementary", { name: "Line" }).getByText("kbit/s").waitFor();
     await page.keyboard.press("Escape");

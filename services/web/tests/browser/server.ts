@@ -11,6 +11,8 @@ export interface ServerOptions {
   demo?: boolean;
   /** What its tokens are signed with; without one it lets everybody in. */
   secret?: string;
+  /** Other sites whose pages may use it, with commas between them. */
+  origins?: string;
 }
 
 export interface RunningServer {
@@ -19,12 +21,12 @@ export interface RunningServer {
 }
 
 /** Start a server; resolves once it answers. */
-export async function startServer({ demo = false, secret = "" }: ServerOptions = {}): Promise<RunningServer> {
+export async function startServer({ demo = false, secret = "", origins = "" }: ServerOptions = {}): Promise<RunningServer> {
   const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
   const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
   const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
     stdio: ["ignore", "pipe", "inherit"],
-    env: { ...process.env, COLUMNS: "200", NO_COLOR: "1", BUNRAKU_SECRET: secret },
+    env: { ...process.env, COLUMNS: "200", NO_COLOR: "1", BUNRAKU_SECRET: secret, BUNRAKU_ORIGINS: origins },
   });
   const ended = new Promise<void>((done) => server.once("exit", () => done()));
   const url = await new Promise<string>((found, failed) => {

@@ -167,3 +167,23 @@ test("without a ticket, not being let in is final", () => {
   expect(closed).toEqual([["a link is needed", true]]);
   Line.remove();
 });
+
+test("a page comes in at several servers, each by its own", async () => {
+  const sent: [string, string | undefined][] = [];
+  vi.stubGlobal("fetch", async (url: string, { headers }: { headers: Record<string, string> }) => {
+    sent.push([url, headers.Authorization]);
+    return new Response('{"title": "Link revoked", "detail": "it is over"}', { status: 401 });
+  });
+  access.hold(VIEWER);
+  const control = token({ role: "control" });
+  const [one, other] = [new access.Access("https://one.example", control), new access.Access("https://other.example")];
+  const denied: string[] = [];
+  access.whenDenied(() => denied.push("page"));
+  one.whenDenied(({ title }) => denied.push(title));
+  expect([one.may("control"), one.may("ingest"), other.may("admin"), other.guarded, access.may("control")]).toEqual([true, false, true, false, false]);
+  await expect(one.request(`${one.server}/v1/sessions`)).rejects.toThrow("Link revoked");
+  await expect(other.request(`${other.server}/v1/sessions`)).rejects.toThrow(ProblemError);
+  expect(sent).toEqual([["https://one.example/v1/sessions", `Bearer ${control}`], ["https://other.example/v1/sessions", undefined]]);
+  expect(denied).toEqual(["Link revoked"]);
+  expect(other.ticketed("wss://other.example/stream")).toBe("wss://other.example/stream");
+});

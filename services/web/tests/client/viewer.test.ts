@@ -120,6 +120,9 @@ test("the pose goes on with time, and a better block takes over", () => {
   expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);
   expect(viewer.positionAt(now)).toBeCloseTo(0.5, 9);
   expect(viewer.line().rate).toBe(0);
+  // what is told of is what was chosen, whatever the block on show still is
+  Line.last.say({ name: "Choice", rate: 1, reason: "best", line: null });
+  expect(viewer.line().rate).toBe(1);
   Line.last.say(data(0, 1, best));
   decodeBlock(goldenTrack(), best).at(15, wanted);
   expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);

@@ -14,7 +14,12 @@ const SCALE = 200;
 /** A canvas as far as a pointer needs one. */
 class Canvas extends EventTarget {
   dataset: Record<string, string> = {};
+  /** Where it stands in the page, pixels. */
+  corner = { left: 0, top: 0 };
   setPointerCapture(): void {}
+  getBoundingClientRect(): { left: number; top: number } {
+    return this.corner;
+  }
 }
 
 let canvas: Canvas;
@@ -75,6 +80,17 @@ test("a ring that another holds is refused, and so is nothing far from any ring"
   expect([refused, hands.source(LEFT_HAND)]).toEqual([[LEFT_HAND], null]);
   send("pointerdown", 5000, 5000, 10);
   expect(refused).toEqual([LEFT_HAND]);
+});
+
+test("the picture may stand anywhere in a page", () => {
+  canvas.corner = { left: 300, top: 1200 };
+  const [x, y] = [ring().x * SCALE + 300, -ring().y * SCALE + 1200];
+  send("pointermove", x, y, 0);
+  expect(pointer.near).toBe(LEFT_HAND);
+  send("pointerdown", x, y, 0);
+  send("pointermove", x + 50, y - 30, 16);
+  expect(pulled().x).toBeCloseTo(ring().x + 50 / SCALE, 9);
+  expect(pulled().y).toBeCloseTo(ring().y + 30 / SCALE, 9);
 });
 
 test("a trembling hand is steadied when that is wished, and still arrives", () => {

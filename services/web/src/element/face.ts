@@ -1,0 +1,101 @@
+/** What stands in the element's shadow: the canvas, words, names over strings, and with controls a bar of buttons. */
+import { createAsks, type Asks } from "../page/asks";
+import { element, setAttribute } from "../page/dom";
+import { icon, limbIcon } from "../page/icons";
+import { LIMB_NAMES, LIMB_ORDER, limbKey, type LimbState } from "../page/model";
+import { createTags, type Tags } from "../page/tags";
+import { createToast, type Toast } from "../page/toast";
+import tokens from "../style/tokens.css?inline";
+import own from "./element.css?inline";
+
+/** Names keep so far from the element's upper edge, pixels. */
+const TOP = 8;
+
+export interface FaceActions {
+  play(): void;
+  toggle(limb: number): void;
+  focus(limb: number | null): void;
+  ask(limb: number): void;
+  give(limb: number): void;
+}
+
+export interface Face {
+  /** What has the keys: the canvas, the buttons, and what of them is clicked. */
+  readonly frame: HTMLElement;
+  readonly canvas: HTMLCanvasElement;
+  readonly tags: Tags;
+  readonly asks: Asks;
+  readonly toast: Toast;
+  /** Words in place of the dance; null for none. */
+  notice(title: string | null, text?: string): void;
+  /** The bar: whether it is there; whether play may be pressed, and would pause; limbs, if they can be taken. */
+  bar(shown: boolean, playing: boolean | null): void;
+  limbs(limbs: readonly LimbState[], hands: boolean, ready: boolean): void;
+  remove(): void;
+}
+
+/** The page's day, with the quotes that a build may leave out. */
+const DAY = /:root\[data-theme=["']?day["']?\]/g;
+
+let sheet: CSSStyleSheet | null = null;
+
+/** One sheet for all elements. A sheet that is made so stands under any content security policy. */
+function styles(): CSSStyleSheet {
+  if (!sheet) {
+    sheet = new CSSStyleSheet();
+    sheet.replaceSync(tokens.replace(DAY, ':host([data-shown="day"])').replaceAll(":root", ":host") + own);
+  }
+  return sheet;
+}
+
+export function createFace(root: ShadowRoot, on: FaceActions): Face {
+  root.adoptedStyleSheets = [styles()];
+  const canvas = element("canvas", { role: "img", "aria-label": "A wooden puppet dancing on a stage before a disc of gold leaf" });
+  const frame = element("div", { class: "frame", part: "frame", tabindex: -1 }, canvas, element("div", { class: "vignette" }));
+  root.append(frame);
+  const tags = createTags(frame, on.ask, () => frame.clientWidth, TOP);
+  const notice = element("div", { class: "notice", part: "notice", role: "status", hidden: true });
+  const messages = element("div", { class: "messages" });
+  frame.append(notice, messages);
+  const asks = createAsks(messages, on.give);
+  const toast = createToast(messages);
+  const play = element("button", { class: "play", type: "button", "aria-label": "Play", onClick: on.play }, icon("play"));
+  const discs = LIMB_ORDER.map((limb) => {
+    const focus = { onFocus: () => on.focus(limb), onBlur: () => on.focus(null), onPointerenter: () => on.focus(limb), onPointerleave: () => on.focus(null) };
+    return { limb, disc: element("button", { type: "button", hidden: true, onClick: () => on.toggle(limb), ...focus }, limbIcon(limb)) };
+  });
+  const bar = element("div", { class: "bar", part: "bar", role: "group", "aria-label": "The stage", hidden: true }, play, ...discs.map(({ disc }) => disc));
+  frame.append(bar);
+  let shownPlaying: boolean | null = false;
+  return {
+    frame, canvas, tags, asks, toast,
+    notice(title, text = "") {
+      notice.hidden = title === null;
+      if (title !== null) notice.replaceChildren(element("b", {}, title), text);
+    },
+    bar(shown, playing) {
+      bar.hidden = !shown;
+      play.hidden = playing === null;
+      if (playing === shownPlaying || playing === null) return;
+      shownPlaying = playing;
+      play.replaceChildren(icon(playing ? "pause" : "play"));
+      play.setAttribute("aria-label", playing ? "Pause" : "Play");
+    },
+    limbs(limbs, hands, ready) {
+      for (const { limb, disc } of discs) {
+        const { holder } = limbs[limb];
+        const name = LIMB_NAMES[limb].toLowerCase();
+        disc.hidden = !hands;
+        disc.disabled = !ready;
+        setAttribute(disc, "data-mine", holder?.mine ?? false);
+        disc.setAttribute("aria-label", !holder ? `Take the ${name}` : holder.mine ? `Release the ${name}` : `${LIMB_NAMES[limb]}, held by ${holder.name}`);
+        disc.title = `${LIMB_NAMES[limb]}, key ${limbKey(limb)}`;
+        if (holder) disc.style.setProperty("--colour", `var(--holder-${holder.colour})`);
+        else disc.style.removeProperty("--colour");
+      }
+    },
+    remove() {
+      frame.remove();
+    },
+  };
+}

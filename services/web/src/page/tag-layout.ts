@@ -1,0 +1,69 @@
+/** Where names stand: by their bars, and never over another name, a bar or the face. Pure; CSS pixels, y down. */
+import type { Box } from "../stage/boxes";
+
+/** A name of this size, and the bar that it belongs to. */
+export interface Label {
+  bar: Box;
+  width: number;
+  height: number;
+}
+
+/** A name's place, and which of the places by its bar that is: told again for the next frame it stays there as long as it can. */
+export interface Laid {
+  box: Box;
+  place: number;
+}
+
+/** From a bar to its name. */
+const GAP = 12;
+/** A name comes back to a better place only where there is so much more room. */
+const MORE = 10;
+/** From the picture's sides. */
+const SIDE = 8;
+
+/**
+ * The places of `labels`, in their order, null for null. `keep` are boxes that nothing may cover beside the bars, `before` what this told of the frame before;
+ * the picture is `width` wide, and `top` is where it begins. Where there is no room left, the place that covers least.
+ */
+export function layLabels(labels: readonly (Label | null)[], keep: readonly Box[], before: readonly (Laid | null)[], width: number, top: number): (Laid | null)[] {
+  const taken = [...keep, ...labels.flatMap((label) => label?.bar ?? [])];
+  return labels.map((label, nth) => {
+    if (!label) return null;
+    const last = before[nth]?.place ?? 0;
+    let best: Laid | null = null;
+    let least = Infinity;
+    for (const [place, box] of placesOf(label, width).entries()) {
+      const margin = place < last ? MORE : 0;
+      // what leaves the picture covers as much as it is out of it
+      const out = Math.max(0, top - box.top) * label.width;
+      const covered = taken.reduce((sum, other) => sum + overlap(box, other, margin), out);
+      if (covered >= least) continue;
+      [best, least] = [{ box, place }, covered];
+      if (covered === 0) break;
+    }
+    if (best) taken.push(best.box);
+    return best;
+  });
+}
+
+/** Above the bar, above it to either side, beside it, and once more above all that. */
+function placesOf({ bar, width, height }: Label, picture: number): Box[] {
+  const middle = (bar.left + bar.right - width) / 2;
+  const above = bar.top - GAP - height;
+  const level = (bar.top + bar.bottom - height) / 2;
+  const places = [
+    [middle, above], [bar.right - width, above], [bar.left, above], [bar.left - GAP - width, level], [bar.right + GAP, level],
+    [middle, above - height - GAP / 2], [bar.right - width, above - height - GAP / 2], [bar.left, above - height - GAP / 2],
+  ] as const;
+  return places.map(([x, y]) => {
+    const left = Math.max(SIDE, Math.min(picture - SIDE - width, x));
+    return { left, top: y, right: left + width, bottom: y + height };
+  });
+}
+
+/** The area that two boxes share, the one grown by `margin`. */
+function overlap(a: Box, b: Box, margin: number): number {
+  const across = Math.min(a.right, b.right) - Math.max(a.left, b.left) + margin;
+  const down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) + margin;
+  return across > 0 && down > 0 ? across * down : 0;
+}

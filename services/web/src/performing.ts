@@ -1,0 +1,91 @@
+/** What is on the stage, frame by frame: the dance of the room, who holds its strings, and one's own hands by pointer and keys. */
+import type { Pose } from "./motion/skeleton";
+import type { Holding } from "./holding";
+import { Commands, type PageActions } from "./input/commands";
+import { Hands } from "./input/hands";
+import type { Mapping } from "./input/mapping";
+import { createPointer, type PointerInput } from "./input/pointer";
+import { VelocityInputs } from "./input/velocity";
+import type { LimbState } from "./page/model";
+import type { Room } from "./room";
+import { Stage } from "./stage/stage";
+import type { StringState } from "./stage/strings";
+
+export interface PerformingOptions {
+  mapping: () => Mapping;
+  /** What keys and pad do beside taking limbs. */
+  actions: PageActions;
+  /** Told whenever what is held here changes. */
+  changed: () => void;
+  /** Keeps the best quality on any machine, for pictures. */
+  best?: boolean;
+}
+
+/** What one frame showed. */
+export interface Shown {
+  /** Null before there is any. */
+  pose: Pose | null;
+  limbs: readonly LimbState[];
+}
+
+export class Performing {
+  readonly stage: Stage;
+  readonly hands: Hands;
+  readonly pointer: PointerInput;
+  readonly velocity: VelocityInputs;
+  readonly commands: Commands;
+  #room: Room | null = null;
+  #drawnAt = 0;
+
+  /** Draws on `canvas`; `holding` is about its hands from now on. Throws where the browser has no WebGL 2. */
+  constructor(canvas: HTMLCanvasElement, private readonly holding: Holding, { mapping, actions, changed, best = false }: PerformingOptions) {
+    this.stage = new Stage(canvas, best);
+    this.hands = new Hands(this.stage);
+    this.hands.changed = changed;
+    const free = (limb: number) => holding.free(limb);
+    this.velocity = new VelocityInputs(this.hands, { take: (limb) => holding.take(limb, "velocity"), free });
+    this.pointer = createPointer(canvas, this.stage, this.hands, {
+      may: free, refused: (limb) => holding.refused(limb), smoothing: () => mapping().pointerSmoothing, nearer: (limb) => this.velocity.nearer(limb),
+    });
+    this.commands = new Commands(this.hands, this.velocity, actions);
+    holding.theatre = { hands: this.hands, velocity: this.velocity, shake: (limb) => this.stage.strings.refuse(limb) };
+  }
+
+  /** The room it is about from now on: its dancer comes on, if one is there already. */
+  enter(room: Room): void {
+    this.#room = room;
+    this.hands.puppeteer = room.puppeteer;
+    this.cast();
+  }
+
+  /** The room's dancer comes on. */
+  cast(): void {
+    const { figure, front } = this.#room?.viewer ?? {};
+    if (figure) this.stage.setFigure(figure, front);
+  }
+
+  /** Moves everything on to local `now`, milliseconds, and draws it; `focused` is a limb whose control has the focus. */
+  draw(now: number, focused: number | null = null): Shown {
+    const { holding, hands, pointer, stage, velocity } = this;
+    const viewer = this.#room?.viewer;
+    const seconds = (now - this.#drawnAt) / 1000;
+    this.#drawnAt = now;
+    pointer.update(now);
+    velocity.update(now);
+    const pose = viewer?.poseAt(now) ?? null;
+    const limbs = holding.limbs();
+    const states = limbs.map(({ holder, selected }, limb): StringState => ({
+      holder: holder?.colour ?? null,
+      lit: pointer.near === limb || focused === limb || selected,
+      pull: hands.pull(limb),
+    }));
+    stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.shownTime(now));
+    return { pose, limbs };
+  }
+
+  /** Lets go what was pressed, as nobody would let it up: the page is hidden. */
+  rest(): void {
+    this.commands.forget();
+    this.velocity.update(performance.now());
+  }
+}

@@ -1,0 +1,27 @@
+/** What other sites' pages load, at addresses that stay, and the page of examples: built after the page, into the same folder. */
+import { defineConfig } from "vite";
+
+/** Entries at `embed/NAME.js`. What they load is named by its content, so that it may be kept for ever. */
+const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/package.ts" };
+
+export default defineConfig({
+  // whatever site loads it, its parts are beside it
+  base: "./",
+  build: {
+    outDir: "../bunraku/page",
+    emptyOutDir: false,
+    copyPublicDir: false,
+    target: "es2023",
+    assetsInlineLimit: 0,
+    modulePreload: false,
+    chunkSizeWarningLimit: 700,
+    rolldownOptions: {
+      input: { ...ENTRIES, examples: "examples/index.html" },
+      preserveEntrySignatures: "strict",
+      output: {
+        entryFileNames: ({ name }) => (name in ENTRIES ? "embed/[name].js" : "assets/[name]-[hash].js"),
+        chunkFileNames: "embed/parts/[name]-[hash].js",
+      },
+    },
+  },
+});
