@@ -196,14 +196,6 @@ export const JAPANESE = {
   "No answer": "サーバーから応答がありません",
   "the server cannot be reached": "サーバーに接続できません",
   "look at the line, then try again": "回線を確かめて、もう一度お試しください",
-  "The stage cannot be shown here": "ここでは舞台を表示できません",
-  "This page came over https, and browsers let it speak with no server that has none.": "このページはhttpsのため、httpsでないサーバーには接続できません。",
-  "This page was opened from a file. The stage's server lets such pages in only if BUNRAKU_ORIGINS has null in it.":
-    "このページはファイルから開かれています。サーバーのBUNRAKU_ORIGINSにnullがある場合だけ表示できます。",
-  "The stage's server does not know this site. Its host can let it in: BUNRAKU_ORIGINS={origin}":
-    "舞台のサーバーはこのサイトを許可していません。管理者は次の設定で許可できます：BUNRAKU_ORIGINS={origin}",
-  "The stage does not answer": "舞台から応答がありません",
-  "Its server cannot be reached now. It is tried again and again.": "サーバーに接続できません。接続を試み続けています。",
   // keys and gamepad
   "Close": "閉じる",
   "The list of keys could not be fetched; try again when the line is back": "キーの一覧を読み込めませんでした。接続が戻ったらもう一度お試しください",
@@ -225,7 +217,6 @@ export const JAPANESE = {
   "seek forward by one block": "1ブロック進む",
   "the show's camera, or your own seat": "演出カメラと自分の席の切り替え",
   "sound on or off": "音のオン・オフ",
-  "the show's camera, or your own seat": "演出カメラ・自分の席",
   "keep this as a new dance": "新しい演目として残す",
   "library": "演目",
   "strings": "糸",
