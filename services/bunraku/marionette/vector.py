@@ -101,7 +101,7 @@ def about(axis: Vector, angle: float) -> Quaternion:
 def between(a: Vector, b: Vector) -> Quaternion:
     """The shortest rotation from the unit vector `a` to the unit vector `b`; opposite ones turn about `across(a)`."""
     w = 1.0 + dot(a, b)
-    if w < 1e-12:
+    if w < 1e-14:
         return about(across(a), 3.141592653589793)
     x, y, z = cross(a, b)
     return normalise((w, x, y, z))

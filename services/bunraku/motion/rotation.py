@@ -107,7 +107,7 @@ def between(a: Array, b: Array) -> Array:
     """
     a, b = np.broadcast_arrays(normalise(np.asarray(a, dtype=np.float64)), normalise(np.asarray(b, dtype=np.float64)))
     dot = np.sum(a * b, axis=-1, keepdims=True)
-    opposite = dot < -1.0 + 1e-12
+    opposite = dot < -1.0 + 1e-14
     square = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     axis = np.where(opposite, normalise(np.cross(a, square)), np.cross(a, b))
     q = normalise(np.concatenate([np.where(opposite, 0.0, 1.0 + dot), axis], axis=-1))

@@ -98,7 +98,7 @@ export function about(out: Numbers, outAt: number, axis: Numbers, axisAt: number
 /** The shortest rotation (4) from the unit vector `a` to the unit vector `b`; opposite ones turn about `across(a)`. */
 export function between(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
   const w = 1 + dot(a, aAt, b, bAt);
-  if (w < 1e-12) {
+  if (w < 1e-14) {
     across(out, outAt + 1, a, aAt);
     out[outAt] = 0;
     return;

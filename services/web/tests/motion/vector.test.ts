@@ -26,6 +26,8 @@ test("between brings one direction to the other, opposite ones too", () => {
       rotate(out, 0, q, 0, a, 0);
       for (let i = 0; i < 3; i++) expect(Math.abs(out[i] + a[i])).toBeLessThan(1e-6);
     }),
+    // all but opposite
+    { examples: [1.3e-6, 1.5e-7, 1.3e-7].map((angle) => [Float64Array.of(0, 1, 0), Float64Array.of(Math.sin(angle), -Math.cos(angle), 0)]) },
   );
 });
 
