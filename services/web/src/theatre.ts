@@ -6,4 +6,5 @@ export { listenToKeyboard } from "./input/keyboard";
 export { listenToMouse } from "./input/mouse";
 export { createPointer } from "./input/pointer";
 export { VelocityInputs } from "./input/velocity";
+export { facePicture, puppetModel } from "./stage/model";
 export { Stage } from "./stage/stage";

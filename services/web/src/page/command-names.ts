@@ -6,7 +6,7 @@ import { LIMB_NAMES } from "./model";
 const WAYS = [["left", "right"], ["down", "up"], ["further", "nearer"]] as const;
 const ACTIONS: Readonly<Record<Exclude<Action, `take_${string}`>, string>> = {
   ask: "ask for the string that another holds", give: "give the string that is asked for",
-  play: "play or pause", back: "seek back by one block", forward: "seek forward by one block", sound: "sound on or off", keep: "keep this as a new dance",
+  play: "play or pause", back: "seek back by one block", forward: "seek forward by one block", sound: "sound on or off", keep: "keep this as a new dance", picture: "save a picture of the stage",
   library: "library", strings: "strings", line: "line",
 };
 
@@ -45,6 +45,6 @@ export function summary(commands: readonly Command[], own: number | null = null)
 /** The commands in the order of the list of keys, in three groups. */
 export const GROUPS: readonly (readonly Command[])[] = [
   ["take_right_hand", "take_left_hand", "take_right_leg", "take_left_leg", ...[2, 3, 1, 0, 4, 5].map((i) => HELD_INPUTS[i]), "ask", "give"],
-  ["play", "back", "forward", "sound", "keep", "library", "strings", "line"],
+  ["play", "back", "forward", "sound", "keep", "picture", "library", "strings", "line"],
   DIGITAL_INPUTS,
 ];
