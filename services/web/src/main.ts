@@ -4,6 +4,7 @@ import type { Vector3 } from "three";
 import { bound, comeIn, guarded, may, ownRole, whenDenied } from "./client/access";
 import { createSession, keep, shareSession, type CameraKeyframe, type Motion } from "./client/library";
 import { ProblemError } from "./client/problem";
+import { Exporting } from "./exporting";
 import { Holding } from "./holding";
 import type { GamepadInput } from "./input/gamepad";
 import type { Hands } from "./input/hands";
@@ -86,6 +87,8 @@ const page = createPage(document.body, {
     void uploadAll(files, page.library, uploaded);
   },
   choose: (id) => void choose(id),
+  picture,
+  download: (piece, format) => void exporting.download(piece, format),
   remove: (piece) => {
     if (confirm(say("Remove \"{name}\" from the library?", piece))) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
   },
@@ -107,6 +110,7 @@ const page = createPage(document.body, {
   focus: (limb) => (focused = limb),
   reframe: resize,
 });
+const exporting = new Exporting(page, () => ({ room, stage }));
 const holding = new Holding(page, () => mapping);
 holding.watching = !may("control");
 let denied = false;
@@ -124,6 +128,10 @@ theme = createTheme((now) => {
 function cameraMoves(): CameraKeyframe[] {
   const clock = room?.viewer.clockTime(performance.now()) ?? null;
   return room && clock !== null ? (stage?.trail.moves(clock - room.viewer.duration * 1e6) ?? []) : [];
+}
+
+function picture(): void {
+  void exporting.picture(pieces.find(room?.viewer.motion ?? null)?.name ?? "");
 }
 
 function play(): void {
@@ -261,6 +269,7 @@ async function openStage(): Promise<void> {
     camera: () => stage?.follow(!stage.following),
     sound: () => listening.toggle(),
     keep: () => page.transport.keep(),
+    picture,
     library: () => page.panels.toggle("library"),
     strings: () => page.panels.toggle("strings"),
     line: () => page.panels.toggle("line"),

@@ -3,3 +3,4 @@ export { createGamepad } from "./input/gamepad";
 export { listenToKeyboard } from "./input/keyboard";
 export { listenToMouse } from "./input/mouse";
 export { Performing } from "./performing";
+export { facePicture, puppetModel } from "./stage/model";

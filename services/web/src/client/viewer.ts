@@ -124,6 +124,11 @@ export class Viewer extends EventTarget {
     return this.store?.rates ?? NO_BLOCKS;
   }
 
+  /** The blocks of `motion`, null where another is watched. */
+  held(motion: string): BlockStore | null {
+    return motion === this.motion ? this.store : null;
+  }
+
   /** What each rate costs and keeps, from the lowest to the highest. */
   get rates(): readonly Rate[] {
     return this.store?.track.rates ?? [];

@@ -11,7 +11,7 @@ import { DIGITAL_INPUTS, HELD_INPUTS, type DigitalInput, type HeldInput } from "
 export type Control = string;
 export const ACTIONS = [
   "take_right_hand", "take_left_hand", "take_right_leg", "take_left_leg", "ask", "give",
-  "play", "back", "forward", "camera", "sound", "keep", "library", "strings", "line",
+  "play", "back", "forward", "camera", "sound", "keep", "picture", "library", "strings", "line",
 ] as const;
 export type Action = (typeof ACTIONS)[number];
 export type Command = DigitalInput | HeldInput | Action;
@@ -39,7 +39,7 @@ export const DEFAULT_MAPPING: Mapping = {
     ArrowRight: ["held_x+", "forward"], ArrowLeft: ["held_x-", "back"], ArrowUp: ["held_y+"], ArrowDown: ["held_y-"],
     PageDown: ["held_z+"], PageUp: ["held_z-"],
     "wheel:+": ["held_z+"], "wheel:-": ["held_z-"],
-    KeyR: ["ask"], KeyG: ["give"], KeyK: ["keep"], KeyM: ["sound"], KeyC: ["camera"], Space: ["play"], KeyL: ["library"], KeyN: ["line"],
+    KeyR: ["ask"], KeyG: ["give"], KeyK: ["keep"], KeyP: ["picture"], KeyM: ["sound"], KeyC: ["camera"], Space: ["play"], KeyL: ["library"], KeyN: ["line"],
     "axis:0+": ["left_hand_x+"], "axis:0-": ["left_hand_x-"], "axis:1-": ["left_hand_y+"], "axis:1+": ["left_hand_y-"],
     "axis:2+": ["right_hand_x+"], "axis:2-": ["right_hand_x-"], "axis:3-": ["right_hand_y+"], "axis:3+": ["right_hand_y-"],
     "button:6": ["left_hand_z+"], "button:4 button:6": ["left_hand_z-"],

@@ -1,6 +1,8 @@
 /** The library drawer: drop zone, uploads with true progress, problems in plain words, and the list of dances. */
 import type { UploadProgress } from "../client/library";
+import type { Format } from "../export/file";
 import { element, setAttribute, setText } from "./dom";
+import { createDownloads } from "./downloads";
 import { clockTime, makingProgress, uploadProgress } from "./format";
 import { icon, motionGlyph } from "./icons";
 import { createPanel, type Panel } from "./panels";
@@ -23,16 +25,23 @@ export interface UploadRow {
   remove(): void;
 }
 
+export interface DownloadRow {
+  /** What is done, and the share of the whole. */
+  doing(words: string, share: number): void;
+  remove(): void;
+}
+
 export interface Library {
   readonly panel: Panel;
   pieces(pieces: readonly Piece[], current: string | null): void;
   upload(name: string, cancel: () => void): UploadRow;
+  download(name: string, cancel: () => void): DownloadRow;
   problem(name: string, title: string, detail: string, hint: string | null): void;
 }
 
 export const ACCEPTED = ".bvh";
 
-export function createLibrary(root: HTMLElement, on: { files(files: readonly File[]): void; choose(id: string): void; remove(piece: Piece): void; close(): void }): Library {
+export function createLibrary(root: HTMLElement, on: { files(files: readonly File[]): void; choose(id: string): void; remove(piece: Piece): void; download(piece: Piece, format: Format): void; close(): void }): Library {
   const panel = createPanel(root, "library", say("Library"), on.close);
   const picker = element("input", { type: "file", accept: ACCEPTED, multiple: true, hidden: true });
   picker.addEventListener("change", () => {
@@ -41,10 +50,12 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
   });
   const drop = element("button", { class: "drop", type: "button", onClick: () => picker.click() }, icon("upload"), element("b", {}, say("Drop a dance here")));
   drop.append(element("span", {}, say("motion .bvh, up to 64 MB, or press to choose")));
-  const doing = element("div", { role: "group", "aria-label": say("Uploads") });
+  const doing = element("div", { role: "group", "aria-label": say("Uploads and downloads") });
   const said = element("div", { role: "alert" });
   const list = element("ul", { class: "motions" });
   const empty = element("p", { class: "empty", hidden: true }, say("No dances yet. Drop a motion capture file anywhere on this page and the puppet dances it."));
+  /** The dance whose downloads are disclosed. */
+  let disclosed: string | null = null;
   panel.body.append(drop, picker, doing, said, list, empty);
   return {
     panel,
@@ -58,33 +69,25 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
           glyph.append(motionGlyph(piece.id));
           const text = element("span", { class: "motion-text" }, element("b", {}, piece.name), element("small", {}, piece.detail));
           choose.append(glyph, text, element("span", { class: "motion-length" }, clockTime(piece.seconds)));
+          const { button: download, choices } = createDownloads(
+            piece.name, piece.id === disclosed, (on) => (disclosed = on ? piece.id : null), (format) => on.download(piece, format),
+          );
           const remove = element("button", { class: "round-button motion-remove", type: "button", "aria-label": say("Remove {name}", { name: piece.name }), onClick: () => on.remove(piece) }, icon("bin"));
-          return element("li", {}, choose, remove);
+          return element("li", {}, choose, element("div", { class: "motion-tools" }, download, remove), choices);
         }),
       );
     },
     upload(name, cancel) {
-      const share = element("span", {}, percent(0));
-      const fill = element("i", { style: "width: 0" });
-      const bar = element("div", { class: "progress", role: "progressbar", "aria-label": say("Upload of {name}", { name }), "aria-valuemin": 0, "aria-valuemax": 100 }, fill);
-      const state = element("span", {}, say("waiting"));
-      const stop = element("button", { class: "text-button", type: "button", "aria-label": say("Cancel the upload of {name}", { name }), onClick: cancel }, say("Cancel"));
-      const row = element("div", { class: "upload" }, element("div", { class: "upload-row" }, element("span", { class: "upload-name" }, name), share), bar);
-      row.append(element("div", { class: "upload-row" }, state, stop));
-      doing.append(row);
-      const show = (done: number, words: string) => {
-        const hundredths = Math.floor(done * 100);
-        setText(share, percent(hundredths / 100));
-        setText(state, words);
-        fill.style.width = `${hundredths}%`;
-        bar.setAttribute("aria-valuenow", String(hundredths));
-        bar.setAttribute("aria-valuetext", series([words, percent(hundredths / 100)]));
-      };
+      const { show, remove } = underWay(doing, "upload", name, cancel);
       return {
         sending: (loaded, total, seconds) => show(total > 0 ? loaded / total : 0, uploadProgress(loaded, total, seconds)),
         making: (stage, done) => show(done, makingProgress(stage)),
-        remove: () => row.remove(),
+        remove,
       };
+    },
+    download(name, cancel) {
+      const { show, remove } = underWay(doing, "download", name, cancel);
+      return { doing: (words, done) => show(done, words), remove };
     },
     problem(name, title, detail, hint) {
       const box = element("div", { class: "problem" }, element("b", {}, say("{name}: {title}", { name, title })), element("p", {}, detail));
@@ -92,6 +95,33 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
       box.append(element("button", { class: "text-button", type: "button", onClick: () => box.remove() }, say("Dismiss")));
       said.replaceChildren(box);
     },
+  };
+}
+
+/** A row of `list` for what is under way, with the share done and what will be cancelled. */
+function underWay(list: HTMLElement, kind: "upload" | "download", name: string, cancel: () => void): { show(done: number, words: string): void; remove(): void } {
+  const share = element("span", {}, percent(0));
+  const fill = element("i", { style: "width: 0" });
+  const [label, stopping] =
+    kind === "upload"
+      ? [say("Upload of {name}", { name }), say("Cancel the upload of {name}", { name })]
+      : [say("Download of {name}", { name }), say("Cancel the download of {name}", { name })];
+  const bar = element("div", { class: "progress", role: "progressbar", "aria-label": label, "aria-valuemin": 0, "aria-valuemax": 100 }, fill);
+  const state = element("span", {}, say("waiting"));
+  const stop = element("button", { class: "text-button", type: "button", "aria-label": stopping, onClick: cancel }, say("Cancel"));
+  const row = element("div", { class: "upload" }, element("div", { class: "upload-row" }, element("span", { class: "upload-name" }, name), share), bar);
+  row.append(element("div", { class: "upload-row" }, state, stop));
+  list.append(row);
+  return {
+    show(done, words) {
+      const hundredths = Math.floor(done * 100);
+      setText(share, percent(hundredths / 100));
+      setText(state, words);
+      fill.style.width = `${hundredths}%`;
+      bar.setAttribute("aria-valuenow", String(hundredths));
+      bar.setAttribute("aria-valuetext", series([words, percent(hundredths / 100)]));
+    },
+    remove: () => row.remove(),
   };
 }
 

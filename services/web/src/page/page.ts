@@ -1,6 +1,7 @@
 /** Everything of the page that is not the stage, put together: one call of `render...` per kind of news. */
 import type { Mapping } from "../input/mapping";
 import { may } from "../client/access";
+import type { Format } from "../export/file";
 import { createAsks, type Asks } from "./asks";
 import { createHeader, type Header } from "./header";
 import { createKeys } from "./keys";
@@ -28,8 +29,11 @@ export interface PageActions extends StringsActions, SoundActions {
   camera(): void;
   /** Keeps the performance as a new motion; left out, it cannot be kept here. */
   keep?(): Promise<void>;
+  /** Saves a picture of the stage. */
+  picture(): void;
   files(files: readonly File[]): void;
   choose(id: string): void;
+  download(piece: Piece, format: Format): void;
   remove(piece: Piece): void;
   mapping(mapping: Mapping): void;
   /** A panel opened or shut: the stage may have to be framed anew. */
@@ -61,7 +65,7 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   root.append(messages);
   const asks = createAsks(messages, on.give);
   const toast = createToast(messages);
-  const library = createLibrary(root, { files: on.files, choose: on.choose, remove: on.remove, close: () => panels.close("library") });
+  const library = createLibrary(root, { ...on, close: () => panels.close("library") });
   const strings = createStringsCard(root, { ...on, close: () => panels.close("strings"), keys: () => keys.show() });
   const line = createLineCard(root, () => panels.close("line"));
   const transport = createTransport(root, { ...on, panel: (name) => panels.toggle(name) });

@@ -1,4 +1,4 @@
-/** Play, seek, loop, sound, keep, and the three panels' buttons. */
+/** Play, seek, loop, sound, picture, keep, and the three panels' buttons. */
 import { element, setAttribute, setText } from "./dom";
 import { clockTime } from "./format";
 import { icon, type IconName } from "./icons";
@@ -38,6 +38,8 @@ export interface TransportActions extends SoundActions {
   panel(panel: PanelName): void;
   /** Follows the show's camera, or no longer. */
   camera(): void;
+  /** Saves a picture of the stage. */
+  picture(): void;
   /** Keeps the performance as a new motion; done, or given up and told why, when it resolves. Left out, it cannot be kept here. */
   keep?(): Promise<void>;
 }
@@ -48,6 +50,7 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
   const seek = createSeek(on.seek);
   const loop = element("button", { class: "round-button loop", type: "button", "aria-label": say("Loop"), onClick: on.loop }, icon("loop"));
   const camera = element("button", { class: "round-button camera", type: "button", "aria-label": say("Show's camera"), hidden: true, onClick: on.camera }, icon("camera"));
+  const picture = element("button", { class: "round-button picture", type: "button", "aria-label": say("Save a picture"), onClick: on.picture }, icon("picture"));
   const sound = createSoundControl(on);
   const keepName = element("span", {}, say(KEEP));
   const keep = element("button", { class: "pill keep", type: "button", "aria-label": say(KEEP), disabled: true, hidden: !on.keep, onClick: () => void keepNow() }, icon("keep"), keepName);
@@ -80,7 +83,7 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
       return [name, pill] as const;
     }),
   );
-  const tools = element("div", { class: "tools" }, loop, camera, sound.element, keep, element("span", { class: "tools-rule" }), ...pills.values());
+  const tools = element("div", { class: "tools" }, loop, camera, sound.element, picture, keep, element("span", { class: "tools-rule" }), ...pills.values());
   const area = element("div", { class: "seek-area" }, element("div", { class: "times" }, now, end), seek.element);
   root.append(element("section", { class: "transport", "aria-label": say("Transport") }, play, area, tools));
   let shown = "";

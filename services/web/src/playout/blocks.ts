@@ -39,6 +39,15 @@ export abstract class Store<Track extends Timing, Block extends { readonly frame
     return true;
   }
 
+  /** Takes over what `other`, of the same track, holds at a better rate. */
+  adopt(other: this): void {
+    other.rates.forEach((rate, index) => {
+      if (rate <= this.rates[index]) return;
+      this.rates[index] = rate;
+      this.blocks[index] = other.blocks[index];
+    });
+  }
+
   /** Microseconds of motion that are here from `position` on without a gap, once around at most. */
   ahead(position: number, loop: boolean): number {
     const { track } = this;

@@ -41,6 +41,7 @@ if (dark < .5) gl_FragColor.rgb = mix(gl_FragColor.rgb, backdrop(vec2(at.x, -.2)
 export interface Floor {
   readonly mesh: Mesh;
   dress(look: Look): void;
+  dispose(): void;
 }
 
 /** `plain` leaves out gloss, for machines that draw in software; `rig` is the frame the floor lies in; `travelled` how far that has gone, for the boards. */
@@ -74,6 +75,10 @@ export function createFloor(backdrop: BackdropUniforms, rig: Object3D, travelled
         material.envMapIntensity = look.floor.environment;
       }
       opacityNear.value = look.floor.opacity;
+    },
+    dispose() {
+      mesh.geometry.dispose();
+      material.dispose();
     },
   };
 }

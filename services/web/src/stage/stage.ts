@@ -10,8 +10,9 @@ import { FrameGate } from "./frame-gate";
 import { createLights } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
+import { PictureCamera, pictureSize } from "./picture";
 import { Puppet } from "./puppet";
-import { QualityChoice } from "./quality";
+import { QUALITIES, QualityChoice } from "./quality";
 import { Rig } from "./rig";
 import { Scenery } from "./scenery";
 import type { Paint } from "./shading";
@@ -59,6 +60,7 @@ export class Stage {
   #framing: Framing = "desktop";
   readonly #quality: QualityChoice;
   readonly #gate: FrameGate;
+  readonly #pictures = new PictureCamera();
   #sinceDrawn = 0;
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
@@ -186,6 +188,24 @@ export class Stage {
     this.renderer.forceContextLoss();
   }
 
+  /** The stage as it was last moved on to, strings and all, as PNG: in the best quality, whatever this machine draws otherwise. */
+  picture(): Promise<Blob> {
+    const { mesh } = this.#floor;
+    const glossy = createFloor(this.#backdrop, this.#scenery.group, this.rig.travelled, false);
+    glossy.dress(this.#look);
+    this.#scenery.group.remove(mesh);
+    this.#scenery.group.add(glossy.mesh);
+    this.#furnish(QUALITIES[0]);
+    try {
+      return this.#pictures.take(this.scene, this.audience.camera, this.#look, pictureSize(this.#width, this.#height));
+    } finally {
+      this.#furnish();
+      this.#scenery.group.remove(glossy.mesh);
+      this.#scenery.group.add(mesh);
+      glossy.dispose();
+    }
+  }
+
   /** CSS pixels of a world place. */
   toScreen(at: Vector3): { x: number; y: number } {
     const clip = at.clone().project(this.audience.camera);
@@ -251,8 +271,7 @@ export class Stage {
   }
 
   /** Only the lacquer of the night mirrors, and only where the machine is up to it. */
-  #furnish(): void {
-    const { reflection, shadows, plain } = this.#quality.quality;
+  #furnish({ reflection, shadows, plain } = this.#quality.quality): void {
     this.#lights.shadows = shadows;
     if (!this.puppet) return;
     this.puppet.reflected = this.#look.dark && reflection;

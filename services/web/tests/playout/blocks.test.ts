@@ -177,3 +177,14 @@ describe("a camera", () => {
     expect(store.sceneAt(0, true, DURATION)).toEqual(seen);
   });
 });
+
+test("a store adopts what another holds better, and leaves it as it is", () => {
+  const [one, other] = [new BlockStore(track), new BlockStore(track)];
+  one.put(0, 1, best);
+  other.put(0, 0, lowest);
+  other.put(1, 0, middle);
+  one.adopt(other);
+  expect([[...one.rates], [...other.rates]]).toEqual([[1, 0, -1], [0, 0, -1]]);
+  const pose = restPose();
+  expect([0, 40e6 / 30, 70e6 / 30].map((position) => one.poseAt(position, false, pose))).toEqual([true, true, false]);
+});

@@ -1,0 +1,60 @@
+/** A whole motion at its best rate, over HTTP, with what a viewer has of it already. */
+
+import { DamagedBlock } from "../codec/errors";
+import { MotionTrack } from "../codec/track";
+import { BlockStore } from "../playout/blocks";
+import { unpack } from "../wire/codec";
+import { MalformedMessage } from "../wire/errors";
+import type { Message } from "../wire/messages";
+import { request } from "./access";
+import { ProblemError } from "./problem";
+
+/** Blocks asked for at a time. */
+const AT_ONCE = 4;
+
+export interface Fetching {
+  /** What is here of this motion, null for nothing. */
+  held?: BlockStore | null;
+  /** Told of the share that is here, 0..1. */
+  told?: (share: number) => void;
+  signal?: AbortSignal;
+}
+
+/**
+ * Every block of `motion` at its best rate. Rejects with ProblemError; given up by `signal`, with the signal's reason.
+ */
+export async function bestBlocks(motion: string, { held = null, told, signal }: Fetching = {}): Promise<BlockStore> {
+  const base = `/v1/motions/${encodeURIComponent(motion)}`;
+  try {
+    const { tracks } = await message(`${base}/description`, "Description", signal);
+    const number = tracks.findIndex(({ type }) => type === "motion");
+    if (number < 0) throw new DamagedBlock("there is no motion in it");
+    const store = new BlockStore(MotionTrack.fromDescription(tracks[number]));
+    if (held) store.adopt(held);
+    const best = store.track.rates.length - 1;
+    const missing = [...store.rates.keys()].filter((index) => store.rates[index] < best);
+    let here = store.rates.length - missing.length;
+    const fetchOn = async () => {
+      for (let index = missing.shift(); index !== undefined; index = missing.shift()) {
+        const { block } = await message(`${base}/blocks/${best}/${index}?track=${number}`, "Data", signal);
+        store.put(index, best, block);
+        signal?.throwIfAborted();
+        told?.(++here / store.rates.length);
+      }
+    };
+    await Promise.all(Array.from({ length: AT_ONCE }, fetchOn));
+    return store;
+  } catch (error) {
+    signal?.throwIfAborted();
+    if (error instanceof DamagedBlock || error instanceof MalformedMessage) throw new ProblemError(0, "This dance cannot be read", error.message);
+    throw error;
+  }
+}
+
+/** The message of this name at an address. */
+async function message<Name extends Message["name"]>(address: string, name: Name, signal?: AbortSignal): Promise<Extract<Message, { name: Name }>> {
+  const answer = await request(address, signal ? { signal } : {});
+  const said = unpack(new Uint8Array(await answer.arrayBuffer()));
+  if (said?.name !== name) throw new MalformedMessage(`${address} is no ${name}`);
+  return said as Extract<Message, { name: Name }>;
+}

@@ -1,0 +1,40 @@
+/** A whole motion frame by frame, as the writers of files take it. */
+
+import { copyPose, type Figure, JOINT_COUNT, type Pose, restPose } from "../motion/skeleton";
+import type { BlockStore } from "../playout/blocks";
+
+/** `frames` poses of `figure`, `fps` a second: the root's places [frame][3] in metres, local rotations [frame][joint 18][w x y z]. */
+export interface Dance {
+  figure: Figure;
+  fps: number;
+  frames: number;
+  roots: Float64Array;
+  rotations: Float64Array;
+}
+
+/** Long work in short steps: it says between them which share of it is done, 0..1. */
+export type Work<T> = Generator<number, T>;
+
+/** Frames of work between two words of how far it is. */
+export const STRIDE = 32;
+
+/** What `store` holds at the motion's own frame rate. Every block must be there. */
+export function* sample(store: BlockStore): Work<Dance> {
+  const { figure, fps, frames } = store.track;
+  const roots = new Float64Array(frames * 3), rotations = new Float64Array(frames * JOINT_COUNT * 4);
+  const pose = restPose();
+  for (let frame = 0; frame < frames; frame++) {
+    if (!store.poseAt((frame * 1e6) / fps, false, pose)) throw new Error(`the block of frame ${frame} is not here`);
+    roots.set(pose.root, frame * 3);
+    rotations.set(pose.rotations, frame * JOINT_COUNT * 4);
+    if (frame % STRIDE === 0) yield frame / frames;
+  }
+  return { figure, fps, frames, roots, rotations };
+}
+
+/** Frame `frame` of `dance`, written into `out` and returned. */
+export function poseOf({ roots, rotations }: Dance, frame: number, out: Pose): Pose {
+  const joints = JOINT_COUNT * 4;
+  copyPose({ root: roots.subarray(frame * 3, frame * 3 + 3), rotations: rotations.subarray(frame * joints, (frame + 1) * joints) }, out);
+  return out;
+}

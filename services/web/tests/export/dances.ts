@@ -1,0 +1,76 @@
+/** Dances to be written, and how far what was read of them is from what they are. */
+import { AnimationMixer, type AnimationClip, type Object3D, Vector3 } from "three";
+import { expect } from "vitest";
+import { type Dance, poseOf, sample, type Work } from "../../src/export/dance";
+import { fromRotationVector } from "../../src/motion/rotation";
+import { emptyWorld, type Figure, JOINT_COUNT, JOINTS, restPose, world } from "../../src/motion/skeleton";
+import { BlockStore } from "../../src/playout/blocks";
+import { type BlockVectors, goldenTrack } from "../golden";
+import { standardFigure } from "../stage/standard-figure";
+import { bytes, vectors } from "../vectors";
+
+/** Forty frames in which every joint turns, each in its own way, and the root goes off; the sacroiliac stays `straight` or not. */
+export function turning({ straight = false, figure = standardFigure() }: { straight?: boolean; figure?: Figure } = {}): Dance {
+  const frames = 40;
+  const dance = { figure, fps: 30, frames, roots: new Float64Array(frames * 3), rotations: new Float64Array(frames * JOINT_COUNT * 4) };
+  for (let frame = 0; frame < frames; frame++) {
+    dance.roots.set([0.02 * frame, 0.9 + 0.1 * Math.sin(frame / 5), -0.01 * frame], frame * 3);
+    for (let joint = 0; joint < JOINT_COUNT; joint++) {
+      const size = straight && joint === 1 ? 0 : 1;
+      const [x, y, z] = [0.3, 0.5, 0.7].map((speed, axis) => size * 1.1 * Math.sin(speed * (frame / 4) + joint + axis));
+      fromRotationVector(dance.rotations, (frame * JOINT_COUNT + joint) * 4, x, joint === 0 ? frame / 6 : y, z);
+    }
+  }
+  return dance;
+}
+
+/** The golden motion at the best rate there is of each block. */
+export function goldenDance(): Dance {
+  const store = new BlockStore(goldenTrack());
+  const { valid } = vectors<BlockVectors>("blocks");
+  [0, 0, 1, 2].forEach((index, nth) => store.put(index, nth, bytes(valid[nth].block)));
+  return finished(sample(store));
+}
+
+/** What a work makes, without a pause; it says rising shares on its way. */
+export function finished<T>(work: Work<T>): T {
+  for (let before = 0; ; ) {
+    const { done, value } = work.next();
+    if (done) return value;
+    expect(value).toBeGreaterThanOrEqual(before);
+    expect(value).toBeLessThanOrEqual(1);
+    before = value;
+  }
+}
+
+/** The bytes of a file in parts. */
+export async function whole(parts: Uint8Array<ArrayBuffer>[]): Promise<ArrayBuffer> {
+  return new Blob(parts).arrayBuffer();
+}
+
+/** World places of the joints in a frame (54), metres. */
+export function placesOf(dance: Dance, frame: number): Float64Array {
+  return world(dance.figure, poseOf(dance, frame, restPose()), emptyWorld()).positions.slice();
+}
+
+/** Plays `clip` on `root`, frame by frame, and says at each how far a joint found by its name is from the dance's at most, metres. */
+export function farthest(dance: Dance, root: Object3D, clip: AnimationClip, unit = 1, joints: readonly string[] = JOINTS): number {
+  const mixer = new AnimationMixer(root);
+  mixer.clipAction(clip).play();
+  const at = new Vector3();
+  let most = 0;
+  for (let frame = 0; frame < dance.frames; frame++) {
+    // the last frame is the end of the loop, where it begins again
+    mixer.setTime(Math.min(frame / dance.fps, clip.duration - 1e-6));
+    root.updateMatrixWorld(true);
+    const places = placesOf(dance, frame);
+    for (const name of joints) {
+      const joint = root.getObjectByName(name);
+      if (!joint) throw new Error(`no ${name} in what was read`);
+      at.setFromMatrixPosition(joint.matrixWorld).multiplyScalar(unit);
+      const k = JOINTS.indexOf(name) * 3;
+      most = Math.max(most, Math.hypot(at.x - places[k], at.y - places[k + 1], at.z - places[k + 2]));
+    }
+  }
+  return most;
+}
