@@ -12,6 +12,7 @@ import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { PointerInput } from "./input/pointer";
 import type { VelocityInputs } from "./input/velocity";
 import { Listening } from "./listening";
+import { isolated } from "./page/format";
 import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
 import { createPage } from "./page/page";
@@ -79,7 +80,7 @@ const page = createPage(document.body, {
   },
   choose: (id) => void choose(id),
   remove: (piece) => {
-    if (confirm(`Remove "${piece.name}" from the library?`)) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
+    if (confirm(`Remove "${isolated(piece.name)}" from the library?`)) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
   },
   toggle: (limb) => holding.toggle(limb),
   ask: (limb) => holding.ask(limb),
@@ -249,6 +250,8 @@ async function openStage(): Promise<void> {
     page.notice("This browser cannot draw the stage", "It needs WebGL 2. Try another browser, or switch on hardware acceleration.");
     return;
   }
+  canvas.addEventListener("webglcontextlost", () => page.notice("The stage went dark", "The graphics were taken away; they come back by themselves. If they do not, load the page again."));
+  canvas.addEventListener("webglcontextrestored", () => page.notice(null));
   stage.still = calm.matches;
   calm.addEventListener("change", () => stage && (stage.still = calm.matches));
   if (theme) stage.setTheme(theme.theme);
