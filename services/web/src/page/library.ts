@@ -85,7 +85,7 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
       };
     },
     problem(name, title, detail, hint) {
-      const box = element("div", { class: "problem" }, element("b", {}, `${name}: ${title}`), element("p", {}, detail));
+      const box = element("div", { class: "problem" }, element("b", {}, element("bdi", {}, name), `: ${title}`), element("p", {}, detail));
       if (hint) box.append(element("p", { class: "muted" }, hint));
       box.append(element("button", { class: "text-button", type: "button", onClick: () => box.remove() }, "Dismiss"));
       said.replaceChildren(box);

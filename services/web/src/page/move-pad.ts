@@ -39,7 +39,7 @@ export function createMovePad(limb: number, press: (input: DigitalInput, down: b
 function button(input: DigitalInput, set: (input: DigitalInput, down: boolean) => void): HTMLButtonElement {
   const way = wayName(input);
   const made = element("button", { class: "move", type: "button", "aria-label": way.charAt(0).toUpperCase() + way.slice(1) });
-  made.append(way === "nearer" ? "Near" : way === "further" ? "Far" : icon(way as "left"));
+  made.append(way === "nearer" ? "Nearer" : way === "further" ? "Further" : icon(way as "left"));
   let pressed = false;
   const change = (to: boolean) => {
     pressed = to;

@@ -99,7 +99,7 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
         const limbName = LIMB_NAMES[limb].toLowerCase();
         setAttribute(disc, "style", colour(holder));
         setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute("aria-label", !holder ? `Take the ${limbName}` : holder.mine ? `Release the ${limbName}` : `${LIMB_NAMES[limb]}, held by ${holder.name}${asked ? ", asked for" : ""}`);
+        disc.setAttribute("aria-label", !holder ? `Take the ${limbName}` : holder.mine ? `Release the ${limbName}, held by you` : `${LIMB_NAMES[limb]}, held by ${holder.name}${asked ? ", asked for" : ""}`);
         disc.disabled = !ready;
         name.hidden = !holder;
         setText(name, holder?.name ?? "");
