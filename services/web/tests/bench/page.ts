@@ -3,7 +3,7 @@
  * --minutes 3"`. It prints a table with the bound of each figure, and as its last line one JSON object.
  *
  *     arrival  `first_paint_s`: from the navigation's beginning until the graphics are done with the first frame that has the
- *              puppet in it, asked of a fence behind its commands; the median of five browsers started for it. `js_gzip_kb`
+ *              puppet in it, asked of a fence behind its commands; the median of five browsers started for it, with nothing cached. `js_gzip_kb`
  *              and `fonts_kb`: all scripts and fonts that came until a hand had been taken
  *     line     `first_paint_1mbit_s`: the same on a line of 1 Mbit/s and 100 ms, emulated by Chromium itself, sockets too
  *     frames   `frame_ms_p95`: what one call of the page's animation frame takes on the main thread, slowed down four times,

@@ -24,10 +24,15 @@ export interface Visit {
 /** How long a page may take for anything, milliseconds: it is drawn in software. */
 const PATIENCE = 120_000;
 
-/** Calls `use` with a page of a browser started for it, which has been nowhere yet: no cache of any kind is warm. */
+/**
+ * Calls `use` with a page of a browser started for it: nothing of ours was ever there, whether fetched or compiled. That it can
+ * draw has been tried, as a browser that people have open has its graphics process.
+ */
 export async function visit<T>({ chromium }: Bench, options: BrowserContextOptions, use: (visit: Visit) => Promise<T>): Promise<T> {
   const browser = await launch(chromium);
   try {
+    const blank = await browser.newPage();
+    await blank.evaluate(() => document.createElement("canvas").getContext("webgl2")?.finish());
     const page = await browser.newPage({ viewport: { width: 760, height: 480 }, colorScheme: "dark", ...options });
     page.setDefaultTimeout(PATIENCE);
     return await use({ page, protocol: await page.context().newCDPSession(page) });
