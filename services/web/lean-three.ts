@@ -6,13 +6,18 @@ import type { Plugin } from "vite";
  * it has not, which stands behind an `#ifdef` of the feature.
  */
 const UNUSED =
-  /\/((mesh|lights_)(phong|toon|matcap|normal)|(gradientmap|sprite|linedashed|distance|cube|equirect|background|map_particle|transmission|iridescence|lightprobes|batching|fog|displacementmap|bumpmap|alphahash|alphamap|clipping_planes|logdepthbuf|lightmap|dithering)|envmap_(fragment|vertex|pars)|shadow\.)[^/]*\.glsl\.js$/;
+  /\/((mesh|lights_)(phong|toon|matcap|normal)|(gradientmap|sprite|linedashed|distance|cube|equirect|background|map_particle|transmission|iridescence|lightprobes|batching|fog|displacementmap|bumpmap|alphahash|alphamap|clipping_planes|logdepthbuf|lightmap|dithering)|envmap_(fragment|vertex|pars)|shadow(?=\.))[^/]*\.glsl\.js$/;
 
 const SHADER = /\/\* glsl \*\/\s*`([^`$]*)`/g;
 
 /** A shader's text without what is there for its readers. */
 function plain(text: string): string {
   return text.replace(/\/\*[\s\S]*?\*\/|\/\/.*/g, "").replace(/\s*\n\s*/g, "\n");
+}
+
+/** A file of three.js with its shaders' texts made small; `id` is its path. */
+export function lean(code: string, id: string): string {
+  return code.replace(SHADER, (_, text: string) => JSON.stringify(UNUSED.test(id) ? "" : plain(text)));
 }
 
 export const leanThree: Plugin = {
@@ -24,6 +29,6 @@ export const leanThree: Plugin = {
   },
   transform: {
     filter: { id: /\/three\/src\// },
-    handler: (code, id) => ({ code: code.replace(SHADER, (_, text: string) => JSON.stringify(UNUSED.test(id) ? "" : plain(text))), map: null }),
+    handler: (code, id) => ({ code: lean(code, id), map: null }),
   },
 };

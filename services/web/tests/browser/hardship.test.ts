@@ -85,7 +85,11 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
   });
 
   test("whose graphics were taken away says so, and has the same picture when they are back", async () => {
-    const page = await own.open("?quality=best", { viewport: { width: 400, height: 320 }, colorScheme: "dark", reducedMotion: "reduce" });
+    const wrong: string[] = [];
+    const page = await own.open("?quality=best", {
+      viewport: { width: 400, height: 320 }, colorScheme: "dark", reducedMotion: "reduce",
+      before: async (page) => void page.on("console", (said) => said.type() === "error" && wrong.push(said.text())),
+    });
     await danced(page);
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     const before = await picture(page);
@@ -101,6 +105,8 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
     const after = await picture(page);
     const differing = after.filter((value, at) => Math.abs(value - before[at]) > 4).length;
     expect(differing / before.length).toBeLessThan(0.01);
+    // of shaders that do not compile three.js tells the console alone
+    expect(wrong).toEqual([]);
   });
 
   test("asked for less motion starts paused, and nothing glides", async () => {
