@@ -6,9 +6,10 @@
  *              puppet in it, asked of a fence behind its commands; the median of five browsers started for it, with nothing cached. `js_gzip_kb`
  *              and `fonts_kb`: all scripts and fonts that came until a hand had been taken
  *     line     `first_paint_1mbit_s`: the same on a line of 1 Mbit/s and 100 ms, emulated by Chromium itself, sockets too
- *     frames   `frame_ms_p95`: what one call of the page's animation frame takes on the main thread, slowed down four times,
- *              with three limbs pulled and at full quality; of frames that drew. Chromium's own layout and painting comes
- *              after it and is told apart, `rendering_ms_p95`; what draws the picture is another process
+ *     frames   `frame_ms_p95`: what one call of the page's animation frame takes of the main thread, slowed down four times,
+ *              with three limbs pulled and at full quality; of frames that drew. It is the thread's own time out
+ *              of Chromium's trace, so that waiting for a processor that others have does not count; what draws the picture is
+ *              another process, and Chromium's layout and painting after it are not the page's
  *     drawing  `draw_calls` and `triangles` of a frame at full quality, by night, three limbs held: shadows and mirror too
  *     memory   `heap_growth_mb`: of what script holds after garbage was collected, over `--minutes` (30) of playing, pulling,
  *              uploading and opening everything, after a warm-up of the same; nodes and listeners beside it

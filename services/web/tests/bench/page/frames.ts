@@ -24,8 +24,6 @@ const SLOWDOWN = 4;
 const FRAMES = 240;
 /** Drawn before anything is measured: what runs for the first time is compiled. */
 const WARM_UP = 60;
-/** What Chromium does for a frame after the page's own part. */
-const RENDERING = new Set(["UpdateLayoutTree", "Layout", "PrePaint", "Paint", "Layerize", "Commit"]);
 const SMALL = { width: 400, height: 300 };
 
 /** Case frames. */
@@ -51,14 +49,10 @@ function measured(bench: Bench, events: Event[]): Figures {
   const marks = ours.filter(({ name }) => name === "drawn").map(({ ts }) => ts);
   const fired = ours.filter(({ name, dur, tdur }) => name === "FireAnimationFrame" && dur !== undefined && tdur !== undefined);
   const drew = fired.filter(({ ts, dur = 0 }) => marks.some((at) => at >= ts && at <= ts + dur));
-  const after = drew.map(({ ts }) => {
-    const next = fired.find((one) => one.ts > ts)?.ts ?? Infinity;
-    return ours.filter((one) => RENDERING.has(one.name) && one.ts > ts && one.ts < next).reduce((sum, { tdur = 0 }) => sum + tdur / 1000, 0);
-  });
   const work = drew.map(({ tdur = 0 }) => tdur / 1000);
   const wall = drew.map(({ dur = 0 }) => dur / 1000);
   bench.note(`frames: ${drew.length} drew of ${fired.length}; by the clock on the wall, other processes too: median ${rounded(percentile(wall, 50))} ms, p95 ${rounded(percentile(wall, 95))} ms`);
-  return { frame_ms_p95: rounded(percentile(work, 95)), frame_ms_p50: rounded(percentile(work, 50)), rendering_ms_p95: rounded(percentile(after, 95)) };
+  return { frame_ms_p95: rounded(percentile(work, 95)), frame_ms_p50: rounded(percentile(work, 50)) };
 }
 
 /** Waits until so many more frames drew. */
