@@ -11,6 +11,8 @@ import { rounded, visit, type Bench, type Figures } from "./bench";
 const REPOSITORY = resolve(import.meta.dirname, "../../../../..");
 /** Rounds before anything is compared: what is made once is made in them. */
 const WARM_UP = 3;
+/** Rounds between notes of how large the heap is: whether it goes on growing. */
+const NOTED = 5;
 
 interface Left {
   bytes: number;
@@ -32,9 +34,14 @@ export async function memory(bench: Bench): Promise<Figures> {
       const before = await left(protocol);
       const end = performance.now() + bench.minutes * 60_000;
       let rounds = 0;
-      for (; performance.now() < end; rounds++) await round(page, clip);
+      const heaps: number[] = [];
+      for (; performance.now() < end; rounds++) {
+        await round(page, clip);
+        if (rounds % NOTED === 0) heaps.push(rounded((await left(protocol)).bytes / 1e6, 2));
+      }
       const after = await left(protocol);
       bench.note(`memory: ${rounds} rounds in ${bench.minutes} minutes, heap ${rounded(before.bytes / 1e6, 2)} to ${rounded(after.bytes / 1e6, 2)} MB, nodes ${before.nodes} to ${after.nodes}, listeners ${before.listeners} to ${after.listeners}`);
+      bench.note(`memory: heap after every ${NOTED} rounds, MB: ${heaps.join(", ")}`);
       return {
         heap_growth_mb: rounded((after.bytes - before.bytes) / 1e6, 2),
         node_growth: after.nodes - before.nodes,
