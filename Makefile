@@ -12,7 +12,7 @@ BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 # the machine's Node if it is new enough, else the one that setup puts here
 export PATH := $(CURDIR)/.tools/node:$(PATH)
-WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/vite.config.ts services/web/vite.embed.config.ts services/bunraku/codec/prior.json -type f 2>/dev/null)
+WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/vite.config.ts services/web/vite.embed.config.ts services/web/lean-three.ts services/bunraku/codec/prior.json -type f 2>/dev/null)
 
 .PHONY: test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
 
@@ -97,6 +97,10 @@ bench-audio: setup
 # the stack of docker-compose.yml, and what it survives: needs Docker with Compose, about half an hour (ARGUMENTS=--rounds 1)
 verify-compose: setup
 	$(BIN)/python -m tests.verify $(ARGUMENTS)
+
+# how the page does in Chromium: some 40 minutes, 30 of them play for its memory (ARGUMENTS="--only arrival,axe", "--minutes 3")
+bench-page: setup
+	@cd services/web && node --input-type=module --eval 'import { runnerImport } from "vite"; await runnerImport("./tests/bench/page.ts")' -- $(ARGUMENTS)
 
 bench-%: setup
 	$(BIN)/python -m tests.bench.$(subst -,_,$*) $(ARGUMENTS)

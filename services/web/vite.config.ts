@@ -1,5 +1,6 @@
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
+import { leanThree } from "./lean-three.ts";
 
 /** The stage's chunk is fetched beside the page's script, and not only once that runs. */
 const preloadTheatre: Plugin = {
@@ -14,7 +15,7 @@ const preloadTheatre: Plugin = {
 };
 
 export default defineConfig({
-  plugins: [preloadTheatre],
+  plugins: [preloadTheatre, leanThree],
   build: {
     outDir: "../bunraku/page",
     emptyOutDir: true,

@@ -12,6 +12,7 @@ import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { VelocityInputs } from "./input/velocity";
 import { goOn, leave } from "./left";
 import { Listening } from "./listening";
+import { isolated } from "./page/format";
 import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
 import { createPage } from "./page/page";
@@ -90,7 +91,7 @@ const page = createPage(document.body, {
   picture,
   download: (piece, format) => void exporting.download(piece, format),
   remove: (piece) => {
-    if (confirm(say("Remove \"{name}\" from the library?", piece))) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
+    if (confirm(say("Remove \"{name}\" from the library?", { name: isolated(piece.name) }))) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
   },
   toggle: (limb) => holding.toggle(limb),
   ask: (limb) => holding.ask(limb),
@@ -284,6 +285,8 @@ async function openStage(): Promise<void> {
     page.notice(say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
     return;
   }
+  canvas.addEventListener("webglcontextlost", () => page.notice(say("The stage went dark"), say("The graphics were taken away; they come back by themselves. If they do not, load the page again.")));
+  canvas.addEventListener("webglcontextrestored", () => page.notice(null));
   const { commands } = performing;
   ({ stage, hands, velocity } = performing);
   stage.still = calm.matches;

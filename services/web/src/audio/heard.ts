@@ -24,9 +24,14 @@ export class HeardClock {
     return this.told.length > 0;
   }
 
+  /** Whether what the device would tell at `nowMs` counts: to ask it takes time. */
+  due(nowMs: number): boolean {
+    return nowMs - this.last >= SOON;
+  }
+
   /** At `pageMs` of the page's clock the device puts out what is at `contextSeconds` of its own; told at `nowMs`. */
   sample(contextSeconds: number, pageMs: number, nowMs: number): void {
-    if (nowMs - this.last < SOON) return;
+    if (!this.due(nowMs)) return;
     this.last = nowMs;
     const first = !this.ready;
     this.told.push(pageMs * 1000 - contextSeconds * 1e6);

@@ -122,8 +122,10 @@ export class AudioPlayer {
 
   /** Asks the device what it puts out now. */
   private listen(): void {
+    const now = this.now();
+    if (!this.heard.due(now)) return;
     const { contextTime = 0, performanceTime = 0 } = this.context.getOutputTimestamp();
-    if (contextTime > 0 && performanceTime > 0) this.heard.sample(contextTime, performanceTime, this.now());
+    if (contextTime > 0 && performanceTime > 0) this.heard.sample(contextTime, performanceTime, now);
   }
 
   /** Forgets all that was put out for later, as the device stands still. */

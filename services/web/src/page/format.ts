@@ -1,8 +1,16 @@
-/** Numbers as people read them. */
+/** Numbers and names as people read them. */
 
 import type { UploadProgress } from "../client/library";
 import { decimal } from "../words/numbers";
 import { series, say } from "../words/say";
+
+/** What turns the direction of writing, until it is ended. */
+const TURNS = /[\u202a-\u202e\u2066-\u2069]/;
+
+/** A name that others gave, within other words: what turns in it turns nothing beside it. */
+export function isolated(name: string): string {
+  return TURNS.test(name) ? `\u2068${name}\u2069` : name;
+}
 
 /** Seconds as m:ss, or h:mm:ss. */
 export function clockTime(seconds: number): string {

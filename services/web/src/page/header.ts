@@ -1,9 +1,8 @@
 /** Seal, wordmark and piece; who is here, the link to share, keys, theme. */
 import { element, setText } from "./dom";
-import { initial } from "./format";
+import { initial, isolated } from "./format";
 import { icon } from "./icons";
 import type { Presence } from "./model";
-import { seal } from "./seal";
 import type { Theme } from "../stage/look";
 import { decimal } from "../words/numbers";
 import { language, series, say } from "../words/say";
@@ -19,8 +18,8 @@ export interface Header {
 
 export function createHeader(root: HTMLElement, on: { share(): void; keys(): void; language(): void; theme(): void }): Header {
   const piece = element("span", { class: "brand-piece" });
-  const brand = element("a", { class: "brand", href: location.pathname, "aria-label": say("Bunraku, home") }, seal());
-  brand.append(element("span", {}, element("b", { class: "brand-name" }, "Bunraku"), piece));
+  const brand = element("a", { class: "brand", href: location.pathname, title: say("Home") }, element("span", { class: "seal" }));
+  brand.append(element("span", {}, element("b", { class: "brand-name" }, element("span", { class: "sr-only" }, "Bunraku")), piece));
   const count = element("span", { class: "people-count" });
   const avatars = element("span", { class: "avatars" });
   const people = element("div", { class: "people", role: "group", hidden: true }, count, avatars);
@@ -33,7 +32,7 @@ export function createHeader(root: HTMLElement, on: { share(): void; keys(): voi
   return {
     piece(name) {
       setText(piece, name);
-      document.title = name ? `${name} - Bunraku` : "Bunraku";
+      document.title = name ? `${isolated(name)} - Bunraku` : "Bunraku";
     },
     people(presence, self) {
       people.hidden = !presence || (presence.viewers < 1 && presence.puppeteers.length === 0);

@@ -7,7 +7,7 @@ import { clockTime, makingProgress, uploadProgress } from "./format";
 import { icon, motionGlyph } from "./icons";
 import { createPanel, type Panel } from "./panels";
 import { percent } from "../words/numbers";
-import { series, say } from "../words/say";
+import { say, sayAround, series } from "../words/say";
 
 export interface Piece {
   id: string;
@@ -90,7 +90,7 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
       return { doing: (words, done) => show(done, words), remove };
     },
     problem(name, title, detail, hint) {
-      const box = element("div", { class: "problem" }, element("b", {}, say("{name}: {title}", { name, title })), element("p", {}, detail));
+      const box = element("div", { class: "problem" }, element("b", {}, ...sayAround("{name}: {title}", { name: element("bdi", {}, name), title })), element("p", {}, detail));
       if (hint) box.append(element("p", { class: "muted" }, hint));
       box.append(element("button", { class: "text-button", type: "button", onClick: () => box.remove() }, say("Dismiss")));
       said.replaceChildren(box);

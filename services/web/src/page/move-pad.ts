@@ -40,8 +40,9 @@ export function createMovePad(limb: number, press: (input: DigitalInput, down: b
 function button(input: DigitalInput, set: (input: DigitalInput, down: boolean) => void): HTMLButtonElement {
   const way = wayName(input);
   const said = say(way);
-  const made = element("button", { class: "move", type: "button", "aria-label": said.charAt(0).toUpperCase() + said.slice(1) });
-  made.append(way === "nearer" ? say("Near") : way === "further" ? say("Far") : icon(way));
+  const name = said.charAt(0).toUpperCase() + said.slice(1);
+  const made = element("button", { class: "move", type: "button", "aria-label": name });
+  made.append(way === "nearer" || way === "further" ? name : icon(way));
   let pressed = false;
   const change = (to: boolean) => {
     pressed = to;

@@ -76,7 +76,7 @@ export function createPlot({ label, ink, least, filled = false }: PlotOptions): 
   const note = element("div", { class: "plot-note" });
   const goalLine = shape("path", { class: "goal" });
   const trace = shape("path", { class: filled ? "area" : "trace" });
-  const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img" });
+  const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img", "aria-label": say("{label}, nothing yet", { label }) });
   svg.append(goalLine, trace, shape("path", { class: "base", d: `M0 ${HEIGHT + 0.5}H${WIDTH}` }));
   const plot = element("div", { class: "plot", style: `--ink: ${ink}` }, element("div", { class: "plot-label" }, label), value);
   plot.append(svg, note);

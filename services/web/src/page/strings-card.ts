@@ -100,7 +100,7 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
         const limbName = say(LIMB_NAMES[limb]).toLowerCase();
         setAttribute(disc, "style", colour(holder));
         setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute("aria-label", !holder ? say("Take the {limb}", { limb: limbName }) : holder.mine ? say("Release the {limb}", { limb: limbName }) : say(asked ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", { limb: say(LIMB_NAMES[limb]), name: holder.name }));
+        disc.setAttribute("aria-label", !holder ? say("Take the {limb}", { limb: limbName }) : holder.mine ? say("Release the {limb}, held by you", { limb: limbName }) : say(asked ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", { limb: say(LIMB_NAMES[limb]), name: holder.name }));
         disc.disabled = !ready;
         name.hidden = !holder;
         setText(name, holder?.name ?? "");

@@ -23,27 +23,46 @@ const SIDE = 8;
 
 /**
  * The places of `labels`, in their order, null for null. `keep` are boxes that nothing may cover beside the bars, `before` what this told of the frame before;
- * the picture is `width` wide, and `top` is where it begins. Where there is no room left, the place that covers least.
+ * the picture is `width` wide, and `top` is where it begins. The first labels have the first choice. Where there is not room for all, each covers as little as
+ * it can.
  */
 export function layLabels(labels: readonly (Label | null)[], keep: readonly Box[], before: readonly (Laid | null)[], width: number, top: number): (Laid | null)[] {
   const taken = [...keep, ...labels.flatMap((label) => label?.bar ?? [])];
-  return labels.map((label, nth) => {
-    if (!label) return null;
+  const choices = labels.map((label, nth) => {
     const last = before[nth]?.place ?? 0;
-    let best: Laid | null = null;
-    let least = Infinity;
-    for (const [place, box] of placesOf(label, width).entries()) {
-      const margin = place < last ? MORE : 0;
-      // what leaves the picture covers as much as it is out of it
-      const out = Math.max(0, top - box.top) * label.width;
-      const covered = taken.reduce((sum, other) => sum + overlap(box, other, margin), out);
-      if (covered >= least) continue;
-      [best, least] = [{ box, place }, covered];
-      if (covered === 0) break;
-    }
-    if (best) taken.push(best.box);
-    return best;
+    return label && placesOf(label, width).map((box, place): Choice => ({ box, place, margin: place < last ? MORE : 0, out: Math.max(0, top - box.top) * label.width }));
   });
+  const laid = layFree(choices, taken);
+  if (laid) return laid;
+  return choices.map((places) => {
+    if (!places) return null;
+    const [best] = places.map((choice) => ({ choice, covered: covered(choice, taken) })).sort((a, b) => a.covered - b.covered);
+    const { box, place } = best.choice;
+    taken.push(box);
+    return { box, place };
+  });
+}
+
+/** A place by a bar, what it has to be free by, and how much of it is out of the picture. */
+interface Choice extends Laid {
+  margin: number;
+  out: number;
+}
+
+/** The first choices that together cover nothing, null where there are none: at most four names of eight places each are tried. */
+function layFree([places, ...others]: readonly (readonly Choice[] | null)[], taken: readonly Box[]): (Laid | null)[] | null {
+  if (places === undefined) return [];
+  for (const choice of places ?? [null]) {
+    if (choice && covered(choice, taken) > 0) continue;
+    const rest = layFree(others, choice ? [...taken, choice.box] : taken);
+    if (rest) return [choice && { box: choice.box, place: choice.place }, ...rest];
+  }
+  return null;
+}
+
+/** How much a place covers of what is taken. */
+function covered({ box, margin, out }: Choice, taken: readonly Box[]): number {
+  return taken.reduce((sum, other) => sum + overlap(box, other, margin), out);
 }
 
 /** Above the bar, above it to either side, beside it, and once more above all that. */

@@ -10,15 +10,20 @@ export class FrameGate {
     this.#context = context;
   }
 
-  /** Whether the frame before has been drawn. */
+  /** Whether the frame before has been drawn, and one can be. */
   get open(): boolean {
     const gl = this.#context;
+    if (gl.isContextLost()) return false;
     if (!this.#fence) return true;
-    if (gl.isContextLost()) this.#fence = null;
-    else if (gl.getSyncParameter(this.#fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
-    if (this.#fence) gl.deleteSync(this.#fence);
+    if (gl.getSyncParameter(this.#fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(this.#fence);
     this.#fence = null;
     return true;
+  }
+
+  /** The context was lost and is there again: what was waited for went with it. */
+  reset(): void {
+    this.#fence = null;
   }
 
   /** Call right after drawing. */

@@ -74,6 +74,8 @@ export class Stage {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.#scenery.group.add(createBackdrop(this.#backdrop), this.#floor.mesh);
+    // three.js' own listener stands before this one: its side of the context is there again by then
+    canvas.addEventListener("webglcontextrestored", () => this.#restore());
     this.rig.group.add(this.audience.camera, this.#lights.group, this.#scenery.group);
     this.scene.add(this.rig.group, this.strings.group);
     this.#furnish();
@@ -108,8 +110,7 @@ export class Stage {
     dressBackdrop(this.#backdrop, this.#look);
     this.#floor.dress(this.#look);
     this.#lights.dress(this.#look);
-    this.scene.environment?.dispose();
-    this.scene.environment = this.#quality.quality.plain ? null : studio(this.renderer, this.#look);
+    this.#light();
     this.renderer.toneMappingExposure = this.#look.exposure;
     this.#furnish();
   }
@@ -263,6 +264,19 @@ export class Stage {
     const [radius, height] = this.#framing === "desktop" || this.#framing === "alone" ? [1.06, 1.3] : [0.98, 1.36];
     this.#backdrop.discRadius.value = radius * this.audience.scale;
     this.#backdrop.discCentre.value.set(0, height * this.audience.scale);
+  }
+
+  #light(): void {
+    this.scene.environment?.dispose();
+    this.scene.environment = this.#quality.quality.plain ? null : studio(this.renderer, this.#look);
+  }
+
+  /** The graphics context was lost and is there again. What was uploaded is by three.js, but not what was drawn for later. */
+  #restore(): void {
+    this.#light();
+    this.#gate.reset();
+    this.#quality.restart();
+    this.#sinceDrawn = 0;
   }
 
   #setSize(): void {

@@ -13,6 +13,9 @@ export const JAPANESE = {
     "金箔の円を背に、舞台で踊る木の人形。糸のボタンか1〜4のキーで、手足を持って動かせます。",
   "This browser cannot draw the stage": "このブラウザでは舞台を表示できません",
   "It needs WebGL 2. Try another browser, or switch on hardware acceleration.": "WebGL 2が必要です。別のブラウザで開くか、ハードウェアアクセラレーションを有効にしてください。",
+  "The stage went dark": "舞台が暗くなりました",
+  "The graphics were taken away; they come back by themselves. If they do not, load the page again.":
+    "描画が中断されました。自動で戻ります。戻らないときはページを再読み込みしてください。",
   "The stage is empty": "舞台は空いています",
   "Nobody dances here now. Come again when somebody does.": "いまは上演していません。また後でお越しください。",
   "Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it.":
@@ -30,7 +33,7 @@ export const JAPANESE = {
     "舞台のサーバーはこのサイトを許可していません。サーバーの管理者が許可できます：BUNRAKU_ORIGINS={origin}",
   "Its server cannot be reached now. It is tried again and again.": "いまサーバーに接続できません。自動で再接続します。",
   // header
-  "Bunraku, home": "Bunraku ホーム",
+  "Home": "ホーム",
   "Share link": "リンクを共有",
   "Link copied": "リンクをコピーしました",
   "Link copied: who has it may watch, for a week": "リンクをコピーしました。1週間、リンクを知っている人が観られます",
@@ -131,7 +134,7 @@ export const JAPANESE = {
   "Ask for {limb}": "{limb}を希望する",
   "Ask no longer for {limb}": "{limb}の希望を取り消す",
   "Take the {limb}": "{limb}を持つ",
-  "Release the {limb}": "{limb}を放す",
+  "Release the {limb}, held by you": "{limb}を放す（あなたが持っています）",
   "Move the {limb}": "{limb}を動かす",
   "Give the {limb} to {name}": "{limb}を{name}さんに譲る",
   "Free": "空き",
@@ -161,8 +164,6 @@ export const JAPANESE = {
   "down": "下",
   "nearer": "手前",
   "further": "奥",
-  "Near": "手前",
-  "Far": "奥",
   // line
   "Line": "回線",
   "Rate": "レート",
@@ -195,6 +196,7 @@ export const JAPANESE = {
   "{count} messages could not be read": "読み取れないメッセージが{count}件あります",
   "waiting for the first block": "最初のブロックを待っています",
   "waiting for a block": "ブロックを待っています",
+  "{label}, nothing yet": "{label}、データなし",
   // why a line ends
   "closed here": "こちらで閉じました",
   "closed with code {code}": "コード{code}で閉じられました",

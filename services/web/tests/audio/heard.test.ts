@@ -48,3 +48,12 @@ test("one wrong telling among right ones changes nothing", () => {
   for (let nth = 0; nth < 30; nth++) heard.sample(nth / 20, nth * 50 + (nth === 20 ? 400 : 0), nth * 50);
   expect(heard.frameAt(1_450) / 48).toBeCloseTo(1_450, 6);
 });
+
+test("the device is due to be asked again some milliseconds after it has told", () => {
+  const heard = new HeardClock();
+  expect(heard.due(0)).toBe(true);
+  heard.sample(1, 5_000, 5_000);
+  expect([heard.due(5_000), heard.due(5_011), heard.due(5_012)]).toEqual([false, false, true]);
+  heard.clear();
+  expect(heard.due(5_001)).toBe(true);
+});

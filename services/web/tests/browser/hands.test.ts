@@ -106,8 +106,11 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
       });
     const page = await own.open("?name=Kiku", { ...CALM, before });
     await ready(page);
-    await pad(page, { axis: [1, -0.9] });
+    // wherever the dance stands still, there is room towards the shoulder's height
+    const wrist = await height(page, "l_wrist");
+    await pad(page, { axis: [1, wrist < (await height(page, "l_shoulder")) ? -0.9 : 0.9] });
     await holds(page, LEFT_HAND);
+    await page.waitForFunction(moved, { from: wrist, least: 0.05 });
     await pad(page, { axis: [1, 0] });
     await letGo(page, LEFT_HAND);
 

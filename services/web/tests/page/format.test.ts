@@ -1,10 +1,14 @@
 import { describe, expect, test } from "vitest";
-import { byteCount, clockTime, figure, initial, makingProgress, pieceName, uploadProgress } from "../../src/page/format";
+import { byteCount, clockTime, figure, initial, isolated, makingProgress, pieceName, uploadProgress } from "../../src/page/format";
 
 describe("figures for people", () => {
   test("times", () => {
     expect([0, 9.99, 87, 204, 3671].map(clockTime)).toEqual(["0:00", "0:09", "1:27", "3:24", "1:01:11"]);
     expect([-1, Number.NaN, Infinity].map(clockTime)).toEqual(["0:00", "0:00", "0:00"]);
+  });
+
+  test("names, of which none turns what stands beside it", () => {
+    expect(["Sanbasō", "<b>", "\u202egnp.", "\u2067a\u2069"].map(isolated)).toEqual(["Sanbasō", "<b>", "\u2068\u202egnp.\u2069", "\u2068\u2067a\u2069\u2069"]);
   });
 
   test("bytes", () => {

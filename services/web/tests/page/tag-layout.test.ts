@@ -53,6 +53,7 @@ describe("names by their bars", () => {
           expect([...bars, face, ...laid.filter((_, k) => k !== nth)].some((other) => covers(box, other))).toBe(false);
         });
       }),
+      { examples: [[[[766, 208], [976, 208], [250, 150], [867, 215]]], [[[648, 150], [518, 210], [250, 210], [351, 217]]]] },
     );
   });
 

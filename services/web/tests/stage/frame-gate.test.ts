@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { FrameGate } from "../../src/stage/frame-gate";
 
-/** The five calls of a WebGL 2 context that the gate makes, over a queue this test drains by hand. */
+/** The calls of a WebGL 2 context that the gate makes, over a queue this test drains by hand. */
 class Queue {
   readonly SYNC_STATUS = 1;
   readonly SIGNALED = 2;
@@ -37,10 +37,16 @@ test("opens when the frame before is drawn, and keeps no fence behind", () => {
   expect(queue.alive).toBe(0);
 });
 
-test("a lost context does not shut it for good", () => {
+test("is shut while the context is lost, and not for good", () => {
   const queue = new Queue();
   const gate = new FrameGate(queue as unknown as WebGL2RenderingContext);
   gate.close();
   queue.lost = true;
+  queue.done = true;
+  expect(gate.open).toBe(false);
+  // a fence of the context before never says anything again
+  [queue.lost, queue.done] = [false, false];
+  expect(gate.open).toBe(false);
+  gate.reset();
   expect(gate.open).toBe(true);
 });

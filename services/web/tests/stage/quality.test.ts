@@ -25,3 +25,11 @@ test("a software renderer starts lower, unless the best is asked for", () => {
   expect(new QualityChoice("ANGLE (Google, Vulkan 1.3 (SwiftShader Device))", true).quality.plain).toBe(false);
   expect(new QualityChoice("ANGLE (Apple M2)", false).quality.plain).toBe(false);
 });
+
+test("frames after a new start are no measure, as shaders are compiled in them", () => {
+  const choice = new QualityChoice("", false);
+  run(choice, 1 / 60, 100);
+  choice.restart();
+  expect(run(choice, 2, 3)).toBe(0);
+  expect(run(choice, 2, 1)).toBe(2);
+});

@@ -26,7 +26,7 @@ export function addArms(assembly: Assembly): void {
     assembly.add(lathe(shoulderAt, elbowAt, UPPER_ARM), shoulder, FINISH.limb);
     assembly.add(ball(elbowAt, 0.036), shoulder, FINISH.jointBall);
     assembly.add(lathe(elbowAt, wristAt, FOREARM), elbow, FINISH.limb);
-    assembly.add(ball(wristAt, 0.0245), elbow, FINISH.jointBall);
+    assembly.add(ball(wristAt, 0.0245, [1, 1, 1], 10), elbow, FINISH.jointBall);
     assembly.add(ring(shoulderAt.clone().lerp(elbowAt, 0.862), upperAxis, 0.115 * upper, 0.0034), shoulder, FINISH.gold);
     assembly.add(ring(elbowAt.clone().lerp(wristAt, 0.118), foreAxis, 0.129 * fore, 0.0034), elbow, FINISH.gold);
     assembly.add(ring(elbowAt.clone().lerp(wristAt, 0.893), foreAxis, 0.0945 * fore, 0.003), elbow, FINISH.gold);

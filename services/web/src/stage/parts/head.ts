@@ -73,7 +73,7 @@ export function addHead(assembly: Assembly): void {
     FINISH.face,
   );
   for (const sign of [1, -1]) {
-    assembly.add(ball(new Vector3(0.002 + sign * 0.0775, 1.628, 0.01), 0.017, [0.42, 1.25, 0.85]), "skullbase", FINISH.gofun);
+    assembly.add(ball(new Vector3(0.002 + sign * 0.0775, 1.628, 0.01), 0.017, [0.42, 1.25, 0.85], 10), "skullbase", FINISH.gofun);
   }
   addHair(assembly);
 }

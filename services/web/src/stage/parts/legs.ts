@@ -54,7 +54,7 @@ export function addLegs(assembly: Assembly): void {
       calf.positions[i + 2] -= 0.014 * Math.exp(-(((t - 0.33) / 0.2) ** 2));
     }
     assembly.add(calf, knee, FINISH.limb);
-    assembly.add(ball(ankleAt, 0.029), knee, FINISH.jointBall);
+    assembly.add(ball(ankleAt, 0.029, [1, 1, 1], 10), knee, FINISH.jointBall);
     assembly.add(ring(hipAt.clone().lerp(kneeAt, 0.899), thighAxis, 0.094 * thigh, 0.003), hip, FINISH.gold);
     assembly.add(ring(kneeAt.clone().lerp(ankleAt, 0.094), shinAxis, 0.096 * shin, 0.003), knee, FINISH.gold);
     assembly.add(ring(kneeAt.clone().lerp(ankleAt, 0.9), shinAxis, 0.0695 * shin, 0.0028), knee, FINISH.gold);

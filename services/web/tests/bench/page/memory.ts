@@ -1,0 +1,117 @@
+/** What half an hour of play leaves behind: case `memory`. */
+import { execFileSync } from "node:child_process";
+import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import type { CDPSession, Page } from "playwright-core";
+import { danced, holds, LEFT_HAND, letGo, ringOf, settled, welcomed } from "../../browser/inside";
+import { sharedFolder } from "../../browser/server";
+import { rounded, visit, type Bench, type Figures } from "./bench";
+
+const REPOSITORY = resolve(import.meta.dirname, "../../../../..");
+/** Rounds before anything is compared: what is made once is made in them. */
+const WARM_UP = 3;
+/** Rounds between notes of how large the heap is: whether it goes on growing. */
+const NOTED = 5;
+
+interface Left {
+  bytes: number;
+  nodes: number;
+  listeners: number;
+}
+
+/** After a warm-up of the same. */
+export async function memory(bench: Bench): Promise<Figures> {
+  const folder = mkdtempSync(join(tmpdir(), "bunraku-bench-"));
+  try {
+    const clip = clipFor(folder);
+    return await visit(bench, {}, async ({ page, protocol }) => {
+      page.on("dialog", (dialog) => void dialog.accept());
+      await page.goto(bench.url);
+      await danced(page);
+      await welcomed(page);
+      for (let nth = 0; nth < WARM_UP; nth++) await round(page, clip);
+      const before = await left(protocol);
+      const end = performance.now() + bench.minutes * 60_000;
+      let rounds = 0;
+      const heaps: number[] = [];
+      for (; performance.now() < end; rounds++) {
+        await round(page, clip);
+        if (rounds % NOTED === 0) heaps.push(rounded((await left(protocol)).bytes / 1e6, 2));
+      }
+      const after = await left(protocol);
+      bench.note(`memory: ${rounds} rounds in ${bench.minutes} minutes, heap ${rounded(before.bytes / 1e6, 2)} to ${rounded(after.bytes / 1e6, 2)} MB, nodes ${before.nodes} to ${after.nodes}, listeners ${before.listeners} to ${after.listeners}`);
+      bench.note(`memory: heap after every ${NOTED} rounds, MB: ${heaps.join(", ")}`);
+      return {
+        heap_growth_mb: rounded((after.bytes - before.bytes) / 1e6, 2),
+        node_growth: after.nodes - before.nodes,
+        listener_growth: after.listeners - before.listeners,
+        memory_rounds: rounds,
+      };
+    });
+  } finally {
+    rmSync(folder, { recursive: true, force: true });
+  }
+}
+
+/** A real clip where there is one, else our own dance as our own writer writes it. */
+function clipFor(folder: string): string {
+  const shared = join(sharedFolder() ?? folder, "mocap/bvh/mass_walk.bvh");
+  if (existsSync(shared)) return shared;
+  const own = join(folder, "own.bvh");
+  const script = "import sys; from bunraku.motion import choreography, writers; sys.stdout.buffer.write(writers.write_bvh(choreography.dance()))";
+  writeFileSync(own, execFileSync(join(REPOSITORY, ".venv/bin/python"), ["-c", script], { maxBuffer: 1 << 26 }));
+  return own;
+}
+
+/** What is left once all that can be freed is. */
+async function left(protocol: CDPSession): Promise<Left> {
+  await protocol.send("HeapProfiler.enable");
+  for (let nth = 0; nth < 3; nth++) await protocol.send("HeapProfiler.collectGarbage");
+  const { usedSize: bytes } = await protocol.send("Runtime.getHeapUsage");
+  const { nodes, jsEventListeners: listeners } = await protocol.send("Memory.getDOMCounters");
+  return { bytes, nodes, listeners };
+}
+
+/** Everything that people do on a page, once; it is left as it was. */
+async function round(page: Page, clip: string): Promise<void> {
+  const press = (name: string) => page.getByRole("button", { name, exact: true }).click();
+  await press("Pause");
+  await page.getByRole("button", { name: "Play", exact: true }).waitFor();
+  const ring = await settled(page, () => ringOf(page, LEFT_HAND), 0.5);
+  await page.mouse.move(ring.x, ring.y);
+  await page.mouse.down();
+  await page.mouse.move(ring.x + 40, ring.y + 40, { steps: 8 });
+  await holds(page, LEFT_HAND);
+  await page.mouse.up();
+  await letGo(page, LEFT_HAND);
+  await press("Play");
+  await page.keyboard.press("Digit2");
+  await holds(page, LEFT_HAND);
+  await page.keyboard.press("KeyW", { delay: 300 });
+  await page.keyboard.press("Escape");
+  await letGo(page, LEFT_HAND);
+  for (const panel of ["Strings", "Line"]) {
+    await press(panel);
+    await page.getByRole("complementary", { name: panel }).waitFor();
+    await press(`Close ${panel.toLowerCase()}`);
+  }
+  await page.keyboard.press("Shift+Slash");
+  await page.getByRole("dialog", { name: "Keys and gamepad" }).waitFor();
+  await page.keyboard.press("Escape");
+  await page.getByRole("slider", { name: "Seek" }).press("Home");
+  for (const theme of ["Light theme", "Dark theme"]) await press(theme);
+  // a dance comes, is danced, and goes
+  const before = await page.locator(".brand-piece").innerText();
+  await page.locator("input[type=file]").setInputFiles(clip);
+  await page.waitForFunction((before) => document.querySelector(".brand-piece")?.textContent !== before, before);
+  await danced(page);
+  const name = await page.locator(".brand-piece").innerText();
+  await page.locator(".motion", { hasText: before }).click();
+  await page.waitForFunction((before) => document.querySelector(".brand-piece")?.textContent === before, before);
+  await danced(page);
+  await page.getByRole("button", { name: `Remove ${name}` }).focus();
+  await page.keyboard.press("Enter");
+  await page.locator(".motion", { hasText: name }).waitFor({ state: "detached" });
+  await press("Close library");
+}
