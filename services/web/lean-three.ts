@@ -6,7 +6,7 @@ import type { Plugin } from "vite";
  * it has not, which stands behind an `#ifdef` of the feature.
  */
 const UNUSED =
-  /\/((mesh|lights_)(phong|toon|matcap|normal)|(gradientmap|sprite|linedashed|distance|cube|equirect|background|map_particle|transmission|iridescence|lightprobes|batching|fog|displacementmap|bumpmap|alphahash|alphamap|clipping_planes|logdepthbuf|lightmap|dithering)|envmap_(fragment|vertex|pars)|shadow(?=\.))[^/]*\.glsl\.js$/;
+  /\/((mesh|lights_)(phong|toon|matcap|normal)|(gradientmap|sprite|linedashed|distance|equirect|background|map_particle|transmission|iridescence|lightprobes|batching|fog|displacementmap|bumpmap|alphahash|alphamap|clipping_planes|logdepthbuf|lightmap|dithering)|envmap_(fragment|vertex|pars)|shadow(?=\.))[^/]*\.glsl\.js$/;
 
 const SHADER = /\/\* glsl \*\/\s*`([^`$]*)`/g;
 

@@ -87,7 +87,7 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
   test("whose graphics were taken away says so, and has the same picture when they are back", async () => {
     const wrong: string[] = [];
     const page = await own.open("?quality=best", {
-      viewport: { width: 400, height: 320 }, colorScheme: "dark", reducedMotion: "reduce",
+      viewport: { width: 260, height: 220 }, colorScheme: "dark", reducedMotion: "reduce",
       before: async (page) => void page.on("console", (said) => said.type() === "error" && wrong.push(said.text())),
     });
     await danced(page);
@@ -173,7 +173,7 @@ function picture(page: Page): Promise<number[]> {
         let drawn = 0;
         renderer.render = (scene, camera) => {
           render.call(renderer, scene, camera);
-          if (scene !== stage.scene || ++drawn < 4) return;
+          if (scene !== stage.scene || ++drawn < 2) return;
           renderer.render = render;
           const gl = renderer.getContext();
           const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
