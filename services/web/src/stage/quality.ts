@@ -46,6 +46,12 @@ export class QualityChoice {
     return QUALITIES[this.#level];
   }
 
+  /** The next frames are no measure: the machine was busy with something else. */
+  forgive(): void {
+    this.#times.length = 0;
+    this.#toSkip = WARM_UP;
+  }
+
   /** Takes the seconds since the frame before; true when the quality has just been stepped down. Never steps up by itself. */
   frame(seconds: number): boolean {
     if (this.#pinned) return false;

@@ -25,3 +25,14 @@ test("a software renderer starts lower, unless the best is asked for", () => {
   expect(new QualityChoice("ANGLE (Google, Vulkan 1.3 (SwiftShader Device))", true).quality.plain).toBe(false);
   expect(new QualityChoice("ANGLE (Apple M2)", false).quality.plain).toBe(false);
 });
+
+test("frames after the machine was busy with something else are no measure", () => {
+  const choice = new QualityChoice("GPU", false);
+  for (let i = 0; i < 3; i++) choice.frame(0.01);
+  for (let i = 0; i < 5; i++) choice.frame(0.2);
+  choice.forgive();
+  for (let i = 0; i < 3; i++) expect(choice.frame(2)).toBe(false);
+  expect(choice.frame(0.01)).toBe(false);
+  expect(choice.quality).toBe(QUALITIES[0]);
+  expect(choice.frame(2)).toBe(true);
+});
