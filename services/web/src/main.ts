@@ -73,7 +73,7 @@ const page = createPage(document.body, {
   volume: (volume) => (listening.volume = volume),
   ...(may("ingest") ? { keep: keepThis({
     keep: (session, called) => keep(session, { name: called, camera: cameraMoves() }),
-    toast: (message, action) => page.toast(message, action),
+    toast: (message, ...actions) => page.toast(message, ...actions),
     session: () => room && { id: room.id, piece: pieces.find(room.viewer.motion)?.name ?? "" },
     puppeteer: name,
     kept: async () => {
@@ -81,6 +81,10 @@ const page = createPage(document.body, {
       renderPieces();
     },
     choose: (motion) => void choose(motion),
+    download: (motion) => {
+      page.panels.open("library");
+      page.library.disclose(motion);
+    },
   }) } : {}),
   files: (files) => {
     if (!may("ingest")) return;

@@ -1,4 +1,4 @@
-/** A glTF 2.0 asset put together piece by piece, and its one file, GLB (https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html). */
+/** A glTF 2.0 asset put together piece by piece, and its one file, GLB (Khronos, glTF 2.0 specification). */
 
 const COMPONENTS = new Map<unknown, number>([[Uint8Array, 5121], [Uint16Array, 5123], [Uint32Array, 5125], [Float32Array, 5126]]);
 const WIDTHS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 } as const;

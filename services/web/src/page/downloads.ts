@@ -14,6 +14,8 @@ export const FORMATS: readonly { format: Format; label: string; what: Plain; tol
 export interface Downloads {
   readonly button: HTMLElement;
   readonly choices: HTMLElement;
+  /** Shows the choices and goes to the first of them. */
+  disclose(): void;
 }
 
 /** The downloads of the dance of this `name`, disclosed or not; `told` when that changes. Escape shuts them. */
@@ -45,5 +47,12 @@ export function createDownloads(name: string, disclosed: boolean, told: (disclos
   button.addEventListener("keydown", escape);
   choices.addEventListener("keydown", escape);
   show();
-  return { button, choices };
+  return {
+    button,
+    choices,
+    disclose() {
+      set(true);
+      choices.querySelector("button")?.focus();
+    },
+  };
 }

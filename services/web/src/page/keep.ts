@@ -17,17 +17,19 @@ export interface KeepOptions {
   /** The new motion is in the library. */
   kept(motion: Motion): Promise<void>;
   choose(id: string): void;
+  /** Shows what the new motion may be downloaded as. */
+  download(id: string): void;
 }
 
 /** What the page's control calls: settled when it is done, or given up and the person told why. */
-export function keepThis({ keep, toast, session, puppeteer, kept, choose }: KeepOptions): () => Promise<void> {
+export function keepThis({ keep, toast, session, puppeteer, kept, choose, download }: KeepOptions): () => Promise<void> {
   return async () => {
     const now = session();
     if (!now) return;
     try {
       const motion = await keep(now.id, keptName(now.piece, puppeteer));
       await kept(motion);
-      toast(say("Kept: {name}", { name: motion.name }), { label: say("Dance it"), act: () => choose(motion.id) });
+      toast(say("Kept: {name}", { name: motion.name }), { label: say("Dance it"), act: () => choose(motion.id) }, { label: say("Download"), act: () => download(motion.id) });
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
       toast(say("{title}: {detail}", error));

@@ -2,7 +2,7 @@
 import type { UploadProgress } from "../client/library";
 import type { Format } from "../export/file";
 import { element, setAttribute, setText } from "./dom";
-import { createDownloads } from "./downloads";
+import { createDownloads, type Downloads } from "./downloads";
 import { clockTime, makingProgress, uploadProgress } from "./format";
 import { icon, motionGlyph } from "./icons";
 import { createPanel, type Panel } from "./panels";
@@ -36,6 +36,8 @@ export interface Library {
   pieces(pieces: readonly Piece[], current: string | null): void;
   upload(name: string, cancel: () => void): UploadRow;
   download(name: string, cancel: () => void): DownloadRow;
+  /** Shows what a dance of the list may be downloaded as. */
+  disclose(id: string): void;
   problem(name: string, title: string, detail: string, hint: string | null): void;
 }
 
@@ -56,11 +58,13 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
   const empty = element("p", { class: "empty", hidden: true }, say("No dances yet. Drop a motion capture file anywhere on this page and the puppet dances it."));
   /** The dance whose downloads are disclosed. */
   let disclosed: string | null = null;
+  const downloads = new Map<string, Downloads>();
   panel.body.append(drop, picker, doing, said, list, empty);
   return {
     panel,
     pieces(pieces, current) {
       empty.hidden = pieces.length > 0;
+      downloads.clear();
       list.replaceChildren(
         ...pieces.map((piece) => {
           const choose = element("button", { class: "motion", type: "button", onClick: () => on.choose(piece.id) });
@@ -69,11 +73,11 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
           glyph.append(motionGlyph(piece.id));
           const text = element("span", { class: "motion-text" }, element("b", {}, piece.name), element("small", {}, piece.detail));
           choose.append(glyph, text, element("span", { class: "motion-length" }, clockTime(piece.seconds)));
-          const { button: download, choices } = createDownloads(
-            piece.name, piece.id === disclosed, (on) => (disclosed = on ? piece.id : null), (format) => on.download(piece, format),
-          );
+          const told = (open: boolean) => (disclosed = open ? piece.id : null);
+          const one = createDownloads(piece.name, piece.id === disclosed, told, (format) => on.download(piece, format));
+          downloads.set(piece.id, one);
           const remove = element("button", { class: "round-button motion-remove", type: "button", "aria-label": say("Remove {name}", { name: piece.name }), onClick: () => on.remove(piece) }, icon("bin"));
-          return element("li", {}, choose, element("div", { class: "motion-tools" }, download, remove), choices);
+          return element("li", {}, choose, element("div", { class: "motion-tools" }, one.button, remove), one.choices);
         }),
       );
     },
@@ -89,6 +93,7 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
       const { show, remove } = underWay(doing, "download", name, cancel);
       return { doing: (words, done) => show(done, words), remove };
     },
+    disclose: (id) => downloads.get(id)?.disclose(),
     problem(name, title, detail, hint) {
       const box = element("div", { class: "problem" }, element("b", {}, ...sayAround("{name}: {title}", { name: element("bdi", {}, name), title })), element("p", {}, detail));
       if (hint) box.append(element("p", { class: "muted" }, hint));

@@ -1,4 +1,4 @@
-/** One short message at a time, read out politely, gone after a while; it may offer one thing to do. */
+/** One short message at a time, read out politely, gone after a while; it may offer something to do. */
 import { element } from "./dom";
 
 export interface ToastAction {
@@ -8,7 +8,7 @@ export interface ToastAction {
   act(): void;
 }
 
-export type Toast = (message: string, action?: ToastAction) => void;
+export type Toast = (message: string, ...actions: readonly ToastAction[]) => void;
 
 /** Milliseconds; with something to do there is more to read and to reach. */
 const LASTING = 3_200;
@@ -19,10 +19,10 @@ export function createToast(root: HTMLElement): Toast {
   root.append(live);
   let timer: ReturnType<typeof setTimeout> | undefined;
   const clear = () => live.replaceChildren();
-  return (message, action) => {
+  return (message, ...actions) => {
     clearTimeout(timer);
     const toast = element("div", { class: "toast" }, message);
-    if (action) {
+    for (const action of actions) {
       const act = () => {
         clear();
         action.act();
@@ -32,6 +32,6 @@ export function createToast(root: HTMLElement): Toast {
       toast.append(button);
     }
     live.replaceChildren(toast);
-    timer = setTimeout(clear, action ? OFFERED : LASTING);
+    timer = setTimeout(clear, actions.length > 0 ? OFFERED : LASTING);
   };
 }

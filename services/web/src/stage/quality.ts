@@ -46,7 +46,7 @@ export class QualityChoice {
     return QUALITIES[this.#level];
   }
 
-  /** Shaders are compiled anew: the next frames are no measure either. */
+  /** The next frames are no measure: the machine was busy with something else, or shaders are compiled anew. */
   restart(): void {
     this.#times.length = 0;
     this.#toSkip = WARM_UP;

@@ -62,6 +62,7 @@ export class Stage {
   readonly #gate: FrameGate;
   readonly #pictures = new PictureCamera();
   #sinceDrawn = 0;
+  #picturing = false;
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement, pinned = false) {
@@ -172,7 +173,7 @@ export class Stage {
     if (!this.#gate.open) return;
     this.renderer.render(this.scene, this.audience.camera);
     this.#gate.close();
-    const slow = puppet && pose && this.#quality.frame(this.#sinceDrawn);
+    const slow = puppet && pose && !this.#picturing && this.#quality.frame(this.#sinceDrawn);
     this.#sinceDrawn = 0;
     if (slow) {
       this.#setSize();
@@ -197,8 +198,12 @@ export class Stage {
     this.#scenery.group.remove(mesh);
     this.#scenery.group.add(glossy.mesh);
     this.#furnish(QUALITIES[0]);
+    this.#picturing = true;
     try {
-      return this.#pictures.take(this.scene, this.audience.camera, this.#look, pictureSize(this.#width, this.#height));
+      return this.#pictures.take(this.scene, this.audience.camera, this.#look, pictureSize(this.#width, this.#height)).finally(() => {
+        this.#picturing = false;
+        this.#quality.restart();
+      });
     } finally {
       this.#furnish();
       this.#scenery.group.remove(glossy.mesh);

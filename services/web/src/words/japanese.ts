@@ -86,6 +86,7 @@ export const JAPANESE = {
   "Remove {name}": "「{name}」を削除",
   "Remove \"{name}\" from the library?": "「{name}」を演目から削除しますか？",
   "Uploads and downloads": "アップロードとダウンロード",
+  "Download": "ダウンロード",
   "Download {name}": "「{name}」をダウンロード",
   "Download {name} as": "「{name}」のダウンロード形式",
   "Download of {name}": "「{name}」のダウンロード",

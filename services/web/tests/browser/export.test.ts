@@ -136,19 +136,25 @@ describeInBrowser("what is taken from the page", {}, ({ open }) => {
     expect(found.colours).toBeGreaterThan(2000);
     expect(found.brightest[0]).toBeGreaterThan(170);
     expect(found.brightest[1]).toBeLessThan(100);
+
+    // what is kept may be taken along at once
+    await page.keyboard.press("KeyK");
+    await page.locator(".toast", { hasText: "Kept: posing" }).getByRole("button", { name: "Download" }).click();
+    await page.getByRole("group", { name: /^Download posing, as .+ pulled it as$/ }).waitFor();
+    expect(await page.evaluate(() => document.activeElement?.getAttribute("aria-label"))).toBe("BVH, motion for animation programs");
   });
 });
 
 /** What the stage draws with, as far as a picture changes it for a moment. */
 function look(page: Page) {
   return page.evaluate(() => {
-    const { scene, renderer } = window.bunraku.stage;
+    const { scene } = window.bunraku.stage;
     const kinds: string[] = [];
     scene.traverse((one) => {
       const { material, castShadow } = one as { material?: { type: string } } & typeof one;
       kinds.push(`${one.name} ${material?.type ?? one.type} ${castShadow}`);
     });
-    return { kinds: kinds.sort(), environment: scene.environment?.uuid ?? null, pixels: [renderer.domElement.width, renderer.domElement.height] };
+    return { kinds: kinds.sort(), environment: scene.environment?.uuid ?? null };
   });
 }
 

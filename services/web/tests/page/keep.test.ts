@@ -8,16 +8,17 @@ const MOTION = { id: "m2", name: "Kept dance" } as unknown as Motion;
 
 function page(keep: Keep, session: { id: string; piece: string } | null = { id: "s1", piece: "Sanbaso" }) {
   const told: string[] = [];
-  const actions: (ToastAction | undefined)[] = [];
+  const actions: ToastAction[] = [];
   const run = keepThis({
     keep, puppeteer: "Aiko",
-    toast: (message, action) => {
+    toast: (message, ...offered) => {
       told.push(message);
-      actions.push(action);
+      actions.push(...offered);
     },
     session: () => session,
     kept: async ({ id }) => void told.push(`kept ${id}`),
     choose: (id) => told.push(`choose ${id}`),
+    download: (id) => told.push(`download ${id}`),
   });
   return { run, told, actions };
 }
@@ -29,8 +30,8 @@ describe("keep this", () => {
     await run();
     expect(asked).toEqual([["s1", "Sanbaso, as Aiko pulled it"]]);
     expect(told).toEqual(["kept m2", "Kept: Kept dance"]);
-    actions[0]?.act();
-    expect(told.at(-1)).toBe("choose m2");
+    for (const { act } of actions) act();
+    expect(told.slice(2)).toEqual(["choose m2", "download m2"]);
   });
 
   test("says what the server would not do", async () => {
