@@ -9,6 +9,7 @@ import { FrameGate } from "./frame-gate";
 import { createLights } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
+import type { Performer } from "./performer";
 import { Puppet } from "./puppet";
 import { QualityChoice } from "./quality";
 import { Rig } from "./rig";
@@ -26,6 +27,9 @@ const HEADROOM = 120;
 /** Movements of the stage's own take no longer step than this, seconds. */
 const LONGEST_STEP = 0.1;
 
+/** Makes who dances for the lengths of the dancer that the stream tells of. */
+export type Casting = (figure: Figure) => Performer;
+
 const FREE: readonly StringState[] = [0, 1, 2, 3].map(() => ({ holder: null, lit: false, pull: null }));
 
 export class Stage {
@@ -36,7 +40,8 @@ export class Stage {
   /** Where the audience's camera was, for keeping. */
   readonly trail = new CameraTrail();
   readonly renderer: WebGLRenderer;
-  puppet: Puppet | null = null;
+  /** Who dances: the puppet, or an avatar in its place. */
+  puppet: Performer | null = null;
   readonly #scenery = new Scenery();
   readonly #backdrop = backdropUniforms();
   readonly #floor: Floor;
@@ -51,6 +56,8 @@ export class Stage {
   #still = false;
   #sharpness = 1;
   #framing: Framing = "desktop";
+  #figure: Figure | null = null;
+  #cast: Casting | null = null;
   readonly #quality: QualityChoice;
   readonly #gate: FrameGate;
   #sinceDrawn = 0;
@@ -106,20 +113,23 @@ export class Stage {
     this.#furnish();
   }
 
-  /** Carves the puppet for a dancer's limb lengths, and turns to where the dance faces (radians about y from z towards x). */
+  /** Takes a dancer's limb lengths, for which the puppet is carved, and turns to where the dance faces (radians about y from z towards x). */
   setFigure(figure: Figure, front = 0): void {
-    this.puppet?.dispose();
-    this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
-    this.puppet = new Puppet(figure, this.#paint, this.#floorAt);
-    this.#furnish();
-    this.puppet.group.visible = false;
-    this.scene.add(this.puppet.group);
-    this.audience.scale = this.puppet.scale;
+    this.#figure = figure;
+    this.#enter(figure);
+    this.audience.scale = (this.puppet as Performer).scale;
     this.#placeDisc();
     this.rig.reset(front);
     this.audience.cut();
-    // Every shader there will be, side by side: one after the other as they come into sight takes longer, and stutters.
-    this.renderer.compile(this.scene, this.audience.camera);
+    this.#compile();
+  }
+
+  /** Has the dance danced by whom `casting` makes for a dancer's lengths, from now on; null: by the puppet. */
+  cast(casting: Casting | null): void {
+    this.#cast = casting;
+    if (!this.#figure) return;
+    this.#enter(this.#figure);
+    this.#compile();
   }
 
   /** CSS pixels. */
@@ -207,6 +217,24 @@ export class Stage {
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
+  #enter(figure: Figure): void {
+    this.puppet?.dispose();
+    this.puppet = this.#cast?.(figure) ?? this.#carve(figure);
+    this.#furnish();
+    this.puppet.group.visible = false;
+    this.scene.add(this.puppet.group);
+  }
+
+  #carve(figure: Figure): Puppet {
+    this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
+    return new Puppet(figure, this.#paint, this.#floorAt);
+  }
+
+  #compile(): void {
+    // Every shader there will be, side by side: one after the other as they come into sight takes longer, and stutters.
+    this.renderer.compile(this.scene, this.audience.camera);
+  }
+
   /** The disc keeps its proportion to the dancer. */
   #placeDisc(): void {
     const [radius, height] = this.#framing === "desktop" ? [1.06, 1.3] : [0.98, 1.36];
@@ -228,7 +256,7 @@ export class Stage {
     this.puppet.plain = plain;
   }
 
-  #reach(puppet: Puppet): number {
+  #reach(puppet: Performer): number {
     const at = new Vector3();
     return Math.max(...[0, 1].map((limb) => Math.abs(puppet.handle(limb, at).project(this.audience.camera).x)));
   }
