@@ -1,6 +1,7 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
+import { Casting } from "./casting";
 import { bound, comeIn, guarded, may, ownRole, whenDenied } from "./client/access";
 import { createSession, keep, shareSession, type CameraKeyframe, type Motion } from "./client/library";
 import { ProblemError } from "./client/problem";
@@ -12,6 +13,7 @@ import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { PointerInput } from "./input/pointer";
 import type { VelocityInputs } from "./input/velocity";
 import { Listening } from "./listening";
+import { isAvatar } from "./page/dance-as";
 import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
 import { createPage } from "./page/page";
@@ -22,6 +24,7 @@ import { tell, uploadAll } from "./page/uploads";
 import { findSession, Room, type Place } from "./room";
 import type { Stage } from "./stage/stage";
 import type { StringState } from "./stage/strings";
+import { FileStore } from "./storage/files";
 import { browserStore } from "./storage/store";
 
 const INVITED = "bunraku.invited";
@@ -73,10 +76,15 @@ const page = createPage(document.body, {
     choose: (motion) => void choose(motion),
   }) } : {}),
   files: (files) => {
-    if (!may("ingest")) return;
-    page.panels.open("library");
-    void uploadAll(files, page.library, uploaded);
+    const own = files.findLast(isAvatar);
+    if (own) void casting.take(own);
+    const dances = may("ingest") ? files.filter((file) => !isAvatar(file)) : [];
+    if (own || dances.length > 0) page.panels.open("library");
+    void uploadAll(dances, page.library, uploaded);
   },
+  avatar: (file) => void casting.take(file),
+  danceAs: (avatar) => casting.choose(avatar),
+  removeAvatar: () => void casting.remove(),
   choose: (id) => void choose(id),
   remove: (piece) => {
     if (confirm(`Remove "${piece.name}" from the library?`)) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
@@ -101,6 +109,7 @@ const page = createPage(document.body, {
 });
 const holding = new Holding(page, () => mapping);
 holding.watching = !may("control");
+const casting = new Casting({ page, files: new FileStore("bunraku"), choices: browserStore });
 let denied = false;
 whenDenied(({ title, detail, hint }) => {
   denied = true;
@@ -252,6 +261,7 @@ async function openStage(): Promise<void> {
   stage.still = calm.matches;
   calm.addEventListener("change", () => stage && (stage.still = calm.matches));
   if (theme) stage.setTheme(theme.theme);
+  casting.stage = stage;
   hands = new Hands(stage);
   hands.changed = () => {
     if (invitedAt !== -Infinity && [0, 1, 2, 3].some((limb) => hands?.source(limb))) endInvitation();
@@ -377,3 +387,4 @@ holding.render();
 page.transport.health("none");
 void openStage();
 void start();
+void casting.restore();

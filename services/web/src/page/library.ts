@@ -1,5 +1,6 @@
 /** The library drawer: drop zone, uploads with true progress, problems in plain words, and the list of dances. */
 import type { UploadProgress } from "../client/library";
+import { createDanceAs, type DanceAs, type DanceAsActions } from "./dance-as";
 import { element, setAttribute, setText } from "./dom";
 import { clockTime, makingProgress, uploadProgress } from "./format";
 import { icon, motionGlyph } from "./icons";
@@ -23,14 +24,22 @@ export interface UploadRow {
 
 export interface Library {
   readonly panel: Panel;
+  readonly danceAs: DanceAs;
   pieces(pieces: readonly Piece[], current: string | null): void;
   upload(name: string, cancel: () => void): UploadRow;
   problem(name: string, title: string, detail: string, hint: string | null): void;
 }
 
-export const ACCEPTED = ".bvh";
+export interface LibraryActions extends DanceAsActions {
+  files(files: readonly File[]): void;
+  choose(id: string): void;
+  remove(piece: Piece): void;
+  close(): void;
+}
 
-export function createLibrary(root: HTMLElement, on: { files(files: readonly File[]): void; choose(id: string): void; remove(piece: Piece): void; close(): void }): Library {
+export const ACCEPTED = ".bvh,.vrm,.glb";
+
+export function createLibrary(root: HTMLElement, on: LibraryActions): Library {
   const panel = createPanel(root, "library", "Library", on.close);
   const picker = element("input", { type: "file", accept: ACCEPTED, multiple: true, hidden: true });
   picker.addEventListener("change", () => {
@@ -43,9 +52,11 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
   const said = element("div", { role: "alert" });
   const list = element("ul", { class: "motions" });
   const empty = element("p", { class: "empty", hidden: true }, "No dances yet. Drop a motion capture file anywhere on this page and the puppet dances it.");
-  panel.body.append(drop, picker, doing, said, list, empty);
+  const danceAs = createDanceAs(on);
+  panel.body.append(drop, picker, doing, said, list, empty, danceAs.element);
   return {
     panel,
+    danceAs,
     pieces(pieces, current) {
       empty.hidden = pieces.length > 0;
       list.replaceChildren(
@@ -95,7 +106,7 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
 
 /** Files dropped anywhere on the page; a gold frame shows that they may be. */
 export function acceptDrops(root: HTMLElement, on: (files: readonly File[]) => void): void {
-  const frame = element("div", { class: "drop-frame", hidden: true }, element("span", {}, "Drop to add this dance"));
+  const frame = element("div", { class: "drop-frame", hidden: true }, element("span", {}, "Drop a dance, or an avatar to dance as"));
   root.append(frame);
   const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
   addEventListener("dragover", (event) => {

@@ -1,9 +1,9 @@
 /** Everything of the page that is not the stage, put together: one call of `render...` per kind of news. */
 import type { Mapping } from "../input/mapping";
-import { may } from "../client/access";
 import { createAsks, type Asks } from "./asks";
 import { createHeader, type Header } from "./header";
 import { createKeys } from "./keys";
+import type { DanceAsActions } from "./dance-as";
 import type { KeysModal } from "./keys-modal";
 import { acceptDrops, createLibrary, type Library, type Piece } from "./library";
 import { createLineCard, type LineCard } from "./line-card";
@@ -15,7 +15,7 @@ import { createToast, type Toast } from "./toast";
 import type { SoundActions } from "./sound-control";
 import { createTransport, type PanelName, type Transport } from "./transport";
 
-export interface PageActions extends StringsActions, SoundActions {
+export interface PageActions extends StringsActions, SoundActions, DanceAsActions {
   share(): void;
   theme(): void;
   play(): void;
@@ -58,7 +58,7 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   root.append(messages);
   const asks = createAsks(messages, on.give);
   const toast = createToast(messages);
-  const library = createLibrary(root, { files: on.files, choose: on.choose, remove: on.remove, close: () => panels.close("library") });
+  const library = createLibrary(root, { ...on, close: () => panels.close("library") });
   const strings = createStringsCard(root, { ...on, close: () => panels.close("strings"), keys: () => keys.show() });
   const line = createLineCard(root, () => panels.close("line"));
   const transport = createTransport(root, { ...on, panel: (name) => panels.toggle(name) });
@@ -76,7 +76,7 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
     while (panels.closeLast());
     on.reframe();
   });
-  if (may("ingest")) acceptDrops(root, on.files);
+  acceptDrops(root, on.files);
   return {
     header, transport, library, strings, line, keys, tags, asks, panels, toast,
     notice(title, text = "") {
