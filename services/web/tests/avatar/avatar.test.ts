@@ -22,6 +22,7 @@ const FILES: Readonly<Record<string, FigureOptions>> = {
   "VRM 1 in askew axes, with short legs": { vrm: 1, askew: true, legLength: 0.6 },
   "a GLB in the T-pose, named as Mixamo does, in centimetres": { name: mixamo, unit: 0.01, askew: true },
   "a GLB in the A-pose, facing aside": { arms: 45, legs: 8, facing: 90, askew: true },
+  "a GLB on its back": { lying: true, unit: 0.01 },
 };
 
 const at = (object: Object3D) => new Vector3().setFromMatrixPosition(object.matrixWorld);

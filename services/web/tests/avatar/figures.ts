@@ -20,6 +20,10 @@ export interface FigureOptions {
   without?: readonly string[];
   /** A tail that swings, in VRM 1. */
   tail?: boolean;
+  /** A picture on it, and drawn as cartoons are (MToon) where the file is a VRM. */
+  dressed?: boolean;
+  /** On its back, as files of tools whose z is up may be. */
+  lying?: boolean;
 }
 
 interface Bone {
@@ -32,6 +36,9 @@ interface Bone {
 }
 
 const at = (x: number, y: number, z: number) => new Vector3(x, y, z);
+
+/** A picture of two by two pixels, PNG. */
+const PICTURE = "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAYAAABytg0kAAAAEUlEQVR42mOIWnDiPwgzwBgAXwgLBRyxh08AAAAASUVORK5CYII=";
 
 /** Bones of a grown-up of 1.65 m in the T-pose, facing z; parents first. */
 function bonesOf({ legLength = 1, forearm = 1, without = [], tail = false }: FigureOptions): Bone[] {
@@ -68,7 +75,7 @@ function bend(name: string, { arms = 0, legs = 0 }: FigureOptions): number {
 
 /** The bytes of a GLB or VRM file. */
 export function figureFile(options: FigureOptions = {}): Uint8Array<ArrayBuffer> {
-  const { facing = options.vrm === 0 ? 180 : 0, unit = 1, askew = false, name = (bone: string) => bone, vrm, tail = false } = options;
+  const { facing = options.vrm === 0 ? 180 : 0, unit = 1, askew = false, name = (bone: string) => bone, vrm, tail = false, dressed = false, lying = false } = options;
   const bones = bonesOf(options);
   const face = new Quaternion().setFromAxisAngle(at(0, 1, 0), (facing * Math.PI) / 180);
   const places = new Map<string, Vector3>();
@@ -108,15 +115,16 @@ export function figureFile(options: FigureOptions = {}): Uint8Array<ArrayBuffer>
     };
   });
   const roots = bones.flatMap((bone, index) => (bone.parent === null ? [index] : []));
-  const root = nodes.push({ name: "Armature", children: roots, scale: [unit, unit, unit] }) - 1;
+  const root = nodes.push({ name: "Armature", children: roots, scale: [unit, unit, unit], ...(lying ? { rotation: [-Math.SQRT1_2, 0, 0, Math.SQRT1_2] } : {}) }) - 1;
   const mesh = nodes.push({ name: "Body", mesh: 0, skin: 0 }) - 1;
   const index = (bone: string) => bones.findIndex((one) => one.name === bone);
   const humanBones = bones.map(({ name }) => name).filter((bone) => !bone.startsWith("tail"));
 
+  const picture = Uint8Array.from(atob(PICTURE), (letter) => letter.charCodeAt(0));
   const { buffer, views, accessors } = pack([
     [new Float32Array(positions), "VEC3", 34962], [new Float32Array(normals), "VEC3", 34962], [new Uint8Array(joints), "VEC4", 34962],
     [new Float32Array(weights), "VEC4", 34962], [new Uint16Array(indices), "SCALAR", 34963], [new Float32Array(inverses), "MAT4", undefined],
-  ]);
+  ], picture);
   const json: Record<string, unknown> = {
     asset: { version: "2.0" },
     scene: 0,
@@ -129,6 +137,7 @@ export function figureFile(options: FigureOptions = {}): Uint8Array<ArrayBuffer>
     bufferViews: views,
     accessors,
   };
+  if (dressed) dress(json, vrm);
   if (vrm === 1) {
     const springs = tail ? { VRMC_springBone: { specVersion: "1.0", springs: [{ name: "tail", joints: [{ node: index("tail"), stiffness: 0.5, dragForce: 0.2, gravityPower: 1, gravityDir: [0, -1, 0] }, { node: index("tailEnd") }] }] } } : {};
     json.extensions = {
@@ -139,12 +148,28 @@ export function figureFile(options: FigureOptions = {}): Uint8Array<ArrayBuffer>
       },
       ...springs,
     };
-    json.extensionsUsed = Object.keys(json.extensions as object);
+    json.extensionsUsed = [...Object.keys(json.extensions as object), "VRMC_materials_mtoon"];
   } else if (vrm === 0) {
-    json.extensions = { VRM: { specVersion: "0.0", meta: { title: "Old boxes" }, humanoid: { humanBones: humanBones.map((bone) => ({ bone, node: index(bone) })) }, materialProperties: [] } };
+    json.extensions = { VRM: { specVersion: "0.0", meta: { title: "Old boxes" }, humanoid: { humanBones: humanBones.map((bone) => ({ bone, node: index(bone) })) }, materialProperties: dressed ? [OLD_CARTOON] : [] } };
     json.extensionsUsed = ["VRM"];
   }
   return container(json, buffer);
+}
+
+/** VRM 0 tells of its materials beside them. */
+const OLD_CARTOON = {
+  name: "cloth", shader: "VRM/MToon", renderQueue: 2000, keywordMap: {}, tagMap: { RenderType: "Opaque" }, textureProperties: { _MainTex: 0 },
+  floatProperties: { _ShadeShift: 0, _ShadeToony: 0.9, _OutlineWidthMode: 1, _OutlineWidth: 0.1, _Cutoff: 0.5, _BlendMode: 0, _CullMode: 2, _ZWrite: 1 },
+  vectorProperties: { _Color: [1, 1, 1, 1], _ShadeColor: [0.6, 0.5, 0.6, 1], _OutlineColor: [0.1, 0.1, 0.1, 1] },
+};
+
+/** Puts the picture on the figure, and cartoon colours on that of VRM 1. */
+function dress(json: Record<string, unknown>, vrm: 0 | 1 | undefined): void {
+  json.images = [{ bufferView: (json.bufferViews as unknown[]).length - 1, mimeType: "image/png" }];
+  json.textures = [{ source: 0 }];
+  const [material] = json.materials as Record<string, unknown>[];
+  Object.assign(material, { name: "cloth", pbrMetallicRoughness: { baseColorTexture: { index: 0 }, metallicFactor: 0 } });
+  if (vrm === 1) material.extensions = { VRMC_materials_mtoon: { specVersion: "1.0", shadeColorFactor: [0.6, 0.5, 0.6], shadingToonyFactor: 0.9, outlineWidthMode: "worldCoordinates", outlineWidthFactor: 0.004, outlineColorFactor: [0.1, 0.1, 0.1] } };
 }
 
 /** A box about the line between two places; with `floor` it goes down to that height. */
@@ -171,7 +196,8 @@ type Part = readonly [values: Float32Array | Uint8Array | Uint16Array, type: "SC
 
 const WIDTHS = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
 
-function pack(parts: readonly Part[]): { buffer: Uint8Array; views: unknown[]; accessors: unknown[] } {
+/** The parts one after another, and behind them a picture, which only has a view. */
+function pack(parts: readonly Part[], picture: Uint8Array): { buffer: Uint8Array; views: unknown[]; accessors: unknown[] } {
   const views: unknown[] = [];
   const accessors: unknown[] = [];
   const bytes: number[] = [];
@@ -184,6 +210,9 @@ function pack(parts: readonly Part[]): { buffer: Uint8Array; views: unknown[]; a
     for (const byte of new Uint8Array(values.buffer)) bytes.push(byte);
     while (bytes.length % 4) bytes.push(0);
   }
+  views.push({ buffer: 0, byteOffset: bytes.length, byteLength: picture.length });
+  bytes.push(...picture);
+  while (bytes.length % 4) bytes.push(0);
   return { buffer: new Uint8Array(bytes), views, accessors };
 }
 

@@ -47,8 +47,9 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
   test("kept for the next visit; the puppet dances when it is chosen, and again when the avatar is removed", async () => {
     const page = await open("", SMALL);
     await danced(page);
-    await drop(page, "boxes.vrm", { vrm: 1, tail: true });
+    await drop(page, "boxes.vrm", { vrm: 1, tail: true, dressed: true });
     await page.getByRole("radio", { name: "Boxes" }).waitFor();
+    expect(await pictures(page)).toEqual([2]);
     await page.reload();
     await page.keyboard.press("KeyL");
     await page.getByRole("radio", { name: "Boxes" }).waitFor();
@@ -57,8 +58,10 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     expect(await limbsApart(page)).toBeLessThan(1);
     await page.getByRole("radio", { name: "The puppet" }).check();
     await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
-    await drop(page, "old.vrm", { vrm: 0 });
+    await drop(page, "old.vrm", { vrm: 0, dressed: true });
     await page.getByRole("radio", { name: "Old boxes" }).waitFor();
+    expect(await pictures(page)).toEqual([2]);
+    expect(await limbsApart(page)).toBeLessThan(1);
     await page.getByRole("button", { name: "Remove the avatar Old boxes" }).click();
     await page.getByRole("radio", { name: "The puppet" }).waitFor({ state: "hidden" });
     await page.reload();
@@ -112,6 +115,18 @@ async function limbsApart(page: Page): Promise<number> {
       });
     });
     return (Math.max(...apart) * 180) / Math.PI;
+  });
+}
+
+/** Widths of the pictures on the avatar, pixels. */
+function pictures(page: Page): Promise<number[]> {
+  return page.evaluate(() => {
+    const found = new Set<{ width: number }>();
+    window.bunraku.stage.puppet?.group.traverse((object) => {
+      const { material = [] } = object as unknown as { material?: object | object[] };
+      for (const one of [material].flat() as { map?: { image: { width: number } } | null }[]) if (one.map) found.add(one.map.image);
+    });
+    return [...found].map(({ width }) => width);
   });
 }
 
