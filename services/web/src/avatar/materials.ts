@@ -1,6 +1,22 @@
-/** Plain materials for machines that draw in software: colours and light, without gloss, bumps and reflections. */
+/** How an avatar's materials take the stage's light. */
+import type { MToonMaterial } from "@pixiv/three-vrm";
 import { Mesh, MeshLambertMaterial, MeshStandardMaterial, type Material, type Object3D } from "three";
 
+/** Of a cartoon's colours, in the light and in the shade. */
+const LIT = 0.55;
+const SHADED = 0.15;
+
+/** Cartoons (MToon) take all of a light wherever it comes from, from behind as shade: before the stage's four they would be washed out. */
+export function dimCartoons(materials: Iterable<Material>): void {
+  for (const material of materials) {
+    if (!("isMToonMaterial" in material)) continue;
+    const { color, shadeColorFactor } = material as MToonMaterial;
+    color.multiplyScalar(LIT);
+    shadeColorFactor.multiplyScalar(SHADED);
+  }
+}
+
+/** Plain materials for machines that draw in software: colours and light, without gloss, bumps and reflections. */
 export class PlainMaterials {
   readonly #full = new Map<Mesh, Material | Material[]>();
   readonly #plain = new Map<Material, Material>();

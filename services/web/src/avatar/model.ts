@@ -1,8 +1,9 @@
 /** A file that was read: what is drawn of it, its humanoid's nodes, and how it stands. Comes with three-vrm, and so only when it is asked for. */
 import { VRMLoaderPlugin, VRMUtils, type VRM } from "@pixiv/three-vrm";
-import { Group, Mesh, TextureLoader, Vector3, type Object3D } from "three";
+import { Group, Mesh, TextureLoader, Vector3, type Material, type Object3D } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { judge } from "./file";
+import { dimCartoons } from "./materials";
 import { broken } from "./problem";
 import { restOf, type Rest } from "./rest";
 
@@ -19,12 +20,15 @@ export class AvatarModel {
     this.stand.name = "avatar";
     this.stand.add(scene);
     this.rest = restOf(this.stand, nodes);
+    const materials = new Set<Material>();
     scene.traverse((object) => {
       if (!(object instanceof Mesh)) return;
+      for (const material of [object.material].flat()) materials.add(material);
       object.castShadow = object.receiveShadow = true;
       // the bounds of a mesh are those of its rest
       object.frustumCulled = false;
     });
+    dimCartoons(materials);
   }
 
   /** Reads a GLB or VRM file; `called` is its name where the file has none. Throws AvatarProblem where it cannot dance. */
