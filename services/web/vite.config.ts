@@ -2,15 +2,16 @@ import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 import { leanThree } from "./lean-three.ts";
 
-/** The stage's chunk is fetched beside the page's script, and not only once that runs. */
+/** The stage's chunk, and those it imports, are fetched beside the page's script, and not only once that runs. */
 const preloadTheatre: Plugin = {
   name: "preload-theatre",
   transformIndexHtml: {
     order: "post",
-    handler: (_, { bundle }) =>
-      Object.values(bundle ?? {})
-        .filter((file) => file.type === "chunk" && file.name === "theatre")
-        .map(({ fileName }) => ({ tag: "link", attrs: { rel: "modulepreload", crossorigin: true, href: `/${fileName}` }, injectTo: "head" })),
+    handler: (html, { bundle }) => {
+      const theatre = Object.values(bundle ?? {}).find((file) => file.type === "chunk" && file.name === "theatre");
+      const files = theatre?.type === "chunk" ? [theatre.fileName, ...theatre.imports].filter((file) => !html.includes(file)) : [];
+      return files.map((file) => ({ tag: "link", attrs: { rel: "modulepreload", crossorigin: true, href: `/${file}` }, injectTo: "head" }));
+    },
   },
 };
 

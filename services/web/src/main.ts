@@ -1,6 +1,7 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
+import { Casting } from "./casting";
 import { bound, comeIn, guarded, may, ownRole, whenDenied } from "./client/access";
 import { createSession, keep, shareSession, type CameraKeyframe, type Motion } from "./client/library";
 import { ProblemError } from "./client/problem";
@@ -12,6 +13,7 @@ import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { VelocityInputs } from "./input/velocity";
 import { goOn, leave } from "./left";
 import { Listening } from "./listening";
+import { isAvatar } from "./page/dance-as";
 import { isolated } from "./page/format";
 import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
@@ -23,6 +25,7 @@ import { tell, uploadAll } from "./page/uploads";
 import type { Performing } from "./performing";
 import { findSession, Room, type Place } from "./room";
 import type { Stage } from "./stage/stage";
+import { FileStore } from "./storage/files";
 import { browserStore } from "./storage/store";
 import { chooseOther, learnLanguage } from "./words/language";
 import { say } from "./words/say";
@@ -87,10 +90,15 @@ const page = createPage(document.body, {
     },
   }) } : {}),
   files: (files) => {
-    if (!may("ingest")) return;
-    page.panels.open("library");
-    void uploadAll(files, page.library, uploaded);
+    const own = files.findLast(isAvatar);
+    if (own) void casting.take(own);
+    const dances = may("ingest") ? files.filter((file) => !isAvatar(file)) : [];
+    if (own || dances.length > 0) page.panels.open("library");
+    void uploadAll(dances, page.library, uploaded);
   },
+  avatar: (file) => void casting.take(file),
+  danceAs: (avatar) => casting.choose(avatar),
+  removeAvatar: () => void casting.remove(),
   choose: (id) => void choose(id),
   picture,
   download: (piece, format) => void exporting.download(piece, format),
@@ -118,6 +126,7 @@ const page = createPage(document.body, {
 const exporting = new Exporting(page, () => ({ room, stage }));
 const holding = new Holding(page, () => mapping);
 holding.watching = !may("control");
+const casting = new Casting({ page, files: new FileStore("bunraku"), choices: browserStore });
 let denied = false;
 whenDenied(({ title, detail, hint }) => {
   denied = true;
@@ -296,6 +305,7 @@ async function openStage(): Promise<void> {
   stage.still = calm.matches;
   calm.addEventListener("change", () => stage && (stage.still = calm.matches));
   if (theme) stage.setTheme(theme.theme);
+  casting.stage = stage;
   listenToKeyboard(window, commands, velocity, () => mapping, { keys: () => page.keys.show(), escape: () => page.panels.closeLast() });
   listenToMouse(canvas, window, commands, () => mapping);
   pad = createGamepad(commands, () => mapping, () => navigator.getGamepads());
@@ -383,3 +393,4 @@ holding.render();
 page.transport.health("none");
 void openStage();
 void start();
+void casting.restore();

@@ -2,7 +2,7 @@
 import { Vector3 } from "three";
 import type { Puppeteer } from "../client/puppeteer";
 import { JOINTS } from "../motion/skeleton";
-import type { Puppet } from "../stage/puppet";
+import { handleOf, type Performer } from "../stage/performer";
 import type { Stage } from "../stage/stage";
 import { handTarget, inChest, orientation, place, thighAngle } from "./frames";
 
@@ -69,17 +69,19 @@ export class Hands {
     const { puppet } = this.#stage;
     if (!puppet || this.#sources[limb] === null) return;
     this.#pulls[limb] = to.clone();
+    // Told in the measures of the dancer of the stream, whoever is seen to dance.
+    const wanted = puppet.told(limb, to, new Vector3());
     const side = limb % 2 === 0 ? "l" : "r";
     if (limb < 2) {
       const wrist = puppet.joint(`${side}_wrist`);
       const fingers = tipOf(puppet, `${side}_wrist`).applyMatrix4(wrist);
-      const tip = to.clone().add(fingers.sub(puppet.handle(limb, new Vector3())));
+      const tip = wanted.add(fingers.sub(handleOf(puppet, limb, new Vector3())));
       const shoulder = place(puppet.joint(`${side}_shoulder`));
       const { x, y, z } = handTarget(tip, shoulder, orientation(puppet.joint("vl5")), armLength(puppet, side));
       this.#puppeteer?.target(limb, x, y, z);
     } else {
       const hip = place(puppet.joint(`${side}_hip`));
-      const angle = thighAngle(to, hip, orientation(puppet.joint("sacroiliac")), offset(puppet, `${side}_knee`).length());
+      const angle = thighAngle(wanted, hip, orientation(puppet.joint("sacroiliac")), offset(puppet, `${side}_knee`).length());
       this.#puppeteer?.target(limb, angle, 0, 0);
     }
   }
@@ -109,15 +111,15 @@ function coarse(value: number): number {
   return Math.round(value * 32) / 32;
 }
 
-function offset(puppet: Puppet, name: string): Vector3 {
+function offset(puppet: Performer, name: string): Vector3 {
   return new Vector3().fromArray(puppet.figure.offsets, JOINTS.indexOf(name) * 3);
 }
 
-function tipOf(puppet: Puppet, name: string): Vector3 {
+function tipOf(puppet: Performer, name: string): Vector3 {
   return new Vector3().fromArray(puppet.figure.tips, JOINTS.indexOf(name) * 3);
 }
 
 /** Upper arm, forearm and hand to the finger tips, metres. */
-function armLength(puppet: Puppet, side: string): number {
+function armLength(puppet: Performer, side: string): number {
   return offset(puppet, `${side}_elbow`).length() + offset(puppet, `${side}_wrist`).length() + tipOf(puppet, `${side}_wrist`).length();
 }

@@ -1,6 +1,7 @@
 /** The library drawer: drop zone, uploads with true progress, problems in plain words, and the list of dances. */
 import type { UploadProgress } from "../client/library";
 import type { Format } from "../export/file";
+import { createDanceAs, type DanceAs, type DanceAsActions } from "./dance-as";
 import { element, setAttribute, setText } from "./dom";
 import { createDownloads, type Downloads } from "./downloads";
 import { clockTime, makingProgress, uploadProgress } from "./format";
@@ -33,6 +34,7 @@ export interface DownloadRow {
 
 export interface Library {
   readonly panel: Panel;
+  readonly danceAs: DanceAs;
   pieces(pieces: readonly Piece[], current: string | null): void;
   upload(name: string, cancel: () => void): UploadRow;
   download(name: string, cancel: () => void): DownloadRow;
@@ -41,9 +43,17 @@ export interface Library {
   problem(name: string, title: string, detail: string, hint: string | null): void;
 }
 
-export const ACCEPTED = ".bvh";
+export interface LibraryActions extends DanceAsActions {
+  files(files: readonly File[]): void;
+  choose(id: string): void;
+  remove(piece: Piece): void;
+  download(piece: Piece, format: Format): void;
+  close(): void;
+}
 
-export function createLibrary(root: HTMLElement, on: { files(files: readonly File[]): void; choose(id: string): void; remove(piece: Piece): void; download(piece: Piece, format: Format): void; close(): void }): Library {
+export const ACCEPTED = ".bvh,.vrm,.glb";
+
+export function createLibrary(root: HTMLElement, on: LibraryActions): Library {
   const panel = createPanel(root, "library", say("Library"), on.close);
   const picker = element("input", { type: "file", accept: ACCEPTED, multiple: true, hidden: true });
   picker.addEventListener("change", () => {
@@ -59,9 +69,11 @@ export function createLibrary(root: HTMLElement, on: { files(files: readonly Fil
   /** The dance whose downloads are disclosed. */
   let disclosed: string | null = null;
   const downloads = new Map<string, Downloads>();
-  panel.body.append(drop, picker, doing, said, list, empty);
+  const danceAs = createDanceAs(on);
+  panel.body.append(drop, picker, doing, said, list, empty, danceAs.element);
   return {
     panel,
+    danceAs,
     pieces(pieces, current) {
       empty.hidden = pieces.length > 0;
       downloads.clear();
@@ -132,7 +144,7 @@ function underWay(list: HTMLElement, kind: "upload" | "download", name: string, 
 
 /** Files dropped anywhere on the page; a gold frame shows that they may be. */
 export function acceptDrops(root: HTMLElement, on: (files: readonly File[]) => void): void {
-  const frame = element("div", { class: "drop-frame", hidden: true }, element("span", {}, say("Drop to add this dance")));
+  const frame = element("div", { class: "drop-frame", hidden: true }, element("span", {}, say("Drop a dance, or an avatar to dance as")));
   root.append(frame);
   const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
   addEventListener("dragover", (event) => {

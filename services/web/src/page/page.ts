@@ -1,10 +1,10 @@
 /** Everything of the page that is not the stage, put together: one call of `render...` per kind of news. */
 import type { Mapping } from "../input/mapping";
-import { may } from "../client/access";
 import type { Format } from "../export/file";
 import { createAsks, type Asks } from "./asks";
 import { createHeader, type Header } from "./header";
 import { createKeys } from "./keys";
+import type { DanceAsActions } from "./dance-as";
 import type { KeysModal } from "./keys-modal";
 import { acceptDrops, createLibrary, type Library, type Piece } from "./library";
 import { createLineCard, type LineCard } from "./line-card";
@@ -17,7 +17,7 @@ import type { SoundActions } from "./sound-control";
 import { createTransport, type PanelName, type Transport } from "./transport";
 import { say } from "../words/say";
 
-export interface PageActions extends StringsActions, SoundActions {
+export interface PageActions extends StringsActions, SoundActions, DanceAsActions {
   share(): void;
   /** Speaks the other language. */
   language(): void;
@@ -83,7 +83,7 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
     while (panels.closeLast());
     on.reframe();
   });
-  if (may("ingest")) acceptDrops(root, on.files);
+  acceptDrops(root, on.files);
   return {
     header, transport, library, strings, line, keys, tags, asks, panels, toast,
     notice(title, text = "") {

@@ -24,14 +24,20 @@ function ratio(length: number, standard: number, low: number, high: number): num
   return Number.isFinite(value) ? Math.min(high, Math.max(low, value)) : 1;
 }
 
+/** Metres of a left leg, the left side of the trunk and a left arm to the wrist, together. */
+export function limbSum(figure: Figure): number {
+  const rest = restPositions(figure);
+  return sumOf((name) => rest.get(name) as Vector3);
+}
+
+function sumOf(places: (name: string) => Vector3): number {
+  const between = (a: string, b: string) => places(a).distanceTo(places(b));
+  return between("l_hip", "l_knee") + between("l_knee", "l_ankle") + between("l_hip", "l_shoulder") + between("l_shoulder", "l_elbow") + between("l_elbow", "l_wrist");
+}
+
 /** How much larger than the standard figure a dancer is, from legs, torso and arms; the girth of everything follows it. */
 export function figureScale(figure: Figure): number {
-  const rest = restPositions(figure);
-  const length = (places: (name: string) => Vector3) => {
-    const between = (a: string, b: string) => places(a).distanceTo(places(b));
-    return between("l_hip", "l_knee") + between("l_knee", "l_ankle") + between("l_hip", "l_shoulder") + between("l_shoulder", "l_elbow") + between("l_elbow", "l_wrist");
-  };
-  return ratio(length((name) => rest.get(name) as Vector3), length(joint), 0.2, 5);
+  return ratio(limbSum(figure), sumOf(joint), 0.2, 5);
 }
 
 export function fitTo(figure: Figure): Fit {

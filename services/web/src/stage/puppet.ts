@@ -9,20 +9,13 @@ import { addHakama } from "./parts/hakama";
 import { addHead } from "./parts/head";
 import { addLegs } from "./parts/legs";
 import { addSleeves } from "./parts/sleeves";
+import { footing, handleOf, type Performer } from "./performer";
 import { figureMaterial, plainFigureMaterial, type Paint } from "./shading";
 import { SleeveBone } from "./sleeve-bone";
 import { SIDES } from "./standard";
 
 /** Bones in the order of the geometry's skin indices: the joints of the contract, then the two sleeves. */
 export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
-
-/** Places people hold, in the order of the limbs of the contract: bone, and place in its frame on the standard figure. */
-const HANDLES: readonly (readonly [bone: string, at: readonly [number, number, number]])[] = [
-  ["l_wrist", [0.004, -0.075, 0.004]],
-  ["r_wrist", [-0.004, -0.075, 0.004]],
-  ["l_knee", [0, 0, 0.008]],
-  ["r_knee", [0, 0, 0.008]],
-];
 
 /** All parts on one dancer's figure, in its rest pose. Pure: takes no graphics context. */
 export function puppetGeometry(figure: Figure): BufferGeometry {
@@ -31,13 +24,12 @@ export function puppetGeometry(figure: Figure): BufferGeometry {
   return assembly.geometry();
 }
 
-export class Puppet {
+export class Puppet implements Performer {
   readonly group = new Group();
   readonly figure: Figure;
-  /** Size against the standard figure of 1.75 m. */
   readonly scale: number;
   /** How far the ankle stands above the ball of the foot at rest, metres. */
-  readonly ankleHeight: number;
+  readonly #ankleHeight: number;
   readonly #bones: Bone[];
   readonly #sleeves: SleeveBone[];
   readonly #geometry: BufferGeometry;
@@ -50,7 +42,7 @@ export class Puppet {
   constructor(figure: Figure, paint: Paint, floorAt: IUniform<number>) {
     this.figure = figure;
     this.scale = figureScale(figure);
-    this.ankleHeight = -figure.offsets[JOINTS.indexOf("l_midtarsal") * 3 + 1];
+    this.#ankleHeight = -figure.offsets[JOINTS.indexOf("l_midtarsal") * 3 + 1];
     this.group.name = "puppet";
     this.#bones = bonesOf(figure);
     this.group.add(this.#bone("humanoid_root"), this.#bone("l_sleeve"), this.#bone("r_sleeve"));
@@ -78,20 +70,25 @@ export class Puppet {
     });
   }
 
-  /** Shows the reflection, which only the lacquer of the night has. */
+  get root(): Matrix4 {
+    return this.#bones[0].matrixWorld;
+  }
+
+  get ground(): number {
+    return footing(this, this.#ankleHeight);
+  }
+
   set reflected(on: boolean) {
     // Taken away, not hidden: what is hidden has its shader compiled all the same.
     if (on) this.group.add(this.#reflection);
     else this.#reflection.removeFromParent();
   }
 
-  /** Draws with the plain material, for machines without a graphics processor. */
   set plain(on: boolean) {
     const wanted = on ? (this.#plain ??= plainFigureMaterial(this.#paint)) : this.#full;
     this.#mesh.material = wanted;
   }
 
-  /** Takes a pose; `seconds` since the one before lets the sleeves swing, 0 sets them still. */
   apply(pose: Pose, seconds: number): void {
     this.#bones[0].position.fromArray(pose.root);
     for (let k = 0; k < JOINTS.length; k++) {
@@ -102,15 +99,15 @@ export class Puppet {
     for (const sleeve of this.#sleeves) sleeve.update(seconds);
   }
 
-  /** World place of a limb's handle (0 left hand, 1 right hand, 2 left knee, 3 right knee), written into `out`. */
   handle(limb: number, out: Vector3): Vector3 {
-    const [bone, at] = HANDLES[limb];
-    return out.set(...at).multiplyScalar(this.scale).applyMatrix4(this.#bone(bone).matrixWorld);
+    return handleOf(this, limb, out);
   }
 
-  /** World matrix of a joint. */
-  joint(name: string): Matrix4 {
-    return this.#bone(name).matrixWorld;
+  readonly joint = (name: string): Matrix4 => this.#bone(name).matrixWorld;
+
+  /** The puppet is the dancer of the stream. */
+  told(_limb: number, to: Vector3, out: Vector3): Vector3 {
+    return out.copy(to);
   }
 
   dispose(): void {

@@ -3,8 +3,7 @@
  * walks off, faces anywhere and stands on a floor a few centimetres from zero: the rig takes all three up, calmly.
  */
 import { Group, Matrix4, Quaternion, Vector2, Vector3 } from "three";
-import type { Puppet } from "./puppet";
-import { SIDES, SOLE } from "./standard";
+import type { Performer } from "./performer";
 
 /** The rig follows once the dancer is this far from its middle, metres, and this quickly, 1/s. */
 const LEASH = 0.25;
@@ -46,11 +45,10 @@ export class Rig {
     this.#front = front;
   }
 
-  follow(puppet: Puppet, seconds: number): void {
+  follow({ root: pelvis, ground }: Pick<Performer, "root" | "ground">, seconds: number): void {
     const { position, rotation } = this.group;
-    const root = new Vector3().setFromMatrixPosition(puppet.joint("humanoid_root"));
-    const facing = facingOf(puppet.joint("humanoid_root"));
-    const ground = lowestFoot(puppet);
+    const root = new Vector3().setFromMatrixPosition(pelvis);
+    const facing = facingOf(pelvis);
     const away = Math.hypot(root.x - position.x, root.z - position.z);
     if (!this.#placed || away > CUT) {
       if (!this.#placed) {
@@ -92,19 +90,4 @@ function facingOf(root: Matrix4): Vector2 {
   const forward = new Vector3(0, 0, 1).applyQuaternion(new Quaternion().setFromRotationMatrix(root));
   const flat = new Vector2(forward.x, forward.z);
   return flat.lengthSq() > 1e-4 ? flat.normalize() : flat.set(0, 1);
-}
-
-/** Height of the floor that the lower foot would stand on: ball or heel, less the sole. */
-function lowestFoot(puppet: Puppet): number {
-  const at = new Vector3();
-  let lowest = Infinity;
-  for (const { side } of SIDES) {
-    lowest = Math.min(lowest, at.setFromMatrixPosition(puppet.joint(`${side}_midtarsal`)).y, heel(puppet, side, at).y);
-  }
-  return lowest - SOLE * puppet.scale;
-}
-
-/** Under the ankle, as high as the ball of the foot is at rest. */
-function heel(puppet: Puppet, side: string, out: Vector3): Vector3 {
-  return out.set(0, -puppet.ankleHeight, -0.045 * puppet.scale).applyMatrix4(puppet.joint(`${side}_ankle`));
 }

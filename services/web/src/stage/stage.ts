@@ -10,6 +10,7 @@ import { FrameGate } from "./frame-gate";
 import { createLights } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import { asanohaTexture, faceTexture } from "./paint";
+import type { Performer } from "./performer";
 import { PictureCamera, pictureSize } from "./picture";
 import { Puppet } from "./puppet";
 import { QUALITIES, QualityChoice } from "./quality";
@@ -33,6 +34,9 @@ const FACE: Extent = { across: 0.1, up: 0.16, down: 0.14 };
 /** Movements of the stage's own take no longer step than this, seconds. */
 const LONGEST_STEP = 0.1;
 
+/** Makes who dances for the lengths of the dancer that the stream tells of. */
+export type Casting = (figure: Figure) => Performer;
+
 const FREE: readonly StringState[] = [0, 1, 2, 3].map(() => ({ holder: null, lit: false, pull: null }));
 
 export class Stage {
@@ -43,7 +47,8 @@ export class Stage {
   /** Where the audience's camera was, for keeping. */
   readonly trail = new CameraTrail();
   readonly renderer: WebGLRenderer;
-  puppet: Puppet | null = null;
+  /** Who dances: the puppet, or an avatar in its place. */
+  puppet: Performer | null = null;
   readonly #scenery = new Scenery();
   readonly #backdrop = backdropUniforms();
   readonly #floor: Floor;
@@ -58,6 +63,8 @@ export class Stage {
   #still = false;
   #sharpness = 1;
   #framing: Framing = "desktop";
+  #figure: Figure | null = null;
+  #cast: Casting | null = null;
   readonly #quality: QualityChoice;
   readonly #gate: FrameGate;
   readonly #pictures = new PictureCamera();
@@ -116,20 +123,23 @@ export class Stage {
     this.#furnish();
   }
 
-  /** Carves the puppet for a dancer's limb lengths, and turns to where the dance faces (radians about y from z towards x). */
+  /** Takes a dancer's limb lengths, for which the puppet is carved, and turns to where the dance faces (radians about y from z towards x). */
   setFigure(figure: Figure, front = 0): void {
-    this.puppet?.dispose();
-    this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
-    this.puppet = new Puppet(figure, this.#paint, this.#floorAt);
-    this.#furnish();
-    this.puppet.group.visible = false;
-    this.scene.add(this.puppet.group);
-    this.audience.scale = this.puppet.scale;
+    this.#figure = figure;
+    this.#enter(figure);
+    this.audience.scale = (this.puppet as Performer).scale;
     this.#placeDisc();
     this.rig.reset(front);
     this.audience.cut();
-    // Every shader there will be, side by side: one after the other as they come into sight takes longer, and stutters.
-    this.renderer.compile(this.scene, this.audience.camera);
+    this.#compile();
+  }
+
+  /** Has the dance danced by whom `casting` makes for a dancer's lengths, from now on; null: by the puppet. */
+  cast(casting: Casting | null): void {
+    this.#cast = casting;
+    if (!this.#figure) return;
+    this.#enter(this.#figure);
+    this.#compile();
   }
 
   /** CSS pixels. */
@@ -264,6 +274,24 @@ export class Stage {
     return boxAround(at, { across: across * scale, up: up * scale, down: down * scale }, camera, this.#width, this.#height);
   }
 
+  #enter(figure: Figure): void {
+    this.puppet?.dispose();
+    this.puppet = this.#cast?.(figure) ?? this.#carve(figure);
+    this.#furnish();
+    this.puppet.group.visible = false;
+    this.scene.add(this.puppet.group);
+  }
+
+  #carve(figure: Figure): Puppet {
+    this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
+    return new Puppet(figure, this.#paint, this.#floorAt);
+  }
+
+  #compile(): void {
+    // Every shader there will be, side by side: one after the other as they come into sight takes longer, and stutters.
+    this.renderer.compile(this.scene, this.audience.camera);
+  }
+
   /** The disc keeps its proportion to the dancer. */
   #placeDisc(): void {
     const [radius, height] = this.#framing === "desktop" || this.#framing === "alone" ? [1.06, 1.3] : [0.98, 1.36];
@@ -297,7 +325,7 @@ export class Stage {
     this.puppet.plain = plain;
   }
 
-  #reach(puppet: Puppet): number {
+  #reach(puppet: Performer): number {
     const at = new Vector3();
     return Math.max(...[0, 1].map((limb) => Math.abs(puppet.handle(limb, at).project(this.audience.camera).x)));
   }

@@ -3,7 +3,7 @@ import { Group, Vector3 } from "three";
 import { apart } from "./apart";
 import { Bars, HOOK, type Bar } from "./bars";
 import type { Look } from "./look";
-import type { Puppet } from "./puppet";
+import type { Performer } from "./performer";
 import { Rings } from "./rings";
 import { Threads } from "./threads";
 
@@ -61,7 +61,7 @@ export class Strings {
   }
 
   /** Draws the four strings. `ground` is the floor's height, `ceiling` what bars stay under, `right` the camera's right, world. */
-  update(puppet: Puppet, states: readonly StringState[], look: Look, seconds: number, ground: number, ceiling: number, right: Vector3): void {
+  update(puppet: Performer, states: readonly StringState[], look: Look, seconds: number, ground: number, ceiling: number, right: Vector3): void {
     this.group.visible = true;
     this.#threads.dark = look.dark;
     const bars: Bar[] = [];

@@ -1,18 +1,17 @@
 import { Matrix4, Quaternion, Vector3 } from "three";
 import { describe, expect, test } from "vitest";
-import type { Puppet } from "../../src/stage/puppet";
+import type { Performer } from "../../src/stage/performer";
 import { Rig } from "../../src/stage/rig";
-import { SOLE } from "../../src/stage/standard";
 
-/** What the rig reads of a puppet: a dancer who stands at x, z on a floor at y, turned by `yaw`. */
-function dancer(x: number, y: number, z: number, yaw = 0): Puppet {
+type Dancer = Pick<Performer, "root" | "ground">;
+
+/** What the rig reads of a performer: a dancer who stands at x, z on a floor at y, turned by `yaw`. */
+function dancer(x: number, y: number, z: number, yaw = 0): Dancer {
   const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), yaw);
-  const at = (height: number) => new Matrix4().compose(new Vector3(x, y + height, z), turn, new Vector3(1, 1, 1));
-  const heights: Record<string, number> = { humanoid_root: 0.85, l_midtarsal: SOLE, r_midtarsal: SOLE, l_ankle: SOLE + 0.07, r_ankle: SOLE + 0.07 };
-  return { scale: 1, ankleHeight: 0.07, joint: (name: string) => at(heights[name]) } as unknown as Puppet;
+  return { root: new Matrix4().compose(new Vector3(x, y + 0.85, z), turn, new Vector3(1, 1, 1)), ground: y };
 }
 
-function follow(rig: Rig, puppet: Puppet, seconds: number): void {
+function follow(rig: Rig, puppet: Dancer, seconds: number): void {
   for (let t = 0; t < seconds; t += 1 / 60) rig.follow(puppet, 1 / 60);
 }
 

@@ -1,0 +1,54 @@
+/** How an avatar's materials take the stage's light. */
+import type { MToonMaterial } from "@pixiv/three-vrm";
+import { Mesh, MeshLambertMaterial, MeshStandardMaterial, type Material, type Object3D } from "three";
+
+/** Of a cartoon's colours, in the light and in the shade. */
+const LIT = 0.55;
+const SHADED = 0.15;
+
+/** Cartoons (MToon) take all of a light wherever it comes from, from behind as shade: before the stage's four they would be washed out. */
+export function dimCartoons(materials: Iterable<Material>): void {
+  for (const material of materials) {
+    if (!("isMToonMaterial" in material)) continue;
+    const { color, shadeColorFactor } = material as MToonMaterial;
+    color.multiplyScalar(LIT);
+    shadeColorFactor.multiplyScalar(SHADED);
+  }
+}
+
+/** Plain materials for machines that draw in software: colours and light, without gloss, bumps and reflections. */
+export class PlainMaterials {
+  readonly #full = new Map<Mesh, Material | Material[]>();
+  readonly #plain = new Map<Material, Material>();
+
+  constructor(model: Object3D) {
+    model.traverse((object) => {
+      if (object instanceof Mesh) this.#full.set(object, object.material as Material | Material[]);
+    });
+  }
+
+  /** Puts the model's own materials on it, or plain ones in the place of those that shade physically. */
+  show(plain: boolean): void {
+    const wanted = (material: Material) => (plain ? this.#plainOf(material) : material);
+    for (const [mesh, material] of this.#full) mesh.material = Array.isArray(material) ? material.map(wanted) : wanted(material);
+  }
+
+  dispose(): void {
+    this.show(false);
+    for (const [material, plain] of this.#plain) if (plain !== material) plain.dispose();
+    this.#plain.clear();
+  }
+
+  #plainOf(material: Material): Material {
+    let plain = this.#plain.get(material);
+    if (!plain) {
+      plain = material;
+      if (material instanceof MeshStandardMaterial) {
+        const { name, color, map, alphaMap, emissive, emissiveMap, emissiveIntensity, vertexColors, side, transparent, opacity, alphaTest, depthWrite } = material;
+        plain = new MeshLambertMaterial({ name, color, map, alphaMap, emissive, emissiveMap, emissiveIntensity, vertexColors, side, transparent, opacity, alphaTest, depthWrite });
+      }
+      this.#plain.set(material, plain);
+    }
+    return plain;
+  }
+}

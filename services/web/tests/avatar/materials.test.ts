@@ -1,0 +1,36 @@
+import { MToonMaterial } from "@pixiv/three-vrm";
+import { BoxGeometry, Color, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial } from "three";
+import { expect, test } from "vitest";
+import { dimCartoons, PlainMaterials } from "../../src/avatar/materials";
+
+test("physical materials are plain where they have to be, with their colours, and themselves again", () => {
+  const [glossy, flat] = [new MeshStandardMaterial({ color: "#336699", transparent: true, opacity: 0.5 }), new MeshBasicMaterial()];
+  const [one, several] = [new Mesh(new BoxGeometry(), glossy), new Mesh(new BoxGeometry(), [flat, glossy])];
+  const materials = new PlainMaterials(new Group().add(one, several));
+  materials.show(true);
+  const plain = one.material as unknown as MeshLambertMaterial;
+  expect([plain.isMeshLambertMaterial, plain.color.getHexString(), plain.opacity, plain.transparent]).toEqual([true, "336699", 0.5, true]);
+  expect(several.material).toEqual([flat, plain]);
+  materials.show(false);
+  expect([one.material, several.material]).toEqual([glossy, [flat, glossy]]);
+});
+
+test("they are the model's own again when nobody dances in it", () => {
+  const mesh = new Mesh(new BoxGeometry(), new MeshStandardMaterial());
+  const own = mesh.material;
+  const materials = new PlainMaterials(mesh);
+  materials.show(true);
+  materials.dispose();
+  expect(mesh.material).toBe(own);
+});
+
+test("cartoons are dimmed, shades more than what is lit, and nothing else is", () => {
+  const cartoon = new MToonMaterial();
+  cartoon.color = new Color(1, 1, 1);
+  cartoon.shadeColorFactor = new Color(1, 1, 1);
+  const other = new MeshStandardMaterial({ color: "#ffffff" });
+  dimCartoons([cartoon, other]);
+  expect(cartoon.color.r).toBeLessThan(1);
+  expect(cartoon.shadeColorFactor.r).toBeLessThan(cartoon.color.r);
+  expect(other.color.r).toBe(1);
+});
