@@ -14,7 +14,7 @@ UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/vite.config.ts services/web/vite.embed.config.ts services/web/lean-three.ts services/bunraku/codec/prior.json -type f 2>/dev/null)
 
-.PHONY: test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
+.PHONY: pictures test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
 
 help:
 	@echo "make demo    set everything up and open the dancing puppet   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
@@ -93,6 +93,10 @@ prior: .setup/python
 # how far apart what is heard and what is shown are, in Chromium
 bench-audio: setup
 	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "is heard where"
+
+# the pictures of README and docs, of the running page
+pictures: setup
+	cd services/web && npx vitest run --config tests/pictures/vitest.config.ts
 
 # the stack of docker-compose.yml, and what it survives: needs Docker with Compose, about half an hour (ARGUMENTS=--rounds 1)
 verify-compose: setup

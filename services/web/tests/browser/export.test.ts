@@ -24,7 +24,7 @@ async function saved(page: Page, act: () => Promise<unknown>): Promise<Saved> {
 
 /** Uploads a file, and waits until it is danced. */
 async function dances(page: Page, name: string, text: string): Promise<void> {
-  await page.locator("input[type=file]").setInputFiles({ name: `${name}.bvh`, mimeType: "text/plain", buffer: Buffer.from(text) });
+  await page.locator('input[type=file][accept*=".bvh"]').setInputFiles({ name: `${name}.bvh`, mimeType: "text/plain", buffer: Buffer.from(text) });
   await page.locator(".brand-piece", { hasText: name }).waitFor({ state: "attached" });
   await danced(page);
 }

@@ -33,7 +33,7 @@ describeInBrowser("Japanese", { demo: true }, ({ open }) => {
   test("tells what is wrong with a file, and gives way to English for good", async () => {
     const page = await open("?lang=ja", { locale: "en-GB" });
     await danced(page);
-    await page.locator("input[type=file]").setInputFiles({ name: "letter.bvh", mimeType: "text/plain", buffer: Buffer.from("Dear all,\n") });
+    await page.locator('input[type=file][accept*=".bvh"]').setInputFiles({ name: "letter.bvh", mimeType: "text/plain", buffer: Buffer.from("Dear all,\n") });
     await page.getByRole("alert").getByText("BVHファイルではありません").waitFor();
     const session = new URL(page.url()).searchParams.get("session");
     await page.getByRole("button", { name: "English" }).click();

@@ -16,7 +16,7 @@ describeInBrowser("the page", {}, ({ open }) => {
   test("invites when the stage is empty, and says what is wrong with a file that is no dance", async () => {
     const page = await open("", NIGHT);
     await page.getByRole("complementary", { name: "Library" }).waitFor();
-    await page.locator("input[type=file]").setInputFiles({ name: "letter.bvh", mimeType: "text/plain", buffer: Buffer.from("Dear all,\n") });
+    await page.locator('input[type=file][accept*=".bvh"]').setInputFiles({ name: "letter.bvh", mimeType: "text/plain", buffer: Buffer.from("Dear all,\n") });
     const problem = page.locator(".problem");
     await problem.waitFor();
     expect(await problem.innerText()).toContain("letter.bvh");
@@ -25,7 +25,7 @@ describeInBrowser("the page", {}, ({ open }) => {
 
   test.skipIf(!shared)("takes a real clip, dances it, and shows one's pull to a second page", async () => {
     const page = await open("", NIGHT);
-    await page.locator("input[type=file]").setInputFiles(join(shared ?? "", "mocap/bvh/perfume_A.bvh"));
+    await page.locator('input[type=file][accept*=".bvh"]').setInputFiles(join(shared ?? "", "mocap/bvh/perfume_A.bvh"));
     await danced(page);
     expect(await page.locator(".brand-piece").innerText()).toBe("perfume_A");
     expect(await page.locator(".problem").count()).toBe(0);

@@ -103,7 +103,7 @@ async function round(page: Page, clip: string): Promise<void> {
   for (const theme of ["Light theme", "Dark theme"]) await press(theme);
   // a dance comes, is danced, and goes
   const before = await page.locator(".brand-piece").innerText();
-  await page.locator("input[type=file]").setInputFiles(clip);
+  await page.locator('input[type=file][accept*=".bvh"]').setInputFiles(clip);
   await page.waitForFunction((before) => document.querySelector(".brand-piece")?.textContent !== before, before);
   await danced(page);
   const name = await page.locator(".brand-piece").innerText();
