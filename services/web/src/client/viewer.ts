@@ -244,8 +244,7 @@ export class Viewer extends EventTarget {
       firstPoseMs: this.firstPoseMs,
       gaps: this.gaps,
       reason: reasonOf({
-        closed: this.closedReason, damaged: this.damaged, shown: this.shown, missing: this.missing >= 0, choice: this.choice,
-        pinned: this.url.searchParams.has("rate"),
+        closed: this.closedReason, damaged: this.damaged, shown: this.shown, missing: this.missing >= 0, choice: this.choice, pinned: this.url.searchParams.has("rate"),
       }),
     };
   }
