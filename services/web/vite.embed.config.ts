@@ -1,10 +1,12 @@
 /** What other sites' pages load, at addresses that stay, and the page of examples: built after the page, into the same folder. */
 import { defineConfig } from "vite";
+import { leanThree } from "./lean-three.ts";
 
 /** Entries at `embed/NAME.js`. What they load is named by its content, so that it may be kept for ever. */
 const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/package.ts" };
 
 export default defineConfig({
+  plugins: [leanThree],
   // whatever site loads it, its parts are beside it
   base: "./",
   build: {

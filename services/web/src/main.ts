@@ -152,13 +152,6 @@ function play(): void {
   if (room?.viewer.timeline) room.edit({ playing: !room.viewer.timeline.playing });
 }
 
-function step(blocks: number): void {
-  if (!room || room.viewer.blocks.length === 0) return;
-  const block = room.viewer.duration / room.viewer.blocks.length;
-  const now = performance.now();
-  room.seek(Math.min(room.viewer.duration, Math.max(0, room.position(now) + blocks * block)), now);
-}
-
 async function share(): Promise<void> {
   const url = new URL(location.href);
   url.search = room ? `?session=${encodeURIComponent(room.id)}` : "";
@@ -278,8 +271,8 @@ async function openStage(): Promise<void> {
     ask: () => holding.ask(),
     give: () => holding.give(),
     play,
-    back: () => step(-1),
-    forward: () => step(1),
+    back: () => room?.step(-1, performance.now()),
+    forward: () => room?.step(1, performance.now()),
     camera: () => stage?.follow(!stage.following),
     sound: () => listening.toggle(),
     keep: () => page.transport.keep(),

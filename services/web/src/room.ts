@@ -61,6 +61,13 @@ export class Room {
     this.edit({ position: Math.round(seconds * 1e6) });
   }
 
+  /** Seeks on by so many blocks, or back, within the dance. */
+  step(blocks: number, now: number): void {
+    const { blocks: all, duration } = this.viewer;
+    if (all.length === 0) return;
+    this.seek(Math.min(duration, Math.max(0, this.position(now) + (blocks * duration) / all.length)), now);
+  }
+
   /** Whether the timeline may be edited from here. */
   get editable(): boolean {
     return this.place === "motions" || this.access.may("control");

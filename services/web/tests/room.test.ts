@@ -51,3 +51,27 @@ test("a room of another server is asked for, entered and edited there", async ()
   watched.close();
   Line.remove();
 });
+
+test("steps are blocks of the dance, and end where it does", async () => {
+  Line.install();
+  server({ "PATCH https://stage.example/v1/sessions/on": {} });
+  const room = new Room("on", "Aiko", () => undefined, { access: new Access("https://stage.example") });
+  const sought = vi.spyOn(room, "seek");
+  room.step(1, 0);
+  expect(sought).not.toHaveBeenCalled();
+  vi.spyOn(room.viewer, "blocks", "get").mockReturnValue(new Int8Array(20));
+  vi.spyOn(room.viewer, "duration", "get").mockReturnValue(30);
+  const at = vi.spyOn(room.viewer, "positionAt").mockReturnValue(12);
+  room.step(1, 7);
+  expect(sought).toHaveBeenLastCalledWith(13.5, 7);
+  room.step(-2, 8);
+  // from where the step before leads
+  expect(sought).toHaveBeenLastCalledWith(10.5, 8);
+  room.step(100, 9);
+  expect(sought).toHaveBeenLastCalledWith(30, 9);
+  room.step(-100, 10);
+  expect(sought).toHaveBeenLastCalledWith(0, 10);
+  at.mockRestore();
+  room.close();
+  Line.remove();
+});

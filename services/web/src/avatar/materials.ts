@@ -1,6 +1,6 @@
 /** How an avatar's materials take the stage's light. */
 import type { MToonMaterial } from "@pixiv/three-vrm";
-import { Mesh, MeshLambertMaterial, MeshStandardMaterial, type Material, type Object3D } from "three";
+import { Mesh, MeshLambertMaterial, type MeshPhysicalMaterial, MeshStandardMaterial, type Material, type Object3D } from "three";
 
 /** Of a cartoon's colours, in the light and in the shade. */
 const LIT = 0.55;
@@ -13,6 +13,23 @@ export function dimCartoons(materials: Iterable<Material>): void {
     const { color, shadeColorFactor } = material as MToonMaterial;
     color.multiplyScalar(LIT);
     shadeColorFactor.multiplyScalar(SHADED);
+  }
+}
+
+/** What is left to see of clear glass, as an opacity. */
+const GLASS = 0.25;
+
+/** Materials as the stage can draw them: without what its shaders were freed of (`lean-three.ts`), with which they would be drawn wrongly or not at all. Glass is thin. */
+export function simplify(materials: Iterable<Material>): void {
+  for (const material of materials) {
+    if (material instanceof MeshStandardMaterial) material.bumpMap = material.lightMap = material.alphaMap = material.displacementMap = null;
+    if (!("isMeshPhysicalMaterial" in material)) continue;
+    const physical = material as MeshPhysicalMaterial;
+    if (physical.transmission > 0) {
+      physical.opacity *= 1 - (1 - GLASS) * physical.transmission;
+      physical.transparent = true;
+    }
+    physical.transmission = physical.dispersion = physical.iridescence = 0;
   }
 }
 

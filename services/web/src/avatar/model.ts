@@ -3,7 +3,7 @@ import { VRMLoaderPlugin, VRMUtils, type VRM } from "@pixiv/three-vrm";
 import { Group, Mesh, TextureLoader, Vector3, type Material, type Object3D } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { judge } from "./file";
-import { dimCartoons } from "./materials";
+import { dimCartoons, simplify } from "./materials";
 import { broken } from "./problem";
 import { restOf, type Rest } from "./rest";
 
@@ -29,6 +29,7 @@ export class AvatarModel {
       object.frustumCulled = false;
     });
     dimCartoons(materials);
+    simplify(materials);
   }
 
   /** Reads a GLB or VRM file; `called` is its name where the file has none. Throws AvatarProblem where it cannot dance. */

@@ -203,7 +203,8 @@ export class Showing {
 
   async #draw(): Promise<void> {
     const missing = await this.drawing.open({
-      ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing), back: () => this.#step(-1), forward: () => this.#step(1),
+      ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing),
+      back: () => this.room?.step(-1, performance.now()), forward: () => this.room?.step(1, performance.now()),
     });
     if (!missing) return;
     this.#blind = true;
@@ -211,12 +212,5 @@ export class Showing {
     this.#leave();
     if (missing === "not loaded") this.#fail("The stage does not answer", "What draws it could not be loaded. Load this page again.");
     else this.#fail("This browser cannot draw the stage", "It needs WebGL 2. Try another browser, or switch on hardware acceleration.");
-  }
-
-  #step(blocks: number): void {
-    const { viewer } = this.room ?? {};
-    if (!this.room || !viewer || viewer.blocks.length === 0) return;
-    const block = viewer.duration / viewer.blocks.length;
-    this.seek(Math.min(viewer.duration, Math.max(0, this.room.position(performance.now()) + blocks * block)));
   }
 }

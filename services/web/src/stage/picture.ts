@@ -42,4 +42,11 @@ export class PictureCamera {
     if (!made) throw new Error("this browser makes no picture of the stage");
     return made;
   }
+
+  /** Gives its graphics back; another picture takes new ones. */
+  dispose(): void {
+    this.#renderer?.dispose();
+    this.#renderer?.forceContextLoss();
+    this.#renderer = null;
+  }
 }

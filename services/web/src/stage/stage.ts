@@ -195,6 +195,7 @@ export class Stage {
   dispose(): void {
     this.puppet?.dispose();
     this.scene.environment?.dispose();
+    this.#pictures.dispose();
     this.renderer.dispose();
     // with the context goes what is in it; browsers keep a few only, and would take an old one from another stage
     this.renderer.forceContextLoss();

@@ -1,7 +1,7 @@
 import { MToonMaterial } from "@pixiv/three-vrm";
-import { BoxGeometry, Color, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial } from "three";
+import { BoxGeometry, Color, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshPhysicalMaterial, MeshStandardMaterial, Texture } from "three";
 import { expect, test } from "vitest";
-import { dimCartoons, PlainMaterials } from "../../src/avatar/materials";
+import { dimCartoons, PlainMaterials, simplify } from "../../src/avatar/materials";
 
 test("physical materials are plain where they have to be, with their colours, and themselves again", () => {
   const [glossy, flat] = [new MeshStandardMaterial({ color: "#336699", transparent: true, opacity: 0.5 }), new MeshBasicMaterial()];
@@ -33,4 +33,16 @@ test("cartoons are dimmed, shades more than what is lit, and nothing else is", (
   expect(cartoon.color.r).toBeLessThan(1);
   expect(cartoon.shadeColorFactor.r).toBeLessThan(cartoon.color.r);
   expect(other.color.r).toBe(1);
+});
+
+test("what the stage's shaders have not is taken away: glass is thin, gloss and pictures stay", () => {
+  const picture = new Texture();
+  const glass = new MeshPhysicalMaterial({ transmission: 1, iridescence: 1, dispersion: 2, clearcoat: 0.5 });
+  const rough = new MeshStandardMaterial({ bumpMap: picture, map: picture, normalMap: picture, opacity: 0.5 });
+  simplify([glass, rough, new MeshBasicMaterial()]);
+  expect([glass.transmission, glass.iridescence, glass.dispersion, glass.clearcoat]).toEqual([0, 0, 0, 0.5]);
+  expect(glass.transparent).toBe(true);
+  expect(glass.opacity).toBeGreaterThan(0.1);
+  expect(glass.opacity).toBeLessThan(0.5);
+  expect([rough.bumpMap, rough.map, rough.normalMap, rough.opacity]).toEqual([null, picture, picture, 0.5]);
 });
