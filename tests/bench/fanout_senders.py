@@ -34,7 +34,8 @@ from bunraku.backing.library import pack
 from bunraku.backing.outlet import Outlet
 from bunraku.backing.settings import Settings
 from bunraku.playout import timeline
-from bunraku.wire.messages import Overlay, Presence
+from bunraku.wire.messages import Presence
+from bunraku.wire.overlay import Overlay
 
 SESSION = "bench"
 DURATION = 90_000_000

@@ -14,7 +14,9 @@ from bunraku.client import StreamEnded, Viewer
 from bunraku.client.api import Client
 from bunraku.client.puppeteer import Puppeteer
 from bunraku.playout.clock import Sample
-from bunraku.wire.messages import LARGEST_FROM_SERVER, LIMBS, SUBPROTOCOL, Overlay, Ping, Pong, unpack
+from bunraku.wire.limbs import LIMBS
+from bunraku.wire.messages import LARGEST_FROM_SERVER, SUBPROTOCOL, Ping, Pong, unpack
+from bunraku.wire.overlay import Overlay
 from tests.bench.network import Far, Link, Network
 
 PORT = 18352

@@ -41,7 +41,8 @@ from bunraku.marionette.vector import Quaternion, Vector
 from bunraku.motion.skeleton import Figure
 from bunraku.playout.overlays import UNIT
 from bunraku.serve import LOAD_AFTER
-from bunraku.wire.messages import Description, Overlay, unpack
+from bunraku.wire.messages import Description, unpack
+from bunraku.wire.overlay import Overlay
 from tests.processes import processor_seconds
 
 FRAME = 1e6 / 60.0

@@ -21,7 +21,8 @@ from bunraku.backing.bus_nats import NatsBus
 from bunraku.backing.register_nats import NatsRegister
 from bunraku.backing.unavailable import Unavailable
 from bunraku.client import Client, Puppeteer, Refused
-from bunraku.wire.messages import SUBPROTOCOL, Overlay, unpack
+from bunraku.wire.messages import SUBPROTOCOL, unpack
+from bunraku.wire.overlay import Overlay
 from tests.conftest import REPOSITORY
 from tests.deploy.nats_files import on_this_machine
 from tests.processes import Owned, free_port, needed

@@ -13,7 +13,8 @@ import pytest
 from bunraku.backing.frames import Opcode
 from bunraku.backing.settings import Settings
 from bunraku.client import Client, Puppeteer
-from bunraku.wire.messages import SUBPROTOCOL, Overlay, unpack
+from bunraku.wire.messages import SUBPROTOCOL, unpack
+from bunraku.wire.overlay import Overlay
 from tests.guests import SECRET, headers, token
 from tests.processes import free_port
 from tests.scrape import scrape, until

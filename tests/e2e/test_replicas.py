@@ -13,7 +13,8 @@ import pytest
 from websockets.asyncio.client import connect
 
 from bunraku.client import Client, Puppeteer, Refused, ServerProblem
-from bunraku.wire.messages import SUBPROTOCOL, Overlay, Presence, TimelineState, unpack
+from bunraku.wire.messages import SUBPROTOCOL, Presence, TimelineState, unpack
+from bunraku.wire.overlay import Overlay
 from tests.processes import Owned, free_port, jetstream, url_of
 from tests.servers import clip
 

@@ -13,19 +13,8 @@ from websockets.exceptions import ConnectionClosed
 
 from bunraku.client.api import Client
 from bunraku.client.puppeteer import Puppeteer
-from bunraku.wire.messages import (
-    SUBPROTOCOL,
-    Claim,
-    Grant,
-    Input,
-    Message,
-    Notice,
-    Overlay,
-    Presence,
-    Problem,
-    Refusal,
-    unpack,
-)
+from bunraku.wire.messages import SUBPROTOCOL, Claim, Grant, Input, Message, Notice, Presence, Problem, Refusal, unpack
+from bunraku.wire.overlay import Overlay
 
 FLOOD = 5_000
 

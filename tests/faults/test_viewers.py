@@ -17,7 +17,7 @@ from bunraku.client import Client, Puppeteer
 from bunraku.client.crowd import Crowd
 from bunraku.client.message_socket import upgrade
 from bunraku.stream import liveness
-from bunraku.wire.messages import Overlay
+from bunraku.wire.overlay import Overlay
 
 
 async def open_session(server: str, clip_file: Path) -> tuple[str, str]:

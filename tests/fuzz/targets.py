@@ -22,7 +22,8 @@ from bunraku.codec.decode import MotionBlock, decode_block
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.prior import MOST_FRAMES, shipped
 from bunraku.codec.track import CODEC, MotionTrack, read_track
-from bunraku.wire.messages import Description, MalformedMessage, unpack
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.messages import Description, unpack
 from tests.vectors.blocks import wild
 from tests.vectors.golden import FOLDER
 

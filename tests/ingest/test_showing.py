@@ -12,7 +12,8 @@ from bunraku.marionette.ownership import Grant, Input
 from bunraku.playout import timeline
 from bunraku.playout.blocks import Pose
 from bunraku.playout.overlays import Overlays, pack_joints
-from bunraku.wire.messages import Overlay, TimelineState
+from bunraku.wire.messages import TimelineState
+from bunraku.wire.overlay import Overlay
 from tests.ingest.dances import BEGAN, DANCES, SECOND, log_of
 
 LEAD = 100_000

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from bunraku.motion import rotation
 from bunraku.playout.overlays import JOINTS, LASTS, Overlays, pack_joints, unpack_joints
-from bunraku.wire.messages import Overlay
+from bunraku.wire.overlay import Overlay
 
 DANCE = rotation.from_rotation_vector(np.random.default_rng(1).uniform(-1, 1, (18, 3)))
 PULLED = rotation.from_rotation_vector(np.random.default_rng(2).uniform(-1, 1, (3, 3)))

@@ -17,7 +17,8 @@ from bunraku.session.distant import DistantStage
 from bunraku.session.requests import SessionEdit
 from bunraku.session.sessions import Sessions
 from bunraku.session.visitor import Visitor
-from bunraku.wire.messages import Claim, Grant, Overlay, Presence, TimelineState, Welcome, unpack
+from bunraku.wire.messages import Claim, Grant, Presence, TimelineState, Welcome, unpack
+from bunraku.wire.overlay import Overlay
 from tests.vectors.blocks import wandering_motion
 
 MOTIONS = ("one", "two")

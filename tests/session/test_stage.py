@@ -33,13 +33,13 @@ from bunraku.wire.messages import (
     Grant,
     Input,
     Notice,
-    Overlay,
     Presence,
     Refusal,
     Release,
     TimelineState,
     unpack,
 )
+from bunraku.wire.overlay import Overlay
 from tests.vectors.blocks import wandering_motion
 
 

@@ -13,7 +13,7 @@ from bunraku.stream.attendance import SILENT, Attendance
 from bunraku.stream.sessions import WatchedSessions
 from bunraku.stream.turns import Turns
 from bunraku.stream.viewers import Viewer
-from bunraku.wire.messages import Overlay
+from bunraku.wire.overlay import Overlay
 from tests.stream.lines import Line
 
 

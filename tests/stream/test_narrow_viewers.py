@@ -15,8 +15,9 @@ from bunraku.playout import timeline
 from bunraku.stream import viewers
 from bunraku.stream.turns import Turns
 from bunraku.stream.viewers import Viewer
-from bunraku.wire.messages import Choice, Data, Overlay, Ping, Pong, TimelineState
+from bunraku.wire.messages import Choice, Data, Ping, Pong, TimelineState
 from bunraku.wire.messages import unpack as unpack_message
+from bunraku.wire.overlay import Overlay
 from tests.playout.virtual_line import VirtualLine
 from tests.stream.lines import Line, frames
 from tests.vectors.blocks import wandering_motion

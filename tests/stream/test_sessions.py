@@ -16,7 +16,8 @@ from bunraku.stream import sessions
 from bunraku.stream.sessions import WatchedSessions
 from bunraku.stream.turns import Turns
 from bunraku.stream.viewers import Viewer
-from bunraku.wire.messages import Overlay, Presence, TimelineState
+from bunraku.wire.messages import Presence, TimelineState
+from bunraku.wire.overlay import Overlay
 from tests.stream.lines import Line
 from tests.vectors.blocks import wandering_motion
 

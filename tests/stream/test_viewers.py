@@ -22,7 +22,6 @@ from bunraku.wire.messages import (
     Data,
     Description,
     Edit,
-    Overlay,
     Ping,
     Pong,
     Presence,
@@ -30,6 +29,7 @@ from bunraku.wire.messages import (
     Report,
     TimelineState,
 )
+from bunraku.wire.overlay import Overlay
 from tests.stream.lines import Line, frames
 from tests.vectors.blocks import wandering_motion
 from tests.vectors.scene import camera, light

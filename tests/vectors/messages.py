@@ -20,7 +20,6 @@ from bunraku.wire.messages import (
     Input,
     Message,
     Notice,
-    Overlay,
     Ping,
     Pong,
     Presence,
@@ -31,6 +30,7 @@ from bunraku.wire.messages import (
     TimelineState,
     Welcome,
 )
+from bunraku.wire.overlay import Overlay
 from tests.vectors.blocks import text
 
 NOW = 1_774_000_000_123_456
@@ -89,27 +89,37 @@ def make() -> dict[str, Any]:
                 {1: (2, 4, 6, -2, -4, -6, 32_766, 0, 0), 2: (0, 0, 20, 0, 0, 40, 0, 0, 60)},
             ),
         ),
+        Overlay(8, NOW, {4: (5, -5, 5, -5, 5, -5, 5, -5, 5)}),
+        Overlay(
+            9,
+            NOW,
+            {0: (1, 2, 3, 4, 5, 6, 7, 8, 9), 6: (0, 0, 3, 0, 0, 6, 0, 0, 9), 15: (-1, 0, 0, -2, 0, 0, -3, 0, 0)},
+            ({0: (0,) * 9, 6: (0, 0, 1, 0, 0, 2, 0, 0, 3), 15: (1, 0, 0, 2, 0, 0, 3, 0, 0)},),
+        ),
+        Claim(13),
         Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)),
         Choice(2, "line", 27_400),
         Choice(4, "best"),
         Input(2, Input.VELOCITY, 9, 13, NOW, (-1.0, 0.0, 0.0)),
     ]
-    target = examples[-2].pack()
+    target = Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)).pack()
     invalid = {
         "empty": b"",
-        "limb past the last": Claim(0).pack()[:-1] + b"\x04",
+        "limb past the last": Claim(0).pack()[:-1] + b"\x10",
         "limb is text": bytes([67]) + msgpack.packb({"limb": "left"}),
         "no map": bytes([67]) + msgpack.packb([1]),
         "not MessagePack": bytes([67, 0xC1]),
         "input too short": target[:-1],
         "input not a number": target[:20] + b"\x00\x00\xc0\x7f" + target[24:],
         "input infinite": target[:20] + b"\x00\x00\x80\x7f" + target[24:],
-        "input of a fifth limb": target[:1] + b"\x04" + target[2:],
+        "input of a limb past the last": target[:1] + b"\x10" + target[2:],
         "overlay shorter than its mask": bytes([5, 1]) + bytes(10),
         "overlay shorter than its frames": bytes([5, 17]) + bytes(10 + 18),
+        "overlay of several without a mask": bytes([14, 0]) + bytes(11),
+        "overlay of several shorter than its mask": bytes([14, 0]) + bytes(10) + b"\x10\x80" + bytes(18),
         "data without an index": bytes([3, 0]),
         "data with an index too long": bytes([3, 0, 128, 128, 128, 1]),
-        "pong too long": examples[9].pack() + b"\0",
+        "pong too long": Pong(1, 2, 3, 4).pack() + b"\0",
     }
     alone = Presence(3, [], ["a1", None, None, None])
     older = bytes([6]) + msgpack.packb({"viewers": 3, "puppeteers": [], "limbs": alone.limbs})

@@ -13,7 +13,8 @@ from bunraku.codec.decode import decode_block
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.prior import shipped
 from bunraku.codec.track import CODEC, read_track
-from bunraku.wire.messages import MalformedMessage, unpack
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.messages import unpack
 from tests.vectors import blocks, golden
 
 

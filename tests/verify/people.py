@@ -16,7 +16,7 @@ from bunraku.client.line import Line
 from bunraku.client.puppeteer import Puppeteer, Refused
 from bunraku.client.viewer import Viewer
 from bunraku.playout.timeline import position_at
-from bunraku.wire.messages import Overlay
+from bunraku.wire.overlay import Overlay
 
 FRAME = 1 / 20
 """Seconds between two pictures: enough to see whether one is missing."""

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import dataclasses
-from random import Random
 from typing import Any
 
 import msgpack
@@ -10,6 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.wire import messages
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.limbs import MOST_LIMBS
 from bunraku.wire.messages import (
     Alive,
     Ask,
@@ -21,10 +22,8 @@ from bunraku.wire.messages import (
     Edit,
     Grant,
     Input,
-    MalformedMessage,
     Message,
     Notice,
-    Overlay,
     Ping,
     Pong,
     Presence,
@@ -34,13 +33,13 @@ from bunraku.wire.messages import (
     Report,
     TimelineState,
     Welcome,
-    newest,
     unpack,
 )
+from bunraku.wire.overlay import Overlay
 
 TIME = st.integers(0, (1 << 53) - 1)
 U32 = st.integers(0, 0xFFFFFFFF)
-LIMB = st.integers(0, 3)
+LIMB = st.integers(0, MOST_LIMBS - 1)
 TEXT = st.text(max_size=20)
 SINGLE = st.floats(allow_nan=False, allow_infinity=False, width=32)
 I16 = st.integers(-32768, 32767)
@@ -134,6 +133,7 @@ def test_sizes_are_those_of_the_contract() -> None:
     assert [len(Data(0, 3, index, b"").pack()) for index in (0, 127, 128, 86_399)] == [3, 3, 4, 5]
     assert len(Overlay(1, 2, {0: (0,) * 9, 3: (1,) * 9}).pack()) == 12 + 36
     assert len(Overlay(1, 2, {0: (0,) * 9}, ({0: (1,) * 9},)).pack()) == 12 + 36
+    assert len(Overlay(1, 2, {0: (0,) * 9, 7: (1,) * 9}).pack()) == 14 + 36
     assert len(Ping(1, 2).pack()) == len(Pong(1, 2, 3, 4).pack()) == len(Input(0, 0, 1, 1, 1, (0, 0, 0)).pack()) == 32
 
 
@@ -141,7 +141,7 @@ def test_sizes_are_those_of_the_contract() -> None:
     ("data", "says"),
     [
         (b"", "no type"),
-        (bytes([67]) + msgpack.packb({"limb": 4}), "limb"),
+        (bytes([67]) + msgpack.packb({"limb": 16}), "limb"),
         (bytes([67]) + msgpack.packb({"limb": "left"}), "limb"),
         (bytes([67]) + msgpack.packb([1]), "type 67"),
         (bytes([67]) + b"\xc1", "MessagePack"),
@@ -151,6 +151,9 @@ def test_sizes_are_those_of_the_contract() -> None:
         (bytes([5, 0x11]) + bytes(28), "48 bytes"),
         (bytes([5, 1]) + bytes(5), "12 bytes"),
         (bytes([5, 1]) + bytes(10), "30 bytes"),
+        (bytes([14, 0]) + bytes(11), "14 bytes"),
+        (bytes([14, 0]) + bytes(10) + b"\x10\x80" + bytes(18), "50 bytes"),
+        (bytes([70, 16]) + bytes(30), "limb 16"),
     ],
 )
 def test_a_malformed_message_says_what_is_wrong(data: bytes, says: str) -> None:
@@ -163,14 +166,3 @@ def test_types_are_unique_and_client_types_start_at_64() -> None:
     assert len(set(types)) == len(types)
     client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Input}
     assert {kind for kind in messages.Message.__args__ if kind.TYPE >= 64} == client
-
-
-@given(st.integers(0, 0xFFFF), TIME, st.sets(LIMB), st.integers(0, 5), st.randoms(use_true_random=False))
-def test_the_newest_frame_of_an_overlay_is_an_overlay_of_it_alone(
-    sequence: int, due: int, limbs: set[int], earlier: int, random: Random
-) -> None:
-    frames = [
-        {limb: tuple(random.randint(-32768, 32767) for _ in range(9)) for limb in limbs} for _ in range(earlier + 1)
-    ]
-    message = Overlay(sequence, due, frames[-1], tuple(frames[:-1]))
-    assert unpack(newest(message.pack())) == Overlay(sequence, due, frames[-1])

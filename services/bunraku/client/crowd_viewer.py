@@ -11,19 +11,9 @@ from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.timing import Timing, read_timing
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.timeline import Timelines, position_at
-from bunraku.wire.messages import (
-    ChannelHeader,
-    Data,
-    Description,
-    MalformedMessage,
-    Overlay,
-    Ping,
-    Pong,
-    Problem,
-    Report,
-    TimelineState,
-    unpack,
-)
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.messages import ChannelHeader, Data, Description, Ping, Pong, Problem, Report, TimelineState, unpack
+from bunraku.wire.overlay import Overlay
 
 AHEAD = 6_000_000
 """No server sends blocks further ahead than this, microseconds."""

@@ -13,9 +13,9 @@ from websockets.exceptions import ConnectionClosed
 
 from bunraku.client.api import Client, authorization
 from bunraku.client.one_euro import OneEuro
+from bunraku.wire.limbs import LIMBS
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
-    LIMBS,
     SUBPROTOCOL,
     Alive,
     Ask,

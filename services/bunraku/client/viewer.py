@@ -35,7 +35,6 @@ from bunraku.wire.messages import (
     Choice,
     Data,
     Description,
-    Overlay,
     Pong,
     Presence,
     Problem,
@@ -43,6 +42,7 @@ from bunraku.wire.messages import (
     TimelineState,
     unpack,
 )
+from bunraku.wire.overlay import Overlay
 
 FRAME = 1 / 60
 

@@ -13,7 +13,8 @@ from bunraku.motion.skeleton import Figure
 from bunraku.playout.blocks import BlockStore, Pose
 from bunraku.playout.overlays import LASTS, Overlays, pack_joints
 from bunraku.playout.timeline import position_at
-from bunraku.wire.messages import Data, Overlay, TimelineState
+from bunraku.wire.messages import Data, TimelineState
+from bunraku.wire.overlay import Overlay
 
 AHEAD = 100_000
 """Overlays are made so long before they are due, microseconds: no viewer knows of one sooner."""

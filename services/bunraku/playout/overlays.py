@@ -10,7 +10,7 @@ import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.wire.messages import Overlay
+from bunraku.wire.overlay import Overlay
 
 Quaternion = Sequence[float]
 JOINTS: tuple[tuple[int, int, int], ...] = ((12, 13, 14), (15, 16, 17), (2, 3, 4), (6, 7, 8))

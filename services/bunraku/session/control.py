@@ -20,7 +20,8 @@ from bunraku.session.distant import DistantStage
 from bunraku.session.stage_door import PRESENT
 from bunraku.session.tally import RATE, Tally
 from bunraku.session.visitor import QUEUE, Visitor
-from bunraku.wire.messages import Input, MalformedMessage, Ping, Pong, unpack
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.messages import Input, Ping, Pong, unpack
 
 EXCESS = 0.004
 """Seconds that one who says too much waits for each message: the line fills, and the sender's own writes wait."""

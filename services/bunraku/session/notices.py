@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bunraku.wire.messages import LIMBS, Notice
+from bunraku.wire.limbs import LIMBS
+from bunraku.wire.messages import Notice
 
 EVERY = 1_000_000
 """Microseconds between two notices of one kind about one limb."""

@@ -32,19 +32,8 @@ from bunraku.session.poses import Poses
 from bunraku.session.puppeteers import Puppeteer, Puppeteers
 from bunraku.session.tally import Tally
 from bunraku.wire import messages
-from bunraku.wire.messages import (
-    Alive,
-    Ask,
-    Claim,
-    Grant,
-    Input,
-    Overlay,
-    Presence,
-    Refusal,
-    Release,
-    TimelineState,
-    Welcome,
-)
+from bunraku.wire.messages import Alive, Ask, Claim, Grant, Input, Presence, Refusal, Release, TimelineState, Welcome
+from bunraku.wire.overlay import Overlay
 
 LEAD = 60_000
 """How far ahead of now overlays are due, microseconds: a message every two frames, and its way to a viewer near by."""

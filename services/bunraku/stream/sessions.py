@@ -22,7 +22,9 @@ from bunraku.stream.attendance import Attendance
 from bunraku.stream.cohorts import Cohorts
 from bunraku.stream.plans import Plans
 from bunraku.stream.viewers import Viewer
-from bunraku.wire.messages import MalformedMessage, Overlay, Presence, TimelineState, unpack
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.messages import Presence, TimelineState, unpack
+from bunraku.wire.overlay import Overlay
 
 COUNTED = 0.5
 """Seconds between two counts of the viewers that are published: each is told to every viewer, so that a thousand who

@@ -35,7 +35,9 @@ from bunraku.stream.pending import QUEUE, Pending
 from bunraku.stream.playing import BESIDE, Playing
 from bunraku.stream.tracks import TRACKS
 from bunraku.stream.turns import Turns
-from bunraku.wire.messages import Data, Edit, MalformedMessage, Ping, Report, TimelineState, newest, unpack
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.messages import Data, Edit, Ping, Report, TimelineState, unpack
+from bunraku.wire.overlay import newest
 
 DEEP = 200_000
 """So much more of what is not live may wait in the queue of a narrow line, microseconds."""

@@ -14,20 +14,19 @@ from typing import Annotated, Any, ClassVar
 import msgpack
 from pydantic import Field, TypeAdapter, ValidationError
 
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.limbs import LIMBS, MOST_LIMBS
+from bunraku.wire.overlay import Overlay
+
 VERSION = 1
 SUBPROTOCOL = "bunraku.v1"
 CLOCK = "unix"
 LARGEST_FROM_CLIENT = 1_024
 LARGEST_FROM_SERVER = 1 << 20
-LIMBS: tuple[str, ...] = ("left_hand", "right_hand", "left_leg", "right_leg")
-
-Limb = Annotated[int, Field(strict=True, ge=0, lt=len(LIMBS))]
+Limb = Annotated[int, Field(strict=True, ge=0, lt=MOST_LIMBS)]
+"""Limb l of performer k is 4 k + l."""
 Count = Annotated[int, Field(strict=True, ge=0, lt=1 << 53)]
 """A count or a time: what JavaScript's numbers hold exactly."""
-
-
-class MalformedMessage(ValueError):
-    """A message of a known type that cannot be read; the text says what is wrong with it."""
 
 
 class _Packed:
@@ -83,8 +82,8 @@ class TimelineState(_Packed):
 
 @dataclass(frozen=True, slots=True)
 class Presence(_Packed):
-    """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS`, `asks` the ids of those
-    who ask for it, first come first."""
+    """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS` of each performer, `asks`
+    the ids of those who ask for it, first come first."""
 
     TYPE = 6
     viewers: Count
@@ -196,7 +195,7 @@ class Alive(_Packed):
     """Still holding `limbs` with nothing new to say."""
 
     TYPE = 69
-    limbs: Annotated[list[Limb], Field(max_length=len(LIMBS))] = field(default_factory=list)
+    limbs: Annotated[list[Limb], Field(max_length=MOST_LIMBS)] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,51 +233,6 @@ class Data:
                 if data[end - 1] < 128:
                     return cls(data[1] >> 4, data[1] & 15, index, data[end:])
         raise MalformedMessage("Data has a track and rate, an index of 1 to 3 bytes, and a block")
-
-
-@dataclass(frozen=True, slots=True)
-class Overlay:
-    """Pulled limbs at clock time `due`: limb -> three rotation vectors of its joints, in units of pi/32767.
-
-    `earlier` are the same limbs in the frames before, oldest first, each `FRAME` µs after the one before it.
-    """
-
-    TYPE: ClassVar[int] = 5
-    FRAME: ClassVar[int] = 16_667
-    sequence: int
-    due: int
-    limbs: dict[int, tuple[int, ...]]
-    earlier: tuple[dict[int, tuple[int, ...]], ...] = ()
-
-    def pack(self) -> bytes:
-        """The message as bytes: 12 and 18 a limb and frame."""
-        limbs = sorted(self.limbs)
-        head = sum(1 << limb for limb in limbs) | len(self.earlier) << 4
-        numbers = [n for frame in (*self.earlier, self.limbs) for limb in limbs for n in frame[limb]]
-        return struct.pack(f"<BBHQ{len(numbers)}h", self.TYPE, head, self.sequence & 0xFFFF, self.due, *numbers)
-
-    @classmethod
-    def unpack(cls, data: bytes) -> Overlay:
-        """The message of `pack`."""
-        if len(data) < 12:
-            raise MalformedMessage("Overlay has 12 bytes at least")
-        limbs = [limb for limb in range(len(LIMBS)) if data[1] >> limb & 1]
-        size = 12 + 18 * len(limbs) * ((data[1] >> 4) + 1)
-        if len(data) != size:
-            raise MalformedMessage(f"Overlay of {len(limbs)} limbs has {size} bytes, not {len(data)}")
-        _, head, sequence, due, *numbers = struct.unpack(f"<BBHQ{(size - 12) // 2}h", data)
-        parts = [tuple(numbers[at : at + 9]) for at in range(0, len(numbers), 9)]
-        frames = [
-            dict(zip(limbs, parts[len(limbs) * frame : len(limbs) * (frame + 1)], strict=True))
-            for frame in range((head >> 4) + 1)
-        ]
-        return cls(sequence, due, frames[-1], tuple(frames[:-1]))
-
-
-def newest(overlay: bytes) -> bytes:
-    """An Overlay's message with its last frame alone, for a line that does not carry all."""
-    limbs = (overlay[1] & 15).bit_count()
-    return bytes((overlay[0], overlay[1] & 15)) + overlay[2:12] + overlay[len(overlay) - 18 * limbs :]
 
 
 @dataclass(frozen=True, slots=True)
@@ -347,8 +301,8 @@ class Input:
     def unpack(cls, data: bytes) -> Input:
         """The message of `pack`; numbers that are not finite are malformed."""
         _, limb, kind, epoch, sequence, sampled, *values = _fixed(cls.LAYOUT, data, "Input")
-        if limb >= len(LIMBS) or kind > cls.TARGET:
-            raise MalformedMessage(f"Input names limb {limb}, kind {kind}; there are 4 limbs and 2 kinds")
+        if limb >= MOST_LIMBS or kind > cls.TARGET:
+            raise MalformedMessage(f"Input names limb {limb}, kind {kind}; there are {MOST_LIMBS} limbs and 2 kinds")
         if not all(map(math.isfinite, values)):
             raise MalformedMessage("Input holds a number that is not finite")
         return cls(limb, kind, epoch, sequence, sampled, (values[0], values[1], values[2]))
@@ -359,7 +313,7 @@ Message = (
     | Notice | Choice | Ping | Edit | Report | Claim | Release | Alive | Ask | Input
 )  # fmt: skip
 
-_FIXED = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)}
+_FIXED = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)} | {Overlay.SEVERAL: Overlay}
 _MAPS: dict[int, TypeAdapter[Any]] = {
     kind.TYPE: TypeAdapter(kind)
     for kind in (
