@@ -2,7 +2,7 @@ import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import { restPose } from "../../src/motion/skeleton";
 import { Overlays, SILENCE } from "../../src/playout/overlay";
-import type { Overlay } from "../../src/wire/messages";
+import type { Overlay } from "../../src/wire/overlay";
 
 const QUARTER = Math.round(32767 / 4);
 
