@@ -225,7 +225,7 @@ function enter(id: string, place: Place = "sessions"): Room {
   history.replaceState(null, "", url);
   page.notice(null);
   viewer.addEventListener("figure", () => {
-    performing?.cast();
+    performing?.comeOn();
     if (!pieces.find(viewer.motion)) void pieces.refresh().then(renderPieces, () => undefined);
     renderPieces();
   });

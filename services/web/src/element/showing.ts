@@ -131,7 +131,7 @@ export class Showing {
       target.addEventListener(event, (told) => {
         if (this.room === room) then(told);
       });
-    during(viewer, "figure", () => this.drawing.performing?.cast());
+    during(viewer, "figure", () => this.drawing.performing?.comeOn());
     during(viewer, "timeline", () => this.#bar());
     during(viewer, "presence", () => this.tell("presence", viewer.presence));
     during(puppeteer, "welcome", () => this.tell("welcome", { id: puppeteer.id, colour: puppeteer.colour }));
