@@ -5,6 +5,7 @@ import type { VelocityInputs } from "./input/velocity";
 import { controlName } from "./page/control-names";
 import { askers, holders, LIMB_NAMES, LIMB_ORDER, type LimbState } from "./page/model";
 import type { Page } from "./page/page";
+import type { Toast } from "./page/toast";
 import type { Room } from "./room";
 import { heard, say } from "./words/say";
 
@@ -18,7 +19,7 @@ export interface Theatre {
 
 /** Where it is shown: the page, or as much of one as there is. */
 export interface HoldingPage {
-  readonly toast: Page["toast"];
+  readonly toast: Toast;
   readonly strings: Pick<Page["strings"], "render" | "notice">;
   readonly asks: Page["asks"];
 }

@@ -55,11 +55,11 @@ export class Performing {
   enter(room: Room | null): void {
     this.#room = room;
     this.hands.puppeteer = room?.puppeteer ?? null;
-    this.cast();
+    this.comeOn();
   }
 
   /** The room's dancer comes on. */
-  cast(): void {
+  comeOn(): void {
     const { figure, front } = this.#room?.viewer ?? {};
     if (figure) this.stage.setFigure(figure, front);
   }

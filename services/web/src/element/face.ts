@@ -4,7 +4,7 @@ import { element, setAttribute } from "../page/dom";
 import { icon, limbIcon } from "../page/icons";
 import { LIMB_NAMES, LIMB_ORDER, limbKey, type LimbState } from "../page/model";
 import { createTags, type Tags } from "../page/tags";
-import { createToast, type Toast } from "../page/toast";
+import { createToast, type Toasts } from "../page/toast";
 import tokens from "../style/tokens.css?inline";
 import own from "./element.css?inline";
 
@@ -25,7 +25,7 @@ export interface Face {
   readonly canvas: HTMLCanvasElement;
   readonly tags: Tags;
   readonly asks: Asks;
-  readonly toast: Toast;
+  readonly toast: Toasts;
   /** Words in place of the dance; null for none. */
   notice(title: string | null, text?: string): void;
   /** The bar: whether it is there; whether play may be pressed, and would pause; limbs, if they can be taken. */

@@ -35,7 +35,7 @@ const FACE: Extent = { across: 0.1, up: 0.16, down: 0.14 };
 const LONGEST_STEP = 0.1;
 
 /** Makes who dances for the lengths of the dancer that the stream tells of. */
-export type Casting = (figure: Figure) => Performer;
+export type MakePerformer = (figure: Figure) => Performer;
 
 const FREE: readonly StringState[] = [0, 1, 2, 3].map(() => ({ holder: null, lit: false, pull: null }));
 
@@ -64,7 +64,7 @@ export class Stage {
   #sharpness = 1;
   #framing: Framing = "desktop";
   #figure: Figure | null = null;
-  #cast: Casting | null = null;
+  #make: MakePerformer | null = null;
   readonly #quality: QualityChoice;
   readonly #gate: FrameGate;
   readonly #pictures = new PictureCamera();
@@ -134,9 +134,9 @@ export class Stage {
     this.#compile();
   }
 
-  /** Has the dance danced by whom `casting` makes for a dancer's lengths, from now on; null: by the puppet. */
-  cast(casting: Casting | null): void {
-    this.#cast = casting;
+  /** Has the dance danced by whom `make` makes for a dancer's lengths, from now on; null: by the puppet. */
+  danceBy(make: MakePerformer | null): void {
+    this.#make = make;
     if (!this.#figure) return;
     this.#enter(this.#figure);
     this.#compile();
@@ -277,7 +277,7 @@ export class Stage {
 
   #enter(figure: Figure): void {
     this.puppet?.dispose();
-    this.puppet = this.#cast?.(figure) ?? this.#carve(figure);
+    this.puppet = this.#make?.(figure) ?? this.#carve(figure);
     this.#furnish();
     this.puppet.group.visible = false;
     this.scene.add(this.puppet.group);
