@@ -30,5 +30,5 @@ export default defineConfig({
   // the prior lies beside the Python codec
   server: { fs: { allow: [".", "../bunraku/codec/prior.json"] }, proxy: { "/v1": { target: "http://127.0.0.1:8000", ws: true } } },
   // one file at a time: browsers that draw in software starve each other
-  test: { include: ["tests/**/*.test.ts"], environment: "node", fileParallelism: false },
+  test: { include: ["tests/**/*.test.ts"], environment: "node", fileParallelism: false, expect: { poll: { timeout: 90_000 } } },
 });
