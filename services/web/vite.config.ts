@@ -15,6 +15,9 @@ const preloadTheatre: Plugin = {
   },
 };
 
+/** Milliseconds. */
+const PATIENCE = 90_000;
+
 export default defineConfig({
   plugins: [preloadTheatre, leanThree],
   build: {
@@ -29,6 +32,14 @@ export default defineConfig({
   },
   // the prior lies beside the Python codec
   server: { fs: { allow: [".", "../bunraku/codec/prior.json"] }, proxy: { "/v1": { target: "http://127.0.0.1:8000", ws: true } } },
-  // one file at a time: browsers that draw in software starve each other
-  test: { include: ["tests/**/*.test.ts"], environment: "node", fileParallelism: false },
+  test: {
+    include: ["tests/**/*.test.ts"],
+    environment: "node",
+    // one file at a time: browsers that draw in software starve each other
+    fileParallelism: false,
+    // bounds for what hangs: how long the rest takes is the machine's affair
+    testTimeout: PATIENCE,
+    hookTimeout: PATIENCE,
+    expect: { poll: { timeout: PATIENCE } },
+  },
 });
