@@ -11,12 +11,11 @@ const UNUSED =
 
 const SHADER = /\/\* glsl \*\/\s*`([^`$]*)`/g;
 
-/** Parts of the renderer for what the stage never does: goggles, other outputs than the canvas, blocks of uniforms, cubes of pictures. What the renderer asks of them all the same is answered. */
+/** Parts of the renderer for what the stage never does: goggles, other outputs than the canvas, blocks of uniforms. What the renderer asks of them all the same is answered. */
 const IDLE: Readonly<Record<string, string>> = {
   "webxr/WebXRManager": "export class WebXRManager { enabled = false; isPresenting = false; addEventListener() {} removeEventListener() {} setAnimationLoop() {} getEnvironmentBlendMode() {} dispose() {} }",
   "webgl/WebGLOutput": "export class WebGLOutput {}",
   "webgl/WebGLUniformsGroups": "export class WebGLUniformsGroups { dispose() {} }",
-  WebGLCubeRenderTarget: "export class WebGLCubeRenderTarget {}",
 };
 
 /** A shader's text without what is there for its readers. Lines of the preprocessor keep their spaces, and so do signs, of which two in a row are another. */
