@@ -173,7 +173,8 @@ export class Viewer extends EventTarget {
     const position = positionAt(timeline, clock);
     const index = store.track.blockAt(position);
     if (store.poseAt(position, timeline.loop, dance)) {
-      if (!this.shown) this.firstPoseMs ??= nowMs - this.started;
+      this.firstPoseMs ??= nowMs - this.started;
+      if (!this.shown) this.solver.prepare(this.figure);
       this.shown = true;
       this.missing = -1;
       this.rate = store.rates[index];
@@ -276,7 +277,7 @@ export class Viewer extends EventTarget {
     this.clock.restart();
     this.timelines.restart();
     this.asking.begin();
-    this.solver.prepare(this.figure);
+    if (this.shown) this.solver.prepare(this.figure);
     this.tell("open");
     if (replaced) this.tell("replaced");
   }
@@ -355,7 +356,6 @@ export class Viewer extends EventTarget {
     this.shown = false;
     this.missing = -1;
     this.rate = -1;
-    this.solver.prepare(this.figure);
     this.tell("figure");
     this.tell("blocks");
   }
