@@ -33,6 +33,8 @@ const FACE: Extent = { across: 0.1, up: 0.16, down: 0.14 };
 
 /** Movements of the stage's own take no longer step than this, seconds. */
 const LONGEST_STEP = 0.1;
+/** The stage is drawn without a dancer only if none came on for so long, seconds: its picture would stand in the way of theirs. */
+const EMPTY_AFTER = 1;
 
 /** Makes who dances for the lengths of the dancer that the stream tells of. */
 export type MakePerformer = (figure: Figure) => Performer;
@@ -49,6 +51,8 @@ export class Stage {
   readonly renderer: WebGLRenderer;
   /** Who dances: the puppet, or an avatar in its place. */
   puppet: Performer | null = null;
+  /** Whether the graphics are done with a frame that has a dancer in it. */
+  shown = false;
   readonly #scenery = new Scenery();
   readonly #backdrop = backdropUniforms();
   readonly #floor: Floor;
@@ -69,6 +73,8 @@ export class Stage {
   readonly #gate: FrameGate;
   readonly #pictures = new PictureCamera();
   #sinceDrawn = 0;
+  #empty = 0;
+  #danced = false;
   #picturing = false;
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
@@ -82,10 +88,12 @@ export class Stage {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.#scenery.group.add(createBackdrop(this.#backdrop), this.#floor.mesh);
+    this.rig.group.add(this.audience.camera, this.#lights.group);
+    this.scene.add(this.rig.group);
+    // drawn in software what is behind the dancer takes longer than the dancer, who comes first then
+    if (!plain) this.#build();
     // three.js' own listener stands before this one: its side of the context is there again by then
     canvas.addEventListener("webglcontextrestored", () => this.#restore());
-    this.rig.group.add(this.audience.camera, this.#lights.group, this.#scenery.group);
-    this.scene.add(this.rig.group, this.strings.group);
     this.#furnish();
   }
 
@@ -120,6 +128,7 @@ export class Stage {
     this.#lights.dress(this.#look);
     this.#light();
     this.renderer.toneMappingExposure = this.#look.exposure;
+    this.renderer.setClearColor(this.#look.backdrop.middle);
     this.#furnish();
   }
 
@@ -181,6 +190,10 @@ export class Stage {
     if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());
     this.#sinceDrawn += interval;
     if (!this.#gate.open) return;
+    this.shown = this.#danced;
+    if (puppet && pose) this.#danced = true;
+    else if ((this.#empty += seconds) < EMPTY_AFTER) return;
+    if (this.shown || !this.#danced) this.#build();
     this.renderer.render(this.scene, this.audience.camera);
     this.#gate.close();
     const slow = puppet && pose && !this.#picturing && this.#quality.frame(this.#sinceDrawn);
@@ -281,6 +294,14 @@ export class Stage {
     this.#furnish();
     this.puppet.group.visible = false;
     this.scene.add(this.puppet.group);
+  }
+
+  /** Puts up what is about the dancer. */
+  #build(): void {
+    if (this.#scenery.group.parent) return;
+    this.rig.group.add(this.#scenery.group);
+    this.scene.add(this.strings.group);
+    if (this.puppet) this.#compile();
   }
 
   #carve(figure: Figure): Puppet {
