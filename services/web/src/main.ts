@@ -323,7 +323,7 @@ function frame(): void {
   pad?.update(now, !page.keys.listening);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
   const { pose, limbs } = performing.draw(now, focused);
-  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.face);
+  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.faces);
   if (pose) invite(now);
   page.transport.camera(stage.hasShow, stage.following);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);

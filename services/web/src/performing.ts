@@ -61,7 +61,7 @@ export class Performing {
   /** The room's dancer comes on. */
   cast(): void {
     const { figure, front } = this.#room?.viewer ?? {};
-    if (figure) this.stage.setFigure(figure, front);
+    if (figure) this.stage.setFigures([figure], front);
   }
 
   /** Moves everything on to local `now`, milliseconds, and draws it; `focused` is a limb whose control has the focus. */
@@ -79,7 +79,7 @@ export class Performing {
       lit: pointer.near === limb || focused === limb || selected,
       pull: hands.pull(limb),
     }));
-    stage.draw(pose, states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.shownTime(now));
+    stage.draw([pose], states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.shownTime(now));
     return { pose, limbs };
   }
 

@@ -11,8 +11,8 @@ export interface Place {
 }
 
 export interface Tags {
-  /** Puts each holder's tag by its bar on the screen, CSS pixels, where it covers nothing; null hides it. `face` is kept free too. */
-  render(limbs: readonly LimbState[], bars: readonly (Box | null)[], face: Box | null): void;
+  /** Puts each holder's tag by its bar on the screen, CSS pixels, where it covers nothing; null hides it. `faces` are kept free too. */
+  render(limbs: readonly LimbState[], bars: readonly (Box | null)[], faces: readonly Box[]): void;
   /** Puts the invitation beside a place; null takes it away. */
   invite(place: Place | null): void;
 }
@@ -39,7 +39,7 @@ export function createTags(root: ParentNode & Node, ask: (limb: number) => void,
   const invitation = element("div", { class: "tag invitation", hidden: true }, say("Take a hand"));
   layer.append(invitation);
   return {
-    render(limbs, bars, face) {
+    render(limbs, bars, faces) {
       const shown = tags.map((one, i) => (limbs[i].holder && bars[i] ? one : null));
       shown.forEach((one, i) => {
         tags[i].tag.hidden = !one;
@@ -53,7 +53,7 @@ export function createTags(root: ParentNode & Node, ask: (limb: number) => void,
         const says = `${holder.name}\n${asked}\n${holder.mine}`;
         if (one.says !== says || one.width === 0) [one.says, one.width, one.height] = [says, one.tag.offsetWidth, one.tag.offsetHeight];
       });
-      laid = layLabels(shown.map((one, i) => one && { bar: bars[i] as Box, width: one.width, height: one.height }), face ? [face] : [], laid, width(), top);
+      laid = layLabels(shown.map((one, i) => one && { bar: bars[i] as Box, width: one.width, height: one.height }), faces, laid, width(), top);
       laid.forEach((place, i) => {
         if (place) tags[i].tag.style.transform = `translate(${place.box.left.toFixed(1)}px, ${place.box.top.toFixed(1)}px)`;
       });

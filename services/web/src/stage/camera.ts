@@ -1,5 +1,5 @@
 /**
- * The audience's camera: a seat of one's own, framed by layout, with a small orbit that springs back and a step back when hands
+ * The audience's camera: a seat of one's own, framed by layout, as far back as several dancers need, with a small orbit that springs back and a step back when hands
  * reach far; or the show's camera, where the motion has one and it is followed.
  */
 import { MathUtils, PerspectiveCamera } from "three";
@@ -20,6 +20,10 @@ const TRANSPORT = 110;
 const DRAWN_FOR = 900;
 const HALF_FIELD = (13 * Math.PI) / 180;
 const EYE = 0.08;
+/** Metres that the standard figure takes to either side of its place, where there are several. */
+const ELBOW_ROOM = 0.8;
+/** Pixels at each side of a desktop's picture in which several dancers do not stand: the dock is there. */
+const DOCK = 76;
 const YAW = (25 * Math.PI) / 180;
 const PITCH_LOW = (-5 * Math.PI) / 180;
 const PITCH_HIGH = (15 * Math.PI) / 180;
@@ -36,6 +40,15 @@ export class AudienceCamera {
   readonly view: View = createView();
   still = false;
   scale = 1;
+  /** How many times further back the seat is than one dancer needs. */
+  wide = 1;
+  /** The furthest that dancers were to a side, and nearer, since the last cut, metres: the seat goes back for them, and not forth again. */
+  #aside = 0;
+  #near = 0;
+  /** Of the picture's width, what they have. */
+  #free = 1;
+  /** Whether the seat is still to be taken for the first time since the last cut. */
+  #fresh = true;
   readonly #own = createView();
   readonly #show = createView();
   #hasShow = false;
@@ -56,9 +69,10 @@ export class AudienceCamera {
   #untouched = REST;
 
   /** Changes the framing, eased over 0.6 s. In a window of few pixels the transport takes a larger share: the puppet makes room. */
-  frame(framing: Framing, height: number): void {
+  frame(framing: Framing, width: number, height: number): void {
     const [visible, look] = FRAMINGS[framing];
     const lost = framing === "desktop" ? Math.max(0, TRANSPORT / height - TRANSPORT / DRAWN_FOR) : 0;
+    this.#free = framing === "desktop" ? Math.max(0.5, 1 - (2 * DOCK) / width) : 1;
     this.#goal = [visible / (1 - lost), look - (visible / (1 - lost)) * (lost / 2)];
   }
 
@@ -99,6 +113,20 @@ export class AudienceCamera {
     this.#met = false;
     this.#hasShow = false;
     this.#over = 0;
+    this.#aside = this.#near = 0;
+    this.#fresh = true;
+  }
+
+  /** How far to the side dancers are seen, metres; 0 where there is one alone. */
+  get aside(): number {
+    return this.#aside;
+  }
+
+  /** Where the dancers are, metres in the frame of the camera's parent. One alone has its picture; several have all theirs together. */
+  stand(dancers: readonly { x: number; z: number }[]): void {
+    if (dancers.length < 2) return;
+    this.#aside = Math.max(this.#aside, ELBOW_ROOM * this.scale, ...dancers.map(({ x }) => Math.abs(x) + ELBOW_ROOM * this.scale));
+    this.#near = Math.max(this.#near, ...dancers.map(({ z }) => z));
   }
 
   /** Turns the view by a drag, radians, in one's own seat; it springs back after 4 s untouched. Leaves the show's camera. */
@@ -130,6 +158,11 @@ export class AudienceCamera {
   #seat(seconds: number, reach: number): void {
     const [visible, look] = this.#goal;
     const share = this.still ? 1 : 1 - Math.exp((-4 / EASE) * seconds);
+    // as far back as shows the dancers at the sides, and as far from the nearest as from one alone
+    const one = ((visible / 2) * this.scale) / Math.tan(HALF_FIELD);
+    const wide = (Math.max(one, this.#aside / (Math.tan(HALF_FIELD) * this.camera.aspect * this.#free)) + this.#near) / one;
+    this.wide += (wide - this.wide) * (this.#fresh ? 1 : share);
+    this.#fresh &&= this.#aside === 0;
     this.#visible += (visible - this.#visible) * share;
     this.#height += (look - this.#height) * share;
     this.#untouched += seconds;
@@ -143,10 +176,11 @@ export class AudienceCamera {
     this.#back += (wanted - this.#back) * (this.still ? 1 : 1 - Math.exp((wanted > this.#back ? -3 : -0.7) * seconds));
 
     const { position, gaze } = this.#own;
-    const distance = ((this.#visible / 2) * this.scale * (1 + this.#back)) / Math.tan(HALF_FIELD);
-    gaze.set(0, this.#height * this.scale, 0);
+    const scale = this.scale * this.wide;
+    const distance = ((this.#visible / 2) * scale * (1 + this.#back)) / Math.tan(HALF_FIELD);
+    gaze.set(0, this.#height * scale, 0);
     const flat = distance * Math.cos(this.#pitch);
-    position.set(Math.sin(this.#yaw) * flat, gaze.y + EYE * this.scale + distance * Math.sin(this.#pitch), Math.cos(this.#yaw) * flat);
+    position.set(Math.sin(this.#yaw) * flat, gaze.y + EYE * scale + distance * Math.sin(this.#pitch), Math.cos(this.#yaw) * flat);
     const { parent } = this.camera;
     if (parent) for (const place of [position, gaze]) parent.localToWorld(place);
     this.#own.fov = 2 * HALF_FIELD;
