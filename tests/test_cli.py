@@ -59,6 +59,19 @@ def test_a_camera_and_lights_are_added_from_keyframes(server: str, clip_file: Pa
     assert "show.json is no JSON" in refused.output
 
 
+def test_dances_are_put_side_by_side(server: str, clip_file: Path) -> None:
+    motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
+    made = RUN.invoke(app, ["perform", f"{server}/v1/motions/{motion}", motion, motion, "--json"])
+    assert made.exit_code == 0, made.output
+    trio = json.loads(made.stdout)
+    assert (trio["performers"], trio["tracks"]) == (3, ["motion"] * 3)
+    shown = RUN.invoke(app, ["perform", motion, motion, motion, "--server", server])
+    assert shown.stdout == f"3 performers, {trio['name']}: {trio['id']}\n"
+    refused = RUN.invoke(app, ["perform", trio["id"], motion, motion, "--server", server])
+    assert refused.exit_code != 0
+    assert "at most 4 performers" in refused.output
+
+
 def test_for_people_there_are_tables(server: str, clip_file: Path) -> None:
     shown = RUN.invoke(app, ["upload", str(clip_file), "--server", server])
     assert "18 of 18" in shown.stdout
@@ -79,6 +92,8 @@ def test_failures_are_said_in_words(server: str, tmp_path: Path) -> None:
         ["audio", "none", str(bad), "--server", server],
         ["audio", f"{server}/v1/sessions/none", str(bad)],
         ["scene", f"{server}/v1/sessions/none", str(bad)],
+        ["perform", "none", "none", "--server", server],
+        ["perform", f"{server}/v1/sessions/none", "none"],
         ["list", "--server", "http://127.0.0.1:9"],
         ["upload", str(tmp_path / "missing.bvh"), "--server", server],
     ):

@@ -167,6 +167,34 @@ def scene(
     say(f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}")
 
 
+@app.command()
+def perform(
+    motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
+    others: Annotated[
+        list[str], typer.Argument(help="Ids of motions that dance beside it; the same one may come again.")
+    ],
+    server: Server = HERE,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Make a new motion in which several dance side by side, four at most."""
+    from bunraku.client.api import Client
+
+    base, kind, identity = read_address(motion)
+    if kind == "sessions":
+        raise typer.BadParameter("motions dance side by side: give one", param_hint="MOTION")
+
+    async def run() -> dict[str, Any]:
+        async with Client(base or server, token) as client:
+            return await client.add_performers(identity, others)
+
+    made = ask(run, base or server)
+    if as_json:
+        out.print_json(data=made)
+        return
+    say(f"{made['performers']} performers, {made['name']}: {made['id']}")
+
+
 @app.command(name="list")
 def list_motions(server: Server = HERE, token: Token = None, as_json: Json = False) -> None:
     """List the motions of a server."""

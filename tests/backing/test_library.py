@@ -1,18 +1,20 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import msgpack
 import pytest
 
 from bunraku.backing import library
-from bunraku.backing.library import Library, StoredMotion, pack, with_audio
+from bunraku.backing.library import Library, StoredMotion, pack, with_audio, with_performers
 from bunraku.codec.audio import AudioTrack, EncodedAudio, audio_track, in_blocks, unpack_audio
 from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decode import decode_scene
 from bunraku.codec.scene_encode import encode_scene
+from bunraku.motion.place import Place
 from bunraku.wire.messages import Data, Description, unpack
 from tests.vectors import audio as sounds
 from tests.vectors import scene as scenes
@@ -45,7 +47,7 @@ async def test_cameras_and_lights_are_tracks_of_their_own(tmp_path: Path) -> Non
     assert stored is not None
     assert [len(track) for track in stored.packets] == [2, 1, 5]
     assert stored.track.figure.offsets.shape == (18, 3)
-    assert stored.front == round(ENCODED.front, 3)
+    assert stored.dances[0].front == round(ENCODED.front, 3)
     assert stored.size > sum(len(packet) for rate in stored.dance for packet in rate) + len(stored.description)
     for number, kind in ((1, "camera"), (2, "light")):
         track = stored.tracks[number]
@@ -79,7 +81,7 @@ def test_audio_stands_last_and_another_takes_its_place() -> None:
     assert sung.packets[:2] == before.packets
     assert sung.kbps[:2] == before.kbps
     assert [len(rates) for rates in sung.kbps] == [2, 1, 2]
-    assert sung.front == before.front
+    assert sung.dances[0].front == before.dances[0].front
     again, kinds = with_audio("m3", sung, encoded_audio(sung, 1.0))
     assert kinds == ["motion", "camera", "audio"]
     other = library.unpack("m3", again)
@@ -171,3 +173,35 @@ async def test_what_could_not_be_an_id_is_no_motion(tmp_path: Path, motion: str)
     shelf = Library.open(f"file://{tmp_path}")
     await shelf.put("m1", pack("m1", ENCODED))
     assert await shelf.get(motion) is None
+
+
+def test_performers_come_together_with_blocks_that_are_the_same() -> None:
+    camera = encode_scene(scenes.camera(2.5, 30.0), ladder=(10.0,))
+    one = library.unpack("one", pack("one", ENCODED, [camera]))
+    two = library.unpack(
+        "two", pack("two", encode_motion(wandering_motion(1.5, 60.0, 9), ladder=(30.0,), grade="live"), [camera])
+    )
+    places = [Place(-1.0, 0.0, 0.5), Place(1.0, 0.0, 0.0), Place(0.0, -2.0, 0.0)]
+    packed, kinds = with_performers("three", one, [two, one], places)
+    three = library.unpack("three", packed)
+    # the others' cameras stay out
+    assert kinds == ["motion", "motion", "motion", "camera"]
+    assert [dance.place for dance in three.dances] == places
+    assert three.track.duration_us == one.track.duration_us
+    assert three.dances[1].track.fps == 60.0
+    for number, of in enumerate((one.packets[0], two.packets[0], one.packets[0], one.packets[1])):
+        for packets, before in zip(three.packets[number], of, strict=True):
+            for packet, was in zip(packets, before, strict=True):
+                assert Data.unpack(packet) == replace(Data.unpack(was), track=number)
+    with pytest.raises(ValueError, match="at most 4 performers"):
+        with_performers("many", three, [three], places * 2)
+    again = library.unpack("lit", library.with_scenes("lit", three, [camera, camera], {"camera"})[0])
+    assert [type(track).__name__ for track in again.tracks] == ["MotionTrack"] * 3 + ["SceneTrack"] * 2
+    assert [dance.place for dance in again.dances] == places
+
+
+def test_more_tracks_than_can_be_numbered_are_refused_with_performers_too() -> None:
+    still = encode_scene(scenes.light(0.5, 24.0), ladder=(30.0,))
+    full = library.unpack("m", pack("m", ENCODED, [still] * 15))
+    with pytest.raises(ValueError, match="at most 16 tracks"):
+        with_performers("n", full, [full], [Place(), Place()])

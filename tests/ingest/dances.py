@@ -6,6 +6,7 @@ from bunraku.backing import library
 from bunraku.backing.library import StoredMotion
 from bunraku.codec.encode import encode_motion
 from bunraku.marionette.log import Log
+from bunraku.motion.place import Place
 from bunraku.motion.skeleton import Motion
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import wandering_motion
@@ -22,7 +23,14 @@ def stored(name: str, seconds: float, seed: int) -> StoredMotion:
     return library.unpack(name, library.pack(name, encoded))
 
 
-DANCES = {"one": stored("one", 3.0, 21), "two": stored("two", 2.0, 22)}
+PLACES = Place(-0.8, 0.1, 0.5), Place(0.8, -0.1, -2.0)
+_ONE, _TWO = stored("one", 3.0, 21), stored("two", 2.0, 22)
+DANCES = {
+    "one": _ONE,
+    "two": _TWO,
+    "both": library.unpack("both", library.with_performers("both", _ONE, [_TWO], PLACES)[0]),
+    "longer": library.unpack("longer", library.with_performers("longer", _TWO, [_ONE], PLACES)[0]),
+}
 
 
 def log_of(*states: TimelineState) -> bytes:

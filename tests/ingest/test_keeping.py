@@ -12,13 +12,14 @@ from bunraku.codec.scene_decode import decode_scene
 from bunraku.ingest.keeping import film, keep
 from bunraku.ingest.results import Made, Refused
 from bunraku.ingest.showing import Showing
-from bunraku.marionette.log import Log, LoggedMarionette
-from bunraku.marionette.merge import Marionette
+from bunraku.marionette.log import Log, LoggedTroupe
+from bunraku.marionette.ownership import Input
+from bunraku.marionette.troupe import Troupe
 from bunraku.motion.skeleton import points
 from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore, SceneStore
 from bunraku.wire.messages import Data
-from tests.ingest.dances import BEGAN, DANCES, SECOND, log_of
+from tests.ingest.dances import BEGAN, DANCES, PLACES, SECOND, log_of
 
 
 def dance_of(name: str) -> BlockStore:
@@ -63,13 +64,47 @@ def test_its_front_and_figure_are_the_dances_and_its_start_is_short() -> None:
     motion, _ = kept_of(made)
     assert isinstance(made, Made)
     dance = DANCES["one"]
-    assert motion.front == dance.front
+    assert motion.dances[0].front == dance.dances[0].front
     np.testing.assert_array_equal(motion.track.figure.offsets, dance.track.figure.offsets)
     assert motion.track.first_frames == 30
     assert made.described["kept_from"] == "one"
     assert made.described["tracks"] == ["motion"]
     assert made.described["duration"] == 2.0
     assert len(made.described["rates"]) == 5
+
+
+def test_of_several_performers_all_are_kept_where_they_stood_with_what_was_pulled_of_each() -> None:
+    log, both = Log(), DANCES["both"]
+    log.timeline(timeline.start("both", 3 * SECOND, BEGAN))
+    troupe = LoggedTroupe(Troupe([dance.track.figure for dance in both.dances]), "both", log)
+    showing = Showing(log, DANCES)
+    troupe.claim(4, "ada", BEGAN)
+    for frame in range(120):
+        now = BEGAN + frame * 16_667
+        troupe.input("ada", Input(4, 1, 1, frame + 1, now, (0.7, 0.3, 0.3)), now)
+        poses = showing.dances_at(now + 60_000)
+        assert poses is not None
+        troupe.overlay([rotations for _, rotations in poses], now + 60_000, now)
+    made = keep("kept", Order(log="l", begin=BEGAN, end=BEGAN + 2 * SECOND), log.pack(), DANCES)
+    assert isinstance(made, Made)
+    assert (made.described["tracks"], made.described["performers"]) == (["motion", "motion"], 2)
+    kept = library.unpack("kept", made.packed)
+    assert [dance.place for dance in kept.dances] == list(PLACES)
+    assert [dance.front for dance in kept.dances] == [dance.front for dance in both.dances]
+    alone = showing.dances_at(BEGAN + SECOND)
+    seen = next(showing.poses([BEGAN + SECOND]))
+    assert alone is not None
+    assert seen is not None
+    for nth, dance in enumerate(kept.dances):
+        store = BlockStore(dance.track)
+        for index, packet in enumerate(dance.packets[-1]):
+            store.put(index, 0, decode_block(dance.track, Data.unpack(packet).block))
+        got = store.pose_at(SECOND)
+        assert got is not None
+        off = points(dance.track.figure, *got) - points(dance.track.figure, *seen[nth])
+        assert np.linalg.norm(off, axis=-1).max() < 1e-3
+        pulled = points(dance.track.figure, *seen[nth]) - points(dance.track.figure, *alone[nth])
+        assert (np.linalg.norm(pulled, axis=-1).max() > 0.1) == (nth == 1)
 
 
 def test_camera_moves_are_a_track_beside_it() -> None:
@@ -137,7 +172,7 @@ def test_what_is_no_longer_remembered_is_not_kept_as_if_nothing_had_been_done(mo
     monkeypatch.setattr("bunraku.marionette.log.MOST_BYTES", 100)
     log = Log()
     log.timeline(timeline.start("one", 3 * SECOND, BEGAN))
-    puppet = LoggedMarionette(Marionette(DANCES["one"].track.figure), "one", log)
+    puppet = LoggedTroupe(Troupe([DANCES["one"].track.figure]), "one", log)
     puppet.claim(0, "ada", BEGAN)
     for later in range(1, 30):
         puppet.alive("ada", [0], BEGAN + later * SECOND // 10)

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from bunraku.marionette import log as logs
-from bunraku.marionette.log import MAGIC, DamagedLog, Log, LoggedMarionette
-from bunraku.marionette.merge import Marionette
+from bunraku.marionette.log import MAGIC, DamagedLog, Log, LoggedTroupe
 from bunraku.marionette.ownership import Grant, Input
+from bunraku.marionette.troupe import Laid, Troupe
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import JOINTS, standard_figure
+from bunraku.motion.skeleton import JOINTS, Figure, standard_figure
 from bunraku.wire.messages import Claim, TimelineState
 from tests.marionette.arms import dance
 
@@ -18,14 +18,18 @@ FRAME = 16_667
 POSES = dance(400, seed=9)
 
 
-def pose_at(due: int) -> Array | None:
-    pose: Array = POSES[due // FRAME % 400]
-    return pose
+def poses_at(due: int) -> list[Array] | None:
+    return [POSES[due // FRAME % 400]]
+
+
+def bytes_of(laid: Laid) -> bytes | None:
+    """What lies over the dance of one performer."""
+    return np.array(list(laid.values())).tobytes() if laid else None
 
 
 def pulled(log: Log, frames: int, begin: int = 0) -> dict[int, bytes | None]:
     """Two passages of pulling, by two people, one of whom asks, and what was shown."""
-    puppet = LoggedMarionette(Marionette(FIGURE), "one", log)
+    puppet = LoggedTroupe(Troupe([FIGURE]), "one", log)
     shown: dict[int, bytes | None] = {}
     grant: Grant | None = None
     for frame in range(begin, begin + frames):
@@ -36,7 +40,7 @@ def pulled(log: Log, frames: int, begin: int = 0) -> dict[int, bytes | None]:
             assert isinstance(answer, Grant)
             grant = answer
             for before in (frame - 2, frame - 1):
-                puppet.see(POSES[before % 400], before * FRAME, before * FRAME)
+                puppet.see([POSES[before % 400]], before * FRAME, before * FRAME)
             puppet.ask(0, "bo", True, now + 1)
         if grant and 2 < phase < 30:
             values = (0.01 * phase, 0.2, 0.4)
@@ -49,8 +53,7 @@ def pulled(log: Log, frames: int, begin: int = 0) -> dict[int, bytes | None]:
         if phase == 50:
             puppet.leave("bo", now)
         puppet.expire(now)
-        overlay = puppet.overlay(POSES[frame % 400], now, now)
-        shown[now] = overlay.rotations.tobytes() if overlay else None
+        shown[now] = bytes_of(puppet.overlay([POSES[frame % 400]], now, now))
     return shown
 
 
@@ -58,10 +61,10 @@ def test_a_log_replays_to_the_last_bit() -> None:
     log = Log()
     shown = pulled(log, 260)
     again = Log.unpack(log.pack())
-    replayed = dict(again.replay(lambda _: FIGURE, pose_at))
+    replayed = dict(again.replay(lambda _: [FIGURE], poses_at))
     assert any(shown.values())
     assert again.known_from == 0
-    assert {due: over.rotations.tobytes() if over else None for due, over in replayed.items()} == {
+    assert {due: bytes_of(over) for due, over in replayed.items()} == {
         due: data for due, data in shown.items() if due in replayed
     }
     assert all(shown[due] is None for due in shown if due not in replayed)
@@ -70,17 +73,17 @@ def test_a_log_replays_to_the_last_bit() -> None:
 def test_passages_that_were_over_are_left_out_and_change_nothing() -> None:
     log = Log()
     pulled(log, 400)
-    whole = list(log.replay(lambda _: FIGURE, pose_at))
+    whole = list(log.replay(lambda _: [FIGURE], poses_at))
     begins = (2 * FRAME, 122 * FRAME, 242 * FRAME)
     for begin in (0, begins[0], begins[1] - 1, begins[1], begins[2], 399 * FRAME):
-        part = list(log.replay(lambda _: FIGURE, pose_at, begin))
+        part = list(log.replay(lambda _: [FIGURE], poses_at, begin))
         assert len(part) <= len(whole)
         for (due, over), (wanted_due, wanted) in zip(part, whole[len(whole) - len(part) :], strict=True):
             assert due == wanted_due
-            assert (over and over.rotations.tobytes()) == (wanted and wanted.rotations.tobytes())
+            assert bytes_of(over) == bytes_of(wanted)
         # what is left out was over before
-        assert all(due < begin or over is None for due, over in whole[: len(whole) - len(part)])
-    assert len(list(log.replay(lambda _: FIGURE, pose_at, begins[2]))) < len(whole) / 2
+        assert all(due < begin or not over for due, over in whole[: len(whole) - len(part)])
+    assert len(list(log.replay(lambda _: [FIGURE], poses_at, begins[2]))) < len(whole) / 2
 
 
 def test_a_log_is_bounded_and_what_is_left_still_replays(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,19 +91,19 @@ def test_a_log_is_bounded_and_what_is_left_still_replays(monkeypatch: pytest.Mon
     log = Log()
     shown = pulled(log, 1_000)
     assert len(log.pack()) < 9_000
-    replayed = dict(log.replay(lambda _: FIGURE, pose_at))
+    replayed = dict(log.replay(lambda _: [FIGURE], poses_at))
     assert replayed
     assert min(replayed) > 0
     assert 0 < log.known_from <= min(replayed)
     assert Log.unpack(log.pack()).known_from == log.known_from
-    assert all((over.rotations.tobytes() if over else None) == shown[due] for due, over in replayed.items())
+    assert all((bytes_of(over)) == shown[due] for due, over in replayed.items())
 
 
 def test_a_passage_that_is_too_long_replays_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(logs, "MOST_BYTES", 200)
     log = Log()
     shown = pulled(log, 40)
-    assert all(over is None for _, over in log.replay(lambda _: FIGURE, pose_at))
+    assert all(not over for _, over in log.replay(lambda _: [FIGURE], poses_at))
     assert log.known_from == max(shown) + 1
     # once the dance was alone again, all is known from there
     pulled(log, 100, 40)
@@ -109,23 +112,41 @@ def test_a_passage_that_is_too_long_replays_to_nothing(monkeypatch: pytest.Monke
 
 def test_the_dancer_may_change_while_limbs_are_held() -> None:
     log = Log()
-    puppet = LoggedMarionette(Marionette(FIGURE), "one", log)
+    puppet = LoggedTroupe(Troupe([FIGURE]), "one", log)
     puppet.claim(2, "ada", 0)
-    puppet.overlay(POSES[0], 0, 0)
-    puppet.set_figure(FIGURE, "two", FRAME)
-    last = puppet.overlay(POSES[1], FRAME, FRAME)
+    puppet.overlay([POSES[0]], 0, 0)
+    puppet.set_figures([FIGURE], "two", FRAME)
+    last = puppet.overlay([POSES[1]], FRAME, FRAME)
     asked: list[str] = []
 
-    def figure_of(motion: str):  # type: ignore[no-untyped-def]
+    def figures_of(motion: str) -> list[Figure]:
         asked.append(motion)
-        return FIGURE
+        return [FIGURE]
 
-    *_, (due, over) = log.replay(figure_of, pose_at)
+    *_, (due, over) = log.replay(figures_of, poses_at)
     assert asked == ["one", "two"]
     assert due == FRAME
-    assert over is not None
-    assert last is not None
-    np.testing.assert_array_equal(over.rotations, last.rotations)
+    assert bytes_of(over) == bytes_of(last) is not None
+
+
+def test_performers_may_come_and_go_while_limbs_are_held() -> None:
+    log = Log()
+    troupe = LoggedTroupe(Troupe([FIGURE]), "one", log)
+    figures = {"one": [FIGURE], "three": [FIGURE] * 3, "two": [FIGURE] * 2}
+    shown: dict[int, dict[int, bytes]] = {}
+    for frame, motion in enumerate(("one", "three", "three", "two", "three", "three")):
+        now = frame * FRAME
+        troupe.set_figures(figures[motion], motion, now)
+        for limb in (0, 7, 11):
+            troupe.claim(limb, "ada", now)
+        laid = troupe.overlay([POSES[frame + 9 * nth] for nth in range(len(figures[motion]))], now, now)
+        shown[now] = {limb: np.array(joints).tobytes() for limb, joints in laid.items()}
+    assert [list(limbs) for limbs in shown.values()] == [[0], *[[0, 7, 11]] * 2, [0, 7], *[[0, 7, 11]] * 2]
+    replayed = Log.unpack(log.pack()).replay(
+        figures.__getitem__, lambda due: [POSES[due // FRAME + 9 * nth] for nth in range(4)]
+    )
+    again = {due: {limb: np.array(joints).tobytes() for limb, joints in laid.items()} for due, laid in replayed}
+    assert again == shown
 
 
 def test_timelines_are_kept_and_name_the_motions() -> None:
@@ -162,13 +183,13 @@ def test_records_that_are_cut_or_name_nobody_are_refused(names: list[str], recor
     values = {"names": names, "timelines": [], "passages": [[[0, 0, 0, 0], 0, 0, records]]}
     log = Log.unpack(MAGIC + msgpack.packb(values))
     with pytest.raises(DamagedLog):
-        list(log.replay(lambda _: FIGURE, pose_at))
+        list(log.replay(lambda _: [FIGURE], poses_at))
 
 
 def test_a_leg_that_the_dance_has_taken_over_the_top_replays_as_it_was_shown() -> None:
     """What a limb has been through before a passage is not in the log."""
     log = Log()
-    puppet = LoggedMarionette(Marionette(FIGURE), "one", log)
+    puppet = LoggedTroupe(Troupe([FIGURE]), "one", log)
     hip = JOINTS.index("l_hip")
 
     def turned(frame: int) -> Array:
@@ -187,13 +208,12 @@ def test_a_leg_that_the_dance_has_taken_over_the_top_replays_as_it_was_shown() -
                 assert isinstance(grant, Grant)
                 epoch = grant.epoch
                 for before in (frame - 2, frame - 1):
-                    puppet.see(turned(before), before * FRAME, before * FRAME)
+                    puppet.see([turned(before)], before * FRAME, before * FRAME)
             if begin + 1 < frame < begin + 100:
                 puppet.input("ada", Input(2, 0, epoch, frame, now, (0.3, 0.0, 0.0)), now)
             if frame == begin + 100:
                 puppet.release(2, "ada", epoch, now)
-            overlay = puppet.overlay(turned(frame), now, now)
-            shown[now] = overlay.rotations.tobytes() if overlay else None
-    replayed = Log.unpack(log.pack()).replay(lambda _: FIGURE, lambda due: turned(due // FRAME))
-    again = {due: over.rotations.tobytes() if over else None for due, over in replayed}
+            shown[now] = bytes_of(puppet.overlay([turned(frame)], now, now))
+    replayed = Log.unpack(log.pack()).replay(lambda _: [FIGURE], lambda due: [turned(due // FRAME)])
+    again = {due: bytes_of(over) for due, over in replayed}
     assert {due: again.get(due) for due in shown} == shown

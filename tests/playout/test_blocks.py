@@ -118,3 +118,21 @@ def test_past_its_end_a_shorter_camera_stands_still_in_a_loop_too() -> None:
         values = held.scene_at(position, True, 4_000_000)
         assert values is not None
         np.testing.assert_allclose(values, scene.values[-1], atol=0.02)
+
+
+def test_in_a_motion_that_goes_on_a_shorter_dance_stands_still_and_a_longer_one_begins_anew_with_it() -> None:
+    held = store(0, 1, 2, 3)
+    shown, alone = held.pose_at(6_000_000, True, 8_000_000), held.pose_at(4_000_000, False)
+    assert shown is not None
+    assert alone is not None
+    np.testing.assert_array_equal(shown[1], alone[1])
+    for duration in (2_000_000, ENCODED.track.duration_us, None):
+        assert held.pose_at(1_000_000, True, duration) is not None
+    # at the seam of a motion of its own length it goes over into its beginning
+    seam, cut = held.pose_at(3_999_000, True, 4_000_000), held.pose_at(6_000_000, True, 8_000_000)
+    assert seam is not None
+    assert cut is not None
+    assert np.abs(seam[0] - cut[0]).max() > 1e-6
+    (still,) = held.rotations_at([6_000_000], True, 8_000_000)
+    assert still is not None
+    np.testing.assert_allclose(still, cut[1], atol=1e-12)

@@ -62,3 +62,14 @@ def test_the_first_after_a_silence_begins_when_it_is_due() -> None:
     for clock in (1, LASTS, 2 * LASTS, 10 * LASTS - 1):
         np.testing.assert_array_equal(overlays.lay(DANCE, clock), DANCE)
     assert turn(overlays.lay(DANCE, 10 * LASTS)[list(JOINTS[0])], PULLED) < 2e-4
+
+
+def test_limbs_of_another_performer_leave_this_one_as_it_is() -> None:
+    overlays = Overlays()
+    overlays.put(Overlay(0, 0, {2: pack_joints(PULLED.tolist()), 9: pack_joints(PULLED[::-1].tolist())}))
+    assert turn(overlays.lay(DANCE, 1)[list(JOINTS[2])], PULLED) < 2e-4
+    np.testing.assert_array_equal(overlays.lay(DANCE, 1, 1), DANCE)
+    third = overlays.lay(DANCE, 1, 2)
+    assert turn(third[list(JOINTS[1])], PULLED[::-1]) < 2e-4
+    others = [k for k in range(18) if k not in JOINTS[1]]
+    np.testing.assert_array_equal(third[others], DANCE[others])

@@ -6,6 +6,7 @@ import pytest
 
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.errors import DamagedBlock
+from bunraku.motion.place import MIDDLE, Place
 from bunraku.playout.blocks import BlockStore
 from bunraku.playout.tracks import Tracks
 from tests.vectors.blocks import wandering_motion
@@ -31,6 +32,17 @@ def test_what_was_told_of_is_not_taken_in_again(dance: dict[str, Any]) -> None:
     tracks.add(0, [dance, {"type": "smell"}])
     tracks.add(1, [{"type": "smell"}])
     assert (tracks.dance, tracks.told) == (kept, 2)
+
+
+def test_performers_are_numbered_in_order_also_behind_one_that_cannot_be_shown(dance: dict[str, Any]) -> None:
+    placed = dance | {"place": [1.0, -0.5, 2]}
+    tracks = Tracks([dance, {"type": "camera", "codec": "later"}, placed])
+    assert tracks.performers[0] is tracks.dance
+    assert tracks.places == [MIDDLE, Place(1.0, -0.5, 2.0)]
+    assert tracks.store(2) is tracks.performers[1] is not None
+    tracks.add(3, [dance | {"codec": "later"}, dance | {"place": [0.0, 900.0, 0.0]}, dance])
+    assert [store is not None for store in tracks.performers] == [True, True, False, False]
+    assert tracks.store(5) is None
 
 
 @pytest.mark.parametrize("described", [[], [{"type": "camera"}], [{"type": "motion", "codec": "later"}]])

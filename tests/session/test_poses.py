@@ -17,6 +17,7 @@ from bunraku.playout.timeline import Timelines
 from bunraku.session import poses as poses_module
 from bunraku.session.poses import AHEAD, Poses, blocks_of
 from bunraku.wire.messages import Data
+from tests.ingest.dances import DANCES
 from tests.vectors.blocks import wandering_motion
 
 STEP = 16_667
@@ -45,7 +46,7 @@ async def test_the_dance_ahead_is_the_dance_at_each_instant_also_over_the_ends_o
         found = poses.at(due, STEP)
         assert wanted is not None
         assert found is not None
-        np.testing.assert_allclose(found, wanted[1], atol=1e-12)
+        np.testing.assert_allclose(found[0], wanted[1], atol=1e-12)
 
 
 async def test_an_edit_holds_at_once_and_another_motion_has_no_pose_here() -> None:
@@ -63,7 +64,7 @@ async def test_an_edit_holds_at_once_and_another_motion_has_no_pose_here() -> No
     still = poses.at(500_000, STEP)
     assert moving is not None
     assert still is not None
-    assert np.abs(moving - still).max() > 1e-3
+    assert np.abs(moving[0] - still[0]).max() > 1e-3
     later = poses.at(500_000 + 40 * STEP, STEP)
     assert later is not None
     np.testing.assert_array_equal(later, still)
@@ -83,9 +84,9 @@ async def test_stages_work_out_the_dance_at_instants_of_their_own(monkeypatch: p
     worked_out: list[int] = []
     rotations_at = BlockStore.rotations_at
 
-    def counted(store: BlockStore, positions: list[int], loop: bool = True) -> list[Array | None]:
+    def counted(store: BlockStore, positions: list[int], loop: bool, duration: int) -> list[Array | None]:
         worked_out.append(frame)
-        return rotations_at(store, positions, loop)
+        return rotations_at(store, positions, loop, duration)
 
     monkeypatch.setattr(BlockStore, "rotations_at", counted)
     for frame in range(2 * AHEAD):
@@ -121,3 +122,30 @@ async def test_a_dance_is_decoded_once_for_all_stages_and_forgotten_with_the_las
     del stages, poses
     gc.collect()
     assert blocks_of(motion.track).rate(0) == -1
+
+
+async def test_all_who_perform_have_poses_also_where_one_dances_longer_or_shorter_than_the_motion() -> None:
+    track = DANCES["both"].track
+    for name, other in (("both", "two"), ("longer", "one")):
+        motion = DANCES[name]
+        timelines = Timelines()
+        timelines.put(timeline.start(motion.id, motion.track.duration_us, 0))
+        poses, blocks = Poses(motion, timelines), [BlockStore(dance.track) for dance in motion.dances]
+        for dance, store in zip(motion.dances, blocks, strict=True):
+            for index, packet in enumerate(dance.packets[-1]):
+                store.put(index, 0, decode_block(dance.track, Data.unpack(packet).block))
+        for frame in range(0, 400, 3):
+            await poses.prepare(frame * STEP)
+            found = poses.at(frame * STEP, STEP)
+            assert found is not None
+            position = frame * STEP % motion.track.duration_us
+            for rotations, store in zip(found, blocks, strict=True):
+                wanted = store.pose_at(position, True, motion.track.duration_us)
+                assert wanted is not None
+                np.testing.assert_allclose(rotations, wanted[1], atol=1e-12)
+            # of one that is over the last pose stands still
+            if name == "both" and position > DANCES[other].track.duration_us:
+                last = blocks[1].pose_at(DANCES[other].track.duration_us, False)
+                assert last is not None
+                np.testing.assert_allclose(found[1], last[1], atol=1e-12)
+    assert track.duration_us == DANCES["one"].track.duration_us

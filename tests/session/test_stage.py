@@ -3,6 +3,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 import msgpack
@@ -15,7 +16,6 @@ from bunraku.backing.library import Library, StoredMotion, pack
 from bunraku.codec import decode
 from bunraku.codec.encode import encode_motion
 from bunraku.marionette.log import Log
-from bunraku.marionette.merge import Marionette
 from bunraku.marionette.ownership import LOST_AFTER
 from bunraku.motion import rotation
 from bunraku.playout import timeline
@@ -24,7 +24,7 @@ from bunraku.playout.overlays import pack_joints
 from bunraku.playout.timeline import position_at
 from bunraku.session import puppeteers
 from bunraku.session.puppeteers import Full, Puppeteer
-from bunraku.session.stage import EDIT_LEAD, FRAME, FRAMES, Stage
+from bunraku.session.stage import EDIT_LEAD, FRAME, FRAMES, Stage, troupe_of
 from bunraku.wire.messages import (
     Alive,
     Ask,
@@ -40,6 +40,7 @@ from bunraku.wire.messages import (
     unpack,
 )
 from bunraku.wire.overlay import Overlay
+from tests.ingest.dances import DANCES
 from tests.vectors.blocks import wandering_motion
 
 
@@ -90,7 +91,7 @@ async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
     await asyncio.to_thread(decode.warm)
     motion = await stored("one", 5)
     state = timeline.start("one", motion.track.duration_us, clock())
-    opened = Stage("s", motion, Marionette(motion.track.figure), bus, state, state.clock)
+    opened = Stage("s", motion, troupe_of(motion), bus, state, state.clock)
     yield opened
     await opened.close()
 
@@ -114,6 +115,22 @@ def enter(stage: Stage, name: str) -> Person:
 
 def granted(person: Person) -> Grant:
     return next(m for m in map(unpack, reversed(person.told)) if isinstance(m, Grant))
+
+
+@asynccontextmanager
+async def holding(stage: Stage, person: Person, limb: int) -> AsyncIterator[None]:
+    """Meanwhile they say that they hold it, however long that takes."""
+
+    async def alive() -> None:
+        while True:
+            stage.hear(person.at, Alive([limb]))
+            await asyncio.sleep(0.05)
+
+    speaking = asyncio.create_task(alive())
+    try:
+        yield
+    finally:
+        speaking.cancel()
 
 
 async def test_overlays_carry_only_pulled_limbs_and_end_with_an_empty_one(stage: Stage, bus: MemoryBus) -> None:
@@ -152,7 +169,8 @@ async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: Memory
     aiko = enter(stage, "Aiko")
     stage.hear(aiko.at, Claim(3))
     await audience.until(2, Overlay)
-    await stage.change(await stored("two", 6))
+    async with holding(stage, aiko, 3):
+        await stage.change(await stored("two", 6))
     assert stage.timeline.motion == "two"
     assert stage.presence.limbs[3] == aiko.id
     count = len(await audience.until(1, Overlay))
@@ -211,7 +229,7 @@ async def test_who_missed_that_a_limb_was_lost_is_told_again(stage: Stage, said:
     ben = enter(stage, "Ben")
     stage.hear(aiko.at, Claim(0))
     # it is taken from her while nothing can be said
-    stage._marionette.release(0, aiko.id, granted(aiko).epoch, clock())
+    stage._troupe.release(0, aiko.id, granted(aiko).epoch, clock())
     for _ in range(5):
         stage.hear(aiko.at, said)
         stage.hear(ben.at, said)
@@ -235,6 +253,40 @@ async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(
     told = [m for m in map(unpack, ben.told) if isinstance(m, Notice)]
     assert [(m.limb, m.reason) for m in told] == [(0, "owner")]
     assert "left hand" in told[0].detail
+
+
+async def test_the_limbs_of_all_performers_are_pulled_and_one_message_tells_of_them(bus: MemoryBus) -> None:
+    motion, audience = DANCES["both"], Audience(bus)
+    state = timeline.start("both", motion.track.duration_us, clock())
+    stage = Stage("s", motion, troupe_of(motion), bus, state, state.clock)
+    aiko, ben = enter(stage, "Aiko"), enter(stage, "Ben")
+    stage.hear(aiko.at, Claim(1))
+    stage.hear(ben.at, Claim(6))
+    assert granted(ben).limb == 6
+    assert stage.presence.limbs == [None, aiko.id, None, None, None, None, ben.id, None]
+    assert len(stage.presence.asks) == 8
+    stage.hear(ben.at, Claim(9))
+    assert unpack(ben.told[-1]) == Refusal(9, "unknown")
+    for number in range(8):
+        stage.hear(aiko.at, Input(1, Input.TARGET, 1, number, 16_000 * number, (-0.6, 0.3, 0.3)))
+        stage.hear(ben.at, Input(6, Input.VELOCITY, 1, number, 16_000 * number, (0.5, 0.0, 0.0)))
+        await audience.until(len([m for m in audience.heard if isinstance(m, Overlay)]) + 1, Overlay)
+    told = [m for m in audience.heard if isinstance(m, Overlay)]
+    assert {tuple(overlay.limbs) for overlay in told} == {(1, 6)}
+    # an input for a limb that is nobody's here is not taken, and said so by the limb's name
+    stage.hear(ben.at, Input(12, Input.VELOCITY, 1, 1, 0, (0.5, 0.0, 0.0)))
+    assert [m.detail for m in map(unpack, ben.told) if isinstance(m, Notice)] == [
+        "the left hand of dancer 4 is not yours: an input for it was refused"
+    ]
+    # the second performer goes, and Ben's leg with them; Aiko's hand stays in hers
+    async with holding(stage, aiko, 1):
+        await stage.change(await stored("two", 6))
+    assert stage.presence.limbs == [None, aiko.id, None, None]
+    assert Refusal(6, "lost") in map(unpack, ben.told)
+    await audience.until(1, TimelineState)
+    stage.hear(aiko.at, Release(1, 1))
+    await audience.alone()
+    await stage.close()
 
 
 async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -> None:
@@ -265,14 +317,14 @@ async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -
         blocks.put(index, 0, decode.decode_block(motion.track, Data.unpack(packet).block))
     state = stage.timeline
 
-    def pose_at(due: int) -> rotation.Array:
+    def poses_at(due: int) -> list[rotation.Array]:
         pose = blocks.pose_at(position_at(state, due), state.loop)
         assert pose is not None
-        return pose[1]
+        return [pose[1]]
 
     again = {
-        due: dict(zip(map(int, over.limbs), map(pack_joints, over.rotations.tolist()), strict=True)) if over else {}
-        for due, over in Log.unpack(stage.log.pack()).replay(lambda _: motion.track.figure, pose_at)
+        due: {limb: pack_joints(joints) for limb, joints in laid.items()}
+        for due, laid in Log.unpack(stage.log.pack()).replay(lambda _: [motion.track.figure], poses_at)
     }
     # once the dance is alone nothing is noted
     assert {due: again.get(due) or {} for due in shown} == shown

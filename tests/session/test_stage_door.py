@@ -12,12 +12,11 @@ from bunraku.backing.library import StoredMotion, pack
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.settings import Settings
 from bunraku.codec.encode import encode_motion
-from bunraku.marionette.merge import Marionette
 from bunraku.playout import timeline
 from bunraku.session import puppeteers, stage_door
 from bunraku.session.distant import DistantStage
 from bunraku.session.requests import SessionEdit
-from bunraku.session.stage import Stage
+from bunraku.session.stage import Stage, troupe_of
 from bunraku.session.stage_door import StageDoor
 from bunraku.session.visitor import Visitor
 from bunraku.wire.messages import Claim
@@ -59,7 +58,7 @@ async def door(backing: Backing, owner: Owner) -> AsyncIterator[StageDoor]:
     stored = await backing.library.get("one")
     assert stored is not None
     state = timeline.start("one", stored.track.duration_us, clock())
-    stage = Stage("s", stored, Marionette(stored.track.figure), backing.bus, state, state.clock)
+    stage = Stage("s", stored, troupe_of(stored), backing.bus, state, state.clock)
     opened = StageDoor(stage, backing, owner, 1)
     yield opened
     await opened.close()

@@ -3,11 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bunraku.backing.library import StoredMotion, pack, unpack, with_audio
+from bunraku.backing.library import StoredMotion, pack, unpack, with_audio, with_performers
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
-from bunraku.stream.tracks import TRACKS, channels, described, paced, steps, told_of
+from bunraku.motion.place import MIDDLE
+from bunraku.stream.tracks import TRACKS, channels, danced, described, paced, steps, told_of
 from bunraku.wire.messages import Description
 from bunraku.wire.messages import unpack as unpack_message
 from tests.vectors.blocks import wandering_motion
@@ -66,3 +67,14 @@ def test_motion_and_sound_share_the_line_where_both_are_wanted(motion: StoredMot
     assert both[0].audio == -1
     assert both[-1].kbps == max(step.kbps for step in both)
     assert len(steps(motion, ("audio",))) == both[-1].audio + 1
+
+
+def test_rates_of_several_performers_are_chosen_and_paid_for_together(motion: StoredMotion) -> None:
+    single = unpack("s", pack("s", encode_motion(wandering_motion(1.0, 30.0, 4), ladder=(20.0,), grade="live")))
+    both = unpack("b", with_performers("b", motion, [single, motion], [MIDDLE] * 3)[0])
+    low, high = motion.kbps[0]
+    assert danced(both) == pytest.approx([2 * low + single.kbps[0][0], 2 * high + single.kbps[0][0]])
+    assert steps(both, ("motion",))[-1].kbps == danced(both)[-1]
+    assert channels(both) == 3 * 19 + 3 + 1
+    assert [track.base for track in paced(both, TRACKS)] == [True] * 3 + [False] * 2
+    assert [track.rates for track in paced(both, ("motion",))] == [2, 1, 2]

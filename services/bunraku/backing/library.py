@@ -22,6 +22,8 @@ from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.scene import SceneTrack, read_scene
 from bunraku.codec.scene_encode import EncodedScene
 from bunraku.codec.track import MotionTrack, read_track
+from bunraku.motion.place import MIDDLE, Place
+from bunraku.wire.limbs import MOST_PERFORMERS
 from bunraku.wire.messages import Data, Description
 
 CACHE_BYTES = 64 << 20
@@ -33,28 +35,37 @@ _LOG_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
 @dataclass(frozen=True, slots=True)
+class Dance:
+    """What one performer dances: its track, the Data messages by rate, lowest first, and index, where it faces, radians
+    about y from z towards x, and where on the stage it is danced."""
+
+    track: MotionTrack
+    packets: list[list[bytes]]
+    front: float
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
 class StoredMotion:
-    """A motion as it is sent: the tracks of its Description, the motion first, and `packets[track][rate][index]`, whole
-    Data messages, lowest rate first; `front` is where the dance faces, radians about y from z towards x; `kbps` what
-    each rate of each track costs."""
+    """A motion as it is sent: the tracks of its Description, the performers' first, and `packets[track][rate][index]`,
+    whole Data messages, lowest rate first; its `dances`, one for each performer; `kbps` what each rate of each track
+    costs."""
 
     id: str
     description: bytes
     tracks: tuple[Track, ...]
     packets: list[list[list[bytes]]]
-    front: float = 0.0
-    kbps: tuple[tuple[float, ...], ...] = ()
+    dances: tuple[Dance, ...]
+    kbps: tuple[tuple[float, ...], ...]
 
     @property
     def track(self) -> MotionTrack:
-        """The motion's own track, whose length is the motion's."""
-        motion = self.tracks[0]
-        assert isinstance(motion, MotionTrack)
-        return motion
+        """The first performer's track, whose length is the motion's."""
+        return self.dances[0].track
 
     @property
     def dance(self) -> list[list[bytes]]:
-        """The Data messages of the motion's own track, by rate and index."""
+        """The Data messages of the first performer's track, by rate and index."""
         return self.packets[0]
 
     @property
@@ -64,12 +75,15 @@ class StoredMotion:
         return len(self.description) + sum(map(len, packets))
 
 
-def pack(motion: str, encoded: EncodedMotion, scenes: Sequence[EncodedScene] = ()) -> bytes:
-    """The object of an encoded motion, with the cameras and lights that belong to it.
+def pack(
+    motion: str, encoded: EncodedMotion, scenes: Sequence[EncodedScene] = (), others: Sequence[EncodedMotion] = ()
+) -> bytes:
+    """The object of an encoded motion, with the `others` who dance with it, and the cameras and lights that belong to
+    it.
 
     Raises ValueError where there are more tracks than a Data message can number.
     """
-    tracks: list[EncodedMotion | EncodedScene] = [encoded, *scenes]
+    tracks: list[EncodedMotion | EncodedScene] = [encoded, *others, *scenes]
     if len(tracks) > MOST_TRACKS:
         raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, not {len(tracks)}")
     packets = [_messages(number, [rate.blocks for rate in track.rates]) for number, track in enumerate(tracks)]
@@ -84,7 +98,7 @@ def with_audio(motion: str, stored: StoredMotion, audio: EncodedAudio) -> tuple[
 
     Raises ValueError where there are more tracks than a Data message can number.
     """
-    described: list[dict[str, Any]] = msgpack.unpackb(stored.description[1:])["tracks"]
+    described = _described(stored)
     packets = list(stored.packets)
     number = next((n for n, track in enumerate(described) if track["type"] == "audio"), len(described))
     if number == MOST_TRACKS:
@@ -103,7 +117,7 @@ def with_scenes(
 
     Raises ValueError where there are more tracks than a Data message can number.
     """
-    described: list[dict[str, Any]] = msgpack.unpackb(stored.description[1:])["tracks"]
+    described = _described(stored)
     kept = [number for number, track in enumerate(described) if track["type"] not in replaced]
     if len(kept) + len(scenes) > MOST_TRACKS:
         raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, and this would have {len(kept) + len(scenes)}")
@@ -113,6 +127,40 @@ def with_scenes(
     packets = [_messages(number, rates) for number, rates in enumerate(blocks)]
     packed: bytes = msgpack.packb({"description": Description(motion, tracks).pack(), "tracks": packets})
     return packed, [track["type"] for track in tracks]
+
+
+def with_performers(
+    motion: str, stored: StoredMotion, others: Sequence[StoredMotion], places: Sequence[Place]
+) -> tuple[bytes, list[str]]:
+    """The object of the motion of this id: `stored` with the performers of `others` beside its own, each at its place
+    of `places`, in this order; and the types of its tracks. All blocks are the same but for the number of their track.
+
+    Raises ValueError where there are more performers or tracks than can be numbered.
+    """
+    own = _described(stored)
+    dancing = [(said, at) for said, at in zip(own, stored.packets, strict=True) if said["type"] == "motion"]
+    beside = [(said, at) for said, at in zip(own, stored.packets, strict=True) if said["type"] != "motion"]
+    for other in others:
+        dancing += [
+            (said, at) for said, at in zip(_described(other), other.packets, strict=True) if said["type"] == "motion"
+        ]
+    if len(dancing) > MOST_PERFORMERS:
+        raise ValueError(f"a stage has at most {MOST_PERFORMERS} performers, and this would have {len(dancing)}")
+    if len(dancing) + len(beside) > MOST_TRACKS:
+        raise ValueError(f"a motion has at most {MOST_TRACKS} tracks, not {len(dancing) + len(beside)}")
+    placed = [(said | {"place": list(place)}, at) for (said, at), place in zip(dancing, places, strict=True)]
+    tracks = [said for said, _ in (*placed, *beside)]
+    packets = [
+        _messages(number, [[Data.unpack(packet).block for packet in rate] for rate in at])
+        for number, (_, at) in enumerate((*placed, *beside))
+    ]
+    packed: bytes = msgpack.packb({"description": Description(motion, tracks).pack(), "tracks": packets})
+    return packed, [track["type"] for track in tracks]
+
+
+def _described(stored: StoredMotion) -> list[dict[str, Any]]:
+    tracks: list[dict[str, Any]] = msgpack.unpackb(stored.description[1:])["tracks"]
+    return tracks
 
 
 def _messages(track: int, rates: Sequence[Sequence[bytes]]) -> list[list[bytes]]:
@@ -129,11 +177,18 @@ def unpack(motion: str, packed: bytes) -> StoredMotion:
     described: list[dict[str, Any]] = msgpack.unpackb(values["description"][1:])["tracks"]
     # objects from when a motion was one track have its packets alone
     packets = values["tracks"] if "tracks" in values else [values["packets"]]
-    dance = read_track(described[0])
-    beside = (read_audio(track, dance) if track["type"] == "audio" else read_scene(track) for track in described[1:])
-    tracks: tuple[Track, ...] = (dance, *beside)
+    dances = tuple(
+        Dance(read_track(said), at, float(said.get("front", 0.0)), Place.read(said.get("place", MIDDLE)))
+        for said, at in zip(described, packets, strict=True)
+        if said["type"] == "motion"
+    )
+    first, beside = dances[0].track, described[len(dances) :]
+    tracks: tuple[Track, ...] = (
+        *(dance.track for dance in dances),
+        *(read_audio(track, first) if track["type"] == "audio" else read_scene(track) for track in beside),
+    )
     kbps = tuple(tuple(float(rate["kbps"]) for rate in track["rates"]) for track in described)
-    return StoredMotion(motion, values["description"], tracks, packets, float(described[0].get("front", 0.0)), kbps)
+    return StoredMotion(motion, values["description"], tracks, packets, dances, kbps)
 
 
 class Library:

@@ -81,6 +81,15 @@ class Client:
         path = f"/v1/motions/{quote(motion, safe='')}/scene"
         return await self._ask("POST", path, json=staging)
 
+    async def add_performers(
+        self, motion: str, motions: list[str], places: list[list[float]] | None = None
+    ) -> dict[str, Any]:
+        """Make a new motion in which the performers of `motions` dance beside those of `motion`: `places` are `[x, z,
+        turn]` of each, metres and radians, its own first; in a row if not said."""
+        path = f"/v1/motions/{quote(motion, safe='')}/performers"
+        asked = {"motions": motions} | ({"places": places} if places is not None else {})
+        return await self._ask("POST", path, json=asked)
+
     async def motions(self) -> list[dict[str, Any]]:
         """All motions, newest first."""
         items: list[dict[str, Any]] = []

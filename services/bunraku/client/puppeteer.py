@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 
 from bunraku.client.api import Client, authorization
 from bunraku.client.one_euro import OneEuro
-from bunraku.wire.limbs import LIMBS
+from bunraku.wire.limbs import limb_number
 from bunraku.wire.messages import (
     LARGEST_FROM_SERVER,
     SUBPROTOCOL,
@@ -43,7 +43,8 @@ class Refused(Exception):
 
 
 class Puppeteer:
-    """One puppeteer of a session. Use as an async context manager; limbs are named as in `LIMBS`.
+    """One puppeteer of a session. Use as an async context manager; limbs are named as in `wire.limbs.LIMBS`, or
+    numbered: limb l of performer k is 4 k + l.
 
     While a limb is held the server is told 10 times a second that it still is.
     """
@@ -92,9 +93,9 @@ class Puppeteer:
         if self._connection is not None:
             await self._connection.close()
 
-    async def claim(self, limb: str) -> None:
+    async def claim(self, limb: str | int) -> None:
         """Take a limb; raises `Refused` where another holds it."""
-        number = LIMBS.index(limb)
+        number = limb_number(limb)
         await self._send(Claim(number).pack())
         try:
             async with asyncio.timeout(ANSWER):
@@ -107,10 +108,10 @@ class Puppeteer:
                 f"{limb} is {answer.reason} by {answer.holder}" if answer.holder else f"{limb}: {answer.reason}"
             )
 
-    async def ask(self, limb: str, seconds: float = ASKED) -> None:
+    async def ask(self, limb: str | int, seconds: float = ASKED) -> None:
         """Ask the holder of a limb for it, and wait until it is one's own; raises `Refused` where it was not given in
         `seconds`. A free limb is taken."""
-        number = LIMBS.index(limb)
+        number = limb_number(limb)
         try:
             await self.claim(limb)
         except Refused:
@@ -125,14 +126,14 @@ class Puppeteer:
             await self._send(Ask(number, False).pack())
             raise Refused(f"{limb} was asked for and not given") from None
 
-    async def release(self, limb: str) -> None:
+    async def release(self, limb: str | int) -> None:
         """Let a limb go."""
-        number = LIMBS.index(limb)
+        number = limb_number(limb)
         if number in self._epochs:
             await self._send(Release(number, self._epochs.pop(number)).pack())
 
     async def target(
-        self, limb: str, x: float, y: float = 0.0, z: float = 0.0, *, smooth: OneEuro | None = None
+        self, limb: str | int, x: float, y: float = 0.0, z: float = 0.0, *, smooth: OneEuro | None = None
     ) -> None:
         """Pull a held hand's tip to a place in the shoulder's frame, arm lengths; a leg's thigh to the angle `x`.
 
@@ -142,12 +143,12 @@ class Puppeteer:
             x, y, z = smooth.filter((x, y, z), time.monotonic())
         await self._input(limb, Input.TARGET, (x, y, z))
 
-    async def velocity(self, limb: str, x: float, y: float = 0.0, z: float = 0.0) -> None:
+    async def velocity(self, limb: str | int, x: float, y: float = 0.0, z: float = 0.0) -> None:
         """Move a held limb at -1..1 of full speed along each axis until told otherwise."""
         await self._input(limb, Input.VELOCITY, (x, y, z))
 
-    async def _input(self, limb: str, kind: int, values: tuple[float, float, float]) -> None:
-        number = LIMBS.index(limb)
+    async def _input(self, limb: str | int, kind: int, values: tuple[float, float, float]) -> None:
+        number = limb_number(limb)
         if number not in self._epochs:
             raise Refused(f"{limb} is not held")
         self._sequence += 1

@@ -154,15 +154,25 @@ class Viewer:
     def _sound(self) -> AudioStore | None:
         return self._tracks.sound if self._tracks is not None else None
 
-    def pose_at(self, reference: int) -> Pose | None:
-        """The merged pose at clock time `reference`, None where nothing is there to be shown."""
-        state = self.timelines.at(reference)
-        if state is None or self._blocks is None or state.motion != self.motion:
+    @property
+    def performers(self) -> list[MotionTrack | None]:
+        """The dances of those who perform, None of one that cannot be shown here."""
+        stores = self._tracks.performers if self._tracks is not None else []
+        return [store.track if store is not None else None for store in stores]
+
+    def pose_at(self, reference: int, performer: int = 0) -> Pose | None:
+        """The merged pose of a performer on the stage at clock time `reference`, None where nothing is there to be
+        shown."""
+        state, tracks = self.timelines.at(reference), self._tracks
+        if state is None or tracks is None or state.motion != self.motion or performer >= len(tracks.performers):
             return None
-        pose = self._blocks.pose_at(timeline.position_at(state, reference), state.loop)
+        store = tracks.performers[performer]
+        position = timeline.position_at(state, reference)
+        pose = store.pose_at(position, state.loop, state.duration) if store is not None else None
         if pose is None:
             return None
-        return pose[0], self._overlays.lay(pose[1], reference)
+        root, rotations = tracks.places[performer].put(*pose)
+        return root, self._overlays.lay(rotations, reference, performer)
 
     def scene_at(self, reference: int, scene: int = 0) -> Array | None:
         """The seven numbers (7,) of the camera or light `scenes[scene]` at clock time `reference` (SPEC.md, Scene

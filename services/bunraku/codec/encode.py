@@ -14,6 +14,7 @@ from bunraku.codec.prior import Prior, shipped
 from bunraku.codec.search import BlockEncoder, Coded
 from bunraku.codec.track import MotionTrack, describe_track, plan
 from bunraku.motion import rotation
+from bunraku.motion.place import MIDDLE, Place
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, Motion, front, points, standard_figure
 
@@ -48,16 +49,19 @@ Spread = Callable[[Callable[[float], Rate], Iterable[float]], Iterable[Rate]]
 
 @dataclass(frozen=True, slots=True)
 class EncodedMotion:
-    """A motion at every rate, lowest first, upon one track; `front` is where it faces (`skeleton.front`)."""
+    """A motion at every rate, lowest first, upon one track; `front` is where it faces (`skeleton.front`), `place` where
+    on the stage it is danced."""
 
     track: MotionTrack
     rates: list[Rate]
     front: float
+    place: Place = MIDDLE
 
     def describe(self) -> dict[str, Any]:
         """What a Description says of this motion (SPEC.md, Track `motion`)."""
         rates = [{"kbps": round(r.kbps, 3), "mean": round(r.mean, 3), "max": r.bound} for r in self.rates]
-        return describe_track(self.track, rates) | {"front": round(self.front, 3)}
+        said = describe_track(self.track, rates) | {"front": round(self.front, 3)}
+        return said if self.place == MIDDLE else said | {"place": list(self.place)}
 
 
 def encode_motion(

@@ -20,6 +20,7 @@ from bunraku.backing.problems import ProblemError
 from bunraku.ingest import metrics
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.keyframes import Staging
+from bunraku.ingest.performers import Performers, Troupe
 from bunraku.ingest.progress import Progress
 from bunraku.ingest.recordings import SUBJECT, Recordings
 from bunraku.ingest.soundtracks import Soundtracks
@@ -37,6 +38,7 @@ def create_app(backing: Backing) -> FastAPI:
     uploads = Uploads(backing)
     soundtracks = Soundtracks(backing, uploads)
     stagings = Stagings(backing, uploads)
+    performers = Performers(backing, uploads)
     recordings = Recordings(backing, uploads.places)
 
     @asynccontextmanager
@@ -96,6 +98,15 @@ def create_app(backing: Backing) -> FastAPI:
         stays as that motion has it. The motion itself stays as it is; the same keyframes again give the same new
         motion, with 200."""
         entry, new = await stagings.add(motion, asked, access_of(request).subject)
+        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+
+    @app.post("/v1/motions/{motion}/performers", status_code=201, tags=["motions"])
+    @needs(Role.INGEST)
+    async def add_performers(motion: str, asked: Troupe, request: Request) -> Response:
+        """Make a motion in which the performers of others dance beside this one's, four of them at most. The motion
+        itself stays as it is, with its sound, cameras and lights; the others' stay out. The same motions at the same
+        places again give the same new motion, with 200."""
+        entry, new = await performers.add(motion, asked, access_of(request).subject)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
     @app.get("/v1/uploads/{upload}", tags=["motions"])

@@ -23,12 +23,18 @@ MEMORY = 4 << 30
 SHARES = 100
 """Times that a job says how far it is, at most: few enough that its pipe never fills."""
 
-Job = Literal["make", "keep", "add", "dress"]
-"""`making.make`, `keeping.keep`, `adding.add` or `scenery.dress`."""
+Job = Literal["make", "keep", "add", "dress", "gather"]
+"""`making.make`, `keeping.keep`, `adding.add`, `scenery.dress` or `gathering.gather`."""
 
 _context = multiprocessing.get_context("forkserver")
 _context.set_forkserver_preload(
-    ["bunraku.ingest.making", "bunraku.ingest.keeping", "bunraku.ingest.adding", "bunraku.ingest.scenery"]
+    [
+        "bunraku.ingest.making",
+        "bunraku.ingest.keeping",
+        "bunraku.ingest.adding",
+        "bunraku.ingest.scenery",
+        "bunraku.ingest.gathering",
+    ]
 )
 
 
@@ -71,16 +77,30 @@ _WORDS: dict[Job, _Words] = {
         "the encoder broke off on these keyframes",
         "please report it with the keyframes",
     ),
+    "gather": _Words(
+        "Too much motion",
+        "let fewer dance, or shorter dances",
+        "Unreadable motion",
+        "the dances could not be put side by side",
+        "please report it",
+    ),
 }
 
 
 def _work(answer: Connection, job: Job, arguments: tuple[Any, ...]) -> None:
     from bunraku.ingest.adding import add
+    from bunraku.ingest.gathering import gather
     from bunraku.ingest.keeping import keep
     from bunraku.ingest.making import make
     from bunraku.ingest.scenery import dress
 
-    works: dict[Job, Callable[..., Made | Refused]] = {"make": make, "keep": keep, "add": add, "dress": dress}
+    works: dict[Job, Callable[..., Made | Refused]] = {
+        "make": make,
+        "keep": keep,
+        "add": add,
+        "dress": dress,
+        "gather": gather,
+    }
     work, words = works[job], _WORDS[job]
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     told = -1

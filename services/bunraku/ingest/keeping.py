@@ -12,7 +12,7 @@ import numpy as np
 
 from bunraku.backing.library import StoredMotion, pack
 from bunraku.backing.order import FPS, Keyframe, Order
-from bunraku.codec.encode import Grade, encode_motion
+from bunraku.codec.encode import EncodedMotion, Grade, encode_motion
 from bunraku.codec.scene import Scene
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.making import FIRST_SECONDS, MOST_FRAMES_AT_BEST
@@ -55,33 +55,41 @@ def keep(
     except (MissingDance, DamagedLog) as error:
         return Refused("Cannot be replayed", str(error))
     dance = dances[last.motion]
-    # every one of these instants has a timeline and its dance
+    # every one of these instants has a timeline and its dances
     shown = [pose for pose in poses if pose is not None]
-    root, rotations = (np.stack(part) for part in zip(*shown, strict=True))
-    kept = Motion(dance.track.figure, float(FPS), root, rotations)
-    grade: Grade = "best" if kept.frames <= MOST_FRAMES_AT_BEST else "live"
-    telling = Lock()
+    performed = [
+        Motion(one.track.figure, float(FPS), *(np.stack(part) for part in zip(*seen, strict=True)))
+        for one, seen in zip(dance.dances, zip(*shown, strict=True), strict=True)
+    ]
+    kept = performed[0]
+    grade: Grade = "best" if kept.frames * len(performed) <= MOST_FRAMES_AT_BEST else "live"
+    telling, before = Lock(), 0.0
 
     def told(share: float) -> None:
         with telling:
-            progress(share)
+            progress(before + share / len(performed))
 
     try:
         scenes = [encode_scene(film(order.camera, times), first_seconds=FIRST_SECONDS)] if order.camera else []
     except ValueError as error:
         return Refused("Invalid camera", str(error), field="camera")
+    each: list[EncodedMotion] = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        encoded = encode_motion(kept, first_seconds=FIRST_SECONDS, grade=grade, progress=told, spread=pool.map)
-    # the dance's front: a hand that was pulled turns no stage
-    encoded = replace(encoded, front=dance.front)
+        for one, danced in zip(dance.dances, performed, strict=True):
+            before = len(each) / len(performed)
+            encoded = encode_motion(danced, first_seconds=FIRST_SECONDS, grade=grade, progress=told, spread=pool.map)
+            # the dance's front: a hand that was pulled turns no stage
+            each.append(replace(encoded, front=one.front, place=one.place))
+    encoded, *others = each
     return Made(
-        pack(motion, encoded, scenes),
+        pack(motion, encoded, scenes, others),
         {
             "duration": kept.duration,
             "fps": kept.fps,
             "frames": kept.frames,
             "blocks": encoded.track.blocks,
-            "tracks": ["motion", *(scene.track.kind for scene in scenes)],
+            "tracks": [*(["motion"] * len(each)), *(scene.track.kind for scene in scenes)],
+            **({"performers": len(each)} if others else {}),
             "rates": encoded.describe()["rates"],
             "kept_from": dance.id,
         },

@@ -1,11 +1,11 @@
-"""What a session's stage showed at any clock time: the dance, and what was pulled laid over it as viewers saw it."""
+"""What a session's stage showed at any clock time: the dances, and what was pulled laid over them as viewers saw it."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping
 
-from bunraku.backing.library import StoredMotion
+from bunraku.backing.library import Dance, StoredMotion
 from bunraku.codec.decode import decode_block
 from bunraku.marionette.log import Log
 from bunraku.motion.rotation import Array
@@ -31,63 +31,68 @@ class Showing:
         self._log = log
         self._states = sorted(log.timelines, key=lambda state: state.epoch)
         self._clocks = [state.clock for state in self._states]
-        self._dances = {motion: _Dance(dance) for motion, dance in dances.items()}
+        self._dances = {motion: [_Dance(dance) for dance in stored.dances] for motion, stored in dances.items()}
 
     def timeline_at(self, clock: int) -> TimelineState | None:
         """The timeline that held at a clock time, None before there was one."""
         index = bisect_right(self._clocks, clock)
         return self._states[index - 1] if index else None
 
-    def dance_at(self, clock: int) -> Pose | None:
-        """The dance's pose at a clock time, None where there was none; raises `MissingDance`."""
+    def dances_at(self, clock: int) -> list[Pose] | None:
+        """The pose of each performer's dance at a clock time, None where there was none; raises `MissingDance`."""
         state = self.timeline_at(clock)
         if state is None:
             return None
-        return self._dance(state.motion).pose_at(position_at(state, clock), state.loop)
+        position = position_at(state, clock)
+        # every block is there
+        poses = (dance.pose_at(position, state.loop, state.duration) for dance in self._performers(state.motion))
+        return [pose for pose in poses if pose is not None]
 
-    def poses(self, times: Iterable[int]) -> Iterator[Pose | None]:
-        """What was seen at clock `times`, ascending: None where there was no dance. Raises `MissingDance`, and
-        `DamagedLog` where the log cannot be replayed."""
+    def poses(self, times: Iterable[int]) -> Iterator[list[Pose] | None]:
+        """What was seen of each performer at clock `times`, ascending: None where there was no dance. Raises
+        `MissingDance`, and `DamagedLog` where the log cannot be replayed."""
         overlays, following, sequence = Overlays(), None, 0
         replayed = None
         for clock in times:
             if replayed is None:
-                replayed = self._log.replay(self._figure, self._rotations_at, clock - LASTS)
+                replayed = self._log.replay(self._figures, self._rotations_at, clock - LASTS)
                 following = next(replayed, None)
             while following is not None and following[0] <= clock + AHEAD:
-                due, over = following
-                rotations = () if over is None else zip(over.limbs, over.joints, strict=True)
-                limbs = {int(limb): pack_joints(joints) for limb, joints in rotations}
-                overlays.put(Overlay(sequence, due, limbs))
+                due, laid = following
+                overlays.put(Overlay(sequence, due, {limb: pack_joints(joints) for limb, joints in laid.items()}))
                 sequence = (sequence + 1) & 0xFFFF
                 following = next(replayed, None)
-            pose = self.dance_at(clock)
-            yield None if pose is None else (pose[0], overlays.lay(pose[1], clock))
+            poses = self.dances_at(clock)
+            yield (
+                None
+                if poses is None
+                else [(root, overlays.lay(rotations, clock, nth)) for nth, (root, rotations) in enumerate(poses)]
+            )
 
-    def _dance(self, motion: str) -> _Dance:
+    def _performers(self, motion: str) -> list[_Dance]:
         if motion not in self._dances:
             raise MissingDance(f"the dance {motion} was removed from the library")
         return self._dances[motion]
 
-    def _figure(self, motion: str) -> Figure:
-        return self._dance(motion).track.figure
+    def _figures(self, motion: str) -> list[Figure]:
+        return [dance.track.figure for dance in self._performers(motion)]
 
-    def _rotations_at(self, clock: int) -> Array | None:
-        pose = self.dance_at(clock)
-        return None if pose is None else pose[1]
+    def _rotations_at(self, clock: int) -> list[Array] | None:
+        poses = self.dances_at(clock)
+        return None if poses is None else [rotations for _, rotations in poses]
 
 
 class _Dance:
     """A dance at its best rate, decoded where it is shown."""
 
-    def __init__(self, dance: StoredMotion) -> None:
-        self.track, self._packets = dance.track, dance.dance[-1]
+    def __init__(self, dance: Dance) -> None:
+        self.track, self._packets = dance.track, dance.packets[-1]
         self._store = BlockStore(dance.track)
 
-    def pose_at(self, position: int, loop: bool) -> Pose | None:
+    def pose_at(self, position: int, loop: bool, duration: int) -> Pose | None:
         index = self.track.block_at(position)
         for needed in (index, (index + 1) % self.track.blocks):
             if self._store.rate(needed) < 0:
                 packet = Data.unpack(self._packets[needed])
                 self._store.put(needed, packet.rate, decode_block(self.track, packet.block))
-        return self._store.pose_at(position, loop)
+        return self._store.pose_at(position, loop, duration)

@@ -1,36 +1,39 @@
-"""What was done to a puppet, so that it can be done again: a session's log replays to the same motion.
+"""What was done to the puppets of a stage, so that it can be done again: a session's log replays to the same motion.
 
 The log is a list of what the merge was told, in the order in which it was told it, with the clock times: claims,
-inputs, frames asked for, and so on. A `Marionette` told the same gives the same overlays to the last bit. It is
+inputs, frames asked for, and so on. A `Troupe` told the same gives the same overlays to the last bit. It is
 bounded: it is cut into passages, each from a moment when the dance was alone to the next, and the oldest are dropped.
 
-As bytes: "bunraku.log/1", then a msgpack map; `passages` holds the entries as fixed records (`_RECORDS`).
+As bytes: "bunraku.log/2", then a msgpack map; `passages` holds the entries as fixed records (`_RECORDS`).
 """
 
 from __future__ import annotations
 
 import struct
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Self
 
 import msgpack
 
-from bunraku.marionette.merge import Marionette, Overlay
 from bunraku.marionette.ownership import Grant, Input, Outcome, Refusal
+from bunraku.marionette.troupe import NEW, Laid, Troupe
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
+from bunraku.wire.limbs import MOST_LIMBS
 from bunraku.wire.messages import TimelineState, unpack
 
-MAGIC = b"bunraku.log/1"
+MAGIC = b"bunraku.log/2"
 MOST_BYTES = 8 << 20
 """A log is no larger: some hours of one limb in a hand."""
 MOST_TIMELINES = 10_000
 
-PoseAt = Callable[[int], Array | None]
-"""The dance's rotations (18, 4) at a clock time in µs, None where there is none."""
+PosesAt = Callable[[int], Sequence[Array] | None]
+"""The rotations (18, 4) of each performer's dance at a clock time in µs, None where there is none."""
+FiguresOf = Callable[[str], Sequence[Figure]]
+"""The figures of the performers of a motion's id."""
 
 _UNKNOWN = 1 << 63
 """The beginning of a passage whose own was dropped: later than all clock times."""
@@ -40,7 +43,7 @@ _RECORDS = {
     _CLAIM: struct.Struct("<QHB"),
     _RELEASE: struct.Struct("<QHBI"),
     _LEAVE: struct.Struct("<QH"),
-    _ALIVE: struct.Struct("<QHB"),
+    _ALIVE: struct.Struct("<QHH"),
     _INPUT: struct.Struct("<QHBBIIq3d"),
     _ASK: struct.Struct("<QHBB"),
     _SETTLE: struct.Struct("<Q"),
@@ -66,7 +69,7 @@ class Passage:
 
 
 class Log:
-    """What was done to one puppet, and the timelines of its stage."""
+    """What was done to the puppets of a stage, and its timelines."""
 
     def __init__(self) -> None:
         self.timelines: deque[TimelineState] = deque(maxlen=MOST_TIMELINES)
@@ -113,7 +116,7 @@ class Log:
             self._size -= len(dropped.records)
             if not self._passages:
                 self._known_from = now + 1
-                self._passages.append(Passage((0,) * 4, dropped.motion, _UNKNOWN))
+                self._passages.append(Passage(NEW, dropped.motion, _UNKNOWN))
                 break
             self._known_from = max(self._known_from, min(self._passages[0].begin, now))
 
@@ -146,24 +149,19 @@ class Log:
             raise DamagedLog(f"a damaged log: {error}") from error
         return log
 
-    def replay(
-        self, figure_of: Callable[[str], Figure], pose_at: PoseAt, begin: int = 0
-    ) -> Iterator[tuple[int, Overlay | None]]:
-        """All frames again, in order: when each was due, and what lay over the dance; passages that were over before
-        clock time `begin` are left out.
-
-        `figure_of` gives the dancer of a motion's id. Raises `DamagedLog`.
-        """
+    def replay(self, figures_of: FiguresOf, poses_at: PosesAt, begin: int = 0) -> Iterator[tuple[int, Laid]]:
+        """All frames again, in order: when each was due, and what lay over the dances; passages that were over before
+        clock time `begin` are left out. Raises `DamagedLog`."""
         passages = tuple(self._passages)
         for passage, following in zip_longest(passages, passages[1:]):
             if following is not None and following.begin <= begin:
                 continue
-            puppet = Marionette(figure_of(self._name(passage.motion)), passage.epochs)
-            yield from self._play(puppet, passage.records, figure_of, pose_at)
+            troupe = Troupe(figures_of(self._name(passage.motion)), passage.epochs)
+            yield from self._play(troupe, passage.records, figures_of, poses_at)
 
     def _play(
-        self, puppet: Marionette, records: bytearray, figure_of: Callable[[str], Figure], pose_at: PoseAt
-    ) -> Iterator[tuple[int, Overlay | None]]:
+        self, troupe: Troupe, records: bytearray, figures_of: FiguresOf, poses_at: PosesAt
+    ) -> Iterator[tuple[int, Laid]]:
         at = 0
         while at < len(records):
             try:
@@ -174,33 +172,33 @@ class Log:
             at += 1 + layout.size
             now = values[0]
             if kind == _CLAIM:
-                puppet.claim(values[2], self._name(values[1]), now)
+                troupe.claim(values[2], self._name(values[1]), now)
             elif kind == _RELEASE:
-                puppet.release(values[2], self._name(values[1]), values[3], now)
+                troupe.release(values[2], self._name(values[1]), values[3], now)
             elif kind == _LEAVE:
-                puppet.leave(self._name(values[1]), now)
+                troupe.leave(self._name(values[1]), now)
             elif kind == _ALIVE:
-                puppet.alive(self._name(values[1]), [limb for limb in range(4) if values[2] >> limb & 1], now)
+                troupe.alive(self._name(values[1]), [limb for limb in range(MOST_LIMBS) if values[2] >> limb & 1], now)
             elif kind == _INPUT:
                 _, who, limb, how, epoch, sequence, sampled, *numbers = values
                 x, y, z = numbers
-                puppet.input(self._name(who), Input(limb, how, epoch, sequence, sampled, (x, y, z)), now)
+                troupe.input(self._name(who), Input(limb, how, epoch, sequence, sampled, (x, y, z)), now)
             elif kind == _ASK:
-                puppet.ask(values[2], self._name(values[1]), bool(values[3]), now)
+                troupe.ask(values[2], self._name(values[1]), bool(values[3]), now)
             elif kind == _SETTLE:
-                puppet.settle(now)
+                troupe.settle(now)
             elif kind == _EXPIRE:
-                puppet.expire(now)
+                troupe.expire(now)
             elif kind == _DANCE:
-                puppet.set_figure(figure_of(self._name(values[1])))
+                troupe.set_figures(figures_of(self._name(values[1])))
             else:
-                pose = pose_at(values[1])
-                if pose is None:
+                poses = poses_at(values[1])
+                if poses is None:
                     continue
                 if kind == _SEE:
-                    puppet.see(pose, now)
+                    troupe.see(poses, now)
                 else:
-                    yield values[1], puppet.overlay(pose, now)
+                    yield values[1], troupe.overlay(poses, now)
 
     def _number(self, name: str) -> int:
         if name not in self._numbers:
@@ -214,64 +212,65 @@ class Log:
         return self._names[number]
 
 
-class LoggedMarionette:
-    """A puppet that keeps a log of what is done to it; each method is `Marionette`'s."""
+class LoggedTroupe:
+    """Puppets that keep a log of what is done to them; each method is `Troupe`'s."""
 
-    def __init__(self, puppet: Marionette, motion: str, log: Log) -> None:
-        """`puppet` is at rest, and of the motion of this id."""
-        self.puppet, self.log = puppet, log
+    def __init__(self, troupe: Troupe, motion: str, log: Log) -> None:
+        """`troupe` is at rest, and of the motion of this id."""
+        self.troupe, self.log = troupe, log
         self._motion = motion
 
     def _note(self, kind: int, now: int, *values: object) -> None:
-        if self.puppet.at_rest:
+        if self.troupe.at_rest:
             if kind != _CLAIM:
                 # at rest nothing else has a consequence
                 return
             # as the passage will be replayed
-            self.puppet.begin_anew()
-            self.log.open(self.puppet.epochs, self._motion, now)
+            self.troupe.begin_anew()
+            self.log.open(self.troupe.epochs, self._motion, now)
         self.log.note(kind, now, *values)
 
-    def set_figure(self, figure: Figure, motion: str, now: int) -> None:
-        """Another dancer, of the motion of this id."""
-        self.puppet.set_figure(figure)
+    def set_figures(self, figures: Sequence[Figure], motion: str, now: int) -> list[tuple[int, str]]:
+        """As `Troupe.set_figures`: the performers of the motion of this id."""
+        gone = self.troupe.set_figures(figures)
         self._note(_DANCE, now, motion)
         self._motion = motion
+        return gone
 
     def claim(self, limb: int, puppeteer: str, now: int) -> Grant | Refusal:
-        """As `Marionette.claim`."""
-        if 0 <= limb < 4:
+        """As `Troupe.claim`."""
+        if 0 <= limb < len(self.troupe):
             self._note(_CLAIM, now, puppeteer, limb)
-        return self.puppet.claim(limb, puppeteer, now)
+        return self.troupe.claim(limb, puppeteer, now)
 
     def release(self, limb: int, puppeteer: str, epoch: int, now: int) -> bool:
-        """As `Marionette.release`."""
-        released = self.puppet.release(limb, puppeteer, epoch, now)
+        """As `Troupe.release`."""
+        released = self.troupe.release(limb, puppeteer, epoch, now)
         if released:
             self._note(_RELEASE, now, puppeteer, limb, epoch)
         return released
 
     def leave(self, puppeteer: str, now: int) -> None:
-        """As `Marionette.leave`."""
+        """As `Troupe.leave`."""
         self._note(_LEAVE, now, puppeteer)
-        self.puppet.leave(puppeteer, now)
+        self.troupe.leave(puppeteer, now)
 
     def alive(self, puppeteer: str, limbs: Iterable[int], now: int) -> None:
-        """As `Marionette.alive`."""
-        held = [limb for limb in limbs if 0 <= limb < 4]
+        """As `Troupe.alive`."""
+        held = [limb for limb in limbs if 0 <= limb < len(self.troupe)]
         self._note(_ALIVE, now, puppeteer, sum(1 << limb for limb in set(held)))
-        self.puppet.alive(puppeteer, held, now)
+        self.troupe.alive(puppeteer, held, now)
 
     def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
-        """As `Marionette.ask`."""
-        if not 0 <= limb < 4:
+        """As `Troupe.ask`."""
+        if not 0 <= limb < len(self.troupe):
             return False
         self._note(_ASK, now, puppeteer, limb, wanted)
-        return self.puppet.ask(limb, puppeteer, wanted, now)
+        return self.troupe.ask(limb, puppeteer, wanted, now)
 
     def input(self, puppeteer: str, given: Input, now: int) -> Outcome:
-        """As `Marionette.input`."""
-        outcome = self.puppet.input(puppeteer, given, now)
+        """As `Troupe.input`."""
+        outcome = self.troupe.input(puppeteer, given, now)
         if outcome in (Outcome.TAKEN, Outcome.REACH):
             sampled = max(min(given.sampled, (1 << 63) - 1), -(1 << 63))
             self._note(
@@ -280,25 +279,25 @@ class LoggedMarionette:
         return outcome
 
     def settle(self, now: int) -> tuple[list[tuple[str, Grant]], bool]:
-        """As `Marionette.settle`."""
-        grants, changed = self.puppet.settle(now)
+        """As `Troupe.settle`."""
+        grants, changed = self.troupe.settle(now)
         if changed:
             self._note(_SETTLE, now)
         return grants, changed
 
     def expire(self, now: int) -> list[tuple[int, str]]:
-        """As `Marionette.expire`."""
-        lost = self.puppet.expire(now)
+        """As `Troupe.expire`."""
+        lost = self.troupe.expire(now)
         if lost:
             self._note(_EXPIRE, now)
-        return [(int(limb), who) for limb, who in lost]
+        return lost
 
-    def see(self, rotations: Array, due: int, now: int) -> None:
-        """As `Marionette.see`; the pose is the dance's at clock time `due`."""
+    def see(self, poses: Sequence[Array], due: int, now: int) -> None:
+        """As `Troupe.see`; the poses are the dances' at clock time `due`."""
         self._note(_SEE, now, due)
-        self.puppet.see(rotations, now)
+        self.troupe.see(poses, now)
 
-    def overlay(self, rotations: Array, due: int, now: int) -> Overlay | None:
-        """As `Marionette.overlay`; the pose is the dance's at clock time `due`."""
+    def overlay(self, poses: Sequence[Array], due: int, now: int) -> Laid:
+        """As `Troupe.overlay`; the poses are the dances' at clock time `due`."""
         self._note(_OVERLAY, now, due)
-        return self.puppet.overlay(rotations, now)
+        return self.troupe.overlay(poses, now)

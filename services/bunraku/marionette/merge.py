@@ -7,7 +7,7 @@ it. It reads no clock: `now` is clock time in integer µs, and must not run back
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +55,7 @@ def apply(rotations: Array, overlay: Overlay | None) -> Array:
 class Marionette:
     """One puppet: who holds its limbs, and the overlay that follows from it."""
 
-    def __init__(self, figure: Figure, epochs: tuple[int, ...] = (0, 0, 0, 0)) -> None:
+    def __init__(self, figure: Figure, epochs: Sequence[int] = (0, 0, 0, 0)) -> None:
         """As `set_figure`; `epochs` are those that a puppet at rest had, to go on from."""
         self._ownership = Ownership(epochs)
         self._handovers = [Handover() for _ in Limb]

@@ -7,6 +7,7 @@ it when it becomes free. Times are clock time in µs and come in as arguments.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal
@@ -25,7 +26,7 @@ ASK_LASTS = 20_000_000
 class Grant:
     """`limb` is the claimant's; its inputs must carry `epoch`."""
 
-    limb: Limb
+    limb: int
     epoch: int
 
 
@@ -84,7 +85,7 @@ class _Hold:
 class Ownership:
     """The four limbs of one puppet and their holders."""
 
-    def __init__(self, epochs: tuple[int, ...] = (0, 0, 0, 0)) -> None:
+    def __init__(self, epochs: Sequence[int] = (0, 0, 0, 0)) -> None:
         # by the limb's number: they are asked for at the stage's rate
         self._holds = [_Hold(epoch=epoch) for epoch in epochs]
 

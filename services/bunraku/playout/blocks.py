@@ -60,10 +60,12 @@ class Store(Generic[Track, Block]):
             end = turn * track.duration_us + min(track.start_us(block + 1), track.duration_us)
         return max(end - position, 0)
 
-    def _at(self, position: int, loop: bool) -> tuple[Block, float, Block | None] | None:
+    def _at(self, position: int, loop: bool, duration: int | None = None) -> tuple[Block, float, Block | None] | None:
         """The block at motion time `position` and the instant in it, in frames from its first; past its last frame
-        also the block that follows, where that is here. None where the block is missing."""
+        also the block that follows, where that is here: at the end of a loop where the track is as long as the motion,
+        whose `duration` in microseconds is its own where that is not given. None where the block is missing."""
         track = self.track
+        loop = loop and (duration is None or track.duration_us + 1e6 / track.fps > duration)
         index = track.block_at(position)
         if index not in self._blocks:
             return None
@@ -78,13 +80,14 @@ class Store(Generic[Track, Block]):
 class BlockStore(Store[MotionTrack, MotionBlock]):
     """Decoded blocks of one motion, of each the best rate that came."""
 
-    def pose_at(self, position: int, loop: bool = True) -> Pose | None:
+    def pose_at(self, position: int, loop: bool = True, duration: int | None = None) -> Pose | None:
         """The pose at motion time `position` in microseconds, None where its block is missing.
 
         Between the last frame of a block and the first of the next it is the mix of the two where the next is here, at
-        the end of a loop too.
+        the end of a loop too where the track is as long as the motion, which lasts `duration` microseconds (its own
+        length, if not said); past the end of a shorter one it stands still.
         """
-        found = self._at(position, loop)
+        found = self._at(position, loop, duration)
         if found is None:
             return None
         block, instant, following = found
@@ -98,12 +101,12 @@ class BlockStore(Store[MotionTrack, MotionBlock]):
             rotation.slerp(rotations[0], next_rotations[0], np.full(len(rotations[0]), mix)),
         )
 
-    def rotations_at(self, positions: list[int], loop: bool = True) -> list[Array | None]:
+    def rotations_at(self, positions: list[int], loop: bool = True, duration: int | None = None) -> list[Array | None]:
         """The rotations (18, 4) of `pose_at` at some motion times at once, which costs little more than one."""
         found: list[Array | None] = [None] * len(positions)
         together: dict[tuple[int, bool], tuple[MotionBlock, MotionBlock | None, list[int], list[float]]] = {}
         for nth, position in enumerate(positions):
-            place = self._at(position, loop)
+            place = self._at(position, loop, duration)
             if place is None:
                 continue
             block, instant, following = place
@@ -134,8 +137,7 @@ class SceneStore(Store[SceneTrack, SceneBlock]):
         Between blocks they are the linear mix, at the end of a loop too where the track is as long as the motion; past
         the end of a shorter one they stand still.
         """
-        whole = self.track.duration_us + 1e6 / self.track.fps > duration
-        found = self._at(position, loop and whole)
+        found = self._at(position, loop, duration)
         if found is None:
             return None
         block, instant, following = found

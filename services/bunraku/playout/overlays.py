@@ -36,8 +36,8 @@ class Overlays:
             if not self._overlays or due > self._overlays[-1].due:
                 self._overlays.append(Overlay(overlay.sequence, due, limbs))
 
-    def lay(self, rotations: Array, clock: int) -> Array:
-        """The dance's pose (18, 4) at `clock` with the pulled limbs over it.
+    def lay(self, rotations: Array, clock: int, performer: int = 0) -> Array:
+        """The dance's pose (18, 4) of a performer at `clock` with the pulled limbs over it.
 
         Between two overlays the later one says which limbs are pulled; a limb that is new in it goes over from the
         dance. After the last it holds for `LASTS`.
@@ -55,7 +55,9 @@ class Overlays:
             after = None
         merged = rotations.copy()
         for limb, numbers in (after or before).limbs.items():
-            joints = list(JOINTS[limb])
+            if limb // len(JOINTS) != performer:
+                continue
+            joints = list(JOINTS[limb % len(JOINTS)])
             turned = unpack_joints(numbers)
             if after is not None:
                 start = unpack_joints(before.limbs[limb]) if limb in before.limbs else rotations[joints]

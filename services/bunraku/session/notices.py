@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bunraku.wire.limbs import LIMBS
+from bunraku.wire.limbs import LIMBS, MOST_LIMBS
 from bunraku.wire.messages import Notice
 
 EVERY = 1_000_000
@@ -17,6 +17,12 @@ _DETAILS = {
 }
 
 
+_NAMES = [
+    LIMBS[limb % len(LIMBS)].replace("_", " ") + (f" of dancer {limb // len(LIMBS) + 1}" if limb >= len(LIMBS) else "")
+    for limb in range(MOST_LIMBS)
+]
+
+
 class Notices:
     """Those to one puppeteer."""
 
@@ -29,4 +35,4 @@ class Notices:
         if last is not None and now - last < EVERY:
             return None
         self._said[limb, reason] = now
-        return Notice(limb, reason, _DETAILS[reason].format(limb=LIMBS[limb].replace("_", " "))).pack()
+        return Notice(limb, reason, _DETAILS[reason].format(limb=_NAMES[limb])).pack()

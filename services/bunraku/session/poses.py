@@ -1,4 +1,4 @@
-"""The dance as a stage needs it: its rotations at clock times a little ahead, from its best blocks."""
+"""The dances as a stage needs them: their rotations at clock times a little ahead, from their best blocks."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def blocks_of(track: MotionTrack) -> BlockStore:
 
 
 class Poses:
-    """The dance of one stage."""
+    """The dances of the performers of one stage."""
 
     def __init__(self, motion: StoredMotion, timelines: Timelines) -> None:
         self._motion = motion
         self._timelines = timelines
-        self._blocks = blocks_of(motion.track)
-        self._known: dict[int, Array] = {}
+        self._blocks = [blocks_of(dance.track) for dance in motion.dances]
+        self._known: dict[int, tuple[Array, ...]] = {}
         self._epoch = -1
         self._share = secrets.randbelow(AHEAD)
 
@@ -46,15 +46,19 @@ class Poses:
         newest = self._timelines.newest
         if newest is None or newest.motion != self._motion.id:
             return
-        track, packets = self._motion.track, self._motion.dance[-1]
-        first = track.block_at(timeline.position_at(newest, due))
-        for index in (first, (first + 1) % track.blocks):
-            if self._blocks.rate(index) < 0:
-                packet = Data.unpack(packets[index])
-                self._blocks.put(index, packet.rate, await asyncio.to_thread(decode_block, track, packet.block))
+        position = timeline.position_at(newest, due)
+        for dance, blocks in zip(self._motion.dances, self._blocks, strict=True):
+            track = dance.track
+            first = track.block_at(position)
+            # whoever dances longer than the motion lasts goes on with the first block after another one
+            for index in (first, (first + 1) % track.blocks, 0):
+                if blocks.rate(index) < 0:
+                    packet = Data.unpack(dance.packets[-1][index])
+                    blocks.put(index, packet.rate, await asyncio.to_thread(decode_block, track, packet.block))
 
-    def at(self, due: int, step: int) -> Array | None:
-        """The rotations (18, 4) at clock time `due`, None where the block is missing or another motion is on.
+    def at(self, due: int, step: int) -> tuple[Array, ...] | None:
+        """The rotations (18, 4) of each performer at clock time `due`, None where a block is missing or another motion
+        is on.
 
         Those of the next frames, `step` µs apart, at most `AHEAD`, are worked out with it, and hold until the timeline
         is edited. Stages do so at instants of their own: fifty at once would keep all from working for a tenth of a
@@ -69,7 +73,7 @@ class Poses:
             self._known = self._work_out([due + step * k for k in range(frames)])
         return self._known.get(due)
 
-    def _work_out(self, dues: list[int]) -> dict[int, Array]:
+    def _work_out(self, dues: list[int]) -> dict[int, tuple[Array, ...]]:
         states = [self._timelines.at(due) for due in dues]
         here = [
             (due, timeline.position_at(state, due), state.loop)
@@ -78,5 +82,12 @@ class Poses:
         ]
         if not here:
             return {}
-        poses = self._blocks.rotations_at([position for _, position, _ in here], here[0][2])
-        return {due: pose for (due, _, _), pose in zip(here, poses, strict=True) if pose is not None}
+        positions, loop = [position for _, position, _ in here], here[0][2]
+        duration = self._motion.track.duration_us
+        each = (blocks.rotations_at(positions, loop, duration) for blocks in self._blocks)
+        known: dict[int, tuple[Array, ...]] = {}
+        for (due, _, _), poses in zip(here, zip(*each, strict=True), strict=True):
+            whole = tuple(pose for pose in poses if pose is not None)
+            if len(whole) == len(poses):
+                known[due] = whole
+        return known

@@ -23,10 +23,10 @@ from bunraku.backing.library import StoredMotion
 from bunraku.backing.problems import ProblemError
 from bunraku.backing.register import SESSIONS, Conflict, Registered
 from bunraku.backing.unavailable import Unavailable
-from bunraku.marionette.merge import Marionette
+from bunraku.marionette.troupe import Troupe
 from bunraku.playout import timeline
 from bunraku.session.distant import DistantStage
-from bunraku.session.stage import Stage
+from bunraku.session.stage import Stage, troupe_of
 from bunraku.session.stage_door import StageDoor, session_json
 from bunraku.session.tally import Tally
 from bunraku.wire.messages import TimelineState, unpack
@@ -88,14 +88,14 @@ class Sessions:
             raise ProblemError(
                 503, "Too many sessions", f"{MOST} sessions are open", hint="end one, or try again later"
             )
-        marionette = await asyncio.to_thread(Marionette, stored.track.figure)
+        troupe = await asyncio.to_thread(troupe_of, stored)
         now, session = clock(), session or secrets.token_hex(9)
         state = timeline.start(motion, stored.track.duration_us, now, playing=playing, loop=loop)
         self._opening.add(session)
         try:
             record = Record(self._replica, now, state.pack())
             revision = await self._backing.register.put(_key(session), record.pack(), 0)
-            stage = self._set(session, stored, marionette, state, now, revision)
+            stage = self._set(session, stored, troupe, state, now, revision)
             self.tally.sessions["opened",] += 1
             _log.info("session %s plays motion %s", session, motion)
         finally:
@@ -111,7 +111,7 @@ class Sessions:
         self,
         session: str,
         motion: StoredMotion,
-        marionette: Marionette,
+        troupe: Troupe,
         state: TimelineState,
         created: int,
         revision: int,
@@ -119,7 +119,7 @@ class Sessions:
         """A stage of this replica's, with its door."""
         # it stays when the request that opens it has its answer
         with request_id.at_work(""):
-            stage = Stage(session, motion, marionette, self._backing.bus, state, created, self.tally)
+            stage = Stage(session, motion, troupe, self._backing.bus, state, created, self.tally)
             self._doors[session] = StageDoor(stage, self._backing, self, revision)
         return stage
 
@@ -222,8 +222,8 @@ class Sessions:
             _log.warning("session %s plays motion %s, which is gone: it is ended", session, state.motion)
             await self._backing.register.remove(_key(session))
             return
-        marionette = await asyncio.to_thread(Marionette, stored.track.figure)
-        stage = self._set(session, stored, marionette, state, record.created, revision)
+        troupe = await asyncio.to_thread(troupe_of, stored)
+        stage = self._set(session, stored, troupe, state, record.created, revision)
         stage.appear()
         self.tally.sessions["taken over",] += 1
         _log.warning("session %s was left by its server and goes on here", session)

@@ -19,12 +19,12 @@ import msgpack
 from bunraku.backing.backing import clock
 from bunraku.backing.bus import Bus, Subscription
 from bunraku.backing.library import StoredMotion
-from bunraku.marionette.log import Log, LoggedMarionette
-from bunraku.marionette.merge import Marionette
-from bunraku.marionette.merge import Overlay as Pulled
+from bunraku.marionette.log import Log, LoggedTroupe
 from bunraku.marionette.ownership import Grant as Granted
 from bunraku.marionette.ownership import Input as Given
 from bunraku.marionette.ownership import Outcome
+from bunraku.marionette.troupe import Laid, Troupe
+from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.overlays import pack_joints
 from bunraku.session.pace import Pace
@@ -55,13 +55,13 @@ class Stage:
         self,
         session: str,
         motion: StoredMotion,
-        marionette: Marionette,
+        troupe: Troupe,
         bus: Bus,
         state: TimelineState,
         created: int,
         tally: Tally | None = None,
     ) -> None:
-        """`marionette` is of the motion's figure; the caller builds it, which takes a tenth of a second. `state` is of
+        """`troupe` is of the motion's figures; the caller builds it, which takes a tenth of a second. `state` is of
         this motion; `created` a clock time, microseconds; `tally` counts what goes on at all stages of a replica."""
         self.id = session
         self.created = created
@@ -79,7 +79,7 @@ class Stage:
         self.seen = clock()
         self.log = Log()
         self.log.timeline(self.timeline)
-        self._marionette = LoggedMarionette(marionette, motion.id, self.log)
+        self._troupe = LoggedTroupe(troupe, motion.id, self.log)
         self._set(motion)
         subject = f"session.{session}"
         self._subscriptions: list[Subscription] = [
@@ -121,15 +121,15 @@ class Stage:
     @property
     def holders(self) -> tuple[str | None, ...]:
         """The holder's id of each limb, or None."""
-        return self._marionette.puppet.holders()
+        return self._troupe.troupe.holders()
 
     @property
     def presence(self) -> Presence:
         """Who is here, who holds what, and who asks for it."""
         puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
-        puppet = self._marionette.puppet
-        asks = [list(limb) for limb in puppet.asks()]
-        return Presence(sum(self._viewers.values()), puppeteers, list(puppet.holders()), asks)
+        troupe = self._troupe.troupe
+        asks = [list(limb) for limb in troupe.asks()]
+        return Presence(sum(self._viewers.values()), puppeteers, list(troupe.holders()), asks)
 
     def edit(self, *, playing: bool | None, position: int | None, loop: bool | None) -> TimelineState:
         """Edit the timeline for everyone, `EDIT_LEAD` from now."""
@@ -139,10 +139,16 @@ class Stage:
     async def change(self, motion: StoredMotion) -> TimelineState:
         """Another motion for everyone, from its start; limbs stay in the hands they are in."""
         # the first arm of its proportions takes a tenth of a second; the loop goes on meanwhile
-        await asyncio.to_thread(Marionette, motion.track.figure)
-        self._marionette.set_figure(motion.track.figure, motion.id, clock())
+        await asyncio.to_thread(troupe_of, motion)
+        now, before = clock(), self.holders
+        for limb, holder in self._troupe.set_figures(_figures(motion), motion.id, now):
+            if (puppeteer := self.puppeteers.get(holder)) is not None:
+                puppeteer.lost(limb, now)
         self._set(motion)
-        return self._put(timeline.change(self.timeline, clock() + EDIT_LEAD, motion.id, motion.track.duration_us))
+        state = self._put(timeline.change(self.timeline, clock() + EDIT_LEAD, motion.id, motion.track.duration_us))
+        if len(self.holders) != len(before):
+            self._announce()
+        return state
 
     def join(self, who: str, name: str, tell: Callable[[bytes], None]) -> Puppeteer:
         """A puppeteer comes, of the id `who`, and is told what there is with `tell`; raises `Full`."""
@@ -155,7 +161,7 @@ class Stage:
         """A puppeteer goes; what they held goes to who asked for it, or back to the dance."""
         self.puppeteers.leave(puppeteer)
         now = clock()
-        self._marionette.leave(puppeteer.id, now)
+        self._troupe.leave(puppeteer.id, now)
         self._settle(now)
         self._announce()
 
@@ -164,7 +170,7 @@ class Stage:
         now = clock()
         who = puppeteer.id
         if isinstance(message, Claim):
-            answer = self._marionette.claim(message.limb, who, now)
+            answer = self._troupe.claim(message.limb, who, now)
             if isinstance(answer, Granted):
                 self._granted(who, answer)
                 self._announce()
@@ -172,21 +178,21 @@ class Stage:
                 puppeteer.tell(Refusal(message.limb, answer.reason, answer.holder).pack())
         elif isinstance(message, Release):
             puppeteer.granted.discard(message.limb)
-            if self._marionette.release(message.limb, who, message.epoch, now):
+            if self._troupe.release(message.limb, who, message.epoch, now):
                 self._settle(now)
                 self._announce()
         elif isinstance(message, Alive):
-            self._marionette.alive(who, message.limbs, now)
-            holders = self._marionette.puppet.holders()
-            for limb in set(message.limbs) & set(range(len(holders))):
-                if holders[limb] != who:
+            self._troupe.alive(who, message.limbs, now)
+            holders = self._troupe.troupe.holders()
+            for limb in set(message.limbs):
+                if limb >= len(holders) or holders[limb] != who:
                     puppeteer.lost(limb, now)
         elif isinstance(message, Ask):
-            if self._marionette.ask(message.limb, who, message.wanted, now):
+            if self._troupe.ask(message.limb, who, message.wanted, now):
                 self._announce()
         elif isinstance(message, Input):
             given = Given(message.limb, message.kind, message.epoch, message.sequence, message.sampled, message.values)
-            outcome = self._marionette.input(who, given, now)
+            outcome = self._troupe.input(who, given, now)
             self._tally.inputs[outcome.value] += 1
             if outcome in (Outcome.REACH, Outcome.OWNER):
                 puppeteer.notice(message.limb, outcome.value, now)
@@ -201,7 +207,7 @@ class Stage:
 
     def _settle(self, now: int) -> bool:
         """Limbs that became free go to who asked for them; whether asks have changed."""
-        grants, changed = self._marionette.settle(now)
+        grants, changed = self._troupe.settle(now)
         for who, grant in grants:
             self._granted(who, grant)
         self._tally.hand_overs += len(grants)
@@ -254,8 +260,8 @@ class Stage:
             await self._poses.prepare(self._time(frame) + LEAD)
             for before in (frame - 2, frame - 1):
                 due = self._time(before) + LEAD
-                if (pose := self._poses.at(due, FRAME)) is not None:
-                    self._marionette.see(pose, due, self._time(before))
+                if (poses := self._poses.at(due, FRAME)) is not None:
+                    self._troupe.see(poses, due, self._time(before))
             pace, late = Pace(), 0
             while self._frames(range(frame if self._every_frame(pace) else frame + FRAMES - 1, frame + FRAMES), late):
                 # a stage that was kept from working goes on from where it should be, in step with the others
@@ -270,7 +276,7 @@ class Stage:
     def _every_frame(self, pace: Pace) -> bool:
         """Whether the next message has all its frames: of a limb that is held, or moved as hands move, the last is
         enough, as viewers show what lies between."""
-        return pace.full and self._marionette.puppet.lively
+        return pace.full and self._troupe.troupe.lively
 
     def _time(self, frame: int) -> int:
         """The clock time of a frame: no two stages of a process work at the same instants."""
@@ -283,34 +289,42 @@ class Stage:
         """Publish what lies over the dance in some frames, each due `LEAD` after its time; whether any limb is
         pulled. It is `late` by so many microseconds, in which nobody could be heard: they are not taken for silence."""
         now, begun = clock(), time.perf_counter()
-        lost = self._marionette.expire(now - max(late, 0))
+        lost = self._troupe.expire(now - max(late, 0))
         for limb, holder in lost:
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.lost(limb, now)
         if self._settle(now) or lost:
             self._announce()
-        shown: list[Pulled | None] = []
+        shown: list[Laid] = []
         for frame in frames:
             due = self._time(frame) + LEAD
-            pose = self._poses.at(due, FRAME)
-            shown.append(self._marionette.overlay(pose, due, self._time(frame)) if pose is not None else None)
+            poses = self._poses.at(due, FRAME)
+            shown.append(self._troupe.overlay(poses, due, self._time(frame)) if poses is not None else {})
         self._sequence += 1
         message = _overlay(self._sequence, self._time(frames[-1]) + LEAD, shown)
-        self._overlay = message if shown[-1] is not None else None
+        self._overlay = message if shown[-1] else None
         self._tally.solving.add(time.perf_counter() - begun)
         self._bus.publish(f"session.{self.id}.overlay", message)
-        return not self._marionette.puppet.at_rest
+        return not self._troupe.troupe.at_rest
 
 
-def _overlay(sequence: int, due: int, shown: list[Pulled | None]) -> bytes:
+def troupe_of(motion: StoredMotion) -> Troupe:
+    """The puppets for a motion; takes a tenth of a second."""
+    return Troupe(_figures(motion))
+
+
+def _figures(motion: StoredMotion) -> list[Figure]:
+    return [dance.track.figure for dance in motion.dances]
+
+
+def _overlay(sequence: int, due: int, shown: list[Laid]) -> bytes:
     """The message of some frames: those of the end that have the limbs of the last."""
-    last = shown[-1].limbs if shown[-1] is not None else ()
+    last = shown[-1].keys()
     frames: list[dict[int, tuple[int, ...]]] = []
-    for pulled in reversed(shown):
-        if (pulled.limbs if pulled is not None else ()) != last:
+    for laid in reversed(shown):
+        if laid.keys() != last:
             break
-        turned = pulled.joints if pulled is not None else ()
-        frames.append({int(limb): pack_joints(joints) for limb, joints in zip(last, turned, strict=True)})
+        frames.append({limb: pack_joints(joints) for limb, joints in laid.items()})
     if not last:
         return Overlay(sequence, due, {}).pack()
     return Overlay(sequence, due, frames[0], tuple(reversed(frames[1:]))).pack()

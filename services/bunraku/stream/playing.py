@@ -10,7 +10,7 @@ from bunraku.playout.pacing import Pacer
 from bunraku.playout.rate import RateChoice
 from bunraku.playout.sharing import Step
 from bunraku.stream.flow import Flow
-from bunraku.stream.tracks import described, paced, steps, told_of
+from bunraku.stream.tracks import danced, described, paced, steps, told_of
 from bunraku.wire.messages import Choice, Report, TimelineState
 
 BESIDE = 1_000_000
@@ -50,8 +50,9 @@ class Playing:
         first, safe = sharing.first_step(self.steps), sharing.safe_step(self.steps)
         self.rate = RateChoice(len(self.steps), None, first, safe, [step.kbps for step in self.steps])
         # where no sound is sent all is the motion's
-        self._silent = [Step(nth, -1, kbps) for nth, kbps in enumerate(motion.kbps[0])]
-        self._alone = RateChoice(len(self._silent), costs=motion.kbps[0])
+        costs = danced(motion)
+        self._silent = [Step(nth, -1, kbps) for nth, kbps in enumerate(costs)]
+        self._alone = RateChoice(len(self._silent), costs=costs)
         self._pinned = pinned is not None
         self._tells = "motion" in wanted
         self._narrow = False

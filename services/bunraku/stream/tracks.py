@@ -52,7 +52,14 @@ def steps(motion: StoredMotion, wanted: Sequence[str]) -> tuple[sharing.Step, ..
     """The ways in which the tracks that a viewer wants may share its line."""
     kinds = list(map(_kind, motion.tracks))
     audio = motion.kbps[kinds.index("audio")] if "audio" in kinds and "audio" in wanted else ()
-    return sharing.steps(motion.kbps[0] if "motion" in wanted or not audio else (), audio)
+    return sharing.steps(danced(motion) if "motion" in wanted or not audio else (), audio)
+
+
+def danced(motion: StoredMotion) -> list[float]:
+    """What each rate of the dances of all performers costs, kbit/s: as many as one has at most, of one with fewer its
+    highest."""
+    each = motion.kbps[: len(motion.dances)]
+    return [sum(kbps[min(rate, len(kbps) - 1)] for kbps in each) for rate in range(max(map(len, each)))]
 
 
 def _channels(track: Track) -> int:

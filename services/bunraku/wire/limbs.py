@@ -4,3 +4,8 @@ LIMBS: tuple[str, ...] = ("left_hand", "right_hand", "left_leg", "right_leg")
 """Of each performer."""
 MOST_PERFORMERS = 4
 MOST_LIMBS = len(LIMBS) * MOST_PERFORMERS
+
+
+def limb_number(limb: str | int) -> int:
+    """The number of one of `LIMBS` of the first performer, or the number itself; raises ValueError for another name."""
+    return limb if isinstance(limb, int) else LIMBS.index(limb)

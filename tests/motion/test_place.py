@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.motion.place import MIDDLE, Place, in_a_row
+from bunraku.motion.skeleton import points
+from tests.vectors.blocks import wandering_motion
+
+NUMBER = st.floats(-6.0, 6.0)
+
+
+def test_in_the_middle_nothing_is_moved() -> None:
+    motion = wandering_motion(0.3, 30.0, 3)
+    root, rotations = MIDDLE.put(motion.root, motion.rotations)
+    assert root is motion.root
+    assert rotations is motion.rotations
+
+
+@given(NUMBER, NUMBER, NUMBER)
+def test_every_point_is_turned_from_z_towards_x_and_moved(x: float, z: float, turn: float) -> None:
+    motion = wandering_motion(0.2, 30.0, 3)
+    before = points(motion.figure, motion.root, motion.rotations)
+    after = points(motion.figure, *Place(x, z, turn).put(motion.root, motion.rotations))
+    sine, cosine = np.sin(turn), np.cos(turn)
+    np.testing.assert_allclose(after[..., 0], cosine * before[..., 0] + sine * before[..., 2] + x, atol=1e-9)
+    np.testing.assert_allclose(after[..., 1], before[..., 1], atol=1e-9)
+    np.testing.assert_allclose(after[..., 2], cosine * before[..., 2] - sine * before[..., 0] + z, atol=1e-9)
+
+
+def test_one_pose_is_put_as_many_are() -> None:
+    motion = wandering_motion(0.2, 30.0, 4)
+    place = Place(1.0, -2.0, 0.7)
+    root, rotations = place.put(motion.root, motion.rotations)
+    alone_root, alone_rotations = place.put(motion.root[2], motion.rotations[2])
+    np.testing.assert_allclose(alone_root, root[2])
+    np.testing.assert_allclose(alone_rotations, rotations[2])
+
+
+@pytest.mark.parametrize(
+    ("said", "says"),
+    [
+        (None, "three numbers"),
+        ([1.0, 2.0], "three numbers"),
+        ([1.0, "left", 0.0], "finite"),
+        ([1.0, float("nan"), 0.0], "finite"),
+        ([0.0, 0.0, float("inf")], "finite"),
+        ([100.5, 0.0, 0.0], "100 metres"),
+        ([0.0, -100.5, 0.0], "100 metres"),
+    ],
+)
+def test_what_is_no_place_is_refused(said: object, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        Place.read(said)
+
+
+def test_a_place_is_read_as_it_was_told() -> None:
+    assert Place.read([1, -2.5, 0.25]) == Place(1.0, -2.5, 0.25)
+    assert Place.read(list(MIDDLE)) == MIDDLE
+
+
+@given(st.lists(st.tuples(NUMBER, NUMBER, st.floats(0.5, 2.0), NUMBER), min_size=1, max_size=4))
+def test_in_a_row_nobody_is_in_the_way_and_all_are_about_the_middle(dances: list[tuple[float, ...]]) -> None:
+    middles = [np.array([x, z]) for x, z, _, _ in dances]
+    reaches, turns = [reach for _, _, reach, _ in dances], [turn for *_, turn in dances]
+    places = in_a_row(middles, reaches, turns, 0.1)
+    at = [
+        place.put(np.array([x, 0.9, z]), np.tile([1.0, 0.0, 0.0, 0.0], (18, 1)))[0]
+        for place, (x, z) in zip(places, middles, strict=True)
+    ]
+    np.testing.assert_allclose([z for _, _, z in at], 0.0, atol=1e-9)
+    left, right = at[0][0] - reaches[0], at[-1][0] + reaches[-1]
+    assert left + right == pytest.approx(0.0, abs=1e-9)
+    for nth in range(1, len(at)):
+        assert at[nth][0] - at[nth - 1][0] == pytest.approx(reaches[nth - 1] + reaches[nth] + 0.1)
