@@ -20,10 +20,12 @@ const TRANSPORT = 110;
 const DRAWN_FOR = 900;
 const HALF_FIELD = (13 * Math.PI) / 180;
 const EYE = 0.08;
+/** How far is seen from before one dancer, metres. */
+const FAR = 40;
 /** Metres that the standard figure takes to either side of its place, where there are several. */
-const ELBOW_ROOM = 0.8;
-/** Pixels at each side of a desktop's picture in which several dancers do not stand: the dock is there. */
-const DOCK = 76;
+const ELBOW_ROOM = 0.9;
+/** Of the picture's width, what several dancers have at least, whatever stands before it. */
+const LEAST_FREE = 0.5;
 const YAW = (25 * Math.PI) / 180;
 const PITCH_LOW = (-5 * Math.PI) / 180;
 const PITCH_HIGH = (15 * Math.PI) / 180;
@@ -35,7 +37,7 @@ const OVER = 0.9;
 const UNTURNED = 1e-3;
 
 export class AudienceCamera {
-  readonly camera = new PerspectiveCamera(26, 1, 0.1, 40);
+  readonly camera = new PerspectiveCamera(26, 1, 0.1, FAR);
   /** What is seen, world frame, whatever the window's shape. */
   readonly view: View = createView();
   still = false;
@@ -45,8 +47,11 @@ export class AudienceCamera {
   /** The furthest that dancers were to a side, and nearer, since the last cut, metres: the seat goes back for them, and not forth again. */
   #aside = 0;
   #near = 0;
-  /** Of the picture's width, what they have. */
+  /** Of the picture's width, what they have, and how far the middle of that is from the picture's. */
   #free = 1;
+  #middle = 0;
+  #shift = 0;
+  #shifted = 0;
   /** Whether the seat is still to be taken for the first time since the last cut. */
   #fresh = true;
   readonly #own = createView();
@@ -68,11 +73,20 @@ export class AudienceCamera {
   #back = 0;
   #untouched = REST;
 
+  /**
+   * What of a picture `width` pixels wide stands before it to the left and to the right, pixels: several dancers are seen between. One alone is in the middle.
+   */
+  set sides({ left, right, width }: { left: number; right: number; width: number }) {
+    const free = 1 - (left + right) / width;
+    const narrow = free < LEAST_FREE;
+    this.#free = narrow ? 1 : free;
+    this.#middle = narrow ? 0 : (left - right) / 2 / width;
+  }
+
   /** Changes the framing, eased over 0.6 s. In a window of few pixels the transport takes a larger share: the puppet makes room. */
-  frame(framing: Framing, width: number, height: number): void {
+  frame(framing: Framing, height: number): void {
     const [visible, look] = FRAMINGS[framing];
     const lost = framing === "desktop" ? Math.max(0, TRANSPORT / height - TRANSPORT / DRAWN_FOR) : 0;
-    this.#free = framing === "desktop" ? Math.max(0.5, 1 - (2 * DOCK) / width) : 1;
     this.#goal = [visible / (1 - lost), look - (visible / (1 - lost)) * (lost / 2)];
   }
 
@@ -162,6 +176,8 @@ export class AudienceCamera {
     const one = ((visible / 2) * this.scale) / Math.tan(HALF_FIELD);
     const wide = (Math.max(one, this.#aside / (Math.tan(HALF_FIELD) * this.camera.aspect * this.#free)) + this.#near) / one;
     this.wide += (wide - this.wide) * (this.#fresh ? 1 : share);
+    const shift = this.#aside > 0 ? this.#middle : 0;
+    this.#shift += (shift - this.#shift) * (this.#fresh ? 1 : share);
     this.#fresh &&= this.#aside === 0;
     this.#visible += (visible - this.#visible) * share;
     this.#height += (look - this.#height) * share;
@@ -191,9 +207,16 @@ export class AudienceCamera {
     const { camera, view } = this;
     const share = MathUtils.smootherstep(this.#over, 0, 1);
     const fov = MathUtils.radToDeg(view.fov + share * (fovIn(view.fov, camera.aspect) - view.fov));
-    if (Math.abs(fov - camera.fov) > 1e-9) {
-      camera.fov = fov;
+    const shift = this.#shift * (1 - share);
+    const far = FAR * this.wide;
+    if (Math.abs(fov - camera.fov) > 1e-9 || Math.abs(far - camera.far) > 1e-6) {
+      Object.assign(camera, { fov, far });
       camera.updateProjectionMatrix();
+    }
+    if (Math.abs(shift - this.#shifted) > 1e-6) {
+      const { aspect } = camera;
+      camera.setViewOffset(aspect, 1, -shift * aspect, 0, aspect, 1);
+      this.#shifted = shift;
     }
     camera.position.copy(view.position);
     camera.parent?.worldToLocal(camera.position);

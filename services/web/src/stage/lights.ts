@@ -122,8 +122,7 @@ function read({ full, numbers }: LightState, { shown, light }: Role, group: Grou
 /** Between the look's own light, of which `level` is left, from `wide` times further away, and the show's. From any distance as much light and as wide a cone reach the dancers. */
 function mix({ light, place, angle, distance, colour, intensity, shown, over }: Role, level: number, wide: number): void {
   const share = MathUtils.smoothstep(over, 0, 1);
-  const { position: target } = light.target;
-  light.position.subVectors(place, target).multiplyScalar(wide).add(target).lerp(shown.place, share);
+  light.position.copy(place).multiplyScalar(wide).lerp(shown.place, share);
   const nearer = distance / Math.max(light.position.distanceTo(light.target.position), NEAREST);
   light.color.lerpColors(colour, shown.colour, share);
   light.intensity = (intensity * MathUtils.lerp(level, shown.share, share)) / nearer ** 2;

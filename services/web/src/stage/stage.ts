@@ -146,8 +146,8 @@ export class Stage {
     if (this.puppet) this.#compile();
   }
 
-  /** CSS pixels. */
-  resize(width: number, height: number, framing: Framing, pixelRatio: number): void {
+  /** CSS pixels; `sides` are those that something stands before to the left and to the right, between which several dancers are seen. */
+  resize(width: number, height: number, framing: Framing, pixelRatio: number, [left, right]: readonly [number, number] = [0, 0]): void {
     const sharpest = framing === "desktop" ? SHARPEST.desktop : SHARPEST.phone;
     this.#width = width;
     this.#height = height;
@@ -155,8 +155,9 @@ export class Stage {
     this.#setSize();
     this.#framing = framing;
     this.#placeDisc();
-    this.audience.frame(framing, width, height);
+    this.audience.frame(framing, height);
     this.audience.resize(width / height);
+    this.audience.sides = { left, right, width };
   }
 
   /**

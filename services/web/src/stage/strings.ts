@@ -33,7 +33,7 @@ export interface StringsView {
 
 const FREE: StringState = { holder: null, lit: false, pull: null };
 /** What is left of the rings and silk of those behind. */
-const BEHIND = 0.5;
+const BEHIND = 0.42;
 const NOWHERE = new Vector3();
 
 /** Pull error that draws a thread fully taut, metres. */
