@@ -6,6 +6,7 @@ import type { VelocityInputs } from "./input/velocity";
 import { controlName } from "./page/control-names";
 import { askers, holders, limbName, limbsInOrder, type LimbState } from "./page/model";
 import type { Page } from "./page/page";
+import type { Toast } from "./page/toast";
 import type { Room } from "./room";
 import { limbNumber } from "./wire/limbs";
 import { heard, say } from "./words/say";
@@ -20,7 +21,7 @@ export interface Theatre {
 
 /** Where it is shown: the page, or as much of one as there is. */
 export interface HoldingPage {
-  readonly toast: Page["toast"];
+  readonly toast: Toast;
   readonly strings: Pick<Page["strings"], "render" | "notice">;
   readonly asks: Page["asks"];
 }

@@ -101,9 +101,7 @@ const page = createPage(document.body, {
   danceAs: (avatar) => casting.choose(avatar),
   removeAvatar: () => void casting.remove(),
   choose: (id) => void choose(id),
-  ...(may("ingest") && may("control") ? { add: (piece) => {
-    if (room?.place === "sessions") void addToStage(piece, room, pieces, page.library).then(renderPieces);
-  } } : {}),
+  ...(may("ingest") && may("control") ? { add: (piece) => room && void addToStage(piece, room, pieces, page.library).then(renderPieces) } : {}),
   picture,
   download: (piece, format) => void exporting.download(piece, format),
   remove: (piece) => {
@@ -136,7 +134,7 @@ const casting = new Casting({ page, files: new FileStore("bunraku"), choices: br
 let denied = false;
 whenDenied(({ title, detail, hint }) => {
   denied = true;
-  page.notice(title, hint ? say("{detail}; {hint}.", { detail, hint }) : detail);
+  page.notice("access", title, hint ? say("{detail}; {hint}.", { detail, hint }) : detail);
 });
 const listening = new Listening((state) => page.transport.sound.render(state), page.transport.sound.element);
 theme = createTheme((now) => {
@@ -229,13 +227,14 @@ function enter(id: string, place: Place = "sessions"): Room {
   const url = new URL(location.href);
   url.searchParams.set(place === "motions" ? "motion" : "session", id);
   history.replaceState(null, "", url);
-  page.notice(null);
+  page.notice("dance", null);
+  page.toast.lost(null);
   viewer.addEventListener("figure", () => {
-    performing?.cast();
+    performing?.comeOn();
     if (!pieces.find(viewer.motion)) void pieces.refresh().then(renderPieces, () => undefined);
     renderPieces();
   });
-  viewer.addEventListener("tracks", () => performing?.cast());
+  viewer.addEventListener("tracks", () => performing?.comeOn());
   const renderTimeline = () => page.transport.timeline(viewer.timeline?.playing ?? false, viewer.timeline?.loop ?? false, viewer.timeline !== null);
   viewer.addEventListener("timeline", renderTimeline);
   viewer.addEventListener("blocks", () => page.transport.blocks(viewer.blocks, viewer.rates.length));
@@ -244,7 +243,8 @@ function enter(id: string, place: Place = "sessions"): Room {
   puppeteer.addEventListener("welcome", renderPeople);
   viewer.addEventListener("open", () => {
     holding.connected = true;
-    page.notice(null);
+    page.notice("dance", null);
+    page.toast.lost(null);
     holding.render();
   });
   viewer.addEventListener("closed", (event) => {
@@ -252,9 +252,10 @@ function enter(id: string, place: Place = "sessions"): Room {
     holding.connected = false;
     holding.render();
     const reason = String((event as CustomEvent<string>).detail);
+    if (viewer.ended || denied) page.toast.lost(null);
     if (denied) return;
-    if (viewer.ended) page.notice(say(place === "motions" ? "The dance has ended" : "The session has ended"), reason);
-    else if (wasConnected) page.toast(say("The line was lost: {reason}", { reason }));
+    if (viewer.ended) page.notice("dance", say(place === "motions" ? "The dance has ended" : "The session has ended"), reason);
+    else if (wasConnected) page.toast.lost(say("The line was lost: {reason}", { reason }));
   });
   renderTimeline();
   renderPieces();
@@ -297,11 +298,11 @@ async function openStage(): Promise<void> {
   try {
     performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, best: query.get("quality") === "best" });
   } catch {
-    page.notice(say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
+    page.notice("graphics", say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
     return;
   }
-  canvas.addEventListener("webglcontextlost", () => page.notice(say("The stage went dark"), say("The graphics were taken away; they come back by themselves. If they do not, load the page again.")));
-  canvas.addEventListener("webglcontextrestored", () => page.notice(null));
+  canvas.addEventListener("webglcontextlost", () => page.notice("graphics", say("The stage went dark"), say("The graphics were taken away; they come back by themselves. If they do not, load the page again.")));
+  canvas.addEventListener("webglcontextrestored", () => page.notice("graphics", null));
   const { commands } = performing;
   ({ stage, hands, velocity } = performing);
   stage.still = calm.matches;
@@ -379,14 +380,14 @@ async function start(): Promise<void> {
     }
     await library;
     if (!room && !may("ingest")) {
-      page.notice(say("The stage is empty"), say("Nobody dances here now. Come again when somebody does."));
+      page.notice("dance", say("The stage is empty"), say("Nobody dances here now. Come again when somebody does."));
     } else if (!room) {
-      page.notice(say("The stage is empty"), say("Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it."));
+      page.notice("dance", say("The stage is empty"), say("Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it."));
       page.panels.open("library");
     }
   } catch (error) {
     if (!(error instanceof ProblemError)) throw error;
-    if (!denied) page.notice(error.title, say("{detail}. {hint}", { detail: error.detail, hint: error.hint ?? "" }));
+    if (!denied) page.notice("dance", error.title, say("{detail}. {hint}", { detail: error.detail, hint: error.hint ?? "" }));
   }
 }
 

@@ -62,11 +62,11 @@ export class Performing {
   enter(room: Room | null): void {
     this.#room = room;
     this.hands.puppeteer = room?.puppeteer ?? null;
-    this.cast();
+    this.comeOn();
   }
 
   /** The room's dancers come on, as far as they are known. */
-  cast(): void {
+  comeOn(): void {
     const { performers = [], figure, front } = this.#room?.viewer ?? {};
     // one that cannot be read keeps its place, and is never seen
     if (figure) this.stage.setFigures(performers.map((one) => one?.figure ?? figure), front);

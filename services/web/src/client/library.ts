@@ -14,8 +14,9 @@ export interface Motion {
   fps: number;
   /** The types of its tracks. */
   tracks?: string[];
-  /** How many dance in it; left out: one. */
+  /** How many dance in it; left out: one. Of several also what each of them dances, by name. */
   performers?: number;
+  pieces?: string[];
   /** Of a motion that was kept from a session: words of where it is from, and its dance's id. */
   source?: string;
   kept_from?: string;

@@ -83,7 +83,7 @@ export class MotionTrack extends Timing {
  * @throws DamagedBlock
  */
 function readPlace(place: unknown): Place {
-  if (place === undefined || place === null) return MIDDLE;
+  if (place === undefined) return MIDDLE;
   if (!Array.isArray(place) || place.length !== 3 || !place.every(Number.isFinite)) throw new DamagedBlock("motion needs a place of three numbers");
   const [x, z, turn] = place as [number, number, number];
   if (Math.abs(x) > FARTHEST || Math.abs(z) > FARTHEST) throw new DamagedBlock(`motion needs a place within ${FARTHEST} metres`);

@@ -5,7 +5,7 @@ import { icon, limbIcon } from "../page/icons";
 import { createNextDancer } from "../page/dancer-chooser";
 import { LIMB_ORDER, limbKey, limbName, performersOf, type LimbState } from "../page/model";
 import { createTags, type Tags } from "../page/tags";
-import { createToast, type Toast } from "../page/toast";
+import { createToast, type Toasts } from "../page/toast";
 import tokens from "../style/tokens.css?inline";
 import { limbNumber } from "../wire/limbs";
 import own from "./element.css?inline";
@@ -28,7 +28,7 @@ export interface Face {
   readonly canvas: HTMLCanvasElement;
   readonly tags: Tags;
   readonly asks: Asks;
-  readonly toast: Toast;
+  readonly toast: Toasts;
   /** Words in place of the dance; null for none. */
   notice(title: string | null, text?: string): void;
   /** The bar: whether it is there; whether play may be pressed, and would pause; limbs, if they can be taken. */

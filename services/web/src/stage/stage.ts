@@ -17,7 +17,7 @@ import { Scenery } from "./scenery";
 import { Strings, type StringState } from "./strings";
 import { studio } from "./studio";
 import { CameraTrail } from "./trail";
-import { Troupe, type Casting } from "./troupe";
+import { Troupe, type MakePerformer } from "./troupe";
 
 /** Pixel ratios above these cost more than they show. */
 const SHARPEST = { desktop: 2, phone: 1.75 };
@@ -140,9 +140,9 @@ export class Stage {
     this.#compile();
   }
 
-  /** Has the first dance danced by whom `casting` makes for a dancer's lengths, from now on; null: by the puppet. */
-  cast(casting: Casting | null): void {
-    this.#troupe.cast(casting);
+  /** Has the first dance danced by whom `make` makes for a dancer's lengths, from now on; null: by the puppet. */
+  danceBy(make: MakePerformer | null): void {
+    this.#troupe.danceBy(make);
     if (this.puppet) this.#compile();
   }
 

@@ -7,12 +7,12 @@ import { Puppet } from "./puppet";
 import { Workshop } from "./workshop";
 
 /** Makes who dances for the lengths of the dancer that the stream tells of. */
-export type Casting = (figure: Figure) => Performer;
+export type MakePerformer = (figure: Figure) => Performer;
 
 export class Troupe {
   readonly group = new Group();
   #performers: Performer[] = [];
-  #cast: Casting | null = null;
+  #make: MakePerformer | null = null;
   #workshop: Workshop | null = null;
   #reflected = false;
   #plain = false;
@@ -41,9 +41,9 @@ export class Troupe {
     return !stay;
   }
 
-  /** Has the first dance danced by whom `casting` makes, from now on; null: by the puppet. */
-  cast(casting: Casting | null): void {
-    this.#cast = casting;
+  /** Has the first dance danced by whom `make` makes, from now on; null: by the puppet. */
+  danceBy(make: MakePerformer | null): void {
+    this.#make = make;
     const [first, ...others] = this.#performers;
     if (!first) return;
     first.dispose();
@@ -74,7 +74,7 @@ export class Troupe {
   }
 
   #add(figure: Figure): void {
-    const performer = (this.#performers.length === 0 ? this.#cast?.(figure) : null) ?? this.#carve(figure);
+    const performer = (this.#performers.length === 0 ? this.#make?.(figure) : null) ?? this.#carve(figure);
     this.#dress(performer);
     performer.group.visible = false;
     this.#performers.push(performer);

@@ -159,6 +159,10 @@ describe("as the motion changes to one of fewer performers", () => {
     expect(puppeteer.asks(4)).toBe(true);
     line.say({ name: "Presence", viewers: 2, puppeteers: [], limbs: free(4), asks: nobody(4) });
     expect([puppeteer.asks(4), told]).toEqual([false, [["lapsed", { limb: 4, free: false }]]]);
+    // one that Presence never told of lapses as soon
+    puppeteer.ask(5);
+    line.say({ name: "Presence", viewers: 2, puppeteers: [], limbs: free(4), asks: nobody(4) });
+    expect([puppeteer.asks(5), told[1]]).toEqual([false, ["lapsed", { limb: 5, free: false }]]);
     // nobody has it any more
     const before = drawn(4);
     puppeteer.claim(4);

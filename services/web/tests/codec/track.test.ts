@@ -73,6 +73,7 @@ describe("a description that cannot be played is refused with what it lacks", ()
     [{ dancer: new Uint8Array(103).fill(0x82) }, "grid is 8"],
     [{ rates: Array(17).fill({ kbps: 1, mean: 1, max: 1 }) }, "rates"],
     [{ rates: [{ kbps: 1, mean: 1 }] }, "rate 0"],
+    [{ place: null }, "place of three numbers"],
     [{ place: [0, 0] }, "place of three numbers"],
     [{ place: [0, 0, 0, 0] }, "place of three numbers"],
     [{ place: [0, NaN, 0] }, "place of three numbers"],
@@ -91,7 +92,7 @@ describe("a description that cannot be played is refused with what it lacks", ()
 test("where its dancer dances is read; left out it is the middle", () => {
   const place = (given: unknown) => MotionTrack.fromDescription({ ...goldenDescription(), place: given }).place;
   expect(place([-100, 1.5, -2])).toEqual({ x: -100, z: 1.5, turn: -2 });
-  expect([goldenTrack().place, place(undefined), place(null)]).toEqual(Array(3).fill({ x: 0, z: 0, turn: 0 }));
+  expect(goldenTrack().place).toEqual({ x: 0, z: 0, turn: 0 });
 });
 
 test("a description with anything in it is of a track whose every block has its place, or refused", () => {

@@ -37,7 +37,7 @@ const [FIRST, OTHER] = [standardFigure(), standardFigure(0.9)];
 
 beforeEach(() => {
   troupe = new Troupe({ value: 0 });
-  troupe.cast((figure) => new Dancer(figure));
+  troupe.danceBy((figure) => new Dancer(figure));
 });
 
 test("one told of again dances on; another's lengths are another dancer", () => {
@@ -64,7 +64,7 @@ test("who comes on, or takes another's place, is dressed as the others are", () 
   troupe.furnish(true, true);
   troupe.enter([FIRST]);
   expect(troupe.performers[0]).toMatchObject({ reflected: true, plain: true });
-  troupe.cast((figure) => new Dancer(figure));
+  troupe.danceBy((figure) => new Dancer(figure));
   expect(troupe.performers[0]).toMatchObject({ reflected: true, plain: true });
   expect(troupe.group.children).toHaveLength(1);
 });
