@@ -1,7 +1,7 @@
 /** One performer of a motion as a viewer shows it: its dance, what is pulled laid over it, and where it stands on the stage. */
 
-import { bring, type PerformerTrack } from "../motion/performer";
-import { copyPose, type Pose, restPose } from "../motion/skeleton";
+import { bring, type PerformerTrack, type Place } from "../motion/performer";
+import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
 import type { BlockStore } from "../playout/blocks";
 import type { Overlays } from "../playout/overlay";
 import type { OwnSolver } from "./own-solver";
@@ -20,15 +20,15 @@ export class Performance implements PerformerTrack {
    */
   constructor(private readonly number: number, readonly store: BlockStore, private readonly own: OwnSolver) {}
 
-  get figure() {
+  get figure(): Figure {
     return this.store.track.figure;
   }
 
-  get front() {
+  get front(): number {
     return this.store.track.front + this.place.turn;
   }
 
-  get place() {
+  get place(): Place {
     return this.store.track.place;
   }
 
