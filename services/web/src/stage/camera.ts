@@ -25,7 +25,7 @@ const FAR = 40;
 /** Metres that the standard figure takes to either side of its place, where there are several. */
 const ELBOW_ROOM = 0.9;
 /** Of the picture's width, what several dancers have at least, whatever stands before it. */
-const LEAST_FREE = 0.5;
+const LEAST_FREE = 0.4;
 const YAW = (25 * Math.PI) / 180;
 const PITCH_LOW = (-5 * Math.PI) / 180;
 const PITCH_HIGH = (15 * Math.PI) / 180;

@@ -131,7 +131,10 @@ export class Stage {
    * whose lengths are told again dance on, and the others come on beside them.
    */
   setFigures(figures: readonly Figure[], front = 0): void {
-    if (this.#troupe.enter(figures)) {
+    const before = this.performers.length;
+    const others = this.#troupe.enter(figures);
+    if (!others && this.performers.length === before) return;
+    if (others) {
       this.audience.scale = this.puppet?.scale ?? 1;
       this.#placeDisc();
       this.rig.reset(front);

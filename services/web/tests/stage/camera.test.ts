@@ -280,4 +280,21 @@ describe("several dancers", () => {
     audience.update(0, 0);
     expect(audience.camera.position.z - 2).toBeCloseTo(away, 6);
   });
+
+  test("are seen between what stands before the picture's sides; one alone is not moved for it", () => {
+    const audience = seat("desktop", 1440, 900);
+    audience.sides = { left: 76, right: 356, width: 1440 };
+    audience.update(0, 0);
+    expect(side(audience, 0)).toBeCloseTo(0, 9);
+    audience.stand([LEFT, RIGHT]);
+    audience.update(0, 0);
+    const pixels = (x: number) => (side(audience, x) * 0.5 + 0.5) * 1440;
+    expect(pixels(0)).toBeCloseTo((76 + 1440 - 356) / 2, 6);
+    expect(pixels(-3.8)).toBeGreaterThan(76);
+    expect(pixels(3.8)).toBeLessThan(1440 - 356);
+    // with hardly any room left they have all of it, covered or not
+    audience.sides = { left: 356, right: 356, width: 760 };
+    audience.update(0, 0);
+    expect(side(audience, 0)).toBeCloseTo(0, 9);
+  });
 });
