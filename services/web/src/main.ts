@@ -12,6 +12,7 @@ import type { GamepadInput } from "./input/gamepad";
 import type { Hands } from "./input/hands";
 import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { VelocityInputs } from "./input/velocity";
+import { addToStage } from "./joining";
 import { goOn, leave } from "./left";
 import { Listening } from "./listening";
 import { isAvatar } from "./page/dance-as";
@@ -102,6 +103,7 @@ const page = createPage(document.body, {
   danceAs: (avatar) => casting.choose(avatar),
   removeAvatar: () => void casting.remove(),
   choose: (id) => void choose(id),
+  ...(may("ingest") && may("control") ? { add: (piece) => room && void addToStage(piece, room, pieces, page.library).then(renderPieces) } : {}),
   picture,
   download: (piece, format) => void exporting.download(piece, format),
   remove: (piece) => {
@@ -123,6 +125,8 @@ const page = createPage(document.body, {
     holding.render();
   },
   focus: (limb) => (focused = limb),
+  dancer: (performer) => holding.chosen.choose(performer),
+  nextDancer: () => holding.nextDancer(),
   reframe: resize,
 });
 const exporting = new Exporting(page, () => ({ room, stage }));
@@ -233,6 +237,7 @@ function enter(id: string, place: Place = "sessions"): Room {
     if (!pieces.find(viewer.motion)) void pieces.refresh().then(renderPieces, () => undefined);
     renderPieces();
   });
+  viewer.addEventListener("tracks", () => performing?.comeOn());
   const renderTimeline = () => page.transport.timeline(viewer.timeline?.playing ?? false, viewer.timeline?.loop ?? false, viewer.timeline !== null);
   viewer.addEventListener("timeline", renderTimeline);
   viewer.addEventListener("blocks", () => page.transport.blocks(viewer.blocks, viewer.rates.length));
@@ -262,8 +267,9 @@ function enter(id: string, place: Place = "sessions"): Room {
 }
 
 function resize(): void {
-  const framing = PHONE.matches ? (page.panels.sheet ? "sheet" : "phone") : "desktop";
-  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio);
+  const { panels } = page;
+  const framing = PHONE.matches ? (panels.sheet ? "sheet" : "phone") : "desktop";
+  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio, framing === "desktop" ? panels.sides : [0, 0]);
 }
 
 /** `window.bunraku`: the parts of the running page, for tests and for people who like to look inside. */
@@ -274,6 +280,7 @@ function expose(): void {
 async function openStage(): Promise<void> {
   const { createGamepad, listenToKeyboard, listenToMouse, Performing } = await import("./theatre");
   const actions = {
+    next_dancer: () => holding.nextDancer(),
     ask: () => holding.ask(),
     give: () => holding.give(),
     play,
@@ -288,7 +295,7 @@ async function openStage(): Promise<void> {
     line: () => page.panels.toggle("line"),
   };
   const changed = () => {
-    if (invitedAt !== -Infinity && [0, 1, 2, 3].some((limb) => hands?.source(limb))) endInvitation();
+    if (invitedAt !== -Infinity && hands?.any) endInvitation();
     holding.render();
   };
   try {
@@ -332,7 +339,7 @@ function frame(): void {
   if (stage.shown || page.keys.open) pad?.update(now, !page.keys.listening);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
   const { pose, limbs } = performing.draw(now, focused);
-  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.face);
+  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.faces);
   if (pose) invite(now);
   if (stage.shown) arriving.arrived();
   page.transport.camera(stage.hasShow, stage.following);

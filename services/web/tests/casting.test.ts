@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import { Casting } from "../src/casting";
 import type { DanceAsState } from "../src/page/dance-as";
-import type { MakePerformer } from "../src/stage/stage";
+import type { MakePerformer } from "../src/stage/troupe";
 import { figureFile, type FigureOptions } from "./avatar/figures";
 import { standardFigure } from "./stage/standard-figure";
 

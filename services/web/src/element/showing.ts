@@ -39,12 +39,13 @@ export class Showing {
       focus: (limb) => (this.drawing.focused = limb),
       ask: (limb) => this.#holding.ask(limb),
       give: (limb) => this.#holding.give(limb),
+      nextDancer: () => this.#holding.nextDancer(),
     });
     const { toast, asks } = this.#face;
     this.#holding = new Holding({
       asks,
       toast,
-      strings: { render: (limbs, ready) => this.#face.limbs(limbs, this.#hands, ready), notice: (text) => toast(text) },
+      strings: { render: (limbs, ready, chosen) => this.#face.limbs(limbs, this.#hands, ready, chosen), notice: (text) => toast(text) },
     }, () => this.drawing.mapping);
     this.#holding.watching = true;
     this.drawing = new Drawing(this.#face, this.#holding);
@@ -131,7 +132,7 @@ export class Showing {
       target.addEventListener(event, (told) => {
         if (this.room === room) then(told);
       });
-    during(viewer, "figure", () => this.drawing.performing?.comeOn());
+    for (const news of ["figure", "tracks"]) during(viewer, news, () => this.drawing.performing?.comeOn());
     during(viewer, "timeline", () => this.#bar());
     during(viewer, "presence", () => this.tell("presence", viewer.presence));
     during(puppeteer, "welcome", () => this.tell("welcome", { id: puppeteer.id, colour: puppeteer.colour }));
@@ -207,7 +208,7 @@ export class Showing {
 
   async #draw(): Promise<void> {
     const missing = await this.drawing.open({
-      ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing),
+      next_dancer: () => this.#holding.nextDancer(), ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing),
       back: () => this.room?.step(-1, performance.now()), forward: () => this.room?.step(1, performance.now()),
     });
     if (!missing) return;

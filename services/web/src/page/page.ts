@@ -36,6 +36,8 @@ export interface PageActions extends StringsActions, SoundActions, DanceAsAction
   choose(id: string): void;
   download(piece: Piece, format: Format): void;
   remove(piece: Piece): void;
+  /** Adds who dances in it to those on the stage; left out, that cannot be done here. */
+  add?(piece: Piece): void;
   mapping(mapping: Mapping): void;
   /** A panel opened or shut: the stage may have to be framed anew. */
   reframe(): void;
@@ -56,7 +58,7 @@ export interface Page {
 }
 
 export function createPage(root: HTMLElement, on: PageActions): Page {
-  const tags = createTags(root, on.ask);
+  const tags = createTags(root, on.ask, undefined, undefined, () => header.boxes);
   const notice = createNotice(root);
   const keys = createKeys(root, on.mapping, () => toast(say("The list of keys could not be fetched; try again when the line is back")));
   const header = createHeader(root, { share: on.share, language: on.language, theme: on.theme, keys: () => keys.show() });

@@ -1,10 +1,12 @@
-/** Four silk threads in one draw: ribbons that face the camera, lit by how hard they are pulled (section 5). */
+/** The silk threads, four of each performer, in one draw: ribbons that face the camera, lit by how hard they are pulled (section 5). */
 import {
   BufferAttribute, BufferGeometry, Color, CustomBlending, DoubleSide, Mesh, OneFactor, OneMinusSrcAlphaFactor, ShaderMaterial, Vector3,
 } from "three";
+import { MOST_LIMBS } from "../wire/limbs";
 
-const THREADS = 4;
+const THREADS = MOST_LIMBS;
 const SEGMENTS = 40;
+const CORNERS = 6;
 const VERTICES = THREADS * (SEGMENTS + 1) * 2;
 
 export interface Thread {
@@ -87,6 +89,15 @@ export class Threads {
 
   set dark(on: boolean) {
     this.mesh.material.uniforms.dark.value = on ? 1 : 0;
+  }
+
+  /** How many there are. */
+  set count(count: number) {
+    this.mesh.geometry.setDrawRange(0, count * SEGMENTS * CORNERS);
+    for (const attribute of Object.values(this.#attributes)) {
+      attribute.clearUpdateRanges();
+      attribute.addUpdateRange(0, count * (SEGMENTS + 1) * 2 * attribute.itemSize);
+    }
   }
 
   /** Draws thread `index` from a handle up to its other end, world metres. */
