@@ -3,8 +3,8 @@ import "./style/page.css";
 import type { Vector3 } from "three";
 import { Arriving } from "./arriving";
 import { Casting } from "./casting";
-import { bound, comeIn, guarded, may, ownRole, whenDenied } from "./client/access";
-import { createSession, keep, shareSession, type CameraKeyframe, type Motion } from "./client/library";
+import { bound, comeIn, may, ownRole, whenDenied } from "./client/access";
+import { createSession, keep, type CameraKeyframe, type Motion } from "./client/library";
 import { ProblemError } from "./client/problem";
 import { Exporting } from "./exporting";
 import { Holding } from "./holding";
@@ -26,6 +26,7 @@ import { createTheme, type ThemeChoice } from "./page/theme";
 import { tell, uploadAll } from "./page/uploads";
 import type { Performing } from "./performing";
 import { findSession, Room, type Place } from "./room";
+import { share } from "./sharing";
 import type { Stage } from "./stage/stage";
 import { FileStore } from "./storage/files";
 import { browserStore } from "./storage/store";
@@ -64,7 +65,7 @@ let theme: ThemeChoice | null = null;
 let mapping = loadMapping();
 
 const page = createPage(document.body, {
-  share: () => void share(),
+  share: () => void share(room?.id ?? null, page.toast),
   language: () => {
     if (room) leave(room, performance.now());
     history.replaceState(history.state, "", chooseOther(location.href));
@@ -156,28 +157,6 @@ function picture(): void {
 
 function play(): void {
   if (room?.viewer.timeline) room.edit({ playing: !room.viewer.timeline.playing });
-}
-
-async function share(): Promise<void> {
-  const url = new URL(location.href);
-  url.search = room ? `?session=${encodeURIComponent(room.id)}` : "";
-  let copied = say("Link copied");
-  if (guarded() && room) {
-    try {
-      url.href = new URL(await shareSession(room.id), location.href).href;
-      copied = say("Link copied: who has it may watch, for a week");
-    } catch (error) {
-      if (!(error instanceof ProblemError)) throw error;
-      page.toast(say("{title}: {detail}", error));
-      return;
-    }
-  }
-  try {
-    await navigator.clipboard.writeText(url.href);
-    page.toast(copied);
-  } catch {
-    page.toast(say("Copy this link: {link}", { link: url.href }));
-  }
 }
 
 async function uploaded(motion: Motion): Promise<void> {
