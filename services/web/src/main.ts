@@ -160,8 +160,8 @@ function play(): void {
 }
 
 async function uploaded(motion: Motion): Promise<void> {
-  await pieces.refresh();
-  renderPieces();
+  // it dances also where the list of all did not come: that is asked for again once it does
+  await pieces.refresh().then(renderPieces, () => undefined);
   await choose(motion.id);
 }
 
