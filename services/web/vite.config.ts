@@ -26,7 +26,8 @@ export default defineConfig({
     target: "es2023",
     assetsInlineLimit: 0,
     // what is needed at first stays in one chunk, though main.ts waits for its words
-    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } } },
+    // what three.js is made lean by takes longest, and is meant to
+    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } }, checks: { bundlerTimings: false } },
     // three.js is one chunk, loaded while the page is already there
     chunkSizeWarningLimit: 700,
   },

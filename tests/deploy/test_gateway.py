@@ -66,6 +66,7 @@ APPS: dict[str, list[str]] = {
         "/v1/motions/{motion}",
         "/v1/motions/{motion}/audio",
         "/v1/motions/{motion}/scene",
+        "/v1/motions/{motion}/performers",
         "/v1/uploads/{upload}",
     ],
     "ik": ["/v1/arms/{proportions}/table", "/v1/arms/{proportions}/figures/{name}", "/v1/solve"],

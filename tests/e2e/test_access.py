@@ -48,6 +48,7 @@ ROUTES: dict[tuple[str, str], Role | None] = {
     ("POST", "/v1/motions"): Role.INGEST,
     ("POST", "/v1/motions/{motion}/audio"): Role.INGEST,
     ("POST", "/v1/motions/{motion}/scene"): Role.INGEST,
+    ("POST", "/v1/motions/{motion}/performers"): Role.INGEST,
     ("GET", "/v1/uploads/{upload}"): Role.INGEST,
     ("DELETE", "/v1/motions/{motion}"): Role.INGEST,
 }

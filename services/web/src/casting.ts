@@ -4,7 +4,8 @@ import { AvatarProblem, LARGEST, tooLarge } from "./avatar/problem";
 import type { DanceAs } from "./page/dance-as";
 import type { Library } from "./page/library";
 import type { Toast } from "./page/toast";
-import type { Casting as Cast, Stage } from "./stage/stage";
+import type { Stage } from "./stage/stage";
+import type { MakePerformer } from "./stage/troupe";
 import type { FileStore } from "./storage/files";
 import type { Store } from "./storage/store";
 import { say } from "./words/say";
@@ -20,12 +21,12 @@ export interface CastingOptions {
 }
 
 export class Casting {
-  #stage: Pick<Stage, "cast"> | null = null;
+  #stage: Pick<Stage, "danceBy"> | null = null;
   #model: AvatarModel | null = null;
   /** Makes the avatar of the model for a dancer's lengths. */
-  #make: Cast | null = null;
+  #make: MakePerformer | null = null;
   /** The same while it dances; null while the puppet does. */
-  #cast: Cast | null = null;
+  #dancing: MakePerformer | null = null;
   /** The file that is being read; a later one makes it stale. */
   #reading: File | null = null;
 
@@ -34,9 +35,9 @@ export class Casting {
   }
 
   /** The stage it is about, once there is one. */
-  set stage(stage: Pick<Stage, "cast">) {
+  set stage(stage: Pick<Stage, "danceBy">) {
     this.#stage = stage;
-    if (this.#cast) stage.cast(this.#cast);
+    if (this.#dancing) stage.danceBy(this.#dancing);
   }
 
   /** Brings back the avatar of the last visit, if there was one. */
@@ -107,21 +108,21 @@ export class Casting {
   }
 
   #show(avatar: boolean): void {
-    this.#cast = avatar ? this.#make : null;
-    this.#stage?.cast(this.#cast);
+    this.#dancing = avatar ? this.#make : null;
+    this.#stage?.danceBy(this.#dancing);
     this.#render();
   }
 
   /** The puppet dances, and the model is no more. */
   #drop(): void {
-    if (this.#cast) this.#stage?.cast(null);
-    this.#cast = this.#make = null;
+    if (this.#dancing) this.#stage?.danceBy(null);
+    this.#dancing = this.#make = null;
     this.#model?.dispose();
     this.#model = null;
     this.#render();
   }
 
   #render(): void {
-    this.options.page.library.danceAs.render({ name: this.#model?.name ?? null, dancing: this.#cast !== null, reading: this.#reading?.name ?? null });
+    this.options.page.library.danceAs.render({ name: this.#model?.name ?? null, dancing: this.#dancing !== null, reading: this.#reading?.name ?? null });
   }
 }

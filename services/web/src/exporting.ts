@@ -17,15 +17,15 @@ export class Exporting {
 
   constructor(private readonly page: Page, private readonly now: () => { room: Room | null; stage: Stage | null }) {}
 
-  /** Makes a file of a whole dance and saves it; what is wrong is told in the library. */
-  async download(piece: Piece, format: Format): Promise<void> {
+  /** Makes a file of a performer's whole dance and saves it; what is wrong is told in the library. */
+  async download(piece: Piece, format: Format, performer = 0): Promise<void> {
     const abort = new AbortController();
     const { signal } = abort;
     const row = this.page.library.download(`${piece.name}, ${format.toUpperCase()}`, () => abort.abort());
     try {
       const [{ bestBlocks, fileName, makeFile }, looks] = await writers();
-      const held = this.now().room?.viewer.held(piece.id) ?? null;
-      const store = await bestBlocks(piece.id, { held, signal, told: (share) => row.doing(say("fetching the dance"), share * FETCHED) });
+      const held = this.now().room?.viewer.held(piece.id, performer) ?? null;
+      const store = await bestBlocks(piece.id, { performer, held, signal, told: (share) => row.doing(say("fetching the dance"), share * FETCHED) });
       const file = await makeFile(format, piece.name, store, { looks, signal, told: (share) => row.doing(say("writing the file"), FETCHED + share * (1 - FETCHED)) });
       this.#save(file, fileName(piece.name, format));
     } catch (error) {

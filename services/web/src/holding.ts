@@ -1,11 +1,14 @@
 /** Who holds what, who asks for it, and what is done about it: between the session's word, one's own hands, and the page. */
+import { Chosen } from "./input/chosen";
 import type { Hands, Source } from "./input/hands";
 import { controlsOf, isPadControl, type Command, type Mapping } from "./input/mapping";
 import type { VelocityInputs } from "./input/velocity";
 import { controlName } from "./page/control-names";
-import { askers, holders, LIMB_NAMES, LIMB_ORDER, type LimbState } from "./page/model";
+import { askers, holders, limbName, limbsInOrder, type LimbState } from "./page/model";
 import type { Page } from "./page/page";
+import type { Toast } from "./page/toast";
 import type { Room } from "./room";
+import { limbNumber } from "./wire/limbs";
 import { heard, say } from "./words/say";
 
 /** What stands on the stage's chunk, and comes after the page. */
@@ -18,7 +21,7 @@ export interface Theatre {
 
 /** Where it is shown: the page, or as much of one as there is. */
 export interface HoldingPage {
-  readonly toast: Page["toast"];
+  readonly toast: Toast;
   readonly strings: Pick<Page["strings"], "render" | "notice">;
   readonly asks: Page["asks"];
 }
@@ -28,6 +31,8 @@ export class Holding {
   connected = false;
   /** Whether this page only watches: nothing can be taken. */
   watching = false;
+  /** Whose strings keys, pad and page act on. */
+  readonly chosen = new Chosen(() => this.render());
   #room: Room | null = null;
   /** The limb that was reached for in vain: what "ask" asks for. */
   #wished: number | null = null;
@@ -42,6 +47,14 @@ export class Holding {
     if (this.theatre) this.theatre.hands.puppeteer = puppeteer;
     const on = <T>(name: string, told: (detail: T) => void) => puppeteer.addEventListener(name, (event) => told((event as CustomEvent<T>).detail));
     const render = () => this.render();
+    const count = () => {
+      this.chosen.count = Math.max(1, viewer.performers.length);
+      // those of who is on the stage no more
+      this.theatre?.hands.letAllGo(limbNumber(this.chosen.count, 0));
+    };
+    count();
+    viewer.addEventListener("figure", count);
+    viewer.addEventListener("tracks", count);
     viewer.addEventListener("presence", render);
     on("welcome", render);
     on("presence", render);
@@ -53,18 +66,19 @@ export class Holding {
       if (asked) this.#given(limb);
     });
     on<{ limb: number; free: boolean }>("lapsed", ({ limb, free }) => {
-      this.page.toast(say(free ? "The {limb} is free now" : "The {limb} was not given", { limb: limbName(limb) }));
+      this.page.toast(say(free ? "The {limb} is free now" : "The {limb} was not given", { limb: this.#name(limb) }));
       this.render();
     });
     on<{ detail: string }>("notice", ({ detail }) => this.page.strings.notice(heard(detail)));
   }
 
-  /** The four limbs as the session says, and one's own at once, before it has answered. */
+  /** The limbs of all performers as the session says, and one's own at once, before it has answered. */
   limbs(): LimbState[] {
     const { puppeteer, viewer } = this.#room ?? {};
     const { hands, velocity } = this.theatre ?? {};
-    const told = holders(viewer?.presence ?? null, puppeteer?.id ?? null);
-    const asking = askers(viewer?.presence ?? null, puppeteer?.id ?? null);
+    const who = [viewer?.presence ?? null, puppeteer?.id ?? null, this.chosen.count] as const;
+    const told = holders(...who);
+    const asking = askers(...who);
     return told.map((one, limb) => {
       const mine = Boolean(hands?.source(limb));
       const holder = mine ? { id: puppeteer?.id ?? "", name: say("You"), colour: puppeteer?.colour ?? 0, mine } : one?.mine ? null : one;
@@ -73,13 +87,22 @@ export class Holding {
   }
 
   free(limb: number): boolean {
-    return !this.watching && !this.limbs()[limb].holder;
+    const state = this.limbs()[limb];
+    return !this.watching && state !== undefined && !state.holder;
   }
 
   render(): void {
     const limbs = this.limbs();
-    this.page.strings.render(limbs, this.connected && this.#room !== null && !this.watching);
+    this.page.strings.render(limbs, this.connected && this.#room !== null && !this.watching, this.chosen.performer);
     this.page.asks.render(limbs, this.#key("give"));
+  }
+
+  /** Turns to the next performer, by a key or button: it is said, as what is seen of it is little. */
+  nextDancer(): void {
+    const { chosen } = this;
+    if (chosen.count < 2) return;
+    chosen.choose((chosen.performer + 1) % chosen.count);
+    this.page.toast(say("Dancer {number} of {count}", { number: chosen.performer + 1, count: chosen.count }));
   }
 
   /** Takes a limb if it is free; if not, says who has it. */
@@ -101,30 +124,32 @@ export class Holding {
 
   /** A limb that was reached for is another's. */
   refused(limb: number): void {
-    if (this.watching) return;
+    const state = this.limbs()[limb];
+    if (this.watching || !state) return;
     this.theatre?.shake(limb);
-    const { holder, asked } = this.limbs()[limb];
+    const { holder, asked } = state;
+    const name = this.#name(limb);
     if (!holder || holder.mine) {
-      this.page.toast(say("The {limb} was let go", { limb: limbName(limb) }));
+      this.page.toast(say("The {limb} was let go", { limb: name }));
     } else if (asked) {
-      this.page.toast(say("You ask {name} for the {limb}", { name: holder.name, limb: limbName(limb) }));
+      this.page.toast(say("You ask {name} for the {limb}", { name: holder.name, limb: name }));
     } else {
       this.#wished = limb;
-      this.page.toast(say("{name} holds the {limb}", { name: holder.name, limb: limbName(limb) }), { label: say("Ask"), key: this.#key("ask"), act: () => this.ask(limb) });
+      this.page.toast(say("{name} holds the {limb}", { name: holder.name, limb: name }), { label: say("Ask"), key: this.#key("ask"), act: () => this.ask(limb) });
     }
   }
 
   /** Asks the holder for a limb; without one, for that which was reached for last. */
   ask(limb = this.#wished): void {
     if (this.watching) return;
-    const holder = limb === null ? null : this.limbs()[limb].holder;
+    const holder = limb === null ? null : this.limbs()[limb]?.holder;
     if (limb === null || !holder || holder.mine) {
       this.page.toast(say("Reach for a string that another holds, then ask for it"));
       return;
     }
     this.#wished = null;
     this.#room?.puppeteer.ask(limb);
-    this.page.toast(this.#room?.puppeteer.asks(limb) ? say("You ask {name} for the {limb}", { name: holder.name, limb: limbName(limb) }) : say("The line is lost; ask again when it is back"));
+    this.page.toast(this.#room?.puppeteer.asks(limb) ? say("You ask {name} for the {limb}", { name: holder.name, limb: this.#name(limb) }) : say("The line is lost; ask again when it is back"));
     this.render();
   }
 
@@ -142,7 +167,7 @@ export class Holding {
 
   #askedOfMe(): number | null {
     const limbs = this.limbs();
-    const asked = LIMB_ORDER.filter((limb) => limbs[limb].holder?.mine && limbs[limb].askers.length > 0);
+    const asked = limbsInOrder(this.chosen.count).filter((limb) => limbs[limb].holder?.mine && limbs[limb].askers.length > 0);
     return asked.find((limb) => limbs[limb].selected) ?? asked[0] ?? null;
   }
 
@@ -153,16 +178,16 @@ export class Holding {
       return;
     }
     velocity?.hold(limb);
-    this.page.toast(say("The {limb} is yours", { limb: limbName(limb) }));
+    this.page.toast(say("The {limb} is yours", { limb: this.#name(limb) }));
     this.render();
+  }
+
+  #name(limb: number): string {
+    return limbName(limb, this.chosen.count);
   }
 
   #key(command: Command): string | null {
     const control = controlsOf(this.mapping(), command).find((one) => !isPadControl(one));
     return control === undefined ? null : controlName(control);
   }
-}
-
-function limbName(limb: number): string {
-  return say(LIMB_NAMES[limb]).toLowerCase();
 }

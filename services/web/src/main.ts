@@ -1,9 +1,10 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
+import { Arriving } from "./arriving";
 import { Casting } from "./casting";
-import { bound, comeIn, guarded, may, ownRole, whenDenied } from "./client/access";
-import { createSession, keep, shareSession, type CameraKeyframe, type Motion } from "./client/library";
+import { bound, comeIn, may, ownRole, whenDenied } from "./client/access";
+import { createSession, keep, type CameraKeyframe, type Motion } from "./client/library";
 import { ProblemError } from "./client/problem";
 import { Exporting } from "./exporting";
 import { Holding } from "./holding";
@@ -11,6 +12,7 @@ import type { GamepadInput } from "./input/gamepad";
 import type { Hands } from "./input/hands";
 import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { VelocityInputs } from "./input/velocity";
+import { addToStage } from "./joining";
 import { goOn, leave } from "./left";
 import { Listening } from "./listening";
 import { isAvatar } from "./page/dance-as";
@@ -24,6 +26,7 @@ import { createTheme, type ThemeChoice } from "./page/theme";
 import { tell, uploadAll } from "./page/uploads";
 import type { Performing } from "./performing";
 import { findSession, Room, type Place } from "./room";
+import { share } from "./sharing";
 import type { Stage } from "./stage/stage";
 import { FileStore } from "./storage/files";
 import { browserStore } from "./storage/store";
@@ -39,6 +42,7 @@ comeIn();
 addEventListener("hashchange", () => comeIn() && location.reload());
 document.documentElement.dataset.role = ownRole();
 if (bound()) document.documentElement.dataset.bound = "";
+const arriving = new Arriving(document.documentElement);
 
 const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvasElement;
 const query = new URLSearchParams(location.search);
@@ -61,7 +65,7 @@ let theme: ThemeChoice | null = null;
 let mapping = loadMapping();
 
 const page = createPage(document.body, {
-  share: () => void share(),
+  share: () => void share(room?.id ?? null, page.toast),
   language: () => {
     if (room) leave(room, performance.now());
     history.replaceState(history.state, "", chooseOther(location.href));
@@ -100,6 +104,7 @@ const page = createPage(document.body, {
   danceAs: (avatar) => casting.choose(avatar),
   removeAvatar: () => void casting.remove(),
   choose: (id) => void choose(id),
+  ...(may("ingest") && may("control") ? { add: (piece) => room && void addToStage(piece, room, pieces, page.library).then(renderPieces) } : {}),
   picture,
   download: (piece, format) => void exporting.download(piece, format),
   remove: (piece) => {
@@ -121,6 +126,8 @@ const page = createPage(document.body, {
     holding.render();
   },
   focus: (limb) => (focused = limb),
+  dancer: (performer) => holding.chosen.choose(performer),
+  nextDancer: () => holding.nextDancer(),
   reframe: resize,
 });
 const exporting = new Exporting(page, () => ({ room, stage }));
@@ -130,7 +137,7 @@ const casting = new Casting({ page, files: new FileStore("bunraku"), choices: br
 let denied = false;
 whenDenied(({ title, detail, hint }) => {
   denied = true;
-  page.notice(title, hint ? say("{detail}; {hint}.", { detail, hint }) : detail);
+  page.notice("access", title, hint ? say("{detail}; {hint}.", { detail, hint }) : detail);
 });
 const listening = new Listening((state) => page.transport.sound.render(state), page.transport.sound.element);
 theme = createTheme((now) => {
@@ -150,28 +157,6 @@ function picture(): void {
 
 function play(): void {
   if (room?.viewer.timeline) room.edit({ playing: !room.viewer.timeline.playing });
-}
-
-async function share(): Promise<void> {
-  const url = new URL(location.href);
-  url.search = room ? `?session=${encodeURIComponent(room.id)}` : "";
-  let copied = say("Link copied");
-  if (guarded() && room) {
-    try {
-      url.href = new URL(await shareSession(room.id), location.href).href;
-      copied = say("Link copied: who has it may watch, for a week");
-    } catch (error) {
-      if (!(error instanceof ProblemError)) throw error;
-      page.toast(say("{title}: {detail}", error));
-      return;
-    }
-  }
-  try {
-    await navigator.clipboard.writeText(url.href);
-    page.toast(copied);
-  } catch {
-    page.toast(say("Copy this link: {link}", { link: url.href }));
-  }
 }
 
 async function uploaded(motion: Motion): Promise<void> {
@@ -216,19 +201,22 @@ function enter(id: string, place: Place = "sessions"): Room {
     page.toast(error instanceof ProblemError ? say("{title}: {detail}", error) : String(error));
   }, { place });
   document.documentElement.toggleAttribute("data-own", place === "motions");
+  const entered = room;
   const { viewer, puppeteer } = room;
   holding.enter(room);
   performing?.enter(room);
-  listening.enter(viewer);
+  arriving.after(() => room === entered && listening.enter(viewer));
   const url = new URL(location.href);
   url.searchParams.set(place === "motions" ? "motion" : "session", id);
   history.replaceState(null, "", url);
-  page.notice(null);
+  page.notice("dance", null);
+  page.toast.lost(null);
   viewer.addEventListener("figure", () => {
-    performing?.cast();
+    performing?.comeOn();
     if (!pieces.find(viewer.motion)) void pieces.refresh().then(renderPieces, () => undefined);
     renderPieces();
   });
+  viewer.addEventListener("tracks", () => performing?.comeOn());
   const renderTimeline = () => page.transport.timeline(viewer.timeline?.playing ?? false, viewer.timeline?.loop ?? false, viewer.timeline !== null);
   viewer.addEventListener("timeline", renderTimeline);
   viewer.addEventListener("blocks", () => page.transport.blocks(viewer.blocks, viewer.rates.length));
@@ -237,7 +225,8 @@ function enter(id: string, place: Place = "sessions"): Room {
   puppeteer.addEventListener("welcome", renderPeople);
   viewer.addEventListener("open", () => {
     holding.connected = true;
-    page.notice(null);
+    page.notice("dance", null);
+    page.toast.lost(null);
     holding.render();
   });
   viewer.addEventListener("closed", (event) => {
@@ -245,9 +234,10 @@ function enter(id: string, place: Place = "sessions"): Room {
     holding.connected = false;
     holding.render();
     const reason = String((event as CustomEvent<string>).detail);
+    if (viewer.ended || denied) page.toast.lost(null);
     if (denied) return;
-    if (viewer.ended) page.notice(say(place === "motions" ? "The dance has ended" : "The session has ended"), reason);
-    else if (wasConnected) page.toast(say("The line was lost: {reason}", { reason }));
+    if (viewer.ended) page.notice("dance", say(place === "motions" ? "The dance has ended" : "The session has ended"), reason);
+    else if (wasConnected) page.toast.lost(say("The line was lost: {reason}", { reason }));
   });
   renderTimeline();
   renderPieces();
@@ -256,8 +246,9 @@ function enter(id: string, place: Place = "sessions"): Room {
 }
 
 function resize(): void {
-  const framing = PHONE.matches ? (page.panels.sheet ? "sheet" : "phone") : "desktop";
-  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio);
+  const { panels } = page;
+  const framing = PHONE.matches ? (panels.sheet ? "sheet" : "phone") : "desktop";
+  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio, framing === "desktop" ? panels.sides : [0, 0]);
 }
 
 /** `window.bunraku`: the parts of the running page, for tests and for people who like to look inside. */
@@ -268,6 +259,7 @@ function expose(): void {
 async function openStage(): Promise<void> {
   const { createGamepad, listenToKeyboard, listenToMouse, Performing } = await import("./theatre");
   const actions = {
+    next_dancer: () => holding.nextDancer(),
     ask: () => holding.ask(),
     give: () => holding.give(),
     play,
@@ -282,17 +274,18 @@ async function openStage(): Promise<void> {
     line: () => page.panels.toggle("line"),
   };
   const changed = () => {
-    if (invitedAt !== -Infinity && [0, 1, 2, 3].some((limb) => hands?.source(limb))) endInvitation();
+    if (invitedAt !== -Infinity && hands?.any) endInvitation();
     holding.render();
   };
   try {
     performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, best: query.get("quality") === "best" });
   } catch {
-    page.notice(say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
+      arriving.arrived();
+    page.notice("graphics", say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
     return;
   }
-  canvas.addEventListener("webglcontextlost", () => page.notice(say("The stage went dark"), say("The graphics were taken away; they come back by themselves. If they do not, load the page again.")));
-  canvas.addEventListener("webglcontextrestored", () => page.notice(null));
+  canvas.addEventListener("webglcontextlost", () => page.notice("graphics", say("The stage went dark"), say("The graphics were taken away; they come back by themselves. If they do not, load the page again.")));
+  canvas.addEventListener("webglcontextrestored", () => page.notice("graphics", null));
   const { commands } = performing;
   ({ stage, hands, velocity } = performing);
   stage.still = calm.matches;
@@ -310,6 +303,7 @@ async function openStage(): Promise<void> {
   document.addEventListener("visibilitychange", () => {
     if (document.hidden) performing?.rest();
   });
+  arriving.staged();
   requestAnimationFrame(frame);
 }
 
@@ -320,11 +314,13 @@ function frame(): void {
   if (!stage || !performing) return;
   const now = performance.now();
   const { viewer } = room ?? {};
-  pad?.update(now, !page.keys.listening);
+  // browsers begin to look for pads when they are asked for them
+  if (stage.shown || page.keys.open) pad?.update(now, !page.keys.listening);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
   const { pose, limbs } = performing.draw(now, focused);
-  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.face);
+  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.faces);
   if (pose) invite(now);
+  if (stage.shown) arriving.arrived();
   page.transport.camera(stage.hasShow, stage.following);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);
   if (viewer && now - sampled >= SAMPLE_EVERY) {
@@ -369,15 +365,17 @@ async function start(): Promise<void> {
       if (calm.matches && session.viewers === 0) entered.edit({ playing: false });
     }
     await library;
+    if (!room) arriving.arrived();
     if (!room && !may("ingest")) {
-      page.notice(say("The stage is empty"), say("Nobody dances here now. Come again when somebody does."));
+      page.notice("dance", say("The stage is empty"), say("Nobody dances here now. Come again when somebody does."));
     } else if (!room) {
-      page.notice(say("The stage is empty"), say("Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it."));
+      page.notice("dance", say("The stage is empty"), say("Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it."));
       page.panels.open("library");
     }
   } catch (error) {
+    arriving.arrived();
     if (!(error instanceof ProblemError)) throw error;
-    if (!denied) page.notice(error.title, say("{detail}. {hint}", { detail: error.detail, hint: error.hint ?? "" }));
+    if (!denied) page.notice("dance", error.title, say("{detail}. {hint}", { detail: error.detail, hint: error.hint ?? "" }));
   }
 }
 

@@ -13,6 +13,7 @@ export type { Framing } from "./stage/camera";
 export type { Theme } from "./stage/look";
 export type { StringState } from "./stage/strings";
 
+export type { PerformerTrack, Place } from "./motion/performer";
 export { JOINTS, LIMBS, restPose, type Figure, type Pose } from "./motion/skeleton";
 export { decodeBlock, MotionBlock } from "./codec/decode";
 export { DamagedBlock } from "./codec/errors";

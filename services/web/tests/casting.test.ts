@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import { Casting } from "../src/casting";
 import type { DanceAsState } from "../src/page/dance-as";
-import type { Casting as Cast } from "../src/stage/stage";
+import type { MakePerformer } from "../src/stage/troupe";
 import { figureFile, type FigureOptions } from "./avatar/figures";
 import { standardFigure } from "./stage/standard-figure";
 
@@ -13,7 +13,7 @@ class Visit {
   shown: DanceAsState | null = null;
   readonly toasts: string[] = [];
   readonly problems: string[][] = [];
-  readonly cast: (Cast | null)[] = [];
+  readonly dancing: (MakePerformer | null)[] = [];
 
   /** The page is opened; with the stage there already, or not yet. */
   open(staged = true): Casting {
@@ -34,7 +34,7 @@ class Visit {
     return casting;
   }
 
-  readonly stage = { cast: (cast: Cast | null) => void this.cast.push(cast) };
+  readonly stage = { danceBy: (make: MakePerformer | null) => void this.dancing.push(make) };
 }
 
 const file = (options: FigureOptions = {}, name = "sato.v2.glb") => new File([figureFile(options)], name);
@@ -49,12 +49,12 @@ describe("who dances", () => {
     await taken;
     expect(visit.shown).toEqual({ name: "sato.v2", dancing: true, reading: null });
     expect(visit.toasts.at(-1)).toBe("sato.v2 dances here; everyone else sees the puppet");
-    const performer = visit.cast.at(-1)?.(standardFigure());
+    const performer = visit.dancing.at(-1)?.(standardFigure());
     expect(performer?.group.getObjectByName("leftHand")).toBeDefined();
     casting.choose(false);
-    expect([visit.cast.at(-1), visit.shown?.dancing, visit.shown?.name]).toEqual([null, false, "sato.v2"]);
+    expect([visit.dancing.at(-1), visit.shown?.dancing, visit.shown?.name]).toEqual([null, false, "sato.v2"]);
     casting.choose(true);
-    expect([visit.cast.at(-1)?.(standardFigure()).figure, visit.shown?.dancing]).toEqual([standardFigure(), true]);
+    expect([visit.dancing.at(-1)?.(standardFigure()).figure, visit.shown?.dancing]).toEqual([standardFigure(), true]);
   });
 
   test("is the avatar of the last visit, or the puppet if that was chosen, also when the stage comes late", async () => {
@@ -63,12 +63,12 @@ describe("who dances", () => {
     const again = visit.open(false);
     await again.restore();
     again.stage = visit.stage;
-    expect([visit.shown?.name, visit.shown?.dancing, visit.cast.at(-1) !== null]).toEqual(["Boxes", true, true]);
+    expect([visit.shown?.name, visit.shown?.dancing, visit.dancing.at(-1) !== null]).toEqual(["Boxes", true, true]);
     again.choose(false);
     const third = visit.open();
-    visit.cast.length = 0;
+    visit.dancing.length = 0;
     await third.restore();
-    expect([visit.shown?.name, visit.shown?.dancing, visit.cast]).toEqual(["Boxes", false, [null]]);
+    expect([visit.shown?.name, visit.shown?.dancing, visit.dancing]).toEqual(["Boxes", false, [null]]);
     expect(visit.problems).toEqual([]);
   });
 
@@ -77,7 +77,7 @@ describe("who dances", () => {
     const casting = visit.open();
     await casting.take(file());
     await casting.remove();
-    expect([visit.shown, visit.cast.at(-1), visit.files.size, visit.choices.size]).toEqual([{ name: null, dancing: false, reading: null }, null, 0, 0]);
+    expect([visit.shown, visit.dancing.at(-1), visit.files.size, visit.choices.size]).toEqual([{ name: null, dancing: false, reading: null }, null, 0, 0]);
     await visit.open().restore();
     expect(visit.shown?.name).toBe(null);
   });

@@ -10,6 +10,7 @@ import type { Page } from "../src/page/page";
 import type { ToastAction } from "../src/page/toast";
 import type { Room } from "../src/room";
 import { Line } from "./client/line";
+import { goldenDescription } from "./golden";
 import { handsBefore, type Session } from "./input/session";
 import { standingPuppet } from "./stage/standard-figure";
 
@@ -27,6 +28,7 @@ let toasts: [string, ToastAction | undefined][];
 let notices: string[];
 let shaken: number[];
 let shown: readonly LimbState[];
+let shownOf: number;
 let key: string | null;
 
 beforeEach(() => {
@@ -39,13 +41,13 @@ beforeEach(() => {
   control = Line.last;
   control.accept();
   const page = {
-    strings: { render: (limbs: readonly LimbState[]) => (shown = limbs), notice: (text: string) => notices.push(text) },
+    strings: { render: (limbs: readonly LimbState[], _: boolean, chosen: number) => ([shown, shownOf] = [limbs, chosen]), notice: (text: string) => notices.push(text) },
     asks: { render: (_: unknown, gives: string | null) => (key = gives) },
     toast: (message: string, action?: ToastAction) => toasts.push([message, action]),
   };
   holding = new Holding(page as unknown as Page, () => DEFAULT_MAPPING);
   hands = handsBefore(standingPuppet(), puppeteer as unknown as Session);
-  velocity = new VelocityInputs(hands, { take: (limb) => holding.take(limb, "velocity"), free: (limb) => holding.free(limb) });
+  velocity = new VelocityInputs(hands, { take: (limb) => holding.take(limb, "velocity"), free: (limb) => holding.free(limb), chosen: holding.chosen });
   hands.changed = () => holding.render();
   holding.theatre = { hands, velocity, shake: (limb) => shaken.push(limb) };
   holding.enter({ viewer, puppeteer } as unknown as Room);
@@ -147,4 +149,52 @@ test("a limb claimed in the same moment by another is said to be theirs when the
 test("notices become a line in the card, and no toast", () => {
   control.say({ name: "Notice", limb: 0, reason: "reach", detail: "out of reach" });
   expect([notices, toasts]).toEqual([["out of reach"], []]);
+});
+
+describe("several performers", () => {
+  const SECOND = 4;
+
+  /** The motion on the stage has so many. */
+  function dance(motion: string, performers: number): void {
+    stream.say({ name: "Description", motion, first: null, tracks: Array.from({ length: performers }, () => goldenDescription()) });
+  }
+  beforeEach(() => dance("two", 2));
+
+  test("have four limbs each, held and named by whose they are", () => {
+    presence([null, null, null, null, "m", null, null, null], Array(8).fill([]));
+    expect([shown.length, shown[0].holder, shown[SECOND].holder?.name]).toEqual([8, null, "Mateo"]);
+    holding.chosen.choose(1);
+    expect(shownOf).toBe(1);
+    velocity.hold(velocity.limb(LEFT_HAND));
+    expect(toasts.at(-1)?.[0]).toBe("Mateo holds the left hand of dancer 2");
+    expect(shaken).toEqual([SECOND + LEFT_HAND]);
+    holding.ask();
+    expect(control.of("Ask")).toEqual([{ name: "Ask", limb: SECOND + LEFT_HAND, wanted: true }]);
+  });
+
+  test("the next one is chosen by a key, and said, round and round; one alone is not spoken of", () => {
+    holding.nextDancer();
+    holding.nextDancer();
+    expect(toasts.map(([message]) => message)).toEqual(["Dancer 2 of 2", "Dancer 1 of 2"]);
+    dance("one", 1);
+    holding.nextDancer();
+    expect(toasts).toHaveLength(2);
+  });
+
+  test("limbs of who goes are let go, and what the session tells of more or fewer is no matter", () => {
+    velocity.hold(SECOND + RIGHT_HAND);
+    velocity.hold(LEFT_HAND);
+    control.say({ name: "Grant", limb: SECOND + RIGHT_HAND, epoch: 3 });
+    holding.chosen.choose(1);
+    dance("one", 1);
+    expect([hands.source(SECOND + RIGHT_HAND), hands.source(LEFT_HAND), holding.chosen.performer, shown.length]).toEqual([null, "velocity", 0, 4]);
+    expect(control.of("Release")).toEqual([{ name: "Release", limb: SECOND + RIGHT_HAND, epoch: 3 }]);
+    presence(["a", null, null, null, "m", null, null, null], [[], [], [], [], ["a"], [], [], []]);
+    control.say({ name: "Refusal", limb: SECOND, reason: "unknown", holder: null });
+    holding.ask(SECOND);
+    holding.give(SECOND);
+    expect([holding.free(SECOND), shown.length]).toEqual([false, 4]);
+    dance("three", 3);
+    expect(shown.length).toBe(12);
+  });
 });

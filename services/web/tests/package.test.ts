@@ -24,7 +24,7 @@ export const count: number = JOINTS.length;
 export function draw(canvas: HTMLCanvasElement, own: number[]): void {
   const stage = new Stage(canvas);
   stage.resize(640, 400, "alone", 2);
-  stage.draw(pose, undefined, 1 / 60, own);
+  stage.draw([pose], undefined, 1 / 60, own);
   stage.renderer.render(stage.scene, stage.audience.camera);
   stage.dispose();
 }

@@ -1,4 +1,4 @@
-/** A whole motion at its best rate, over HTTP, with what a viewer has of it already. */
+/** The whole dance of one performer of a motion at its best rate, over HTTP, with what a viewer has of it already. */
 
 import { DamagedBlock } from "../codec/errors";
 import { MotionTrack } from "../codec/track";
@@ -13,7 +13,9 @@ import { ProblemError } from "./problem";
 const AT_ONCE = 4;
 
 export interface Fetching {
-  /** What is here of this motion, null for nothing. */
+  /** Whose dance, by number. */
+  performer?: number;
+  /** What is here of it, null for nothing. */
   held?: BlockStore | null;
   /** Told of the share that is here, 0..1. */
   told?: (share: number) => void;
@@ -21,14 +23,14 @@ export interface Fetching {
 }
 
 /**
- * Every block of `motion` at its best rate. Rejects with ProblemError; given up by `signal`, with the signal's reason.
+ * Every block of a dance in `motion` at its best rate. Rejects with ProblemError; given up by `signal`, with the signal's reason.
  */
-export async function bestBlocks(motion: string, { held = null, told, signal }: Fetching = {}): Promise<BlockStore> {
+export async function bestBlocks(motion: string, { performer = 0, held = null, told, signal }: Fetching = {}): Promise<BlockStore> {
   const base = `/v1/motions/${encodeURIComponent(motion)}`;
   try {
     const { tracks } = await message(`${base}/description`, "Description", signal);
-    const number = tracks.findIndex(({ type }) => type === "motion");
-    if (number < 0) throw new DamagedBlock("there is no motion in it");
+    const number = [...tracks.keys()].filter((index) => tracks[index].type === "motion").at(performer);
+    if (number === undefined) throw new DamagedBlock("there is no motion in it");
     const store = new BlockStore(MotionTrack.fromDescription(tracks[number]));
     if (held) store.adopt(held);
     const best = store.track.rates.length - 1;

@@ -14,13 +14,16 @@ export interface Motion {
   fps: number;
   /** The types of its tracks. */
   tracks?: string[];
+  /** How many dance in it; left out: one. Of several also what each of them dances, by name. */
+  performers?: number;
+  pieces?: string[];
   /** Of a motion that was kept from a session: words of where it is from, and its dance's id. */
   source?: string;
   kept_from?: string;
   [key: string]: unknown;
 }
 
-/** A session; `position` and `duration` in microseconds, `limbs` the holder's id or null for each. */
+/** A session; `position` and `duration` in microseconds, `limbs` the holder's id or null for each of every performer's. */
 export interface Session {
   id: string;
   motion: string;
@@ -74,6 +77,11 @@ export function listMotions(cursor?: string): Promise<Page<Motion>> {
 /** Removes a motion. */
 export async function deleteMotion(id: string): Promise<void> {
   await ask("DELETE", `/v1/motions/${encodeURIComponent(id)}`);
+}
+
+/** A new motion: `motion` with those who dance in `motions` beside its own, in a row. There may be four in all. */
+export function addPerformers(motion: string, motions: readonly string[], access = pageAccess): Promise<Motion> {
+  return ask("POST", `/v1/motions/${encodeURIComponent(motion)}/performers`, { motions }, access) as Promise<Motion>;
 }
 
 /** A new session over a motion. */

@@ -8,6 +8,7 @@ import { Correction } from "../marionette/correction";
 import { Handover } from "../marionette/handover";
 import type { Pulled } from "../marionette/pulled";
 import { LIMB_JOINTS, type Pose } from "../motion/skeleton";
+import { limbOf } from "../wire/limbs";
 import { Pull } from "./pull";
 import type { Solver } from "./solver";
 
@@ -35,18 +36,18 @@ export class OwnLimb {
 
   constructor(readonly limb: number) {
     this.pull = new Pull(limb);
-    this.at = 4 * LIMB_JOINTS[limb];
+    this.at = 4 * LIMB_JOINTS[limbOf(limb)];
   }
 
   /**
-   * Lays the limb over `pose`, which shows what everyone sees, where it is this puppeteer's. `dance` is the dance alone, `laid`
+   * Lays the limb over `pose` of its performer, which shows what everyone sees, where it is this puppeteer's. `dance` is the dance alone, `laid`
    * says whether `pose` has the limb pulled, `theirs` whether the session has it in another's hands.
    */
   lay(pose: Pose, dance: Pose, laid: boolean, theirs: boolean, nowMs: number, solver: Solver): void {
     const { pull, handover, correction, joints, at } = this;
     const seconds = this.drawnAt === null ? 0 : Math.min(Math.max(nowMs - this.drawnAt, 0) / 1000, LONGEST_STEP);
     this.drawnAt = nowMs;
-    const puppet = solver.limbs[this.limb];
+    const puppet = solver.limbs[limbOf(this.limb)];
     if (puppet !== this.puppet) {
       // another dancer: a limb that is held goes on in it, from where the dance has it
       this.puppet = puppet;

@@ -6,6 +6,7 @@
  */
 
 import { clampThigh, THIGH_GREATEST, THIGH_LEAST } from "../marionette/leg";
+import { limbOf } from "../wire/limbs";
 
 /** Full speed of a hand, arm lengths a second along each axis. */
 export const HAND_SPEED = 1;
@@ -37,7 +38,7 @@ export class Pull {
   constructor(readonly limb: number) {}
 
   private get isHand(): boolean {
-    return this.limb < 2;
+    return limbOf(this.limb) < 2;
   }
 
   /** Takes the limb; it stays where it is until it is told otherwise. */

@@ -1,6 +1,7 @@
-/** A puppeteer: claims limbs of a session's puppet and says where they should be. */
+/** A puppeteer: claims limbs of a session's puppets and says where they should be. Limbs go by number, of all performers that there can be. */
 
 import { LIMBS, type Pose } from "../motion/skeleton";
+import { limbNumber, MOST_LIMBS } from "../wire/limbs";
 import { type Grant, type Message, type Notice, type Presence, type Refusal, TARGET, VELOCITY } from "../wire/messages";
 import { type Access, pageAccess } from "./access";
 import { Connection } from "./connection";
@@ -78,7 +79,7 @@ export class Puppeteer extends EventTarget {
     super();
     this.viewer = options.viewer;
     this.now = options.now ?? (() => performance.now());
-    this.holdings = LIMBS.map((_, limb) => ({
+    this.holdings = Array.from({ length: MOST_LIMBS }, (_, limb) => ({
       limb: new OwnLimb(limb), holder: null, wanted: false, epoch: null, sequence: 0, news: "none", speed: [0, 0, 0], anchored: false, inputAt: 0, heardAt: 0,
       ask: "none", askedAt: 0,
     }));
@@ -158,11 +159,15 @@ export class Puppeteer extends EventTarget {
     this.say(hold, this.now());
   }
 
-  /** Lays one's own limbs over `pose`, in which those of the mask `laid` are pulled already over the `dance`; for the viewer. */
-  lay(pose: Pose, dance: Pose, laid: number, nowMs: number, solver: Solver): void {
-    this.holdings.forEach(({ limb, holder }, nth) => {
+  /**
+   * Lays one's own limbs of `performer` over its `pose`, in which those of the mask `laid` (bit 0 the first of its four) are pulled already over the `dance`;
+   * for the viewer.
+   */
+  lay(pose: Pose, dance: Pose, laid: number, nowMs: number, solver: Solver, performer = 0): void {
+    for (let nth = 0; nth < LIMBS.length; nth++) {
+      const { limb, holder } = this.holdings[limbNumber(performer, nth)];
       limb.lay(pose, dance, ((laid >> nth) & 1) !== 0, holder !== null && holder !== this.id, nowMs, solver);
-    });
+    }
   }
 
   /** Lets all go and ends it. */
@@ -184,7 +189,7 @@ export class Puppeteer extends EventTarget {
         break;
       case "Presence":
         this.presence = message;
-        this.holdings.forEach((hold, limb) => (hold.holder = message.limbs[limb]));
+        this.holdings.forEach((hold, limb) => (hold.holder = message.limbs[limb] ?? null));
         this.listed(message);
         this.dispatchEvent(new Event("presence"));
         break;
@@ -234,7 +239,9 @@ export class Puppeteer extends EventTarget {
   private listed({ asks, limbs }: Presence): void {
     this.holdings.forEach((hold, limb) => {
       if (hold.ask === "none") return;
-      if (asks[limb].includes(this.id ?? "")) hold.ask = "listed";
+      if (asks[limb]?.includes(this.id ?? "")) hold.ask = "listed";
+      // its performer is gone
+      else if (limb >= limbs.length) this.lapse(hold);
       // told that it is free, the session did not take the ask: its holder had let go before
       else if (limbs[limb] === null) this.lapse(hold, true);
       else if (hold.ask === "listed" && limbs[limb] !== this.id) this.lapse(hold);

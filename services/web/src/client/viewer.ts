@@ -3,19 +3,20 @@
 import { DamagedBlock } from "../codec/errors";
 import type { SceneTrack } from "../codec/scene";
 import type { Rate } from "../codec/timing";
-import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
+import type { PerformerTrack } from "../motion/performer";
+import type { Figure, Pose } from "../motion/skeleton";
 import type { BlockStore } from "../playout/blocks";
 import { ReferenceClock } from "../playout/clock";
 import { PlayoutDelay } from "../playout/delay";
 import { Following, type Lead } from "../playout/following";
-import { Overlays } from "../playout/overlay";
 import { type LightState, lightStates } from "../playout/scenes";
 import type { AudioStore } from "../playout/sounds";
 import { positionAt, Timelines } from "../playout/timeline";
 import { Tracks } from "../playout/tracks";
 import {
-  type Choice, type Data, type Description, type Edit, type Message, type Overlay, OVERLAY_FRAME, type Presence, type Report, type TimelineState,
+  type Choice, type Data, type Description, type Edit, type Message, type Presence, type Report, type TimelineState,
 } from "../wire/messages";
+import { type Overlay, OVERLAY_FRAME } from "../wire/overlay";
 import { pageAccess } from "./access";
 import { Asking } from "./asking";
 import { Connection } from "./connection";
@@ -23,6 +24,7 @@ import type { LineFigures } from "./line-figures";
 import { Meter } from "./meter";
 import type { Puppeteer } from "./puppeteer";
 import { marionetteBy, OwnSolver } from "./own-solver";
+import { Performances } from "./performances";
 import { reasonOf } from "./reasons";
 import { returningUrl } from "./returning";
 import type { ViewerOptions } from "./viewer-options";
@@ -53,25 +55,17 @@ export class Viewer extends EventTarget {
 
   private readonly url: URL;
   private readonly now: () => number;
-  private readonly solver: OwnSolver;
+  private readonly performances: Performances;
   private readonly connection: Connection;
   private readonly started: number;
-  private readonly overlays = new Overlays();
   private readonly delay = new PlayoutDelay();
   private readonly following = new Following();
   private readonly meter = new Meter();
   private readonly asking: Asking;
   private tracks: Tracks | null = null;
-  private readonly dance = restPose();
-  private readonly merged = restPose();
-  private shown = false;
-  private missing = -1;
-  private gaps = 0;
-  private firstPoseMs: number | null = null;
   private latency: number | null = null;
   private decodeMs = 0;
   private frameMs = 0;
-  private rate = -1;
   private choice: Choice | null = null;
   private closedReason: string | null = null;
   /** The private timeline to go on with when the line comes back. */
@@ -82,7 +76,8 @@ export class Viewer extends EventTarget {
     this.url = new URL(options.url);
     this.now = options.now ?? (() => performance.now());
     const { access = pageAccess, solver = marionetteBy(access) } = options;
-    this.solver = new OwnSolver(this.url.origin.replace(/^ws/, "http"), solver);
+    const origin = this.url.origin.replace(/^ws/, "http");
+    this.performances = new Performances((figure) => new OwnSolver(figure, origin, solver));
     this.started = this.now();
     this.connection = new Connection({
       url: () => access.ticketed(this.address()),
@@ -99,14 +94,19 @@ export class Viewer extends EventTarget {
     return this.tracks?.dance ?? null;
   }
 
-  /** The dancer's lengths, null before the first Description. */
-  get figure(): Figure | null {
-    return this.store?.track.figure ?? null;
+  /** Those who dance, by number, as far as they are known; null one whose track cannot be read. The first is the show's. */
+  get performers(): readonly (PerformerTrack | null)[] {
+    return this.performances.all;
   }
 
-  /** Where the dance faces over its length, radians about y from z towards x. */
+  /** The first dancer's lengths, null before the first Description. */
+  get figure(): Figure | null {
+    return this.performers[0]?.figure ?? null;
+  }
+
+  /** Where the first dance faces over its length as it stands on the stage, radians about y from z towards x. */
   get front(): number {
-    return this.store?.track.front ?? 0;
+    return this.performers[0]?.front ?? 0;
   }
 
   /** The newest timeline. */
@@ -119,14 +119,14 @@ export class Viewer extends EventTarget {
     return (this.store?.track.durationUs ?? 0) / 1e6;
   }
 
-  /** Per block: -1 missing, else the best rate held. It is the live array. */
+  /** Per block of the first dance: -1 missing, else the best rate held. It is the live array. */
   get blocks(): Int8Array {
     return this.store?.rates ?? NO_BLOCKS;
   }
 
-  /** The blocks of `motion`, null where another is watched. */
-  held(motion: string): BlockStore | null {
-    return motion === this.motion ? this.store : null;
+  /** The blocks of a performer's dance in `motion`, null where another is watched. */
+  held(motion: string, performer = 0): BlockStore | null {
+    return (motion === this.motion && this.tracks?.performers[performer]) || null;
   }
 
   /** What each rate costs and keeps, from the lowest to the highest. */
@@ -162,30 +162,15 @@ export class Viewer extends EventTarget {
   }
 
   /**
-   * The pose to draw at local `nowMs`: the dance, with what is pulled laid over it, and one's own limbs as one pulls them. Null
-   * before there is any; where the block needed is missing the dance holds still. The storage is used again by the next call.
+   * The pose of a performer to draw at local `nowMs`, as it stands on the stage: the dance, with what is pulled laid over it, and
+   * one's own limbs as one pulls them. Null before there is any; where the block needed is missing the dance holds still. The
+   * storage is used again by the next call for this performer.
    */
-  poseAt(nowMs: number): Pose | null {
-    const { store, dance, merged } = this;
+  poseAt(nowMs: number, performer = 0): Pose | null {
     const clock = this.shownTime(nowMs);
     const timeline = this.timelines.at(clock);
-    if (!store || !timeline || timeline.motion !== this.motion) return null;
-    const position = positionAt(timeline, clock);
-    const index = store.track.blockAt(position);
-    if (store.poseAt(position, timeline.loop, dance)) {
-      if (!this.shown) this.firstPoseMs ??= nowMs - this.started;
-      this.shown = true;
-      this.missing = -1;
-      this.rate = store.rates[index];
-    } else if (timeline.playing && this.shown && this.missing !== index) {
-      this.missing = index;
-      this.gaps++;
-    }
-    if (!this.shown) return null;
-    copyPose(dance, merged);
-    const laid = this.overlays.lay(clock, merged);
-    if (this.solver.solver) this.puppeteer?.lay(merged, dance, laid, nowMs, this.solver.solver);
-    return merged;
+    if (!timeline || timeline.motion !== this.motion) return null;
+    return this.performances.poseAt(performer, clock, timeline, this.puppeteer, nowMs);
   }
 
   /** Cameras and lights of the motion, in the Description's order. */
@@ -228,23 +213,24 @@ export class Viewer extends EventTarget {
 
   /** How the line fares now. */
   line(): LineFigures {
-    const { clock, store } = this;
+    const { clock, store, performances } = this;
+    const { firstPoseMs, rate } = performances;
     const now = this.now();
     const timeline = this.timelines.newest;
     const ahead = store && timeline ? store.ahead(this.positionAt(now) * 1e6, timeline.loop) : 0;
     const known = Number.isFinite(clock.error);
     return {
-      rate: this.rate < 0 ? -1 : (this.choice?.rate ?? this.rate),
+      rate: rate < 0 ? -1 : (this.choice?.rate ?? rate),
       kbps: this.meter.kbps(now),
       bufferSeconds: ahead / 1e6,
       clockOffsetMs: known ? clock.offset / 1000 - performance.timeOrigin : null,
       clockErrorMs: known ? clock.error / 1000 : null,
       latencyMs: this.latency,
       playoutDelayMs: this.delay.at(now * 1000) / 1000,
-      firstPoseMs: this.firstPoseMs,
-      gaps: this.gaps,
+      firstPoseMs: firstPoseMs === null ? null : firstPoseMs - this.started,
+      gaps: performances.gaps,
       reason: reasonOf({
-        closed: this.closedReason, damaged: this.damaged, shown: this.shown, missing: this.missing >= 0, choice: this.choice, pinned: this.url.searchParams.has("rate"),
+        closed: this.closedReason, damaged: this.damaged, shown: performances.shown, missing: performances.waiting, choice: this.choice, pinned: this.url.searchParams.has("rate"),
       }),
     };
   }
@@ -276,7 +262,7 @@ export class Viewer extends EventTarget {
     this.clock.restart();
     this.timelines.restart();
     this.asking.begin();
-    this.solver.prepare(this.figure);
+    this.performances.prepare();
     this.tell("open");
     if (replaced) this.tell("replaced");
   }
@@ -338,6 +324,7 @@ export class Viewer extends EventTarget {
     if (message.motion === this.motion && this.tracks) {
       const { told } = this.tracks;
       this.tracks.add(message.first ?? 0, message.tracks);
+      this.performances.add(this.tracks);
       if (this.tracks.told > told) this.tell("tracks");
       return;
     }
@@ -351,11 +338,7 @@ export class Viewer extends EventTarget {
       return;
     }
     this.motion = message.motion;
-    this.overlays.clear();
-    this.shown = false;
-    this.missing = -1;
-    this.rate = -1;
-    this.solver.prepare(this.figure);
+    this.performances.begin(this.tracks);
     this.tell("figure");
     this.tell("blocks");
   }
@@ -387,7 +370,7 @@ export class Viewer extends EventTarget {
   }
 
   private overlay(message: Overlay, now: number): void {
-    this.overlays.put(message);
+    this.performances.overlays.put(message);
     const late = this.clock.at(now * 1000) - message.due;
     this.latency = this.latency === null ? late / 1000 : this.latency + NEWEST * (late / 1000 - this.latency);
     // its first frame is gone to from the last one of the message before

@@ -1,5 +1,6 @@
 /** What the blocks of one motion have in common: sent once, in the Description (`proto/SPEC.md`, Track `motion`). */
 
+import { MIDDLE, type Place } from "../motion/performer";
 import { multiply } from "../motion/rotation";
 import type { Figure } from "../motion/skeleton";
 import { aboutAxis } from "../motion/vector";
@@ -13,6 +14,9 @@ export const CODEC = "bunraku.motion/2";
 /** Headings of a block's root in a whole turn about y. */
 export const HEADINGS = 64;
 
+/** Metres from the middle of the stage along x and z. */
+const FARTHEST = 100;
+
 /** Constants of a motion's blocks, as in the Description. */
 export class MotionTrack extends Timing {
   readonly weights: Weights;
@@ -24,7 +28,8 @@ export class MotionTrack extends Timing {
    * @param firstFrames frames of the first block
    * @param dancer limb lengths, and what rotations are told from
    * @param rates what each rate costs and keeps, from the lowest to the highest
-   * @param front where the dance faces over its length, radians about y from z towards x
+   * @param front where the dance faces over its length before it is turned by `place`, radians about y from z towards x
+   * @param place where it stands
    */
   constructor(
     fps: number,
@@ -34,6 +39,7 @@ export class MotionTrack extends Timing {
     readonly dancer: Dancer,
     readonly rates: readonly Rate[] = [],
     readonly front = 0,
+    readonly place: Place = MIDDLE,
   ) {
     super(fps, frames, blockFrames, firstFrames);
     this.weights = channelWeights(dancer.figure, dancer.reference);
@@ -66,7 +72,20 @@ export class MotionTrack extends Timing {
     const rates = readRates(map, "motion");
     return new MotionTrack(
       fps, frames, blockFrames, firstFrames, unpackDancer(dancer), rates,
-      Number.isFinite(front) ? Number(front) : 0,
+      Number.isFinite(front) ? Number(front) : 0, readPlace(map.place),
     );
   }
+}
+
+/**
+ * Where the dancer of a track dances, from its map's `place`.
+ *
+ * @throws DamagedBlock
+ */
+function readPlace(place: unknown): Place {
+  if (place === undefined) return MIDDLE;
+  if (!Array.isArray(place) || place.length !== 3 || !place.every(Number.isFinite)) throw new DamagedBlock("motion needs a place of three numbers");
+  const [x, z, turn] = place as [number, number, number];
+  if (Math.abs(x) > FARTHEST || Math.abs(z) > FARTHEST) throw new DamagedBlock(`motion needs a place within ${FARTHEST} metres`);
+  return { x, z, turn };
 }

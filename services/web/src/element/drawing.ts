@@ -14,7 +14,7 @@ const PORTRAIT = 0.7;
 const LOW = 380;
 
 /** What keys do beside taking limbs; what else they do is the page's. */
-export type Deeds = Pick<PageActions, "ask" | "give" | "play" | "back" | "forward">;
+export type Deeds = Pick<PageActions, "next_dancer" | "ask" | "give" | "play" | "back" | "forward">;
 
 export class Drawing {
   performing: Performing | null = null;
@@ -126,7 +126,7 @@ export class Drawing {
     const now = performance.now();
     const { pose, limbs } = performing.draw(now, this.focused);
     const { stage } = performing;
-    this.face.tags.render(limbs, pose ? limbs.map((_, limb) => stage.bar(limb)) : [], stage.face);
+    this.face.tags.render(limbs, pose ? limbs.map((_, limb) => stage.bar(limb)) : [], stage.faces);
     this.#room?.viewer.drawn(performance.now() - now);
     if (!pose || this.#told) return;
     this.#told = true;

@@ -2,10 +2,12 @@
 import { createAsks, type Asks } from "../page/asks";
 import { element, setAttribute } from "../page/dom";
 import { icon, limbIcon } from "../page/icons";
-import { LIMB_NAMES, LIMB_ORDER, limbKey, type LimbState } from "../page/model";
+import { createNextDancer } from "../page/dancer-chooser";
+import { LIMB_ORDER, limbKey, limbName, performersOf, type LimbState } from "../page/model";
 import { createTags, type Tags } from "../page/tags";
-import { createToast, type Toast } from "../page/toast";
+import { createToast, type Toasts } from "../page/toast";
 import tokens from "../style/tokens.css?inline";
+import { limbNumber } from "../wire/limbs";
 import own from "./element.css?inline";
 
 /** Names keep so far from the element's upper edge, pixels. */
@@ -17,6 +19,7 @@ export interface FaceActions {
   focus(limb: number | null): void;
   ask(limb: number): void;
   give(limb: number): void;
+  nextDancer(): void;
 }
 
 export interface Face {
@@ -25,12 +28,12 @@ export interface Face {
   readonly canvas: HTMLCanvasElement;
   readonly tags: Tags;
   readonly asks: Asks;
-  readonly toast: Toast;
+  readonly toast: Toasts;
   /** Words in place of the dance; null for none. */
   notice(title: string | null, text?: string): void;
   /** The bar: whether it is there; whether play may be pressed, and would pause; limbs, if they can be taken. */
   bar(shown: boolean, playing: boolean | null): void;
-  limbs(limbs: readonly LimbState[], hands: boolean, ready: boolean): void;
+  limbs(limbs: readonly LimbState[], hands: boolean, ready: boolean, chosen?: number): void;
   remove(): void;
 }
 
@@ -60,11 +63,15 @@ export function createFace(root: ShadowRoot, on: FaceActions): Face {
   const asks = createAsks(messages, on.give);
   const toast = createToast(messages);
   const play = element("button", { class: "play", type: "button", "aria-label": "Play", onClick: on.play }, icon("play"));
+  /** Whose limbs the buttons take. */
+  let performer = 0;
   const discs = LIMB_ORDER.map((limb) => {
-    const focus = { onFocus: () => on.focus(limb), onBlur: () => on.focus(null), onPointerenter: () => on.focus(limb), onPointerleave: () => on.focus(null) };
-    return { limb, disc: element("button", { type: "button", hidden: true, onClick: () => on.toggle(limb), ...focus }, limbIcon(limb)) };
+    const light = () => on.focus(limbNumber(performer, limb));
+    const focus = { onFocus: light, onBlur: () => on.focus(null), onPointerenter: light, onPointerleave: () => on.focus(null) };
+    return { limb, disc: element("button", { type: "button", hidden: true, onClick: () => on.toggle(limbNumber(performer, limb)), ...focus }, limbIcon(limb)) };
   });
-  const bar = element("div", { class: "bar", part: "bar", role: "group", "aria-label": "The stage", hidden: true }, play, ...discs.map(({ disc }) => disc));
+  const next = createNextDancer(on.nextDancer);
+  const bar = element("div", { class: "bar", part: "bar", role: "group", "aria-label": "The stage", hidden: true }, play, next.element, ...discs.map(({ disc }) => disc));
   frame.append(bar);
   let shownPlaying: boolean | null = false;
   return {
@@ -81,15 +88,19 @@ export function createFace(root: ShadowRoot, on: FaceActions): Face {
       play.replaceChildren(icon(playing ? "pause" : "play"));
       play.setAttribute("aria-label", playing ? "Pause" : "Play");
     },
-    limbs(limbs, hands, ready) {
+    limbs(limbs, hands, ready, chosen = 0) {
+      performer = chosen;
+      next.render(hands ? limbs : [], chosen);
       for (const { limb, disc } of discs) {
-        const { holder } = limbs[limb];
-        const name = LIMB_NAMES[limb].toLowerCase();
+        const own = limbNumber(chosen, limb);
+        const { holder } = limbs[own];
+        const name = limbName(own, performersOf(limbs));
+        const capital = name.charAt(0).toUpperCase() + name.slice(1);
         disc.hidden = !hands;
         disc.disabled = !ready;
         setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute("aria-label", !holder ? `Take the ${name}` : holder.mine ? `Release the ${name}` : `${LIMB_NAMES[limb]}, held by ${holder.name}`);
-        disc.title = `${LIMB_NAMES[limb]}, key ${limbKey(limb)}`;
+        disc.setAttribute("aria-label", !holder ? `Take the ${name}` : holder.mine ? `Release the ${name}` : `${capital}, held by ${holder.name}`);
+        disc.title = `${capital}, key ${limbKey(limb)}`;
         if (holder) disc.style.setProperty("--colour", `var(--holder-${holder.colour})`);
         else disc.style.removeProperty("--colour");
       }

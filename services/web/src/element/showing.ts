@@ -39,12 +39,13 @@ export class Showing {
       focus: (limb) => (this.drawing.focused = limb),
       ask: (limb) => this.#holding.ask(limb),
       give: (limb) => this.#holding.give(limb),
+      nextDancer: () => this.#holding.nextDancer(),
     });
     const { toast, asks } = this.#face;
     this.#holding = new Holding({
       asks,
       toast,
-      strings: { render: (limbs, ready) => this.#face.limbs(limbs, this.#hands, ready), notice: (text) => toast(text) },
+      strings: { render: (limbs, ready, chosen) => this.#face.limbs(limbs, this.#hands, ready, chosen), notice: (text) => toast(text) },
     }, () => this.drawing.mapping);
     this.#holding.watching = true;
     this.drawing = new Drawing(this.#face, this.#holding);
@@ -131,7 +132,7 @@ export class Showing {
       target.addEventListener(event, (told) => {
         if (this.room === room) then(told);
       });
-    during(viewer, "figure", () => this.drawing.performing?.cast());
+    for (const news of ["figure", "tracks"]) during(viewer, news, () => this.drawing.performing?.comeOn());
     during(viewer, "timeline", () => this.#bar());
     during(viewer, "presence", () => this.tell("presence", viewer.presence));
     during(puppeteer, "welcome", () => this.tell("welcome", { id: puppeteer.id, colour: puppeteer.colour }));
@@ -141,17 +142,20 @@ export class Showing {
       opened = true;
       this.#holding.connected = true;
       this.#holding.render();
+      this.#face.toast.lost(null);
       this.#clear();
     });
     during(viewer, "closed", (event) => {
       const reason = String((event as CustomEvent<string>).detail);
+      const wasConnected = this.#holding.connected;
       this.#holding.connected = false;
       this.#holding.render();
       this.tell("closed", { reason, final: viewer.ended });
+      if (viewer.ended || denied) this.#face.toast.lost(null);
       if (denied) return;
       if (viewer.ended) this.#face.notice(place === "motions" ? "The dance has ended" : "The session has ended", reason);
       else if (!opened) void this.#unreached(server, asked);
-      else this.#face.toast(`The line was lost: ${reason}`);
+      else if (wasConnected) this.#face.toast.lost(`The line was lost: ${reason}`);
     });
     this.#bar();
     this.#holding.render();
@@ -165,6 +169,7 @@ export class Showing {
     this.#holding.connected = false;
     room?.close();
     (this.root.host as HTMLElement).removeAttribute("data-hands");
+    this.#face.toast.lost(null);
     this.#face.bar(false, null);
   }
 
@@ -203,7 +208,7 @@ export class Showing {
 
   async #draw(): Promise<void> {
     const missing = await this.drawing.open({
-      ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing),
+      next_dancer: () => this.#holding.nextDancer(), ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing),
       back: () => this.room?.step(-1, performance.now()), forward: () => this.room?.step(1, performance.now()),
     });
     if (!missing) return;

@@ -13,7 +13,8 @@ export type PageActions = Readonly<Record<Exclude<Action, `take_${string}`>, () 
 interface Press {
   commands: readonly Command[];
   at: number;
-  /** Limbs that this press took. */
+  /** Limbs that it is about, and those of them that it took: of who was chosen as it went down. */
+  limbs: readonly number[];
   took: readonly number[];
 }
 
@@ -33,9 +34,9 @@ export class Commands {
     const commands = pressed?.commands ?? meant(bound, this.velocity.selected !== null);
     for (const command of commands) if (isInput(command)) this.velocity.set(control, command, strength);
     if (pressed || commands.length === 0) return commands.length > 0;
-    const limbs = commands.map(limbTaken).filter((limb) => limb !== null);
+    const limbs = commands.map(limbTaken).filter((part) => part !== null).map((part) => this.velocity.limb(part));
     const took = limbs.filter((limb) => this.hands.source(limb) !== "pointer" && !this.velocity.holds(limb) && this.velocity.hold(limb));
-    this.#pressed.set(control, { commands, at: now, took });
+    this.#pressed.set(control, { commands, at: now, limbs, took });
     for (const command of commands) if (!isInput(command) && limbTaken(command) === null) this.actions[command as keyof PageActions]();
     return true;
   }
@@ -52,10 +53,8 @@ export class Commands {
     if (!press) return;
     this.#rest(control, press);
     const long = now - press.at > LONG_PRESS;
-    for (const limb of press.commands.map(limbTaken)) {
-      // A tap takes and the next tap lets go; a long press holds for as long as it lasts.
-      if (limb !== null && (long || !press.took.includes(limb))) this.velocity.letGo(limb);
-    }
+    // A tap takes and the next tap lets go; a long press holds for as long as it lasts.
+    for (const limb of press.limbs) if (long || !press.took.includes(limb)) this.velocity.letGo(limb);
   }
 
   /** Lets all controls up whose names pass, without a tap's meaning. */

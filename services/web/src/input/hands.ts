@@ -1,7 +1,8 @@
-/** The puppeteer's own hands on the strings: pointers and inputs of speed say where in the audience's terms, this says it to the session. */
+/** The puppeteer's own hands on the strings of all performers, by number of the limb: pointers and inputs of speed say where in the audience's terms, this says it to the session. */
 import { Vector3 } from "three";
 import type { Puppeteer } from "../client/puppeteer";
 import { JOINTS } from "../motion/skeleton";
+import { limbOf, MOST_LIMBS, performerOf } from "../wire/limbs";
 import { handleOf, type Performer } from "../stage/performer";
 import type { Stage } from "../stage/stage";
 import { handTarget, inChest, orientation, place, thighAngle } from "./frames";
@@ -14,8 +15,9 @@ export class Hands {
   changed: () => void = () => undefined;
   readonly #stage: Stage;
   #puppeteer: Puppeteer | null = null;
-  readonly #sources: (Source | null)[] = [null, null, null, null];
-  readonly #pulls: (Vector3 | null)[] = [null, null, null, null];
+  /** By number of the limb. */
+  readonly #sources: (Source | null)[] = Array<null>(MOST_LIMBS).fill(null);
+  readonly #pulls: (Vector3 | null)[] = Array<null>(MOST_LIMBS).fill(null);
 
   constructor(stage: Stage) {
     this.#stage = stage;
@@ -24,12 +26,17 @@ export class Hands {
   /** The session to speak to; what was held in another is forgotten. */
   set puppeteer(puppeteer: Puppeteer | null) {
     this.#puppeteer = puppeteer;
-    for (let limb = 0; limb < 4; limb++) this.#forget(limb);
+    for (let limb = 0; limb < MOST_LIMBS; limb++) this.#forget(limb);
   }
 
   /** What holds a limb here, or null. */
   source(limb: number): Source | null {
     return this.#sources[limb];
+  }
+
+  /** Whether any limb is held here. */
+  get any(): boolean {
+    return this.#sources.some((source) => source !== null);
   }
 
   /** Where a limb is pulled to, world metres; null when by speed or not at all. */
@@ -54,8 +61,9 @@ export class Hands {
     this.changed();
   }
 
-  letAllGo(): void {
-    for (let limb = 0; limb < 4; limb++) this.letGo(limb);
+  /** Lets all go, or all from a number on. */
+  letAllGo(from = 0): void {
+    for (let limb = from; limb < MOST_LIMBS; limb++) this.letGo(limb);
   }
 
   /** The session refused a limb, or took it back. */
@@ -66,16 +74,17 @@ export class Hands {
 
   /** Pulls a limb's handle to a place in the world. */
   pullTo(limb: number, to: Vector3): void {
-    const { puppet } = this.#stage;
+    const puppet = this.#stage.performers[performerOf(limb)];
     if (!puppet || this.#sources[limb] === null) return;
+    const part = limbOf(limb);
     this.#pulls[limb] = to.clone();
     // Told in the measures of the dancer of the stream, whoever is seen to dance.
-    const wanted = puppet.told(limb, to, new Vector3());
-    const side = limb % 2 === 0 ? "l" : "r";
-    if (limb < 2) {
+    const wanted = puppet.told(part, to, new Vector3());
+    const side = part % 2 === 0 ? "l" : "r";
+    if (part < 2) {
       const wrist = puppet.joint(`${side}_wrist`);
       const fingers = tipOf(puppet, `${side}_wrist`).applyMatrix4(wrist);
-      const tip = wanted.add(fingers.sub(handleOf(puppet, limb, new Vector3())));
+      const tip = wanted.add(fingers.sub(handleOf(puppet, part, new Vector3())));
       const shoulder = place(puppet.joint(`${side}_shoulder`));
       const { x, y, z } = handTarget(tip, shoulder, orientation(puppet.joint("vl5")), armLength(puppet, side));
       this.#puppeteer?.target(limb, x, y, z);
@@ -88,10 +97,10 @@ export class Hands {
 
   /** Moves a limb at -1..1 of full speed to the audience's right, up, and towards the audience; of a leg only up counts. */
   move(limb: number, right: number, up: number, nearer: number): void {
-    const { puppet } = this.#stage;
+    const puppet = this.#stage.performers[performerOf(limb)];
     if (!puppet || this.#sources[limb] === null) return;
     this.#pulls[limb] = null;
-    if (limb >= 2) {
+    if (limbOf(limb) >= 2) {
       this.#puppeteer?.velocity(limb, up, 0, 0);
       return;
     }

@@ -24,8 +24,7 @@ export function listenToKeyboard(target: GlobalEventHandlers, commands: Commands
     }
     if (event.repeat) return false;
     if (code === "Escape") {
-      if (velocity.selected === null) actions.escape();
-      for (let limb = 0; limb < 4; limb++) velocity.letGo(limb);
+      if (!velocity.letAllGo()) actions.escape();
       return true;
     }
     if (event.key === "?") {

@@ -10,7 +10,7 @@ import { DIGITAL_INPUTS, HELD_INPUTS, type DigitalInput, type HeldInput } from "
 
 export type Control = string;
 export const ACTIONS = [
-  "take_right_hand", "take_left_hand", "take_right_leg", "take_left_leg", "ask", "give",
+  "take_right_hand", "take_left_hand", "take_right_leg", "take_left_leg", "next_dancer", "ask", "give",
   "play", "back", "forward", "camera", "sound", "keep", "picture", "library", "strings", "line",
 ] as const;
 export type Action = (typeof ACTIONS)[number];
@@ -39,14 +39,14 @@ export const DEFAULT_MAPPING: Mapping = {
     ArrowRight: ["held_x+", "forward"], ArrowLeft: ["held_x-", "back"], ArrowUp: ["held_y+"], ArrowDown: ["held_y-"],
     PageDown: ["held_z+"], PageUp: ["held_z-"],
     "wheel:+": ["held_z+"], "wheel:-": ["held_z-"],
-    KeyR: ["ask"], KeyG: ["give"], KeyK: ["keep"], KeyP: ["picture"], KeyM: ["sound"], KeyC: ["camera"], Space: ["play"], KeyL: ["library"], KeyN: ["line"],
+    KeyT: ["next_dancer"], KeyR: ["ask"], KeyG: ["give"], KeyK: ["keep"], KeyP: ["picture"], KeyM: ["sound"], KeyC: ["camera"], Space: ["play"], KeyL: ["library"], KeyN: ["line"],
     "axis:0+": ["left_hand_x+"], "axis:0-": ["left_hand_x-"], "axis:1-": ["left_hand_y+"], "axis:1+": ["left_hand_y-"],
     "axis:2+": ["right_hand_x+"], "axis:2-": ["right_hand_x-"], "axis:3-": ["right_hand_y+"], "axis:3+": ["right_hand_y-"],
     "button:6": ["left_hand_z+"], "button:4 button:6": ["left_hand_z-"],
     "button:7": ["right_hand_z+"], "button:5 button:7": ["right_hand_z-"],
     "button:4 axis:1-": ["left_leg+"], "button:4 axis:1+": ["left_leg-"], "button:4 axis:0+": [], "button:4 axis:0-": [],
     "button:5 axis:3-": ["right_leg+"], "button:5 axis:3+": ["right_leg-"], "button:5 axis:2+": [], "button:5 axis:2-": [],
-    "button:0": ["play"], "button:14": ["back"], "button:15": ["forward"], "button:2": ["give"], "button:3": ["ask"],
+    "button:0": ["play"], "button:14": ["back"], "button:15": ["forward"], "button:12": ["next_dancer"], "button:2": ["give"], "button:3": ["ask"],
   },
   deadZone: 0.16,
   stickSmoothing: 0.25,

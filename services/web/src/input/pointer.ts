@@ -1,5 +1,6 @@
 /** Mouse and touch on the stage: a ring or hand is dragged, anything else turns the view. */
 import { Vector3 } from "three";
+import { limbNumber, limbOf, performerOf } from "../wire/limbs";
 import type { Stage } from "../stage/stage";
 import type { Hands } from "./hands";
 import { OneEuro, smoothness } from "./one-euro";
@@ -37,20 +38,22 @@ interface Drag {
 }
 
 /**
- * Whether a limb can be taken, and who is told when not; how much a pull is smoothed, 0 to 1; how fast a limb goes nearer meanwhile, -1 to 1, by keys or wheel.
+ * Whether a limb can be taken, and who is told when not, and when it was; how much a pull is smoothed, 0 to 1; how fast a limb goes nearer meanwhile, -1 to 1, by keys or wheel.
  */
 export interface PointerOptions {
   may(limb: number): boolean;
   refused(limb: number): void;
+  taken(limb: number): void;
   smoothing(): number;
   nearer(limb: number): number;
 }
 
-export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Hands, { may, refused, smoothing, nearer }: PointerOptions): PointerInput {
+export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Hands, { may, refused, taken, smoothing, nearer }: PointerOptions): PointerInput {
   const drags = new Map<number, Drag>();
   let near: number | null = null;
   let orbiting: { id: number; x: number; y: number } | null = null;
   const handle = new Vector3();
+  const handleAt = (limb: number) => stage.performers[performerOf(limb)].handle(limbOf(limb), handle);
 
   /** Where in the picture an event is, CSS pixels: the canvas may stand anywhere in a page. */
   const placeOf = (event: PointerEvent): { x: number; y: number } => {
@@ -58,14 +61,15 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
     return { x: event.clientX - left, y: event.clientY - top };
   };
   const nearest = (x: number, y: number): number | null => {
-    if (!stage.puppet) return null;
     let best: number | null = null;
     let least = GRAB;
-    for (let limb = 0; limb < 4; limb++) {
-      const at = stage.toScreen(stage.puppet.handle(limb, handle));
-      const away = Math.hypot(at.x - x, at.y - y);
-      if (away < least) [best, least] = [limb, away];
-    }
+    stage.performers.forEach(({ group }, k) => {
+      for (let limb = limbNumber(k, 0); group.visible && limb < limbNumber(k + 1, 0); limb++) {
+        const at = stage.toScreen(handleAt(limb));
+        const away = Math.hypot(at.x - x, at.y - y);
+        if (away < least) [best, least] = [limb, away];
+      }
+    });
     return best;
   };
   const light = (limb: number | null) => {
@@ -74,9 +78,9 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
     else canvas.dataset.near = "";
   };
   const pull = (drag: Drag, now: number) => {
-    if (!stage.puppet) return;
     const { limb, x, y, dx, dy, filter } = drag;
-    stage.puppet.handle(limb, handle);
+    if (!stage.performers[performerOf(limb)]) return;
+    handleAt(limb);
     deepen(drag, now);
     const place = stage.fromScreen(x + dx, y + dy, handle.addScaledVector(stage.back(), drag.ahead));
     if (!place) return;
@@ -113,8 +117,9 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
       refused(limb);
       return;
     }
-    if (!stage.puppet || !hands.take(limb, "pointer")) return;
-    const at = stage.toScreen(stage.puppet.handle(limb, handle));
+    if (!hands.take(limb, "pointer")) return;
+    taken(limb);
+    const at = stage.toScreen(handleAt(limb));
     drags.set(pointerId, { limb, x, y, dx: at.x - x, dy: at.y - y, filter: new OneEuro(3, { minCutoff: 1, beta: BETA, derivativeCutoff: 1 }), ahead: 0, depth: 0, at: event.timeStamp });
     canvas.dataset.pulling = "";
   });

@@ -2,6 +2,8 @@
  * Moves limbs by speed: every key, pad control and button of the page that is held down stands here with the input it means. The first press takes the limb,
  * several at once add up, opposite ones cancel (`directionOf`).
  */
+import { MOST_LIMBS, performerOf } from "../wire/limbs";
+import { Chosen } from "./chosen";
 import type { Hands } from "./hands";
 import { directionOf, effectOf, type DigitalInput, type HeldInput } from "./inputs";
 
@@ -9,7 +11,7 @@ import { directionOf, effectOf, type DigitalInput, type HeldInput } from "./inpu
 const REST = 700;
 /** A limb that another held is tried again no sooner than this after it came free. Milliseconds. */
 const PATIENCE = 300;
-/** The first of these that is held is selected. */
+/** The first of these that is held of the chosen performer is selected. */
 const ORDER = [1, 0, 3, 2];
 
 export interface VelocityActions {
@@ -17,6 +19,8 @@ export interface VelocityActions {
   take(limb: number): boolean;
   /** Whether nobody holds a limb. */
   free(limb: number): boolean;
+  /** Whose limbs the inputs move; left out, the first's. */
+  chosen?: Chosen;
 }
 
 /** Inputs of one limb, and how strongly each is pressed. */
@@ -37,20 +41,29 @@ export class VelocityInputs {
   readonly #hands: Hands;
   readonly #actions: VelocityActions;
   readonly #down = new Map<string, { input: DigitalInput | HeldInput; strength: number }>();
-  readonly #motions: Motion[] = [0, 1, 2, 3].map(() => ({ active: false, movedAt: -Infinity, triedAt: -Infinity, momentary: false, spent: false }));
+  readonly #chosen: Chosen;
+  readonly #motions: Motion[] = Array.from({ length: MOST_LIMBS }, () => ({ active: false, movedAt: -Infinity, triedAt: -Infinity, momentary: false, spent: false }));
   #selected: number | null = null;
   /** What is held of each limb since the last frame. */
-  #held: Held[] = [[], [], [], []];
+  #held: Held[] = noneHeld();
 
   constructor(hands: Hands, actions: VelocityActions) {
     this.#hands = hands;
     this.#actions = actions;
+    this.#chosen = actions.chosen ?? new Chosen();
   }
 
-  /** The limb that the inputs of "whichever is held" move: one that a pointer pulls before the one taken last; null for none. */
+  /** The chosen performer's limb of this name: `part` counts as `LIMBS`. */
+  limb(part: number): number {
+    return this.#chosen.limb(part);
+  }
+
+  /** The limb of the chosen performer that the inputs of "whichever is held" move: one that a pointer pulls before the one taken last; null for none. */
   get selected(): number | null {
-    if (this.#selected === null || !this.holds(this.#selected)) this.#selected = ORDER.find((limb) => this.holds(limb)) ?? null;
-    return ORDER.find((limb) => this.#hands.source(limb) === "pointer") ?? this.#selected;
+    const own = ORDER.map((part) => this.limb(part));
+    const last = this.#selected;
+    if (last === null || performerOf(last) !== this.#chosen.performer || !this.holds(last)) this.#selected = own.find((limb) => this.holds(limb)) ?? null;
+    return own.find((limb) => this.#hands.source(limb) === "pointer") ?? this.#selected;
   }
 
   /** How fast a limb that a pointer pulls over the screen is moved nearer to the audience, -1 to 1: what a pointer cannot say. */
@@ -84,12 +97,23 @@ export class VelocityInputs {
     this.#hands.letGo(limb);
   }
 
+  /** Lets go whatever is held until it is let go, of all performers; whether anything was, or is pulled by a pointer. */
+  letAllGo(): boolean {
+    let held = false;
+    for (let limb = 0; limb < MOST_LIMBS; limb++) {
+      held ||= this.holds(limb) || this.#hands.source(limb) === "pointer";
+      this.letGo(limb);
+    }
+    return held;
+  }
+
   /** Takes, moves and lets go as the inputs say. Once a frame, with a time that never runs backwards, milliseconds. */
   update(now: number): void {
     const selected = this.selected;
-    const held: Held[] = [[], [], [], []];
+    const held = noneHeld();
     for (const { input, strength } of this.#down.values()) {
-      const limb = effectOf(input).limb ?? selected;
+      const part = effectOf(input).limb;
+      const limb = part === null ? selected : this.limb(part);
       if (limb !== null) held[limb].push([input, strength]);
     }
     this.#held = held;
@@ -118,4 +142,8 @@ export class VelocityInputs {
       this.#hands.letGo(limb);
     }
   }
+}
+
+function noneHeld(): Held[] {
+  return Array.from({ length: MOST_LIMBS }, () => []);
 }

@@ -1,6 +1,6 @@
 /** What others ask of one's own limbs, standing until it is given, withdrawn or lapsed. Read out politely; nothing is taken by force. */
 import { element } from "./dom";
-import { LIMB_NAMES, LIMB_ORDER, type LimbState } from "./model";
+import { limbName, limbsInOrder, performersOf, type LimbState } from "./model";
 import { say } from "../words/say";
 
 export interface Asks {
@@ -14,18 +14,19 @@ export function createAsks(root: HTMLElement, give: (limb: number) => void): Ask
   let shown = "";
   return {
     render(limbs, key) {
-      const asked = LIMB_ORDER.filter((limb) => limbs[limb].holder?.mine && limbs[limb].askers.length > 0);
-      const now = JSON.stringify([asked.map((limb) => [limb, limbs[limb].askers[0]]), key]);
+      const performers = performersOf(limbs);
+      const asked = limbsInOrder(performers).filter((limb) => limbs[limb].holder?.mine && limbs[limb].askers.length > 0);
+      const now = JSON.stringify([asked.map((limb) => [limb, limbs[limb].askers[0]]), key, performers]);
       if (now === shown) return;
       shown = now;
       const within = live.contains(document.activeElement);
       live.replaceChildren(
         ...asked.map((limb, i) => {
           const { name, colour } = limbs[limb].askers[0];
-          const limbName = say(LIMB_NAMES[limb]).toLowerCase();
-          const button = element("button", { class: "toast-action", type: "button", "aria-label": say("Give the {limb} to {name}", { limb: limbName, name }), onClick: () => give(limb) }, say("Give"));
+          const named = { limb: limbName(limb, performers), name };
+          const button = element("button", { class: "toast-action", type: "button", "aria-label": say("Give the {limb} to {name}", named), onClick: () => give(limb) }, say("Give"));
           if (key && i === 0) button.append(element("kbd", { class: "key-hint" }, key));
-          return element("div", { class: "toast ask", style: `--colour: var(--holder-${colour})` }, say("{name} asks for the {limb}", { limb: limbName, name }), button);
+          return element("div", { class: "toast ask", style: `--colour: var(--holder-${colour})` }, say("{name} asks for the {limb}", named), button);
         }),
       );
       if (within) live.querySelector("button")?.focus();

@@ -6,7 +6,7 @@ import { series, say, type Plain } from "../words/say";
 
 const WAYS = [["left", "right"], ["down", "up"], ["further", "nearer"]] as const;
 const ACTIONS: Readonly<Record<Exclude<Action, `take_${string}`>, Plain>> = {
-  ask: "ask for the string that another holds", give: "give the string that is asked for",
+  next_dancer: "next dancer", ask: "ask for the string that another holds", give: "give the string that is asked for",
   play: "play or pause", back: "seek back by one block", forward: "seek forward by one block", camera: "the show's camera, or your own seat", sound: "sound on or off", keep: "keep this as a new dance", picture: "save a picture of the stage",
   library: "library", strings: "strings", line: "line",
 };
@@ -46,7 +46,7 @@ export function summary(commands: readonly Command[], own: number | null = null)
 
 /** The commands in the order of the list of keys, in three groups. */
 export const GROUPS: readonly (readonly Command[])[] = [
-  ["take_right_hand", "take_left_hand", "take_right_leg", "take_left_leg", ...[2, 3, 1, 0, 4, 5].map((i) => HELD_INPUTS[i]), "ask", "give"],
+  ["take_right_hand", "take_left_hand", "take_right_leg", "take_left_leg", ...[2, 3, 1, 0, 4, 5].map((i) => HELD_INPUTS[i]), "next_dancer", "ask", "give"],
   ["play", "back", "forward", "camera", "sound", "keep", "picture", "library", "strings", "line"],
   DIGITAL_INPUTS,
 ];

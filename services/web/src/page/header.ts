@@ -3,6 +3,7 @@ import { element, setText } from "./dom";
 import { initial, isolated } from "./format";
 import { icon } from "./icons";
 import type { Presence } from "./model";
+import type { Box } from "../stage/boxes";
 import type { Theme } from "../stage/look";
 import { decimal } from "../words/numbers";
 import { language, series, say } from "../words/say";
@@ -14,6 +15,8 @@ export interface Header {
   piece(name: string): void;
   people(presence: Presence | null, self: string | null): void;
   theme(theme: Theme): void;
+  /** Where its parts are, CSS pixels. */
+  readonly boxes: readonly Box[];
 }
 
 export function createHeader(root: HTMLElement, on: { share(): void; keys(): void; language(): void; theme(): void }): Header {
@@ -28,8 +31,12 @@ export function createHeader(root: HTMLElement, on: { share(): void; keys(): voi
   const own = OTHER[language()];
   const other = element("button", { class: "round-button language", type: "button", lang: own.lang, "aria-label": own.name, title: own.name, onClick: on.language }, own.letter);
   const theme = element("button", { class: "round-button", type: "button", onClick: on.theme }, icon("theme"));
-  root.append(element("header", { class: "header" }, brand, element("div", { class: "header-right" }, people, share, keys, other, theme)));
+  const right = element("div", { class: "header-right" }, people, share, keys, other, theme);
+  root.append(element("header", { class: "header" }, brand, right));
   return {
+    get boxes() {
+      return [brand, right].map((part) => part.getBoundingClientRect());
+    },
     piece(name) {
       setText(piece, name);
       document.title = name ? `${isolated(name)} - Bunraku` : "Bunraku";

@@ -5,7 +5,7 @@ import { createDanceAs, type DanceAs, type DanceAsActions } from "./dance-as";
 import { element, setAttribute, setText } from "./dom";
 import { createDownloads, type Downloads } from "./downloads";
 import { clockTime, makingProgress, uploadProgress } from "./format";
-import { icon, motionGlyph } from "./icons";
+import { icon, motionGlyph, type IconName } from "./icons";
 import { createPanel, type Panel } from "./panels";
 import { percent } from "../words/numbers";
 import { say, sayAround, series } from "../words/say";
@@ -16,6 +16,8 @@ export interface Piece {
   /** What kind of recording: "40 Hz, 1.2 mm". */
   detail: string;
   seconds: number;
+  /** How many dance in it. */
+  performers: number;
 }
 
 export interface UploadRow {
@@ -47,6 +49,8 @@ export interface LibraryActions extends DanceAsActions {
   files(files: readonly File[]): void;
   choose(id: string): void;
   remove(piece: Piece): void;
+  /** Adds who dances in it to those on the stage; left out, that cannot be done here. */
+  add?(piece: Piece): void;
   download(piece: Piece, format: Format): void;
   close(): void;
 }
@@ -88,8 +92,11 @@ export function createLibrary(root: HTMLElement, on: LibraryActions): Library {
           const told = (open: boolean) => (disclosed = open ? piece.id : null);
           const one = createDownloads(piece.name, piece.id === disclosed, told, (format) => on.download(piece, format));
           downloads.set(piece.id, one);
-          const remove = element("button", { class: "round-button motion-remove", type: "button", "aria-label": say("Remove {name}", { name: piece.name }), onClick: () => on.remove(piece) }, icon("bin"));
-          return element("li", {}, choose, element("div", { class: "motion-tools" }, one.button, remove), one.choices);
+          const remove = tool("bin", "motion-remove", say("Remove {name}", { name: piece.name }), () => on.remove(piece));
+          const tools = element("div", { class: "motion-tools" }, one.button, remove);
+          // beside whom it is to dance
+          if (on.add && current !== null) tools.prepend(tool("add", "motion-add", say("Add {name} to the stage", { name: piece.name }), () => on.add?.(piece)));
+          return element("li", {}, choose, tools, one.choices);
         }),
       );
     },
@@ -113,6 +120,10 @@ export function createLibrary(root: HTMLElement, on: LibraryActions): Library {
       said.replaceChildren(box);
     },
   };
+}
+
+function tool(drawn: IconName, kind: string, name: string, act: () => void): HTMLElement {
+  return element("button", { class: `round-button ${kind}`, type: "button", "aria-label": name, title: name, onClick: act }, icon(drawn));
 }
 
 /** A row of `list` for what is under way, with the share done and what will be cancelled. */

@@ -1,5 +1,7 @@
 /** What the page shows of a session, in the words of the contract. */
 import type { Viewer } from "../client/viewer";
+import { LIMBS } from "../motion/skeleton";
+import { limbNumber, limbOf, performerOf } from "../wire/limbs";
 import { say, type Plain } from "../words/say";
 
 export type Presence = NonNullable<Viewer["presence"]>;
@@ -12,7 +14,23 @@ export const LIMB_NAMES = ["Left hand", "Right hand", "Left leg", "Right leg"] a
 
 /** The key (1 to 4) that takes a limb. */
 export function limbKey(limb: number): number {
-  return LIMB_ORDER.indexOf(limb) + 1;
+  return LIMB_ORDER.indexOf(limbOf(limb)) + 1;
+}
+
+/** How many performers these are the limbs of. */
+export function performersOf(limbs: readonly unknown[]): number {
+  return limbs.length / LIMBS.length;
+}
+
+/** Limbs as people read them, one performer's after another's. */
+export function limbsInOrder(performers: number): number[] {
+  return Array.from({ length: performers }, (_, k) => LIMB_ORDER.map((part) => limbNumber(k, part))).flat();
+}
+
+/** A limb within a sentence, of one of so many performers: "left hand", or where there are several "left hand of dancer 2". */
+export function limbName(limb: number, performers = 1): string {
+  const name = say(LIMB_NAMES[limbOf(limb)]).toLowerCase();
+  return performers > 1 ? say("{limb} of dancer {number}", { limb: name, number: performerOf(limb) + 1 }) : name;
 }
 
 /** Who holds a limb, as the page tells it. */
@@ -42,9 +60,9 @@ export interface LimbState {
   selected: boolean;
 }
 
-/** Those who ask for each of the four limbs, without oneself. */
-export function askers(presence: Presence | null, self: string | null): Asker[][] {
-  return [0, 1, 2, 3].map((limb) =>
+/** Those who ask for each of the limbs of so many performers, without oneself. */
+export function askers(presence: Presence | null, self: string | null, performers = 1): Asker[][] {
+  return Array.from({ length: limbNumber(performers, 0) }, (_, limb) =>
     (presence?.asks[limb] ?? []).filter((id) => id !== self).map((id) => {
       const person = presence?.puppeteers.find((one) => one.id === id);
       return { id, name: person?.name || say("Someone"), colour: person?.colour ?? 0 };
@@ -52,9 +70,9 @@ export function askers(presence: Presence | null, self: string | null): Asker[][
   );
 }
 
-/** Holders of the four limbs, null where free. */
-export function holders(presence: Presence | null, self: string | null): (Holder | null)[] {
-  return [0, 1, 2, 3].map((limb) => {
+/** Holders of the limbs of so many performers, null where free. The session may tell of fewer or more while the dance is changed. */
+export function holders(presence: Presence | null, self: string | null, performers = 1): (Holder | null)[] {
+  return Array.from({ length: limbNumber(performers, 0) }, (_, limb) => {
     const id = presence?.limbs[limb];
     if (!id) return null;
     const person = presence?.puppeteers.find((one) => one.id === id);

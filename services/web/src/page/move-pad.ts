@@ -1,4 +1,4 @@
-/** Press-and-hold arrows that move one limb: laid out as the keys Q W E, A S D are; of a leg only up and down. */
+/** Press-and-hold arrows that move one limb of the chosen performer: laid out as the keys Q W E, A S D are; of a leg only up and down. */
 import { DIGITAL_INPUTS, effectOf, type DigitalInput } from "../input/inputs";
 import { wayName } from "./command-names";
 import { element } from "./dom";

@@ -9,10 +9,11 @@ import type { KeysModal } from "./keys-modal";
 import { acceptDrops, createLibrary, type Library, type Piece } from "./library";
 import { createLineCard, type LineCard } from "./line-card";
 import { element } from "./dom";
+import { createNotice, type Notice } from "./notice";
 import { createPanels, PHONE, type Panels } from "./panels";
 import { createStringsCard, type StringsActions, type StringsCard } from "./strings-card";
 import { createTags, type Tags } from "./tags";
-import { createToast, type Toast } from "./toast";
+import { createToast, type Toasts } from "./toast";
 import type { SoundActions } from "./sound-control";
 import { createTransport, type PanelName, type Transport } from "./transport";
 import { say } from "../words/say";
@@ -35,6 +36,8 @@ export interface PageActions extends StringsActions, SoundActions, DanceAsAction
   choose(id: string): void;
   download(piece: Piece, format: Format): void;
   remove(piece: Piece): void;
+  /** Adds who dances in it to those on the stage; left out, that cannot be done here. */
+  add?(piece: Piece): void;
   mapping(mapping: Mapping): void;
   /** A panel opened or shut: the stage may have to be framed anew. */
   reframe(): void;
@@ -50,15 +53,13 @@ export interface Page {
   readonly tags: Tags;
   readonly asks: Asks;
   readonly panels: Panels;
-  readonly toast: Toast;
-  /** Words on an empty stage; null for none. */
-  notice(title: string | null, text?: string): void;
+  readonly toast: Toasts;
+  readonly notice: Notice;
 }
 
 export function createPage(root: HTMLElement, on: PageActions): Page {
-  const tags = createTags(root, on.ask);
-  const notice = element("div", { class: "notice", role: "status", hidden: true });
-  root.append(notice);
+  const tags = createTags(root, on.ask, undefined, undefined, () => header.boxes);
+  const notice = createNotice(root);
   const keys = createKeys(root, on.mapping, () => toast(say("The list of keys could not be fetched; try again when the line is back")));
   const header = createHeader(root, { share: on.share, language: on.language, theme: on.theme, keys: () => keys.show() });
   const messages = element("div", { class: "messages" });
@@ -85,10 +86,6 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   });
   acceptDrops(root, on.files);
   return {
-    header, transport, library, strings, line, keys, tags, asks, panels, toast,
-    notice(title, text = "") {
-      notice.hidden = title === null;
-      if (title !== null) notice.replaceChildren(element("b", {}, title), text);
-    },
+    header, transport, library, strings, line, keys, tags, asks, panels, toast, notice,
   };
 }

@@ -29,7 +29,13 @@ export interface Panels {
   closeLast(): boolean;
   /** Some panel covers the lower part of a phone. */
   readonly sheet: boolean;
+  /** Pixels of a desktop that panels, or the dock in their place, take to the left and to the right. */
+  readonly sides: readonly [left: number, right: number];
 }
+
+/** What a panel takes with its margin, and the dock with its own, pixels (art direction, section 6). */
+const PANEL = 356;
+const DOCK = 76;
 
 /** `changed` is told of every panel that opens or shuts. The button that opened a panel gets the focus back. */
 export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, changed: (name: PanelName, open: boolean) => void): Panels {
@@ -66,6 +72,10 @@ export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, change
     },
     get sheet() {
       return PHONE.matches && order.length > 0;
+    },
+    get sides() {
+      const taken = (...names: PanelName[]) => (names.some((name) => order.includes(name)) ? PANEL : DOCK);
+      return [taken("library"), taken("strings", "line")] as const;
     },
   };
 }

@@ -8,14 +8,15 @@ import { series, say } from "../words/say";
 const MOST_PAGES = 5;
 
 export function asPiece(motion: Motion): Piece {
-  return { id: motion.id, name: motion.name || pieceName(motion.filename), detail: kind(motion), seconds: motion.duration };
+  return { id: motion.id, name: motion.name || pieceName(motion.filename), detail: kind(motion), seconds: motion.duration, performers: motion.performers ?? 1 };
 }
 
-/** "BVH, 120 Hz, with music". */
-function kind({ filename, fps, tracks }: Motion): string {
+/** "BVH, 120 Hz, 2 dancers, with music". */
+function kind({ filename, fps, tracks, performers = 1 }: Motion): string {
   const ending = /\.([^.]+)$/.exec(filename)?.[1];
   const music = tracks?.includes("audio") ? say("with music") : null;
-  return series([ending?.toUpperCase(), `${Number.isInteger(fps) ? fps : figure(fps)} Hz`, music].filter((word) => word != null));
+  const dancers = performers > 1 ? say("{count} dancers", { count: performers }) : null;
+  return series([ending?.toUpperCase(), `${Number.isInteger(fps) ? fps : figure(fps)} Hz`, dancers, music].filter((word) => word != null));
 }
 
 export class Pieces {

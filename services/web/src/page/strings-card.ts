@@ -2,9 +2,11 @@
 import type { DigitalInput } from "../input/inputs";
 import { element, setAttribute, setText } from "./dom";
 import { limbIcon } from "./icons";
-import { LIMB_NAMES, LIMB_ORDER, limbKey, type Holder, type LimbState } from "./model";
+import { createDancerChooser, createNextDancer } from "./dancer-chooser";
+import { LIMB_NAMES, LIMB_ORDER, limbKey, limbName, performersOf, type Holder, type LimbState } from "./model";
 import { createMovePad } from "./move-pad";
 import { createPanel, type Panel } from "./panels";
+import { limbNumber } from "../wire/limbs";
 import { say, sayAround } from "../words/say";
 
 /** A notice stands so long, milliseconds. */
@@ -12,8 +14,8 @@ const NOTICE = 5_000;
 
 export interface StringsCard {
   readonly panel: Panel;
-  /** Shows the limbs; without `ready` nothing can be taken. */
-  render(limbs: readonly LimbState[], ready: boolean): void;
+  /** Shows the limbs of the `chosen` performer of all whose limbs these are; without `ready` nothing can be taken. */
+  render(limbs: readonly LimbState[], ready: boolean, chosen?: number): void;
   dock(shown: boolean): void;
   /** A quiet line about an input that was not taken as it came. */
   notice(text: string): void;
@@ -26,6 +28,9 @@ export interface StringsActions {
   give(limb: number): void;
   select(limb: number): void;
   focus(limb: number | null): void;
+  /** Chooses a performer, or the next one. */
+  dancer(performer: number): void;
+  nextDancer(): void;
   /** A button of the page goes down or comes up. */
   press(input: DigitalInput, down: boolean): void;
 }
@@ -34,28 +39,33 @@ type Doing = "toggle" | "ask" | "withdraw" | "give";
 
 export function createStringsCard(root: HTMLElement, on: StringsActions & { close(): void; keys(): void }): StringsCard {
   const panel = createPanel(root, "strings", say("Strings"), on.close);
-  const lights = (limb: number) => ({
-    onFocus: () => on.focus(limb),
+  /** Whose limbs the rows show, of how many. */
+  let [performer, performers] = [0, 1];
+  const own = (part: number) => limbNumber(performer, part);
+  const lights = (part: number) => ({
+    onFocus: () => on.focus(own(part)),
     onBlur: () => on.focus(null),
-    onPointerenter: () => on.focus(limb),
+    onPointerenter: () => on.focus(own(part)),
     onPointerleave: () => on.focus(null),
   });
   const rows = LIMB_ORDER.map((limb) => {
     const state = element("small");
-    const glyph = element("button", { class: "limb-glyph", type: "button", disabled: true, "aria-label": say("Move the {limb}", { limb: say(LIMB_NAMES[limb]).toLowerCase() }), onClick: () => on.select(limb) }, limbIcon(limb));
+    const glyph = element("button", { class: "limb-glyph", type: "button", disabled: true, onClick: () => on.select(own(limb)) }, limbIcon(limb));
     let doing: Doing = "toggle";
-    const action = element("button", { class: "limb-action", type: "button", onClick: () => on[doing](limb), ...lights(limb) });
+    const action = element("button", { class: "limb-action", type: "button", onClick: () => on[doing](own(limb)), ...lights(limb) });
     const pad = createMovePad(limb, on.press);
     const row = element("li", {}, glyph, element("span", {}, element("b", {}, say(LIMB_NAMES[limb])), state), action, pad.element);
     const render = (limbState: LimbState, ready: boolean) => {
       const { holder, askers, asked, selected } = limbState;
       setAttribute(row, "style", colour(holder));
+      const name = { limb: limbName(own(limb), performers) };
       setText(state, said(limbState));
       if (!holder) state.append(element("span", { class: "key-hint" }, say(", key {key}", { key: limbKey(limb) })));
       doing = !holder ? "toggle" : holder.mine ? (askers.length > 0 ? "give" : "toggle") : asked ? "withdraw" : "ask";
       const word = doing === "toggle" ? (holder ? "Release" : "Take") : ({ give: "Give", ask: "Ask", withdraw: "Withdraw" } as const)[doing];
       setText(action, say(word));
-      action.setAttribute("aria-label", say(ACTION_NAMES[word], { limb: say(LIMB_NAMES[limb]).toLowerCase() }));
+      action.setAttribute("aria-label", say(ACTION_NAMES[word], name));
+      glyph.setAttribute("aria-label", say("Move the {limb}", name));
       action.disabled = !ready;
       setAttribute(action, "data-mine", holder?.mine ?? false);
       const mine = holder?.mine ?? false;
@@ -68,15 +78,17 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
   });
   const discs = LIMB_ORDER.map((limb) => {
     const name = element("span", { hidden: true });
-    const disc = element("button", { type: "button", onClick: () => on.toggle(limb), ...lights(limb) }, limbIcon(limb), name);
+    const disc = element("button", { type: "button", onClick: () => on.toggle(own(limb)), ...lights(limb) }, limbIcon(limb), name);
     return { limb, disc, name };
   });
   const hint = element("p", { class: "strings-hint" }, ...sayAround("Drag a ring on the stage, or press {first} to {last}.", { first: element("kbd", {}, "1"), last: element("kbd", {}, "4") }));
   const notice = element("p", { class: "strings-notice", role: "status", "aria-live": "polite" });
   // on a phone the header has no room for it
   const keys = element("button", { class: "text-button", type: "button", onClick: on.keys }, say("Touch, gamepad and keys"));
-  panel.body.append(element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)), hint, notice, keys);
-  const dock = element("nav", { class: "dock", "aria-label": say("Take a string") }, ...discs.map(({ disc }) => disc));
+  const chooser = createDancerChooser(on.dancer);
+  const next = createNextDancer(on.nextDancer);
+  panel.body.append(chooser.element, element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)), hint, notice, keys);
+  const dock = element("nav", { class: "dock", "aria-label": say("Take a string") }, next.element, ...discs.map(({ disc }) => disc));
   root.append(dock);
   let fading: ReturnType<typeof setTimeout> | undefined;
   return {
@@ -93,14 +105,17 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
         hint.hidden = false;
       }, NOTICE);
     },
-    render(limbs, ready) {
-      for (const { limb, render } of rows) render(limbs[limb], ready);
+    render(limbs, ready, chosen = 0) {
+      [performer, performers] = [chosen, performersOf(limbs)];
+      for (const part of [chooser, next]) part.render(limbs, chosen);
+      for (const { limb, render } of rows) render(limbs[own(limb)], ready);
       for (const { limb, disc, name } of discs) {
-        const { holder, asked } = limbs[limb];
-        const limbName = say(LIMB_NAMES[limb]).toLowerCase();
+        const { holder, asked } = limbs[own(limb)];
+        const named = limbName(own(limb), performers);
+        const capital = named.charAt(0).toUpperCase() + named.slice(1);
         setAttribute(disc, "style", colour(holder));
         setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute("aria-label", !holder ? say("Take the {limb}", { limb: limbName }) : holder.mine ? say("Release the {limb}, held by you", { limb: limbName }) : say(asked ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", { limb: say(LIMB_NAMES[limb]), name: holder.name }));
+        disc.setAttribute("aria-label", !holder ? say("Take the {limb}", { limb: named }) : holder.mine ? say("Release the {limb}, held by you", { limb: named }) : say(asked ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", { limb: capital, name: holder.name }));
         disc.disabled = !ready;
         name.hidden = !holder;
         setText(name, holder?.name ?? "");

@@ -20,6 +20,8 @@ const GAP = 12;
 const MORE = 10;
 /** From the picture's sides. */
 const SIDE = 8;
+/** Places that are tried before the names are laid one after another, as well as each can: all there are of four names, and many of more. */
+const MOST_TRIES = 5_000;
 
 /**
  * The places of `labels`, in their order, null for null. `keep` are boxes that nothing may cover beside the bars, `before` what this told of the frame before;
@@ -32,7 +34,7 @@ export function layLabels(labels: readonly (Label | null)[], keep: readonly Box[
     const last = before[nth]?.place ?? 0;
     return label && placesOf(label, width).map((box, place): Choice => ({ box, place, margin: place < last ? MORE : 0, out: Math.max(0, top - box.top) * label.width }));
   });
-  const laid = layFree(choices, taken);
+  const laid = layFree(choices, taken, { left: MOST_TRIES });
   if (laid) return laid;
   return choices.map((places) => {
     if (!places) return null;
@@ -49,12 +51,12 @@ interface Choice extends Laid {
   out: number;
 }
 
-/** The first choices that together cover nothing, null where there are none: at most four names of eight places each are tried. */
-function layFree([places, ...others]: readonly (readonly Choice[] | null)[], taken: readonly Box[]): (Laid | null)[] | null {
+/** The first choices that together cover nothing, null where there are none, or none was found in so many `tries`. */
+function layFree([places, ...others]: readonly (readonly Choice[] | null)[], taken: readonly Box[], tries: { left: number }): (Laid | null)[] | null {
   if (places === undefined) return [];
   for (const choice of places ?? [null]) {
-    if (choice && covered(choice, taken) > 0) continue;
-    const rest = layFree(others, choice ? [...taken, choice.box] : taken);
+    if (choice && (tries.left-- <= 0 || covered(choice, taken) > 0)) continue;
+    const rest = layFree(others, choice ? [...taken, choice.box] : taken, tries);
     if (rest) return [choice && { box: choice.box, place: choice.place }, ...rest];
   }
   return null;

@@ -1,8 +1,10 @@
 /** Names over the strings, with "Ask" where another holds one, and once the invitation by the nearer hand. */
-import { element, setText } from "./dom";
+import { element, setAttribute, setText } from "./dom";
 import type { Box } from "../stage/boxes";
+import { LIMBS } from "../motion/skeleton";
+import { MOST_LIMBS } from "../wire/limbs";
 import { say } from "../words/say";
-import { LIMB_NAMES, type LimbState } from "./model";
+import { limbName, type LimbState } from "./model";
 import { layLabels, type Laid } from "./tag-layout";
 
 export interface Place {
@@ -11,8 +13,8 @@ export interface Place {
 }
 
 export interface Tags {
-  /** Puts each holder's tag by its bar on the screen, CSS pixels, where it covers nothing; null hides it. `face` is kept free too. */
-  render(limbs: readonly LimbState[], bars: readonly (Box | null)[], face: Box | null): void;
+  /** Puts each holder's tag by its bar on the screen, CSS pixels, where it covers nothing; null hides it. `faces` are kept free too. */
+  render(limbs: readonly LimbState[], bars: readonly (Box | null)[], faces: readonly Box[]): void;
   /** Puts the invitation beside a place; null takes it away. */
   invite(place: Place | null): void;
 }
@@ -22,12 +24,12 @@ const TOP = 32;
 
 /**
  * `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. They keep in a
- * picture of `width` CSS pixels and below `top`.
+ * picture of `width` CSS pixels and below `top`. `beside` are boxes at the picture's edge, where the strings of several performers may hang.
  */
-export function createTags(root: ParentNode & Node, ask: (limb: number) => void, width: () => number = () => innerWidth, top = TOP): Tags {
+export function createTags(root: ParentNode & Node, ask: (limb: number) => void, width: () => number = () => innerWidth, top = TOP, beside: () => readonly Box[] = () => []): Tags {
   const layer = element("div", { class: "tags", "aria-hidden": "true" });
   root.append(layer);
-  const tags = [0, 1, 2, 3].map((i) => {
+  const tags = Array.from({ length: MOST_LIMBS }, (_, i) => {
     const name = document.createTextNode("");
     const limb = element("span");
     const button = element("button", { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => ask(i) }, say("Ask"));
@@ -39,21 +41,24 @@ export function createTags(root: ParentNode & Node, ask: (limb: number) => void,
   const invitation = element("div", { class: "tag invitation", hidden: true }, say("Take a hand"));
   layer.append(invitation);
   return {
-    render(limbs, bars, face) {
-      const shown = tags.map((one, i) => (limbs[i].holder && bars[i] ? one : null));
+    render(limbs, bars, faces) {
+      setAttribute(layer, "data-several", limbs.length > LIMBS.length);
+      const shown = tags.map((one, i) => (limbs[i]?.holder && bars[i] ? one : null));
       shown.forEach((one, i) => {
         tags[i].tag.hidden = !one;
-        const { holder, asked } = limbs[i];
+        const { holder = null, asked = false } = limbs[i] ?? {};
         if (!one || !holder) return;
         setText(one.name, holder.name);
-        setText(one.limb, asked ? say("asked") : say(LIMB_NAMES[i]).toLowerCase());
+        // whose limb it is the string shows that it hangs by
+        setText(one.limb, asked ? say("asked") : limbName(i));
         one.button.hidden = holder.mine || asked;
         one.tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
         // asking for its size lays the page out: only where what it says is new
         const says = `${holder.name}\n${asked}\n${holder.mine}`;
         if (one.says !== says || one.width === 0) [one.says, one.width, one.height] = [says, one.tag.offsetWidth, one.tag.offsetHeight];
       });
-      laid = layLabels(shown.map((one, i) => one && { bar: bars[i] as Box, width: one.width, height: one.height }), face ? [face] : [], laid, width(), top);
+      const kept = limbs.length > LIMBS.length && shown.some(Boolean) ? [...faces, ...beside()] : faces;
+      laid = layLabels(shown.map((one, i) => one && { bar: bars[i] as Box, width: one.width, height: one.height }), kept, laid, width(), top);
       laid.forEach((place, i) => {
         if (place) tags[i].tag.style.transform = `translate(${place.box.left.toFixed(1)}px, ${place.box.top.toFixed(1)}px)`;
       });

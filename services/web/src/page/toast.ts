@@ -1,5 +1,6 @@
-/** One short message at a time, read out politely, gone after a while; it may offer something to do. */
+/** Short messages, read out politely: one at a time that is gone after a while and may offer something to do, and those that stand as long as what they tell of. */
 import { element } from "./dom";
+import { createStanding } from "./standing";
 
 export interface ToastAction {
   label: string;
@@ -10,16 +11,22 @@ export interface ToastAction {
 
 export type Toast = (message: string, ...actions: readonly ToastAction[]) => void;
 
+export interface Toasts extends Toast {
+  /** Says that the line is lost until it is back, which null tells. */
+  lost(message: string | null): void;
+}
+
 /** Milliseconds; with something to do there is more to read and to reach. */
 const LASTING = 3_200;
 const OFFERED = 8_000;
 
-export function createToast(root: HTMLElement): Toast {
-  const live = element("div", { role: "status", "aria-live": "polite" });
+export function createToast(root: HTMLElement): Toasts {
+  const live = element("div", { class: "toasts", role: "status", "aria-live": "polite", "aria-atomic": "false" });
   root.append(live);
+  const stand = createStanding<"line" | "moment">(live);
   let timer: ReturnType<typeof setTimeout> | undefined;
-  const clear = () => live.replaceChildren();
-  return (message, ...actions) => {
+  const clear = () => stand("moment", null);
+  const show: Toast = (message, ...actions) => {
     clearTimeout(timer);
     const toast = element("div", { class: "toast" }, message);
     for (const action of actions) {
@@ -31,7 +38,8 @@ export function createToast(root: HTMLElement): Toast {
       if (action.key) button.append(element("kbd", { class: "key-hint" }, action.key));
       toast.append(button);
     }
-    live.replaceChildren(toast);
+    stand("moment", toast);
     timer = setTimeout(clear, actions.length > 0 ? OFFERED : LASTING);
   };
+  return Object.assign(show, { lost: (message: string | null) => stand("line", message === null ? null : element("div", { class: "toast" }, message)) });
 }

@@ -27,7 +27,7 @@ export async function uploadAll(files: readonly File[], library: Library, done: 
 }
 
 /** Shows what went wrong with something named `name`. */
-export function tell(library: Library, name: string, error: unknown): void {
+export function tell(library: Pick<Library, "problem">, name: string, error: unknown): void {
   if (!(error instanceof ProblemError)) throw error;
   const { title, detail, line, hint } = error;
   library.problem(name, title, line === null ? detail : say("{detail} (line {line})", { detail, line }), hint);

@@ -61,6 +61,12 @@ export abstract class Store<Track extends Timing, Block extends { readonly frame
     return track.startUs(end % track.blocks) + (end >= track.blocks ? track.durationUs : 0) - position;
   }
 
+  /** Whether the track is, to a frame, as long as a motion of `duration` microseconds, or longer. */
+  protected lasts(duration: number): boolean {
+    const { track } = this;
+    return track.durationUs + 1e6 / track.fps > duration;
+  }
+
   /** The block after block `index`, in a loop the first after the last; null where there is none, or it is not here. */
   protected following(index: number, loop: boolean): Block | null {
     return index + 1 < this.track.blocks ? this.blocks[index + 1] : loop ? this.blocks[0] : null;
@@ -74,16 +80,17 @@ export class BlockStore extends Store<MotionTrack, MotionBlock> {
   /**
    * The pose at motion time `position` in microseconds, written into `out`; false, and `out` untouched, where its block is
    * missing. Between the last frame of a block and the first of the next it is the mix of the two where the next is here, at
-   * the end of a loop too.
+   * the end of a loop too where the track is as long as the motion, of `duration` microseconds. Past the end of a shorter one
+   * it stands still.
    */
-  poseAt(position: number, loop: boolean, out: Pose): boolean {
+  poseAt(position: number, loop: boolean, out: Pose, duration = this.track.durationUs): boolean {
     const { track } = this;
     const index = track.blockAt(position);
     const block = this.blocks[index];
     if (!block) return false;
     const instant = (position * track.fps) / 1e6 - track.firstFrame(index);
     const past = instant - (block.frames - 1);
-    const following = this.following(index, loop);
+    const following = this.following(index, loop && this.lasts(duration));
     if (past <= 0 || !following) {
       block.at(Math.min(Math.max(instant, -0.5), block.frames - 0.5), out);
       return true;
@@ -121,7 +128,7 @@ export class SceneStore extends Store<SceneTrack, SceneBlock> {
     this.any = true;
     const instant = (position * track.fps) / 1e6 - track.firstFrame(index);
     const past = instant - (block.frames - 1);
-    const following = this.following(index, loop && track.durationUs + 1e6 / track.fps > duration);
+    const following = this.following(index, loop && this.lasts(duration));
     if (past <= 0 || !following) {
       block.at(Math.min(Math.max(instant, -0.5), block.frames - 0.5), shown);
       return shown;

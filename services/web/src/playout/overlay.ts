@@ -2,7 +2,8 @@
 
 import { fromRotationVector, slerp } from "../motion/rotation";
 import { LIMB_JOINTS, LIMBS, type Pose } from "../motion/skeleton";
-import { OVERLAY_FRAME, type Overlay } from "../wire/messages";
+import { limbNumber } from "../wire/limbs";
+import { OVERLAY_FRAME, type Overlay } from "../wire/overlay";
 
 /** With no overlay for so long, microseconds, the dance is alone. */
 export const SILENCE = 250_000;
@@ -15,15 +16,18 @@ const UNIT = Math.PI / 32767;
 /** Numbers of one limb: three quaternions. */
 const LIMB_SIZE = 12;
 
+/** The bits of one performer's limbs. */
+const LIMBS_MASK = (1 << LIMBS.length) - 1;
+
 interface Laid {
   due: number;
   mask: number;
-  /** For each limb its three joints' local rotations, w x y z (48). */
+  /** For each limb up to the last pulled one its three joints' local rotations, w x y z (12). */
   rotations: Float64Array;
 }
 
 function read(limbs: Overlay["limbs"], due: number): Laid {
-  const laid = { due, mask: 0, rotations: new Float64Array(LIMBS.length * LIMB_SIZE) };
+  const laid = { due, mask: 0, rotations: new Float64Array((1 + Math.max(-1, ...limbs.keys())) * LIMB_SIZE) };
   for (const [limb, numbers] of limbs) {
     laid.mask |= 1 << limb;
     for (let joint = 0; joint < 3; joint++) {
@@ -50,12 +54,12 @@ export class Overlays {
   }
 
   /**
-   * Lays the limbs pulled at `clock` over `pose`; the mask of the limbs laid.
+   * Lays the limbs of `performer` pulled at `clock` over its `pose`; the mask of those laid, bit 0 the first of its four.
    *
    * Between two overlays a limb goes from the one before to the one after, or from the dance where the one before leaves it to
    * the dance. With none after, or none before, the nearest holds for `SILENCE` at most.
    */
-  lay(clock: number, pose: Pose): number {
+  lay(clock: number, pose: Pose, performer = 0): number {
     const { laid } = this;
     let at = laid.length;
     while (at > 0 && laid[at - 1].due > clock) at--;
@@ -66,16 +70,17 @@ export class Overlays {
     if (!before || !goal) return 0;
     const mix = goal === before ? 1 : (clock - before.due) / (goal.due - before.due);
     for (let limb = 0; limb < LIMBS.length; limb++) {
-      if (!((goal.mask >> limb) & 1)) continue;
-      const held = (before.mask >> limb) & 1;
+      const number = limbNumber(performer, limb);
+      if (!((goal.mask >> number) & 1)) continue;
+      const held = (before.mask >> number) & 1;
       for (let joint = 0; joint < 3; joint++) {
-        const from = limb * LIMB_SIZE + joint * 4;
+        const from = number * LIMB_SIZE + joint * 4;
         const to = (LIMB_JOINTS[limb] + joint) * 4;
         if (held) slerp(pose.rotations, to, before.rotations, from, goal.rotations, from, mix);
         else slerp(pose.rotations, to, pose.rotations, to, goal.rotations, from, mix);
       }
     }
-    return goal.mask;
+    return (goal.mask >> limbNumber(performer, 0)) & LIMBS_MASK;
   }
 
   private insert(frame: Laid): void {

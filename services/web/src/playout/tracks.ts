@@ -1,9 +1,10 @@
-/** The tracks of a stream that are known here: the dance, and the sound, the cameras and the lights beside it. */
+/** The tracks of a stream that are known here: the dance, and the other performers, the sound, the cameras and the lights beside it. */
 
 import { AudioTrack } from "../codec/audio";
 import { DamagedBlock } from "../codec/errors";
 import { SceneTrack } from "../codec/scene";
 import { MotionTrack } from "../codec/track";
+import { MOST_PERFORMERS } from "../wire/limbs";
 import type { Track } from "../wire/messages";
 import { BlockStore, SceneStore } from "./blocks";
 import { AudioStore } from "./sounds";
@@ -11,7 +12,10 @@ import { AudioStore } from "./sounds";
 type TrackStore = BlockStore | SceneStore | AudioStore;
 
 export class Tracks {
+  /** The first performer's: its length is the motion's. */
   readonly dance: BlockStore;
+  /** By number, null of one that cannot be read: it keeps its number, by which limbs are told apart. */
+  readonly performers: (BlockStore | null)[] = [];
   /** Cameras and lights, in the Description's order. */
   readonly scenes: SceneStore[] = [];
   /** The sound, null where there is none: the first of the Description. */
@@ -23,13 +27,12 @@ export class Tracks {
 
   /**
    * @param described the `tracks` of a Description; those of a type or codec that is not known here are skipped
-   * @throws DamagedBlock where there is no motion among them that can be played here
+   * @throws DamagedBlock where there is no motion among them, or the first cannot be played here
    */
   constructor(described: readonly Track[]) {
     const index = described.findIndex(({ type }) => type === "motion");
     if (index < 0) throw new DamagedBlock("the stream has no motion in it");
     this.dance = new BlockStore(MotionTrack.fromDescription(described[index]));
-    this.stores.set(index, this.dance);
     this.add(0, described);
   }
 
@@ -39,20 +42,31 @@ export class Tracks {
       const number = first + nth;
       if (number < this.told) return;
       try {
-        if (map.type === "camera" || map.type === "light") {
-          const store = new SceneStore(SceneTrack.fromDescription(map));
-          this.stores.set(number, store);
-          this.scenes.push(store);
-        } else if (map.type === "audio" && !this.sound) {
-          this.sound = new AudioStore(AudioTrack.fromDescription(map, this.dance.track));
-          this.stores.set(number, this.sound);
-        }
+        const store = this.keeping(map);
+        if (store) this.stores.set(number, store);
       } catch (error) {
         if (!(error instanceof DamagedBlock)) throw error;
-        console.warn(`the ${map.type} of this motion is left out: ${error.message}`);
+        if (map.type === "motion") this.performers.push(null);
+        console.warn(`the ${map.type} at ${number} of this stream is left out: ${error.message}`);
       }
     });
     this.told = Math.max(this.told, first + described.length);
+  }
+
+  /** What the next track told of is kept in, null where it is of no use here. */
+  private keeping(map: Track): TrackStore | null {
+    if (map.type === "motion" && this.performers.length < MOST_PERFORMERS) {
+      const store = this.performers.length === 0 ? this.dance : new BlockStore(MotionTrack.fromDescription(map));
+      this.performers.push(store);
+      return store;
+    }
+    if (map.type === "camera" || map.type === "light") {
+      const store = new SceneStore(SceneTrack.fromDescription(map));
+      this.scenes.push(store);
+      return store;
+    }
+    if (map.type === "audio" && !this.sound) return (this.sound = new AudioStore(AudioTrack.fromDescription(map, this.dance.track)));
+    return null;
   }
 
   /** What keeps the blocks of the track of this index, null where it is not known here. */

@@ -2,9 +2,10 @@
 import {
   BufferGeometry, Color, Euler, Float32BufferAttribute, InstancedMesh, Matrix4, MeshStandardMaterial, Quaternion, Vector3,
 } from "three";
+import { MOST_LIMBS } from "../wire/limbs";
 import { lathe, ring, type Surface } from "./surface";
 
-const BARS = 4;
+const BARS = MOST_LIMBS;
 /** A turned rod: (place, radius) in fractions of its length. */
 const ROD = [
   [0, 0.0001], [0.004, 0.0152], [0.03, 0.0247], [0.06, 0.019], [0.09, 0.0228], [0.3, 0.0323], [0.5, 0.038], [0.7, 0.0323],

@@ -1,5 +1,5 @@
 /**
- * The audience's camera: a seat of one's own, framed by layout, with a small orbit that springs back and a step back when hands
+ * The audience's camera: a seat of one's own, framed by layout, as far back as several dancers need, with a small orbit that springs back and a step back when hands
  * reach far; or the show's camera, where the motion has one and it is followed.
  */
 import { MathUtils, PerspectiveCamera } from "three";
@@ -20,6 +20,12 @@ const TRANSPORT = 110;
 const DRAWN_FOR = 900;
 const HALF_FIELD = (13 * Math.PI) / 180;
 const EYE = 0.08;
+/** How far is seen from before one dancer, metres. */
+const FAR = 40;
+/** Metres that the standard figure takes to either side of its place, where there are several. */
+const ELBOW_ROOM = 0.9;
+/** Of the picture's width, what several dancers have at least, whatever stands before it. */
+const LEAST_FREE = 0.4;
 const YAW = (25 * Math.PI) / 180;
 const PITCH_LOW = (-5 * Math.PI) / 180;
 const PITCH_HIGH = (15 * Math.PI) / 180;
@@ -31,11 +37,23 @@ const OVER = 0.9;
 const UNTURNED = 1e-3;
 
 export class AudienceCamera {
-  readonly camera = new PerspectiveCamera(26, 1, 0.1, 40);
+  readonly camera = new PerspectiveCamera(26, 1, 0.1, FAR);
   /** What is seen, world frame, whatever the window's shape. */
   readonly view: View = createView();
   still = false;
   scale = 1;
+  /** How many times further back the seat is than one dancer needs. */
+  wide = 1;
+  /** The furthest that dancers were to a side, and nearer, since the last cut, metres: the seat goes back for them, and not forth again. */
+  #aside = 0;
+  #near = 0;
+  /** Of the picture's width, what they have, and how far the middle of that is from the picture's. */
+  #free = 1;
+  #middle = 0;
+  #shift = 0;
+  #shifted = 0;
+  /** Whether the seat is still to be taken for the first time since the last cut. */
+  #fresh = true;
   readonly #own = createView();
   readonly #show = createView();
   #hasShow = false;
@@ -54,6 +72,16 @@ export class AudienceCamera {
   #pitch = 0;
   #back = 0;
   #untouched = REST;
+
+  /**
+   * What of a picture `width` pixels wide stands before it to the left and to the right, pixels: several dancers are seen between. One alone is in the middle.
+   */
+  set sides({ left, right, width }: { left: number; right: number; width: number }) {
+    const free = 1 - (left + right) / width;
+    const narrow = free < LEAST_FREE;
+    this.#free = narrow ? 1 : free;
+    this.#middle = narrow ? 0 : (left - right) / 2 / width;
+  }
 
   /** Changes the framing, eased over 0.6 s. In a window of few pixels the transport takes a larger share: the puppet makes room. */
   frame(framing: Framing, height: number): void {
@@ -99,6 +127,20 @@ export class AudienceCamera {
     this.#met = false;
     this.#hasShow = false;
     this.#over = 0;
+    this.#aside = this.#near = 0;
+    this.#fresh = true;
+  }
+
+  /** How far to the side dancers are seen, metres; 0 where there is one alone. */
+  get aside(): number {
+    return this.#aside;
+  }
+
+  /** Where the dancers are, metres in the frame of the camera's parent. One alone has its picture; several have all theirs together. */
+  stand(dancers: readonly { x: number; z: number }[]): void {
+    if (dancers.length < 2) return;
+    this.#aside = Math.max(this.#aside, ELBOW_ROOM * this.scale, ...dancers.map(({ x }) => Math.abs(x) + ELBOW_ROOM * this.scale));
+    this.#near = Math.max(this.#near, ...dancers.map(({ z }) => z));
   }
 
   /** Turns the view by a drag, radians, in one's own seat; it springs back after 4 s untouched. Leaves the show's camera. */
@@ -130,6 +172,13 @@ export class AudienceCamera {
   #seat(seconds: number, reach: number): void {
     const [visible, look] = this.#goal;
     const share = this.still ? 1 : 1 - Math.exp((-4 / EASE) * seconds);
+    // as far back as shows the dancers at the sides, and as far from the nearest as from one alone
+    const one = ((visible / 2) * this.scale) / Math.tan(HALF_FIELD);
+    const wide = (Math.max(one, this.#aside / (Math.tan(HALF_FIELD) * this.camera.aspect * this.#free)) + this.#near) / one;
+    this.wide += (wide - this.wide) * (this.#fresh ? 1 : share);
+    const shift = this.#aside > 0 ? this.#middle : 0;
+    this.#shift += (shift - this.#shift) * (this.#fresh ? 1 : share);
+    this.#fresh &&= this.#aside === 0;
     this.#visible += (visible - this.#visible) * share;
     this.#height += (look - this.#height) * share;
     this.#untouched += seconds;
@@ -143,10 +192,11 @@ export class AudienceCamera {
     this.#back += (wanted - this.#back) * (this.still ? 1 : 1 - Math.exp((wanted > this.#back ? -3 : -0.7) * seconds));
 
     const { position, gaze } = this.#own;
-    const distance = ((this.#visible / 2) * this.scale * (1 + this.#back)) / Math.tan(HALF_FIELD);
-    gaze.set(0, this.#height * this.scale, 0);
+    const scale = this.scale * this.wide;
+    const distance = ((this.#visible / 2) * scale * (1 + this.#back)) / Math.tan(HALF_FIELD);
+    gaze.set(0, this.#height * scale, 0);
     const flat = distance * Math.cos(this.#pitch);
-    position.set(Math.sin(this.#yaw) * flat, gaze.y + EYE * this.scale + distance * Math.sin(this.#pitch), Math.cos(this.#yaw) * flat);
+    position.set(Math.sin(this.#yaw) * flat, gaze.y + EYE * scale + distance * Math.sin(this.#pitch), Math.cos(this.#yaw) * flat);
     const { parent } = this.camera;
     if (parent) for (const place of [position, gaze]) parent.localToWorld(place);
     this.#own.fov = 2 * HALF_FIELD;
@@ -157,9 +207,16 @@ export class AudienceCamera {
     const { camera, view } = this;
     const share = MathUtils.smootherstep(this.#over, 0, 1);
     const fov = MathUtils.radToDeg(view.fov + share * (fovIn(view.fov, camera.aspect) - view.fov));
-    if (Math.abs(fov - camera.fov) > 1e-9) {
-      camera.fov = fov;
+    const shift = this.#shift * (1 - share);
+    const far = FAR * this.wide;
+    if (Math.abs(fov - camera.fov) > 1e-9 || Math.abs(far - camera.far) > 1e-6) {
+      Object.assign(camera, { fov, far });
       camera.updateProjectionMatrix();
+    }
+    if (Math.abs(shift - this.#shifted) > 1e-6) {
+      const { aspect } = camera;
+      camera.setViewOffset(aspect, 1, -shift * aspect, 0, aspect, 1);
+      this.#shifted = shift;
     }
     camera.position.copy(view.position);
     camera.parent?.worldToLocal(camera.position);

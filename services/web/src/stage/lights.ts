@@ -22,9 +22,9 @@ export interface Lights {
   /**
    * Moves on by `seconds`. The first of a show's `lights` stands for the key, the second for the warm rim, the third for the cool
    * one; full, each throws on the dancer what the look's own does, from its own place and in its own colour. The group's world
-   * matrix is up to date.
+   * matrix is up to date. What is lit is `wide` times wider than one dancer's.
    */
-  show(lights: readonly LightState[], seconds: number): void;
+  show(lights: readonly LightState[], seconds: number, wide?: number): void;
 }
 
 /** A spot as the look has it, and as it stands in for a light of the show. */
@@ -63,13 +63,14 @@ export function createLights(): Lights {
   for (const light of [key, fill, roles[1].light, roles[2].light]) group.add(light, light.target);
   let filled = 1;
   let level = 1;
+  let wide = 1;
   const apply = () => {
-    for (const one of roles) mix(one, level);
+    for (const one of roles) mix(one, level, wide);
     fill.intensity = filled * level;
     const { camera } = key.shadow;
     const distance = key.position.distanceTo(key.target.position);
-    camera.near = Math.max(distance - SHADOWED[0], 0.2);
-    camera.far = distance + SHADOWED[1];
+    camera.near = Math.max(distance - SHADOWED[0] * wide, 0.2);
+    camera.far = distance + SHADOWED[1] * wide;
     camera.updateProjectionMatrix();
   };
   return {
@@ -92,7 +93,8 @@ export function createLights(): Lights {
       });
       apply();
     },
-    show(lights, seconds) {
+    show(lights, seconds, times = 1) {
+      wide = times;
       roles.forEach((one, at) => {
         const told = lights[at];
         if (told) read(told, one, group);
@@ -117,12 +119,12 @@ function read({ full, numbers }: LightState, { shown, light }: Role, group: Grou
   shown.share = numbers[6] / full;
 }
 
-/** Between the look's own light, of which `level` is left, and the show's. From any distance as much light and as wide a cone reach the dancer. */
-function mix({ light, place, angle, distance, colour, intensity, shown, over }: Role, level: number): void {
+/** Between the look's own light, of which `level` is left, from `wide` times further away, and the show's. From any distance as much light and as wide a cone reach the dancers. */
+function mix({ light, place, angle, distance, colour, intensity, shown, over }: Role, level: number, wide: number): void {
   const share = MathUtils.smoothstep(over, 0, 1);
-  light.position.lerpVectors(place, shown.place, share);
+  light.position.copy(place).multiplyScalar(wide).lerp(shown.place, share);
   const nearer = distance / Math.max(light.position.distanceTo(light.target.position), NEAREST);
   light.color.lerpColors(colour, shown.colour, share);
   light.intensity = (intensity * MathUtils.lerp(level, shown.share, share)) / nearer ** 2;
-  light.angle = Math.min(Math.atan(Math.tan(angle) * nearer), WIDEST);
+  light.angle = Math.min(Math.atan(Math.tan(angle) * nearer * wide), WIDEST);
 }

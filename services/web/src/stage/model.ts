@@ -6,6 +6,7 @@ import { PATTERN } from "./finish";
 import { faceTexture } from "./paint";
 import { Puppet } from "./puppet";
 import { SIDES } from "./standard";
+import { Workshop } from "./workshop";
 
 /** Triangles whose normals look less forward than this have no face painted on them. */
 const FRONT = 0.2;
@@ -14,7 +15,7 @@ const FRONT = 0.2;
 export function puppetModel(figure: Figure): PuppetModel {
   // a file has no use for the paint of the stage
   const unpainted = { face: new Texture(), asanoha: new Texture() };
-  const puppet = new Puppet(figure, unpainted, { value: 0 });
+  const puppet = new Puppet(figure, new Workshop(unpainted, { value: 0 }));
   const { geometry } = puppet.group.getObjectByName("figure") as SkinnedMesh;
   const values = (name: string) => geometry.getAttribute(name).array;
   const normals = Float32Array.from(values("normal")), pattern = values("pattern");

@@ -1,28 +1,11 @@
 /** The puppet: bones named as H-Anim names the joints, one skinned mesh over them, and by night its reflection. */
-import { Bone, Group, Matrix4, Skeleton, SkinnedMesh, Vector3, type BufferGeometry, type IUniform, type Material } from "three";
+import { Bone, Group, Matrix4, Skeleton, SkinnedMesh, Vector3, type BufferGeometry, type Material } from "three";
 import { JOINTS, PARENTS, type Figure, type Pose } from "../motion/skeleton";
-import { Assembly } from "./assembly";
-import { figureScale, fitTo, restPositions } from "./fit";
-import { addArms } from "./parts/arms";
-import { addBodice } from "./parts/bodice";
-import { addHakama } from "./parts/hakama";
-import { addHead } from "./parts/head";
-import { addLegs } from "./parts/legs";
-import { addSleeves } from "./parts/sleeves";
+import { figureScale, restPositions } from "./fit";
 import { footing, handleOf, type Performer } from "./performer";
-import { figureMaterial, plainFigureMaterial, type Paint } from "./shading";
 import { SleeveBone } from "./sleeve-bone";
 import { SIDES } from "./standard";
-
-/** Bones in the order of the geometry's skin indices: the joints of the contract, then the two sleeves. */
-export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
-
-/** All parts on one dancer's figure, in its rest pose. Pure: takes no graphics context. */
-export function puppetGeometry(figure: Figure): BufferGeometry {
-  const assembly = new Assembly(BONES, fitTo(figure));
-  for (const add of [addLegs, addArms, addHead, addBodice, addHakama, addSleeves]) add(assembly);
-  return assembly.geometry();
-}
+import { BONES, type Workshop } from "./workshop";
 
 export class Puppet implements Performer {
   readonly group = new Group();
@@ -32,15 +15,13 @@ export class Puppet implements Performer {
   readonly #ankleHeight: number;
   readonly #bones: Bone[];
   readonly #sleeves: SleeveBone[];
-  readonly #geometry: BufferGeometry;
+  readonly #workshop: Workshop;
   readonly #mesh: SkinnedMesh<BufferGeometry, Material>;
-  readonly #paint: Paint;
-  readonly #full: Material;
-  #plain: Material | null = null;
   readonly #reflection: SkinnedMesh<BufferGeometry, Material>;
 
-  constructor(figure: Figure, paint: Paint, floorAt: IUniform<number>) {
+  constructor(figure: Figure, workshop: Workshop) {
     this.figure = figure;
+    this.#workshop = workshop;
     this.scale = figureScale(figure);
     this.#ankleHeight = -figure.offsets[JOINTS.indexOf("l_midtarsal") * 3 + 1];
     this.group.name = "puppet";
@@ -48,14 +29,12 @@ export class Puppet implements Performer {
     this.group.add(this.#bone("humanoid_root"), this.#bone("l_sleeve"), this.#bone("r_sleeve"));
     this.group.updateMatrixWorld(true);
     const skeleton = new Skeleton(this.#bones);
-    this.#geometry = puppetGeometry(figure);
-    this.#paint = paint;
-    this.#full = figureMaterial(paint);
-    this.#mesh = new SkinnedMesh<BufferGeometry, Material>(this.#geometry, this.#full);
+    const shape = workshop.shape(figure);
+    this.#mesh = new SkinnedMesh(shape, workshop.full);
     this.#mesh.name = "figure";
     this.#mesh.castShadow = true;
     this.#mesh.receiveShadow = true;
-    this.#reflection = new SkinnedMesh<BufferGeometry, Material>(this.#geometry, figureMaterial(paint, floorAt));
+    this.#reflection = new SkinnedMesh(shape, workshop.mirrored);
     this.#reflection.renderOrder = -1;
     for (const mesh of [this.#mesh, this.#reflection]) {
       mesh.bind(skeleton, new Matrix4());
@@ -85,8 +64,7 @@ export class Puppet implements Performer {
   }
 
   set plain(on: boolean) {
-    const wanted = on ? (this.#plain ??= plainFigureMaterial(this.#paint)) : this.#full;
-    this.#mesh.material = wanted;
+    this.#mesh.material = on ? this.#workshop.plain : this.#workshop.full;
   }
 
   apply(pose: Pose, seconds: number): void {
@@ -110,9 +88,8 @@ export class Puppet implements Performer {
     return out.copy(to);
   }
 
+  /** What it is made of is its workshop's. */
   dispose(): void {
-    this.#geometry.dispose();
-    for (const material of [this.#full, this.#plain, this.#reflection.material]) material?.dispose();
     this.#mesh.skeleton.dispose();
     this.group.removeFromParent();
   }

@@ -1,8 +1,8 @@
 /**
- * The rig carries camera, lights, backdrop and floor after the dancer, so that joints stay where the dance puts them. Mocap
+ * The rig carries camera, lights, backdrop and floor after the dancer, of several after the middle between them, so that joints stay where the dance puts them. Mocap
  * walks off, faces anywhere and stands on a floor a few centimetres from zero: the rig takes all three up, calmly.
  */
-import { Group, Matrix4, Quaternion, Vector2, Vector3 } from "three";
+import { Box3, Group, Matrix4, Quaternion, Vector2, Vector3 } from "three";
 import type { Performer } from "./performer";
 
 /** The rig follows once the dancer is this far from its middle, metres, and this quickly, 1/s. */
@@ -28,8 +28,10 @@ const JUMP = 0.15;
 
 export class Rig {
   readonly group = new Group();
-  /** Local metres x and z that the rig has gone: floor boards stay while it moves. */
+  /** What the rig has gone in x and z, in the measures of the floor: its boards stay while it moves. */
   readonly travelled = new Vector2();
+  /** How many times wider than for one dancer what stands about them is. */
+  wide = 1;
   readonly #facing = new Vector2();
   #front = 0;
   #watched = 0;
@@ -45,10 +47,12 @@ export class Rig {
     this.#front = front;
   }
 
-  follow({ root: pelvis, ground }: Pick<Performer, "root" | "ground">, seconds: number): void {
+  /** Moves on by `seconds` after these dancers, one at least. */
+  follow(dancers: readonly Pick<Performer, "root" | "ground">[], seconds: number): void {
     const { position, rotation } = this.group;
-    const root = new Vector3().setFromMatrixPosition(pelvis);
-    const facing = facingOf(pelvis);
+    const root = new Box3().setFromPoints(dancers.map((dancer) => new Vector3().setFromMatrixPosition(dancer.root))).getCenter(new Vector3());
+    const facing = dancers.reduce((sum, dancer) => sum.add(facingOf(dancer.root)), new Vector2()).divideScalar(dancers.length);
+    const ground = Math.min(...dancers.map((dancer) => dancer.ground));
     const away = Math.hypot(root.x - position.x, root.z - position.z);
     if (!this.#placed || away > CUT) {
       if (!this.#placed) {
@@ -80,7 +84,7 @@ export class Rig {
       const step = new Vector3((root.x - position.x) * share, 0, (root.z - position.z) * share);
       position.add(step);
       step.applyAxisAngle(new Vector3(0, 1, 0), -rotation.y);
-      this.travelled.add(new Vector2(step.x, step.z));
+      this.travelled.add(new Vector2(step.x, step.z).divideScalar(this.wide));
     }
   }
 }

@@ -1,7 +1,8 @@
-/** The four rings people take hold of: one instanced billboard, drawn over everything (section 5). */
+/** The rings people take hold of, four of each performer: one instanced billboard, drawn over everything (section 5). */
 import { Color, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, PlaneGeometry, ShaderMaterial, Vector3 } from "three";
+import { MOST_LIMBS } from "../wire/limbs";
 
-const RINGS = 4;
+const RINGS = MOST_LIMBS;
 
 export interface Ring {
   colour: string;
@@ -27,7 +28,7 @@ export class Rings {
     geometry.setAttribute("place", this.#place);
     geometry.setAttribute("tint", this.#tint);
     geometry.setAttribute("shape", this.#shape);
-    geometry.instanceCount = RINGS;
+    geometry.instanceCount = 0;
     const material = new ShaderMaterial({
       transparent: true,
       depthWrite: false,
@@ -57,6 +58,11 @@ export class Rings {
     this.mesh.name = "rings";
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = 8;
+  }
+
+  /** How many there are. */
+  set count(count: number) {
+    this.mesh.geometry.instanceCount = count;
   }
 
   set(index: number, at: Vector3, ring: Ring): void {

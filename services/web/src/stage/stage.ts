@@ -9,17 +9,15 @@ import { createFloor, type Floor } from "./floor";
 import { FrameGate } from "./frame-gate";
 import { createLights } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
-import { asanohaTexture, faceTexture } from "./paint";
 import type { Performer } from "./performer";
 import { PictureCamera, pictureSize } from "./picture";
-import { Puppet } from "./puppet";
 import { QUALITIES, QualityChoice } from "./quality";
 import { Rig } from "./rig";
 import { Scenery } from "./scenery";
-import type { Paint } from "./shading";
 import { Strings, type StringState } from "./strings";
 import { studio } from "./studio";
 import { CameraTrail } from "./trail";
+import { Troupe, type MakePerformer } from "./troupe";
 
 /** Pixel ratios above these cost more than they show. */
 const SHARPEST = { desktop: 2, phone: 1.75 };
@@ -31,13 +29,13 @@ const HEADROOM_SHARE = 0.2;
 const BAR: Extent = { across: 0.17, up: 0.07, down: 0.05 };
 const FACE: Extent = { across: 0.1, up: 0.16, down: 0.14 };
 
+/** How far to the side the lights reach that stand about one dancer, metres. */
+const LIT = 1.2;
+
 /** Movements of the stage's own take no longer step than this, seconds. */
 const LONGEST_STEP = 0.1;
-
-/** Makes who dances for the lengths of the dancer that the stream tells of. */
-export type Casting = (figure: Figure) => Performer;
-
-const FREE: readonly StringState[] = [0, 1, 2, 3].map(() => ({ holder: null, lit: false, pull: null }));
+/** The stage is drawn without a dancer only if none came on for so long, seconds: its picture would stand in the way of theirs. */
+const EMPTY_AFTER = 1;
 
 export class Stage {
   readonly scene = new Scene();
@@ -47,15 +45,15 @@ export class Stage {
   /** Where the audience's camera was, for keeping. */
   readonly trail = new CameraTrail();
   readonly renderer: WebGLRenderer;
-  /** Who dances: the puppet, or an avatar in its place. */
-  puppet: Performer | null = null;
+  /** Whether the graphics are done with a frame that has a dancer in it. */
+  shown = false;
+  readonly #troupe: Troupe;
   readonly #scenery = new Scenery();
   readonly #backdrop = backdropUniforms();
   readonly #floor: Floor;
   readonly #lights = createLights();
   readonly #floorAt: IUniform<number> = { value: 0 };
   readonly #caster = new Raycaster();
-  #paint: Paint | null = null;
   #look: Look = LOOKS.night;
   #themed: Theme | null = null;
   #width = 1;
@@ -63,12 +61,12 @@ export class Stage {
   #still = false;
   #sharpness = 1;
   #framing: Framing = "desktop";
-  #figure: Figure | null = null;
-  #cast: Casting | null = null;
   readonly #quality: QualityChoice;
   readonly #gate: FrameGate;
   readonly #pictures = new PictureCamera();
   #sinceDrawn = 0;
+  #empty = 0;
+  #danced = false;
   #picturing = false;
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
@@ -82,11 +80,24 @@ export class Stage {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.#scenery.group.add(createBackdrop(this.#backdrop), this.#floor.mesh);
+    this.#troupe = new Troupe(this.#floorAt);
+    this.rig.group.add(this.audience.camera, this.#lights.group);
+    this.scene.add(this.rig.group, this.#troupe.group);
+    // drawn in software what is behind the dancers takes longer than they do, who come first then
+    if (!plain) this.#build();
     // three.js' own listener stands before this one: its side of the context is there again by then
     canvas.addEventListener("webglcontextrestored", () => this.#restore());
-    this.rig.group.add(this.audience.camera, this.#lights.group, this.#scenery.group);
-    this.scene.add(this.rig.group, this.strings.group);
     this.#furnish();
+  }
+
+  /** Who dance, in the order of the motion's tracks. */
+  get performers(): readonly Performer[] {
+    return this.#troupe.performers;
+  }
+
+  /** The first of them, the show's: the puppet, or an avatar in its place. */
+  get puppet(): Performer | null {
+    return this.performers[0] ?? null;
   }
 
   /** No easing, no swing: for people who asked for less motion. */
@@ -120,30 +131,35 @@ export class Stage {
     this.#lights.dress(this.#look);
     this.#light();
     this.renderer.toneMappingExposure = this.#look.exposure;
+    this.renderer.setClearColor(this.#look.backdrop.middle);
     this.#furnish();
   }
 
-  /** Takes a dancer's limb lengths, for which the puppet is carved, and turns to where the dance faces (radians about y from z towards x). */
-  setFigure(figure: Figure, front = 0): void {
-    this.#figure = figure;
-    this.#enter(figure);
-    this.audience.scale = (this.puppet as Performer).scale;
-    this.#placeDisc();
-    this.rig.reset(front);
-    this.audience.cut();
+  /**
+   * Takes the limb lengths of a motion's dancers, for whom puppets are carved, and turns to where the first one's dance faces (radians about y from z towards x). Those
+   * whose lengths are told again dance on, and the others come on beside them.
+   */
+  setFigures(figures: readonly Figure[], front = 0): void {
+    const before = this.performers.length;
+    const others = this.#troupe.enter(figures);
+    if (!others && this.performers.length === before) return;
+    if (others) {
+      this.audience.scale = this.puppet?.scale ?? 1;
+      this.#placeDisc();
+      this.rig.reset(front);
+      this.audience.cut();
+    }
     this.#compile();
   }
 
-  /** Has the dance danced by whom `casting` makes for a dancer's lengths, from now on; null: by the puppet. */
-  cast(casting: Casting | null): void {
-    this.#cast = casting;
-    if (!this.#figure) return;
-    this.#enter(this.#figure);
-    this.#compile();
+  /** Has the first dance danced by whom `make` makes for a dancer's lengths, from now on; null: by the puppet. */
+  danceBy(make: MakePerformer | null): void {
+    this.#troupe.danceBy(make);
+    if (this.puppet) this.#compile();
   }
 
-  /** CSS pixels. */
-  resize(width: number, height: number, framing: Framing, pixelRatio: number): void {
+  /** CSS pixels; `sides` are those that something stands before to the left and to the right, between which several dancers are seen. */
+  resize(width: number, height: number, framing: Framing, pixelRatio: number, [left, right]: readonly [number, number] = [0, 0]): void {
     const sharpest = framing === "desktop" ? SHARPEST.desktop : SHARPEST.phone;
     this.#width = width;
     this.#height = height;
@@ -153,37 +169,51 @@ export class Stage {
     this.#placeDisc();
     this.audience.frame(framing, height);
     this.audience.resize(width / height);
+    this.audience.sides = { left, right, width };
   }
 
   /**
-   * Moves everything on to a pose (null: none yet) and its strings, and draws it if the graphics are done with the frame
+   * Moves everything on to the performers' poses (null: none yet) and their strings, by number of the limb, and draws it if the graphics are done with the frame
    * before; `interval` is the seconds since the last call, `show` the seven numbers of the show's camera, null where there is
-   * none, `lights` are the show's, and `clock` the clock time of the pose in microseconds, by which the camera is remembered.
+   * none, `lights` are the show's, and `clock` the clock time of the poses in microseconds, by which the camera is remembered.
    */
   draw(
-    pose: Pose | null, states: readonly StringState[] = FREE, interval = 0, show: ArrayLike<number> | null = null,
+    poses: readonly (Pose | null)[], states: readonly StringState[] = [], interval = 0, show: ArrayLike<number> | null = null,
     lights: readonly LightState[] = [], clock: number | null = null,
   ): void {
-    const { puppet } = this;
+    const { audience, rig } = this;
     const seconds = Math.min(interval, LONGEST_STEP);
-    if (puppet && pose) {
-      puppet.group.visible = true;
-      puppet.apply(pose, this.#still ? 0 : seconds);
-      this.rig.follow(puppet, seconds);
-      this.#floorAt.value = this.rig.group.position.y;
+    this.#troupe.apply(poses, this.#still ? 0 : seconds);
+    const { shown } = this.#troupe;
+    const posed = poses.some((pose) => pose !== null) && shown.length > 0;
+    if (posed) {
+      rig.follow(shown, seconds);
+      this.#floorAt.value = rig.group.position.y;
     }
-    this.rig.group.updateMatrixWorld(true);
-    this.audience.update(seconds, puppet && pose ? this.#reach(puppet) : 0, show);
-    this.#lights.show(lights, this.#still ? Infinity : seconds);
+    rig.group.updateMatrixWorld(true);
+    if (posed) audience.stand(shown.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))));
+    audience.update(seconds, posed ? this.#reach(shown) : 0, show);
+    // what is about the dancers is as wide as the picture of them
+    const { wide } = audience;
+    this.#scenery.group.scale.setScalar(wide);
+    rig.wide = wide;
+    this.#lights.show(lights, this.#still ? Infinity : seconds, Math.max(wide, audience.aside / LIT));
     this.scene.environmentIntensity = this.#look.environment * this.#lights.level;
-    this.#scenery.turn(this.audience.view, this.audience.seated, seconds);
-    if (pose && clock !== null) this.trail.add(clock, this.audience.view, this.audience.moved);
-    if (puppet && pose) this.strings.update(puppet, states, this.#look, seconds, this.#floorAt.value, this.#ceiling(), this.right());
+    this.#scenery.turn(audience.view, audience.seated, seconds);
+    if (posed && clock !== null) this.trail.add(clock, audience.view, audience.moved);
+    if (posed) {
+      const seat = { ground: this.#floorAt.value, ceiling: this.#ceiling(), right: this.right(), wide };
+      this.strings.update(this.performers.map((one) => (one.group.visible ? one : null)), states, this.#look, seconds, seat);
+    }
     this.#sinceDrawn += interval;
     if (!this.#gate.open) return;
-    this.renderer.render(this.scene, this.audience.camera);
+    this.shown = this.#danced;
+    if (posed) this.#danced = true;
+    else if ((this.#empty += seconds) < EMPTY_AFTER) return;
+    if (this.shown || !this.#danced) this.#build();
+    this.renderer.render(this.scene, audience.camera);
     this.#gate.close();
-    const slow = puppet && pose && !this.#picturing && this.#quality.frame(this.#sinceDrawn);
+    const slow = posed && !this.#picturing && this.#quality.frame(this.#sinceDrawn);
     this.#sinceDrawn = 0;
     if (slow) {
       this.#setSize();
@@ -193,7 +223,7 @@ export class Stage {
 
   /** Gives back all that the graphics hold; the stage and its canvas draw no more. */
   dispose(): void {
-    this.puppet?.dispose();
+    this.#troupe.dispose();
     this.scene.environment?.dispose();
     this.#pictures.dispose();
     this.renderer.dispose();
@@ -235,9 +265,9 @@ export class Stage {
     return at && this.#box(at, BAR);
   }
 
-  /** Where the face is on the screen, CSS pixels; null without a puppet. */
-  get face(): Box | null {
-    return this.puppet && this.#box(new Vector3().setFromMatrixPosition(this.puppet.joint("skullbase")), FACE);
+  /** Where the faces are on the screen, CSS pixels. */
+  get faces(): Box[] {
+    return this.#troupe.shown.map((performer) => this.#box(new Vector3().setFromMatrixPosition(performer.joint("skullbase")), FACE));
   }
 
   /** World place under a pixel, on the plane through `through` that faces the camera; null behind the camera. */
@@ -275,17 +305,12 @@ export class Stage {
     return boxAround(at, { across: across * scale, up: up * scale, down: down * scale }, camera, this.#width, this.#height);
   }
 
-  #enter(figure: Figure): void {
-    this.puppet?.dispose();
-    this.puppet = this.#cast?.(figure) ?? this.#carve(figure);
-    this.#furnish();
-    this.puppet.group.visible = false;
-    this.scene.add(this.puppet.group);
-  }
-
-  #carve(figure: Figure): Puppet {
-    this.#paint ??= { face: faceTexture(), asanoha: asanohaTexture() };
-    return new Puppet(figure, this.#paint, this.#floorAt);
+  /** Puts up what is about the dancers. */
+  #build(): void {
+    if (this.#scenery.group.parent) return;
+    this.rig.group.add(this.#scenery.group);
+    this.scene.add(this.strings.group);
+    if (this.puppet) this.#compile();
   }
 
   #compile(): void {
@@ -321,14 +346,12 @@ export class Stage {
   /** Only the lacquer of the night mirrors, and only where the machine is up to it. */
   #furnish({ reflection, shadows, plain } = this.#quality.quality): void {
     this.#lights.shadows = shadows;
-    if (!this.puppet) return;
-    this.puppet.reflected = this.#look.dark && reflection;
-    this.puppet.plain = plain;
+    this.#troupe.furnish(this.#look.dark && reflection, plain);
   }
 
-  #reach(puppet: Performer): number {
+  #reach(shown: readonly Performer[]): number {
     const at = new Vector3();
-    return Math.max(...[0, 1].map((limb) => Math.abs(puppet.handle(limb, at).project(this.audience.camera).x)));
+    return Math.max(...shown.flatMap((performer) => [0, 1].map((limb) => Math.abs(performer.handle(limb, at).project(this.audience.camera).x))));
   }
 
   #ceiling(): number {

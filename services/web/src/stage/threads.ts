@@ -1,10 +1,12 @@
-/** Four silk threads in one draw: ribbons that face the camera, lit by how hard they are pulled (section 5). */
+/** The silk threads, four of each performer, in one draw: ribbons that face the camera, lit by how hard they are pulled (section 5). */
 import {
   BufferAttribute, BufferGeometry, Color, CustomBlending, DoubleSide, Mesh, OneFactor, OneMinusSrcAlphaFactor, ShaderMaterial, Vector3,
 } from "three";
+import { MOST_LIMBS } from "../wire/limbs";
 
-const THREADS = 4;
+const THREADS = MOST_LIMBS;
 const SEGMENTS = 40;
+const CORNERS = 6;
 const VERTICES = THREADS * (SEGMENTS + 1) * 2;
 
 export interface Thread {
@@ -23,6 +25,8 @@ export class Threads {
   readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
   readonly #attributes: Record<"position" | "tangent3" | "tint" | "pull", BufferAttribute>;
   readonly #colour = new Color();
+  /** How each is dyed. */
+  readonly #dyed: string[] = [];
 
   constructor() {
     const geometry = new BufferGeometry();
@@ -87,29 +91,54 @@ export class Threads {
     this.mesh.material.uniforms.dark.value = on ? 1 : 0;
   }
 
+  /** How many there are. */
+  set count(count: number) {
+    this.mesh.geometry.setDrawRange(0, count * SEGMENTS * CORNERS);
+    for (const attribute of Object.values(this.#attributes)) {
+      attribute.clearUpdateRanges();
+      attribute.addUpdateRange(0, count * (SEGMENTS + 1) * 2 * attribute.itemSize);
+    }
+  }
+
   /** Draws thread `index` from a handle up to its other end, world metres. */
   set(index: number, from: Vector3, to: Vector3, thread: Thread): void {
-    const { r, g, b } = this.#colour.set(thread.colour);
-    const { position, tangent3, tint, pull } = this.#attributes;
-    const at = (t: number) => {
-      const point = from.clone().lerp(to, t);
-      point.y -= thread.sag * 4 * t * (1 - t);
-      point.x += thread.sag * 0.6 * Math.sin(t * Math.PI);
-      return point;
-    };
+    const { position, tangent3, pull } = this.#attributes;
+    const { sag, tension } = thread;
+    // numbers alone: every frame has some six hundred of these points
+    const dx = to.x - from.x;
+    const dy = to.y - from.y;
+    const dz = to.z - from.z;
+    const x = (t: number) => from.x + dx * t + sag * 0.6 * Math.sin(t * Math.PI);
+    const y = (t: number) => from.y + dy * t - sag * 4 * t * (1 - t);
     for (let i = 0; i <= SEGMENTS; i++) {
       const t = i / SEGMENTS;
-      const point = at(t);
-      const along = at(Math.min(1, t + 0.01)).sub(at(Math.max(0, t - 0.01)));
-      const alpha = thread.alpha * (thread.fading ? (1 - t) ** 1.3 : 1);
+      const before = Math.max(0, t - 0.01);
+      const after = Math.min(1, t + 0.01);
       for (let edge = 0; edge < 2; edge++) {
         const vertex = (index * (SEGMENTS + 1) + i) * 2 + edge;
-        position.setXYZ(vertex, point.x, point.y, point.z);
-        tangent3.setXYZ(vertex, along.x, along.y, along.z);
-        tint.setXYZW(vertex, r, g, b, alpha);
-        pull.setX(vertex, thread.tension);
+        position.setXYZ(vertex, x(t), y(t), from.z + dz * t);
+        tangent3.setXYZ(vertex, x(after) - x(before), y(after) - y(before), dz * (after - before));
+        pull.setX(vertex, tension);
       }
     }
-    for (const attribute of Object.values(this.#attributes)) attribute.needsUpdate = true;
+    position.needsUpdate = tangent3.needsUpdate = pull.needsUpdate = true;
+    this.#dye(index, thread);
+  }
+
+  /** The colour of a thread, which changes seldom. */
+  #dye(index: number, { colour, alpha, fading }: Thread): void {
+    const dyed = `${colour} ${alpha} ${fading}`;
+    if (dyed === this.#dyed[index]) return;
+    this.#dyed[index] = dyed;
+    const { r, g, b } = this.#colour.set(colour);
+    const { tint } = this.#attributes;
+    for (let i = 0; i <= SEGMENTS; i++) {
+      const left = fading ? (1 - i / SEGMENTS) ** 1.3 : 1;
+      for (let edge = 0; edge < 2; edge++) {
+        const vertex = (index * (SEGMENTS + 1) + i) * 2 + edge;
+        tint.setXYZW(vertex, r, g, b, alpha * left);
+      }
+    }
+    tint.needsUpdate = true;
   }
 }

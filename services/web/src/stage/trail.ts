@@ -4,6 +4,7 @@
  * narrowed by every sample, and the first that none of them reaches ends it).
  */
 import type { CameraKeyframe } from "../client/library";
+import { Rows } from "./rows";
 import type { View } from "./view";
 
 /** How far a line may be off the camera's position, and off the point it gazes at, metres. */
@@ -22,8 +23,12 @@ const SLACK = [0, 1, 2, 3, 4, 5].map(() => NEAR / Math.sqrt(3)).concat(NEAR_ANGL
 /** Clock time, then the seven numbers of a camera. */
 type Sample = Float64Array;
 
+const SAMPLE = 1 + NUMBERS;
+
 export class CameraTrail {
-  #keys: Sample[] = [];
+  readonly #keys = new Rows(SAMPLE);
+  /** The last of them, where the line that goes on begins. */
+  #key: Sample | null = null;
   /** The newest sample, where a line from the last keyframe may end. */
   #newest: Sample | null = null;
   /** When the view was moved last. */
@@ -38,15 +43,16 @@ export class CameraTrail {
   add(time: number, { position, gaze, fov }: View, moved = true): void {
     const sample = Float64Array.of(time, position.x, position.y, position.z, gaze.x, gaze.y, gaze.z, fov);
     if (!sample.every(Number.isFinite)) return;
-    const last = this.#newest ?? this.#keys.at(-1);
+    const last = this.#newest ?? this.#key;
     if (last && time <= last[0]) return;
     if (moved) this.#moved = time;
-    if (this.#keys.length === 0) {
+    let key = this.#key;
+    if (key && this.#newest && !this.#reaches(key, sample)) key = this.#begin(this.#newest);
+    if (!key) {
       this.#begin(sample);
       return;
     }
-    if (this.#newest && !this.#reaches(sample)) this.#begin(this.#newest);
-    this.#narrow(sample);
+    this.#narrow(key, sample);
     this.#newest = sample;
   }
 
@@ -54,7 +60,8 @@ export class CameraTrail {
    * Keyframes between two clock times, and those next to them on either side, so that the camera is known all along; ascending.
    */
   keyframes(begin = -Infinity, end = Infinity): CameraKeyframe[] {
-    const all = this.#newest ? [...this.#keys, this.#newest] : this.#keys;
+    const all = Array.from({ length: this.#keys.length }, (_, nth) => this.#keys.at(nth) as Sample);
+    if (this.#newest) all.push(this.#newest);
     const first = Math.max(0, all.findLastIndex((key) => key[0] <= begin));
     const after = all.findIndex((key) => key[0] >= end);
     return all.slice(first, after < 0 ? all.length : after + 1).map(keyframe);
@@ -66,27 +73,26 @@ export class CameraTrail {
   }
 
   clear(): void {
-    this.#keys = [];
-    this.#newest = null;
+    this.#keys.clear();
+    this.#key = this.#newest = null;
     this.#moved = -Infinity;
   }
 
   /** A line starts here. */
-  #begin(key: Sample): void {
+  #begin(key: Sample): Sample {
+    this.#key = key;
     this.#keys.push(key);
     this.#newest = null;
     this.#lowest.fill(-Infinity);
     this.#highest.fill(Infinity);
-    const oldest = key[0] - REMEMBERED;
     // the one before the oldest that is remembered is where its line comes from
-    const before = this.#keys.findIndex((one) => one[0] > oldest) - 1;
-    const drop = Math.max(before, this.#keys.length - MOST);
-    if (drop > 0) this.#keys.splice(0, drop);
+    const before = this.#keys.until(key[0] - REMEMBERED) - 1;
+    this.#keys.drop(Math.max(before, this.#keys.length - MOST, 0));
+    return key;
   }
 
   /** Whether a line from the last keyframe to `sample` passes near all samples since. */
-  #reaches(sample: Sample): boolean {
-    const key = this.#keys[this.#keys.length - 1];
+  #reaches(key: Sample, sample: Sample): boolean {
     const span = sample[0] - key[0];
     for (let n = 0; n < NUMBERS; n++) {
       const slope = (sample[n + 1] - key[n + 1]) / span;
@@ -95,8 +101,7 @@ export class CameraTrail {
     return true;
   }
 
-  #narrow(sample: Sample): void {
-    const key = this.#keys[this.#keys.length - 1];
+  #narrow(key: Sample, sample: Sample): void {
     const span = sample[0] - key[0];
     for (let n = 0; n < NUMBERS; n++) {
       const step = sample[n + 1] - key[n + 1];

@@ -1,15 +1,15 @@
 /** Any message of `bunraku.v1` to bytes and back. */
 
 import { MalformedMessage } from "./errors";
-import {
-  packData, packInput, packOverlay, packPing, packPong, unpackData, unpackInput, unpackOverlay, unpackPing, unpackPong,
-} from "./fixed";
+import { packData, packInput, packPing, packPong, unpackData, unpackInput, unpackPing, unpackPong } from "./fixed";
 import { isMapType, packMap, unpackMap } from "./maps";
 import { type Message, TYPES } from "./messages";
+import { OVERLAY_OF_SEVERAL, packOverlay, unpackOverlay } from "./overlay";
 
 const FIXED = new Map<number, (bytes: Uint8Array) => Message>([
   [TYPES.Data, unpackData],
   [TYPES.Overlay, unpackOverlay],
+  [OVERLAY_OF_SEVERAL, unpackOverlay],
   [TYPES.Pong, unpackPong],
   [TYPES.Ping, unpackPing],
   [TYPES.Input, unpackInput],

@@ -1,37 +1,14 @@
 /** Messages of fixed layout, little-endian (`proto/SPEC.md`, Fixed messages): what is hot, to bytes and back. */
 
-import { LIMBS } from "../motion/skeleton";
 import { MalformedMessage } from "./errors";
-import { type Data, type Input, type Overlay, type Ping, type Pong, TARGET, TYPES } from "./messages";
+import { empty, getU64, setU64, viewOf } from "./layout";
+import { MOST_LIMBS } from "./limbs";
+import { type Data, type Input, type Ping, type Pong, TARGET, TYPES } from "./messages";
 
 /** Before the index of a block, which is LEB128 of three bytes at most. */
 const DATA_HEADER = 2;
 const MOST_INDEX_BYTES = 3;
-const OVERLAY_HEADER = 12;
-const LIMB_NUMBERS = 9;
 const SHORT = 32;
-const WORD = 2 ** 32;
-
-function viewOf(bytes: Uint8Array): DataView {
-  return new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-}
-
-function empty(name: keyof typeof TYPES, size: number): [Uint8Array<ArrayBuffer>, DataView] {
-  const bytes = new Uint8Array(size);
-  bytes[0] = TYPES[name];
-  return [bytes, viewOf(bytes)];
-}
-
-function setU64(view: DataView, at: number, value: number): void {
-  view.setUint32(at, value % WORD, true);
-  view.setUint32(at + 4, Math.floor(value / WORD), true);
-}
-
-function getU64(view: DataView, at: number, what: string): number {
-  const value = view.getUint32(at + 4, true) * WORD + view.getUint32(at, true);
-  if (!Number.isSafeInteger(value)) throw new MalformedMessage(`${what} is past 2^53`);
-  return value;
-}
 
 function short(bytes: Uint8Array, name: string): DataView {
   if (bytes.length !== SHORT) throw new MalformedMessage(`${name} has ${SHORT} bytes, not ${bytes.length}`);
@@ -47,7 +24,7 @@ export function packData(message: Data): Uint8Array<ArrayBuffer> {
     }
     index.push((rest & 127) | 128);
   }
-  const [bytes] = empty("Data", DATA_HEADER + index.length + message.block.length);
+  const [bytes] = empty(TYPES.Data, DATA_HEADER + index.length + message.block.length);
   bytes[1] = (message.track << 4) | message.rate;
   bytes.set(index, DATA_HEADER);
   bytes.set(message.block, DATA_HEADER + index.length);
@@ -66,41 +43,8 @@ export function unpackData(bytes: Uint8Array): Data {
   throw new MalformedMessage("Data has a track and rate, an index of 1 to 3 bytes, and a block");
 }
 
-export function packOverlay(message: Overlay): Uint8Array<ArrayBuffer> {
-  const limbs = [...message.limbs.keys()].sort((a, b) => a - b);
-  const frames = [...message.earlier, message.limbs];
-  const [bytes, view] = empty("Overlay", OVERLAY_HEADER + frames.length * limbs.length * LIMB_NUMBERS * 2);
-  bytes[1] = limbs.reduce((mask, limb) => mask | (1 << limb), 0) | (message.earlier.length << 4);
-  view.setUint16(2, message.sequence, true);
-  setU64(view, 4, message.due);
-  const numbers = frames.flatMap((frame) => limbs.flatMap((limb) => [...frame.get(limb)!]));
-  numbers.forEach((number, i) => view.setInt16(OVERLAY_HEADER + 2 * i, number, true));
-  return bytes;
-}
-
-export function unpackOverlay(bytes: Uint8Array): Overlay {
-  if (bytes.length < OVERLAY_HEADER) throw new MalformedMessage("Overlay has 12 bytes at least");
-  const held = LIMBS.map((_, limb) => limb).filter((limb) => (bytes[1] >> limb) & 1);
-  const frames = (bytes[1] >> 4) + 1;
-  const size = OVERLAY_HEADER + frames * held.length * LIMB_NUMBERS * 2;
-  if (bytes.length !== size) {
-    throw new MalformedMessage(`Overlay of ${frames} frames of ${held.length} limbs has ${size} bytes, not ${bytes.length}`);
-  }
-  const view = viewOf(bytes);
-  const earlier = Array.from({ length: frames }, (_, frame) => {
-    const limbs = new Map<number, Int16Array>();
-    held.forEach((limb, nth) => {
-      const at = OVERLAY_HEADER + (frame * held.length + nth) * LIMB_NUMBERS * 2;
-      limbs.set(limb, Int16Array.from({ length: LIMB_NUMBERS }, (_, i) => view.getInt16(at + 2 * i, true)));
-    });
-    return limbs;
-  });
-  const limbs = earlier.pop()!;
-  return { name: "Overlay", sequence: view.getUint16(2, true), due: getU64(view, 4, "Overlay's due time"), limbs, earlier };
-}
-
 export function packPing(message: Ping): Uint8Array<ArrayBuffer> {
-  const [bytes, view] = empty("Ping", SHORT);
+  const [bytes, view] = empty(TYPES.Ping, SHORT);
   view.setUint32(4, message.sequence, true);
   setU64(view, 8, message.sent);
   return bytes;
@@ -112,7 +56,7 @@ export function unpackPing(bytes: Uint8Array): Ping {
 }
 
 export function packPong(message: Pong): Uint8Array<ArrayBuffer> {
-  const [bytes, view] = empty("Pong", SHORT);
+  const [bytes, view] = empty(TYPES.Pong, SHORT);
   view.setUint32(4, message.sequence, true);
   setU64(view, 8, message.sent);
   setU64(view, 16, message.received);
@@ -127,7 +71,7 @@ export function unpackPong(bytes: Uint8Array): Pong {
 }
 
 export function packInput(message: Input): Uint8Array<ArrayBuffer> {
-  const [bytes, view] = empty("Input", SHORT);
+  const [bytes, view] = empty(TYPES.Input, SHORT);
   bytes[1] = message.limb;
   bytes[2] = message.kind;
   view.setUint32(4, message.epoch, true);
@@ -140,8 +84,8 @@ export function packInput(message: Input): Uint8Array<ArrayBuffer> {
 export function unpackInput(bytes: Uint8Array): Input {
   const view = short(bytes, "Input");
   const [, limb, kind] = bytes;
-  if (limb >= LIMBS.length || kind > TARGET) {
-    throw new MalformedMessage(`Input names limb ${limb}, kind ${kind}; there are 4 limbs and 2 kinds`);
+  if (limb >= MOST_LIMBS || kind > TARGET) {
+    throw new MalformedMessage(`Input names limb ${limb}, kind ${kind}; there are ${MOST_LIMBS} limbs and 2 kinds`);
   }
   const values: [number, number, number] = [
     view.getFloat32(20, true), view.getFloat32(24, true), view.getFloat32(28, true),

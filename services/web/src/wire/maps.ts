@@ -1,8 +1,8 @@
 /** Messages of one MessagePack map (`proto/SPEC.md`, MessagePack messages): their fields, checked, to bytes and back. */
 
 import { decode, encode } from "@msgpack/msgpack";
-import { LIMBS } from "../motion/skeleton";
 import { MalformedMessage } from "./errors";
+import { MOST_LIMBS } from "./limbs";
 import { type Message, type PuppeteerPresence, type Track, TYPES } from "./messages";
 
 /** Reads a field's value, or throws what it should have been. */
@@ -22,7 +22,7 @@ const text: Field = (value) => (expect(typeof value === "string", "text"), value
 const flag: Field = (value) => (expect(typeof value === "boolean", "true or false"), value);
 const count: Field = (value) =>
   (expect(Number.isSafeInteger(value) && (value as number) >= 0, "a whole number of 0..2^53"), value);
-const limb: Field = (value) => (count(value), expect((value as number) < LIMBS.length, "a limb, 0..3"), value);
+const limb: Field = (value) => (count(value), expect((value as number) < MOST_LIMBS, `a limb, 0..${MOST_LIMBS - 1}`), value);
 const list = (item: Field): Field => (value) => {
   expect(Array.isArray(value), "a list");
   return (value as unknown[]).map(item);
@@ -41,14 +41,16 @@ const puppeteer = map((value): PuppeteerPresence => ({
   id: text(value.id) as string, name: text(value.name) as string, colour: count(value.colour) as number,
 }));
 
-/** Who asks for each limb; left out by those who know of no asking. */
-const asked: Field = (value) => {
-  if (value === undefined || value === null) return LIMBS.map(() => []);
-  const each = list(list(text))(value) as unknown[];
-  return (expect(each.length === LIMBS.length, "a list for each limb"), each);
+/** Who asks for each of the `limbs` that were read before; left out by those who know of no asking. */
+const asked = (value: unknown, { limbs }: Readonly<Record<string, unknown>>): unknown => {
+  const each = limbs as unknown[];
+  if (value === undefined || value === null) return each.map(() => []);
+  const asks = list(list(text))(value) as unknown[];
+  return (expect(asks.length === each.length, "a list for each limb"), asks);
 };
 
-const FIELDS: { [name in MapName]: Readonly<Record<string, Field>> } = {
+/** The fields of each message in the order in which they are read; one may look at those `before` it. */
+const FIELDS: { [name in MapName]: Readonly<Record<string, (value: unknown, before: Readonly<Record<string, unknown>>) => unknown>> } = {
   ChannelHeader: { motion: text, now: count, channels: count, software: text, version: count, clock: text },
   Description: { motion: text, first: optional(count), tracks: list(track) },
   TimelineState: {
@@ -101,7 +103,7 @@ export function unpackMap(bytes: Uint8Array): Message {
   const message: Record<string, unknown> = { name };
   for (const [key, field] of Object.entries(FIELDS[name])) {
     try {
-      message[key] = field(values[key]);
+      message[key] = field(values[key], message);
     } catch (error) {
       throw new MalformedMessage(`${name}, ${key}: ${(error as Error).message}`);
     }

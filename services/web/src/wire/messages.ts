@@ -3,6 +3,8 @@
  * microseconds on the clock or in the motion, as each field says. They are numbers: all lie below 2^53.
  */
 
+import { OVERLAY, type Overlay } from "./overlay";
+
 export const VERSION = 1;
 export const SUBPROTOCOL = "bunraku.v1";
 
@@ -49,20 +51,6 @@ export interface TimelineState {
   duration: number;
 }
 
-/** Pulled limbs at clock time `due`: for each limb its number and nine numbers, three rotation vectors in pi/32767. */
-export interface Overlay {
-  name: "Overlay";
-  sequence: number;
-  /** When the last frame is due. */
-  due: number;
-  limbs: Map<number, Int16Array>;
-  /** The same limbs in the frames before, oldest first, `OVERLAY_FRAME` apart. */
-  earlier: Map<number, Int16Array>[];
-}
-
-/** Microseconds from one frame of an overlay to the next. */
-export const OVERLAY_FRAME = 16_667;
-
 /** Who pulls: `colour` 0-4 in the order of joining. */
 export interface PuppeteerPresence {
   id: string;
@@ -70,7 +58,10 @@ export interface PuppeteerPresence {
   colour: number;
 }
 
-/** Who is here and who holds what: for each of the four limbs its holder's id, or null, and the ids of those who ask for it, first come first. */
+/**
+ * Who is here and who holds what: for each of the four limbs of each performer, by number, its holder's id, or null, and the ids of those who ask for it,
+ * first come first.
+ */
 export interface Presence {
   name: "Presence";
   viewers: number;
@@ -206,6 +197,6 @@ export type Message = ServerMessage | ClientMessage;
 
 /** The type byte of each message. */
 export const TYPES: Readonly<Record<Message["name"], number>> = {
-  ChannelHeader: 1, Description: 2, Data: 3, TimelineState: 4, Overlay: 5, Presence: 6, Pong: 7, Problem: 8, Welcome: 9,
+  ChannelHeader: 1, Description: 2, Data: 3, TimelineState: 4, Overlay: OVERLAY, Presence: 6, Pong: 7, Problem: 8, Welcome: 9,
   Grant: 10, Refusal: 11, Notice: 12, Choice: 13, Ping: 64, Edit: 65, Report: 66, Claim: 67, Release: 68, Alive: 69, Input: 70, Ask: 71,
 };

@@ -11,8 +11,10 @@
  *              of Chromium's trace, so that waiting for a processor that others have does not count; what draws the picture is
  *              another process, and Chromium's layout and painting after it are not the page's
  *     drawing  `draw_calls` and `triangles` of a frame at full quality, by night, three limbs held: shadows and mirror too
- *     memory   `heap_growth_mb`: of what script holds after garbage was collected, over `--minutes` (30) of playing, pulling,
- *              uploading and opening everything, after a warm-up of the same; nodes and listeners beside it
+ *     memory   `heap_growth_mb`: of the script's heap after garbage was collected, over `--minutes` (30) of playing, pulling,
+ *              uploading and opening everything, after a warm-up of the same; nodes and listeners beside it. Of it
+ *              `heap_growth_objects_mb` is what the page made and holds, `heap_growth_code_mb` what V8 makes of the script,
+ *              ever better as it runs
  *     audio    `audio_ms_p95`: what is heard against what is shown, the worst of its lines (`make bench-audio`)
  *     axe      `axe_violations`: axe-core's, in both themes with every panel open, on a desktop and on a phone
  *

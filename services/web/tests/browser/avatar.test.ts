@@ -109,8 +109,9 @@ async function limbsApart(page: Page): Promise<number> {
       const limbs = [["UpperArm", "Arm", "shoulder"], ["LowerArm", "ForeArm", "elbow"], ["Hand", "Hand", "wrist"]].concat([["UpperLeg", "UpLeg", "hip"], ["LowerLeg", "Leg", "knee"], ["Foot", "Foot", "ankle"]]);
       return [0, 1, 3, 4].map((k) => {
         const [a, b] = [limbs[k], limbs[k + 1]];
-        const mine = own(`${side}${b[0]}`, `${tool}${b[1]}`).sub(own(`${side}${a[0]}`, `${tool}${a[1]}`));
-        return mine.angleTo(place(puppet.joint(`${s}_${b[2]}`)).sub(place(puppet.joint(`${s}_${a[2]}`))));
+        const mine = own(`${side}${b[0]}`, `${tool}${b[1]}`).sub(own(`${side}${a[0]}`, `${tool}${a[1]}`)).normalize();
+        const told = place(puppet.joint(`${s}_${b[2]}`)).sub(place(puppet.joint(`${s}_${a[2]}`))).normalize();
+        return Math.acos(Math.min(1, mine.dot(told)));
       });
     });
     return (Math.max(...apart) * 180) / Math.PI;

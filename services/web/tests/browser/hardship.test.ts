@@ -46,9 +46,16 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
       const on = viewer.positionAt(performance.now()) - from;
       return on - viewer.duration * Math.floor(on / viewer.duration) > 1;
     }, cut.position);
+    // what is said for a moment comes and goes beside it
+    await page.keyboard.press("KeyR");
+    const moment = page.getByText("Reach for a string that another holds");
+    await moment.waitFor();
+    await moment.waitFor({ state: "detached" });
+    expect(await page.getByText("The line was lost").isVisible()).toBe(true);
     const known = lines.length;
     await page.context().setOffline(false);
     await page.locator('.health[data-state="good"]').waitFor();
+    await page.getByText("The line was lost").waitFor({ state: "detached" });
     expect(lines.length).toBeGreaterThan(known);
     await welcomed(page);
     await expect.poll(() => page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(true);
@@ -111,19 +118,20 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
     await settled(page, () => seat(page), 1e-3);
     const before = await picture(page);
     expect(new Set(before).size).toBeGreaterThan(30);
-    await page.evaluate(() => {
-      const lost = window.bunraku.stage.renderer.getContext().getExtension("WEBGL_lose_context");
-      Object.assign(window, { lost });
-      lost?.loseContext();
-    });
-    await page.getByText("The stage went dark").waitFor();
-    await page.evaluate(() => (window as unknown as { lost: WEBGL_lose_context }).lost.restoreContext());
-    await page.getByText("The stage went dark").waitFor({ state: "hidden" });
+    await darken(page);
     const after = await picture(page);
     const differing = after.filter((value, at) => Math.abs(value - before[at]) > 4).length;
     expect(differing / before.length).toBeLessThan(0.01);
     // of shaders that do not compile three.js tells the console alone
     expect(wrong).toEqual([]);
+  });
+
+  test("takes back what it said of its graphics when they are back, and nothing that it said of something else", async () => {
+    const page = await own.open("?session=no-such-session", { viewport: { width: 260, height: 220 } });
+    await page.getByText("The session has ended").waitFor();
+    await page.waitForFunction(() => window.bunraku?.stage);
+    await darken(page);
+    expect(await page.getByText("The session has ended").isVisible()).toBe(true);
   });
 
   test("asked for less motion starts paused, and nothing glides", async () => {
@@ -217,4 +225,16 @@ function picture(page: Page): Promise<number[]> {
         };
       }),
   );
+}
+
+/** Takes the page's graphics away and gives them back, each once the page has said so. */
+async function darken(page: Page): Promise<void> {
+  await page.evaluate(() => {
+    const lost = window.bunraku.stage.renderer.getContext().getExtension("WEBGL_lose_context");
+    Object.assign(window, { lost });
+    lost?.loseContext();
+  });
+  await page.getByText("The stage went dark").waitFor();
+  await page.evaluate(() => (window as unknown as { lost: WEBGL_lose_context }).lost.restoreContext());
+  await page.getByText("The stage went dark").waitFor({ state: "hidden" });
 }

@@ -48,6 +48,18 @@ test("what is held at the best rate is not asked for again, and what is held sta
   expect([...held.rates]).toEqual([0, 1, -1]);
 });
 
+test("of another performer the blocks are those of its own track", async () => {
+  const other = valid.filter(({ track }) => track === 1).slice(0, 3).map(({ block }) => bytes(block));
+  const asked = serving((path) => {
+    if (path.endsWith("/description")) return pack({ name: "Description", motion: "m", first: null, tracks: [goldenDescription(), { type: "smell" }, goldenDescription(1)] });
+    const index = Number(/\/blocks\/1\/(\d+)\?track=2$/.exec(path)![1]);
+    return pack({ name: "Data", track: 2, rate: 1, index, block: other[index] });
+  });
+  const store = await bestBlocks("m", { performer: 1 });
+  expect([[...store.rates], store.track.frames, asked.length]).toEqual([[1, 1, 1], 66, 4]);
+  await expect(bestBlocks("m", { performer: 2 })).rejects.toThrow("This dance cannot be read");
+});
+
 test("a damaged block, and what is no block, are a problem told in words", async () => {
   serving((path) => (path.includes("/blocks/1/1?") ? pack({ name: "Data", track: 1, rate: 1, index: 1, block: bytes(vectors<BlockVectors>("blocks").invalid[0].block) }) : null));
   await expect(bestBlocks("m")).rejects.toThrow(ProblemError);

@@ -49,6 +49,12 @@ test("a session is kept with what was given of name, length and camera", async (
   ]);
 });
 
+test("others come to dance beside those of a motion", async () => {
+  const made = answering(201, '{"id": "n", "performers": 3, "made_from": "m/1"}');
+  expect((await library.addPerformers("m/1", ["a", "b"])).performers).toBe(3);
+  expect(made.map(([path, { method, body }]) => [method, path, body])).toEqual([["POST", "/v1/motions/m%2F1/performers", '{"motions":["a","b"]}']]);
+});
+
 test("a motion is removed", async () => {
   const made = answering(204, "");
   await library.deleteMotion("m");

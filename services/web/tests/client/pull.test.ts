@@ -1,6 +1,6 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { Pull } from "../../src/client/pull";
+import { Pull, THIGH } from "../../src/client/pull";
 
 function near(got: Float64Array, wanted: number[]): void {
   wanted.forEach((value, axis) => expect(got[axis]).toBeCloseTo(value, 12));
@@ -28,6 +28,16 @@ test("taken anew it starts anew", () => {
   expect(pull.placed).toBe(false);
   pull.begin(Float64Array.of(0, -0.5, 0), 110);
   near(pull.wanted(120), [0, -0.5, 0]);
+});
+
+test("of another performer a hand is a hand and a leg is a leg", () => {
+  const hand = new Pull(5), leg = new Pull(6);
+  for (const pull of [hand, leg]) {
+    pull.take(0);
+    pull.target(3, 4, 0, 0);
+  }
+  near(hand.wanted(1_000), [0.6, 0.8, 0]);
+  near(leg.wanted(1_000), [THIGH[1], 0, 0]);
 });
 
 describe("a target", () => {

@@ -73,6 +73,15 @@ describe("a description that cannot be played is refused with what it lacks", ()
     [{ dancer: new Uint8Array(103).fill(0x82) }, "grid is 8"],
     [{ rates: Array(17).fill({ kbps: 1, mean: 1, max: 1 }) }, "rates"],
     [{ rates: [{ kbps: 1, mean: 1 }] }, "rate 0"],
+    [{ place: null }, "place of three numbers"],
+    [{ place: [0, 0] }, "place of three numbers"],
+    [{ place: [0, 0, 0, 0] }, "place of three numbers"],
+    [{ place: [0, NaN, 0] }, "place of three numbers"],
+    [{ place: [0, 0, Infinity] }, "place of three numbers"],
+    [{ place: [0, "1", 0] }, "place of three numbers"],
+    [{ place: { x: 0, z: 0, turn: 0 } }, "place of three numbers"],
+    [{ place: [100.001, 0, 0] }, "within 100 metres"],
+    [{ place: [0, -101, 0] }, "within 100 metres"],
   ])("%o", (change, what) => {
     const read = () => MotionTrack.fromDescription({ ...goldenDescription(), ...change });
     expect(read).toThrow(DamagedBlock);
@@ -80,11 +89,17 @@ describe("a description that cannot be played is refused with what it lacks", ()
   });
 });
 
+test("where its dancer dances is read; left out it is the middle", () => {
+  const place = (given: unknown) => MotionTrack.fromDescription({ ...goldenDescription(), place: given }).place;
+  expect(place([-100, 1.5, -2])).toEqual({ x: -100, z: 1.5, turn: -2 });
+  expect(goldenTrack().place).toEqual({ x: 0, z: 0, turn: 0 });
+});
+
 test("a description with anything in it is of a track whose every block has its place, or refused", () => {
   const value = fc.oneof(
     fc.anything(), fc.double(), fc.double({ min: 0, max: 1e-300 }), fc.integer(), fc.integer({ min: 0, max: 2000 }), fc.uint8Array(),
   );
-  const changes = fc.dictionary(fc.constantFrom(...Object.keys(goldenDescription())), value, { maxKeys: 3 });
+  const changes = fc.dictionary(fc.constantFrom("place", ...Object.keys(goldenDescription())), value, { maxKeys: 3 });
   const outcome = new Outcome(DamagedBlock);
   fc.assert(
     fc.property(fc.nat(2), changes, (which, change) => {
@@ -93,6 +108,7 @@ test("a description with anything in it is of a track whose every block has its 
         const last = track.blocks - 1;
         expect(track.durationUs).toBeLessThan(2 ** 48);
         expect(track.framesIn(last)).toBeGreaterThan(0);
+        expect(Math.max(Math.abs(track.place.x), Math.abs(track.place.z))).toBeLessThanOrEqual(100);
         expect(track.blockAt(track.startUs(last))).toBe(last);
       });
     }),

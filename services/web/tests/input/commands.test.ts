@@ -1,4 +1,5 @@
 import { beforeEach, describe, expect, test } from "vitest";
+import { Chosen } from "../../src/input/chosen";
 import { Commands } from "../../src/input/commands";
 import type { Hands } from "../../src/input/hands";
 import { VelocityInputs } from "../../src/input/velocity";
@@ -13,12 +14,14 @@ let velocity: VelocityInputs;
 let commands: Commands;
 let session: Session;
 let told: string[];
+let chosen: Chosen;
 
 beforeEach(() => {
   session = new Session();
   hands = handsBefore(standingPuppet(), session);
   told = [];
-  velocity = new VelocityInputs(hands, { take: (limb) => hands.take(limb, "velocity"), free: (limb) => hands.source(limb) === null });
+  chosen = new Chosen();
+  velocity = new VelocityInputs(hands, { take: (limb) => hands.take(limb, "velocity"), free: (limb) => hands.source(limb) === null, chosen });
   commands = new Commands(hands, velocity, deeds(told));
 });
 
@@ -31,6 +34,16 @@ describe("a control that takes a limb", () => {
     expect(velocity.holds(LEFT_HAND)).toBe(true);
     commands.release("Digit2", 1100);
     expect(hands.source(LEFT_HAND)).toBe(null);
+  });
+
+  test("takes it of the chosen performer, and lets go what it took though another is chosen meanwhile", () => {
+    chosen.count = 2;
+    chosen.choose(1);
+    commands.press("Digit2", ["take_left_hand"], 1, 0);
+    chosen.choose(0);
+    expect(hands.source(4 + LEFT_HAND)).toBe("velocity");
+    commands.release("Digit2", 500);
+    expect(hands.any).toBe(false);
   });
 
   test("held long holds it for as long as it lasts", () => {

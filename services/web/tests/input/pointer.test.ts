@@ -29,21 +29,24 @@ let pointer: PointerInput;
 let puppet: Puppet;
 let free: boolean;
 let refused: number[];
+let taken: number[];
+let performers: Puppet[];
 let smoothing: number;
 let nearer: number;
 
 beforeEach(() => {
-  [canvas, session, puppet, free, refused, smoothing, nearer] = [new Canvas(), new Session(), standingPuppet(), true, [], 0, 0];
+  [canvas, session, puppet, free, refused, taken, smoothing, nearer] = [new Canvas(), new Session(), standingPuppet(), true, [], [], 0, 0];
+  performers = [puppet];
   const stage = {
-    puppet,
+    performers,
     toScreen: (at: Vector3) => ({ x: at.x * SCALE, y: -at.y * SCALE }),
     fromScreen: (x: number, y: number, through: Vector3) => new Vector3(x / SCALE, -y / SCALE, through.z),
     back: () => new Vector3(0, 0, 1),
     audience: { orbit: () => undefined },
   };
-  hands = handsBefore(puppet, session);
+  hands = handsBefore(performers, session);
   pointer = createPointer(canvas as unknown as HTMLCanvasElement, stage as unknown as Stage, hands, {
-    may: () => free, refused: (limb) => refused.push(limb), smoothing: () => smoothing, nearer: () => nearer,
+    may: () => free, refused: (limb) => refused.push(limb), taken: (limb) => taken.push(limb), smoothing: () => smoothing, nearer: () => nearer,
   });
 });
 
@@ -64,7 +67,7 @@ function grab(): { x: number; y: number } {
 
 test("a ring follows the pointer that took it, from where it was taken, and is let go with it", () => {
   const at = grab();
-  expect(hands.source(LEFT_HAND)).toBe("pointer");
+  expect([hands.source(LEFT_HAND), taken]).toEqual(["pointer", [LEFT_HAND]]);
   send("pointermove", at.x + 20, at.y - 40, 16);
   const wanted = ring().add(new Vector3(0.1, 0.2, 0));
   expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
@@ -72,6 +75,24 @@ test("a ring follows the pointer that took it, from where it was taken, and is l
   expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
   send("pointerup", at.x + 20, at.y - 40, 48);
   expect(hands.source(LEFT_HAND)).toBe(null);
+});
+
+test("of several performers the nearest ring is taken, whosever it is, but of none who is not seen", () => {
+  const second = standingPuppet();
+  second.group.position.x = 1;
+  second.handle = (limb, out) => puppet.handle(limb, out).add(second.group.position);
+  performers.push(second);
+  const at = { x: ring().x * SCALE + SCALE, y: -ring().y * SCALE };
+  second.group.visible = false;
+  send("pointerdown", at.x, at.y, 0);
+  expect(taken).toEqual([]);
+  send("pointerup", at.x, at.y, 0);
+  second.group.visible = true;
+  send("pointerdown", at.x, at.y, 0);
+  expect([taken, session.said[0]]).toEqual([[4 + LEFT_HAND], ["claim", 4 + LEFT_HAND]]);
+  send("pointermove", at.x + 20, at.y, 16);
+  expect(hands.pull(4 + LEFT_HAND)?.x).toBeCloseTo(ring().x + 1.1, 9);
+  expect(hands.pull(LEFT_HAND)).toBe(null);
 });
 
 test("a ring that another holds is refused, and so is nothing far from any ring", () => {

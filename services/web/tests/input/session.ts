@@ -29,9 +29,9 @@ export class Session {
   }
 }
 
-/** Hands of one who sits before `puppet`, looking along -z, in `session`. */
-export function handsBefore(puppet: Puppet | null, session: Session | null): Hands {
-  const stage = { puppet, right: () => new Vector3(1, 0, 0), up: () => new Vector3(0, 1, 0), back: () => new Vector3(0, 0, 1) };
+/** Hands of one who sits before a puppet, or several, looking along -z, in `session`. */
+export function handsBefore(puppets: Puppet | readonly Puppet[] | null, session: Session | null): Hands {
+  const stage = { performers: puppets === null ? [] : "group" in puppets ? [puppets] : puppets, right: () => new Vector3(1, 0, 0), up: () => new Vector3(0, 1, 0), back: () => new Vector3(0, 0, 1) };
   const hands = new Hands(stage as unknown as Stage);
   hands.puppeteer = session as unknown as Puppeteer | null;
   return hands;

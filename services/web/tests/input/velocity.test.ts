@@ -1,4 +1,5 @@
 import { beforeEach, describe, expect, test } from "vitest";
+import { Chosen } from "../../src/input/chosen";
 import type { Hands } from "../../src/input/hands";
 import { VelocityInputs } from "../../src/input/velocity";
 import { standingPuppet } from "../stage/standard-figure";
@@ -11,18 +12,22 @@ let hands: Hands;
 let velocity: VelocityInputs;
 let told: number[];
 let others: Set<number>;
+let chosen: Chosen;
 
 beforeEach(() => {
   session = new Session();
   hands = handsBefore(standingPuppet(), session);
   told = [];
   others = new Set();
+  chosen = new Chosen();
+  chosen.count = 2;
   velocity = new VelocityInputs(hands, {
     take: (limb) => {
       told.push(limb);
       return !others.has(limb) && hands.take(limb, "velocity");
     },
     free: (limb) => !others.has(limb) && hands.source(limb) === null,
+    chosen,
   });
 });
 
@@ -123,4 +128,41 @@ test("leaves alone what a pointer holds", () => {
   velocity.update(0);
   velocity.letGo(LEFT_HAND);
   expect([hands.source(LEFT_HAND), told, session.said]).toEqual(["pointer", [], []]);
+});
+
+describe("of several performers", () => {
+  const SECOND = 4;
+
+  test("inputs move the limbs of the chosen one, and go over with the choice", () => {
+    chosen.choose(1);
+    velocity.set("stick", "left_hand_x+", 1);
+    velocity.update(0);
+    expect(told).toEqual([SECOND + LEFT_HAND]);
+    chosen.choose(0);
+    velocity.update(16);
+    expect(told).toEqual([SECOND + LEFT_HAND, LEFT_HAND]);
+    velocity.update(800);
+    expect([hands.source(SECOND + LEFT_HAND), hands.source(LEFT_HAND)]).toEqual([null, "velocity"]);
+  });
+
+  test("what is held stays held, and only the chosen one's is moved by the keys of the held string", () => {
+    velocity.hold(LEFT_HAND);
+    chosen.choose(1);
+    expect(velocity.selected).toBe(null);
+    velocity.hold(SECOND + RIGHT_HAND);
+    expect([velocity.selected, velocity.holds(LEFT_HAND)]).toEqual([SECOND + RIGHT_HAND, true]);
+    chosen.choose(0);
+    expect(velocity.selected).toBe(LEFT_HAND);
+  });
+
+  test("all are let go together", () => {
+    expect(velocity.letAllGo()).toBe(false);
+    velocity.hold(LEFT_HAND);
+    velocity.hold(SECOND + LEFT_LEG);
+    chosen.choose(1);
+    expect(velocity.letAllGo()).toBe(true);
+    expect(hands.any).toBe(false);
+    hands.take(RIGHT_HAND, "pointer");
+    expect([velocity.letAllGo(), hands.source(RIGHT_HAND)]).toEqual([true, "pointer"]);
+  });
 });

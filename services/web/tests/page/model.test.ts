@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { askers, holders, limbKey } from "../../src/page/model";
+import { askers, holders, limbKey, limbName, limbsInOrder, performersOf } from "../../src/page/model";
 
 test("holders by limb: oneself is You, strangers have their name and colour; and those who ask, without oneself", () => {
   const presence = {
@@ -18,8 +18,19 @@ test("holders by limb: oneself is You, strangers have their name and colour; and
   expect(holders(null, "b")).toEqual([null, null, null, null]);
   expect(askers(presence, "b")).toEqual([[], [], [{ id: "a", name: "Aiko", colour: 0 }, { id: "gone", name: "Someone", colour: 0 }], []]);
   expect(askers(null, "b")).toEqual([[], [], [], []]);
+  // while the dance is changed, what is told is of more or fewer limbs than there are
+  expect(holders(presence, "b", 2).slice(2).map((holder) => holder?.id)).toEqual(["b", "gone", undefined, undefined, undefined, undefined]);
+  expect(askers(presence, "b", 2)).toHaveLength(8);
+  expect(holders({ ...presence, limbs: [...presence.limbs, "a"] }, "b")).toHaveLength(4);
 });
 
 test("keys 1 to 4 are right hand, left hand, right leg, left leg", () => {
   expect([1, 0, 3, 2].map(limbKey)).toEqual([1, 2, 3, 4]);
+  expect([5, 4, 7, 6].map(limbKey)).toEqual([1, 2, 3, 4]);
+});
+
+test("limbs are named, of several dancers each with its own, and stand in the order of the keys", () => {
+  expect([limbName(0), limbName(0, 2), limbName(7, 2)]).toEqual(["left hand", "left hand of dancer 1", "right leg of dancer 2"]);
+  expect(limbsInOrder(2)).toEqual([1, 0, 3, 2, 5, 4, 7, 6]);
+  expect(performersOf(Array(12))).toBe(3);
 });

@@ -73,4 +73,14 @@ describe("names by their bars", () => {
     const [laid] = layLabels([label(700, 300)], [everywhere], [null], WIDTH, TOP);
     expect(laid).not.toBe(null);
   });
+
+  test("of many stand clear of one another where there is room, and are laid within a frame where there is none", () => {
+    const many = Array.from({ length: 16 }, (_, nth) => label(90 + (nth % 8) * 170, 250 + Math.floor(nth / 8) * 200, 110));
+    const boxes = layLabels(many, [], [], WIDTH, TOP).map((one) => one!.box);
+    boxes.forEach((box, nth) => expect([...many.map(({ bar }) => bar), ...boxes.filter((_, k) => k !== nth)].some((other) => covers(box, other))).toBe(false));
+    const crowd = Array.from({ length: 16 }, (_, nth) => label(700 + nth, 300));
+    const began = performance.now();
+    expect(layLabels(crowd, [], [], WIDTH, TOP).every((one) => one !== null)).toBe(true);
+    expect(performance.now() - began).toBeLessThan(500);
+  });
 });

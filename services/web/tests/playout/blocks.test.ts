@@ -125,6 +125,32 @@ describe("the pose", () => {
     decodeBlock(track, last).at(17.5, wanted);
     expect(stayed).toEqual(wanted);
   });
+
+  test("past the end of a track that is shorter than the motion stands still, in a loop too", () => {
+    const store = filled();
+    const still = restPose(), pose = restPose(), looped = restPose();
+    store.poseAt(2_600_000, false, still, 4_000_000);
+    for (const position of [2_600_001, 3_000_000, 3_999_999]) {
+      for (const loop of [true, false]) {
+        expect(store.poseAt(position, loop, pose, 4_000_000)).toBe(true);
+        expect(pose).toEqual(still);
+      }
+    }
+    // one that is shorter by less than a frame goes over into the start all the same
+    store.poseAt(2_600_000 - 0.01, true, looped);
+    store.poseAt(2_600_000 - 0.01, true, pose, 2_633_000);
+    expect(pose).toEqual(looped);
+    expect(pose).not.toEqual(still);
+  });
+
+  test("of a track that is longer than the motion is what it is at that instant", () => {
+    const short = restPose(), whole = restPose();
+    for (const position of [0, 500_000, 1_099_999, 1_100_000]) {
+      filled().poseAt(position, true, short, 1_100_000);
+      filled().poseAt(position, true, whole);
+      expect(short).toEqual(whole);
+    }
+  });
 });
 
 describe("a camera", () => {

@@ -2,7 +2,7 @@ import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import { restPose } from "../../src/motion/skeleton";
 import { Overlays, SILENCE } from "../../src/playout/overlay";
-import type { Overlay } from "../../src/wire/messages";
+import type { Overlay } from "../../src/wire/overlay";
 
 const QUARTER = Math.round(32767 / 4);
 
@@ -98,6 +98,36 @@ test("only the pulled limbs change, and rotations stay of unit length", () => {
       }
     }),
   );
+});
+
+describe("of several performers", () => {
+  test("each limb is laid over its own, and the others stay as they are", () => {
+    const overlays = new Overlays();
+    overlays.put(overlay(1_000_000, QUARTER, 5, 14));
+    overlays.put(overlay(1_100_000, QUARTER, 5, 14));
+    const poses = [0, 1, 2, 3].map(() => restPose());
+    expect(poses.map((pose, performer) => overlays.lay(1_050_000, pose, performer))).toEqual([0, 0b0010, 0, 0b0100]);
+    const joints = poses.map(({ rotations }) => [...rotations.keys()].filter((at) => rotations[at] !== restPose().rotations[at]).map((at) => Math.floor(at / 4)));
+    // the right shoulder of the second, the left hip of the fourth
+    expect(joints.map((changed) => [...new Set(changed)])).toEqual([[], [15], [], [2]]);
+    for (const [performer, joint] of [[1, 15], [3, 2]]) {
+      const [w, x] = poses[performer].rotations.subarray(joint * 4);
+      expect(2 * Math.atan2(x, w)).toBeCloseTo(Math.PI / 4, 3);
+    }
+  });
+
+  test("the limb of one goes over from its own dance while another's is held", () => {
+    const overlays = new Overlays();
+    overlays.put(overlay(1_000_000, QUARTER, 0));
+    overlays.put(overlay(1_100_000, QUARTER, 0, 4));
+    const pose = restPose();
+    expect(overlays.lay(1_050_000, pose, 1)).toBe(1);
+    expect(2 * Math.atan2(pose.rotations[49], pose.rotations[48])).toBeCloseTo(Math.PI / 8, 3);
+    expect(angle(overlays, 1_050_000)).toBeCloseTo(Math.PI / 4, 3);
+    // let go in the next, it is the dance's at once
+    overlays.put(overlay(1_150_000, QUARTER, 0));
+    expect(overlays.lay(1_120_000, restPose(), 1)).toBe(0);
+  });
 });
 
 test("another motion starts without the old overlays", () => {

@@ -233,3 +233,68 @@ describe("the show's camera", () => {
     expect(audience.camera.position.x).toBeCloseTo(0, 9);
   });
 });
+
+describe("several dancers", () => {
+  const [LEFT, RIGHT] = [{ x: -3, z: 0 }, { x: 3, z: 0 }];
+  const side = (audience: AudienceCamera, x: number, z = 0) => new Vector3(x, 1, z).project(audience.camera).x;
+
+  test.each([[1440, 900, "desktop"], [390, 844, "phone"], [760, 480, "alone"]] as const)("are all in the picture of %d by %d", (width, height, framing) => {
+    const audience = seat(framing, width, height);
+    audience.stand([LEFT, RIGHT]);
+    audience.update(0, 0);
+    expect(side(audience, 3.8)).toBeLessThan(1);
+    expect(side(audience, -3.8)).toBeGreaterThan(-1);
+    expect(above(audience, 0, height) / height).toBeCloseTo(above(seat(framing, width, height), 0, height) / height, 2);
+  });
+
+  test("one alone, wherever it strays, has the picture of one", () => {
+    const audience = seat("phone", 390, 844);
+    const before = audience.camera.position.clone();
+    audience.stand([RIGHT]);
+    audience.update(0, 0);
+    expect(audience.camera.position.distanceTo(before)).toBe(0);
+  });
+
+  test("the seat goes back for those who go apart, and stays there until the next cut", () => {
+    const audience = seat("alone", 800, 600);
+    audience.stand([LEFT, RIGHT]);
+    audience.update(0, 0);
+    const { wide } = audience;
+    audience.stand([{ x: -5, z: 0 }, { x: 5, z: 0 }]);
+    audience.update(0, 0);
+    const further = audience.wide;
+    expect(further).toBeGreaterThan(wide * 1.4);
+    audience.stand([LEFT, RIGHT]);
+    audience.update(0, 0);
+    expect(audience.wide).toBe(further);
+    audience.cut();
+    audience.stand([LEFT, RIGHT]);
+    audience.update(0, 0);
+    expect(audience.wide).toBeCloseTo(wide, 9);
+  });
+
+  test("is as far from the nearest as from one alone", () => {
+    const audience = seat("alone", 1600, 600);
+    const away = audience.camera.position.z;
+    audience.stand([{ x: 0, z: 2 }, { x: 0, z: -2 }]);
+    audience.update(0, 0);
+    expect(audience.camera.position.z - 2).toBeCloseTo(away, 6);
+  });
+
+  test("are seen between what stands before the picture's sides; one alone is not moved for it", () => {
+    const audience = seat("desktop", 1440, 900);
+    audience.sides = { left: 76, right: 356, width: 1440 };
+    audience.update(0, 0);
+    expect(side(audience, 0)).toBeCloseTo(0, 9);
+    audience.stand([LEFT, RIGHT]);
+    audience.update(0, 0);
+    const pixels = (x: number) => (side(audience, x) * 0.5 + 0.5) * 1440;
+    expect(pixels(0)).toBeCloseTo((76 + 1440 - 356) / 2, 6);
+    expect(pixels(-3.8)).toBeGreaterThan(76);
+    expect(pixels(3.8)).toBeLessThan(1440 - 356);
+    // with hardly any room left they have all of it, covered or not
+    audience.sides = { left: 356, right: 356, width: 760 };
+    audience.update(0, 0);
+    expect(side(audience, 0)).toBeCloseTo(0, 9);
+  });
+});

@@ -3,7 +3,7 @@ import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { JOINTS } from "../../src/motion/skeleton";
 import { fitTo, figureScale, restPositions } from "../../src/stage/fit";
-import { BONES } from "../../src/stage/puppet";
+import { BONES } from "../../src/stage/workshop";
 import { CROWN, HEAD, joint, LEFT_FINGER_TIP, SOLE } from "../../src/stage/standard";
 import { otherFigure, standardFigure } from "./standard-figure";
 

@@ -12,20 +12,20 @@ function dancer(x: number, y: number, z: number, yaw = 0): Dancer {
 }
 
 function follow(rig: Rig, puppet: Dancer, seconds: number): void {
-  for (let t = 0; t < seconds; t += 1 / 60) rig.follow(puppet, 1 / 60);
+  for (let t = 0; t < seconds; t += 1 / 60) rig.follow([puppet], 1 / 60);
 }
 
 describe("the rig", () => {
   test("meets a dancer where they stand", () => {
     const rig = new Rig();
-    rig.follow(dancer(3, 0.2, -2), 0);
+    rig.follow([dancer(3, 0.2, -2)], 0);
     expect(rig.group.position.distanceTo(new Vector3(3, 0.2, -2))).toBeLessThan(1e-9);
   });
 
   test("meets a dance from its front, wherever the dancer looks just then", () => {
     const rig = new Rig();
     rig.reset(2.8);
-    rig.follow(dancer(0, 0, 0, 0.4), 1 / 60);
+    rig.follow([dancer(0, 0, 0, 0.4)], 1 / 60);
     expect(rig.group.rotation.y).toBeCloseTo(2.8, 6);
     follow(rig, dancer(0, 0, 0, 2.5), 5);
     expect(rig.group.rotation.y).toBeCloseTo(2.8, 1);
@@ -44,7 +44,7 @@ describe("the rig", () => {
   test("cuts to a dancer put elsewhere, and the boards do not slide", () => {
     const rig = new Rig();
     follow(rig, dancer(0, 0, 0), 0.1);
-    rig.follow(dancer(5, 0, 5), 1 / 60);
+    rig.follow([dancer(5, 0, 5)], 1 / 60);
     expect(rig.group.position.x).toBe(5);
     expect(rig.travelled.length()).toBe(0);
   });
@@ -65,7 +65,24 @@ describe("the rig", () => {
     follow(steady, dancer(0, 0, 0, Math.PI / 2), 20);
     expect(steady.group.rotation.y).toBeGreaterThan(0.3);
     const turning = new Rig();
-    for (let t = 0; t < 20; t += 1 / 60) turning.follow(dancer(0, 0, 0, 4 * t), 1 / 60);
+    for (let t = 0; t < 20; t += 1 / 60) turning.follow([dancer(0, 0, 0, 4 * t)], 1 / 60);
     expect(Math.abs(turning.group.rotation.y)).toBeLessThan(0.3);
+  });
+
+  test("stands in the middle between several, on the floor of the lowest, and goes with all of them", () => {
+    const rig = new Rig();
+    const at = (x: number) => [dancer(x - 2, 0.1, 1), dancer(x, 0, -1), dancer(x + 1, 0, 0)];
+    rig.follow(at(0), 0);
+    expect(rig.group.position.distanceTo(new Vector3(-0.5, 0, 0))).toBeLessThan(1e-9);
+    rig.wide = 2;
+    for (let t = 0; t < 10; t += 1 / 60) rig.follow(at(1), 1 / 60);
+    expect(rig.group.position.x).toBeCloseTo(0.25, 2);
+    expect(rig.travelled.x).toBeCloseTo(0.375, 2);
+  });
+
+  test("turns to none of several who face one another", () => {
+    const rig = new Rig();
+    for (let t = 0; t < 20; t += 1 / 60) rig.follow([dancer(-1, 0, 0, Math.PI / 2), dancer(1, 0, 0, -Math.PI / 2)], 1 / 60);
+    expect(rig.group.rotation.y).toBeCloseTo(0, 6);
   });
 });

@@ -3,6 +3,7 @@ import { Texture, type Vector3 } from "three";
 import { JOINTS, PARENTS, restPose, type Figure } from "../../src/motion/skeleton";
 import { Puppet } from "../../src/stage/puppet";
 import { CROWN, joint, LEFT_FINGER_TIP } from "../../src/stage/standard";
+import { Workshop } from "../../src/stage/workshop";
 
 /** The standard figure, its joints `size` times as far apart. */
 export function standardFigure(size = 1): Figure {
@@ -23,7 +24,7 @@ export function standardFigure(size = 1): Figure {
 
 /** The puppet of the standard figure at rest where the figure stands, turned by `yaw`, radians about y. */
 export function standingPuppet(yaw = 0): Puppet {
-  const puppet = new Puppet(standardFigure(), { face: new Texture(), asanoha: new Texture() }, { value: 0 });
+  const puppet = new Puppet(standardFigure(), new Workshop({ face: new Texture(), asanoha: new Texture() }, { value: 0 }));
   const pose = restPose();
   joint("humanoid_root").toArray(pose.root);
   pose.rotations.set([Math.cos(yaw / 2), 0, Math.sin(yaw / 2), 0]);

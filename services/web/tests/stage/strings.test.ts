@@ -1,7 +1,6 @@
-import { Vector3 } from "three";
+import { type InstancedBufferGeometry, type Mesh, Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { LOOKS } from "../../src/stage/look";
-import type { Puppet } from "../../src/stage/puppet";
 import { Strings, type StringState } from "../../src/stage/strings";
 
 const FREE: StringState = { holder: null, lit: false, pull: null };
@@ -13,7 +12,7 @@ function hung(handles: readonly [number, number][], holders: readonly (number | 
   strings.still = true;
   const puppet = { scale: 1, handle: (limb: number, out: Vector3) => out.set(...handles[limb], 0) };
   const states = holders.map((holder) => ({ ...FREE, holder }));
-  strings.update(puppet as unknown as Puppet, states, LOOKS.night, 0.016, 0, 2.6, RIGHT);
+  strings.update([puppet], states, LOOKS.night, 0.016, { ground: 0, ceiling: 2.6, right: RIGHT, wide: 1 });
   return [0, 1, 2, 3].map((limb) => strings.bar(limb)?.clone() ?? null);
 }
 
@@ -36,5 +35,41 @@ describe("bars", () => {
     const bars = hung([[0, 2.2], [0, 1.2], [0, 0.5], [0, 0.5]], [0, 1, null, null]);
     expect(bars[0]?.x).toBeCloseTo(0.08, 9);
     expect(bars[1]?.x).toBeCloseTo(-0.08, 9);
+  });
+});
+
+describe("strings of several performers", () => {
+  const place = (x: number) => ({ scale: 1, handle: (_: number, out: Vector3) => out.set(x, 1, 0) });
+  const view = { ground: 0, ceiling: 2.6, right: RIGHT, wide: 1 };
+  const rings = (strings: Strings) => strings.group.getObjectByName("rings") as Mesh<InstancedBufferGeometry>;
+  const values = (strings: Strings, name: string, limb: number) => {
+    const attribute = rings(strings).geometry.getAttribute(name);
+    return Array.from({ length: attribute.itemSize }, (_, i) => attribute.getComponent(limb, i));
+  };
+
+  test("are four each, numbered on, and none of one who is not there yet", () => {
+    const strings = new Strings();
+    strings.still = true;
+    const states: StringState[] = [];
+    states[9] = { ...FREE, holder: 2 };
+    strings.update([place(-2), null, place(2)], states, LOOKS.night, 0.016, view);
+    expect(rings(strings).geometry.instanceCount).toBe(12);
+    expect(values(strings, "place", 3)).toEqual([-2, 1, 0]);
+    expect(values(strings, "tint", 4)[3]).toBe(0);
+    expect(values(strings, "place", 11)).toEqual([2, 1, 0]);
+    expect([0, 4, 8, 9, 10].map((limb) => strings.bar(limb) !== null)).toEqual([false, false, false, true, false]);
+    strings.update([place(0)], [], LOOKS.night, 0.016, view);
+    expect(rings(strings).geometry.instanceCount).toBe(4);
+  });
+
+  test("of those behind are calmer, until one points at them; from further away all are larger", () => {
+    const strings = new Strings();
+    strings.still = true;
+    const behind = { ...FREE, behind: true };
+    strings.update([place(0), place(1)], [FREE, FREE, FREE, FREE, behind, { ...behind, lit: true }], LOOKS.night, 0.016, { ...view, wide: 4 });
+    const [own, other, lit] = [0, 4, 5].map((limb) => values(strings, "tint", limb)[3]);
+    expect(other).toBeLessThan(0.5 * own);
+    expect([own, lit]).toEqual([expect.closeTo(LOOKS.night.ringStrength, 6), 1]);
+    expect(values(strings, "shape", 0)[0]).toBeCloseTo(0.092, 6);
   });
 });

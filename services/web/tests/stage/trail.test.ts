@@ -1,3 +1,5 @@
+import { setFlagsFromString } from "node:v8";
+import { runInNewContext } from "node:vm";
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import type { CameraKeyframe } from "../../src/client/library";
@@ -146,4 +148,24 @@ test("what cannot be a camera, and a time that runs back, are passed over", () =
   expect(trail.keyframes()).toEqual(before);
   trail.clear();
   expect(trail.keyframes()).toEqual([]);
+});
+
+test("ten minutes of a camera that never rests take less than five megabytes", () => {
+  setFlagsFromString("--expose-gc");
+  const collect = runInNewContext("gc") as () => void;
+  const held = () => {
+    collect();
+    const { heapUsed, external } = process.memoryUsage();
+    return heapUsed + external;
+  };
+  const view = createView();
+  const trail = new CameraTrail();
+  const before = held();
+  // from side to side: each frame is a keyframe
+  for (let frame = 0; frame < MOST + 1000; frame++) {
+    readView([frame % 2, 1, 4, 0, 1, 0, 0.45], view);
+    trail.add(BEGAN + frame * FRAME, view);
+  }
+  expect(held() - before).toBeLessThan(5e6);
+  expect(trail.keyframes().length).toBeGreaterThan(MOST - 10);
 });

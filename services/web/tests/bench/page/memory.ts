@@ -7,6 +7,7 @@ import type { CDPSession, Page } from "playwright-core";
 import { danced, holds, LEFT_HAND, letGo, ringOf, settled, welcomed } from "../../browser/inside";
 import { sharedFolder } from "../../browser/server";
 import { rounded, visit, type Bench, type Figures } from "./bench";
+import { heapOf, type Heap } from "./heap";
 
 const REPOSITORY = resolve(import.meta.dirname, "../../../../..");
 /** Rounds before anything is compared: what is made once is made in them. */
@@ -14,7 +15,7 @@ const WARM_UP = 3;
 /** Rounds between notes of how large the heap is: whether it goes on growing. */
 const NOTED = 5;
 
-interface Left {
+interface Left extends Heap {
   bytes: number;
   nodes: number;
   listeners: number;
@@ -37,13 +38,15 @@ export async function memory(bench: Bench): Promise<Figures> {
       const heaps: number[] = [];
       for (; performance.now() < end; rounds++) {
         await round(page, clip);
-        if (rounds % NOTED === 0) heaps.push(rounded((await left(protocol)).bytes / 1e6, 2));
+        if (rounds % NOTED === 0) heaps.push(rounded((await used(protocol)) / 1e6, 2));
       }
       const after = await left(protocol);
       bench.note(`memory: ${rounds} rounds in ${bench.minutes} minutes, heap ${rounded(before.bytes / 1e6, 2)} to ${rounded(after.bytes / 1e6, 2)} MB, nodes ${before.nodes} to ${after.nodes}, listeners ${before.listeners} to ${after.listeners}`);
       bench.note(`memory: heap after every ${NOTED} rounds, MB: ${heaps.join(", ")}`);
       return {
         heap_growth_mb: rounded((after.bytes - before.bytes) / 1e6, 2),
+        heap_growth_objects_mb: rounded((after.objects - before.objects) / 1e6, 2),
+        heap_growth_code_mb: rounded((after.code - before.code) / 1e6, 2),
         node_growth: after.nodes - before.nodes,
         listener_growth: after.listeners - before.listeners,
         memory_rounds: rounds,
@@ -64,13 +67,18 @@ function clipFor(folder: string): string {
   return own;
 }
 
-/** What is left once all that can be freed is. */
-async function left(protocol: CDPSession): Promise<Left> {
+/** Bytes of the heap once all that can be freed is. */
+async function used(protocol: CDPSession): Promise<number> {
   await protocol.send("HeapProfiler.enable");
   for (let nth = 0; nth < 3; nth++) await protocol.send("HeapProfiler.collectGarbage");
-  const { usedSize: bytes } = await protocol.send("Runtime.getHeapUsage");
+  return (await protocol.send("Runtime.getHeapUsage")).usedSize;
+}
+
+/** What is left then. */
+async function left(protocol: CDPSession): Promise<Left> {
+  const bytes = await used(protocol);
   const { nodes, jsEventListeners: listeners } = await protocol.send("Memory.getDOMCounters");
-  return { bytes, nodes, listeners };
+  return { bytes, nodes, listeners, ...(await heapOf(protocol)) };
 }
 
 /** Everything that people do on a page, once; it is left as it was. */

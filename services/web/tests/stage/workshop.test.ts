@@ -1,6 +1,7 @@
+import { Texture } from "three";
 import { describe, expect, test } from "vitest";
-import { BONES, puppetGeometry } from "../../src/stage/puppet";
-import { otherFigure } from "./standard-figure";
+import { BONES, puppetGeometry, Workshop } from "../../src/stage/workshop";
+import { otherFigure, standardFigure } from "./standard-figure";
 
 describe("the puppet's geometry", () => {
   const geometry = puppetGeometry(otherFigure());
@@ -26,4 +27,17 @@ describe("the puppet's geometry", () => {
       expect(used.has(BONES.indexOf(bone))).toBe(true);
     }
   });
+});
+
+test("dancers of equal lengths have one mesh, and it is given back when none of them is left", () => {
+  const workshop = new Workshop({ face: new Texture(), asanoha: new Texture() }, { value: 0 });
+  const shape = workshop.shape(standardFigure());
+  expect(workshop.shape(standardFigure())).toBe(shape);
+  const other = workshop.shape(otherFigure());
+  expect(other).not.toBe(shape);
+  const gone: unknown[] = [];
+  for (const one of [shape, other]) one.addEventListener("dispose", () => gone.push(one));
+  workshop.keep([standardFigure()]);
+  expect(gone).toEqual([other]);
+  expect(workshop.shape(standardFigure())).toBe(shape);
 });

@@ -1,0 +1,93 @@
+/** Who is on the stage: a puppet for each dancer of the motion, or in the first one's place an avatar. */
+import { Group, type IUniform } from "three";
+import type { Figure, Pose } from "../motion/skeleton";
+import { asanohaTexture, faceTexture } from "./paint";
+import type { Performer } from "./performer";
+import { Puppet } from "./puppet";
+import { Workshop } from "./workshop";
+
+/** Makes who dances for the lengths of the dancer that the stream tells of. */
+export type MakePerformer = (figure: Figure) => Performer;
+
+export class Troupe {
+  readonly group = new Group();
+  #performers: Performer[] = [];
+  #make: MakePerformer | null = null;
+  #workshop: Workshop | null = null;
+  #reflected = false;
+  #plain = false;
+
+  /** `floorAt` holds the height of the floor that reflects. */
+  constructor(private readonly floorAt: IUniform<number>) {
+    this.group.name = "troupe";
+  }
+
+  /** All who dance, in the order of the motion's tracks. */
+  get performers(): readonly Performer[] {
+    return this.#performers;
+  }
+
+  /** Those of whom there was a pose. */
+  get shown(): readonly Performer[] {
+    return this.#performers.filter(({ group }) => group.visible);
+  }
+
+  /** Comes on, a performer for each of the dancers' lengths. Returns whether they are others than before; false where more joined at most. */
+  enter(figures: readonly Figure[]): boolean {
+    const stay = this.#performers.length > 0 && this.#performers.every(({ figure }, k) => figure === figures[k]);
+    if (!stay) for (const performer of this.#performers.splice(0)) performer.dispose();
+    for (const figure of figures.slice(this.#performers.length)) this.#add(figure);
+    this.#workshop?.keep(figures);
+    return !stay;
+  }
+
+  /** Has the first dance danced by whom `make` makes, from now on; null: by the puppet. */
+  danceBy(make: MakePerformer | null): void {
+    this.#make = make;
+    const [first, ...others] = this.#performers;
+    if (!first) return;
+    first.dispose();
+    this.#performers = [];
+    this.#add(first.figure);
+    this.#performers.push(...others);
+  }
+
+  /** Takes a pose for each; one without stands as it stood. `seconds` let what hangs loose swing, 0 sets it still. */
+  apply(poses: readonly (Pose | null)[], seconds: number): void {
+    this.#performers.forEach((performer, k) => {
+      const pose = poses[k];
+      if (!pose) return;
+      performer.group.visible = true;
+      performer.apply(pose, seconds);
+    });
+  }
+
+  /** Shows reflections, and draws with plain materials, as of now for all who come on too. */
+  furnish(reflected: boolean, plain: boolean): void {
+    [this.#reflected, this.#plain] = [reflected, plain];
+    for (const performer of this.#performers) this.#dress(performer);
+  }
+
+  dispose(): void {
+    for (const performer of this.#performers.splice(0)) performer.dispose();
+    this.#workshop?.dispose();
+  }
+
+  #add(figure: Figure): void {
+    const performer = (this.#performers.length === 0 ? this.#make?.(figure) : null) ?? this.#carve(figure);
+    this.#dress(performer);
+    performer.group.visible = false;
+    this.#performers.push(performer);
+    this.group.add(performer.group);
+  }
+
+  #carve(figure: Figure): Puppet {
+    this.#workshop ??= new Workshop({ face: faceTexture(), asanoha: asanohaTexture() }, this.floorAt);
+    return new Puppet(figure, this.#workshop);
+  }
+
+  #dress(performer: Performer): void {
+    performer.reflected = this.#reflected;
+    performer.plain = this.#plain;
+  }
+}
