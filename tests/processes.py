@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import pwd
 import shutil
@@ -19,6 +20,8 @@ from pathlib import Path
 import pytest
 
 STARTING = 30.0
+EACH = 1_000
+"""Ports that one of the processes of the tests has."""
 
 
 def needed(program: str, *folders: Path) -> str:
@@ -32,9 +35,23 @@ def needed(program: str, *folders: Path) -> str:
 
 
 def free_port() -> int:
-    """A port that nobody has."""
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        return int(taken.getsockname()[1])
+    """A port that nobody has, below those that a system gives who asks for any: one of these may be another test's
+    before its server has started, or while it is killed."""
+    for port in _PORTS:
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            break
+    return port
+
+
+def _ports() -> Iterator[int]:
+    """Those of this process of the tests, over and over: another begins elsewhere, and another run mostly so."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    first = 12_000 + EACH * (worker % 20)
+    for number in itertools.count(os.getpid()):
+        yield first + number % EACH
+
+
+_PORTS = _ports()
 
 
 class Owned:

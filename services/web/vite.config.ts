@@ -15,6 +15,9 @@ const preloadTheatre: Plugin = {
   },
 };
 
+/** Milliseconds. */
+const PATIENCE = 90_000;
+
 export default defineConfig({
   plugins: [preloadTheatre, leanThree],
   build: {
@@ -23,12 +26,21 @@ export default defineConfig({
     target: "es2023",
     assetsInlineLimit: 0,
     // what is needed at first stays in one chunk, though main.ts waits for its words
-    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } } },
+    // what three.js is made lean by takes longest, and is meant to
+    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } }, checks: { bundlerTimings: false } },
     // three.js is one chunk, loaded while the page is already there
     chunkSizeWarningLimit: 700,
   },
   // the prior lies beside the Python codec
   server: { fs: { allow: [".", "../bunraku/codec/prior.json"] }, proxy: { "/v1": { target: "http://127.0.0.1:8000", ws: true } } },
-  // one file at a time: browsers that draw in software starve each other
-  test: { include: ["tests/**/*.test.ts"], environment: "node", fileParallelism: false },
+  test: {
+    include: ["tests/**/*.test.ts"],
+    environment: "node",
+    // one file at a time: browsers that draw in software starve each other
+    fileParallelism: false,
+    // bounds for what hangs: how long the rest takes is the machine's affair
+    testTimeout: PATIENCE,
+    hookTimeout: PATIENCE,
+    expect: { poll: { timeout: PATIENCE } },
+  },
 });

@@ -18,6 +18,8 @@ export default defineConfig({
     modulePreload: false,
     chunkSizeWarningLimit: 700,
     rolldownOptions: {
+      // what three.js is made lean by takes longest, and is meant to
+      checks: { bundlerTimings: false },
       input: { ...ENTRIES, examples: "examples/index.html" },
       preserveEntrySignatures: "strict",
       output: {

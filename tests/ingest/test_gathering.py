@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from bunraku.backing import library
 from bunraku.backing.library import StoredMotion
 from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import encode_motion
-from bunraku.ingest.gathering import ARMS, ROAMING, gather, side_by_side
+from bunraku.ingest.gathering import ROAMING, ROOM, gather, side_by_side
 from bunraku.ingest.results import Made, Refused
 from bunraku.motion import rotation
 from bunraku.motion.place import Place
@@ -47,25 +49,33 @@ def on_stage(motion: StoredMotion) -> list[np.ndarray]:
     return found
 
 
-def test_they_stand_in_a_row_each_with_room_for_its_dance_and_face_one_way() -> None:
-    still, wide = walking("still", 0.0, 2.0), walking("wide", 2.0, -1.0)
+def test_they_stand_in_a_row_as_near_as_their_dances_let_them_and_face_one_way() -> None:
+    still, wide = walking("still", 0.0, 2.0), walking("wide", 1.5, -1.0)
     made = gather("three", still, [wide, still], None)
     assert isinstance(made, Made)
     assert made.described == {"tracks": ["motion"] * 3, "performers": 3, "made_from": "still"}
     roots = on_stage(library.unpack("three", made.packed))
-    low, high = zip(*((root[:, 0].min(), root[:, 0].max()) for root in roots), strict=True)
-    assert high[1] - low[1] == pytest.approx(2.0, abs=0.1)
-    for nth in (1, 2):
-        assert low[nth] - high[nth - 1] > 2 * ARMS - 0.1
-    assert low[0] - ARMS + high[2] + ARMS == pytest.approx(0.0, abs=0.1)
+    for left, right in pairwise(roots):
+        assert (right[:, 0] - left[:, 0]).min() == pytest.approx(ROOM, abs=0.15)
+    middles = [(root[:, 0].min() + root[:, 0].max()) / 2 for root in roots]
+    assert middles[0] + middles[2] == pytest.approx(0.0, abs=0.1)
     for root in roots:
         assert abs(root[:, 2]).max() < 0.1
 
 
+def test_who_dance_the_same_keep_step_side_by_side() -> None:
+    wide = walking("wide", 3.0, 1.0)
+    made = gather("two", wide, [wide], None)
+    assert isinstance(made, Made)
+    left, right = on_stage(library.unpack("two", made.packed))
+    assert right[:, 0] - left[:, 0] == pytest.approx(ROOM, abs=1e-6)
+
+
 def test_who_walks_across_the_floor_is_not_given_all_of_it() -> None:
-    far = walking("far", 30.0, 0.0)
-    left, right = side_by_side([far.dances[0], far.dances[0]])
-    assert right.x - left.x == pytest.approx(2 * (ROAMING + ARMS), abs=0.2)
+    far, still = walking("far", 30.0, 0.0), walking("still", 0.0, 0.0)
+    left, right = side_by_side([far.dances[0], still.dances[0]])
+    middles = [place.x + 3.0 + half for place, half in ((left, 15.0), (right, 0.0))]
+    assert middles[1] - middles[0] == pytest.approx(ROOM + ROAMING, abs=0.6)
 
 
 def test_places_may_be_given_and_there_are_as_many_as_performers() -> None:

@@ -62,16 +62,16 @@ def test_a_place_is_read_as_it_was_told() -> None:
 
 
 @given(st.lists(st.tuples(NUMBER, NUMBER, st.floats(0.5, 2.0), NUMBER), min_size=1, max_size=4))
-def test_in_a_row_nobody_is_in_the_way_and_all_are_about_the_middle(dances: list[tuple[float, ...]]) -> None:
+def test_in_a_row_each_is_as_far_from_the_next_as_is_asked_and_all_are_about_the_middle(
+    dances: list[tuple[float, ...]],
+) -> None:
     middles = [np.array([x, z]) for x, z, _, _ in dances]
-    reaches, turns = [reach for _, _, reach, _ in dances], [turn for *_, turn in dances]
-    places = in_a_row(middles, reaches, turns, 0.1)
+    apart, turns = [far for _, _, far, _ in dances[1:]], [turn for *_, turn in dances]
+    places = in_a_row(middles, apart, turns)
     at = [
         place.put(np.array([x, 0.9, z]), np.tile([1.0, 0.0, 0.0, 0.0], (18, 1)))[0]
         for place, (x, z) in zip(places, middles, strict=True)
     ]
     np.testing.assert_allclose([z for _, _, z in at], 0.0, atol=1e-9)
-    left, right = at[0][0] - reaches[0], at[-1][0] + reaches[-1]
-    assert left + right == pytest.approx(0.0, abs=1e-9)
-    for nth in range(1, len(at)):
-        assert at[nth][0] - at[nth - 1][0] == pytest.approx(reaches[nth - 1] + reaches[nth] + 0.1)
+    assert at[0][0] + at[-1][0] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(np.diff([x for x, _, _ in at]), apart, atol=1e-9)

@@ -167,14 +167,15 @@ async def test_edits_hold_for_everyone_a_lead_from_now(stage: Stage, bus: Memory
 async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: MemoryBus) -> None:
     audience = Audience(bus)
     aiko = enter(stage, "Aiko")
+    two = await stored("two", 6)
     stage.hear(aiko.at, Claim(3))
-    await audience.until(2, Overlay)
     async with holding(stage, aiko, 3):
-        await stage.change(await stored("two", 6))
-    assert stage.timeline.motion == "two"
-    assert stage.presence.limbs[3] == aiko.id
-    count = len(await audience.until(1, Overlay))
-    await audience.until(count + 3, Overlay)
+        await audience.until(2, Overlay)
+        await stage.change(two)
+        assert stage.timeline.motion == "two"
+        assert stage.presence.limbs[3] == aiko.id
+        count = len(await audience.until(1, Overlay))
+        await audience.until(count + 3, Overlay)
 
 
 async def test_colours_are_given_in_order_and_again_when_free(stage: Stage) -> None:
@@ -334,12 +335,13 @@ async def test_a_holder_whom_a_stalled_server_could_not_hear_keeps_the_limb(stag
     audience = Audience(bus)
     aiko = enter(stage, "Aiko")
     stage.hear(aiko.at, Claim(0))
-    shown = len(await audience.until(2, Overlay))
+    async with holding(stage, aiko, 0):
+        shown = len(await audience.until(2, Overlay))
     # the machine has something else to do for longer than a lease: what Aiko says meanwhile waits at the socket
     time.sleep(1.5e-6 * LOST_AFTER)  # noqa: ASYNC251 - it is the loop that stands still
     await audience.until(shown + 1, Overlay)
-    stage.hear(aiko.at, Alive([0]))
-    await audience.until(shown + 8, Overlay)
+    async with holding(stage, aiko, 0):
+        await audience.until(shown + 8, Overlay)
     assert stage.presence.limbs[0] == aiko.id
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,14 +15,14 @@ from bunraku.motion.place import Place, in_a_row
 from bunraku.motion.rotation import Array
 from bunraku.wire.messages import Data
 
-ARMS = 0.75
-"""Metres to either side of a dancer's root that are the dancer's."""
-ROAMING = 1.5
-"""Metres to either side of its middle that a dance is given room for at most: who walks further meets another."""
-GAP = 0.1
-"""Metres between two."""
+ROOM = 1.6
+"""Metres between the roots of two who dance side by side: an arm of each, and a little."""
+ROAMING = 2.0
+"""Metres more, at most, that two are given who go towards each other: who walks further meets the other."""
 MOST_OF_THE_TIME = 2.0, 98.0
 """Percentiles of a dance's places between which it counts as being."""
+STEP = 0.1
+"""Seconds between two looks at where they are."""
 
 
 def gather(
@@ -48,18 +49,22 @@ def gather(
 
 
 def side_by_side(dances: Sequence[Dance], progress: Callable[[float], None] = lambda _: None) -> list[Place]:
-    """Places in a row, each wide enough for its dance, all facing z."""
-    middles, reaches = [], []
+    """Places in a row, all facing z, as near as two may be who go where their dances take them at the same time."""
+    times = np.arange(0.0, max(dances[0].track.duration_us * 1e-6, STEP), STEP)
+    middles: list[Array] = []
+    across: list[Array] = []
     for nth, dance in enumerate(dances):
-        floor = _floor(dance)
-        turn = rotation.about_axis(1, np.array(-dance.front))
-        low, high = np.percentile(rotation.rotate(turn, floor)[:, 0], MOST_OF_THE_TIME)
-        reaches.append(min((high - low) / 2, ROAMING) + ARMS)
-        # the middle of where it is once turned, turned back
-        turned = np.percentile(rotation.rotate(turn, floor), MOST_OF_THE_TIME, axis=0).mean(axis=0)
-        middles.append(rotation.rotate(rotation.conjugate(turn), turned)[[0, 2]])
+        floor, turn = _floor(dance), rotation.about_axis(1, np.array(-dance.front))
+        turned = rotation.rotate(turn, floor)
+        middle = np.percentile(turned, MOST_OF_THE_TIME, axis=0).mean(axis=0)
+        middles.append(rotation.rotate(rotation.conjugate(turn), middle)[[0, 2]])
+        # one that is over stands still
+        frames = np.minimum((times * dance.track.fps).astype(int), len(floor) - 1)
+        across.append(turned[frames, 0] - middle[0])
         progress((nth + 1) / len(dances))
-    return in_a_row(middles, reaches, [-dance.front for dance in dances], GAP)
+    towards = [np.percentile(left - right, MOST_OF_THE_TIME[1]) for left, right in pairwise(across)]
+    apart = [ROOM + float(np.clip(nearer, 0.0, ROAMING)) for nearer in towards]
+    return in_a_row(middles, apart, [-dance.front for dance in dances])
 
 
 def _floor(dance: Dance) -> Array:

@@ -51,17 +51,15 @@ MIDDLE = Place()
 """In the middle of the stage, as it is told."""
 
 
-def in_a_row(middles: list[Array], reaches: list[float], turns: list[float], gap: float) -> list[Place]:
+def in_a_row(middles: list[Array], apart: list[float], turns: list[float]) -> list[Place]:
     """Places beside each other along x, from the left of who looks at them to the right, about the middle.
 
-    `middles` (2,) are x and z of the middle of each dance before it is turned, which comes to stand at z 0; `reaches`
-    are how far each goes from there to either side once turned, metres; `gap` is kept between two.
+    `middles` (2,) are x and z of the middle of each dance before it is turned, which comes to stand at z 0; `apart` is
+    how far each is from the next, metres: one fewer.
     """
-    whole = 2 * sum(reaches) + gap * (len(reaches) - 1)
-    places, at = [], -whole / 2
-    for (x, z), reach, turn in zip(middles, reaches, turns, strict=True):
-        at += reach
+    places, at = [], -sum(apart) / 2
+    for (x, z), turn, following in zip(middles, turns, (*apart, 0.0), strict=True):
         sine, cosine = sin(turn), cos(turn)
         places.append(Place(at - (cosine * x + sine * z), -(cosine * z - sine * x), turn))
-        at += reach + gap
+        at += following
     return places

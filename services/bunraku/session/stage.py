@@ -27,6 +27,7 @@ from bunraku.marionette.troupe import Laid, Troupe
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.overlays import pack_joints
+from bunraku.session.deafness import Deafness
 from bunraku.session.pace import Pace
 from bunraku.session.poses import Poses
 from bunraku.session.puppeteers import Puppeteer, Puppeteers
@@ -73,6 +74,7 @@ class Stage:
         self._viewers: dict[str, int] = {}
         self._counting: asyncio.TimerHandle | None = None
         self._engaged = asyncio.Event()
+        self._deafness = Deafness()
         self._sequence = 0
         self._phase = secrets.randbelow(FRAMES * FRAME)
         self._overlay: bytes | None = None
@@ -289,7 +291,7 @@ class Stage:
         """Publish what lies over the dance in some frames, each due `LEAD` after its time; whether any limb is
         pulled. It is `late` by so many microseconds, in which nobody could be heard: they are not taken for silence."""
         now, begun = clock(), time.perf_counter()
-        lost = self._troupe.expire(now - max(late, 0))
+        lost = self._troupe.expire(now - self._deafness.late(late, now))
         for limb, holder in lost:
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.lost(limb, now)

@@ -1,9 +1,10 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
 import type { Vector3 } from "three";
+import { Arriving } from "./arriving";
 import { Casting } from "./casting";
-import { bound, comeIn, guarded, may, ownRole, whenDenied } from "./client/access";
-import { createSession, keep, shareSession, type CameraKeyframe, type Motion } from "./client/library";
+import { bound, comeIn, may, ownRole, whenDenied } from "./client/access";
+import { createSession, keep, type CameraKeyframe, type Motion } from "./client/library";
 import { ProblemError } from "./client/problem";
 import { Exporting } from "./exporting";
 import { Holding } from "./holding";
@@ -25,6 +26,7 @@ import { createTheme, type ThemeChoice } from "./page/theme";
 import { tell, uploadAll } from "./page/uploads";
 import type { Performing } from "./performing";
 import { findSession, Room, type Place } from "./room";
+import { shareLink } from "./sharing";
 import type { Stage } from "./stage/stage";
 import { FileStore } from "./storage/files";
 import { browserStore } from "./storage/store";
@@ -40,6 +42,7 @@ comeIn();
 addEventListener("hashchange", () => comeIn() && location.reload());
 document.documentElement.dataset.role = ownRole();
 if (bound()) document.documentElement.dataset.bound = "";
+const arriving = new Arriving(document.documentElement);
 
 const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvasElement;
 const query = new URLSearchParams(location.search);
@@ -62,7 +65,7 @@ let theme: ThemeChoice | null = null;
 let mapping = loadMapping();
 
 const page = createPage(document.body, {
-  share: () => void share(),
+  share: () => void shareLink(room, page.toast),
   language: () => {
     if (room) leave(room, performance.now());
     history.replaceState(history.state, "", chooseOther(location.href));
@@ -156,28 +159,6 @@ function play(): void {
   if (room?.viewer.timeline) room.edit({ playing: !room.viewer.timeline.playing });
 }
 
-async function share(): Promise<void> {
-  const url = new URL(location.href);
-  url.search = room ? `?session=${encodeURIComponent(room.id)}` : "";
-  let copied = say("Link copied");
-  if (guarded() && room) {
-    try {
-      url.href = new URL(await shareSession(room.id), location.href).href;
-      copied = say("Link copied: who has it may watch, for a week");
-    } catch (error) {
-      if (!(error instanceof ProblemError)) throw error;
-      page.toast(say("{title}: {detail}", error));
-      return;
-    }
-  }
-  try {
-    await navigator.clipboard.writeText(url.href);
-    page.toast(copied);
-  } catch {
-    page.toast(say("Copy this link: {link}", { link: url.href }));
-  }
-}
-
 async function uploaded(motion: Motion): Promise<void> {
   await pieces.refresh();
   renderPieces();
@@ -220,10 +201,11 @@ function enter(id: string, place: Place = "sessions"): Room {
     page.toast(error instanceof ProblemError ? say("{title}: {detail}", error) : String(error));
   }, { place });
   document.documentElement.toggleAttribute("data-own", place === "motions");
+  const entered = room;
   const { viewer, puppeteer } = room;
   holding.enter(room);
   performing?.enter(room);
-  listening.enter(viewer);
+  arriving.after(() => room === entered && listening.enter(viewer));
   const url = new URL(location.href);
   url.searchParams.set(place === "motions" ? "motion" : "session", id);
   history.replaceState(null, "", url);
@@ -298,6 +280,7 @@ async function openStage(): Promise<void> {
   try {
     performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, best: query.get("quality") === "best" });
   } catch {
+      arriving.arrived();
     page.notice("graphics", say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
     return;
   }
@@ -320,6 +303,7 @@ async function openStage(): Promise<void> {
   document.addEventListener("visibilitychange", () => {
     if (document.hidden) performing?.rest();
   });
+  arriving.staged();
   requestAnimationFrame(frame);
 }
 
@@ -330,11 +314,13 @@ function frame(): void {
   if (!stage || !performing) return;
   const now = performance.now();
   const { viewer } = room ?? {};
-  pad?.update(now, !page.keys.listening);
+  // browsers begin to look for pads when they are asked for them
+  if (stage.shown || page.keys.open) pad?.update(now, !page.keys.listening);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
   const { pose, limbs } = performing.draw(now, focused);
   page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.faces);
   if (pose) invite(now);
+  if (stage.shown) arriving.arrived();
   page.transport.camera(stage.hasShow, stage.following);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);
   if (viewer && now - sampled >= SAMPLE_EVERY) {
@@ -379,6 +365,7 @@ async function start(): Promise<void> {
       if (calm.matches && session.viewers === 0) entered.edit({ playing: false });
     }
     await library;
+    if (!room) arriving.arrived();
     if (!room && !may("ingest")) {
       page.notice("dance", say("The stage is empty"), say("Nobody dances here now. Come again when somebody does."));
     } else if (!room) {
@@ -386,6 +373,7 @@ async function start(): Promise<void> {
       page.panels.open("library");
     }
   } catch (error) {
+    arriving.arrived();
     if (!(error instanceof ProblemError)) throw error;
     if (!denied) page.notice("dance", error.title, say("{detail}. {hint}", { detail: error.detail, hint: error.hint ?? "" }));
   }

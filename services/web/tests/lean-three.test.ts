@@ -36,3 +36,27 @@ test("what is left out of the parts is nothing without a feature that the stage 
     expect(/^#if[\s\S]*#endif$/.test(text) || /toon|phong|gradientmap/.test(name), name).toBe(true);
   }
 });
+
+test("spaces go where a compiler needs none", () => {
+  const shader = (text: string) => lean(`export default /* glsl */\`${text}\`;`, "/three/src/renderers/shaders/ShaderChunk/one.glsl.js");
+  expect(shader("\n#define LEAST 1e-6 * 2.0\n\tfloat a = b - - c + d [ 1 ] * 2.0; // note\n\tif ( a >= b && ! c ) { return; }\n")).toBe(
+    String.raw`export default "\n#define LEAST 1e-6 * 2.0\nfloat a=b - - c + d[1]*2.0;\nif(a>=b&&! c){return;}\n";`,
+  );
+});
+
+test("what stands in for an idle part of the renderer answers what the renderer asks of it", () => {
+  const source = join(import.meta.dirname, "../node_modules/three/src/renderers");
+  const renderer = readFileSync(join(source, "WebGLRenderer.js"), "utf8");
+  const text = (part: string) => lean("", join(source, `${part}.js`));
+  const goggles = text("webxr/WebXRManager");
+  for (const asked of ["addEventListener", "removeEventListener", "setAnimationLoop", "dispose"]) {
+    expect(renderer).toContain(`xr.${asked}(`);
+    expect(goggles).toContain(`${asked}()`);
+  }
+  // all else is asked of goggles that are worn
+  const others = renderer.match(/\bxr\.\w+\(/g)?.filter((call) => !goggles.includes(call.slice(3))) ?? [];
+  expect([...new Set(others)].sort()).toEqual(["xr.getCamera(", "xr.getDepthSensingMesh(", "xr.hasDepthSensing(", "xr.updateCamera("]);
+  expect(text("webgl/WebGLOutput")).toBe("export class WebGLOutput {}");
+  expect(renderer.match(/\bnew WebGLOutput\(/g)).toHaveLength(1);
+  expect(text("webgl/WebGLUniformsGroups")).toContain("dispose()");
+});

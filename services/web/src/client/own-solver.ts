@@ -4,7 +4,7 @@ import type { Figure } from "../motion/skeleton";
 import { type Access, pageAccess } from "./access";
 import type { Solver, SolverOf } from "./solver";
 
-/** The marionette, fetched by this access. It comes after the first picture: nobody pulls before. */
+/** The marionette, fetched by this access. It comes after the first pose: nobody pulls before. */
 export function marionetteBy(access: Access): SolverOf {
   return async (figure, origin) => (await import("./marionette")).fetchMarionette(figure, origin, access);
 }

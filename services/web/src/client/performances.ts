@@ -38,7 +38,6 @@ export class Performances {
     this.missing = this.rate = -1;
     this.all = [];
     this.add(tracks);
-    this.all[0]?.prepare();
   }
 
   /** Those who were not known before come on. */
@@ -49,9 +48,9 @@ export class Performances {
     }
   }
 
-  /** Makes what is missing of what one's own limbs are solved with. */
+  /** Makes what is missing of what one's own limbs of those who were seen are solved with. */
   prepare(): void {
-    for (const one of this.all) one?.prepare();
+    for (const one of this.all) if (one?.shown) one.prepare();
   }
 
   /** The pose of a performer to draw at `clock` of its motion's `timeline`, local `nowMs`: see `Viewer.poseAt`. */

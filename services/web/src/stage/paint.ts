@@ -6,7 +6,8 @@ type Point = readonly [x: number, y: number];
 function canvas(size: number): CanvasRenderingContext2D {
   const element = document.createElement("canvas");
   element.width = element.height = size;
-  const context = element.getContext("2d");
+  // painted without the graphics, which have the stage to make ready meanwhile
+  const context = element.getContext("2d", { willReadFrequently: true });
   if (!context) throw new Error("this browser gives no 2D canvas to paint the puppet's face on");
   return context;
 }
@@ -40,7 +41,7 @@ function blush(context: CanvasRenderingContext2D, x: number, y: number, radius: 
   soft.addColorStop(0, `rgba(${rgb},${strength})`);
   soft.addColorStop(1, `rgba(${rgb},0)`);
   context.fillStyle = soft;
-  context.fillRect(0, 0, SIZE, SIZE);
+  context.fillRect(px(x) - radius, py(y) - radius, 2 * radius, 2 * radius);
 }
 
 /** The painted face, a colour to multiply the gofun with. */

@@ -34,6 +34,8 @@ const LIT = 1.2;
 
 /** Movements of the stage's own take no longer step than this, seconds. */
 const LONGEST_STEP = 0.1;
+/** The stage is drawn without a dancer only if none came on for so long, seconds: its picture would stand in the way of theirs. */
+const EMPTY_AFTER = 1;
 
 export class Stage {
   readonly scene = new Scene();
@@ -43,6 +45,8 @@ export class Stage {
   /** Where the audience's camera was, for keeping. */
   readonly trail = new CameraTrail();
   readonly renderer: WebGLRenderer;
+  /** Whether the graphics are done with a frame that has a dancer in it. */
+  shown = false;
   readonly #troupe: Troupe;
   readonly #scenery = new Scenery();
   readonly #backdrop = backdropUniforms();
@@ -61,6 +65,8 @@ export class Stage {
   readonly #gate: FrameGate;
   readonly #pictures = new PictureCamera();
   #sinceDrawn = 0;
+  #empty = 0;
+  #danced = false;
   #picturing = false;
 
   /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
@@ -75,10 +81,12 @@ export class Stage {
     this.renderer.shadowMap.type = PCFShadowMap;
     this.#scenery.group.add(createBackdrop(this.#backdrop), this.#floor.mesh);
     this.#troupe = new Troupe(this.#floorAt);
+    this.rig.group.add(this.audience.camera, this.#lights.group);
+    this.scene.add(this.rig.group, this.#troupe.group);
+    // drawn in software what is behind the dancers takes longer than they, who come first then
+    if (!plain) this.#build();
     // three.js' own listener stands before this one: its side of the context is there again by then
     canvas.addEventListener("webglcontextrestored", () => this.#restore());
-    this.rig.group.add(this.audience.camera, this.#lights.group, this.#scenery.group);
-    this.scene.add(this.rig.group, this.strings.group, this.#troupe.group);
     this.#furnish();
   }
 
@@ -123,6 +131,7 @@ export class Stage {
     this.#lights.dress(this.#look);
     this.#light();
     this.renderer.toneMappingExposure = this.#look.exposure;
+    this.renderer.setClearColor(this.#look.backdrop.middle);
     this.#furnish();
   }
 
@@ -198,6 +207,10 @@ export class Stage {
     }
     this.#sinceDrawn += interval;
     if (!this.#gate.open) return;
+    this.shown = this.#danced;
+    if (posed) this.#danced = true;
+    else if ((this.#empty += seconds) < EMPTY_AFTER) return;
+    if (this.shown || !this.#danced) this.#build();
     this.renderer.render(this.scene, audience.camera);
     this.#gate.close();
     const slow = posed && !this.#picturing && this.#quality.frame(this.#sinceDrawn);
@@ -290,6 +303,14 @@ export class Stage {
   #box(at: Vector3, { across, up, down }: Extent): Box {
     const { camera, scale } = this.audience;
     return boxAround(at, { across: across * scale, up: up * scale, down: down * scale }, camera, this.#width, this.#height);
+  }
+
+  /** Puts up what is about the dancers. */
+  #build(): void {
+    if (this.#scenery.group.parent) return;
+    this.rig.group.add(this.#scenery.group);
+    this.scene.add(this.strings.group);
+    if (this.puppet) this.#compile();
   }
 
   #compile(): void {

@@ -25,6 +25,8 @@ export class Threads {
   readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
   readonly #attributes: Record<"position" | "tangent3" | "tint" | "pull", BufferAttribute>;
   readonly #colour = new Color();
+  /** How each is dyed. */
+  readonly #dyed: string[] = [];
 
   constructor() {
     const geometry = new BufferGeometry();
@@ -100,27 +102,43 @@ export class Threads {
 
   /** Draws thread `index` from a handle up to its other end, world metres. */
   set(index: number, from: Vector3, to: Vector3, thread: Thread): void {
-    const { r, g, b } = this.#colour.set(thread.colour);
-    const { position, tangent3, tint, pull } = this.#attributes;
-    const at = (t: number) => {
-      const point = from.clone().lerp(to, t);
-      point.y -= thread.sag * 4 * t * (1 - t);
-      point.x += thread.sag * 0.6 * Math.sin(t * Math.PI);
-      return point;
-    };
+    const { position, tangent3, pull } = this.#attributes;
+    const { sag, tension } = thread;
+    // numbers alone: every frame has some six hundred of these points
+    const dx = to.x - from.x;
+    const dy = to.y - from.y;
+    const dz = to.z - from.z;
+    const x = (t: number) => from.x + dx * t + sag * 0.6 * Math.sin(t * Math.PI);
+    const y = (t: number) => from.y + dy * t - sag * 4 * t * (1 - t);
     for (let i = 0; i <= SEGMENTS; i++) {
       const t = i / SEGMENTS;
-      const point = at(t);
-      const along = at(Math.min(1, t + 0.01)).sub(at(Math.max(0, t - 0.01)));
-      const alpha = thread.alpha * (thread.fading ? (1 - t) ** 1.3 : 1);
+      const before = Math.max(0, t - 0.01);
+      const after = Math.min(1, t + 0.01);
       for (let edge = 0; edge < 2; edge++) {
         const vertex = (index * (SEGMENTS + 1) + i) * 2 + edge;
-        position.setXYZ(vertex, point.x, point.y, point.z);
-        tangent3.setXYZ(vertex, along.x, along.y, along.z);
-        tint.setXYZW(vertex, r, g, b, alpha);
-        pull.setX(vertex, thread.tension);
+        position.setXYZ(vertex, x(t), y(t), from.z + dz * t);
+        tangent3.setXYZ(vertex, x(after) - x(before), y(after) - y(before), dz * (after - before));
+        pull.setX(vertex, tension);
       }
     }
-    for (const attribute of Object.values(this.#attributes)) attribute.needsUpdate = true;
+    position.needsUpdate = tangent3.needsUpdate = pull.needsUpdate = true;
+    this.#dye(index, thread);
+  }
+
+  /** The colour of a thread, which changes seldom. */
+  #dye(index: number, { colour, alpha, fading }: Thread): void {
+    const dyed = `${colour} ${alpha} ${fading}`;
+    if (dyed === this.#dyed[index]) return;
+    this.#dyed[index] = dyed;
+    const { r, g, b } = this.#colour.set(colour);
+    const { tint } = this.#attributes;
+    for (let i = 0; i <= SEGMENTS; i++) {
+      const left = fading ? (1 - i / SEGMENTS) ** 1.3 : 1;
+      for (let edge = 0; edge < 2; edge++) {
+        const vertex = (index * (SEGMENTS + 1) + i) * 2 + edge;
+        tint.setXYZW(vertex, r, g, b, alpha * left);
+      }
+    }
+    tint.needsUpdate = true;
   }
 }

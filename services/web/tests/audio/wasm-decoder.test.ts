@@ -10,7 +10,7 @@ test.each([1, 2])("packets come out in order, %i channels of 60 ms, those too th
   const decoder = wasmDecoder(channels)((number, planes) => out.push([number, planes && planes.map(({ length }) => length)]));
   decoder.decode(7, NOTHING);
   decoder.decode(8, NOTHING);
-  await vi.waitFor(() => expect(out).toHaveLength(2));
+  await expect.poll(() => out).toHaveLength(2);
   decoder.decode(9, NOTHING);
   const lengths = new Array<number>(channels).fill(PACKET);
   expect(out).toEqual([[7, lengths], [8, lengths], [9, lengths]]);
@@ -24,6 +24,6 @@ test("what cannot be decoded is told as that, and it goes on; ended before it wa
   decoder.decode(0, Uint8Array.of((31 << 3) | 3, 63, 1, 2));
   decoder.decode(1, NOTHING);
   decoder.end();
-  await vi.waitFor(() => expect(out).toEqual([[0, false], [1, true]]));
+  await expect.poll(() => out).toEqual([[0, false], [1, true]]);
   vi.restoreAllMocks();
 });

@@ -61,7 +61,7 @@ describe("packets", () => {
     inside.put(1);
     expect(out).toEqual([[40, [1, 2]], [41, [1, 1]]]);
     decoder.end();
-    await vi.waitFor(() => expect(inside.state).toBe("closed"));
+    await expect.poll(() => inside.state).toBe("closed");
   });
 
   test("it fails at one: that is told as such, and no other", async () => {

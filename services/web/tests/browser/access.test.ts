@@ -33,7 +33,7 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
     }
     expect(await page.getByRole("navigation", { name: "Take a string" }).isVisible()).toBe(false);
     expect(await page.getByRole("button", { name: "Line" }).isVisible()).toBe(true);
-    expect(await page.locator(".brand-piece").innerText()).not.toBe("");
+    await expect.poll(() => page.locator(".brand-piece").innerText()).not.toBe("");
     // neither key nor hand takes a string
     await page.keyboard.press("Digit2");
     await page.keyboard.press("Space");
@@ -75,9 +75,8 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await page.getByRole("button", { name: "Play", exact: true }).click();
     await page.getByRole("button", { name: "Share link" }).click();
-    const toast = page.locator(".toast");
-    await toast.waitFor();
-    const [copied] = /http\S+/.exec(await toast.innerText()) ?? [await page.evaluate(() => navigator.clipboard.readText().catch(() => ""))];
+    // looked at as soon as it is there, as it does not stay
+    const [copied] = /http\S+/.exec(await page.locator(".toast").innerText()) ?? [await page.evaluate(() => navigator.clipboard.readText().catch(() => ""))];
     const shares = (await (await asAdmin("GET", "/v1/shares")).json()) as { items: { by: string }[] };
     expect(shares.items[0]?.by).toBe("operator");
     if (copied) {

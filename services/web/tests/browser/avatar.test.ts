@@ -3,7 +3,7 @@ import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { figureFile, mixamo, type FigureOptions } from "../avatar/figures";
 import { describeInBrowser } from "./in-browser";
-import { danced, drawn, LEFT_HAND, letGo, ringOf, settled, welcomed } from "./inside";
+import { danced, drawn, LEFT_HAND, letGo, ringOf, settled, standAtBeginning, toasted, welcomed } from "./inside";
 
 const SMALL = { viewport: { width: 640, height: 560 }, reducedMotion: "reduce" } as const;
 /** The same figure in three kinds of file, each of other proportions than the dancer's. */
@@ -18,11 +18,10 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     const page = await open("", { ...SMALL, before });
     await danced(page);
     await welcomed(page);
+    await standAtBeginning(page);
     sent.length = 0;
-    await drop(page, "mine.glb", OWN);
-    await page.getByRole("radio", { name: "mine" }).waitFor();
+    await toasted(page, "mine dances here; everyone else sees the puppet", () => drop(page, "mine.glb", OWN));
     expect(await page.getByRole("radio", { name: "mine" }).isChecked()).toBe(true);
-    await page.getByText("everyone else sees the puppet", { exact: false }).first().waitFor();
     await danced(page);
     expect(await page.evaluate(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") === undefined)).toBe(true);
     expect(await limbsApart(page)).toBeLessThan(1);
@@ -31,14 +30,14 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     const ring = await settled(page, () => ringOf(page, LEFT_HAND), 0.5);
     await page.mouse.move(ring.x, ring.y);
     await page.mouse.down();
-    // Beside and below the shoulder, where an arm has room wherever the dance stands still.
+    // Beside and below the shoulder, where an arm has room.
     const shoulder = await screenOf(page, "mixamorigLeftArm");
     const scale = Math.abs((await screenOf(page, "mixamorigHead")).y - (await screenOf(page, "mixamorigHips")).y) / 0.6;
     const to = { x: shoulder.x + 0.38 * scale, y: shoulder.y + 0.1 * scale };
     await page.mouse.move(to.x, to.y, { steps: 8 });
     await page.waitForFunction((limb) => window.bunraku.hands.source(limb) === "pointer", LEFT_HAND);
     await settled(page, () => ringOf(page, LEFT_HAND), 0.3);
-    expect(await away(page)).toBeLessThan(0.03);
+    await expect.poll(() => away(page)).toBeLessThan(0.03);
     await page.mouse.up();
     await letGo(page, LEFT_HAND);
     expect(sent).toEqual([]);
@@ -47,11 +46,9 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
   test("kept for the next visit; the puppet dances when it is chosen, and again when the avatar is removed", async () => {
     const page = await open("", SMALL);
     await danced(page);
-    await drop(page, "boxes.vrm", { vrm: 1, tail: true, dressed: true });
-    await page.getByRole("radio", { name: "Boxes" }).waitFor();
-    expect(await pictures(page)).toEqual([2]);
     // said once it is kept
-    await page.getByText("Boxes dances here").waitFor();
+    await toasted(page, "Boxes dances here", () => drop(page, "boxes.vrm", { vrm: 1, tail: true, dressed: true }));
+    expect(await pictures(page)).toEqual([2]);
     await page.reload();
     // keys are heard once the stage is there
     await danced(page);
@@ -61,8 +58,7 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     expect(await limbsApart(page)).toBeLessThan(1);
     await page.getByRole("radio", { name: "The puppet" }).check();
     await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
-    await drop(page, "old.vrm", { vrm: 0, dressed: true });
-    await page.getByText("Old boxes dances here").waitFor();
+    await toasted(page, "Old boxes dances here", () => drop(page, "old.vrm", { vrm: 0, dressed: true }));
     expect(await pictures(page)).toEqual([2]);
     expect(await limbsApart(page)).toBeLessThan(1);
     await page.getByRole("button", { name: "Remove the avatar Old boxes" }).click();
@@ -113,8 +109,9 @@ async function limbsApart(page: Page): Promise<number> {
       const limbs = [["UpperArm", "Arm", "shoulder"], ["LowerArm", "ForeArm", "elbow"], ["Hand", "Hand", "wrist"]].concat([["UpperLeg", "UpLeg", "hip"], ["LowerLeg", "Leg", "knee"], ["Foot", "Foot", "ankle"]]);
       return [0, 1, 3, 4].map((k) => {
         const [a, b] = [limbs[k], limbs[k + 1]];
-        const mine = own(`${side}${b[0]}`, `${tool}${b[1]}`).sub(own(`${side}${a[0]}`, `${tool}${a[1]}`));
-        return mine.angleTo(place(puppet.joint(`${s}_${b[2]}`)).sub(place(puppet.joint(`${s}_${a[2]}`))));
+        const mine = own(`${side}${b[0]}`, `${tool}${b[1]}`).sub(own(`${side}${a[0]}`, `${tool}${a[1]}`)).normalize();
+        const told = place(puppet.joint(`${s}_${b[2]}`)).sub(place(puppet.joint(`${s}_${a[2]}`))).normalize();
+        return Math.acos(Math.min(1, mine.dot(told)));
       });
     });
     return (Math.max(...apart) * 180) / Math.PI;

@@ -7,7 +7,7 @@ import { expect, test } from "vitest";
 import { JOINTS } from "../../src/motion/skeleton";
 import { bowing } from "./bowing";
 import { describeInBrowser, type Opening } from "./in-browser";
-import { danced, holds, LEFT_HAND, placeOf, ringOf, settled } from "./inside";
+import { danced, holds, LEFT_HAND, placeOf, ringOf, settled, standAtBeginning, tap, toasted } from "./inside";
 
 const CALM: Opening = { viewport: { width: 760, height: 560 }, reducedMotion: "reduce", colorScheme: "dark" };
 
@@ -82,11 +82,11 @@ describeInBrowser("what is taken from the page", {}, ({ open }) => {
     expect(glb.name).toBe("again.glb");
     const { images, nodes } = jsonOf(glb) as { images: { mimeType: string }[]; nodes: unknown[] };
     expect([images[0].mimeType, nodes.length]).toEqual(["image/png", 21]);
-    const vrma = await downloaded(page, "again", "VRMA");
+    const vrma = await toasted(page, "Saved again.vrma", () => downloaded(page, "again", "VRMA"));
     expect(vrma.name).toBe("again.vrma");
     expect(jsonOf(vrma)).toHaveProperty(["extensions", "VRMC_vrm_animation", "specVersion"], "1.0");
-    await page.getByText("Saved again.vrma").waitFor();
-    expect(await page.locator(".problem, .upload").count()).toBe(0);
+    await page.locator(".upload").waitFor({ state: "detached" });
+    expect(await page.locator(".problem").count()).toBe(0);
 
     // Escape shuts what was disclosed, then the library
     await page.keyboard.press("Escape");
@@ -116,18 +116,18 @@ describeInBrowser("what is taken from the page", {}, ({ open }) => {
   test("a picture shows the stage with the pulled pose, in full quality, and leaves the stage as it was", async () => {
     const page = await open("", CALM);
     await dances(page, "posing", bowing(75));
+    await standAtBeginning(page);
     await page.keyboard.press("Escape");
-    await page.keyboard.press("Digit2");
+    await tap(page, "Digit2");
     await holds(page, LEFT_HAND);
-    await page.keyboard.down("KeyW");
     const from = await placeOf(page, "l_wrist");
+    await page.keyboard.down("KeyW");
     await page.waitForFunction((height) => (window.bunraku.stage.scene.getObjectByName("l_wrist")?.matrixWorld.elements[13] ?? 0) > height + 0.15, from[1]);
     await page.keyboard.up("KeyW");
     const ring = await settled(page, () => ringOf(page, LEFT_HAND), 1);
     const before = await look(page);
-    const picture = await saved(page, () => page.keyboard.press("KeyP"));
+    const picture = await toasted(page, "Saved posing.png", () => saved(page, () => page.keyboard.press("KeyP")));
     expect(picture.name).toBe("posing.png");
-    await page.getByText("Saved posing.png").waitFor();
     expect(await look(page)).toEqual(before);
 
     // the pulled hand is where it is on the page; the other hangs lower, and where it would mirror this one is the dark

@@ -1,8 +1,8 @@
 /** What a puppeteer has in the hand, in a real browser: keys bound anew and remembered, arrows pressed and held, a held limb asked for and given, a performance kept. */
 import type { Page, WebSocketRoute } from "playwright-core";
 import { expect, test } from "vitest";
-import { describeInBrowser, PATIENCE, type Opening } from "./in-browser";
-import { danced, drawn, holds, LEFT_HAND, letGo, placeOf, RIGHT_LEG, settled, welcomed } from "./inside";
+import { describeInBrowser, type Opening } from "./in-browser";
+import { danced, drawn, holds, LEFT_HAND, letGo, placeOf, RIGHT_LEG, settled, standAtBeginning, tap, toasted, undrawn, welcomed } from "./inside";
 
 /** Paused on entering, as less motion is asked for. */
 const CALM: Opening = { viewport: { width: 760, height: 560 }, reducedMotion: "reduce" };
@@ -65,30 +65,28 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
   test("the arrows of a held limb are pressed and held, by keyboard and by pointer, and go on when the line is lost", async () => {
     const lines: WebSocketRoute[] = [];
     const page = await open("Aiko", lines);
+    await standAtBeginning(page);
     await page.keyboard.press("KeyS");
     await page.getByRole("button", { name: "Take left hand" }).click();
     await holds(page, LEFT_HAND);
     const pad = page.getByRole("group", { name: "Move the left hand" });
     expect(await pad.getByRole("button").evaluateAll((all) => all.map((one) => one.getAttribute("aria-label")))).toEqual(["Nearer", "Up", "Further", "Left", "Down", "Right"]);
-    // Wherever the dance stands still, there is room towards the shoulder's height.
-    const [wrist, shoulder] = [await height(page, "l_wrist"), await height(page, "l_shoulder")];
-    const way = wrist < shoulder ? "Up" : "Down";
-    await pad.getByRole("button", { name: way }).focus();
+    const wrist = await height(page, "l_wrist");
+    await pad.getByRole("button", { name: "Up" }).focus();
     await page.keyboard.down("Space");
     await page.waitForFunction(moved, { from: wrist, least: 0.05 });
     await page.keyboard.up("Space");
     await still(page);
 
     const between = await height(page, "l_wrist");
-    const back = pad.getByRole("button", { name: way === "Up" ? "Down" : "Up" });
+    const back = pad.getByRole("button", { name: "Down" });
     await back.hover();
     await page.mouse.down();
     await page.waitForFunction(moved, { from: between, least: 0.05 });
     const before = lines.length;
-    await lines.at(-1)?.close({ code: 1012, reason: "cut by the test" });
-    await page.getByText("The line was lost").waitFor();
-    await expect.poll(() => lines.length, { timeout: PATIENCE }).toBeGreaterThan(before);
-    await expect.poll(() => page.getByRole("button", { name: "Release left hand" }).isEnabled(), { timeout: PATIENCE }).toBe(true);
+    await toasted(page, "The line was lost", async () => lines.at(-1)?.close({ code: 1012, reason: "cut by the test" }));
+    await expect.poll(() => lines.length).toBeGreaterThan(before);
+    await expect.poll(() => page.getByRole("button", { name: "Release left hand" }).isEnabled()).toBe(true);
     expect(await back.getAttribute("data-on")).toBe("");
     await page.mouse.up();
     await still(page);
@@ -106,9 +104,9 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
       });
     const page = await own.open("?name=Kiku", { ...CALM, before });
     await ready(page);
-    // wherever the dance stands still, there is room towards the shoulder's height
+    await standAtBeginning(page);
     const wrist = await height(page, "l_wrist");
-    await pad(page, { axis: [1, wrist < (await height(page, "l_shoulder")) ? -0.9 : 0.9] });
+    await pad(page, { axis: [1, -0.9] });
     await holds(page, LEFT_HAND);
     await page.waitForFunction(moved, { from: wrist, least: 0.05 });
     await pad(page, { axis: [1, 0] });
@@ -129,10 +127,11 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
 
   test("a held limb is asked for, shown to its holder, and given; and what was done is kept", async () => {
     const [aiko, mateo] = [await open("Aiko"), await open("Mateo")];
-    await aiko.keyboard.press("Digit2");
+    // who is asked for a limb gives it up by silence too
+    for (const page of [aiko, mateo]) await undrawn(page);
+    await tap(aiko, "Digit2");
     await mateo.getByRole("button", { name: "Left hand, held by Aiko" }).waitFor();
-    await mateo.keyboard.press("Digit2");
-    await mateo.getByText("Aiko holds the left hand").waitFor();
+    await toasted(mateo, "Aiko holds the left hand", () => tap(mateo, "Digit2"));
     expect(await source(mateo)).toBe(null);
     await mateo.keyboard.press("KeyR");
     const asked = aiko.getByText("Mateo asks for the left hand");

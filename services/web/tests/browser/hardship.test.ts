@@ -4,12 +4,18 @@ import { expect, test } from "vitest";
 import { DESKTOP, inEveryState, PHONE, violations } from "./axe";
 import { bowing } from "./bowing";
 import { describeInBrowser } from "./in-browser";
-import { danced, drawn, holds, LEFT_HAND, letGo, welcomed } from "./inside";
+import { danced, drawn, holds, LEFT_HAND, letGo, settled, standAtBeginning, tap, toasted, welcomed } from "./inside";
 
 /** Seconds that the dance may be from where it has to be. */
 const NEAR = 0.1;
 
 describeInBrowser("a page under hardship", { demo: true }, (own) => {
+  /** The session on the stage. */
+  async function session(): Promise<{ id: string; viewers: number }> {
+    const { items } = (await (await fetch(`${own.url}/v1/sessions`)).json()) as { items: { id: string; viewers: number }[] };
+    return items[0];
+  }
+
   test("without a net says so and dances on, and with one again is where the dance is", async () => {
     const lines: WebSocketRoute[] = [];
     const page = await own.open("", {
@@ -28,13 +34,18 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
     }, NEAR);
     const begun = await whereabouts(page);
     await page.context().setOffline(true);
-    for (const line of lines) await line.close({ code: 1012, reason: "cut by the test" });
-    await page.getByText("The line was lost").waitFor();
+    await toasted(page, "The line was lost", async () => {
+      for (const line of lines) await line.close({ code: 1012, reason: "cut by the test" });
+    });
     await page.locator('.health[data-state="lost"]').waitFor();
     expect(await page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(false);
     const cut = await whereabouts(page);
-    // it has some seconds in hand
-    await page.waitForFunction((from) => window.bunraku.viewer.positionAt(performance.now()) > from + 1, cut.position);
+    // it has some seconds in hand, and may begin anew in them
+    await page.waitForFunction((from) => {
+      const { viewer } = window.bunraku;
+      const on = viewer.positionAt(performance.now()) - from;
+      return on - viewer.duration * Math.floor(on / viewer.duration) > 1;
+    }, cut.position);
     // what is said for a moment comes and goes beside it
     await page.keyboard.press("KeyR");
     const moment = page.getByText("Reach for a string that another holds");
@@ -57,7 +68,7 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
       },
       { begun, near: NEAR },
     );
-    await page.keyboard.press("Digit2");
+    await tap(page, "Digit2");
     await holds(page, LEFT_HAND);
     await page.keyboard.press("Escape");
     await letGo(page, LEFT_HAND);
@@ -103,7 +114,8 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
       before: async (page) => void page.on("console", (said) => said.type() === "error" && wrong.push(said.text())),
     });
     await danced(page);
-    await page.getByRole("button", { name: "Play", exact: true }).waitFor();
+    await standAtBeginning(page);
+    await settled(page, () => seat(page), 1e-3);
     const before = await picture(page);
     expect(new Set(before).size).toBeGreaterThan(30);
     await darken(page);
@@ -123,6 +135,10 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
   });
 
   test("asked for less motion starts paused, and nothing glides", async () => {
+    // so it does for who comes first, and not for others
+    await expect.poll(async () => (await session()).viewers).toBe(0);
+    const edit = { method: "PATCH", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ playing: true }) };
+    expect((await fetch(`${own.url}/v1/sessions/${(await session()).id}`, edit)).status).toBe(200);
     const page = await own.open("", { reducedMotion: "reduce" });
     await danced(page);
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
@@ -136,6 +152,11 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
     );
     expect(gliding).toEqual([]);
     expect(await page.evaluate(() => window.bunraku.stage.strings.still)).toBe(true);
+    // told of, it takes effect a while later
+    await page.waitForFunction(() => {
+      const { viewer } = window.bunraku;
+      return viewer.timelines.at(viewer.shownTime(performance.now()))?.playing === false;
+    });
     const [one, other] = [await whereabouts(page), await drawn(page).then(() => whereabouts(page))];
     expect(other.position).toBe(one.position);
   });
@@ -145,7 +166,7 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
     await danced(page);
     await welcomed(page);
     // a held string has more to show
-    await page.keyboard.press("Digit2");
+    await tap(page, "Digit2");
     await holds(page, LEFT_HAND);
     const found: string[] = [];
     for (const viewport of [DESKTOP, PHONE]) {
@@ -161,6 +182,14 @@ function whereabouts(page: Page): Promise<{ position: number; now: number }> {
   return page.evaluate(() => {
     const now = performance.now();
     return { position: window.bunraku.viewer.positionAt(now), now };
+  });
+}
+
+/** Where the audience sits, metres: it follows the dancer calmly. */
+function seat(page: Page): Promise<[number, number, number]> {
+  return page.evaluate(() => {
+    const { elements } = window.bunraku.stage.audience.camera.matrixWorld;
+    return [elements[12], elements[13], elements[14]] as [number, number, number];
   });
 }
 

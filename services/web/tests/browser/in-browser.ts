@@ -38,7 +38,8 @@ export function describeInBrowser(name: string, { browser: flags = [], timeout =
 
     beforeAll(async () => {
       [server, browser] = await Promise.all([startServer(options), launch(path ?? "", ...flags)]);
-    }, PATIENCE);
+      // it makes our dance and its music first
+    }, 2 * PATIENCE);
     afterAll(async () => {
       await browser?.close();
       await server?.stop();

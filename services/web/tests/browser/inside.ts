@@ -18,9 +18,48 @@ export type Place = [number, number, number];
 /** Indices of limbs. */
 export const [LEFT_HAND, RIGHT_LEG] = [0, 3];
 
-/** Waits for the first pose on the stage. */
+/** Waits for the first pose on the stage, and until it was drawn: the first picture makes the shaders, over which a slow machine stands still. */
 export async function danced(page: Page): Promise<void> {
   await page.waitForFunction(() => window.bunraku?.stage?.puppet?.group.visible);
+  // one is begun only when the one before is done
+  const begun = await page.evaluate(() => window.bunraku.stage.renderer.info.render.frame);
+  await page.waitForFunction((begun) => window.bunraku.stage.renderer.info.render.frame > begun + 1, begun);
+}
+
+/**
+ * Puts the session on the stage at the beginning of its dance and pauses it, for everyone, and waits until the page shows that. There the hands of our own
+ * dance hang down, and have room upwards, as they have not everywhere.
+ */
+export async function standAtBeginning(page: Page): Promise<void> {
+  await page.evaluate(async () => {
+    const session = new URLSearchParams(location.search).get("session");
+    const edit = { method: "PATCH", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ playing: false, position: 0 }) };
+    const answer = await fetch(`/v1/sessions/${session}`, edit);
+    if (!answer.ok) throw new Error(await answer.text());
+  });
+  await page.waitForFunction(() => {
+    const { viewer } = window.bunraku;
+    // not the newest, which holds from a while after it was told of
+    const timeline = viewer.timelines.at(viewer.shownTime(performance.now()));
+    return timeline !== null && !timeline.playing && timeline.position === 0 && viewer.blocks[0] >= 0;
+  });
+  await drawn(page);
+}
+
+/** Presses a key and lets it up at once: a key held for long means something else, and a page that stands still between the two makes a tap long. */
+export async function tap(page: Page, key: string): Promise<void> {
+  await Promise.all([page.keyboard.down(key), page.keyboard.up(key)]);
+}
+
+/** What `act` gives, once the page has said a `text` over it, which it does in passing: so it is looked for from before. */
+export async function toasted<T>(page: Page, text: string, act: () => Promise<T>): Promise<T> {
+  const [done] = await Promise.all([act(), page.locator(".toast", { hasText: text }).waitFor()]);
+  return done;
+}
+
+/** Draws the stage no more. Two pages that draw in software starve each other, and what a page holds that stands still for half a second is lost. */
+export async function undrawn(page: Page): Promise<void> {
+  await page.evaluate(() => void (window.bunraku.stage.renderer.render = () => undefined));
 }
 
 /** Waits for the session's welcome: from then on limbs can be taken. */
@@ -61,15 +100,14 @@ export function drawn(page: Page): Promise<unknown> {
   return page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 }
 
-/** What `look` finds once five frames running have shown the same, to `within` of its unit. */
+/** What `look` finds once it has found the same six times running, some frames apart, to `within` of its unit: what moves slowly is told from what stands. */
 export async function settled<T extends object>(page: Page, look: () => Promise<T>, within: number): Promise<T> {
-  let last = await look();
-  for (let same = 0; same < 5; ) {
+  let first = await look();
+  for (let same = 0; ; ) {
     await drawn(page);
     const now = await look();
-    const before: number[] = Object.values(last);
-    same = Math.hypot(...Object.values(now).map((number: number, at) => number - before[at])) < within ? same + 1 : 0;
-    last = now;
+    const before: number[] = Object.values(first);
+    if (Math.hypot(...Object.values(now).map((number: number, at) => number - before[at])) >= within) [first, same] = [now, 0];
+    else if (++same === 5) return now;
   }
-  return last;
 }

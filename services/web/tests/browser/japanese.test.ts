@@ -1,7 +1,7 @@
 /** The page in Japanese in a real browser: its names for screen readers, what the server's problems become, and the way back. */
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./in-browser";
-import { danced, LEFT_HAND, welcomed } from "./inside";
+import { danced, holds, LEFT_HAND, welcomed } from "./inside";
 
 const KANA = /[\p{Script=Hiragana}\p{Script=Katakana}\p{Script=Han}]/u;
 
@@ -21,7 +21,7 @@ describeInBrowser("Japanese", { demo: true }, ({ open }) => {
     await page.locator(".tag", { hasText: "左手" }).waitFor();
     expect(await page.locator(".tag", { hasText: "左手" }).innerText()).toContain("あなた");
     await page.getByRole("button", { name: "左手を放す" }).waitFor();
-    expect(await page.evaluate((limb) => window.bunraku.puppeteer.holds(limb), LEFT_HAND)).toBe(true);
+    await holds(page, LEFT_HAND);
     await page.getByRole("button", { name: "キーとゲームパッド" }).click();
     await page.getByRole("dialog", { name: "キーとゲームパッド" }).getByText("1ブロック戻る").waitFor();
     // no name for screen readers was left in English

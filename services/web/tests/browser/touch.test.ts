@@ -1,17 +1,18 @@
 /** A ring dragged by touch in a real browser. */
 import { test } from "vitest";
 import { describeInBrowser } from "./in-browser";
-import { danced, LEFT_HAND, letGo, ringOf, settled, welcomed } from "./inside";
+import { danced, LEFT_HAND, letGo, ringOf, settled, standAtBeginning, welcomed } from "./inside";
 
 describeInBrowser("a finger on the page", { demo: true }, ({ open }) => {
   test("a finger on a ring pulls the hand, and lifted gives it back", async () => {
-    // A small phone: there the limbs' buttons stand below the hands wherever the dance is paused.
+    // A small phone: there the limbs' buttons stand below the hands.
     const page = await open("", { viewport: { width: 360, height: 640 }, hasTouch: true, reducedMotion: "reduce" });
     await danced(page);
     // Paused on entering, as less motion is asked for: only the finger moves the hand.
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await welcomed(page);
-    // once the pause has taken effect and nothing moves any more
+    await standAtBeginning(page);
+    // once nothing moves any more
     const ring = await settled(page, () => ringOf(page, LEFT_HAND), 0.5);
     const touch = await page.context().newCDPSession(page);
     const finger = (type: "touchStart" | "touchMove", x: number, y: number) =>

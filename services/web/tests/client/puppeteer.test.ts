@@ -28,7 +28,8 @@ beforeEach(async () => {
     { name: "TimelineState", epoch: 1, motion: "d", clock: UNIX, position: 0, playing: false, loop: true, duration: 2_600_000 },
     { name: "Data", track: 0, rate: 1, index: 0, block },
   );
-  // the solver is made in its own time
+  // the solver is made from the first pose on, in its own time
+  viewer.poseAt(now);
   await vi.advanceTimersByTimeAsync(0);
   puppeteer = new Puppeteer({ url: "ws://stage/v1/sessions/s/control", viewer, now: () => now });
   line = Line.last;

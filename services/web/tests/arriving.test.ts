@@ -1,0 +1,51 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { Arriving } from "../src/arriving";
+
+beforeEach(() => void vi.useFakeTimers());
+afterEach(() => void vi.useRealTimers());
+
+function begin(): { arriving: Arriving; told: string[]; veil: () => string | undefined } {
+  const root = { dataset: {} as DOMStringMap } as HTMLElement;
+  const arriving = new Arriving(root);
+  const told: string[] = [];
+  arriving.after(() => void told.push("sound"));
+  return { arriving, told, veil: () => root.dataset["arriving"] };
+}
+
+test("a page whose stage is ready at once shows itself with the puppet, and what waited is done then, once", () => {
+  const { arriving, told, veil } = begin();
+  expect(veil()).toBe("veiled");
+  arriving.staged();
+  vi.advanceTimersByTime(1_000);
+  expect([veil(), told]).toEqual(["veiled", []]);
+  arriving.arrived();
+  expect([veil(), told]).toEqual([undefined, ["sound"]]);
+  arriving.arrived();
+  vi.advanceTimersByTime(10_000);
+  expect([veil(), told]).toEqual([undefined, ["sound"]]);
+});
+
+test("a page whose stage is on its way over a slow line shows itself, and all else waits on", () => {
+  const { arriving, told, veil } = begin();
+  vi.advanceTimersByTime(200);
+  expect([veil(), told]).toEqual(["", []]);
+  vi.advanceTimersByTime(60_000);
+  expect([veil(), told]).toEqual(["", []]);
+  arriving.staged();
+  arriving.arrived();
+  expect([veil(), told]).toEqual([undefined, ["sound"]]);
+});
+
+test("nothing waits for long where nobody dances", () => {
+  const { arriving, told, veil } = begin();
+  arriving.staged();
+  vi.advanceTimersByTime(2_000);
+  expect([veil(), told]).toEqual([undefined, ["sound"]]);
+});
+
+test("once the puppet is there nothing has to wait", () => {
+  const { arriving, told } = begin();
+  arriving.arrived();
+  arriving.after(() => void told.push("later"));
+  expect(told).toEqual(["sound", "later"]);
+});

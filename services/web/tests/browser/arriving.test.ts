@@ -1,0 +1,33 @@
+import type { Page } from "playwright-core";
+import { expect, test } from "vitest";
+import { describeInBrowser } from "./in-browser";
+import { danced } from "./inside";
+
+describeInBrowser("arriving", { demo: true }, ({ open }) => {
+  test("a page whose stage is on its way shows itself, and what can wait comes after the puppet", async () => {
+    const asked: string[] = [];
+    let seen: Promise<string[]> | undefined;
+    /** What the page asked for by the time that it can be used. */
+    const usable = async (page: Page) => {
+      await page.getByRole("button", { name: "Library" }).waitFor();
+      return [...asked];
+    };
+    const page = await open("", {
+      before: async (page) => {
+        page.on("request", (request) => void asked.push(new URL(request.url()).pathname));
+        await page.route("**/theatre-*.js", async (route) => {
+          seen ??= usable(page);
+          await seen.catch(() => undefined);
+          await route.continue();
+        });
+      },
+    });
+    const late = [/inter-.*\.woff2/, /marionette-/, /sound-/];
+    expect((await seen)?.filter((path) => late.some((what) => what.test(path)))).toEqual([]);
+    await danced(page);
+    await page.waitForFunction(() => !("arriving" in document.documentElement.dataset));
+    for (const what of late) await expect.poll(() => asked.some((path) => what.test(path)), { timeout: 30_000 }).toBe(true);
+    // what is about the dancer has come, too
+    await page.waitForFunction(() => window.bunraku.stage.scene.getObjectByName("floor") && window.bunraku.stage.scene.getObjectByName("strings"));
+  });
+});
