@@ -11,7 +11,9 @@ new ResizeObserver(fit).observe(canvas);
 
 const url = `${location.origin.replace("http", "ws")}/v1/sessions/${items[0].id}/stream`;
 const viewer = new Viewer({ url, access });
-viewer.addEventListener("figure", () => stage.setFigure(viewer.figure, viewer.front));
+// of several performers the further ones may be known a little later
+const enter = () => stage.setFigures(viewer.performers.map((one) => one?.figure ?? viewer.figure), viewer.front);
+for (const news of ["figure", "tracks"]) viewer.addEventListener(news, enter);
 
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 let before = performance.now();
@@ -21,6 +23,7 @@ requestAnimationFrame(function frame(now) {
   const way = calm.matches ? 0 : (now / 40_000) * 2 * Math.PI;
   // where the camera stands, what it looks at (metres), and how wide it sees (radians)
   const camera = [4.5 * Math.sin(way), 1.3, 4.5 * Math.cos(way), 0, 1, 0, 0.55];
-  stage.draw(viewer.poseAt(now), undefined, (now - before) / 1000, camera);
+  const poses = viewer.performers.map((_, performer) => viewer.poseAt(now, performer));
+  stage.draw(poses, undefined, (now - before) / 1000, camera);
   before = now;
 });
