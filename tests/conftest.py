@@ -11,12 +11,16 @@ from typing import Any
 
 import hypothesis
 import pytest
+from httpx2._config import DEFAULT_TIMEOUT_CONFIG
 
 from tests.servers import clip, running
 
 # how long an example takes says more of the machine than of the code
 hypothesis.settings.register_profile("bunraku", deadline=None)
 hypothesis.settings.load_profile("bunraku")
+
+# so does how long a server of the tests takes to answer; five seconds are for who waits at a screen
+DEFAULT_TIMEOUT_CONFIG.read = 60.0
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 

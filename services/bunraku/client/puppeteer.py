@@ -46,7 +46,8 @@ class Puppeteer:
     """One puppeteer of a session. Use as an async context manager; limbs are named as in `wire.limbs.LIMBS`, or
     numbered: limb l of performer k is 4 k + l.
 
-    While a limb is held the server is told 10 times a second that it still is.
+    While a limb is held the server is told 10 times a second that it still is. One that was lost, as this process stood
+    still for longer than a holder may be silent, is claimed again and told once more where it should be.
     """
 
     def __init__(self, client: Client, session: str, name: str = "Someone") -> None:
@@ -57,6 +58,10 @@ class Puppeteer:
         self.notice: Notice | None = None
         """What became of an input that was not taken as it came, last."""
         self._epochs: dict[int, int] = {}
+        self._said: dict[int, tuple[int, tuple[float, float, float]]] = {}
+        """What was last asked of each limb that is held: kind and values."""
+        self._lost: set[int] = set()
+        """Limbs that were lost and are claimed again."""
         self._sequence = 0
         self._answers: asyncio.Queue[Grant | Refusal] = asyncio.Queue(64)
         self._welcome = asyncio.Event()
@@ -96,6 +101,7 @@ class Puppeteer:
     async def claim(self, limb: str | int) -> None:
         """Take a limb; raises `Refused` where another holds it."""
         number = limb_number(limb)
+        self._said.pop(number, None)
         await self._send(Claim(number).pack())
         try:
             async with asyncio.timeout(ANSWER):
@@ -151,6 +157,11 @@ class Puppeteer:
         number = limb_number(limb)
         if number not in self._epochs:
             raise Refused(f"{limb} is not held")
+        self._said[number] = kind, values
+        await self._say(number)
+
+    async def _say(self, number: int) -> None:
+        kind, values = self._said[number]
         self._sequence += 1
         sampled = time.time_ns() // 1000
         await self._send(Input(number, kind, self._epochs[number], self._sequence, sampled, values).pack())
@@ -165,19 +176,16 @@ class Puppeteer:
 
     async def _listen(self) -> None:
         assert self._connection is not None
-        with contextlib.suppress(ConnectionClosed):
+        with contextlib.suppress(ConnectionClosed, Refused):
             async for data in self._connection:
                 message = unpack(data) if isinstance(data, bytes) else None
                 if isinstance(message, Welcome):
                     self.id = message.id
                     self._welcome.set()
                 elif isinstance(message, Grant):
-                    self._epochs[message.limb] = message.epoch
-                    self._answers.put_nowait(message)
+                    await self._granted(message)
                 elif isinstance(message, Refusal):
-                    self._epochs.pop(message.limb, None)
-                    if message.reason != "lost":
-                        self._answers.put_nowait(message)
+                    await self._refused(message)
                 elif isinstance(message, Notice):
                     self.notice = message
                 elif isinstance(message, Presence):
@@ -185,6 +193,32 @@ class Puppeteer:
                 elif isinstance(message, Problem):
                     self._ended = f"{message.title}: {message.detail}"
         self._welcome.set()
+
+    async def _granted(self, grant: Grant) -> None:
+        limb, again = grant.limb, grant.limb in self._lost
+        self._lost.discard(limb)
+        if again and limb not in self._epochs:
+            # let go before the answer came
+            await self._send(Release(limb, grant.epoch).pack())
+            return
+        self._epochs[limb] = grant.epoch
+        if not again:
+            self._answers.put_nowait(grant)
+        elif limb in self._said:
+            await self._say(limb)
+
+    async def _refused(self, refusal: Refusal) -> None:
+        limb = refusal.limb
+        if refusal.reason == "lost":
+            if limb in self._epochs:
+                self._lost.add(limb)
+                await self._send(Claim(limb).pack())
+            return
+        self._epochs.pop(limb, None)
+        if limb in self._lost:
+            self._lost.discard(limb)
+        else:
+            self._answers.put_nowait(refusal)
 
     async def _keep_alive(self) -> None:
         while True:

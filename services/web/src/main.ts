@@ -26,7 +26,7 @@ import { createTheme, type ThemeChoice } from "./page/theme";
 import { tell, uploadAll } from "./page/uploads";
 import type { Performing } from "./performing";
 import { findSession, Room, type Place } from "./room";
-import { shareLink } from "./sharing";
+import { share } from "./sharing";
 import type { Stage } from "./stage/stage";
 import { FileStore } from "./storage/files";
 import { browserStore } from "./storage/store";
@@ -65,7 +65,7 @@ let theme: ThemeChoice | null = null;
 let mapping = loadMapping();
 
 const page = createPage(document.body, {
-  share: () => void shareLink(room, page.toast),
+  share: () => void share(room?.id ?? null, page.toast),
   language: () => {
     if (room) leave(room, performance.now());
     history.replaceState(history.state, "", chooseOther(location.href));
@@ -160,8 +160,8 @@ function play(): void {
 }
 
 async function uploaded(motion: Motion): Promise<void> {
-  await pieces.refresh();
-  renderPieces();
+  // it dances also where the list of all did not come: that is asked for again once it does
+  await pieces.refresh().then(renderPieces, () => undefined);
   await choose(motion.id);
 }
 

@@ -1,19 +1,20 @@
-/** The link by which others come to the same stage. */
+/** The link by which others come to the same stage, told and copied. */
 import { guarded } from "./client/access";
 import { shareSession } from "./client/library";
 import { ProblemError } from "./client/problem";
-import type { Toast } from "./page/toast";
-import type { Room } from "./room";
 import { say } from "./words/say";
 
-/** Copies the link of what is watched, and says so; where it cannot be copied it is shown. On a server that asks for one it is a link that lets others watch. */
-export async function shareLink(room: Pick<Room, "id"> | null, toast: Toast): Promise<void> {
+/**
+ * Copies the page's address with its session, null for none; where the server asks who comes it is one by which others may watch.
+ * `toast` is told what became of it; where nothing may be copied, the link itself.
+ */
+export async function share(session: string | null, toast: (message: string) => void): Promise<void> {
   const url = new URL(location.href);
-  url.search = room ? `?session=${encodeURIComponent(room.id)}` : "";
+  url.search = session === null ? "" : `?session=${encodeURIComponent(session)}`;
   let copied = say("Link copied");
-  if (guarded() && room) {
+  if (guarded() && session !== null) {
     try {
-      url.href = new URL(await shareSession(room.id), location.href).href;
+      url.href = new URL(await shareSession(session), location.href).href;
       copied = say("Link copied: who has it may watch, for a week");
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;

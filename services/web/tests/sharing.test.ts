@@ -1,23 +1,30 @@
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { shareLink } from "../src/sharing";
+import { afterEach, expect, test, vi } from "vitest";
+import { share } from "../src/sharing";
 
-let toasts: string[];
-let copied: string[];
-
-beforeEach(() => {
-  [toasts, copied] = [[], []];
-  vi.stubGlobal("location", { href: "https://stage.example/?motion=m1&quality=best" });
-  vi.stubGlobal("navigator", { clipboard: { writeText: (text: string) => Promise.resolve(void copied.push(text)) } });
-});
 afterEach(() => void vi.unstubAllGlobals());
 
-test("the link is the session's alone, and copied", async () => {
-  await shareLink({ id: "s/1" }, (message) => toasts.push(message));
-  expect([copied, toasts]).toEqual([["https://stage.example/?session=s%2F1"], ["Link copied"]]);
+/** What is copied and what is told where the page is at `href` and the clipboard takes what it is given, or refuses it. */
+async function shared(href: string, session: string | null, takes: boolean): Promise<{ copied: string[]; told: string[] }> {
+  const [copied, told]: [string[], string[]] = [[], []];
+  const writeText = (text: string) => (takes ? Promise.resolve(void copied.push(text)) : Promise.reject(new Error("not allowed")));
+  vi.stubGlobal("location", new URL(href));
+  vi.stubGlobal("navigator", { clipboard: { writeText } });
+  await share(session, (message) => told.push(message));
+  return { copied, told };
+}
+
+test("the link is the page's address with its session and nothing else of the query", async () => {
+  const { copied, told } = await shared("http://stage.example/?name=Aiko&lang=ja", "a b", true);
+  expect(copied).toEqual(["http://stage.example/?session=a%20b"]);
+  expect(told).toEqual(["Link copied"]);
 });
 
-test("where nothing can be copied it is shown; with nothing on the stage it is the page's", async () => {
-  vi.stubGlobal("navigator", { clipboard: { writeText: () => Promise.reject(new Error("not allowed")) } });
-  await shareLink(null, (message) => toasts.push(message));
-  expect([copied, toasts]).toEqual([[], ["Copy this link: https://stage.example/"]]);
+test("without a session it is the page's address", async () => {
+  expect((await shared("http://stage.example/?motion=m", null, true)).copied).toEqual(["http://stage.example/"]);
+});
+
+test("where nothing may be copied the link is told", async () => {
+  const { copied, told } = await shared("http://stage.example/", "s", false);
+  expect(copied).toEqual([]);
+  expect(told).toEqual(["Copy this link: http://stage.example/?session=s"]);
 });

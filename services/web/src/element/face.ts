@@ -56,7 +56,7 @@ export function createFace(root: ShadowRoot, on: FaceActions): Face {
   const canvas = element("canvas", { role: "img", "aria-label": "A wooden puppet dancing on a stage before a disc of gold leaf" });
   const frame = element("div", { class: "frame", part: "frame", tabindex: -1 }, canvas, element("div", { class: "vignette" }));
   root.append(frame);
-  const tags = createTags(frame, on.ask, () => frame.clientWidth, TOP);
+  const tags = createTags(frame, on.ask, TOP);
   const notice = element("div", { class: "notice", part: "notice", role: "status", hidden: true });
   const messages = element("div", { class: "messages" });
   frame.append(notice, messages);

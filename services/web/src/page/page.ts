@@ -58,7 +58,7 @@ export interface Page {
 }
 
 export function createPage(root: HTMLElement, on: PageActions): Page {
-  const tags = createTags(root, on.ask, undefined, undefined, () => header.boxes);
+  const tags = createTags(root, on.ask, undefined, () => header.boxes);
   const notice = createNotice(root);
   const keys = createKeys(root, on.mapping, () => toast(say("The list of keys could not be fetched; try again when the line is back")));
   const header = createHeader(root, { share: on.share, language: on.language, theme: on.theme, keys: () => keys.show() });

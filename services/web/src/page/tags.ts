@@ -23,12 +23,16 @@ export interface Tags {
 const TOP = 32;
 
 /**
- * `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. They keep in a
- * picture of `width` CSS pixels and below `top`. `beside` are boxes at the picture's edge, where the strings of several performers may hang.
+ * `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. They keep
+ * within their layer, which is over the whole picture, and below `top`, CSS pixels. `beside` are boxes at the picture's edge, where the strings of several
+ * performers may hang.
  */
-export function createTags(root: ParentNode & Node, ask: (limb: number) => void, width: () => number = () => innerWidth, top = TOP, beside: () => readonly Box[] = () => []): Tags {
+export function createTags(root: ParentNode & Node, ask: (limb: number) => void, top = TOP, beside: () => readonly Box[] = () => []): Tags {
   const layer = element("div", { class: "tags", "aria-hidden": "true" });
   root.append(layer);
+  // told, not asked for: every frame the page would be laid out for it. None while a sheet is before them
+  let width = 0;
+  new ResizeObserver(([{ contentRect }]) => (width = contentRect.width || width)).observe(layer);
   const tags = Array.from({ length: MOST_LIMBS }, (_, i) => {
     const name = document.createTextNode("");
     const limb = element("span");
@@ -45,20 +49,22 @@ export function createTags(root: ParentNode & Node, ask: (limb: number) => void,
       setAttribute(layer, "data-several", limbs.length > LIMBS.length);
       const shown = tags.map((one, i) => (limbs[i]?.holder && bars[i] ? one : null));
       shown.forEach((one, i) => {
-        tags[i].tag.hidden = !one;
+        const { tag } = tags[i];
+        if (tag.hidden !== !one) tag.hidden = !one;
         const { holder = null, asked = false } = limbs[i] ?? {};
         if (!one || !holder) return;
+        // written, and its size asked for, which lays the page out, only where what it says is new
+        const says = `${limbs.length}\n${holder.name}\n${holder.colour}\n${asked}\n${holder.mine}`;
+        if (one.says === says && one.width > 0) return;
         setText(one.name, holder.name);
         // whose limb it is the string shows that it hangs by
         setText(one.limb, asked ? say("asked") : limbName(i));
         one.button.hidden = holder.mine || asked;
-        one.tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
-        // asking for its size lays the page out: only where what it says is new
-        const says = `${holder.name}\n${asked}\n${holder.mine}`;
-        if (one.says !== says || one.width === 0) [one.says, one.width, one.height] = [says, one.tag.offsetWidth, one.tag.offsetHeight];
+        tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
+        [one.says, one.width, one.height] = [says, tag.offsetWidth, tag.offsetHeight];
       });
       const kept = limbs.length > LIMBS.length && shown.some(Boolean) ? [...faces, ...beside()] : faces;
-      laid = layLabels(shown.map((one, i) => one && { bar: bars[i] as Box, width: one.width, height: one.height }), kept, laid, width(), top);
+      laid = layLabels(shown.map((one, i) => one && { bar: bars[i] as Box, width: one.width, height: one.height }), kept, laid, width, top);
       laid.forEach((place, i) => {
         if (place) tags[i].tag.style.transform = `translate(${place.box.left.toFixed(1)}px, ${place.box.top.toFixed(1)}px)`;
       });
@@ -66,7 +72,7 @@ export function createTags(root: ParentNode & Node, ask: (limb: number) => void,
     invite(place) {
       invitation.hidden = !place;
       if (!place) return;
-      const right = place.x + 150 < width();
+      const right = place.x + 150 < width;
       const move = right ? `translate(${(place.x + 26).toFixed(1)}px, ${place.y.toFixed(1)}px) translate(0, -50%)` : `translate(${(place.x - 26).toFixed(1)}px, ${place.y.toFixed(1)}px) translate(-100%, -50%)`;
       invitation.style.transform = move;
     },

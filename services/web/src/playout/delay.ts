@@ -33,7 +33,7 @@ export class PlayoutDelay {
     this.late[this.next] = late;
     this.next = (this.next + 1) % KEPT;
     if (this.late.length < LEAST) return;
-    const sorted = this.late.toSorted((a, b) => a - b);
+    const sorted = Float64Array.from(this.late).sort();
     const enough = sorted[Math.ceil(SHARE * sorted.length) - 1] + MARGIN;
     this.from = this.at(local);
     this.since = Math.max(local, this.since);

@@ -83,7 +83,7 @@ export class Stage {
     this.#troupe = new Troupe(this.#floorAt);
     this.rig.group.add(this.audience.camera, this.#lights.group);
     this.scene.add(this.rig.group, this.#troupe.group);
-    // drawn in software what is behind the dancers takes longer than they, who come first then
+    // drawn in software what is behind the dancers takes longer than they do, who come first then
     if (!plain) this.#build();
     // three.js' own listener stands before this one: its side of the context is there again by then
     canvas.addEventListener("webglcontextrestored", () => this.#restore());

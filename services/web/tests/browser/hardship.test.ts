@@ -47,10 +47,8 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
       return on - viewer.duration * Math.floor(on / viewer.duration) > 1;
     }, cut.position);
     // what is said for a moment comes and goes beside it
-    await page.keyboard.press("KeyR");
-    const moment = page.getByText("Reach for a string that another holds");
-    await moment.waitFor();
-    await moment.waitFor({ state: "detached" });
+    await toasted(page, "Reach for a string that another holds", () => page.keyboard.press("KeyR"));
+    await page.getByText("Reach for a string that another holds").waitFor({ state: "detached" });
     expect(await page.getByText("The line was lost").isVisible()).toBe(true);
     const known = lines.length;
     await page.context().setOffline(false);
