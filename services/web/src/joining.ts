@@ -17,7 +17,8 @@ export async function addToStage(piece: Piece, room: Room, pieces: Pieces, libra
   }
   try {
     const { id } = await addPerformers(motion, [piece.id]);
-    await pieces.refresh();
+    // it comes on also where the list of all did not come
+    await pieces.refresh().catch(() => undefined);
     room.edit({ motion: id, position: Math.round(room.position(performance.now()) * 1e6) });
   } catch (error) {
     tell(library, piece.name, error);
