@@ -34,13 +34,15 @@ export default defineConfig({
   // the prior lies beside the Python codec
   server: { fs: { allow: [".", "../bunraku/codec/prior.json"] }, proxy: { "/v1": { target: "http://127.0.0.1:8000", ws: true } } },
   test: {
-    include: ["tests/**/*.test.ts"],
-    environment: "node",
-    // one file at a time: browsers that draw in software starve each other
-    fileParallelism: false,
     // bounds for what hangs: how long the rest takes is the machine's affair
     testTimeout: PATIENCE,
     hookTimeout: PATIENCE,
     expect: { poll: { timeout: PATIENCE } },
+    environment: "node",
+    projects: [
+      { extends: true, test: { name: "node", include: ["tests/**/*.test.ts"], exclude: ["tests/browser/**"], maxWorkers: 2, sequence: { groupOrder: 0 } } },
+      // one file at a time: browsers that draw in software starve each other
+      { extends: true, test: { name: "browser", include: ["tests/browser/*.test.ts"], fileParallelism: false, globalSetup: "tests/browser/once.ts", sequence: { groupOrder: 1 } } },
+    ],
   },
 });

@@ -74,7 +74,8 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
     const wrist = await height(page, "l_wrist");
     await pad.getByRole("button", { name: "Up" }).focus();
     await page.keyboard.down("Space");
-    await page.waitForFunction(moved, { from: wrist, least: 0.05 });
+    // so far up that there is as much room downwards as is looked for next
+    await page.waitForFunction(moved, { from: wrist, least: 0.15 });
     await page.keyboard.up("Space");
     await still(page);
 

@@ -1,6 +1,6 @@
 /** Real servers for browser tests: `bunraku up` on a free port, keeping its things in a folder of its own. */
 import { spawn, spawnSync } from "node:child_process";
-import { existsSync, mkdtempSync, rmSync } from "node:fs";
+import { cpSync, existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 
@@ -21,8 +21,26 @@ export interface RunningServer {
 }
 
 /** Start a server; resolves once it answers. */
-export async function startServer({ demo = false, secret = "", origins = "" }: ServerOptions = {}): Promise<RunningServer> {
+export async function startServer(options: ServerOptions = {}): Promise<RunningServer> {
   const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
+  const folder = process.env["BUNRAKU_DEMO_DATA"];
+  if (options.demo && folder) cpSync(await demoData(folder), data, { recursive: true });
+  return serve(data, options, () => rmSync(data, { recursive: true, force: true }));
+}
+
+/** What a server keeps that has made our own dance: made once for all test files, within `folder`, as it takes as long as seven starts of a server. */
+async function demoData(folder: string): Promise<string> {
+  const made = join(folder, "made");
+  if (!existsSync(made)) {
+    const data = mkdtempSync(join(folder, "making-"));
+    await (await serve(data, { demo: true })).stop();
+    cpSync(data, made, { recursive: true });
+  }
+  return made;
+}
+
+/** A server that keeps its things in `data`; `after` is done once it has ended. */
+async function serve(data: string, { demo = false, secret = "", origins = "" }: ServerOptions, after: () => void = () => undefined): Promise<RunningServer> {
   const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
   const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
     stdio: ["ignore", "pipe", "inherit"],
@@ -43,7 +61,7 @@ export async function startServer({ demo = false, secret = "", origins = "" }: S
     async stop() {
       server.kill("SIGINT");
       await ended;
-      rmSync(data, { recursive: true, force: true });
+      after();
     },
   };
 }
