@@ -49,3 +49,8 @@ def test_performers_are_numbered_in_order_also_behind_one_that_cannot_be_shown(d
 def test_without_a_dance_there_is_nothing_to_show(described: list[dict[str, Any]]) -> None:
     with pytest.raises(DamagedBlock):
         Tracks(described)
+
+
+def test_without_a_place_for_the_first_there_is_nothing_to_show(dance: dict[str, Any]) -> None:
+    with pytest.raises(DamagedBlock, match="no place to dance at"):
+        Tracks([dance | {"place": [0.0, 900.0, 0.0]}, dance])

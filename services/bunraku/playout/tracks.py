@@ -44,6 +44,8 @@ class Tracks:
         """How many tracks were told of."""
         self._stores: dict[int, TrackStore] = {number: self.dance}
         self.add(0, described)
+        if self.performers[0] is None:
+            raise DamagedBlock(f"of track {number}: {described[number].get('place')!r} is no place to dance at")
 
     def add(self, first: int, described: Sequence[dict[str, Any]]) -> None:
         """Take in the tracks from number `first` on that were not told of yet: a narrow line may bring them after the
