@@ -124,9 +124,7 @@ def audio(
     as_json: Json = False,
 ) -> None:
     """Make a new motion of one and a sound, which begins with it."""
-    base, kind, identity = read_address(motion)
-    if kind == "sessions":
-        raise typer.BadParameter("sound is added to a motion: give one", param_hint="MOTION")
+    base, identity = _motion(motion, "sound is added to a motion: give one")
     made = _send(file, base or server, token, as_json, lambda client, *told: client.add_audio(identity, file, *told))
     if as_json:
         out.print_json(data=made)
@@ -148,9 +146,7 @@ def scene(
 
     from bunraku.client.api import Client
 
-    base, kind, identity = read_address(motion)
-    if kind == "sessions":
-        raise typer.BadParameter("a scene is added to a motion: give one", param_hint="MOTION")
+    base, identity = _motion(motion, "a scene is added to a motion: give one")
     try:
         staging = json.loads(file.read_bytes())
     except ValueError as error:
@@ -180,9 +176,7 @@ def perform(
     """Make a new motion in which several dance side by side, four at most."""
     from bunraku.client.api import Client
 
-    base, kind, identity = read_address(motion)
-    if kind == "sessions":
-        raise typer.BadParameter("motions dance side by side: give one", param_hint="MOTION")
+    base, identity = _motion(motion, "motions dance side by side: give one")
 
     async def run() -> dict[str, Any]:
         async with Client(base or server, token) as client:
@@ -338,6 +332,14 @@ def warm() -> None:
     from bunraku.session import solving
 
     solving.warm()
+
+
+def _motion(address: str, otherwise: str) -> tuple[str | None, str]:
+    """The server, if it is named, and the id of a motion; `otherwise` is said where a session is given."""
+    base, kind, identity = read_address(address)
+    if kind == "sessions":
+        raise typer.BadParameter(otherwise, param_hint="MOTION")
+    return base, identity
 
 
 def _send(

@@ -20,7 +20,7 @@ from bunraku.backing.problems import ProblemError
 from bunraku.ingest import metrics
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.keyframes import Staging
-from bunraku.ingest.performers import Performers, Troupe
+from bunraku.ingest.performers import Gathering, Performers
 from bunraku.ingest.progress import Progress
 from bunraku.ingest.recordings import SUBJECT, Recordings
 from bunraku.ingest.soundtracks import Soundtracks
@@ -102,7 +102,7 @@ def create_app(backing: Backing) -> FastAPI:
 
     @app.post("/v1/motions/{motion}/performers", status_code=201, tags=["motions"])
     @needs(Role.INGEST)
-    async def add_performers(motion: str, asked: Troupe, request: Request) -> Response:
+    async def add_performers(motion: str, asked: Gathering, request: Request) -> Response:
         """Make a motion in which the performers of others dance beside this one's, four of them at most. The motion
         itself stays as it is, with its sound, cameras and lights; the others' stay out. The same motions at the same
         places again give the same new motion, with 200."""

@@ -22,7 +22,7 @@ from bunraku.wire.limbs import MOST_PERFORMERS
 LONGEST_NAME = 200
 
 
-class Troupe(BaseModel):
+class Gathering(BaseModel):
     """Whose performers dance beside a motion's own, and where all of them do."""
 
     model_config = ConfigDict(extra="forbid")
@@ -51,13 +51,13 @@ class Performers:
         self._seconds = backing.settings.upload_seconds
         self._under_way = 0
 
-    async def add(self, motion: str, asked: Troupe, subject: str = "") -> tuple[Entry, bool]:
+    async def add(self, motion: str, asked: Gathering, subject: str = "") -> tuple[Entry, bool]:
         """The motion `motion` with the performers that are asked for, stored by `subject`, and whether it is new;
         raises `ProblemError`."""
         places = None if asked.places is None else [_place(nth, said) for nth, said in enumerate(asked.places)]
         others = [await self._derived.known(other) for other in asked.motions]
         if self._under_way >= WAITING:
-            raise ProblemError(503, "Busy", f"{WAITING} troupes are under way", hint="try again in a few seconds")
+            raise ProblemError(503, "Busy", f"{WAITING} gatherings are under way", hint="try again in a few seconds")
 
         async def gather(made: str, stored: StoredMotion) -> Made | Refused:
             found = [await self._stored(other) for other in asked.motions]

@@ -15,7 +15,7 @@ import msgpack
 from pydantic import Field, TypeAdapter, ValidationError
 
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.limbs import LIMBS, MOST_LIMBS
+from bunraku.wire.limbs import MOST_LIMBS
 from bunraku.wire.overlay import Overlay
 
 VERSION = 1
@@ -89,7 +89,12 @@ class Presence(_Packed):
     viewers: Count
     puppeteers: list[dict[str, Any]]
     limbs: list[str | None]
-    asks: list[list[str]] = field(default_factory=lambda: [[] for _ in LIMBS])
+    asks: list[list[str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Left out, nobody asks for any of them."""
+        if not self.asks:
+            object.__setattr__(self, "asks", [[] for _ in self.limbs])
 
 
 @dataclass(frozen=True, slots=True)

@@ -280,7 +280,7 @@ async function openStage(): Promise<void> {
   try {
     performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, best: query.get("quality") === "best" });
   } catch {
-      arriving.arrived();
+    arriving.arrived();
     page.notice("graphics", say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
     return;
   }
