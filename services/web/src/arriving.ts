@@ -1,11 +1,11 @@
 /**
- * The puppet comes first. Until it is there the page's fonts, its sound and whatever else can wait do, as all come over the same line;
- * and where the stage is ready at once the page shows itself together with the puppet, as a machine that draws in software paints
- * one after the other. Neither waits for a dance that does not come.
+ * The puppet comes first. Until it is there only the seal is to be seen, and the page's fonts, its sound and whatever else can wait do,
+ * as all come over the same line, and a machine that draws in software paints one after the other. Neither waits for a dance that
+ * does not come, nor the page for a stage that is long on its way.
  */
 
 /** The page shows itself if the stage is not ready after so long, milliseconds: it is on its way over a slow line. */
-const NEAR = 150;
+const NEAR = 2_500;
 /** From when the stage is ready nothing waits longer than this, milliseconds. */
 const LONGEST = 2_000;
 
@@ -14,7 +14,10 @@ export class Arriving {
   #waiting: (() => void)[] | null = [];
   #staged = false;
 
-  /** Begins at once. `root` tells the style sheet of it in `data-arriving`: `veiled` while the page is not to be seen, then empty. */
+  /**
+   * Begins at once. `root` tells the style sheet of it in `data-arriving`: `veiled` while only the seal is to be seen, as
+   * the page's own markup begins with, then empty.
+   */
   constructor(private readonly root: HTMLElement) {
     root.dataset["arriving"] = "veiled";
     setTimeout(() => this.#unveil(), NEAR);

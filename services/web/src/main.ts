@@ -27,6 +27,7 @@ import { tell, uploadAll } from "./page/uploads";
 import type { Performing } from "./performing";
 import { findSession, Room, type Place } from "./room";
 import { share } from "./sharing";
+import { openGraphics, type Graphics } from "./stage/graphics";
 import type { Stage } from "./stage/stage";
 import { FileStore } from "./storage/files";
 import { browserStore } from "./storage/store";
@@ -220,7 +221,7 @@ function enter(id: string, place: Place = "sessions"): Room {
   const renderTimeline = () => page.transport.timeline(viewer.timeline?.playing ?? false, viewer.timeline?.loop ?? false, viewer.timeline !== null);
   viewer.addEventListener("timeline", renderTimeline);
   viewer.addEventListener("blocks", () => page.transport.blocks(viewer.blocks, viewer.rates.length));
-  const renderPeople = () => page.header.people(viewer.presence, puppeteer.id);
+  const renderPeople = () => arriving.after(() => room === entered && page.header.people(viewer.presence, puppeteer.id));
   viewer.addEventListener("presence", renderPeople);
   puppeteer.addEventListener("welcome", renderPeople);
   viewer.addEventListener("open", () => {
@@ -257,7 +258,17 @@ function expose(): void {
 }
 
 async function openStage(): Promise<void> {
+  let graphics: Graphics;
+  try {
+    graphics = openGraphics(canvas, query.get("quality") === "best");
+  } catch {
+    arriving.arrived();
+    page.notice("graphics", say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
+    return;
+  }
   const { createGamepad, listenToKeyboard, listenToMouse, Performing } = await import("./theatre");
+  // what came over the line meanwhile is first: what that asks for is on its way while the stage is built
+  await new Promise((done) => setTimeout(done));
   const actions = {
     next_dancer: () => holding.nextDancer(),
     ask: () => holding.ask(),
@@ -277,13 +288,7 @@ async function openStage(): Promise<void> {
     if (invitedAt !== -Infinity && hands?.any) endInvitation();
     holding.render();
   };
-  try {
-    performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, best: query.get("quality") === "best" });
-  } catch {
-    arriving.arrived();
-    page.notice("graphics", say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
-    return;
-  }
+  performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, graphics });
   canvas.addEventListener("webglcontextlost", () => page.notice("graphics", say("The stage went dark"), say("The graphics were taken away; they come back by themselves. If they do not, load the page again.")));
   canvas.addEventListener("webglcontextrestored", () => page.notice("graphics", null));
   const { commands } = performing;
@@ -382,6 +387,6 @@ async function start(): Promise<void> {
 page.keys.mapping(mapping);
 holding.render();
 page.transport.health("none");
-void openStage();
 void start();
+void openStage();
 void casting.restore();

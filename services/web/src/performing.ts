@@ -9,6 +9,7 @@ import { createPointer, type PointerInput } from "./input/pointer";
 import { VelocityInputs } from "./input/velocity";
 import type { LimbState } from "./page/model";
 import type { Room } from "./room";
+import type { Graphics } from "./stage/graphics";
 import { Stage } from "./stage/stage";
 import type { StringState } from "./stage/strings";
 
@@ -18,8 +19,8 @@ export interface PerformingOptions {
   actions: PageActions;
   /** Told whenever what is held here changes. */
   changed: () => void;
-  /** Keeps the best quality on any machine, for pictures. */
-  best?: boolean;
+  /** The canvas's, where they are open already. */
+  graphics?: Graphics;
 }
 
 /** The rings of who is turned to light up for so long, milliseconds. */
@@ -44,8 +45,8 @@ export class Performing {
   #turned = { to: 0, until: 0 };
 
   /** Draws on `canvas`; `holding` is about its hands from now on. Throws where the browser has no WebGL 2. */
-  constructor(canvas: HTMLCanvasElement, private readonly holding: Holding, { mapping, actions, changed, best = false }: PerformingOptions) {
-    this.stage = new Stage(canvas, best);
+  constructor(canvas: HTMLCanvasElement, private readonly holding: Holding, { mapping, actions, changed, graphics }: PerformingOptions) {
+    this.stage = new Stage(canvas, graphics);
     this.hands = new Hands(this.stage);
     this.hands.changed = changed;
     const free = (limb: number) => holding.free(limb);

@@ -27,7 +27,7 @@ test("a page whose stage is ready at once shows itself with the puppet, and what
 
 test("a page whose stage is on its way over a slow line shows itself, and all else waits on", () => {
   const { arriving, told, veil } = begin();
-  vi.advanceTimersByTime(200);
+  vi.advanceTimersByTime(2_500);
   expect([veil(), told]).toEqual(["", []]);
   vi.advanceTimersByTime(60_000);
   expect([veil(), told]).toEqual(["", []]);

@@ -40,10 +40,11 @@ export class Assembly {
     const pattern = finish.pattern ?? PATTERN.plain;
     const position = new Vector3();
     const normal = new Vector3();
+    const weightsAt: Weights = typeof carrier === "string" ? rigid(carrier) : (at) => normalised(carrier(at));
     for (let i = 0; i < surface.positions.length / 3; i++) {
       position.fromArray(surface.positions, i * 3);
       normal.fromArray(surface.normals, i * 3);
-      const weights = typeof carrier === "string" ? [[carrier, 1] as const] : normalised(carrier(position));
+      const weights = weightsAt(position);
       if (pattern === PATTERN.face) {
         const y = (position.y - HEAD.y + CHIN) / HEAD_GROWTH - CHIN;
         this.#patterns.push((position.x - HEAD.x) / HEAD_GROWTH / FACE_WINDOW[0] + 0.5, y / FACE_WINDOW[1] + 0.5, pattern);
@@ -83,6 +84,11 @@ export class Assembly {
     if (index === undefined) throw new Error(`the puppet has no bone ${bone}`);
     return index;
   }
+}
+
+function rigid(bone: string): Weights {
+  const all = [[bone, 1] as const];
+  return () => all;
 }
 
 function normalised(weights: readonly (readonly [string, number])[]): (readonly [string, number])[] {

@@ -1,5 +1,5 @@
 /** The puppet: bones named as H-Anim names the joints, one skinned mesh over them, and by night its reflection. */
-import { Bone, Group, Matrix4, Skeleton, SkinnedMesh, Vector3, type BufferGeometry, type Material } from "three";
+import { Bone, Group, Matrix4, Skeleton, SkinnedMesh, Sphere, Vector3, type BufferGeometry, type Material } from "three";
 import { JOINTS, PARENTS, type Figure, type Pose } from "../motion/skeleton";
 import { figureScale, restPositions } from "./fit";
 import { footing, handleOf, type Performer } from "./performer";
@@ -39,6 +39,8 @@ export class Puppet implements Performer {
     for (const mesh of [this.#mesh, this.#reflection]) {
       mesh.bind(skeleton, new Matrix4());
       mesh.frustumCulled = false;
+      // else three.js bends all of it to find where it is among what it sorts
+      mesh.boundingSphere = new Sphere();
     }
     this.group.add(this.#mesh);
     const rest = restPositions(figure);

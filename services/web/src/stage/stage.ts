@@ -7,11 +7,12 @@ import { boxAround, type Box, type Extent } from "./boxes";
 import { AudienceCamera, type Framing } from "./camera";
 import { createFloor, type Floor } from "./floor";
 import { FrameGate } from "./frame-gate";
+import { openGraphics, type Graphics } from "./graphics";
 import { createLights } from "./lights";
 import { LOOKS, type Look, type Theme } from "./look";
 import type { Performer } from "./performer";
 import { PictureCamera, pictureSize } from "./picture";
-import { QUALITIES, QualityChoice } from "./quality";
+import { QUALITIES, type QualityChoice } from "./quality";
 import { Rig } from "./rig";
 import { Scenery } from "./scenery";
 import { Strings, type StringState } from "./strings";
@@ -69,13 +70,13 @@ export class Stage {
   #danced = false;
   #picturing = false;
 
-  /** `pinned` keeps the best quality on any machine, for pictures. Throws where the browser has no WebGL 2. */
-  constructor(canvas: HTMLCanvasElement, pinned = false) {
-    this.#quality = new QualityChoice(driverName(), pinned);
-    const { plain } = this.#quality.quality;
+  /** Draws on `canvas` with its `graphics`. Throws where the browser has no WebGL 2. */
+  constructor(canvas: HTMLCanvasElement, { context, quality }: Graphics = openGraphics(canvas)) {
+    this.#quality = quality;
+    const { plain } = quality.quality;
     this.#floor = createFloor(this.#backdrop, this.#scenery.group, this.rig.travelled, plain);
-    this.renderer = new WebGLRenderer({ canvas, antialias: !plain, powerPreference: "high-performance" });
-    this.#gate = new FrameGate(this.renderer.getContext() as WebGL2RenderingContext);
+    this.renderer = new WebGLRenderer({ canvas, context });
+    this.#gate = new FrameGate(context);
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
@@ -339,8 +340,8 @@ export class Stage {
   }
 
   #setSize(): void {
-    this.renderer.setPixelRatio(this.#sharpness * this.#quality.quality.sharpness);
-    this.renderer.setSize(this.#width, this.#height, false);
+    // both at once: each time that its size changes a canvas waits for the graphics
+    this.renderer.setDrawingBufferSize(this.#width, this.#height, this.#sharpness * this.#quality.quality.sharpness);
   }
 
   /** Only the lacquer of the night mirrors, and only where the machine is up to it. */
@@ -358,14 +359,4 @@ export class Stage {
     const middle = this.rig.group.localToWorld(new Vector3(0, 1, 0));
     return this.fromScreen(this.#width / 2, Math.min(HEADROOM, HEADROOM_SHARE * this.#height), middle)?.y ?? 2.2;
   }
-}
-
-/** What draws here, asked of a context of its own, since a canvas fixes its smoothing with its first one. */
-function driverName(): string {
-  const context = document.createElement("canvas").getContext("webgl2");
-  if (!context) throw new Error("this browser has no WebGL 2");
-  const told = context.getExtension("WEBGL_debug_renderer_info");
-  const name = told ? String(context.getParameter(told.UNMASKED_RENDERER_WEBGL)) : "";
-  context.getExtension("WEBGL_lose_context")?.loseContext();
-  return name;
 }

@@ -4,11 +4,12 @@ import { describeInBrowser } from "./in-browser";
 import { danced } from "./inside";
 
 describeInBrowser("arriving", { demo: true }, ({ open }) => {
-  test("a page whose stage is on its way shows itself, and what can wait comes after the puppet", async () => {
+  test("the seal is seen first; a page whose stage is on its way shows itself, and what can wait comes after the puppet", async () => {
     const asked: string[] = [];
     let seen: Promise<string[]> | undefined;
     /** What the page asked for by the time that it can be used. */
     const usable = async (page: Page) => {
+      await page.locator("main > .seal").waitFor();
       await page.getByRole("button", { name: "Library" }).waitFor();
       return [...asked];
     };
@@ -26,6 +27,7 @@ describeInBrowser("arriving", { demo: true }, ({ open }) => {
     expect((await seen)?.filter((path) => late.some((what) => what.test(path)))).toEqual([]);
     await danced(page);
     await page.waitForFunction(() => !("arriving" in document.documentElement.dataset));
+    expect(await page.locator("main > .seal").isVisible()).toBe(false);
     for (const what of late) await expect.poll(() => asked.some((path) => what.test(path)), { timeout: 30_000 }).toBe(true);
     // what is about the dancer has come, too
     await page.waitForFunction(() => window.bunraku.stage.scene.getObjectByName("floor") && window.bunraku.stage.scene.getObjectByName("strings"));

@@ -48,14 +48,14 @@ async function painted(page: Page, url: string): Promise<number> {
 
 /** In the page: notes when the graphics are done with the first frame that has the puppet in it. */
 function watch(): void {
+  let drawn: (() => boolean) | null = null;
   const look = () => {
     const { stage } = window.bunraku ?? {};
-    if (!stage) {
-      requestAnimationFrame(look);
-      return;
-    }
+    if (drawn?.()) window.firstPaint ??= performance.now();
+    if (!stage || drawn) return;
     const { renderer } = stage;
     const render = renderer.render;
+    drawn = () => false;
     renderer.render = (scene, camera) => {
       render.call(renderer, scene, camera);
       if (scene !== stage.scene || !stage.puppet?.group.visible) return;
@@ -63,14 +63,21 @@ function watch(): void {
       const gl = renderer.getContext() as WebGL2RenderingContext;
       const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) as WebGLSync;
       gl.flush();
-      const wait = () => {
-        if (gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED) window.firstPaint = performance.now();
-        else setTimeout(wait);
-      };
-      wait();
+      drawn = () => gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED;
     };
   };
-  requestAnimationFrame(look);
+  // before each frame too: it may take long, and a timer's turn comes after it
+  const request = window.requestAnimationFrame.bind(window);
+  window.requestAnimationFrame = (callback) =>
+    request((time) => {
+      look();
+      callback(time);
+    });
+  const keepLooking = () => {
+    look();
+    if (window.firstPaint === undefined) setTimeout(keepLooking);
+  };
+  keepLooking();
 }
 
 /** Scripts and fonts that a page has fetched by the time that a hand was taken, each as it comes over a line. */

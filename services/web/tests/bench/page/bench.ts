@@ -1,5 +1,5 @@
 /** What every case of `make bench-page` has: the server, Chromium, and pages that nothing was kept for. */
-import type { BrowserContextOptions, CDPSession, Page } from "playwright-core";
+import type { Browser, BrowserContextOptions, CDPSession, Page } from "playwright-core";
 import { launch } from "../../browser/chromium";
 
 /** By name; whole lists go to the table alone. */
@@ -24,6 +24,10 @@ export interface Visit {
 /** How long a page may take for anything, milliseconds: it is drawn in software. */
 const PATIENCE = 120_000;
 
+/** A browser at rest takes less of a processor than this, over so many seconds. */
+const RESTING = 0.05;
+const LOOK = 0.5;
+
 /**
  * Calls `use` with a page of a browser started for it: nothing of ours was ever there, whether fetched or compiled. That it can
  * draw has been tried, as a browser that people have open has its graphics process.
@@ -35,10 +39,28 @@ export async function visit<T>({ chromium }: Bench, options: BrowserContextOptio
     await blank.evaluate(() => document.createElement("canvas").getContext("webgl2")?.finish());
     const page = await browser.newPage({ viewport: { width: 760, height: 480 }, colorScheme: "dark", ...options });
     page.setDefaultTimeout(PATIENCE);
+    await atRest(browser);
     return await use({ page, protocol: await page.context().newCDPSession(page) });
   } finally {
     await browser.close();
   }
+}
+
+/**
+ * Waits until the browser is done with its own start: for each window it loads pages of its own for its address bar, which take a
+ * processor for half a second, and which a browser that people have open loaded long ago.
+ */
+async function atRest(browser: Browser): Promise<void> {
+  const protocol = await browser.newBrowserCDPSession();
+  let before = -Infinity;
+  for (;;) {
+    const { processInfo } = await protocol.send("SystemInfo.getProcessInfo");
+    const taken = processInfo.reduce((sum, { cpuTime }) => sum + cpuTime, 0);
+    if (taken - before < RESTING * LOOK) break;
+    before = taken;
+    await new Promise((done) => setTimeout(done, LOOK * 1000));
+  }
+  await protocol.detach();
 }
 
 /** The least value that so many of a hundred are not above. */
