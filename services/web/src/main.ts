@@ -106,7 +106,7 @@ const page = createPage(document.body, {
   choose: (id) => void choose(id),
   ...(may("ingest") && may("control") ? { add: (piece) => room && void addToStage(piece, room, pieces, page.library).then(renderPieces) } : {}),
   picture,
-  download: (piece, format) => void exporting.download(piece, format),
+  download: (...asked) => void exporting.download(...asked),
   remove: (piece) => {
     if (confirm(say("Remove \"{name}\" from the library?", { name: isolated(piece.name) }))) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
   },

@@ -1,4 +1,4 @@
-/** A dance as a file, made beside a page that stays alive. */
+/** Dances as a file, made beside a page that stays alive. */
 
 import type { Figure } from "../motion/skeleton";
 import type { BlockStore } from "../playout/blocks";
@@ -24,15 +24,35 @@ export interface Making {
   signal?: AbortSignal;
 }
 
-/** The whole motion in `store` as a file. Given up by `signal`, it rejects with the signal's reason. */
-export async function makeFile(format: Format, name: string, store: BlockStore, { looks, told, signal }: Making): Promise<Blob> {
+/** Of a dancer the blocks, and how many of their frames are danced. */
+export interface Source {
+  store: BlockStore;
+  frames: number;
+}
+
+/**
+ * The dances of `sources` as one file: of all of them as GLB; BVH and VRMA are of one figure by their nature, and so of the
+ * first. Given up by `signal`, it rejects with the signal's reason.
+ */
+export async function makeFile(format: Format, name: string, sources: readonly Source[], { looks, told, signal }: Making): Promise<Blob> {
   const ease = (from: number, to: number) => ({ told: (share: number) => told?.(from + (to - from) * share), ...(signal ? { signal } : {}) });
-  const dance = await atEase(sample(store), ease(0, 0.5));
-  const parts = await atEase(await writer(format, name, dance, looks), ease(0.5, 1));
+  const dances: Dance[] = [];
+  const part = 0.5 / sources.length;
+  for (const { store, frames } of sources) dances.push(await atEase(sample(store, frames), ease(dances.length * part, (dances.length + 1) * part)));
+  const parts = await atEase(await writer(format, name, dances, looks), ease(0.5, 1));
   return new Blob(parts, { type: TYPES[format] });
 }
 
-async function writer(format: Format, name: string, dance: Dance, looks: Looks): Promise<Work<Uint8Array<ArrayBuffer>[]>> {
-  if (format === "bvh") return writeBvh(dance);
-  return format === "vrma" ? writeVrma(dance, name) : writeGlb(dance, name, looks.model(dance.figure), await looks.face());
+async function writer(format: Format, name: string, dances: readonly Dance[], { model, face }: Looks): Promise<Work<Uint8Array<ArrayBuffer>[]>> {
+  if (format === "bvh") return writeBvh(dances[0]);
+  if (format === "vrma") return writeVrma(dances[0], name);
+  const models = new Map<string, PuppetModel>();
+  const danced = dances.map((dance) => {
+    const { offsets, tips } = dance.figure;
+    const lengths = `${offsets.join()} ${tips.join()}`;
+    const made = models.get(lengths) ?? model(dance.figure);
+    models.set(lengths, made);
+    return { dance, model: made };
+  });
+  return writeGlb(danced, name, await face());
 }
