@@ -5,7 +5,7 @@ import type { BlockStore } from "../playout/blocks";
 import { atEase } from "./at-ease";
 import { writeBvh } from "./bvh";
 import { sample, type Dance, type Work } from "./dance";
-import { type PuppetModel, writeGlb } from "./glb";
+import { type Danced, type PuppetModel, writeGlb } from "./glb";
 import { writeVrma } from "./vrma";
 
 export type Format = "bvh" | "glb" | "vrma";
@@ -39,20 +39,26 @@ export async function makeFile(format: Format, name: string, sources: readonly S
   const dances: Dance[] = [];
   const part = 0.5 / sources.length;
   for (const { store, frames } of sources) dances.push(await atEase(sample(store, frames), ease(dances.length * part, (dances.length + 1) * part)));
-  const parts = await atEase(await writer(format, name, dances, looks), ease(0.5, 1));
+  const write = async () => {
+    if (format === "bvh") return writeBvh(dances[0]);
+    if (format === "vrma") return writeVrma(dances[0], name);
+    return writeGlb(await atEase(cast(dances, looks), ease(0.5, 0.5)), name, await looks.face());
+  };
+  const parts = await atEase(await write(), ease(0.5, 1));
   return new Blob(parts, { type: TYPES[format] });
 }
 
-async function writer(format: Format, name: string, dances: readonly Dance[], { model, face }: Looks): Promise<Work<Uint8Array<ArrayBuffer>[]>> {
-  if (format === "bvh") return writeBvh(dances[0]);
-  if (format === "vrma") return writeVrma(dances[0], name);
+/** Who is seen to dance: those of equal lengths are made once. */
+function* cast(dances: readonly Dance[], { model }: Looks): Work<Danced[]> {
   const models = new Map<string, PuppetModel>();
-  const danced = dances.map((dance) => {
+  const danced: Danced[] = [];
+  for (const dance of dances) {
     const { offsets, tips } = dance.figure;
     const lengths = `${offsets.join()} ${tips.join()}`;
     const made = models.get(lengths) ?? model(dance.figure);
     models.set(lengths, made);
-    return { dance, model: made };
-  });
-  return writeGlb(danced, name, await face());
+    danced.push({ dance, model: made });
+    yield danced.length / dances.length;
+  }
+  return danced;
 }

@@ -35,9 +35,8 @@ export interface Danced {
 }
 
 /**
- * All of `danced` as one scene and one animation of this `name`. One alone dances in the middle; of several each hangs from a
- * node of its own, "dancer 1" and so on, which stands in its place on the stage. `face` is the picture of their faces, PNG,
- * white without.
+ * All of `danced` as one scene and one animation of this `name`. Each hangs from a node of its own, "dancer 1" and so on, which
+ * stands in its place on the stage; one alone in the middle needs none. `face` is the picture of their faces, PNG, white without.
  */
 export function* writeGlb(danced: readonly Danced[], name: string, face: Uint8Array<ArrayBuffer> | null): Work<Uint8Array<ArrayBuffer>[]> {
   const asset = new Gltf();

@@ -109,6 +109,13 @@ describe("several dancers in one file", () => {
     });
   });
 
+  test("have sleeves that swing by their own dance alone, though one model danced before", async () => {
+    const { animations } = await read(...dances);
+    const [first, third] = ["l_sleeve", "l_sleeve_2"].map((name) => animations[0].tracks.find((track) => track.name === `${name}.quaternion`)?.values);
+    expect(first?.length).toBe(dances[0].frames * 4);
+    expect(third).toEqual(first);
+  });
+
   test("who is done dancing stands still while others dance", async () => {
     const { scene, animations } = await read(...dances);
     const [, short] = dances;
