@@ -1,6 +1,7 @@
-/** Who dances on this page: the puppet, or an avatar that the person brought, which never leaves the browser. */
+/** Who dances in the place of one of the dancers on this page: the puppet, or an avatar that the person brought, which never leaves the browser. */
 import type { AvatarModel } from "./avatar/model";
 import { AvatarProblem, LARGEST, tooLarge } from "./avatar/problem";
+import type { Chosen } from "./input/chosen";
 import type { DanceAs } from "./page/dance-as";
 import type { Library } from "./page/library";
 import type { Toast } from "./page/toast";
@@ -8,9 +9,10 @@ import type { Stage } from "./stage/stage";
 import type { MakePerformer } from "./stage/troupe";
 import type { FileStore } from "./storage/files";
 import type { Store } from "./storage/store";
+import { MOST_PERFORMERS } from "./wire/limbs";
 import { say } from "./words/say";
 
-/** Where the file is kept, and whether it dances. */
+/** Where the file is kept, and whether it dances; of dancers behind the first with their number from 1. */
 const FILE = "avatar";
 const DANCING = "bunraku.avatar";
 
@@ -30,22 +32,31 @@ export class Casting {
   /** The file that is being read; a later one makes it stale. */
   #reading: File | null = null;
 
-  constructor(private readonly options: CastingOptions) {
+  #restored = false;
+  readonly #file: string;
+  readonly #choice: string;
+
+  /** In the place of a performer, by number. */
+  constructor(private readonly options: CastingOptions, private readonly performer = 0) {
+    const own = performer > 0 ? `.${performer + 1}` : "";
+    [this.#file, this.#choice] = [FILE + own, DANCING + own];
     this.#render();
   }
 
   /** The stage it is about, once there is one. */
   set stage(stage: Pick<Stage, "danceBy">) {
     this.#stage = stage;
-    if (this.#dancing) stage.danceBy(this.#dancing);
+    if (this.#dancing) stage.danceBy(this.#dancing, this.performer);
   }
 
-  /** Brings back the avatar of the last visit, if there was one. */
+  /** Brings back the avatar of the last visit, if there was one; once. */
   async restore(): Promise<void> {
+    if (this.#restored) return;
+    this.#restored = true;
     const { files, choices } = this.options;
-    const dancing = choices.get(DANCING);
+    const dancing = choices.get(this.#choice);
     if (dancing === null) return;
-    const file = await files.get(FILE);
+    const file = await files.get(this.#file);
     if (!file || this.#reading || this.#model) return;
     await this.#read(file, dancing === "yes");
   }
@@ -54,8 +65,8 @@ export class Casting {
   async take(file: File): Promise<void> {
     if (!(await this.#read(file, true))) return;
     const { page, files, choices } = this.options;
-    choices.put(DANCING, "yes");
-    const kept = await files.put(FILE, file);
+    choices.put(this.#choice, "yes");
+    const kept = await files.put(this.#file, file);
     const name = this.#model?.name ?? file.name;
     page.toast(
       kept
@@ -67,7 +78,7 @@ export class Casting {
   /** The avatar dances, or the puppet does. */
   choose(avatar: boolean): void {
     if (!this.#model) return;
-    this.options.choices.put(DANCING, avatar ? "yes" : "no");
+    this.options.choices.put(this.#choice, avatar ? "yes" : "no");
     this.#show(avatar);
   }
 
@@ -75,8 +86,8 @@ export class Casting {
   async remove(): Promise<void> {
     this.#reading = null;
     this.#drop();
-    this.options.choices.remove(DANCING);
-    await this.options.files.remove(FILE);
+    this.options.choices.remove(this.#choice);
+    await this.options.files.remove(this.#file);
   }
 
   async #read(file: File, dancing: boolean): Promise<boolean> {
@@ -109,13 +120,13 @@ export class Casting {
 
   #show(avatar: boolean): void {
     this.#dancing = avatar ? this.#make : null;
-    this.#stage?.danceBy(this.#dancing);
+    this.#stage?.danceBy(this.#dancing, this.performer);
     this.#render();
   }
 
   /** The puppet dances, and the model is no more. */
   #drop(): void {
-    if (this.#dancing) this.#stage?.danceBy(null);
+    if (this.#dancing) this.#stage?.danceBy(null, this.performer);
     this.#dancing = this.#make = null;
     this.#model?.dispose();
     this.#model = null;
@@ -123,6 +134,31 @@ export class Casting {
   }
 
   #render(): void {
-    this.options.page.library.danceAs.render({ name: this.#model?.name ?? null, dancing: this.#dancing !== null, reading: this.#reading?.name ?? null });
+    this.options.page.library.danceAs.render(this.performer, { name: this.#model?.name ?? null, dancing: this.#dancing !== null, reading: this.#reading?.name ?? null });
+  }
+}
+
+/** Who dances in the places of all the dancers that there may be. */
+export class Castings {
+  readonly #all: readonly Casting[];
+
+  /** The person brings avatars for the `choice`'s performer. */
+  constructor(options: CastingOptions, private readonly choice: Pick<Chosen, "performer">) {
+    this.#all = Array.from({ length: MOST_PERFORMERS }, (_, performer) => new Casting(options, performer));
+  }
+
+  /** In the place of the chosen dancer. */
+  get chosen(): Casting {
+    return this.#all[this.choice.performer];
+  }
+
+  /** The stage they are about, once there is one. */
+  set stage(stage: Pick<Stage, "danceBy">) {
+    for (const casting of this.#all) casting.stage = stage;
+  }
+
+  /** Brings back the avatars of the last visit for so many dancers: those of others are not read before they are seen. */
+  restore(dancers: number): void {
+    for (const casting of this.#all.slice(0, dancers)) void casting.restore();
   }
 }

@@ -1,6 +1,6 @@
 /** What is taken from the page: dances as files, and the stage as a picture. Between library, writers, stage and the browser. */
 import { ProblemError } from "./client/problem";
-import type { Format } from "./export/file";
+import type { Format, Source } from "./export/file";
 import type { Piece } from "./page/library";
 import type { Page } from "./page/page";
 import { saveFile } from "./page/save-file";
@@ -17,17 +17,23 @@ export class Exporting {
 
   constructor(private readonly page: Page, private readonly now: () => { room: Room | null; stage: Stage | null }) {}
 
-  /** Makes a file of a performer's whole dance and saves it; what is wrong is told in the library. */
-  async download(piece: Piece, format: Format, performer = 0): Promise<void> {
+  /** Makes a file of the whole dances of these `performers` and saves it; what is wrong is told in the library. */
+  async download(piece: Piece, format: Format, performers: readonly number[]): Promise<void> {
     const abort = new AbortController();
     const { signal } = abort;
-    const row = this.page.library.download(`${piece.name}, ${format.toUpperCase()}`, () => abort.abort());
+    // one of several
+    const part = performers.length < piece.performers ? `, ${say("Dancer {number}", { number: performers[0] + 1 })}` : "";
+    const row = this.page.library.download(`${piece.name}${part}, ${format.toUpperCase()}`, () => abort.abort());
     try {
       const [{ bestBlocks, fileName, makeFile }, looks] = await writers();
-      const held = this.now().room?.viewer.held(piece.id, performer) ?? null;
-      const store = await bestBlocks(piece.id, { performer, held, signal, told: (share) => row.doing(say("fetching the dance"), share * FETCHED) });
-      const file = await makeFile(format, piece.name, store, { looks, signal, told: (share) => row.doing(say("writing the file"), FETCHED + share * (1 - FETCHED)) });
-      this.#save(file, fileName(piece.name, format));
+      const sources: Source[] = [];
+      for (const performer of performers) {
+        const held = this.now().room?.viewer.held(piece.id, performer) ?? null;
+        const told = (share: number) => row.doing(say("fetching the dance"), ((sources.length + share) / performers.length) * FETCHED);
+        sources.push(await bestBlocks(piece.id, { performer, held, signal, told }));
+      }
+      const file = await makeFile(format, piece.name, sources, { looks, signal, told: (share) => row.doing(say("writing the file"), FETCHED + share * (1 - FETCHED)) });
+      this.#save(file, fileName(piece.name, format, part));
     } catch (error) {
       if (!signal.aborted) tell(this.page.library, piece.name, error);
     } finally {

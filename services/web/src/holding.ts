@@ -24,6 +24,7 @@ export interface HoldingPage {
   readonly toast: Toast;
   readonly strings: Pick<Page["strings"], "render" | "notice">;
   readonly asks: Page["asks"];
+  readonly library?: { readonly danceAs: Pick<Page["library"]["danceAs"], "dancers"> };
 }
 
 export class Holding {
@@ -95,6 +96,7 @@ export class Holding {
     const limbs = this.limbs();
     this.page.strings.render(limbs, this.connected && this.#room !== null && !this.watching, this.chosen.performer);
     this.page.asks.render(limbs, this.#key("give"));
+    this.page.library?.danceAs.dancers(limbs, this.chosen.performer);
   }
 
   /** Turns to the next performer, by a key or button: it is said, as what is seen of it is little. */

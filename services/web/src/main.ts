@@ -2,7 +2,7 @@
 import "./style/page.css";
 import type { Vector3 } from "three";
 import { Arriving } from "./arriving";
-import { Casting } from "./casting";
+import { Castings } from "./casting";
 import { bound, comeIn, may, ownRole, whenDenied } from "./client/access";
 import { createSession, keep, type CameraKeyframe, type Motion } from "./client/library";
 import { ProblemError } from "./client/problem";
@@ -96,18 +96,18 @@ const page = createPage(document.body, {
   }) } : {}),
   files: (files) => {
     const own = files.findLast(isAvatar);
-    if (own) void casting.take(own);
+    if (own) void castings.chosen.take(own);
     const dances = may("ingest") ? files.filter((file) => !isAvatar(file)) : [];
     if (own || dances.length > 0) page.panels.open("library");
     void uploadAll(dances, page.library, uploaded);
   },
-  avatar: (file) => void casting.take(file),
-  danceAs: (avatar) => casting.choose(avatar),
-  removeAvatar: () => void casting.remove(),
+  avatar: (file) => void castings.chosen.take(file),
+  danceAs: (avatar) => castings.chosen.choose(avatar),
+  removeAvatar: () => void castings.chosen.remove(),
   choose: (id) => void choose(id),
   ...(may("ingest") && may("control") ? { add: (piece) => room && void addToStage(piece, room, pieces, page.library).then(renderPieces) } : {}),
   picture,
-  download: (piece, format) => void exporting.download(piece, format),
+  download: (...asked) => void exporting.download(...asked),
   remove: (piece) => {
     if (confirm(say("Remove \"{name}\" from the library?", { name: isolated(piece.name) }))) void pieces.remove(piece.id).then(renderPieces, (error) => tell(page.library, piece.name, error));
   },
@@ -134,7 +134,7 @@ const page = createPage(document.body, {
 const exporting = new Exporting(page, () => ({ room, stage }));
 const holding = new Holding(page, () => mapping);
 holding.watching = !may("control");
-const casting = new Casting({ page, files: new FileStore("bunraku"), choices: browserStore });
+const castings = new Castings({ page, files: new FileStore("bunraku"), choices: browserStore }, holding.chosen);
 let denied = false;
 whenDenied(({ title, detail, hint }) => {
   denied = true;
@@ -214,10 +214,14 @@ function enter(id: string, place: Place = "sessions"): Room {
   page.toast.lost(null);
   viewer.addEventListener("figure", () => {
     performing?.comeOn();
+    castings.restore(viewer.performers.length);
     if (!pieces.find(viewer.motion)) void pieces.refresh().then(renderPieces, () => undefined);
     renderPieces();
   });
-  viewer.addEventListener("tracks", () => performing?.comeOn());
+  viewer.addEventListener("tracks", () => {
+    performing?.comeOn();
+    castings.restore(viewer.performers.length);
+  });
   const renderTimeline = () => page.transport.timeline(viewer.timeline?.playing ?? false, viewer.timeline?.loop ?? false, viewer.timeline !== null);
   viewer.addEventListener("timeline", renderTimeline);
   viewer.addEventListener("blocks", () => page.transport.blocks(viewer.blocks, viewer.rates.length));
@@ -296,7 +300,7 @@ async function openStage(): Promise<void> {
   stage.still = calm.matches;
   calm.addEventListener("change", () => stage && (stage.still = calm.matches));
   if (theme) stage.setTheme(theme.theme);
-  casting.stage = stage;
+  castings.stage = stage;
   listenToKeyboard(window, commands, velocity, () => mapping, { keys: () => page.keys.show(), escape: () => page.panels.closeLast() });
   listenToMouse(canvas, window, commands, () => mapping);
   pad = createGamepad(commands, () => mapping, () => navigator.getGamepads());
@@ -389,4 +393,4 @@ holding.render();
 page.transport.health("none");
 void start();
 void openStage();
-void casting.restore();
+castings.restore(1);

@@ -1,5 +1,5 @@
 import { describe, expect, test } from "vitest";
-import { Casting } from "../src/casting";
+import { Casting, type CastingOptions, Castings } from "../src/casting";
 import type { DanceAsState } from "../src/page/dance-as";
 import type { MakePerformer } from "../src/stage/troupe";
 import { figureFile, type FigureOptions } from "./avatar/figures";
@@ -9,32 +9,51 @@ import { standardFigure } from "./stage/standard-figure";
 class Visit {
   readonly files = new Map<string, File>();
   readonly choices = new Map<string, string>();
+  /** Keys of the files that were looked for. */
+  readonly sought: string[] = [];
   full = false;
-  shown: DanceAsState | null = null;
+  /** Of each performer. */
+  readonly told: DanceAsState[] = [];
   readonly toasts: string[] = [];
   readonly problems: string[][] = [];
+  /** Who is to dance from then on, and in whose place. */
   readonly dancing: (MakePerformer | null)[] = [];
+  readonly places: number[] = [];
 
   /** The page is opened; with the stage there already, or not yet. */
   open(staged = true): Casting {
-    const element = {} as HTMLElement;
-    const casting = new Casting({
-      page: {
-        library: { danceAs: { element, render: (state) => (this.shown = state) }, problem: (...told) => void this.problems.push(told.map(String)) },
-        toast: (message) => void this.toasts.push(message),
-      },
-      files: {
-        get: async (key) => this.files.get(key) ?? null,
-        put: async (key, file) => !this.full && this.files.set(key, file) !== undefined,
-        remove: async (key) => void this.files.delete(key),
-      },
-      choices: { get: (key) => this.choices.get(key) ?? null, put: (key, text) => void this.choices.set(key, text), remove: (key) => void this.choices.delete(key) },
-    });
+    const casting = new Casting(this.options);
     if (staged) casting.stage = this.stage;
     return casting;
   }
 
-  readonly stage = { danceBy: (make: MakePerformer | null) => void this.dancing.push(make) };
+  get options(): CastingOptions {
+    const element = {} as HTMLElement;
+    return {
+      page: {
+        library: { danceAs: { element, render: (performer, state) => (this.told[performer] = state), dancers: () => undefined }, problem: (...told) => void this.problems.push(told.map(String)) },
+        toast: (message) => void this.toasts.push(message),
+      },
+      files: {
+        get: async (key) => (this.sought.push(key), this.files.get(key) ?? null),
+        put: async (key, file) => !this.full && this.files.set(key, file) !== undefined,
+        remove: async (key) => void this.files.delete(key),
+      },
+      choices: { get: (key) => this.choices.get(key) ?? null, put: (key, text) => void this.choices.set(key, text), remove: (key) => void this.choices.delete(key) },
+    };
+  }
+
+  /** What the first one's place shows. */
+  get shown(): DanceAsState | null {
+    return this.told[0] ?? null;
+  }
+
+  readonly stage = {
+    danceBy: (make: MakePerformer | null, performer = 0) => {
+      this.dancing.push(make);
+      this.places.push(performer);
+    },
+  };
 }
 
 const file = (options: FigureOptions = {}, name = "sato.v2.glb") => new File([figureFile(options)], name);
@@ -87,6 +106,58 @@ describe("who dances", () => {
     const casting = visit.open();
     await Promise.all([casting.take(file({}, "first.glb")), casting.take(file({}, "second.glb"))]);
     expect([visit.shown?.name, visit.files.get("avatar")?.name]).toEqual(["second", "second.glb"]);
+  });
+});
+
+describe("of several dancers", () => {
+  const NOBODY: DanceAsState = { name: null, dancing: false, reading: null };
+
+  test("the chosen one's place is taken, and the others' stay whose they were", async () => {
+    const visit = new Visit();
+    const chosen = { performer: 1 };
+    const castings = new Castings(visit.options, chosen);
+    castings.stage = visit.stage;
+    expect(visit.told).toEqual([NOBODY, NOBODY, NOBODY, NOBODY]);
+    await castings.chosen.take(file({}, "second.glb"));
+    expect(visit.told.map(({ name }) => name)).toEqual([null, "second", null, null]);
+    expect([visit.dancing.at(-1) !== null, new Set(visit.places)]).toEqual([true, new Set([1])]);
+    chosen.performer = 0;
+    await castings.chosen.take(file({}, "first.glb"));
+    expect([visit.told.map(({ name }) => name), visit.places.at(-1)]).toEqual([["first", "second", null, null], 0]);
+    castings.chosen.choose(false);
+    expect([visit.told.map(({ dancing }) => dancing), visit.dancing.at(-1), visit.places.at(-1)]).toEqual([[false, true, false, false], null, 0]);
+    await castings.chosen.remove();
+    expect([visit.told.map(({ name }) => name), [...visit.files.keys()]]).toEqual([[null, "second", null, null], ["avatar.2"]]);
+  });
+
+  test("each one's avatar of the last visit is read once that dancer is there, and only then", async () => {
+    const visit = new Visit();
+    const chosen = { performer: 0 };
+    const before = new Castings(visit.options, chosen);
+    await before.chosen.take(file({}, "first.glb"));
+    chosen.performer = 2;
+    await before.chosen.take(file({}, "third.glb"));
+    const castings = new Castings(visit.options, chosen);
+    castings.restore(1);
+    castings.stage = visit.stage;
+    await expect.poll(() => visit.told[0].name).toBe("first");
+    castings.restore(2);
+    expect(visit.told[2]).toEqual(NOBODY);
+    castings.restore(3);
+    await expect.poll(() => visit.told[2]).toEqual({ name: "third", dancing: true, reading: null });
+    expect(visit.places.at(-1)).toBe(2);
+  });
+
+  test("what cannot be read of the last visit is told once, though the dancer comes again", async () => {
+    const visit = new Visit();
+    visit.files.set("avatar.2", new File(["solid cube"], "cube.glb"));
+    visit.choices.set("bunraku.avatar.2", "yes");
+    const castings = new Castings(visit.options, { performer: 0 });
+    castings.restore(2);
+    await expect.poll(() => visit.problems.length).toBe(1);
+    castings.restore(1);
+    castings.restore(2);
+    expect(visit.sought).toEqual(["avatar.2"]);
   });
 });
 

@@ -30,6 +30,7 @@ let shaken: number[];
 let shown: readonly LimbState[];
 let shownOf: number;
 let key: string | null;
+let cast: number[];
 
 beforeEach(() => {
   Line.install();
@@ -43,6 +44,7 @@ beforeEach(() => {
   const page = {
     strings: { render: (limbs: readonly LimbState[], _: boolean, chosen: number) => ([shown, shownOf] = [limbs, chosen]), notice: (text: string) => notices.push(text) },
     asks: { render: (_: unknown, gives: string | null) => (key = gives) },
+    library: { danceAs: { dancers: (limbs: readonly LimbState[], chosen: number) => (cast = [limbs.length, chosen]) } },
     toast: (message: string, action?: ToastAction) => toasts.push([message, action]),
   };
   holding = new Holding(page as unknown as Page, () => DEFAULT_MAPPING);
@@ -164,7 +166,7 @@ describe("several performers", () => {
     presence([null, null, null, null, "m", null, null, null], Array(8).fill([]));
     expect([shown.length, shown[0].holder, shown[SECOND].holder?.name]).toEqual([8, null, "Mateo"]);
     holding.chosen.choose(1);
-    expect(shownOf).toBe(1);
+    expect([shownOf, cast]).toEqual([1, [8, 1]]);
     velocity.hold(velocity.limb(LEFT_HAND));
     expect(toasts.at(-1)?.[0]).toBe("Mateo holds the left hand of dancer 2");
     expect(shaken).toEqual([SECOND + LEFT_HAND]);

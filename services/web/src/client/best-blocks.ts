@@ -1,6 +1,7 @@
 /** The whole dance of one performer of a motion at its best rate, over HTTP, with what a viewer has of it already. */
 
 import { DamagedBlock } from "../codec/errors";
+import { readTiming } from "../codec/timing";
 import { MotionTrack } from "../codec/track";
 import { BlockStore } from "../playout/blocks";
 import { unpack } from "../wire/codec";
@@ -23,29 +24,35 @@ export interface Fetching {
 }
 
 /**
- * Every block of a dance in `motion` at its best rate. Rejects with ProblemError; given up by `signal`, with the signal's reason.
+ * Every block of a dance in `motion` at its best rate, and how many of its frames are danced there: the motion is as long as the
+ * first performer's dance, at which a longer one is cut. Rejects with ProblemError; given up by `signal`, with the signal's reason.
  */
-export async function bestBlocks(motion: string, { performer = 0, held = null, told, signal }: Fetching = {}): Promise<BlockStore> {
+export async function bestBlocks(motion: string, { performer = 0, held = null, told, signal }: Fetching = {}): Promise<{ store: BlockStore; frames: number }> {
   const base = `/v1/motions/${encodeURIComponent(motion)}`;
   try {
     const { tracks } = await message(`${base}/description`, "Description", signal);
-    const number = [...tracks.keys()].filter((index) => tracks[index].type === "motion").at(performer);
+    const dances = [...tracks.keys()].filter((index) => tracks[index].type === "motion");
+    const number = dances.at(performer);
     if (number === undefined) throw new DamagedBlock("there is no motion in it");
-    const store = new BlockStore(MotionTrack.fromDescription(tracks[number]));
+    const track = MotionTrack.fromDescription(tracks[number]);
+    const store = new BlockStore(track);
     if (held) store.adopt(held);
-    const best = store.track.rates.length - 1;
-    const missing = [...store.rates.keys()].filter((index) => store.rates[index] < best);
-    let here = store.rates.length - missing.length;
+    const lasting = readTiming(tracks[dances[0]], "motion").durationUs;
+    const frames = Math.min(track.frames, Math.max(1, Math.round((lasting * track.fps) / 1e6)));
+    const best = track.rates.length - 1;
+    const danced = [...store.rates.keys()].filter((index) => track.firstFrame(index) < frames);
+    const missing = danced.filter((index) => store.rates[index] < best);
+    let here = danced.length - missing.length;
     const fetchOn = async () => {
       for (let index = missing.shift(); index !== undefined; index = missing.shift()) {
         const { block } = await message(`${base}/blocks/${best}/${index}?track=${number}`, "Data", signal);
         store.put(index, best, block);
         signal?.throwIfAborted();
-        told?.(++here / store.rates.length);
+        told?.(++here / danced.length);
       }
     };
     await Promise.all(Array.from({ length: AT_ONCE }, fetchOn));
-    return store;
+    return { store, frames };
   } catch (error) {
     signal?.throwIfAborted();
     if (error instanceof DamagedBlock || error instanceof MalformedMessage) throw new ProblemError(0, "This dance cannot be read", error.message);

@@ -1,7 +1,8 @@
 /** Motion as BVH, as the Python room's `motion/writers.py` writes it. */
 
-import { JOINT_COUNT, JOINTS, PARENTS, TIPS } from "../motion/skeleton";
-import { type Dance, STRIDE, type Work } from "./dance";
+import { bring } from "../motion/performer";
+import { JOINT_COUNT, JOINTS, PARENTS, restPose, TIPS } from "../motion/skeleton";
+import { type Dance, poseOf, STRIDE, type Work } from "./dance";
 
 const CENTIMETRES = 100;
 const DEGREES = 180 / Math.PI;
@@ -10,17 +11,20 @@ const encoder = new TextEncoder();
 
 /**
  * `dance` as BVH in centimetres, y up, facing z, with H-Anim joint names and its I-pose as the rest pose. The root has six
- * channels, whose positions are absolute; all joints turn in the order z, x, y. Lengths and angles have 6 decimals.
+ * channels, whose positions are absolute: on the stage that all dancers share, so that the files of several stand beside each
+ * other. All joints turn in the order z, x, y. Lengths and angles have 6 decimals.
  */
 export function* writeBvh(dance: Dance): Work<Uint8Array<ArrayBuffer>[]> {
-  const { fps, frames, roots, rotations } = dance;
+  const { fps, frames, place } = dance;
   const frameTime = Number((1 / fps).toPrecision(10));
   const parts = [encoder.encode([...hierarchy(dance), "MOTION", `Frames: ${frames}`, `Frame Time: ${frameTime}`, ""].join("\n"))];
   const values = new Float64Array(3 + JOINT_COUNT * 3);
+  const pose = restPose();
   let rows = "";
   for (let frame = 0; frame < frames; frame++) {
-    for (let axis = 0; axis < 3; axis++) values[axis] = roots[frame * 3 + axis] * CENTIMETRES;
-    for (let joint = 0; joint < JOINT_COUNT; joint++) eulerZxy(values, 3 + joint * 3, rotations, (frame * JOINT_COUNT + joint) * 4);
+    const { root, rotations } = bring(poseOf(dance, frame, pose), place);
+    for (let axis = 0; axis < 3; axis++) values[axis] = root[axis] * CENTIMETRES;
+    for (let joint = 0; joint < JOINT_COUNT; joint++) eulerZxy(values, 3 + joint * 3, rotations, joint * 4);
     rows += `${row(values)}\n`;
     if (frame % STRIDE !== STRIDE - 1 && frame !== frames - 1) continue;
     parts.push(encoder.encode(rows));

@@ -1,11 +1,16 @@
 /** A whole motion frame by frame, as the writers of files take it. */
 
+import type { Place } from "../motion/performer";
 import { copyPose, type Figure, JOINT_COUNT, type Pose, restPose } from "../motion/skeleton";
 import type { BlockStore } from "../playout/blocks";
 
-/** `frames` poses of `figure`, `fps` a second: the root's places [frame][3] in metres, local rotations [frame][joint 18][w x y z]. */
+/**
+ * `frames` poses of `figure`, `fps` a second: the root's places [frame][3] in metres, local rotations [frame][joint 18][w x y z].
+ * They are told about the middle of a stage of the dance's own, which stands at `place` on the stage that all dancers share.
+ */
 export interface Dance {
   figure: Figure;
+  place: Place;
   fps: number;
   frames: number;
   roots: Float64Array;
@@ -18,9 +23,9 @@ export type Work<T> = Generator<number, T>;
 /** Frames of work between two words of how far it is. */
 export const STRIDE = 32;
 
-/** What `store` holds at the motion's own frame rate. Every block must be there. */
-export function* sample(store: BlockStore): Work<Dance> {
-  const { figure, fps, frames } = store.track;
+/** The first `frames` of what `store` holds, at its own frame rate. Every block of them must be there. */
+export function* sample(store: BlockStore, frames = store.track.frames): Work<Dance> {
+  const { figure, place, fps } = store.track;
   const roots = new Float64Array(frames * 3), rotations = new Float64Array(frames * JOINT_COUNT * 4);
   const pose = restPose();
   for (let frame = 0; frame < frames; frame++) {
@@ -29,7 +34,7 @@ export function* sample(store: BlockStore): Work<Dance> {
     rotations.set(pose.rotations, frame * JOINT_COUNT * 4);
     if (frame % STRIDE === 0) yield frame / frames;
   }
-  return { figure, fps, frames, roots, rotations };
+  return { figure, place, fps, frames, roots, rotations };
 }
 
 /** Frame `frame` of `dance`, written into `out` and returned. */

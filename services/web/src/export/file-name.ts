@@ -7,9 +7,9 @@ const UNSAFE = /[\\/:*?"<>|\p{Cc}\p{Cf}\p{Cs}]+/gu;
 /** Devices of Windows, whatever their ending. */
 const DEVICE = /^(con|prn|aux|nul|com\d|lpt\d)$/i;
 
-/** `name` as a file's, with this ending (without a dot); letters of all scripts stay. */
-export function fileName(name: string, ending: string): string {
+/** `name` as a file's, with this ending (without a dot); letters of all scripts stay. `part`, of which file of several it is, is kept whole behind it. */
+export function fileName(name: string, ending: string, part = ""): string {
   const plain = name.normalize("NFC").replace(UNSAFE, " ").replace(/\s+/g, " ");
   const short = [...plain].slice(0, LONGEST).join("").replace(/^[\s.]+|[\s.]+$/g, "");
-  return `${short === "" || DEVICE.test(short) ? `dance${short && ` ${short}`}` : short}.${ending}`;
+  return `${short === "" || DEVICE.test(short) ? `dance${short && ` ${short}`}` : short}${part}.${ending}`;
 }

@@ -11,6 +11,8 @@ export interface GltfNode {
   name: string;
   children?: number[];
   translation?: number[];
+  /** x y z w */
+  rotation?: number[];
   mesh?: number;
   skin?: number;
 }

@@ -7,7 +7,11 @@ import { frameTimes, Gltf, putRotation } from "./gltf";
 
 const EXTENSION = "VRMC_vrm_animation";
 
-/** `dance` of this `name` as the turns of a humanoid's bones from its T-pose, and where its hips are, metres. */
+/**
+ * `dance` of this `name` as the turns of a humanoid's bones from its T-pose, and where its hips are, metres. The place on the
+ * stage is left out: a file is of one avatar about where that stands, and its player measures the hips' way by the avatar's
+ * height, so that dancers would come nearer to each other as their avatars are smaller.
+ */
 export function* writeVrma(dance: Dance, name: string): Work<Uint8Array<ArrayBuffer>[]> {
   const { figure, fps, frames } = dance;
   const asset = new Gltf();

@@ -1,9 +1,8 @@
 /** The library drawer: drop zone, uploads with true progress, problems in plain words, and the list of dances. */
 import type { UploadProgress } from "../client/library";
-import type { Format } from "../export/file";
 import { createDanceAs, type DanceAs, type DanceAsActions } from "./dance-as";
 import { element, setAttribute, setText } from "./dom";
-import { createDownloads, type Downloads } from "./downloads";
+import { type ChooseFile, createDownloads, type Downloads } from "./downloads";
 import { clockTime, makingProgress, uploadProgress } from "./format";
 import { icon, motionGlyph, type IconName } from "./icons";
 import { createPanel, type Panel } from "./panels";
@@ -51,7 +50,7 @@ export interface LibraryActions extends DanceAsActions {
   remove(piece: Piece): void;
   /** Adds who dances in it to those on the stage; left out, that cannot be done here. */
   add?(piece: Piece): void;
-  download(piece: Piece, format: Format): void;
+  download(piece: Piece, ...file: Parameters<ChooseFile>): void;
   close(): void;
 }
 
@@ -90,7 +89,7 @@ export function createLibrary(root: HTMLElement, on: LibraryActions): Library {
           const text = element("span", { class: "motion-text" }, element("b", {}, piece.name), element("small", {}, piece.detail));
           choose.append(glyph, text, element("span", { class: "motion-length" }, clockTime(piece.seconds)));
           const told = (open: boolean) => (disclosed = open ? piece.id : null);
-          const one = createDownloads(piece.name, piece.id === disclosed, told, (format) => on.download(piece, format));
+          const one = createDownloads(piece, piece.id === disclosed, told, (...file) => on.download(piece, ...file));
           downloads.set(piece.id, one);
           const remove = tool("bin", "motion-remove", say("Remove {name}", { name: piece.name }), () => on.remove(piece));
           const tools = element("div", { class: "motion-tools" }, one.button, remove);

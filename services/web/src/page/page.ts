@@ -1,10 +1,10 @@
 /** Everything of the page that is not the stage, put together: one call of `render...` per kind of news. */
 import type { Mapping } from "../input/mapping";
-import type { Format } from "../export/file";
 import { createAsks, type Asks } from "./asks";
 import { createHeader, type Header } from "./header";
 import { createKeys } from "./keys";
 import type { DanceAsActions } from "./dance-as";
+import type { ChooseFile } from "./downloads";
 import type { KeysModal } from "./keys-modal";
 import { acceptDrops, createLibrary, type Library, type Piece } from "./library";
 import { createLineCard, type LineCard } from "./line-card";
@@ -34,7 +34,7 @@ export interface PageActions extends StringsActions, SoundActions, DanceAsAction
   picture(): void;
   files(files: readonly File[]): void;
   choose(id: string): void;
-  download(piece: Piece, format: Format): void;
+  download(piece: Piece, ...file: Parameters<ChooseFile>): void;
   remove(piece: Piece): void;
   /** Adds who dances in it to those on the stage; left out, that cannot be done here. */
   add?(piece: Piece): void;

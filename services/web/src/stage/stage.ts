@@ -153,9 +153,9 @@ export class Stage {
     this.#compile();
   }
 
-  /** Has the first dance danced by whom `make` makes for a dancer's lengths, from now on; null: by the puppet. */
-  danceBy(make: MakePerformer | null): void {
-    this.#troupe.danceBy(make);
+  /** Has the dance of a performer, by number, danced by whom `make` makes for a dancer's lengths, from now on; null: by the puppet. */
+  danceBy(make: MakePerformer | null, performer = 0): void {
+    this.#troupe.danceBy(make, performer);
     if (this.puppet) this.#compile();
   }
 

@@ -1,4 +1,4 @@
-/** Who is on the stage: a puppet for each dancer of the motion, or in the first one's place an avatar. */
+/** Who is on the stage: for each dancer of the motion a puppet, or an avatar in its place. */
 import { Group, type IUniform } from "three";
 import type { Figure, Pose } from "../motion/skeleton";
 import { asanohaTexture, faceTexture } from "./paint";
@@ -11,8 +11,9 @@ export type MakePerformer = (figure: Figure) => Performer;
 
 export class Troupe {
   readonly group = new Group();
-  #performers: Performer[] = [];
-  #make: MakePerformer | null = null;
+  readonly #performers: Performer[] = [];
+  /** By number of the performer; none for a puppet. */
+  readonly #makes: (MakePerformer | null)[] = [];
   #workshop: Workshop | null = null;
   #reflected = false;
   #plain = false;
@@ -36,20 +37,18 @@ export class Troupe {
   enter(figures: readonly Figure[]): boolean {
     const stay = this.#performers.length > 0 && this.#performers.every(({ figure }, k) => figure === figures[k]);
     if (!stay) for (const performer of this.#performers.splice(0)) performer.dispose();
-    for (const figure of figures.slice(this.#performers.length)) this.#add(figure);
+    for (let k = this.#performers.length; k < figures.length; k++) this.#performers.push(this.#cast(figures[k], k));
     this.#workshop?.keep(figures);
     return !stay;
   }
 
-  /** Has the first dance danced by whom `make` makes, from now on; null: by the puppet. */
-  danceBy(make: MakePerformer | null): void {
-    this.#make = make;
-    const [first, ...others] = this.#performers;
-    if (!first) return;
-    first.dispose();
-    this.#performers = [];
-    this.#add(first.figure);
-    this.#performers.push(...others);
+  /** Has the dance of a performer, by number, danced by whom `make` makes, from now on and in every motion; null: by the puppet. */
+  danceBy(make: MakePerformer | null, performer = 0): void {
+    this.#makes[performer] = make;
+    const before = this.#performers[performer];
+    if (!before) return;
+    before.dispose();
+    this.#performers[performer] = this.#cast(before.figure, performer);
   }
 
   /** Takes a pose for each; one without stands as it stood. `seconds` let what hangs loose swing, 0 sets it still. */
@@ -73,12 +72,12 @@ export class Troupe {
     this.#workshop?.dispose();
   }
 
-  #add(figure: Figure): void {
-    const performer = (this.#performers.length === 0 ? this.#make?.(figure) : null) ?? this.#carve(figure);
+  #cast(figure: Figure, number: number): Performer {
+    const performer = this.#makes[number]?.(figure) ?? this.#carve(figure);
     this.#dress(performer);
     performer.group.visible = false;
-    this.#performers.push(performer);
     this.group.add(performer.group);
+    return performer;
   }
 
   #carve(figure: Figure): Puppet {

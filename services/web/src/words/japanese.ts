@@ -139,6 +139,8 @@ export const JAPANESE = {
   "motion for animation programs": "アニメーションソフト用の動き",
   "puppet": "人形",
   "the puppet and its dance": "人形とその踊り",
+  "all the puppets": "すべての人形",
+  "all the puppets and their dances": "すべての人形とその踊り",
   "avatars": "アバター",
   "motion for VRM avatars": "VRMアバター用の動き",
   "fetching the dance": "取得中",

@@ -3,9 +3,12 @@ import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { figureFile, mixamo, type FigureOptions } from "../avatar/figures";
 import { describeInBrowser } from "./in-browser";
-import { danced, drawn, LEFT_HAND, letGo, ringOf, settled, standAtBeginning, toasted, welcomed } from "./inside";
+import { violations } from "./axe";
+import { danced, drawn, LEFT_HAND, letGo, ringOf, settled, several, standAtBeginning, toasted, welcomed } from "./inside";
 
 const SMALL = { viewport: { width: 640, height: 560 }, reducedMotion: "reduce" } as const;
+/** The first limb of the second performer: its left hand. */
+const SECOND = 4;
 /** The same figure in three kinds of file, each of other proportions than the dancer's. */
 const OWN: FigureOptions = { name: mixamo, unit: 0.01, askew: true, arms: 40, forearm: 0.8, legLength: 0.85 };
 
@@ -27,17 +30,7 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     expect(await limbsApart(page)).toBeLessThan(1);
     await page.keyboard.press("Escape");
 
-    const ring = await settled(page, () => ringOf(page, LEFT_HAND), 0.5);
-    await page.mouse.move(ring.x, ring.y);
-    await page.mouse.down();
-    // Beside and below the shoulder, where an arm has room.
-    const shoulder = await screenOf(page, "mixamorigLeftArm");
-    const scale = Math.abs((await screenOf(page, "mixamorigHead")).y - (await screenOf(page, "mixamorigHips")).y) / 0.6;
-    const to = { x: shoulder.x + 0.38 * scale, y: shoulder.y + 0.1 * scale };
-    await page.mouse.move(to.x, to.y, { steps: 8 });
-    await page.waitForFunction((limb) => window.bunraku.hands.source(limb) === "pointer", LEFT_HAND);
-    await settled(page, () => ringOf(page, LEFT_HAND), 0.3);
-    await expect.poll(() => away(page)).toBeLessThan(0.03);
+    await pulled(page, LEFT_HAND);
     await page.mouse.up();
     await letGo(page, LEFT_HAND);
     expect(sent).toEqual([]);
@@ -77,7 +70,92 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     await page.getByRole("alert").getByText("cube.glb: It is no GLB").waitFor();
     expect(await page.evaluate(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined)).toBe(true);
   });
+
+  test("of several dancers it takes the chosen one's place, is pulled there, and each may have one", async () => {
+    const page = await open("", { ...SMALL, viewport: { width: 760, height: 560 } });
+    await danced(page);
+    await welcomed(page);
+    const section = page.getByRole("region", { name: "Dance as" });
+    await page.keyboard.press("KeyL");
+    await section.getByRole("button", { name: "Choose your own avatar" }).waitFor();
+    expect(await section.getByRole("button", { name: /^Dancer/ }).count()).toBe(0);
+    await page.getByRole("button", { name: "Add Sanbasō, First Steps to the stage", exact: true }).click();
+    await several(page, 2);
+    await section.getByRole("button", { name: /^Dancer 2/ }).press("Enter");
+    await toasted(page, "mine dances here", () => drop(page, "mine.glb", OWN));
+    await several(page, 2);
+    await standAtBeginning(page);
+    expect(await puppets(page)).toEqual([true, false]);
+    expect(await limbsApart(page, 1)).toBeLessThan(1);
+    expect(await section.getByRole("radio", { name: "mine" }).isChecked()).toBe(true);
+    expect(await violations(page)).toEqual([]);
+    await page.keyboard.press("Escape");
+
+    const before = await wristOf(page, 0);
+    await pulled(page, SECOND + LEFT_HAND);
+    // the tag hangs over that dancer
+    const { x, width } = await page.locator(".tag:visible", { hasText: "left hand" }).boundingBox() ?? { x: NaN, width: NaN };
+    const [first, second] = await heads(page);
+    expect(Math.abs(x + width / 2 - second)).toBeLessThan(Math.abs(x + width / 2 - first));
+    // which stands still, but for a better block that comes
+    expect(Math.hypot(...(await wristOf(page, 0)).map((at, axis) => at - before[axis]))).toBeLessThan(0.06);
+    await page.mouse.up();
+    await letGo(page, SECOND + LEFT_HAND);
+
+    // by keyboard alone the first one's turn
+    await toasted(page, "Dancer 1 of 2", () => page.keyboard.press("KeyT"));
+    await page.keyboard.press("KeyL");
+    await section.getByRole("radio", { name: "mine" }).waitFor({ state: "hidden" });
+    await toasted(page, "Boxes dances here", () => drop(page, "boxes.vrm", { vrm: 1, tail: true, dressed: true }));
+    await several(page, 2);
+    expect(await puppets(page)).toEqual([false, false]);
+    await section.getByRole("radio", { name: "The puppet" }).check();
+    await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
+    expect(await puppets(page)).toEqual([true, false]);
+
+    await page.reload();
+    await danced(page);
+    await several(page, 2);
+    await page.waitForFunction(() => window.bunraku.stage.performers[1]?.group.getObjectByName("figure") === undefined);
+    await page.keyboard.press("KeyL");
+    await section.getByRole("radio", { name: "Boxes" }).waitFor();
+    expect(await section.getByRole("radio", { name: "Boxes" }).isChecked()).toBe(false);
+    await section.getByRole("button", { name: /^Dancer 2/ }).click();
+    await section.getByRole("button", { name: "Remove the avatar mine" }).click();
+    await expect.poll(() => puppets(page)).toEqual([true, true]);
+    await expect.poll(() => kept(page)).toBe(1);
+  });
 });
+
+/** Of each dancer, whether the puppet dances. */
+function puppets(page: Page): Promise<boolean[]> {
+  return page.evaluate(() => window.bunraku.stage.performers.map(({ group }) => group.getObjectByName("figure") !== undefined));
+}
+
+/** How far from the left the dancers' heads are on the screen, pixels. */
+function heads(page: Page): Promise<number[]> {
+  return page.evaluate(() => window.bunraku.stage.faces.map(({ left, right }) => (left + right) / 2));
+}
+
+/** Drags a left hand beside and below its shoulder, where an arm has room, and waits until it is there. */
+async function pulled(page: Page, hand: number): Promise<void> {
+  const performer = hand >> 2;
+  const ring = await settled(page, () => ringOf(page, hand), 0.5);
+  await page.mouse.move(ring.x, ring.y);
+  await page.mouse.down();
+  const shoulder = await screenOf(page, "mixamorigLeftArm", performer);
+  const scale = Math.abs((await screenOf(page, "mixamorigHead", performer)).y - (await screenOf(page, "mixamorigHips", performer)).y) / 0.6;
+  const to = { x: shoulder.x + 0.38 * scale, y: shoulder.y + 0.1 * scale };
+  await page.mouse.move(to.x, to.y, { steps: 8 });
+  await page.waitForFunction((limb) => window.bunraku.hands.source(limb) === "pointer", hand);
+  await settled(page, () => ringOf(page, hand), 0.3);
+  await expect.poll(() => away(page, hand)).toBeLessThan(0.03);
+}
+
+/** World place of a dancer's left wrist. */
+function wristOf(page: Page, performer: number): Promise<number[]> {
+  return page.evaluate((performer) => window.bunraku.stage.performers[performer].joint("l_wrist").elements.slice(12, 15), performer);
+}
 
 async function drop(page: Page, name: string, options: FigureOptions): Promise<void> {
   await dropBytes(page, name, [...figureFile(options)]);
@@ -92,11 +170,12 @@ async function dropBytes(page: Page, name: string, bytes: number[]): Promise<voi
   }, { name, bytes });
 }
 
-/** The most that a limb of the avatar points elsewhere than the dancer's of the stream, degrees. */
-async function limbsApart(page: Page): Promise<number> {
+/** The most that a limb of an avatar points elsewhere than the dancer's of the stream, degrees. */
+async function limbsApart(page: Page, performer = 0): Promise<number> {
   await drawn(page);
-  return page.evaluate(() => {
-    const { puppet, rig } = window.bunraku.stage;
+  return page.evaluate((performer) => {
+    const { performers, rig } = window.bunraku.stage;
+    const puppet = performers[performer];
     if (!puppet) throw new Error("nobody dances");
     const place = (matrix: { elements: number[] }) => rig.group.position.clone().fromArray(matrix.elements, 12);
     const own = (...names: string[]) => {
@@ -115,7 +194,7 @@ async function limbsApart(page: Page): Promise<number> {
       });
     });
     return (Math.max(...apart) * 180) / Math.PI;
-  });
+  }, performer);
 }
 
 /** How many files the browser keeps for the page. */
@@ -142,22 +221,22 @@ function pictures(page: Page): Promise<number[]> {
   });
 }
 
-/** Where a node of the avatar is on the screen, pixels. */
-function screenOf(page: Page, name: string): Promise<{ x: number; y: number }> {
-  return page.evaluate((name) => {
+/** Where a node of an avatar is on the screen, pixels. */
+function screenOf(page: Page, name: string, performer: number): Promise<{ x: number; y: number }> {
+  return page.evaluate(({ name, performer }) => {
     const { stage } = window.bunraku;
-    const node = stage.puppet?.group.getObjectByName(name);
+    const node = stage.performers[performer]?.group.getObjectByName(name);
     if (!node) throw new Error(`no ${name}`);
     return stage.toScreen(stage.rig.group.position.clone().fromArray(node.matrixWorld.elements, 12));
-  }, name);
+  }, { name, performer });
 }
 
-/** How far the avatar's left hand is from where it is pulled to, metres. */
-function away(page: Page): Promise<number> {
-  return page.evaluate((limb) => {
+/** How far a hand is from where it is pulled to, metres, by the limb's number. */
+function away(page: Page, hand: number): Promise<number> {
+  return page.evaluate((hand) => {
     const { stage, hands } = window.bunraku;
-    const to = hands.pull(limb);
-    if (!to || !stage.puppet) throw new Error("nothing is pulled");
-    return stage.puppet.handle(limb, to.clone()).distanceTo(to);
-  }, LEFT_HAND);
+    const to = hands.pull(hand);
+    if (!to) throw new Error("nothing is pulled");
+    return stage.performers[hand >> 2].handle(hand & 3, to.clone()).distanceTo(to);
+  }, hand);
 }

@@ -29,12 +29,14 @@ async function dances(page: Page, name: string, text: string): Promise<void> {
   await danced(page);
 }
 
-/** Downloads a dance from the open library by keyboard alone. */
-async function downloaded(page: Page, name: string, kind: string): Promise<Saved> {
+/** Downloads a dance from the open library by keyboard alone; of several dancers one's own, by number from 1, or all. */
+async function downloaded(page: Page, name: string, kind: string, dancer: number | null = null): Promise<Saved> {
   const disclosing = page.getByRole("button", { name: `Download ${name}`, exact: true });
   await disclosing.focus();
   if ((await disclosing.getAttribute("aria-expanded")) === "false") await page.keyboard.press("Enter");
-  const choice = page.getByRole("group", { name: `Download ${name} as` }).getByRole("button", { name: new RegExp(`^${kind},`) });
+  const choices = page.getByRole("group", { name: `Download ${name} as`, exact: true });
+  const offered = dancer === null ? choices : choices.getByRole("group", { name: `Dancer ${dancer}` });
+  const choice = offered.getByRole("button", { name: new RegExp(`^${kind},`) });
   await choice.focus();
   return saved(page, () => page.keyboard.press("Enter"));
 }
@@ -95,6 +97,38 @@ describeInBrowser("what is taken from the page", {}, ({ open }) => {
     expect(await disclosing.evaluate((one) => one === document.activeElement)).toBe(true);
     await page.keyboard.press("Escape");
     await page.getByRole("complementary", { name: "Library" }).waitFor({ state: "hidden" });
+  });
+
+  test("of several dancers all are in one GLB; motion is downloaded of each, as it stands on the stage", async () => {
+    const page = await open("", CALM);
+    await dances(page, "pair", bowing(45));
+    const alone = placesIn(await downloaded(page, "pair", "BVH"));
+    await page.getByRole("button", { name: "Add pair to the stage" }).click();
+    await page.waitForFunction(() => window.bunraku.stage.performers.length === 2);
+    const glb = await downloaded(page, "pair × 2", "GLB");
+    expect(glb.name).toBe("pair × 2.glb");
+    const { nodes, skins } = jsonOf(glb) as { nodes: { name: string }[]; skins: unknown[] };
+    expect([nodes.filter(({ name }) => name.startsWith("dancer")).length, skins.length]).toEqual([2, 2]);
+    const vrma = await downloaded(page, "pair × 2", "VRMA", 1);
+    expect(vrma.name).toBe("pair × 2, Dancer 1.vrma");
+    const bvh = await toasted(page, "Saved pair × 2, Dancer 2.bvh", () => downloaded(page, "pair × 2", "BVH", 2));
+    expect(bvh.name).toBe("pair × 2, Dancer 2.bvh");
+
+    // the same dance, brought to the second one's place
+    const { x, z, turn } = await page.evaluate(() => ({ x: 0, z: 0, turn: 0, ...window.bunraku.viewer.performers[1]?.place }));
+    expect(Math.hypot(x, z)).toBeGreaterThan(0.3);
+    const placed = placesIn(bvh);
+    expect(placed).toHaveLength(45);
+    const up = new Vector3(0, 1, 0), at = new Vector3(x, 0, z);
+    const most = Math.max(...alone.flatMap((places, frame) => places.map((place, joint) => place.applyAxisAngle(up, turn).add(at).distanceTo(placed[frame][joint]))));
+    expect(most).toBeLessThan(1e-4);
+    // and where it is seen, at whatever rate it came
+    await standAtBeginning(page);
+    const [root, worst] = await page.evaluate(() => {
+      const { stage, viewer } = window.bunraku;
+      return [stage.performers[1].joint("humanoid_root").elements.slice(12, 15), Math.max(...viewer.rates.map(({ max }) => max)) / 1000] as const;
+    });
+    expect(placed[0][0].distanceTo(new Vector3(...root))).toBeLessThan(worst + 1e-4);
   });
 
   test("a download that is given up saves nothing; one whose blocks are gone says so", async () => {

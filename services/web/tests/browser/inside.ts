@@ -86,13 +86,19 @@ export function placeOf(page: Page, joint: string): Promise<Place> {
   }, joint);
 }
 
-/** Where a limb's ring is on the screen, pixels. */
+/** Where a limb's ring is on the screen, pixels, by the limb's number. */
 export function ringOf(page: Page, limb: number): Promise<{ x: number; y: number }> {
   return page.evaluate((limb) => {
     const { stage } = window.bunraku;
-    if (!stage.puppet) throw new Error("no puppet on the stage");
-    return stage.toScreen(stage.puppet.handle(limb, stage.rig.group.position.clone()));
+    const puppet = stage.performers[limb >> 2];
+    if (!puppet) throw new Error("nobody on the stage has this limb");
+    return stage.toScreen(puppet.handle(limb & 3, stage.rig.group.position.clone()));
   }, limb);
+}
+
+/** Waits until so many are on the stage, and the page knows whose strings there are. */
+export async function several(page: Page, count: number): Promise<void> {
+  await page.waitForFunction((count) => window.bunraku.stage.performers.filter(({ group }) => group.visible).length === count, count);
 }
 
 /** Waits until the page has drawn what it knows by now. */

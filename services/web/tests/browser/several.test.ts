@@ -3,7 +3,7 @@ import type { Page } from "playwright-core";
 import { afterAll, expect, test } from "vitest";
 import { violations } from "./axe";
 import { describeInBrowser, type Opening } from "./in-browser";
-import { danced, drawn, holds, LEFT_HAND, letGo, settled, standAtBeginning, tap, toasted, undrawn, welcomed } from "./inside";
+import { danced, drawn, holds, LEFT_HAND, letGo, ringOf, settled, several, standAtBeginning, tap, toasted, undrawn, welcomed } from "./inside";
 import { startSite } from "./site";
 
 /** Paused on entering, as less motion is asked for. */
@@ -112,11 +112,6 @@ async function add(page: Page, name: string): Promise<void> {
   await page.getByRole("button", { name: `Add ${name} to the stage`, exact: true }).click();
 }
 
-/** Waits until so many are on the stage, and the page knows whose strings there are. */
-async function several(page: Page, count: number): Promise<void> {
-  await page.waitForFunction((count) => window.bunraku.stage.performers.filter(({ group }) => group.visible).length === count, count);
-}
-
 /** How far to the sides heads are, -1 and 1 the edges of the picture. */
 function sides(page: Page): Promise<{ left: number; right: number }> {
   return page.evaluate(() => {
@@ -124,14 +119,6 @@ function sides(page: Page): Promise<{ left: number; right: number }> {
     const at = stage.performers.map((one) => stage.rig.group.position.clone().setFromMatrixPosition(one.joint("skullbase")).project(stage.audience.camera).x);
     return { left: Math.min(...at), right: Math.max(...at) };
   });
-}
-
-/** Where a limb's ring is on the screen, pixels, by the limb's number. */
-function ringOf(page: Page, limb: number): Promise<{ x: number; y: number }> {
-  return page.evaluate((limb) => {
-    const { stage } = window.bunraku;
-    return stage.toScreen(stage.performers[limb >> 2].handle(limb & 3, stage.rig.group.position.clone()));
-  }, limb);
 }
 
 /** World places of all performers' left wrists. */

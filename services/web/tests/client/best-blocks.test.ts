@@ -30,8 +30,9 @@ function serving(answer: (path: string) => Uint8Array<ArrayBuffer> | null = () =
 test("every block comes at the best rate, and it is told how far it is", async () => {
   const asked = serving();
   const shares: number[] = [];
-  const store = await bestBlocks("m/1", { told: (share) => shares.push(share) });
+  const { store, frames } = await bestBlocks("m/1", { told: (share) => shares.push(share) });
   expect([...store.rates]).toEqual([1, 1, 1]);
+  expect(frames).toBe(78);
   expect(asked[0]).toBe("/v1/motions/m%2F1/description");
   expect(asked).toHaveLength(4);
   expect(shares.at(-1)).toBe(1);
@@ -42,7 +43,7 @@ test("what is held at the best rate is not asked for again, and what is held sta
   const held = new BlockStore(goldenTrack());
   held.put(0, 0, bytes(valid[0].block));
   held.put(1, 1, BEST[1]);
-  const store = await bestBlocks("m", { held });
+  const { store } = await bestBlocks("m", { held });
   expect([...store.rates]).toEqual([1, 1, 1]);
   expect(asked.filter((path) => path.includes("/blocks/")).map((path) => path.split("/").at(-1))).toEqual(["0?track=1", "2?track=1"]);
   expect([...held.rates]).toEqual([0, 1, -1]);
@@ -55,9 +56,21 @@ test("of another performer the blocks are those of its own track", async () => {
     const index = Number(/\/blocks\/1\/(\d+)\?track=2$/.exec(path)![1]);
     return pack({ name: "Data", track: 2, rate: 1, index, block: other[index] });
   });
-  const store = await bestBlocks("m", { performer: 1 });
+  const { store } = await bestBlocks("m", { performer: 1 });
   expect([[...store.rates], store.track.frames, asked.length]).toEqual([[1, 1, 1], 66, 4]);
   await expect(bestBlocks("m", { performer: 2 })).rejects.toThrow("This dance cannot be read");
+});
+
+test("of a performer whose dance is longer than the first's come the blocks of what is danced", async () => {
+  const asked = serving((path) => {
+    // the first lasts 1.1 s, the second 2.6
+    if (path.endsWith("/description")) return pack({ name: "Description", motion: "m", first: null, tracks: [goldenDescription(1), goldenDescription()] });
+    return null;
+  });
+  const shares: number[] = [];
+  const { store, frames } = await bestBlocks("m", { performer: 1, told: (share) => shares.push(share) });
+  expect([frames, [...store.rates], asked.length]).toEqual([33, [1, 1, -1], 3]);
+  expect(shares.at(-1)).toBe(1);
 });
 
 test("a damaged block, and what is no block, are a problem told in words", async () => {

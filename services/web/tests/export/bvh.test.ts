@@ -7,13 +7,14 @@ import type { Dance } from "../../src/export/dance";
 import { otherFigure } from "../stage/standard-figure";
 import { farthest, finished, goldenDance, placesOf, turning, whole } from "./dances";
 
+const BESIDE = { x: 1.3, z: -0.4, turn: 2.2 };
 const REPOSITORY = resolve(import.meta.dirname, "../../../..");
 
 async function written(dance: Dance): Promise<string> {
   return new TextDecoder().decode(await whole(finished(writeBvh(dance))));
 }
 
-test.each([["turning", turning()], ["of another build", turning({ figure: otherFigure() })], ["golden", goldenDance()]])("three.js reads a dance %s as it is", async (_, dance) => {
+test.each([["turning", turning()], ["of another build", turning({ figure: otherFigure() })], ["golden", goldenDance()], ["of a second dancer in its place", goldenDance(1, BESIDE)]])("three.js reads a dance %s as it is", async (_, dance) => {
   const { skeleton, clip } = new BVHLoader().parse(await written(dance));
   expect(skeleton.bones[0].name).toBe("humanoid_root");
   expect(farthest(dance, skeleton.bones[0], clip, 0.01)).toBeLessThan(1e-4);
@@ -25,22 +26,24 @@ import json, sys
 import numpy as np
 from bunraku.motion import bvh
 from bunraku.motion.kinematics import pose
+from bunraku.motion.place import Place
 from bunraku.motion.skeleton import JOINTS, Figure, Motion
 from bunraku.motion.writers import write_bvh
 asked = json.load(sys.stdin)
 figure = Figure(np.array(asked["offsets"]).reshape(18, 3), np.array(asked["tips"]).reshape(18, 3))
 frames = asked["frames"]
-motion = Motion(figure, asked["fps"], np.array(asked["roots"]).reshape(frames, 3), np.array(asked["rotations"]).reshape(frames, 18, 4))
+place = Place(**asked["place"])
+motion = Motion(figure, asked["fps"], *place.put(np.array(asked["roots"]).reshape(frames, 3), np.array(asked["rotations"]).reshape(frames, 18, 4)))
 read = bvh.read(asked["text"].encode())
 order = [read.names.index(name) for name in JOINTS]
 position, _ = pose(read, order)
 json.dump({"fps": read.fps, "places": position[:, order].ravel().tolist(), "text": write_bvh(motion).decode()}, sys.stdout)
 `;
 
-test.each([["turning", turning()], ["golden", goldenDance()]])("our own reader reads a dance %s as it is, and our Python writer writes it alike", async (_, dance) => {
+test.each([["turning", turning()], ["golden", goldenDance()], ["of a second dancer in its place", turning({ place: BESIDE })]])("our own reader reads a dance %s as it is, and our Python writer writes it alike", async (_, dance) => {
   const text = await written(dance);
   const { figure, fps, frames, roots, rotations } = dance;
-  const asked = { text, fps, frames, offsets: [...figure.offsets], tips: [...figure.tips], roots: [...roots], rotations: [...rotations] };
+  const asked = { text, fps, frames, offsets: [...figure.offsets], tips: [...figure.tips], roots: [...roots], rotations: [...rotations], place: dance.place };
   const python = spawnSync(join(REPOSITORY, ".venv/bin/python"), ["-c", PYTHON], { input: JSON.stringify(asked), encoding: "utf8", cwd: REPOSITORY, maxBuffer: 1e8 });
   expect(python.stderr).toBe("");
   const said = JSON.parse(python.stdout) as { fps: number; places: number[]; text: string };

@@ -1,10 +1,11 @@
 import { expect, test } from "vitest";
 import { poseOf, sample } from "../../src/export/dance";
+import { MIDDLE } from "../../src/motion/performer";
 import { restPose } from "../../src/motion/skeleton";
 import { BlockStore } from "../../src/playout/blocks";
 import { type BlockVectors, goldenTrack } from "../golden";
-import { vectors } from "../vectors";
-import { finished, goldenDance } from "./dances";
+import { bytes, vectors } from "../vectors";
+import { finished, goldenDance, goldenStore } from "./dances";
 
 test("each frame is the best block's pose at that frame", () => {
   const dance = goldenDance();
@@ -21,6 +22,14 @@ test("each frame is the best block's pose at that frame", () => {
     }
   }
   expect(compared).toBeGreaterThan(2);
+});
+
+test("as many frames are taken as are danced, without the blocks that come after them", () => {
+  const whole = goldenStore(), part = new BlockStore(goldenTrack());
+  for (const index of [0, 1]) part.put(index, 1, bytes(vectors<BlockVectors>("blocks").valid[index + 1].block));
+  const dance = finished(sample(part, 45));
+  expect([dance.frames, dance.roots.length, dance.place]).toEqual([45, 135, MIDDLE]);
+  expect(poseOf(dance, 44, restPose())).toEqual(poseOf(finished(sample(whole)), 44, restPose()));
 });
 
 test("a motion of which a block is missing is not made up", () => {

@@ -3,16 +3,18 @@ import { AnimationMixer, type AnimationClip, type Object3D, Vector3 } from "thre
 import { expect } from "vitest";
 import { type Dance, poseOf, sample, type Work } from "../../src/export/dance";
 import { fromRotationVector } from "../../src/motion/rotation";
+import { MotionTrack } from "../../src/codec/track";
+import { bring, MIDDLE, type Place } from "../../src/motion/performer";
 import { emptyWorld, type Figure, JOINT_COUNT, JOINTS, restPose, world } from "../../src/motion/skeleton";
 import { BlockStore } from "../../src/playout/blocks";
-import { type BlockVectors, goldenTrack } from "../golden";
+import { type BlockVectors, goldenDescription } from "../golden";
 import { standardFigure } from "../stage/standard-figure";
 import { bytes, vectors } from "../vectors";
 
 /** Forty frames in which every joint turns, each in its own way, and the root goes off; the sacroiliac stays `straight` or not. */
-export function turning({ straight = false, figure = standardFigure() }: { straight?: boolean; figure?: Figure } = {}): Dance {
+export function turning({ straight = false, figure = standardFigure(), place = MIDDLE }: { straight?: boolean; figure?: Figure; place?: Place } = {}): Dance {
   const frames = 40;
-  const dance = { figure, fps: 30, frames, roots: new Float64Array(frames * 3), rotations: new Float64Array(frames * JOINT_COUNT * 4) };
+  const dance = { figure, place, fps: 30, frames, roots: new Float64Array(frames * 3), rotations: new Float64Array(frames * JOINT_COUNT * 4) };
   for (let frame = 0; frame < frames; frame++) {
     dance.roots.set([0.02 * frame, 0.9 + 0.1 * Math.sin(frame / 5), -0.01 * frame], frame * 3);
     for (let joint = 0; joint < JOINT_COUNT; joint++) {
@@ -24,12 +26,19 @@ export function turning({ straight = false, figure = standardFigure() }: { strai
   return dance;
 }
 
-/** The golden motion at the best rate there is of each block. */
-export function goldenDance(): Dance {
-  const store = new BlockStore(goldenTrack());
-  const { valid } = vectors<BlockVectors>("blocks");
-  [0, 0, 1, 2].forEach((index, nth) => store.put(index, nth, bytes(valid[nth].block)));
-  return finished(sample(store));
+/** The golden motion, or another of them, at the best rate there is of each block; standing at a place. */
+export function goldenDance(which = 0, { x, z, turn }: Place = MIDDLE): Dance {
+  return finished(sample(goldenStore(which, { x, z, turn })));
+}
+
+/** Its blocks. */
+export function goldenStore(which = 0, { x, z, turn }: Place = MIDDLE): BlockStore {
+  const store = new BlockStore(MotionTrack.fromDescription({ ...goldenDescription(which), place: [x, z, turn] }));
+  const blocks = vectors<BlockVectors>("blocks").valid.filter(({ track }) => track === which);
+  // the first is there at two rates of the first motion
+  const indices = which === 0 ? [0, 0, 1, 2] : [0, 1, 2];
+  indices.forEach((index, nth) => store.put(index, nth, bytes(blocks[nth].block)));
+  return store;
 }
 
 /** What a work makes, without a pause; it says rising shares on its way. */
@@ -48,13 +57,13 @@ export async function whole(parts: Uint8Array<ArrayBuffer>[]): Promise<ArrayBuff
   return new Blob(parts).arrayBuffer();
 }
 
-/** World places of the joints in a frame (54), metres. */
+/** World places of the joints in a frame (54) on the stage that all dancers share, metres. */
 export function placesOf(dance: Dance, frame: number): Float64Array {
-  return world(dance.figure, poseOf(dance, frame, restPose()), emptyWorld()).positions.slice();
+  return world(dance.figure, bring(poseOf(dance, frame, restPose()), dance.place), emptyWorld()).positions.slice();
 }
 
-/** Plays `clip` on `root`, frame by frame, and says at each how far a joint found by its name is from the dance's at most, metres. */
-export function farthest(dance: Dance, root: Object3D, clip: AnimationClip, unit = 1, joints: readonly string[] = JOINTS): number {
+/** Plays `clip` on `root`, frame by frame, and says how far a joint that is found by its name is from the dance's at most, metres. */
+export function farthest(dance: Dance, root: Object3D, clip: AnimationClip, unit = 1, find = (name: string) => root.getObjectByName(name)): number {
   const mixer = new AnimationMixer(root);
   mixer.clipAction(clip).play();
   const at = new Vector3();
@@ -64,8 +73,8 @@ export function farthest(dance: Dance, root: Object3D, clip: AnimationClip, unit
     mixer.setTime(Math.min(frame / dance.fps, clip.duration - 1e-6));
     root.updateMatrixWorld(true);
     const places = placesOf(dance, frame);
-    for (const name of joints) {
-      const joint = root.getObjectByName(name);
+    for (const name of JOINTS) {
+      const joint = find(name);
       if (!joint) throw new Error(`no ${name} in what was read`);
       at.setFromMatrixPosition(joint.matrixWorld).multiplyScalar(unit);
       const k = JOINTS.indexOf(name) * 3;

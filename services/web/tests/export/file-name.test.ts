@@ -16,4 +16,5 @@ test.each([
 
 test("long names are cut between characters", () => {
   expect(fileName("🎭".repeat(200), "glb")).toBe(`${"🎭".repeat(80)}.glb`);
+  expect(fileName("🎭".repeat(200), "bvh", ", Dancer 2")).toBe(`${"🎭".repeat(80)}, Dancer 2.bvh`);
 });

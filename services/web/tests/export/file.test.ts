@@ -1,34 +1,63 @@
 import { expect, test } from "vitest";
 import { makeFile, type Format } from "../../src/export/file";
-import { BlockStore } from "../../src/playout/blocks";
+import type { Figure } from "../../src/motion/skeleton";
 import { puppetModel } from "../../src/stage/model";
-import { type BlockVectors, goldenTrack } from "../golden";
-import { bytes, vectors } from "../vectors";
+import { goldenStore } from "./dances";
 
-const store = new BlockStore(goldenTrack());
-[0, 0, 1, 2].forEach((index, nth) => store.put(index, nth, bytes(vectors<BlockVectors>("blocks").valid[nth].block)));
+const source = { store: goldenStore(), frames: 78 };
+/** A second dancer, cut where the first is done. */
+const second = { store: goldenStore(1, { x: 1, z: 0, turn: 0.5 }), frames: 40 };
 // eight bytes that stand for a picture
 const picture = Uint8Array.of(0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10);
 const looks = { model: puppetModel, face: async () => picture };
 
 test.each([["bvh", "HIERARCHY"], ["glb", "glTF"], ["vrma", "glTF"]] as const)("a dance as %s", async (format, beginning) => {
   const shares: number[] = [];
-  const file = await makeFile(format, "a dance", store, { looks, told: (share) => shares.push(share) });
+  const file = await makeFile(format, "a dance", [source], { looks, told: (share) => shares.push(share) });
   expect((await file.text()).startsWith(beginning)).toBe(true);
   expect(shares).toEqual([...shares].sort((a, b) => a - b));
 });
 
 test("the puppet's face is in its GLB", async () => {
-  const file = Buffer.from(await (await makeFile("glb", "a dance", store, { looks })).arrayBuffer());
-  const json = JSON.parse(file.subarray(20, 20 + file.readUInt32LE(12)).toString()) as { images: { bufferView: number }[]; bufferViews: { byteOffset: number; byteLength: number }[] };
+  const file = Buffer.from(await (await makeFile("glb", "a dance", [source], { looks })).arrayBuffer());
+  const json = jsonOf(file);
   const { byteOffset, byteLength } = json.bufferViews[json.images[0].bufferView];
   const buffer = file.subarray(20 + file.readUInt32LE(12) + 8);
   expect([...buffer.subarray(byteOffset, byteOffset + byteLength)]).toEqual([...picture]);
 });
 
+test("of several dancers all are in one GLB, those of equal lengths with one mesh, and each as long as it is danced", async () => {
+  const made: unknown[] = [];
+  const shares: number[] = [];
+  const counting = { ...looks, model: (figure: Figure) => (made.push(figure), puppetModel(figure)) };
+  const again = { store: goldenStore(0, { x: -1, z: 0, turn: 0 }), frames: 78 };
+  const file = await makeFile("glb", "a dance", [source, second, again], { looks: counting, told: (share) => shares.push(share) });
+  const json = jsonOf(Buffer.from(await file.arrayBuffer()));
+  expect([made.length, json.meshes.length, json.skins.length]).toEqual([2, 2, 3]);
+  expect(json.nodes.filter(({ name }) => name.startsWith("dancer")).map(({ name }) => name)).toEqual(["dancer 1", "dancer 2", "dancer 3"]);
+  const times = new Set(json.animations[0].samplers.map(({ input }) => json.accessors[input].count));
+  expect([...times]).toEqual([78, 40]);
+  expect(shares).toEqual([...shares].sort((a, b) => a - b));
+});
+
 test("what is given up is not made", async () => {
   const reason = new Error("given up");
   for (const format of ["bvh", "glb", "vrma"] satisfies Format[]) {
-    await expect(makeFile(format, "a dance", store, { looks, signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
+    await expect(makeFile(format, "a dance", [source], { looks, signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
   }
 });
+
+interface Described {
+  nodes: { name: string }[];
+  meshes: unknown[];
+  skins: unknown[];
+  animations: { samplers: { input: number }[] }[];
+  accessors: { count: number }[];
+  images: { bufferView: number }[];
+  bufferViews: { byteOffset: number; byteLength: number }[];
+}
+
+/** What a GLB says of itself. */
+function jsonOf(file: Buffer): Described {
+  return JSON.parse(file.subarray(20, 20 + file.readUInt32LE(12)).toString()) as Described;
+}

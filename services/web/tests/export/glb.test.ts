@@ -1,18 +1,27 @@
-import { type Object3D, Quaternion, type SkinnedMesh, Vector3 } from "three";
+import { AnimationMixer, type Object3D, Quaternion, type SkinnedMesh, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
-import { expect, test } from "vitest";
+import { describe, expect, test } from "vitest";
 import type { Dance } from "../../src/export/dance";
-import { writeGlb } from "../../src/export/glb";
+import { type PuppetModel, writeGlb } from "../../src/export/glb";
+import { JOINTS } from "../../src/motion/skeleton";
 import { puppetModel } from "../../src/stage/model";
-import { otherFigure } from "../stage/standard-figure";
-import { farthest, finished, goldenDance, turning, whole } from "./dances";
+import { otherFigure, standardFigure } from "../stage/standard-figure";
+import { farthest, finished, goldenDance, placesOf, turning, whole } from "./dances";
 
-async function read(dance: Dance) {
-  const file = await whole(finished(writeGlb(dance, "a dance", puppetModel(dance.figure), null)));
+/** What three.js reads of the file of these dances; those of one figure have one model. */
+async function read(...dances: Dance[]) {
+  const models = new Map(dances.map(({ figure }) => [figure, puppetModel(figure)]));
+  const danced = dances.map((dance) => ({ dance, model: models.get(dance.figure) as PuppetModel }));
+  const file = await whole(finished(writeGlb(danced, "a dance", null)));
   return { ...(await new GLTFLoader().parseAsync(file, "")), size: file.byteLength };
 }
 
-test.each([["turning", turning()], ["of another build", turning({ figure: otherFigure() })], ["golden", goldenDance()]])("three.js reads a dance %s as it is", async (_, dance) => {
+const ALONE: [string, Dance][] = [
+  ["turning", turning()], ["of another build", turning({ figure: otherFigure() })], ["golden", goldenDance()],
+  ["away from the middle", goldenDance(1, { x: -2, z: 0.5, turn: 1 })],
+];
+
+test.each(ALONE)("three.js reads a dance %s as it is", async (_, dance) => {
   const { scene, animations } = await read(dance);
   expect(animations[0].name).toBe("a dance");
   expect(animations[0].duration).toBeCloseTo((dance.frames - 1) / dance.fps, 5);
@@ -62,3 +71,69 @@ test("sleeves hang: with the arms out to the sides their bags point down", async
     expect(new Vector3(0, 0, -1).applyQuaternion(turn).y).toBeLessThan(-0.9);
   }
 });
+
+describe("several dancers in one file", () => {
+  const figure = standardFigure();
+  const dances = [
+    turning({ figure, place: { x: -1, z: 0, turn: 0 } }),
+    goldenDance(1, { x: 1.3, z: -0.4, turn: 2.2 }),
+    turning({ figure, place: { x: 0, z: 1.5, turn: -0.7 } }),
+  ];
+
+  test("stand each in its place and dance its own dance, as three.js reads them", async () => {
+    const { scene, animations } = await read(...dances);
+    expect(animations.map(({ name }) => name)).toEqual(["a dance"]);
+    dances.forEach((dance, nth) => expect(farthest(dance, scene, animations[0], 1, (name) => jointOf(scene, nth, name))).toBeLessThan(1e-4));
+  });
+
+  test("have a puppet each, which hangs on its own bones; those of equal lengths have one mesh", async () => {
+    const { scene, animations, size } = await read(...dances);
+    const alone = await Promise.all([read(dances[0]), read(dances[1])]);
+    expect(size).toBeLessThan(alone[0].size + alone[1].size + 100_000);
+    const mixer = new AnimationMixer(scene);
+    mixer.clipAction(animations[0]).play();
+    mixer.setTime(0.8);
+    scene.updateMatrixWorld(true);
+    const at = new Vector3();
+    dances.forEach((_, nth) => {
+      const head = jointOf(scene, nth, "skullbase") as Object3D;
+      const meshes = scene.getObjectByName(`puppet_${nth + 1}`)?.children as SkinnedMesh[];
+      expect(meshes.map(({ skeleton }) => skeleton.bones.includes(head as SkinnedMesh["skeleton"]["bones"][0]))).toEqual([true, true]);
+      // the second of the two is the face, all of it on the head
+      const face = meshes[1];
+      const { index } = face.geometry;
+      for (let nth = 0; nth < (index?.count ?? 0); nth += 97) {
+        face.getVertexPosition(index?.getX(nth) as number, at).applyMatrix4(face.matrixWorld);
+        expect(at.distanceTo(new Vector3().setFromMatrixPosition(head.matrixWorld))).toBeLessThan(0.4);
+      }
+    });
+  });
+
+  test("have sleeves that swing by their own dance alone, though one model danced before", async () => {
+    const { animations } = await read(...dances);
+    const [first, third] = ["l_sleeve", "l_sleeve_2"].map((name) => animations[0].tracks.find((track) => track.name === `${name}.quaternion`)?.values);
+    expect(first?.length).toBe(dances[0].frames * 4);
+    expect(third).toEqual(first);
+  });
+
+  test("who is done dancing stands still while others dance", async () => {
+    const { scene, animations } = await read(...dances);
+    const [, short] = dances;
+    const mixer = new AnimationMixer(scene);
+    mixer.clipAction(animations[0]).play();
+    mixer.setTime((short.frames - 1) / short.fps + 0.1);
+    scene.updateMatrixWorld(true);
+    const wrist = new Vector3().setFromMatrixPosition((jointOf(scene, 1, "l_wrist") as Object3D).matrixWorld);
+    const at = JOINTS.indexOf("l_wrist") * 3;
+    expect(wrist.distanceTo(new Vector3().fromArray(placesOf(short, short.frames - 1), at))).toBeLessThan(1e-4);
+  });
+});
+
+/** The joint of this name of a dancer, by number, of several: three.js numbers names that are there already. */
+function jointOf(scene: Object3D, nth: number, name: string): Object3D | undefined {
+  let found: Object3D | undefined;
+  scene.getObjectByName(`dancer_${nth + 1}`)?.traverse((one) => {
+    if (one.name.replace(/_\d+$/, "") === name) found = one;
+  });
+  return found;
+}

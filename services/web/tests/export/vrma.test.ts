@@ -34,7 +34,7 @@ function avatar({ figure }: Dance): VRMCore {
 
 const FROM_SPINE = BONES.indexOf("spine");
 
-describe.each([["turning", turning()], ["with a straight sacroiliac", turning({ straight: true })], ["golden", goldenDance()]])("a dance %s", (_, dance) => {
+describe.each([["turning", turning()], ["with a straight sacroiliac", turning({ straight: true })], ["golden", goldenDance()], ["of a second dancer", goldenDance(1, { x: 1.3, z: -0.4, turn: 2.2 })]])("a dance %s", (_, dance) => {
   test("moves an avatar of the dancer's build through three-vrm as the dancer moves", async () => {
     const animation = await read(dance);
     expect(animation.humanoidTracks.rotation.size).toBe(BONES.length);
@@ -66,6 +66,11 @@ describe.each([["turning", turning()], ["with a straight sacroiliac", turning({ 
       });
     }
   });
+});
+
+test("a second dancer's is told about where its avatar stands, wherever that is on the stage", async () => {
+  const bytes = async (dance: Dance) => new Uint8Array(await whole(finished(writeVrma(dance, "a dance"))));
+  expect(await bytes(goldenDance(1, { x: 1.3, z: -0.4, turn: 2.2 }))).toEqual(await bytes(goldenDance(1)));
 });
 
 test("with a straight sacroiliac nothing is shifted", async () => {

@@ -50,6 +50,25 @@ test("one told of again dances on; another's lengths are another dancer", () => 
   expect(troupe.group.children).toEqual([troupe.performers[0].group]);
 });
 
+test("each one's place is taken for itself: the others dance on, and so it is in the next motion", () => {
+  const third = standardFigure(0.8);
+  for (const number of [1, 2, 3]) troupe.danceBy((figure) => new Dancer(figure), number);
+  troupe.enter([FIRST, OTHER, third]);
+  troupe.apply([restPose(), restPose(), restPose()], 0);
+  const [first, second, last] = troupe.performers;
+  const guests: Dancer[] = [];
+  troupe.danceBy((figure) => guests[guests.push(new Dancer(figure)) - 1], 1);
+  expect(troupe.performers).toEqual([first, guests[0], last]);
+  expect([guests[0].figure, second.group.parent, troupe.shown]).toEqual([OTHER, null, [first, last]]);
+  expect(troupe.group.children).toHaveLength(3);
+  troupe.enter([third, FIRST]);
+  expect(troupe.performers[1]).toBe(guests[1]);
+  expect([guests.length, troupe.performers[1].figure]).toEqual([2, FIRST]);
+  // nobody is there whose place it is
+  troupe.danceBy(null, 3);
+  expect(troupe.performers).toHaveLength(2);
+});
+
 test("is seen from its first pose on, and stands where none comes", () => {
   troupe.enter([FIRST]);
   troupe.apply([null], 0);
