@@ -5,6 +5,9 @@ import { leanThree } from "./lean-three.ts";
 /** Entries at `embed/NAME.js`. What they load is named by its content, so that it may be kept for ever. */
 const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/package.ts" };
 
+/** What draws, and what is for the examples alone. */
+const LATER = /\/node_modules\/three\/|\/src\/(stage\/|package\.ts|page\/theme\.ts)|\/examples[./]/;
+
 export default defineConfig({
   plugins: [leanThree],
   // whatever site loads it, its parts are beside it
@@ -25,6 +28,8 @@ export default defineConfig({
       output: {
         entryFileNames: ({ name }) => (name in ENTRIES ? "embed/[name].js" : "assets/[name]-[hash].js"),
         chunkFileNames: "embed/parts/[name]-[hash].js",
+        // what the element begins with stays in one piece, though what it fetches later has parts of it too
+        codeSplitting: { groups: [{ name: "stage-element", tags: ["$initial"], test: (id) => !LATER.test(id) }] },
       },
     },
   },

@@ -9,7 +9,7 @@ import type { Page } from "./page/page";
 import type { Toast } from "./page/toast";
 import type { Room } from "./room";
 import { limbNumber } from "./wire/limbs";
-import { heard, say } from "./words/say";
+import { pageSpeech } from "./words/say";
 
 /** What stands on the stage's chunk, and comes after the page. */
 export interface Theatre {
@@ -38,7 +38,7 @@ export class Holding {
   /** The limb that was reached for in vain: what "ask" asks for. */
   #wished: number | null = null;
 
-  constructor(private readonly page: HoldingPage, private readonly mapping: () => Mapping) {}
+  constructor(private readonly page: HoldingPage, private readonly mapping: () => Mapping, private readonly speech = pageSpeech) {}
 
   /** The session it is about from now on. */
   enter(room: Room): void {
@@ -67,22 +67,22 @@ export class Holding {
       if (asked) this.#given(limb);
     });
     on<{ limb: number; free: boolean }>("lapsed", ({ limb, free }) => {
-      this.page.toast(say(free ? "The {limb} is free now" : "The {limb} was not given", { limb: this.#name(limb) }));
+      this.page.toast(this.speech.say(free ? "The {limb} is free now" : "The {limb} was not given", { limb: this.#name(limb) }));
       this.render();
     });
-    on<{ detail: string }>("notice", ({ detail }) => this.page.strings.notice(heard(detail)));
+    on<{ detail: string }>("notice", ({ detail }) => this.page.strings.notice(this.speech.heard(detail)));
   }
 
   /** The limbs of all performers as the session says, and one's own at once, before it has answered. */
   limbs(): LimbState[] {
     const { puppeteer, viewer } = this.#room ?? {};
     const { hands, velocity } = this.theatre ?? {};
-    const who = [viewer?.presence ?? null, puppeteer?.id ?? null, this.chosen.count] as const;
+    const who = [viewer?.presence ?? null, puppeteer?.id ?? null, this.chosen.count, this.speech] as const;
     const told = holders(...who);
     const asking = askers(...who);
     return told.map((one, limb) => {
       const mine = Boolean(hands?.source(limb));
-      const holder = mine ? { id: puppeteer?.id ?? "", name: say("You"), colour: puppeteer?.colour ?? 0, mine } : one?.mine ? null : one;
+      const holder = mine ? { id: puppeteer?.id ?? "", name: this.speech.say("You"), colour: puppeteer?.colour ?? 0, mine } : one?.mine ? null : one;
       return { holder, askers: asking[limb], asked: puppeteer?.asks(limb) ?? false, selected: velocity?.selected === limb && velocity.holds(limb) };
     });
   }
@@ -104,7 +104,7 @@ export class Holding {
     const { chosen } = this;
     if (chosen.count < 2) return;
     chosen.choose((chosen.performer + 1) % chosen.count);
-    this.page.toast(say("Dancer {number} of {count}", { number: chosen.performer + 1, count: chosen.count }));
+    this.page.toast(this.speech.say("Dancer {number} of {count}", { number: chosen.performer + 1, count: chosen.count }));
   }
 
   /** Takes a limb if it is free; if not, says who has it. */
@@ -132,12 +132,12 @@ export class Holding {
     const { holder, asked } = state;
     const name = this.#name(limb);
     if (!holder || holder.mine) {
-      this.page.toast(say("The {limb} was let go", { limb: name }));
+      this.page.toast(this.speech.say("The {limb} was let go", { limb: name }));
     } else if (asked) {
-      this.page.toast(say("You ask {name} for the {limb}", { name: holder.name, limb: name }));
+      this.page.toast(this.speech.say("You ask {name} for the {limb}", { name: holder.name, limb: name }));
     } else {
       this.#wished = limb;
-      this.page.toast(say("{name} holds the {limb}", { name: holder.name, limb: name }), { label: say("Ask"), key: this.#key("ask"), act: () => this.ask(limb) });
+      this.page.toast(this.speech.say("{name} holds the {limb}", { name: holder.name, limb: name }), { label: this.speech.say("Ask"), key: this.#key("ask"), act: () => this.ask(limb) });
     }
   }
 
@@ -146,12 +146,12 @@ export class Holding {
     if (this.watching) return;
     const holder = limb === null ? null : this.limbs()[limb]?.holder;
     if (limb === null || !holder || holder.mine) {
-      this.page.toast(say("Reach for a string that another holds, then ask for it"));
+      this.page.toast(this.speech.say("Reach for a string that another holds, then ask for it"));
       return;
     }
     this.#wished = null;
     this.#room?.puppeteer.ask(limb);
-    this.page.toast(this.#room?.puppeteer.asks(limb) ? say("You ask {name} for the {limb}", { name: holder.name, limb: this.#name(limb) }) : say("The line is lost; ask again when it is back"));
+    this.page.toast(this.#room?.puppeteer.asks(limb) ? this.speech.say("You ask {name} for the {limb}", { name: holder.name, limb: this.#name(limb) }) : this.speech.say("The line is lost; ask again when it is back"));
     this.render();
   }
 
@@ -163,7 +163,7 @@ export class Holding {
   /** Gives a limb to the first who asks for it; without one, the selected limb if it is asked for, else any that is. */
   give(limb = this.#askedOfMe()): void {
     if (this.watching) return;
-    if (limb === null) this.page.toast(say("Nobody asks for a string of yours"));
+    if (limb === null) this.page.toast(this.speech.say("Nobody asks for a string of yours"));
     else this.theatre?.hands.letGo(limb);
   }
 
@@ -180,16 +180,16 @@ export class Holding {
       return;
     }
     velocity?.hold(limb);
-    this.page.toast(say("The {limb} is yours", { limb: this.#name(limb) }));
+    this.page.toast(this.speech.say("The {limb} is yours", { limb: this.#name(limb) }));
     this.render();
   }
 
   #name(limb: number): string {
-    return limbName(limb, this.chosen.count);
+    return limbName(limb, this.chosen.count, this.speech);
   }
 
   #key(command: Command): string | null {
     const control = controlsOf(this.mapping(), command).find((one) => !isPadControl(one));
-    return control === undefined ? null : controlName(control);
+    return control === undefined ? null : controlName(control, this.speech);
   }
 }

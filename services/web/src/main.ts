@@ -2,6 +2,7 @@
 import "./style/page.css";
 import type { Vector3 } from "three";
 import { Arriving } from "./arriving";
+import { browserSound } from "./audio/preference";
 import { Castings } from "./casting";
 import { bound, comeIn, may, ownRole, whenDenied } from "./client/access";
 import { createSession, keep, type CameraKeyframe, type Motion } from "./client/library";
@@ -140,7 +141,7 @@ whenDenied(({ title, detail, hint }) => {
   denied = true;
   page.notice("access", title, hint ? say("{detail}; {hint}.", { detail, hint }) : detail);
 });
-const listening = new Listening((state) => page.transport.sound.render(state), page.transport.sound.element);
+const listening = new Listening((state) => page.transport.sound.render(state), page.transport.sound.element, browserSound);
 theme = createTheme((now) => {
   page.header.theme(now);
   stage?.setTheme(now);

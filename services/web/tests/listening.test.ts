@@ -1,16 +1,19 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { browserSound, type SoundPreference } from "../src/audio/preference";
 import type { Viewer } from "../src/client/viewer";
 import { Listening, type SoundState } from "../src/listening";
 import { stubStorage } from "./storage/stubs";
 
 const { players, speakers } = vi.hoisted(() => ({
   players: [] as { store: unknown; retimed: number; closed: boolean }[],
-  speakers: [] as { allowed: boolean; heard: boolean; volume: number; changed: () => void }[],
+  speakers: [] as { allowed: boolean; heard: boolean; closed: boolean; volume: number; changed: () => void }[],
 }));
+/** When a decoder is found. */
+let found: Promise<unknown>;
 
 /** What is heard through: the browser's audio, and the player that is tested by itself. */
 vi.mock("../src/audio/sound", () => ({
-  findDecoder: async () => () => undefined,
+  findDecoder: () => found,
   AudioPlayer: class {
     closed = false;
     retimed = 0;
@@ -23,9 +26,12 @@ vi.mock("../src/audio/sound", () => ({
     retime = () => void this.retimed++;
     close = () => void (this.closed = true);
   },
+}));
+vi.mock("../src/audio/speaker", () => ({
   Speaker: class {
     allowed = false;
     heard = false;
+    closed = false;
     volume = 0;
     constructor(readonly changed: () => void) {
       speakers.push(this);
@@ -35,6 +41,9 @@ vi.mock("../src/audio/sound", () => ({
     }
     suspend(): void {
       this.set(false);
+    }
+    close(): void {
+      this.closed = true;
     }
     private set(heard: boolean): void {
       this.heard = heard;
@@ -58,23 +67,23 @@ let page: EventTarget;
 let viewer: Watched;
 let listening: Listening;
 let states: SoundState[];
-const button = { contains: (target: unknown) => target === button } as unknown as Element;
+const button = {} as Element;
 
 beforeEach(() => {
   players.length = speakers.length = 0;
   page = new EventTarget();
   vi.stubGlobal("addEventListener", page.addEventListener.bind(page));
-  vi.stubGlobal("Node", EventTarget);
   vi.stubGlobal("KeyboardEvent", class {});
   stubStorage("localStorage");
+  found = Promise.resolve(() => undefined);
   states = [];
   start();
 });
 afterEach(() => void vi.unstubAllGlobals());
 
-function start(): void {
+function start(memory = browserSound): void {
   viewer = new Watched();
-  listening = new Listening((state) => states.push(state), button);
+  listening = new Listening((state) => states.push(state), button, memory);
   listening.enter(viewer as unknown as Viewer);
 }
 
@@ -116,11 +125,22 @@ describe("with sound", () => {
     start();
     await viewer.show(true);
     gesture();
+    // nothing is opened that is not wanted
+    expect(speakers).toHaveLength(1);
+    listening.toggle();
     speakers[1].allowed = true;
     page.dispatchEvent(new Event("click"));
-    expect(speakers[1].heard).toBe(false);
-    listening.toggle();
     expect(speakers[1].heard).toBe(true);
+  });
+
+  test("a press of its button is no such gesture: it says what it wants itself", () => {
+    speakers[0].allowed = true;
+    page.dispatchEvent(Object.assign(new Event("click"), { composedPath: () => [button, page] }));
+    expect(speakers[0].heard).toBe(false);
+    listening.toggle();
+    expect(speakers[0].heard).toBe(true);
+    listening.toggle();
+    expect(speakers[0].heard).toBe(false);
   });
 
   test("how loud is told at once, and who tells it wants to hear", () => {
@@ -148,5 +168,57 @@ describe("with sound", () => {
     void viewer.show(true);
     await viewer.show(true);
     expect(players.filter(({ closed }) => !closed).map(({ store }) => store)).toEqual([viewer.sound]);
+  });
+});
+
+describe("where it is not wanted at first", () => {
+  let remembered: SoundPreference;
+
+  beforeEach(() => {
+    remembered = { on: false, volume: 0.5 };
+    start({ load: () => remembered, save: (preference) => void (remembered = preference) });
+    return viewer.show(true);
+  });
+
+  test("nothing is opened or heard, whatever is pressed", () => {
+    gesture();
+    expect([players.length, speakers.length, viewer.lead, states.at(-1)]).toEqual([0, 0, null, { there: true, heard: false, volume: 0.5 }]);
+  });
+
+  test("the device is opened within the gesture that asks for it, though what plays comes later", async () => {
+    listening.toggle();
+    expect([speakers.length, players.length, remembered.on]).toEqual([1, 0, true]);
+    gesture();
+    await new Promise((done) => setTimeout(done));
+    expect([players.length, speakers[0].heard, speakers[0].volume]).toEqual([1, true, 0.5]);
+    listening.prefer({ on: true, volume: 1 });
+    listening.prefer({ on: true, volume: 0.25 });
+    expect([speakers.length, players.length, speakers[0].volume]).toEqual([1, 1, 0.25]);
+  });
+
+  test("asked for twice before it is there, it is played once", async () => {
+    listening.prefer({ on: true, volume: 1 });
+    listening.prefer({ on: true, volume: 0.5 });
+    await new Promise((done) => setTimeout(done));
+    expect([speakers.length, players.length]).toEqual([1, 1]);
+  });
+
+  test("what could not be loaded is not said to be heard", async () => {
+    const warned = vi.spyOn(console, "warn").mockImplementation(() => undefined);
+    found = Promise.reject(new Error("no line"));
+    listening.toggle();
+    gesture();
+    await new Promise((done) => setTimeout(done));
+    expect([players.length, speakers[0].heard, warned.mock.calls.length]).toEqual([0, false, 1]);
+    warned.mockRestore();
+  });
+
+  test("closed it is silent, gives the device back, and hears no gesture", async () => {
+    listening.toggle();
+    gesture();
+    await new Promise((done) => setTimeout(done));
+    listening.close();
+    gesture();
+    expect([players[0].closed, speakers[0].heard, speakers[0].closed, states.at(-1)?.there]).toEqual([true, false, true, false]);
   });
 });

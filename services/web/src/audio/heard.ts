@@ -4,13 +4,13 @@
  */
 
 import { Slew } from "../playout/slew";
+import { FRAMES_A_SECOND } from "./speaker";
 
 const REMEMBERED = 7;
 /** A telling this soon after another says nothing new. */
 const SOON = 12;
 /** Time constant with which a device that stood still is followed, microseconds. */
 const QUICK = 50e3;
-export const FRAMES_A_SECOND = 48_000;
 const FRAMES_A_MS = FRAMES_A_SECOND / 1000;
 
 export class HeardClock {

@@ -5,10 +5,11 @@ import type { AudioStore } from "../playout/sounds";
 import { type Span, spansBetween } from "../playout/spans";
 import type { Timelines } from "../playout/timeline";
 import { DecodedSound } from "./decoded";
-import { FRAMES_A_SECOND, HeardClock } from "./heard";
+import { HeardClock } from "./heard";
 import type { MakeDecoder } from "./packet-decoder";
 import { type Joint, packetsOf, quiet, render } from "./renderer";
 import { Schedule, type Slot, SLOT, SLOT_US, SLOTS_A_SECOND, stageEnd } from "./schedule";
+import { FRAMES_A_SECOND } from "./speaker";
 
 /** How often it is seen to, milliseconds. */
 const EVERY = 50;

@@ -9,14 +9,22 @@ export interface SoundPreference {
   readonly volume: number;
 }
 
+/** Where it is kept whether sound is wanted. */
+export interface SoundMemory {
+  load(): SoundPreference;
+  save(preference: SoundPreference): void;
+}
+
 const DEFAULT: SoundPreference = { on: true, volume: 0.8 };
 
-export function loadPreference(): SoundPreference {
-  const { on, volume } = (browserStore.getJson(KEY) ?? {}) as Partial<Record<keyof SoundPreference, unknown>>;
-  const good = typeof volume === "number" && volume >= 0 && volume <= 1;
-  return { on: typeof on === "boolean" ? on : DEFAULT.on, volume: good ? volume : DEFAULT.volume };
-}
-
-export function savePreference(preference: SoundPreference): void {
-  browserStore.putJson(KEY, preference);
-}
+/** The page's: kept until the person clears it. */
+export const browserSound: SoundMemory = {
+  load() {
+    const { on, volume } = (browserStore.getJson(KEY) ?? {}) as Partial<Record<keyof SoundPreference, unknown>>;
+    const good = typeof volume === "number" && volume >= 0 && volume <= 1;
+    return { on: typeof on === "boolean" ? on : DEFAULT.on, volume: good ? volume : DEFAULT.volume };
+  },
+  save(preference) {
+    browserStore.putJson(KEY, preference);
+  },
+};

@@ -1,4 +1,3 @@
-/** All that is heard, in one piece, fetched when the first motion with sound comes on. */
+/** What decodes and plays, in one piece, fetched when a motion with sound is to be heard. */
 export { findDecoder } from "./packet-decoder";
 export { AudioPlayer } from "./player";
-export { Speaker } from "./speaker";

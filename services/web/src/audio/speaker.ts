@@ -1,6 +1,6 @@
-/** The page's one audio device: how loud, and whether it may be heard yet. */
+/** One audio device: how loud, and whether it may be heard yet. */
 
-import { FRAMES_A_SECOND } from "./heard";
+export const FRAMES_A_SECOND = 48_000;
 
 /** Time constant of changes of loudness, seconds. */
 const EASE = 0.015;
@@ -27,6 +27,11 @@ export class Speaker {
 
   suspend(): void {
     void this.context.suspend();
+  }
+
+  /** Gives the device back, for good. */
+  close(): void {
+    void this.context.close();
   }
 
   /** How loud, 0 to 1 as it is heard; loudness goes with about the square root of the amplitude. */

@@ -4,6 +4,7 @@
  */
 
 import { tabStore } from "../storage/store";
+import { pageSpeech, type Speech } from "../words/say";
 import { ProblemError } from "./problem";
 
 /** Roles, each of which may do what those before it may. */
@@ -28,8 +29,8 @@ export class Access {
   #claims = EVERYTHING;
   #denied: ((problem: ProblemError) => void) | null = null;
 
-  /** At `server`, an origin such as `https://stage.example`, or "" for that of this page; with a token, or without. */
-  constructor(readonly server = "", token: string | null = null) {
+  /** At `server`, an origin such as `https://stage.example`, or "" for that of this page; with a token, or without. What the server says is told in `speech`. */
+  constructor(readonly server = "", token: string | null = null, readonly speech: Speech = pageSpeech) {
     this.hold(token);
   }
 
@@ -74,9 +75,9 @@ export class Access {
     try {
       answer = await fetch(url, { ...options, headers: { ...this.authorization(), ...options.headers } });
     } catch {
-      throw ProblemError.unreachable();
+      throw ProblemError.unreachable(this.speech);
     }
-    if (!answer.ok) throw this.refusedWith(ProblemError.from(answer.status, await answer.text()));
+    if (!answer.ok) throw this.refusedWith(ProblemError.from(answer.status, await answer.text(), this.speech));
     return answer;
   }
 

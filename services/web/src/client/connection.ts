@@ -7,7 +7,7 @@ import { pack, unpack } from "../wire/codec";
 import { MalformedMessage } from "../wire/errors";
 import { type ClientMessage, type Message, SUBPROTOCOL } from "../wire/messages";
 import { ProblemError } from "./problem";
-import { heard, say, type Plain } from "../words/say";
+import { pageSpeech, type Plain, type Speech } from "../words/say";
 
 const FIRST_WAIT = 250;
 const LONGEST_WAIT = 4_000;
@@ -37,6 +37,8 @@ export interface ConnectionOptions {
   url: () => string | Promise<string>;
   /** Whether the other end answers what is said soon: then its silence counts. */
   answered?: boolean;
+  /** In whose words it is told why the line is gone: the page's, if nothing else is said. */
+  speech?: Speech;
   /** There is a line; `replaced` where it takes the place of one that fell silent. */
   onOpen: (replaced: boolean) => void;
   onMessage: (message: Message, bytes: number) => void;
@@ -62,7 +64,10 @@ export class Connection {
   private askedAt: number | null = null;
   private listening: ReturnType<typeof setTimeout> | undefined;
 
+  private readonly speech: Speech;
+
   constructor(private readonly options: ConnectionOptions) {
+    this.speech = options.speech ?? pageSpeech;
     this.connect();
   }
 
@@ -103,7 +108,7 @@ export class Connection {
   }
 
   /** Ends it for good. */
-  close(reason = say("closed here")): void {
+  close(reason = this.speech.say("closed here")): void {
     if (this.ended) return;
     this.ended = true;
     clearTimeout(this.timer);
@@ -193,6 +198,7 @@ export class Connection {
     }
     this.wait = FIRST_WAIT;
     if (message === null) return;
+    const { say, heard } = this.speech;
     if (message.name === "Problem") this.problem = say("{title}: {detail}", { title: heard(message.title), detail: heard(message.detail) });
     this.options.onMessage(message, data.byteLength);
   }
@@ -201,6 +207,7 @@ export class Connection {
     this.attempt++;
     this.beside?.close(1000);
     this.socket = this.beside = this.askedAt = null;
+    const { say, heard } = this.speech;
     const reason = this.problem ?? (heard(said) || (code in REASONS ? say(REASONS[code]) : say("closed with code {code}", { code })));
     this.ended = FINAL.has(code) || (code === DENIED && !this.ticketed);
     if (!this.ended) {

@@ -1,4 +1,4 @@
-import { heard, say } from "../words/say";
+import { pageSpeech } from "../words/say";
 
 /** What went wrong over HTTP, in words for the person who gets it (RFC 9457). `status` is 0 where no server answered. */
 export class ProblemError extends Error {
@@ -11,12 +11,14 @@ export class ProblemError extends Error {
     readonly hint: string | null = null,
     readonly line: number | null = null,
     readonly field: string | null = null,
+    { say } = pageSpeech,
   ) {
     super(say("{title}: {detail}", { title, detail }));
   }
 
-  /** The problem in the body of an answer of `status`, of whatever form. */
-  static from(status: number, body: string): ProblemError {
+  /** The problem in the body of an answer of `status`, of whatever form, in words of `speech`. */
+  static from(status: number, body: string, speech = pageSpeech): ProblemError {
+    const { say, heard } = speech;
     let said: Record<string, unknown> = {};
     try {
       const parsed: unknown = JSON.parse(body);
@@ -27,11 +29,12 @@ export class ProblemError extends Error {
     const text = (value: unknown) => (typeof value === "string" ? heard(value) : null);
     return new ProblemError(
       status, text(said.title) ?? say("The server refused"), text(said.detail) ?? say("it answered {status}", { status }), text(said.hint),
-      typeof said.line === "number" ? said.line : null, typeof said.field === "string" ? said.field : null,
+      typeof said.line === "number" ? said.line : null, typeof said.field === "string" ? said.field : null, speech,
     );
   }
 
-  static unreachable(): ProblemError {
-    return new ProblemError(0, say("No answer"), say("the server cannot be reached"), say("look at the line, then try again"));
+  static unreachable(speech = pageSpeech): ProblemError {
+    const { say } = speech;
+    return new ProblemError(0, say("No answer"), say("the server cannot be reached"), say("look at the line, then try again"), null, null, speech);
   }
 }

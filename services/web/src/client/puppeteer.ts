@@ -86,6 +86,7 @@ export class Puppeteer extends EventTarget {
     const { url, access = pageAccess } = options;
     this.connection = url === null ? NO_LINE : new Connection({
       url: () => access.ticketed(url),
+      speech: access.speech,
       onOpen: () => undefined,
       onMessage: (message) => this.receive(message),
       onMalformed: () => undefined,

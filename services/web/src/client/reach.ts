@@ -1,5 +1,5 @@
 /** Why a page has no word from a server: browsers say of every such failure only that it failed. */
-import { say } from "../words/say";
+import { pageSpeech } from "../words/say";
 
 /** In words for a person; `final` where to try again would not help. */
 export interface Unreached {
@@ -15,7 +15,7 @@ const LOCAL = /^(localhost|127\.\d+\.\d+\.\d+|\[::1\]|.*\.localhost)$/;
  * Why `server` (an origin) does not speak with a page of `origin`; null where it does. A page of the kind that may not read answers still learns whether
  * there are any.
  */
-export async function whyUnreached(server: string, origin: string): Promise<Unreached | null> {
+export async function whyUnreached(server: string, origin: string, { say } = pageSpeech): Promise<Unreached | null> {
   const health = `${server}/v1/health`;
   if (await answers(health, "cors")) return null;
   if (origin.startsWith("https:") && server.startsWith("http:") && !LOCAL.test(new URL(server).hostname)) {

@@ -1,7 +1,7 @@
 /** Why a viewer shows what it shows, in words for a person (`proto/SPEC.md`, Choice). */
 import type { Choice } from "../wire/messages";
 import { decimal } from "../words/numbers";
-import { say, type Plain } from "../words/say";
+import { pageSpeech, type Plain } from "../words/say";
 
 const REASONS: Readonly<Record<string, Plain>> = {
   best: "the best there is",
@@ -25,7 +25,7 @@ export interface Standing {
 }
 
 /** Why what is shown is as it is. */
-export function reasonOf(standing: Standing): string {
+export function reasonOf(standing: Standing, { say } = pageSpeech): string {
   const { closed, damaged, shown, missing, choice, pinned } = standing;
   if (closed !== null) return closed;
   if (damaged > 0) return damaged === 1 ? say("1 message could not be read") : say("{count} messages could not be read", { count: decimal(damaged, 0) });

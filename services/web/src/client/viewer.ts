@@ -17,6 +17,7 @@ import {
   type Choice, type Data, type Description, type Edit, type Message, type Presence, type Report, type TimelineState,
 } from "../wire/messages";
 import { type Overlay, OVERLAY_FRAME } from "../wire/overlay";
+import type { Speech } from "../words/say";
 import { pageAccess } from "./access";
 import { Asking } from "./asking";
 import { Connection } from "./connection";
@@ -54,6 +55,7 @@ export class Viewer extends EventTarget {
   lead: ((nowMs: number) => Lead | null) | null = null;
 
   private readonly url: URL;
+  private readonly speech: Speech;
   private readonly now: () => number;
   private readonly performances: Performances;
   private readonly connection: Connection;
@@ -76,12 +78,14 @@ export class Viewer extends EventTarget {
     this.url = new URL(options.url);
     this.now = options.now ?? (() => performance.now());
     const { access = pageAccess, solver = marionetteBy(access) } = options;
+    this.speech = access.speech;
     const origin = this.url.origin.replace(/^ws/, "http");
     this.performances = new Performances((figure) => new OwnSolver(figure, origin, solver));
     this.started = this.now();
     this.connection = new Connection({
       url: () => access.ticketed(this.address()),
       answered: true,
+      speech: this.speech,
       onOpen: (replaced) => this.opened(replaced),
       onMessage: (message, bytes) => this.receive(message, bytes),
       onMalformed: () => void this.damaged++,
@@ -231,7 +235,7 @@ export class Viewer extends EventTarget {
       gaps: performances.gaps,
       reason: reasonOf({
         closed: this.closedReason, damaged: this.damaged, shown: performances.shown, missing: performances.waiting, choice: this.choice, pinned: this.url.searchParams.has("rate"),
-      }),
+      }, this.speech),
     };
   }
 

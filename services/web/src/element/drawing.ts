@@ -14,7 +14,7 @@ const PORTRAIT = 0.7;
 const LOW = 380;
 
 /** What keys do beside taking limbs; what else they do is the page's. */
-export type Deeds = Pick<PageActions, "next_dancer" | "ask" | "give" | "play" | "back" | "forward">;
+export type Deeds = Pick<PageActions, "next_dancer" | "ask" | "give" | "play" | "back" | "forward" | "sound">;
 
 export class Drawing {
   performing: Performing | null = null;

@@ -1,10 +1,13 @@
 /** One stage at work: from when its element comes into a document until it has left it. The element's wiring. */
+import type { SoundMemory } from "../audio/preference";
 import { Access, tabToken } from "../client/access";
 import { ProblemError } from "../client/problem";
-import { type Unreached, whyUnreached } from "../client/reach";
+import { whyUnreached } from "../client/reach";
 import { Holding } from "../holding";
+import { Listening } from "../listening";
 import { ownName } from "../page/name";
 import { findSession, Room } from "../room";
+import type { Speech } from "../words/say";
 import { Drawing } from "./drawing";
 import { createFace, type Face } from "./face";
 import { readSource, type Source } from "./source";
@@ -16,15 +19,16 @@ export type Tell = (event: "ready" | "welcome" | "presence" | "closed" | "error"
 const AGAIN = 4_000;
 /** The status of one that says so itself. */
 const AWAY = 503;
-/** Where the server can be reached, but what was asked of it cannot be had. */
-const NOT_NOW: Unreached = { title: "The stage does not answer", text: "Its server cannot show it now. It is tried again and again.", final: false };
 
 export class Showing {
   room: Room | null = null;
   readonly drawing: Drawing;
+  readonly listening: Listening;
   readonly #face: Face;
   readonly #holding: Holding;
   #controls = false;
+  /** Whether there is sound to be heard. */
+  #sounds = false;
   #closed = false;
   #blind = false;
   #said: string | null = null;
@@ -32,7 +36,8 @@ export class Showing {
   /** Counts what was asked for: what comes too late is not shown. */
   #asked = 0;
 
-  constructor(private readonly root: ShadowRoot, private readonly tell: Tell) {
+  /** In `root`; all that it says it says in `speech`. `memory` knows whether sound is wanted. */
+  constructor(private readonly root: ShadowRoot, private readonly speech: Speech, memory: SoundMemory, private readonly tell: Tell) {
     this.#face = createFace(root, {
       play: () => this.play(!this.playing),
       toggle: (limb) => this.#holding.toggle(limb),
@@ -40,14 +45,20 @@ export class Showing {
       ask: (limb) => this.#holding.ask(limb),
       give: (limb) => this.#holding.give(limb),
       nextDancer: () => this.#holding.nextDancer(),
-    });
+      sound: () => this.listening.toggle(),
+    }, speech);
     const { toast, asks } = this.#face;
     this.#holding = new Holding({
       asks,
       toast,
       strings: { render: (limbs, ready, chosen) => this.#face.limbs(limbs, this.#hands, ready, chosen), notice: (text) => toast(text) },
-    }, () => this.drawing.mapping);
+    }, () => this.drawing.mapping, speech);
     this.#holding.watching = true;
+    this.listening = new Listening(({ there, heard }) => {
+      this.#face.sound(there, heard);
+      this.#sounds = there;
+      this.#bar();
+    }, this.#face.soundButton, memory);
     this.drawing = new Drawing(this.#face, this.#holding);
     this.drawing.begun = () => this.tell("ready");
     void this.#draw();
@@ -77,15 +88,17 @@ export class Showing {
     this.#clear();
     if (src === null) return;
     const source = readSource(src, document.baseURI);
-    if (!source) return this.#fail("No stage is here", `${JSON.stringify(src)} is no address of a stage.`);
+    const { say } = this.speech;
+    if (!source) return this.#fail(say("No stage is here"), say("{address} is no address of a stage.", { address: JSON.stringify(src) }));
     const own = source.server === location.origin ? tabToken() : null;
-    await this.#find(source, new Access(source.server, source.token ?? own), asked);
+    await this.#find(source, new Access(source.server, source.token ?? own, this.speech), asked);
   }
 
   /** Ends it for good: its sockets, its listening and its graphics. */
   close(): void {
     this.#closed = true;
     this.#leave();
+    this.listening.close();
     this.drawing.close();
     this.#face.remove();
   }
@@ -97,10 +110,11 @@ export class Showing {
 
   /** Enters what a source names, and tries again while its server is away. */
   async #find(source: Source, access: Access, asked: number): Promise<void> {
+    const { say } = this.speech;
     try {
       const id = source.id ?? (await findSession(Promise.resolve(null), access))?.id ?? null;
       if (asked !== this.#asked || this.#closed) return;
-      if (id === null) this.#fail("The stage is empty", "Nobody dances here now. Come again when somebody does.");
+      if (id === null) this.#fail(say("The stage is empty"), say("Nobody dances here now. Come again when somebody does."));
       else this.#enter(source, id, access);
     } catch (error) {
       if (asked !== this.#asked || this.#closed) return;
@@ -114,7 +128,8 @@ export class Showing {
 
   #enter({ place, query, server }: Source, id: string, access: Access): void {
     const asked = this.#asked;
-    const failed = (error: unknown) => this.#face.toast(error instanceof ProblemError ? `${error.title}: ${error.detail}` : String(error));
+    const { say } = this.speech;
+    const failed = (error: unknown) => this.#face.toast(error instanceof ProblemError ? error.message : String(error));
     const room = new Room(id, ownName(query, Math.random()), failed, { place, access, watching: !this.#controls });
     this.room = room;
     const { viewer, puppeteer } = room;
@@ -127,6 +142,7 @@ export class Showing {
     this.#holding.watching = !this.#hands;
     this.#holding.enter(room);
     this.drawing.enter(room);
+    this.listening.enter(viewer);
     (this.root.host as HTMLElement).toggleAttribute("data-hands", this.#hands);
     const during = (target: EventTarget, event: string, then: (event: Event) => void) =>
       target.addEventListener(event, (told) => {
@@ -153,9 +169,9 @@ export class Showing {
       this.tell("closed", { reason, final: viewer.ended });
       if (viewer.ended || denied) this.#face.toast.lost(null);
       if (denied) return;
-      if (viewer.ended) this.#face.notice(place === "motions" ? "The dance has ended" : "The session has ended", reason);
+      if (viewer.ended) this.#face.notice(say(place === "motions" ? "The dance has ended" : "The session has ended"), reason);
       else if (!opened) void this.#unreached(server, asked);
-      else if (wasConnected) this.#face.toast.lost(`The line was lost: ${reason}`);
+      else if (wasConnected) this.#face.toast.lost(say("The line was lost: {reason}", { reason }));
     });
     this.#bar();
     this.#holding.render();
@@ -166,6 +182,7 @@ export class Showing {
     clearTimeout(this.#again);
     this.room = null;
     this.drawing.enter(null);
+    this.listening.enter(null);
     this.#holding.connected = false;
     room?.close();
     (this.root.host as HTMLElement).removeAttribute("data-hands");
@@ -175,7 +192,10 @@ export class Showing {
 
   /** Says why no word comes from a server, and gives up, and returns true, where none will. */
   async #unreached(server: string, asked: number): Promise<boolean> {
-    const { title, text, final } = (await whyUnreached(server, location.origin)) ?? NOT_NOW;
+    const { say } = this.speech;
+    const why = await whyUnreached(server, location.origin, this.speech);
+    // it can be reached, but what was asked of it cannot be had
+    const { title, text, final } = why ?? { title: say("The stage does not answer"), text: say("Its server cannot show it now. It is tried again and again."), final: false };
     if (asked !== this.#asked || this.#closed || this.#holding.connected) return false;
     if (final) this.#leave();
     this.#fail(title, text);
@@ -183,12 +203,12 @@ export class Showing {
   }
 
   #problem({ title, detail, hint }: ProblemError): void {
-    this.#fail(title, hint ? `${detail}; ${hint}.` : detail);
+    this.#fail(title, hint ? this.speech.say("{detail}; {hint}.", { detail, hint }) : detail);
   }
 
   /** Says what is in the way: once, however often it is met. */
   #fail(title: string, text: string): void {
-    const said = `${title}: ${text}`;
+    const said = this.speech.say("{title}: {detail}", { title, detail: text });
     if (said === this.#said) return;
     this.#said = said;
     this.#face.notice(title, text);
@@ -203,19 +223,20 @@ export class Showing {
   #bar(): void {
     const { room } = this;
     const editable = room?.editable ?? false;
-    this.#face.bar(this.#controls && room !== null && (editable || this.#hands), editable ? this.playing : null);
+    this.#face.bar(this.#controls && room !== null && (editable || this.#hands || this.#sounds), editable ? this.playing : null);
   }
 
   async #draw(): Promise<void> {
     const missing = await this.drawing.open({
-      next_dancer: () => this.#holding.nextDancer(), ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing),
+      next_dancer: () => this.#holding.nextDancer(), ask: () => this.#holding.ask(), give: () => this.#holding.give(), play: () => this.play(!this.playing), sound: () => this.listening.toggle(),
       back: () => this.room?.step(-1, performance.now()), forward: () => this.room?.step(1, performance.now()),
     });
     if (!missing) return;
     this.#blind = true;
     this.#asked++;
     this.#leave();
-    if (missing === "not loaded") this.#fail("The stage does not answer", "What draws it could not be loaded. Load this page again.");
-    else this.#fail("This browser cannot draw the stage", "It needs WebGL 2. Try another browser, or switch on hardware acceleration.");
+    const { say } = this.speech;
+    if (missing === "not loaded") this.#fail(say("The stage does not answer"), say("What draws it could not be loaded. Load this page again."));
+    else this.#fail(say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
   }
 }

@@ -1,8 +1,11 @@
 /** `<bunraku-stage src="https://stage.example/?session=ID">`: a stage as an element of any page. */
+import type { SoundPreference } from "../audio/preference";
 import type { Puppeteer } from "../client/puppeteer";
 import type { Viewer } from "../client/viewer";
 import type { Presence } from "../page/model";
 import type { Stage } from "../stage/stage";
+import { japaneseSpeech } from "../words/language";
+import { type Language, Speech } from "../words/say";
 import { Showing } from "./showing";
 
 /** Night or day, or as the system wishes. */
@@ -20,22 +23,31 @@ export interface BunrakuStageEvents {
   closed: CustomEvent<{ reason: string; final: boolean }>;
   /** What is in the way, in plain words, which the element shows too. */
   error: CustomEvent<string>;
+  /** `muted` or `volume` is another, whoever changed it. */
+  volumechange: Event;
 }
 
 const Base: typeof HTMLElement = typeof HTMLElement === "undefined" ? (class {} as typeof HTMLElement) : HTMLElement;
 
 /**
  * Attributes, each of which may change at any time: `src` (a page, session or motion of a server, with `#share=...` where it asks for a link), `theme`
- * (`night`, `day`, or `auto`), `controls` (limbs can be taken, and the dance paused; else it is only watched), `still` (less motion; `prefers-reduced-motion` does the same).
+ * (`night`, `day`, or `auto`), `controls` (limbs can be taken, and the dance paused; else it is only watched), `still` (less motion; `prefers-reduced-motion` does the same),
+ * `muted` (put there or taken away it is followed; left out it is muted at first all the same), `volume`, and `lang`, its own or that of what it stands in: it speaks Japanese or English.
  */
 export class BunrakuStage extends Base {
-  static readonly observedAttributes = ["src", "theme", "controls", "still"] as const;
+  static readonly observedAttributes = ["src", "theme", "controls", "still", "muted", "volume", "lang"] as const;
 
   #showing: Showing | null = null;
+  /** What it speaks, or will once it has the words; null while it is in no document. */
+  #language: Language | null = null;
+  /** Counts its beginnings: words that come too late are not spoken. */
+  #beginning = 0;
   readonly #day = globalThis.matchMedia?.("(prefers-color-scheme: light)");
   readonly #calm = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)");
   readonly #dress = () => this.#dressed();
+  #languages: MutationObserver | null = null;
   #waiting = false;
+  #muted = true;
 
   /** The address of what is shown, as the attribute has it. */
   get src(): string {
@@ -69,6 +81,30 @@ export class BunrakuStage extends Base {
 
   set still(still: boolean) {
     this.toggleAttribute("still", still);
+  }
+
+  /**
+   * Whether its sound is off, as it always is at first. Its button for sound changes it, or a handler of the visitor's press in the page about it; switched on
+   * without such, it is heard from the visitor's next press anywhere in the page, as browsers will have it.
+   */
+  get muted(): boolean {
+    return this.#muted;
+  }
+
+  set muted(muted: boolean) {
+    if (muted === this.#muted) return;
+    this.#muted = muted;
+    this.#sound();
+  }
+
+  /** How loud, 0 to 1, as it is heard: 1 if nothing else is said. Throws `IndexSizeError` for another number, as `<video>` does. */
+  get volume(): number {
+    return volumeOf(this.getAttribute("volume"));
+  }
+
+  set volume(volume: number) {
+    if (!(volume >= 0 && volume <= 1)) throw new DOMException(`${volume} is no volume: it is 0 to 1`, "IndexSizeError");
+    this.setAttribute("volume", String(volume));
   }
 
   /** What comes over the line; null while there is none. It changes with `src`. */
@@ -116,19 +152,17 @@ export class BunrakuStage extends Base {
   }
 
   connectedCallback(): void {
-    // moved within the document, it goes on
-    if (this.#showing) return;
-    const root = this.shadowRoot ?? this.attachShadow({ mode: "open" });
-    this.#showing = new Showing(root, (event, detail) => this.dispatchEvent(new CustomEvent(event, { detail })));
-    this.#day.addEventListener("change", this.#dress);
-    this.#calm.addEventListener("change", this.#dress);
-    this.#dressed();
-    this.#show();
+    // whatever it stands in may come to speak another
+    this.#languages ??= new MutationObserver(() => void this.#begin());
+    this.#languages.observe(document, { subtree: true, attributeFilter: ["lang"] });
+    void this.#begin();
   }
 
   disconnectedCallback(): void {
     queueMicrotask(() => {
-      if (!this.isConnected) this.#end();
+      if (this.isConnected) return;
+      this.#languages?.disconnect();
+      this.#end();
     });
   }
 
@@ -136,16 +170,55 @@ export class BunrakuStage extends Base {
   connectedMoveCallback(): void {}
 
   attributeChangedCallback(name: (typeof BunrakuStage.observedAttributes)[number], before: string | null, now: string | null): void {
+    if (name === "lang") {
+      if (this.#language) void this.#begin();
+      return;
+    }
+    if (name === "muted") {
+      this.muted = now !== null;
+      return;
+    }
+    if (name === "volume") {
+      if (volumeOf(before) !== volumeOf(now)) this.#sound();
+      return;
+    }
     if (!this.#showing || before === now) return;
     if (name === "theme" || name === "still") this.#dressed();
     else if (name === "src" || (before === null) !== (now === null)) this.#show();
   }
 
+  /** Begins in the language of where it stands; what speaks that already, as it was but moved, goes on. */
+  async #begin(): Promise<void> {
+    // by the nearest `lang`, or what the document came with
+    const language = this.matches(":lang(ja)") ? "ja" : "en";
+    if (language === this.#language) return;
+    this.#end();
+    this.#language = language;
+    const beginning = this.#beginning;
+    const speech = language === "ja" ? await japaneseSpeech() : new Speech();
+    if (beginning !== this.#beginning) return;
+    const root = this.shadowRoot ?? this.attachShadow({ mode: "open" });
+    const memory = { load: () => ({ on: !this.#muted, volume: this.volume }), save: ({ on }: SoundPreference) => void (this.muted = !on) };
+    this.#showing = new Showing(root, speech, memory, (event, detail) => this.dispatchEvent(new CustomEvent(event, { detail })));
+    this.#day.addEventListener("change", this.#dress);
+    this.#calm.addEventListener("change", this.#dress);
+    this.#dressed();
+    this.#show();
+  }
+
   #end(): void {
+    this.#beginning++;
+    this.#language = null;
     this.#showing?.close();
     this.#showing = null;
     this.#day.removeEventListener("change", this.#dress);
     this.#calm.removeEventListener("change", this.#dress);
+  }
+
+  #sound(): void {
+    this.#showing?.listening.prefer({ on: !this.#muted, volume: this.volume });
+    // what is there from the beginning is no change
+    if (this.#language) this.dispatchEvent(new Event("volumechange"));
   }
 
   /** Once for several attributes that change together. */
@@ -166,6 +239,12 @@ export class BunrakuStage extends Base {
     this.#showing.drawing.theme = shown;
     this.#showing.drawing.still = this.still || this.#calm.matches;
   }
+}
+
+/** The volume that an attribute says; what is none says 1. */
+function volumeOf(said: string | null): number {
+  const volume = parseFloat(said ?? "");
+  return volume >= 0 && volume <= 1 ? volume : 1;
 }
 
 export interface BunrakuStage {

@@ -1,6 +1,6 @@
 /** Controls as people read them. Pure. Letters go by their place on a keyboard as printed in the USA. */
 import type { Control } from "../input/mapping";
-import { say } from "../words/say";
+import { pageSpeech, type Speech } from "../words/say";
 
 const KEYS: Readonly<Record<string, string>> = {
   ArrowRight: "→", ArrowLeft: "←", ArrowUp: "↑", ArrowDown: "↓", PageUp: "Page Up", PageDown: "Page Down",
@@ -14,11 +14,11 @@ const STICKS = ["Left stick {way}", "Right stick {way}"] as const;
 const WAYS = [["←", "→"], ["↑", "↓"]];
 
 /** "W", "Num 1", "R2", "L1 + Left stick ↑". */
-export function controlName(control: Control): string {
-  return control.split(" ").map(one).join(" + ");
+export function controlName(control: Control, speech = pageSpeech): string {
+  return control.split(" ").map((one) => partName(one, speech)).join(" + ");
 }
 
-function one(control: string): string {
+function partName(control: string, { say }: Speech): string {
   const [kind, rest] = control.split(":");
   if (rest === undefined) return KEYS[control] ?? control.replace(/^(Key|Digit)/, "").replace(/^Numpad/, say("Num ")).replace(/([a-z])([A-Z])/g, "$1 $2");
   const index = parseInt(rest, 10);

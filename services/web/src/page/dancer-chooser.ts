@@ -1,6 +1,6 @@
 /** Which of several dancers the rows and keys act on: a button each, with who holds what of it at a glance. */
 import { limbNumber } from "../wire/limbs";
-import { series, say } from "../words/say";
+import { pageSpeech, series, say } from "../words/say";
 import { element, setAttribute } from "./dom";
 import { LIMB_NAMES, LIMB_ORDER, performersOf, type LimbState } from "./model";
 
@@ -40,7 +40,7 @@ export function createDancerChooser(choose: (performer: number) => void): Dancer
 }
 
 /** A button of the dock: the chosen dancer's number; pressed, the next one is chosen. Hidden where there is but one. */
-export function createNextDancer(next: () => void): DancerChooser {
+export function createNextDancer(next: () => void, { say } = pageSpeech): DancerChooser {
   const button = element("button", { class: "next-dancer", type: "button", hidden: true, onClick: next });
   return {
     element: button,

@@ -2,7 +2,7 @@
 import type { Viewer } from "../client/viewer";
 import { LIMBS } from "../motion/skeleton";
 import { limbNumber, limbOf, performerOf } from "../wire/limbs";
-import { say, type Plain } from "../words/say";
+import { pageSpeech, type Plain } from "../words/say";
 
 export type Presence = NonNullable<Viewer["presence"]>;
 export type Timeline = NonNullable<Viewer["timeline"]>;
@@ -28,7 +28,7 @@ export function limbsInOrder(performers: number): number[] {
 }
 
 /** A limb within a sentence, of one of so many performers: "left hand", or where there are several "left hand of dancer 2". */
-export function limbName(limb: number, performers = 1): string {
+export function limbName(limb: number, performers = 1, { say } = pageSpeech): string {
   const name = say(LIMB_NAMES[limbOf(limb)]).toLowerCase();
   return performers > 1 ? say("{limb} of dancer {number}", { limb: name, number: performerOf(limb) + 1 }) : name;
 }
@@ -61,7 +61,7 @@ export interface LimbState {
 }
 
 /** Those who ask for each of the limbs of so many performers, without oneself. */
-export function askers(presence: Presence | null, self: string | null, performers = 1): Asker[][] {
+export function askers(presence: Presence | null, self: string | null, performers = 1, { say } = pageSpeech): Asker[][] {
   return Array.from({ length: limbNumber(performers, 0) }, (_, limb) =>
     (presence?.asks[limb] ?? []).filter((id) => id !== self).map((id) => {
       const person = presence?.puppeteers.find((one) => one.id === id);
@@ -71,7 +71,7 @@ export function askers(presence: Presence | null, self: string | null, performer
 }
 
 /** Holders of the limbs of so many performers, null where free. The session may tell of fewer or more while the dance is changed. */
-export function holders(presence: Presence | null, self: string | null, performers = 1): (Holder | null)[] {
+export function holders(presence: Presence | null, self: string | null, performers = 1, { say } = pageSpeech): (Holder | null)[] {
   return Array.from({ length: limbNumber(performers, 0) }, (_, limb) => {
     const id = presence?.limbs[limb];
     if (!id) return null;

@@ -3,7 +3,7 @@ import { element, setAttribute, setText } from "./dom";
 import type { Box } from "../stage/boxes";
 import { LIMBS } from "../motion/skeleton";
 import { MOST_LIMBS } from "../wire/limbs";
-import { say } from "../words/say";
+import { pageSpeech } from "../words/say";
 import { limbName, type LimbState } from "./model";
 import { layLabels, type Laid } from "./tag-layout";
 
@@ -27,7 +27,8 @@ const TOP = 32;
  * within their layer, which is over the whole picture, and below `top`, CSS pixels. `beside` are boxes at the picture's edge, where the strings of several
  * performers may hang.
  */
-export function createTags(root: ParentNode & Node, ask: (limb: number) => void, top = TOP, beside: () => readonly Box[] = () => []): Tags {
+export function createTags(root: ParentNode & Node, ask: (limb: number) => void, top = TOP, beside: () => readonly Box[] = () => [], speech = pageSpeech): Tags {
+  const { say } = speech;
   const layer = element("div", { class: "tags", "aria-hidden": "true" });
   root.append(layer);
   // told, not asked for: every frame the page would be laid out for it. None while a sheet is before them
@@ -58,7 +59,7 @@ export function createTags(root: ParentNode & Node, ask: (limb: number) => void,
         if (one.says === says && one.width > 0) return;
         setText(one.name, holder.name);
         // whose limb it is the string shows that it hangs by
-        setText(one.limb, asked ? say("asked") : limbName(i));
+        setText(one.limb, asked ? say("asked") : limbName(i, 1, speech));
         one.button.hidden = holder.mine || asked;
         tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
         [one.says, one.width, one.height] = [says, tag.offsetWidth, tag.offsetHeight];

@@ -24,6 +24,12 @@ export const JAPANESE = {
   "The session has ended": "この舞台は終わりました",
   "The line was lost: {reason}": "接続が切れました：{reason}",
   // a stage in another site's page
+  "A wooden puppet dancing on a stage before a disc of gold leaf": "金箔の円を背に、舞台で踊る木の人形",
+  "The stage": "舞台",
+  "No stage is here": "ここに舞台はありません",
+  "{address} is no address of a stage.": "{address}は舞台のアドレスではありません。",
+  "What draws it could not be loaded. Load this page again.": "描画するプログラムを読み込めませんでした。このページを再読み込みしてください。",
+  "Its server cannot show it now. It is tried again and again.": "いまサーバーが応答できません。自動で再接続します。",
   "The stage cannot be shown here": "ここでは舞台を表示できません",
   "The stage does not answer": "舞台が応答しません",
   "This page came over https, and browsers let it speak with no server that has none.": "このページはhttpsで開かれているため、httpsでないサーバーには接続できません。",

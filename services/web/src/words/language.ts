@@ -1,6 +1,6 @@
 /** Which language the page speaks: the address's (`?lang=`), else the one chosen before, else the first of the browser's that it knows. */
 import { browserStore } from "../storage/store";
-import { language, speak, type Language } from "./say";
+import { language, speak, Speech, type Language, type Words } from "./say";
 
 const KEY = "bunraku.language";
 const LANGUAGES: readonly Language[] = ["en", "ja"];
@@ -16,15 +16,25 @@ export function chosenLanguage(asked: string | null, kept: string | null, prefer
 
 /** Learns the language of the page and speaks it: before anything is said. English where the other cannot be fetched. */
 export async function learnLanguage(query: URLSearchParams): Promise<Language> {
-  if (chosenLanguage(query.get("lang"), browserStore.get(KEY), navigator.languages) === "ja") {
-    try {
-      const { JAPANESE, HEARD } = await import("./japanese");
-      speak("ja", { said: JAPANESE, heard: HEARD });
-    } catch (error) {
-      console.warn("the Japanese of this page cannot be fetched.", error);
-    }
-  }
+  const japanese = chosenLanguage(query.get("lang"), browserStore.get(KEY), navigator.languages) === "ja" && (await fetchJapanese());
+  if (japanese) speak("ja", japanese);
   return language();
+}
+
+/** How Japanese is spoken by what is no page of its own. English where the words cannot be fetched. */
+export async function japaneseSpeech(): Promise<Speech> {
+  const japanese = await fetchJapanese();
+  return japanese ? new Speech("ja", japanese) : new Speech();
+}
+
+async function fetchJapanese(): Promise<Words | null> {
+  try {
+    const { JAPANESE, HEARD } = await import("./japanese");
+    return { said: JAPANESE, heard: HEARD };
+  } catch (error) {
+    console.warn("the Japanese words cannot be fetched.", error);
+    return null;
+  }
 }
 
 /** The one that the page does not speak. */

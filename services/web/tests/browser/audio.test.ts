@@ -2,6 +2,7 @@
 import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
 import { bowing } from "./bowing";
+import { loaded } from "./elements";
 import { describeInBrowser, PATIENCE } from "./in-browser";
 import { danced } from "./inside";
 import { wave } from "./wave";
@@ -120,9 +121,14 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
     await button.click();
     await heard(page, false);
     await page.reload();
-    await page.waitForFunction(() => window.bunraku?.listening?.speaker);
-    await heard(page, false);
+    await danced(page);
+    await button.waitFor();
+    // what is not wanted is not even fetched
+    expect(await loaded(page, /sound|decoder/)).toBe(0);
+    expect(await page.evaluate(() => window.bunraku.listening.speaker)).toBeNull();
     expect(await page.getByRole("slider", { name: "Volume" }).inputValue()).toBe("5");
+    await button.click();
+    await heard(page, true);
   });
 
   /** How much further in the motion the stage is than the sound, milliseconds, for each click. */
@@ -149,11 +155,6 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
 /** Waits until the device runs, or stands. */
 async function heard(page: Page, on: boolean): Promise<void> {
   await page.waitForFunction((wanted) => window.bunraku.listening.speaker?.heard === wanted, on);
-}
-
-/** Scripts that the page has loaded whose names match. */
-function loaded(page: Page, names: RegExp): Promise<number> {
-  return page.evaluate((source) => performance.getEntriesByType("resource").filter(({ name }) => new RegExp(source).test(name.split("/").pop()!)).length, names.source);
 }
 
 /** Clicks of a millisecond, `EVERY` seconds apart from zero on, over a quiet tone, in two channels. */

@@ -6,6 +6,7 @@ import { pathToFileURL } from "node:url";
 import type { Page, WebSocket } from "playwright-core";
 import { afterAll, beforeAll, expect, onTestFinished, test } from "vitest";
 import type { BunrakuStage } from "../../src/element/stage-element";
+import { pageWith, stagesDanced } from "./elements";
 import { describeInBrowser, type Opening } from "./in-browser";
 import { LEFT_HAND, settled, tap } from "./inside";
 import { makeToken } from "./server";
@@ -31,21 +32,15 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     return (await (await fetch(own.url + path, { method, headers, ...(body ? { body: JSON.stringify(body) } : {}) })).json()) as { items: { id: string }[]; link: string };
   }
 
-  /** The whole of such a page, under a policy that allows the server's scripts and sockets, and no style but the page's own sizes. */
-  function plain(stages: string): string {
-    const policy = `default-src 'none'; script-src ${own.url}; connect-src * ${own.url.replace("http", "ws")}; style-src-elem 'none'; style-src-attr 'unsafe-inline'`;
-    return `<!doctype html><title>Elsewhere</title><meta http-equiv="Content-Security-Policy" content="${policy}"><script type="module" src="${own.url}/embed/bunraku-stage.js"></script><h1>Elsewhere</h1>${stages}`;
-  }
-
   /** A page of the site. */
   async function open(stages: string, address = site.origin, opening: Opening = {}): Promise<Page> {
-    site.html = plain(stages);
+    site.html = pageWith(stages, own.url);
     return own.open(address, opening);
   }
 
   test("one script tag shows it, and its hand can be pulled by pointer and by keys", async () => {
     const page = await open(`<bunraku-stage src="${own.url}/?session=${session}&name=Aiko#token=${token}" controls style="width: 420px; margin: 30px"></bunraku-stage>`);
-    await danced(page);
+    await stagesDanced(page);
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await page.waitForFunction(() => document.querySelector("bunraku-stage")?.puppeteer?.id);
@@ -86,7 +81,7 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     const before = async (page: Page) => void page.on("websocket", (line) => lines.push(line));
     const { link } = await asked("POST", "/v1/shares", { session });
     const page = await open(`<bunraku-stage src="${own.url}${link}" theme="night" style="width: 300px"></bunraku-stage><p></p>`, site.origin, { before });
-    await danced(page);
+    await stagesDanced(page);
     const openLines = () => lines.filter((line) => !line.isClosed()).map((line) => new URL(line.url()).pathname.split("/").at(-1));
     await expect.poll(openLines).toEqual(["stream"]);
     expect(await page.getByRole("button").count()).toBe(0);
@@ -97,10 +92,10 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
 
     // a link for viewers has no hands, whatever the page asks for
     await page.evaluate(() => (document.querySelector("bunraku-stage")!.controls = true));
-    await danced(page);
+    await stagesDanced(page);
     // the line before is told of as closed a while after it was
     await expect.poll(openLines).toEqual(["stream"]);
-    expect(await page.getByRole("button").count()).toBe(0);
+    await expect.poll(() => page.getByRole("button").evaluateAll((all) => all.map((one) => one.getAttribute("title")))).toEqual(["Sound on"]);
     await page.evaluate((src) => (document.querySelector("bunraku-stage")!.src = src), `${own.url}/?session=${session}#token=${token}`);
     await page.getByRole("button", { name: "Take the left hand" }).waitFor();
     await page.waitForFunction(() => document.querySelector("bunraku-stage")?.puppeteer?.id);
@@ -113,7 +108,7 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
       Object.assign(window, { begun });
     });
     await page.evaluate((src) => (document.querySelector("bunraku-stage")!.src = src), `${own.url}/v1/motions/${motion}#token=${token}`);
-    await danced(page);
+    await stagesDanced(page);
     await page.getByRole("button", { name: "Take the left hand" }).waitFor({ state: "hidden" });
     await page.evaluate(() => {
       const stage = document.querySelector("bunraku-stage")!;
@@ -146,7 +141,7 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     await expect.poll(openLines).toEqual([]);
     // and it can come back
     await page.evaluate(() => document.body.append((window as unknown as { kept: BunrakuStage }).kept));
-    await danced(page);
+    await stagesDanced(page);
   });
 
   test("several stand in one page, also in one opened from a file", async () => {
@@ -154,9 +149,9 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     onTestFinished(() => rmSync(folder, { recursive: true }));
     const file = join(folder, "page.html");
     const src = `${own.url}/#token=${token}`;
-    writeFileSync(file, plain(`<bunraku-stage src="${src}" style="width: 200px"></bunraku-stage><bunraku-stage src="${src}" theme="day" style="width: 200px"></bunraku-stage>`));
+    writeFileSync(file, pageWith(`<bunraku-stage src="${src}" style="width: 200px"></bunraku-stage><bunraku-stage src="${src}" theme="day" style="width: 200px"></bunraku-stage>`, own.url));
     const page = await own.open(pathToFileURL(file).href);
-    await danced(page, 2);
+    await stagesDanced(page, 2);
   });
 
   test("the page of examples shows each beside its source, under the server's own policy", async () => {
@@ -211,7 +206,7 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     const late = await open(small(`${own.url}/#token=${token}`), site.origin, { before: (page) => page.route("**/v1/sessions", (request) => request.abort()) });
     await said(late).getByText("It is tried again").waitFor();
     await late.unroute("**/v1/sessions");
-    await danced(late);
+    await stagesDanced(late);
     await said(late).waitFor({ state: "hidden" });
 
     const blind = await open(small(`${own.url}/#token=${token}`), site.origin, {
@@ -220,16 +215,6 @@ describeInBrowser("a stage in another site's page", { demo: true, secret: SECRET
     await said(blind).getByText("This browser cannot draw the stage").waitFor();
   });
 });
-
-/** Waits for the first pose on every one of so many stages, and until it was drawn. */
-async function danced(page: Page, count = 1): Promise<void> {
-  await page.waitForFunction((count) => {
-    const stages = [...document.querySelectorAll("bunraku-stage")];
-    return stages.length === count && stages.every((one) => one.stage?.puppet?.group.visible && (one.viewer?.line().firstPoseMs ?? null) !== null);
-  }, count);
-  const begun = await page.evaluate(() => [...document.querySelectorAll("bunraku-stage")].map((one) => one.stage!.renderer.info.render.frame));
-  await page.waitForFunction((begun) => [...document.querySelectorAll("bunraku-stage")].every((one, nth) => one.stage!.renderer.info.render.frame > begun[nth] + 1), begun);
-}
 
 /** Where the left hand's ring is in the window, pixels. */
 function ringOf(page: Page): Promise<{ x: number; y: number }> {

@@ -1,17 +1,20 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Connection } from "../../src/client/connection";
 import type { Message } from "../../src/wire/messages";
+import { japaneseSpeech } from "../../src/words/language";
+import { pageSpeech } from "../../src/words/say";
 import { Line } from "./line";
 
 beforeEach(() => Line.install());
 afterEach(() => Line.remove());
 
-function connect(answered = false) {
+function connect(answered = false, speech = pageSpeech) {
   const heard: Message[] = [], closed: [string, boolean][] = [], malformed: string[] = [];
   let open = 0, replacements = 0;
   const connection = new Connection({
     url: () => "ws://stage/stream",
     answered,
+    speech,
     onOpen: (replaced) => {
       open++;
       if (replaced) replacements++;
@@ -167,4 +170,18 @@ test("without answers to be expected silence means nothing; another line can be 
   connection.close();
   connection.renew();
   expect([Line.opened.length, Line.last.readyState]).toEqual([2, 3]);
+});
+
+test("why it is gone is told in its own words, what the server says of it too", async () => {
+  const speech = await japaneseSpeech();
+  const { closed } = connect(false, speech);
+  Line.last.end(1006);
+  const { connection, closed: here } = connect(false, speech);
+  Line.last.accept();
+  connection.close();
+  const { closed: refused } = connect(false, speech);
+  Line.last.accept();
+  Line.last.say({ name: "Problem", title: "No such session", detail: "there is no session abc" });
+  Line.last.end(4404);
+  expect([closed, here, refused]).toEqual([[["回線が途切れました", false]], [["こちらで閉じました", true]], [["その舞台は見つかりません：舞台abcはありません", true]]]);
 });

@@ -2,6 +2,7 @@ import { createServer, type RequestListener, type Server } from "node:http";
 import type { AddressInfo } from "node:net";
 import { afterEach, expect, test, vi } from "vitest";
 import { whyUnreached } from "../../src/client/reach";
+import { japaneseSpeech } from "../../src/words/language";
 
 const SITE = "https://dance.example";
 let server: Server | null = null;
@@ -51,4 +52,5 @@ test("a page that came over https speaks with no other machine that has none", a
   vi.stubGlobal("fetch", () => Promise.reject(new TypeError("Failed to fetch")));
   expect(await whyUnreached("http://stage.example", SITE)).toMatchObject({ final: true, text: expect.stringContaining("https") });
   expect(await whyUnreached("http://localhost:8000", SITE)).toMatchObject({ final: false });
+  expect(await whyUnreached("http://localhost:8000", SITE, await japaneseSpeech())).toMatchObject({ title: "舞台が応答しません" });
 });

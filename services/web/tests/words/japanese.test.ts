@@ -58,14 +58,14 @@ describe("texts for people", () => {
   const BARE = [
     /"?(aria-label|aria-valuetext|title|placeholder|alt)"?: ["`]/,
     /setAttribute\("aria-(label|valuetext)", ["`]/,
-    /(toast|lost|confirm|alert)\(["`]/,
+    /(toast|lost|fail|confirm|alert)\(["`]/,
     // what a notice is about comes first
     /notice\((?!"(access|graphics|dance)", [^"`])["`]/,
     /element\("\w+", \{[^}]*\}, ["`](?!Bunraku"|Esc"|\?"|\d")/,
   ];
 
   test("are said by `say`", () => {
-    const shown = [...sources].filter(([file]) => /^(page|client|input)\b|^\w+\.ts$/.test(file));
+    const shown = [...sources].filter(([file]) => /^(page|client|input|element)\b|^\w+\.ts$/.test(file));
     const lines = shown.flatMap(([file, source]) => source.split("\n").map((line) => `${file}: ${line.trim()}`));
     expect(lines.filter((line) => BARE.some((bare) => bare.test(line)))).toEqual([]);
   });

@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
-import { chooseOther, chosenLanguage, learnLanguage, otherLanguage } from "../../src/words/language";
+import { chooseOther, chosenLanguage, japaneseSpeech, learnLanguage, otherLanguage } from "../../src/words/language";
 import { language, say, speak } from "../../src/words/say";
 import { forbidStorage, stubStorage } from "../storage/stubs";
 
@@ -33,6 +33,12 @@ describe("the language", () => {
     expect(await learnLanguage(new URLSearchParams("lang=en"))).toBe("en");
     expect(say("Strings")).toBe("Strings");
   });
+});
+
+test("Japanese can be spoken beside the page's language", async () => {
+  const { language: other, say: sayInJapanese } = await japaneseSpeech();
+  expect([other, sayInJapanese("Strings")]).toEqual(["ja", "糸"]);
+  expect([language(), say("Strings")]).toEqual(["en", "Strings"]);
 });
 
 describe("the other language", () => {

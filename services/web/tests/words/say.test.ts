@@ -1,7 +1,7 @@
 import { afterEach, describe, expect, test } from "vitest";
 import { HEARD, JAPANESE } from "../../src/words/japanese";
 import { decimal, percent } from "../../src/words/numbers";
-import { heard, language, say, sayAround, series, speak } from "../../src/words/say";
+import { heard, language, pageSpeech, say, sayAround, series, speak, Speech } from "../../src/words/say";
 
 afterEach(() => speak("en"));
 
@@ -33,6 +33,13 @@ describe("Japanese", () => {
     expect(heard("the left hand is not yours: an input for it was refused")).toBe("左手はあなたが持っていないため、動かせません");
     for (const text of ["No such thing", "a file may have bytes", "", "there is no motion"]) expect(heard(text)).toBe(text);
   });
+});
+
+test("two speeches are spoken beside each other, and beside the page's", () => {
+  const japanese = new Speech("ja", { said: JAPANESE, heard: HEARD });
+  const { say: sayInJapanese, heard: heardInJapanese } = japanese;
+  expect([japanese.language, sayInJapanese("Strings"), heardInJapanese("No such session"), japanese.series(["a", "b"])]).toEqual(["ja", "糸", "その舞台は見つかりません", "a、b"]);
+  expect([new Speech().say("Strings"), pageSpeech.say("Strings"), language(), heard("No such session")]).toEqual(["Strings", "Strings", "en", "No such session"]);
 });
 
 test("numbers have the language's form", () => {
