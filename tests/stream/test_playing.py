@@ -61,6 +61,52 @@ def test_what_is_held_of_this_motion_is_not_sent_again(motion: StoredMotion) -> 
     assert [index for index, _ in all_packets(playing, motion)][:2] == [1, 3]
 
 
+@pytest.fixture(scope="module")
+def pair() -> StoredMotion:
+    """Two performers, the second in blocks of another length, and a camera."""
+    first, second = (
+        encode_motion(wandering_motion(seconds, fps, seed), ladder=(30.0, 5.0), grade="live")
+        for seconds, fps, seed in ((9.2, 30.0, 9), (8.5, 24.0, 8))
+    )
+    return unpack("m", pack("m", first, [encode_scene(camera(9.2, 30.0), ladder=(20.0, 4.0))], [second]))
+
+
+def sent_to(playing: Playing, motion: StoredMotion) -> set[tuple[int, int]]:
+    """Track and index of each block that one who stands at the beginning is sent."""
+    state = timeline.start("m", motion.track.duration_us, 0, playing=False)
+    packets = iter(lambda: playing.next_packet(state, 0, FREE, 0), None)
+    data = [Data.unpack(packet) for packet in packets if packet[0] == Data.TYPE]
+    return {(one.track, one.index) for one in data}
+
+
+def test_what_is_held_of_other_performers_is_not_sent_again_either(pair: StoredMotion) -> None:
+    first, second = (dance.track.blocks for dance in pair.dances)
+    assert first != second
+    everything = sent_to(Playing(pair, TRACKS, None), pair)
+    playing = Playing(pair, TRACKS, None)
+    # told from the last block on, around the end
+    assert playing.has(Held("m", 0, (1,) * 9, 3, [(second - 1, (1, 1, -1, 1))]))
+    performers = {(track, index) for track, index in everything if track < 2}
+    assert {(track, index) for track, index in sent_to(playing, pair) if track < 2} == performers - {
+        *((0, index) for index in range(9)),
+        (1, 0),
+        (1, 2),
+    }
+
+
+def test_of_performers_that_were_not_told_of_nothing_is_held(pair: StoredMotion) -> None:
+    for tracks in (0, 1):
+        playing = Playing(pair, TRACKS, None)
+        assert playing.has(Held("m", 0, (1,) * 9, tracks, [(0, (1,) * 9)]))
+        assert {(1, index) for index in range(4)} <= sent_to(playing, pair)
+
+
+def test_more_than_there_is_may_be_said_to_be_held(pair: StoredMotion) -> None:
+    playing = Playing(pair, TRACKS, None)
+    assert playing.has(Held("m", 9_999_999, (15,) * 64, 99, [(9_999_999, (15,) * 64)] * 3))
+    assert {track for track, _ in sent_to(playing, pair)} == {2}
+
+
 def test_a_choice_is_news_once_and_again_when_rate_or_reason_change(motion: StoredMotion) -> None:
     playing = Playing(motion, TRACKS, None)
 

@@ -81,9 +81,12 @@ class Playing:
         if held is None or held.motion != self.motion.id:
             return False
         self._told_of(min(len(self.motion.tracks) if held.tracks is None else held.tracks, self._wanted))
-        for nth, rate in enumerate(held.rates):
-            if rate >= 0:
-                self.pacer.has(0, (held.first + nth) % self.motion.track.blocks, rate)
+        # dances are the first tracks; of one that is yet to be told of nothing can be held
+        dances = self.motion.dances[: self._known]
+        for number, (dance, (first, rates)) in enumerate(zip(dances, held.performers, strict=False)):
+            for index, rate in enumerate(rates, first):
+                if rate >= 0:
+                    self.pacer.has(number, index % dance.track.blocks, rate)
         return True
 
     def described(self, far: bool) -> bytes:

@@ -145,13 +145,13 @@ describe("on a narrow line", () => {
     expect([copyAt(0), copyAt(1), copyAt(2)]).toEqual([pose, null, pose]);
   });
 
-  test("what comes back tells of the first's blocks alone", () => {
+  test("what comes back tells of all performers' blocks", () => {
     start(description());
     Line.last.say(data(0, 0, first), data(2, 1, short[1]));
     Line.last.end(1006);
     now += 250;
     vi.advanceTimersByTime(250);
-    expect(new URL(Line.last.url).searchParams.get("have")).toBe("dance.0.1--.4");
+    expect(new URL(Line.last.url).searchParams.get("have")).toBe("dance.0.1--.4.1.1-g.0.-h");
     Line.last.accept();
     start();
     expect(viewer.performers).toHaveLength(3);
