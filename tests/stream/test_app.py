@@ -14,6 +14,7 @@ from bunraku.codec.track import read_track
 from bunraku.wire.messages import (
     SUBPROTOCOL,
     ChannelHeader,
+    Choice,
     Claim,
     Data,
     Description,
@@ -25,6 +26,7 @@ from bunraku.wire.messages import (
     TimelineState,
     unpack,
 )
+from tests.servers import clip
 
 
 def socket(server: str, path: str, protocol: str = SUBPROTOCOL) -> connect:
@@ -157,6 +159,19 @@ async def test_what_is_wrong_is_said_and_the_socket_closed(
     if problem is not None:
         assert problem.title
         assert problem.detail
+
+
+async def test_where_a_paused_session_is_sought_to_is_sent_at_once(server: str, tmp_path: Path) -> None:
+    source = tmp_path / "long.bvh"
+    source.write_bytes(clip(8.0, 31))
+    async with Client(server) as client:
+        session = await client.open_session((await client.upload(source))["id"], playing=False)
+        async with socket(server, f"/v1/sessions/{session['id']}/stream") as connection:
+            await until(connection, Choice)
+            await client.edit_session(session["id"], position=6_000_000)
+            found = await until(connection, Data)
+    assert isinstance(found, Data)
+    assert found.index >= 5
 
 
 async def heard_before_answer(server: str, address: str) -> tuple[bool, list[tuple[int, int]]]:
