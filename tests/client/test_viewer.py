@@ -15,11 +15,12 @@ from websockets.typing import Subprotocol
 from bunraku.backing.library import Library, pack, with_audio
 from bunraku.backing.library import unpack as unpack_motion
 from bunraku.client import Client, StreamEnded, Viewer
+from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.motion.skeleton import points
-from bunraku.playout.blocks import Pose
+from bunraku.playout.blocks import BlockStore, Pose
 from bunraku.playout.held import Held
 from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
 from tests.servers import running
@@ -269,3 +270,32 @@ def test_of_a_performer_that_cannot_be_played_it_holds_nothing() -> None:
     ]
     viewer = told([dances[0], dances[1] | {"codec": "bunraku.motion/9"}, dances[2]])
     assert "?have=m.0.-.3.0..0.-&at=" in viewer._address()
+
+
+async def test_of_a_paused_dance_the_best_of_every_performer_is_shown_soon(tmp_path: Path) -> None:
+    dances = [encode_motion(wandering_motion(8.0, 30.0, seed), ladder=(60.0, 5.0), grade="live") for seed in (5, 6)]
+    await Library.open(f"file://{tmp_path}/library").put("pair", pack("pair", dances[0], others=dances[1:]))
+    with running(tmp_path) as url:
+        async with Client(url) as client:
+            session = (await client.open_session("pair", playing=False))["id"]
+            viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
+            wanted = []
+            for dance in dances:
+                store = BlockStore(dance.track)
+                store.put(0, 1, decode_block(dance.track, dance.rates[1].blocks[0]))
+                wanted.append(store.pose_at(0))
+            best = asyncio.Event()
+
+            def see(reference: int, _: Pose) -> None:
+                shown = [viewer.pose_at(reference, number) for number in (0, 1)]
+                if all(
+                    pose is not None and true is not None and np.array_equal(pose[1], true[1])
+                    for pose, true in zip(shown, wanted, strict=True)
+                ):
+                    best.set()
+
+            watching = asyncio.create_task(viewer.watch(60.0, see))
+            async with asyncio.timeout(30):
+                await best.wait()
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)

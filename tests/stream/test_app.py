@@ -23,6 +23,7 @@ from bunraku.wire.messages import (
     Ping,
     Pong,
     Problem,
+    Report,
     TimelineState,
     unpack,
 )
@@ -172,6 +173,36 @@ async def test_where_a_paused_session_is_sought_to_is_sent_at_once(server: str, 
             found = await until(connection, Data)
     assert isinstance(found, Data)
     assert found.index >= 5
+
+
+async def test_of_a_stage_that_stands_the_blocks_on_show_of_all_performers_come_at_their_best(
+    server: str, motion: str
+) -> None:
+    async with Client(server) as client:
+        pair = (await client.add_performers(motion, [motion]))["id"]
+        session = (await client.open_session(pair, playing=False))["id"]
+    async with socket(server, f"/v1/sessions/{session}/stream") as connection:
+        found: list[tuple[int, int, int]] = []
+        while not isinstance(said := await message(connection), Choice):
+            if isinstance(said, Data):
+                found.append((said.track, said.index, said.rate))
+        assert {(0, 0, 0), (1, 0, 0), (0, 0, 4), (1, 0, 4)} <= set(found)
+        # and nothing after them, whatever is looked at again
+        for sequence in (1, 2):
+            await connection.send(Report(buffer=3_000_000).pack())
+            await connection.send(Ping(sequence, 2).pack())
+            while not isinstance(said := await message(connection), Pong):
+                assert not isinstance(said, Data)
+    assert len(found) == len(set(found))
+
+
+async def test_a_dance_that_is_paused_comes_at_its_best_where_it_stands(server: str, motion: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream") as connection:
+        await until(connection, Choice)
+        await connection.send(Edit(playing=False, position=100_000).pack())
+        data = await until(connection, Data)
+    assert isinstance(data, Data)
+    assert (data.index, data.rate) == (0, 4)
 
 
 async def heard_before_answer(server: str, address: str) -> tuple[bool, list[tuple[int, int]]]:
