@@ -1,7 +1,10 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
+from urllib.parse import parse_qsl
 
 import numpy as np
 import pytest
@@ -12,11 +15,13 @@ from websockets.typing import Subprotocol
 from bunraku.backing.library import Library, pack, with_audio
 from bunraku.backing.library import unpack as unpack_motion
 from bunraku.client import Client, StreamEnded, Viewer
+from bunraku.codec.decode import decode_block
 from bunraku.codec.encode import encode_motion
 from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.motion.skeleton import points
-from bunraku.playout.blocks import Pose
+from bunraku.playout.blocks import BlockStore, Pose
+from bunraku.playout.held import Held
 from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
 from tests.servers import running
 from tests.sounds import click, decode, onset
@@ -168,46 +173,129 @@ def test_a_stream_without_a_dance_says_so() -> None:
         told([{"type": "motion", "codec": "bunraku.motion/9"}])
 
 
+class Door:
+    """Stands before a stream, `behind` it: knows the queries of those who come and what they were sent, and can cut
+    their lines; the numbers in `refused` are told to come again."""
+
+    def __init__(self, behind: str, *refused: int) -> None:
+        self.behind = behind
+        self.refused = refused
+        self.queries: list[str] = []
+        self.sent: list[list[bytes]] = []
+        self.cut = asyncio.Event()
+
+    async def __call__(self, viewer: ServerConnection) -> None:
+        self.queries.append(viewer.request.path.partition("?")[2] if viewer.request else "")
+        self.sent.append(sent := [])
+        if len(self.queries) in self.refused:
+            await viewer.send(Problem("Not now", "the bus does not answer; come again").pack())
+            await viewer.close(1013, "Not now")
+            return
+        address = f"{self.behind}?{self.queries[-1]}"
+        async with connect(address, subprotocols=[PROTOCOL], compression=None) as line:
+
+            async def there() -> None:
+                async for said in viewer:
+                    await line.send(said)
+
+            async def back() -> None:
+                async for said in line:
+                    await viewer.send(said)
+                    sent.append(bytes(said))  # type: ignore[arg-type]
+
+            ways = [asyncio.create_task(way) for way in (there(), back(), self.cut.wait())]
+            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+            for way in ways:
+                way.cancel()
+        self.cut.clear()
+        await viewer.close(1012, "the server ends")
+
+    @asynccontextmanager
+    async def open(self, query: str = "") -> AsyncIterator[Viewer]:
+        """A viewer who comes through it."""
+        async with serve(self, "127.0.0.1", 0, subprotocols=[PROTOCOL], compression=None) as opened:
+            port = next(iter(opened.sockets)).getsockname()[1]
+            yield Viewer(f"ws://127.0.0.1:{port}/{query}")
+
+
 async def test_who_is_told_to_come_again_does(server: str, clip_file: Path) -> None:
     async with Client(server) as client:
         motion = (await client.upload(clip_file))["id"]
-        behind = client.socket_url(f"/v1/motions/{motion}/stream")
-        came, cut = 0, asyncio.Event()
-
-        async def door(viewer: ServerConnection) -> None:
-            nonlocal came
-            came += 1
-            if came == 2:
-                await viewer.send(Problem("Not now", "the bus does not answer; come again").pack())
-                await viewer.close(1013, "Not now")
-                return
-            query = viewer.request.path.partition("?")[2] if viewer.request else ""
-            async with connect(f"{behind}?{query}", subprotocols=[PROTOCOL], compression=None) as line:
-
-                async def there() -> None:
-                    async for said in viewer:
-                        await line.send(said)
-
-                async def back() -> None:
-                    async for said in line:
-                        await viewer.send(said)
-
-                ways = [asyncio.create_task(way) for way in (there(), back(), cut.wait())]
-                await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-                for way in ways:
-                    way.cancel()
-            cut.clear()
-            await viewer.close(1012, "the server ends")
-
-        async with serve(door, "127.0.0.1", 0, subprotocols=[PROTOCOL], compression=None) as opened:
-            port = next(iter(opened.sockets)).getsockname()[1]
-            viewer = Viewer(f"ws://127.0.0.1:{port}/")
-            shown = asyncio.Event()
-            watching = asyncio.create_task(viewer.watch(4.0, lambda _, __: shown.set()))
-            async with asyncio.timeout(30):
-                await shown.wait()
-            cut.set()
-            figures = await watching
-    assert came == 3
+        door = Door(client.socket_url(f"/v1/motions/{motion}/stream"), 2)
+    async with door.open() as viewer:
+        shown = asyncio.Event()
+        watching = asyncio.create_task(viewer.watch(4.0, lambda _, __: shown.set()))
+        async with asyncio.timeout(30):
+            await shown.wait()
+        door.cut.set()
+        figures = await watching
+    assert len(door.queries) == 3
     assert figures.reconnects == 2
     assert figures.gaps == 0
+
+
+async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what_it_holds(tmp_path: Path) -> None:
+    first, second = (
+        encode_motion(wandering_motion(seconds, fps, seed), ladder=(30.0, 5.0), grade="live")
+        for seconds, fps, seed in ((8.0, 30.0, 5), (9.0, 24.0, 6))
+    )
+    await Library.open(f"file://{tmp_path}/library").put("pair", pack("pair", first, others=[second]))
+    with running(tmp_path) as url:
+        door = Door(Client(url).socket_url("/v1/motions/pair/stream"))
+        async with door.open("?rate=1") as viewer:
+            shown, again = asyncio.Event(), asyncio.Event()
+
+            def see(reference: int, _: Pose) -> None:
+                if viewer.pose_at(reference, 1) is not None:
+                    (again if len(door.queries) > 1 else shown).set()
+
+            watching = asyncio.create_task(viewer.watch(5.0, see))
+            async with asyncio.timeout(30):
+                await shown.wait()
+                door.cut.set()
+                await again.wait()
+            await watching
+    held = Held.read(dict(parse_qsl(door.queries[1]))["have"])
+    assert held.tracks == 2
+    assert [max(rates) for _, rates in held.performers] == [1, 1]
+    before, after = ({one[:4] for one in sent if one[0] == Data.TYPE} for sent in door.sent)
+    assert before
+    assert after
+    assert not before & after
+
+
+def test_of_a_performer_that_cannot_be_played_it_holds_nothing() -> None:
+    dances = [
+        encode_motion(wandering_motion(1.0, 30.0, seed), ladder=(30.0,), grade="live").describe() for seed in (5, 6, 7)
+    ]
+    viewer = told([dances[0], dances[1] | {"codec": "bunraku.motion/9"}, dances[2]])
+    assert "?have=m.0.-.3.0..0.-&at=" in viewer._address()
+
+
+async def test_of_a_paused_dance_the_best_of_every_performer_is_shown_soon(tmp_path: Path) -> None:
+    dances = [encode_motion(wandering_motion(8.0, 30.0, seed), ladder=(60.0, 5.0), grade="live") for seed in (5, 6)]
+    await Library.open(f"file://{tmp_path}/library").put("pair", pack("pair", dances[0], others=dances[1:]))
+    with running(tmp_path) as url:
+        async with Client(url) as client:
+            session = (await client.open_session("pair", playing=False))["id"]
+            viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
+            wanted = []
+            for dance in dances:
+                store = BlockStore(dance.track)
+                store.put(0, 1, decode_block(dance.track, dance.rates[1].blocks[0]))
+                wanted.append(store.pose_at(0))
+            best = asyncio.Event()
+
+            def see(reference: int, _: Pose) -> None:
+                shown = [viewer.pose_at(reference, number) for number in (0, 1)]
+                if all(
+                    pose is not None and true is not None and np.array_equal(pose[1], true[1])
+                    for pose, true in zip(shown, wanted, strict=True)
+                ):
+                    best.set()
+
+            watching = asyncio.create_task(viewer.watch(60.0, see))
+            async with asyncio.timeout(30):
+                await best.wait()
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)

@@ -14,6 +14,7 @@ from bunraku.codec.track import read_track
 from bunraku.wire.messages import (
     SUBPROTOCOL,
     ChannelHeader,
+    Choice,
     Claim,
     Data,
     Description,
@@ -22,9 +23,11 @@ from bunraku.wire.messages import (
     Ping,
     Pong,
     Problem,
+    Report,
     TimelineState,
     unpack,
 )
+from tests.servers import clip
 
 
 def socket(server: str, path: str, protocol: str = SUBPROTOCOL) -> connect:
@@ -159,7 +162,94 @@ async def test_what_is_wrong_is_said_and_the_socket_closed(
         assert problem.detail
 
 
-@pytest.mark.parametrize("query", ["rate=99", "rate=-1", "rate=x", "at=x"])
+async def test_where_a_paused_session_is_sought_to_is_sent_at_once(server: str, tmp_path: Path) -> None:
+    source = tmp_path / "long.bvh"
+    source.write_bytes(clip(8.0, 31))
+    async with Client(server) as client:
+        session = await client.open_session((await client.upload(source))["id"], playing=False)
+        async with socket(server, f"/v1/sessions/{session['id']}/stream") as connection:
+            await until(connection, Choice)
+            await client.edit_session(session["id"], position=6_000_000)
+            found = await until(connection, Data)
+    assert isinstance(found, Data)
+    assert found.index >= 5
+
+
+async def test_of_a_stage_that_stands_the_blocks_on_show_of_all_performers_come_at_their_best(
+    server: str, motion: str
+) -> None:
+    async with Client(server) as client:
+        pair = (await client.add_performers(motion, [motion]))["id"]
+        session = (await client.open_session(pair, playing=False))["id"]
+    async with socket(server, f"/v1/sessions/{session}/stream") as connection:
+        found: list[tuple[int, int, int]] = []
+        while not isinstance(said := await message(connection), Choice):
+            if isinstance(said, Data):
+                found.append((said.track, said.index, said.rate))
+        assert {(0, 0, 0), (1, 0, 0), (0, 0, 4), (1, 0, 4)} <= set(found)
+        # and nothing after them, whatever is looked at again
+        for sequence in (1, 2):
+            await connection.send(Report(buffer=3_000_000).pack())
+            await connection.send(Ping(sequence, 2).pack())
+            while not isinstance(said := await message(connection), Pong):
+                assert not isinstance(said, Data)
+    assert len(found) == len(set(found))
+
+
+async def test_a_dance_that_is_paused_comes_at_its_best_where_it_stands(server: str, motion: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream") as connection:
+        await until(connection, Choice)
+        await connection.send(Edit(playing=False, position=100_000).pack())
+        data = await until(connection, Data)
+    assert isinstance(data, Data)
+    assert (data.index, data.rate) == (0, 4)
+
+
+async def heard_before_answer(server: str, address: str) -> tuple[bool, list[tuple[int, int]]]:
+    """Whether what comes back is described, and track and index of the blocks that come, until a Ping is answered."""
+    described, blocks = False, []
+    async with socket(server, address) as connection:
+        await until(connection, ChannelHeader)
+        await connection.send(Ping(1, 2).pack())
+        while not isinstance(found := await message(connection), Pong):
+            described = described or isinstance(found, Description)
+            if isinstance(found, Data):
+                blocks.append((found.track, found.index))
+    return described, blocks
+
+
+async def test_who_comes_back_is_sent_what_it_does_not_hold_of_any_performer(server: str, motion: str) -> None:
+    async with Client(server) as client:
+        pair = (await client.add_performers(motion, [motion]))["id"]
+    # all of a dance of 3.4 s is within reach, but what is not there is sent: of the second its last block
+    stream = f"/v1/motions/{pair}/stream?tracks=motion"
+    assert await heard_before_answer(server, f"{stream}&have={pair}.0.4444.2.0.4h-") == (False, [(1, 3)])
+    assert await heard_before_answer(server, f"{stream}&have={pair}.0.4444.2.0.4i") == (False, [])
+    # clients that tell of the first alone are sent the others whole
+    assert await heard_before_answer(server, f"{stream}&have={pair}.0.4444.2") == (False, [(1, n) for n in range(4)])
+
+
+@pytest.mark.parametrize("have", ["2.1.2G", "2.1.g", "2.1", "2" + ".1.2" * 4, "2.1." + "2z" * 32])
+async def test_what_cannot_be_read_of_what_is_held_is_said(server: str, motion: str, have: str) -> None:
+    async with socket(server, f"/v1/motions/{motion}/stream?have={motion}.0.4444.{have}") as connection:
+        problem = await message(connection)
+        assert isinstance(problem, Problem)
+        assert problem.title == "Unreadable query"
+        with pytest.raises(ConnectionClosed) as closed:
+            await connection.recv()
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1008
+
+
+async def test_more_may_be_said_to_be_held_than_there_is(server: str, motion: str) -> None:
+    most = ".9999999.fzfzfzf" * 3
+    described, blocks = await heard_before_answer(
+        server, f"/v1/motions/{motion}/stream?have={motion}.9999999.{'f' * 64}.99{most}"
+    )
+    assert (described, blocks) == (False, [])
+
+
+@pytest.mark.parametrize("query", ["rate=99", "rate=-1", "rate=x", "at=x", "have=" + "1" * 500])
 async def test_wrong_queries_do_not_open_a_socket(server: str, motion: str, query: str) -> None:
     with pytest.raises(Exception, match=r"HTTP 4\d\d"):
         async with socket(server, f"/v1/motions/{motion}/stream?{query}") as connection:

@@ -185,6 +185,63 @@ async def test_what_must_arrive_waits_for_no_room(motion: StoredMotion, monkeypa
     assert watching.viewer._timer is None
 
 
+@pytest.fixture(scope="module")
+def pair() -> StoredMotion:
+    first, second = (
+        encode_motion(wandering_motion(40.0, 30.0, seed), ladder=(60.0, 20.0, 8.0, 3.0), grade="live")
+        for seed in (9, 8)
+    )
+    return unpack("pair", pack("pair", first, others=[second]))
+
+
+async def test_while_the_stage_stands_what_is_on_show_is_bettered_first_and_once_and_then_the_line_falls_still(
+    pair: StoredMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watching = Watching(pair, monkeypatch, 1_800.0)
+    watching.go(16_000_000)
+    assert watching.viewer.choice is not None
+    assert watching.viewer.choice[0] < 3
+    before = len(watching.of(Data))
+    state = timeline.edit(watching.state, watching.at + 100_000, playing=False)
+    watching.viewer.timeline(state, pair)
+    paused = watching.at
+    while watching.at < paused + 30_000_000:
+        watching.go(100_000)
+        # a block at most waits behind another
+        assert watching.line.line.waiting(watching.at) < 2 * max(len(block) for block in pair.packets[0][3])
+    data = [(came, message) for _, came, message in watching.of(Data) if isinstance(message, Data)]
+    on_show = pair.track.block_at(state.position)
+    first = [(message.track, message.index, message.rate) for _, message in data[before : before + 2]]
+    assert first == [(0, on_show, 3), (1, on_show, 3)]
+    assert data[before + 1][0] < paused + 3_000_000
+    assert len(data) == len({(message.track, message.index, message.rate) for _, message in data})
+    # nothing more is to be sent, and no timer looks for room
+    assert watching.viewer._timer is None
+    written = len(watching.line.sent)
+    watching.go(5_000_000)
+    assert len(watching.line.sent) == written
+    watching.viewer.gone()
+
+
+async def test_a_loop_that_is_there_whole_comes_better_than_the_line_carries_as_it_dances(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    dances = [
+        encode_motion(wandering_motion(8.0, 30.0, seed), ladder=(60.0, 20.0, 8.0, 3.0), grade="live") for seed in (9, 8)
+    ]
+    loop = unpack("loop", pack("loop", dances[0], others=dances[1:]))
+    watching = Watching(loop, monkeypatch, 1_200.0)
+    watching.go(60_000_000)
+    assert watching.viewer.choice is not None
+    assert watching.viewer.choice[0] < 3
+    data = [message for _, _, message in watching.of(Data) if isinstance(message, Data)]
+    assert len(data) == len({(message.track, message.index, message.rate) for message in data})
+    there = {(message.track, message.index) for message in data if message.rate == 3}
+    assert there == {(track, index) for track in (0, 1) for index in range(loop.track.blocks)}
+    assert watching.viewer._timer is None
+    watching.viewer.gone()
+
+
 async def test_a_quick_line_is_not_asked_for_overlays_and_one_that_becomes_slow_is_no_longer_written_to_unasked(
     motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,8 +14,9 @@ from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.playout.held import Held
 from bunraku.playout.pacing import SAFE
+from bunraku.playout.window import HEADS
 from bunraku.stream.flow import Flow
-from bunraku.stream.playing import Playing
+from bunraku.stream.playing import STILL, Playing
 from bunraku.stream.tracks import TRACKS
 from bunraku.wire.messages import Choice, Data, Description, Report
 from bunraku.wire.messages import unpack as unpack_message
@@ -46,6 +47,8 @@ def test_what_is_within_reach_is_sent_once(motion: StoredMotion) -> None:
     playing = Playing(motion, TRACKS, None)
     found = all_packets(playing, motion)
     assert found[0] == (0, 0)
+    # what is on show is bettered, as the stage stands
+    found.remove((0, 1))
     assert [index for index, _ in found[1:]] == list(range(1, len(found)))
     assert {rate for _, rate in found[1:]} == {1}
     assert all_packets(playing, motion) == []
@@ -59,6 +62,52 @@ def test_what_is_held_of_this_motion_is_not_sent_again(motion: StoredMotion) -> 
     # told from the last block on, around the end
     assert playing.has(Held("m", blocks - 1, (1, 1, -1, 1)))
     assert [index for index, _ in all_packets(playing, motion)][:2] == [1, 3]
+
+
+@pytest.fixture(scope="module")
+def pair() -> StoredMotion:
+    """Two performers, the second in blocks of another length, and a camera."""
+    first, second = (
+        encode_motion(wandering_motion(seconds, fps, seed), ladder=(30.0, 5.0), grade="live")
+        for seconds, fps, seed in ((9.2, 30.0, 9), (8.5, 24.0, 8))
+    )
+    return unpack("m", pack("m", first, [encode_scene(camera(9.2, 30.0), ladder=(20.0, 4.0))], [second]))
+
+
+def sent_to(playing: Playing, motion: StoredMotion) -> set[tuple[int, int]]:
+    """Track and index of each block that one who stands at the beginning is sent."""
+    state = timeline.start("m", motion.track.duration_us, 0, playing=False)
+    packets = iter(lambda: playing.next_packet(state, 0, FREE, 0), None)
+    data = [Data.unpack(packet) for packet in packets if packet[0] == Data.TYPE]
+    return {(one.track, one.index) for one in data}
+
+
+def test_what_is_held_of_other_performers_is_not_sent_again_either(pair: StoredMotion) -> None:
+    first, second = (dance.track.blocks for dance in pair.dances)
+    assert first != second
+    everything = sent_to(Playing(pair, TRACKS, None), pair)
+    playing = Playing(pair, TRACKS, None)
+    # told from the last block on, around the end
+    assert playing.has(Held("m", 0, (1,) * 9, 3, [(second - 1, (1, 1, -1, 1))]))
+    performers = {(track, index) for track, index in everything if track < 2}
+    assert {(track, index) for track, index in sent_to(playing, pair) if track < 2} == performers - {
+        *((0, index) for index in range(9)),
+        (1, 0),
+        (1, 2),
+    }
+
+
+def test_of_performers_that_were_not_told_of_nothing_is_held(pair: StoredMotion) -> None:
+    for tracks in (0, 1):
+        playing = Playing(pair, TRACKS, None)
+        assert playing.has(Held("m", 0, (1,) * 9, tracks, [(0, (1,) * 9)]))
+        assert {(1, index) for index in range(4)} <= sent_to(playing, pair)
+
+
+def test_more_than_there_is_may_be_said_to_be_held(pair: StoredMotion) -> None:
+    playing = Playing(pair, TRACKS, None)
+    assert playing.has(Held("m", 9_999_999, (15,) * 64, 99, [(9_999_999, (15,) * 64)] * 3))
+    assert {track for track, _ in sent_to(playing, pair)} == {2}
 
 
 def test_a_choice_is_news_once_and_again_when_rate_or_reason_change(motion: StoredMotion) -> None:
@@ -169,3 +218,62 @@ def test_a_line_too_narrow_for_sound_gets_a_better_motion() -> None:
     assert between < 1_000 * (lowest + sound)
     assert chosen(between) == (2, -1)
     assert chosen(2_000 * (best + sound))[1] >= 0
+
+
+def carrying(bps: float | None) -> Flow:
+    """A flow over a line that is known to carry so much, None where it is quick."""
+    known = SimpleNamespace(
+        narrow=bps is not None,
+        net_came=True,
+        carries=bps and bps / 8,
+        unknown=False,
+        far=bps is not None,
+        blocks_turn=lambda: True,
+    )
+    return cast(Flow, known)
+
+
+def best_on_show(motion: StoredMotion, flow: Flow, pinned: int | None = None, **report: object) -> list[int]:
+    """At which rates, in the end, the first blocks of the performers are there of a stage that stands."""
+    playing = Playing(motion, TRACKS, pinned)
+    state = timeline.start("m", motion.track.duration_us, 0, playing=False)
+    playing.report(Report(buffer=3_000_000, **report), 0)  # type: ignore[arg-type]
+    playing.report(Report(buffer=3_000_000, **report), 2_000_000)  # type: ignore[arg-type]
+    rates: dict[tuple[int, int], int] = {}
+    while (packet := playing.next_packet(state, 4_000_000, flow, -10_000_000)) is not None:
+        data = Data.unpack(packet)
+        assert data.rate > rates.get((data.track, data.index), -1)
+        rates[data.track, data.index] = data.rate
+    return [rates[number, 0] for number in range(len(motion.dances))]
+
+
+def test_of_a_stage_that_stands_all_performers_are_bettered_as_far_as_a_block_takes_the_line_not_long() -> None:
+    ladder = (60.0, 20.0, 8.0, 3.0)
+    first, second = (encode_motion(wandering_motion(4.0, 30.0, n), ladder=ladder, grade="live") for n in (9, 8))
+    motion = unpack("m", pack("m", first, others=[second]))
+    assert best_on_show(motion, carrying(None)) == [3, 3]
+    # a second of one at the best rate, with its heads
+    bits = 1_000 * sum(kbps[-1] for kbps in motion.kbps) / 2 + 8 * HEADS
+    assert best_on_show(motion, carrying(1.01 * bits / STILL)) == [3, 3]
+    assert best_on_show(motion, carrying(0.99 * bits / STILL)) == [2, 2]
+    assert best_on_show(motion, carrying(100)) == [0, 0]
+    # which is more than goes on while it dances
+    playing = Playing(motion, TRACKS, None)
+    assert playing.next_packet(timeline.start("m", 4_000_000, 0), 0, carrying(1.01 * bits / STILL), -10_000_000)
+    assert playing.choice[0] < 3
+
+
+def test_what_is_on_show_is_not_bettered_where_the_line_is_not_what_a_lower_rate_is_for(pair: StoredMotion) -> None:
+    assert best_on_show(pair, carrying(None)) == [1, 1]
+    assert best_on_show(pair, carrying(None), 0) == [0, 0]
+    assert best_on_show(pair, carrying(None), hidden=True) == [0, 0]
+    assert best_on_show(pair, carrying(None), frame=90_000) == [0, 0]
+
+
+def test_beside_hands_what_is_on_show_gets_no_more_than_was_chosen(pair: StoredMotion) -> None:
+    state = timeline.start("m", pair.track.duration_us, 0, playing=False)
+    playing, flow = Playing(pair, TRACKS, None), carrying(8_000)
+    packets = list(iter(lambda: playing.next_packet(state, 0, flow, 0), None))
+    assert playing.choice == (0, "hands")
+    assert {packet[1] & 15 for packet in packets if packet[0] == Data.TYPE} == {0}
+    assert playing.next_packet(state, 2_000_000, flow, 0) is not None

@@ -12,6 +12,7 @@ from bunraku.codec.scene_encode import encode_scene
 from bunraku.ingest.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.playout.held import Held
+from bunraku.playout.pacing import MARGIN
 from bunraku.stream import viewers
 from bunraku.stream.pending import PINGS, QUEUE
 from bunraku.stream.turns import Turns
@@ -165,6 +166,27 @@ async def test_private_timelines_are_edited_others_not(motions: dict[str, Stored
         assert [s.playing for s in of(TimelineState, line) if isinstance(s, TimelineState)] == [True, False][
             : 1 + private
         ]
+
+
+@pytest.mark.parametrize("playing", [True, False])
+async def test_what_a_timeline_begins_with_goes_though_it_lies_a_little_ahead(
+    motions: dict[str, StoredMotion], monkeypatch: pytest.MonkeyPatch, playing: bool
+) -> None:
+    now = clock()
+    monkeypatch.setattr(viewers, "clock", lambda: now)
+    viewer, line, state = watching(motions["one"], playing=playing, now=now)
+    before = len(of(Data, line))
+    viewer.timeline(timeline.edit(state, now + 100_000, position=6_200_000), motions["one"])
+    viewer.advance()
+    track, sent = motions["one"].track, of(Data, line)[before:]
+    assert next(message.index for message in sent if isinstance(message, Data)) == track.block_at(6_200_000)
+    # the next comes within reach when the stage has begun and gone so far
+    following = viewer._following
+    if not playing:
+        assert following is None
+        return
+    beyond = next(at for at in map(track.start_us, range(track.blocks)) if at > 10_200_000 - track.duration_us)
+    assert following == now + 100_000 + beyond + track.duration_us - 10_200_000 + MARGIN
 
 
 async def test_what_is_malformed_is_refused(motions: dict[str, StoredMotion]) -> None:

@@ -26,7 +26,7 @@ from bunraku.playout import timeline
 from bunraku.playout.blocks import BlockStore, Pose, SceneStore
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.delay import PlayoutDelay
-from bunraku.playout.held import MOST, Held
+from bunraku.playout.held import MOST, Blocks, Held
 from bunraku.playout.overlays import Overlays
 from bunraku.playout.sounds import AudioStore
 from bunraku.playout.tracks import Tracks
@@ -126,10 +126,8 @@ class Viewer:
             return self.url
         now = self.clock.at(self._local())
         position = timeline.position_at(state, now)
-        track = self._tracks.dance.track
-        first = track.block_at(position)
-        ahead = [self._tracks.dance.rate((first + nth) % track.blocks) for nth in range(min(track.blocks, MOST))]
-        query = {"have": Held(self.motion, first, ahead, self._tracks.told).text()}
+        (first, rates), *others = (_held(store, position) for store in self._tracks.performers)
+        query = {"have": Held(self.motion, first, rates, self._tracks.told, others).text()}
         if "/sessions/" not in self.url:
             query |= {"at": f"{position / 1e6:.6f}", "clock": str(now)}
         parts = urlsplit(self.url)
@@ -330,6 +328,15 @@ class Viewer:
         figures.clock_error_ms = self.clock.error / 1e3 if self.clock.ready else None
         figures.overlay_early_ms = float(np.median(self._early)) if self._early else None
         return figures
+
+
+def _held(store: BlockStore | None, position: int) -> Blocks:
+    """What is here of a performer from motion time `position` on; of one that cannot be played nothing."""
+    if store is None:
+        return 0, ()
+    blocks = store.track.blocks
+    first = store.track.block_at(position)
+    return first, [store.rate((first + nth) % blocks) for nth in range(min(blocks, MOST))]
 
 
 def _local() -> int:

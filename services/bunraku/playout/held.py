@@ -6,34 +6,80 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from bunraku.wire.limbs import MOST_PERFORMERS
+
 MOST = 64
-"""Blocks that may be told of."""
-_FORM = re.compile(r"([A-Za-z0-9]{1,64})\.([0-9]{1,7})\.([0-9a-f-]{0,64})(?:\.([0-9]{1,2}))?")
+"""Blocks of each performer that may be told of."""
+_FORM = re.compile(
+    r"([A-Za-z0-9]{1,64})\.([0-9]{1,7})\.([0-9a-f-]{0,64})"
+    rf"(?:\.([0-9]{{1,2}})((?:\.[0-9]{{1,7}}\.[0-9a-z-]{{0,64}}){{0,{MOST_PERFORMERS - 1}}}))?"
+)
+_RUN = re.compile(r"(.)\1{1,20}")
+_DIGITS = "-0123456789abcdef"
+
+Blocks = tuple[int, Sequence[int]]
+"""Of one performer: the index of a block, and from that one on, around the end, the rates held, -1 for none."""
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """The Description of `motion`, of its first `tracks` or, None, of all; and of its own track's blocks from `first`
-    on the rates held, -1 for none."""
+    """The Description of `motion`, of its first `tracks` or, None, of all; `first` and `rates` are the first
+    performer's `Blocks`, `others` those of the next ones, which are told only where `tracks` is."""
 
     motion: str
     first: int
     rates: Sequence[int]
     tracks: int | None = None
+    others: Sequence[Blocks] = ()
 
     def text(self) -> str:
         """As it stands in a URL."""
-        digits = "".join("-" if rate < 0 else f"{rate:x}" for rate in self.rates[:MOST])
-        return f"{self.motion}.{self.first}.{digits}" + ("" if self.tracks is None else f".{self.tracks}")
+        text = f"{self.motion}.{self.first}.{_digits(self.rates)}"
+        if self.tracks is None:
+            return text
+        # of the first all digits: servers that know of no others read that
+        others = (f".{first}.{_RUN.sub(_short, _digits(rates))}" for first, rates in self.others)
+        return f"{text}.{self.tracks}{''.join(others)}"
+
+    @property
+    def performers(self) -> list[Blocks]:
+        """Of each performer, the first first, what is held."""
+        return [(self.first, self.rates), *self.others]
 
     @classmethod
     def read(cls, text: str) -> Held:
         """What `text` says; raises ValueError where it is not of this form."""
         found = _FORM.fullmatch(text)
         if found is None:
-            raise ValueError(
-                "have=MOTION.FIRST.RATES.TRACKS: an id, a block's index, a hexadecimal digit or - for that block and "
-                f"for each after it, {MOST} at most, and how many tracks were told of"
-            )
-        rates = tuple(-1 if digit == "-" else int(digit, 16) for digit in found[3])
-        return cls(found[1], int(found[2]), rates, int(found[4]) if found[4] else None)
+            raise ValueError(_WANTED)
+        said = (found[5] or "").split(".")[1:]
+        others = tuple((int(first), _rates(runs)) for first, runs in zip(said[::2], said[1::2], strict=True))
+        return cls(found[1], int(found[2]), _rates(found[3]), int(found[4]) if found[4] else None, others)
+
+
+_WANTED = (
+    "have=MOTION.FIRST.RATES.TRACKS: an id, a block's index, a hexadecimal digit or - for that block and for each "
+    f"after it, {MOST} at most, and how many tracks were told of; then .FIRST.RATES of each performer behind the "
+    f"first, {MOST_PERFORMERS - 1} at most, where a letter from g to z repeats the digit before it 1 to 20 times"
+)
+
+
+def _digits(rates: Sequence[int]) -> str:
+    return "".join(_DIGITS[rate + 1] for rate in rates[:MOST])
+
+
+def _short(run: re.Match[str]) -> str:
+    return run[1] + chr(ord("f") + len(run[0]) - 1)
+
+
+def _rates(text: str) -> tuple[int, ...]:
+    """What digits, and letters that repeat them, say; raises ValueError."""
+    rates: list[int] = []
+    for sign in text:
+        if sign in _DIGITS:
+            rates.append(_DIGITS.index(sign) - 1)
+        elif rates:
+            rates += rates[-1:] * (ord(sign) - ord("f"))
+        if not 0 < len(rates) <= MOST:
+            raise ValueError(_WANTED)
+    return tuple(rates)

@@ -8,6 +8,9 @@ sent. What a viewer already has is not sent again.
 Over a line that is narrow or may stand for a while the lowest rate goes far ahead as a net, a second of it for the
 bytes of a packet's heads, and better versions of what is soon shown just in time: whatever the line does for half a
 minute, the dance goes on.
+
+Where there is time for more than the line carries otherwise, what stays on show is bettered first, as the stage stands;
+and of a loop all of which is here the rest.
 """
 
 from __future__ import annotations
@@ -92,6 +95,8 @@ class Pacer:
         """Of others nothing is sent."""
         self._sent: dict[tuple[int, int], int] = {}
         self._filling = True
+        # all of so many tracks was sent at this rate
+        self._best: tuple[int, int] | None = None
 
     def has(self, track: int, index: int, rate: int) -> None:
         """The viewer has this block at this rate already."""
@@ -107,13 +112,15 @@ class Pacer:
         net: bool = False,
         spare: bool = True,
         better: bool = True,
+        idle: int | None = None,
     ) -> Due | None:
         """The block to send now, None when enough is on its way.
 
         A block counts as sent once it was returned. `rate` is the wanted rate, kept within those each track has, and
         `audio` that of sound where it is another, -1 for none of it. `net` says that one is kept, as over a narrow
         line; sound is in none. Without `spare` room only what is missing soon is sent, and without `better` nothing
-        that a viewer has at another rate.
+        that a viewer has at another rate. `idle` is the rate of what the line has time for: that of blocks that stay
+        on show and, where a net is kept, of a loop all of which was sent; None for no more than that.
         """
         position = position_at(state, clock)
         rates = ((track, track.wanted(rate, audio)) for track in self.tracks)
@@ -122,11 +129,13 @@ class Pacer:
             for track, wanted in rates
             if wanted >= 0 and (due := self._due(track, state, position, wanted, net, better)) is not None
         ]
-        if not found:
+        due = min(found, default=None)
+        if due is None:
             self._filling = False
-            return None
-        due = min(found)
-        if not spare and (due.far or due.better or (net and due.distance > SOON)):
+        soon = due is not None and not (due.far or due.better or due.distance > JUST)
+        if idle is not None and spare and better and not soon:
+            due = self._staying(state, position, idle) or due or (self._around(state, position, idle) if net else None)
+        if due is None or (not spare and (due.far or due.better or (net and due.distance > SOON))):
             return None
         self._sent[due.track, due.index] = due.rate
         return due
@@ -190,6 +199,51 @@ class Pacer:
                 found.append(Due(far, True, distance + after, place, track.number, index, rate))
         return min(found, default=None)
 
+    def _staying(self, state: TimelineState, position: int, rate: int) -> Due | None:
+        """What is to be bettered first of the blocks that stay on show: where the stage stands, and of tracks of one
+        block."""
+        stands = _stands(state, position)
+        found: list[Due] = []
+        for track in self.tracks:
+            timing, best = track.timing, min(rate, track.rates - 1)
+            blocks = timing.block_at(state.duration - 1) + 1
+            if track.audio or not (stands or blocks == 1):
+                continue
+            first = min(timing.block_at(position), blocks - 1)
+            # from a block's last frame on what is shown is the mix with the first of the next
+            for turn, index in {divmod(first, blocks), divmod(first + 1, blocks)}:
+                distance = max(timing.start_us(index) + turn * state.duration - position, 0)
+                shown = distance < 1e6 / timing.fps and (state.loop or not turn)
+                if shown and self._sent.get((track.number, index), best) < best:
+                    found.append(Due(False, True, distance, track.place, track.number, index, best))
+        return min(found, default=None)
+
+    def _around(self, state: TimelineState, position: int, rate: int) -> Due | None:
+        """What is to be bettered first of a loop all of which was sent, sound aside."""
+        if not state.loop or self._best == (rate, len(self.tracks)):
+            return None
+        # one that came while it is on show would be seen to jump
+        soonest = 0 if _stands(state, position) else min(JUST, state.duration // 2)
+        found: list[Due] = []
+        lower = False
+        for track in self.tracks:
+            timing, best = track.timing, min(rate, track.rates - 1)
+            blocks = 0 if track.audio else timing.block_at(state.duration - 1) + 1
+            first = min(timing.block_at(position), blocks - 1)
+            for count in range(blocks):
+                turn, index = divmod(first + count, blocks)
+                sent = self._sent.get((track.number, index))
+                if sent is None:
+                    return None
+                if sent < best:
+                    lower = True
+                    distance = timing.start_us(index) + turn * state.duration - position
+                    if soonest < distance <= NET_AHEAD:
+                        found.append(Due(False, True, distance, track.place, track.number, index, best))
+        if not lower:
+            self._best = rate, len(self.tracks)
+        return min(found, default=None)
+
 
 def arrivals(
     tracks: Sequence[Paced], state: TimelineState, clock: int, rate: int, audio: int | None = None
@@ -222,6 +276,11 @@ def arrivals(
             if turn < 0:
                 break
     return sorted(found)
+
+
+def _stands(state: TimelineState, position: int) -> bool:
+    """Whether the stage stands still at `position`: paused, or at the end without a loop."""
+    return not state.playing or (not state.loop and position >= state.duration)
 
 
 def _again(timing: Timing, position: int, duration: int) -> int:

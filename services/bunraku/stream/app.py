@@ -36,7 +36,7 @@ IMMUTABLE = {"Cache-Control": "public, max-age=31536000, immutable"}
 
 RateQuery = Annotated[int | None, Query(ge=0, le=15)]
 TracksQuery = Annotated[str, Query(max_length=64)]
-HaveQuery = Annotated[str, Query(max_length=160)]
+HaveQuery = Annotated[str, Query(max_length=400)]
 RETURN = 60_000_000
 """Who says when a private timeline began says so within this of now, microseconds."""
 

@@ -9,12 +9,15 @@ from bunraku.playout.held import Held
 from bunraku.playout.pacing import Pacer
 from bunraku.playout.rate import RateChoice
 from bunraku.playout.sharing import Step
+from bunraku.playout.window import HEADS
 from bunraku.stream.flow import Flow
 from bunraku.stream.tracks import danced, described, paced, steps, told_of
 from bunraku.wire.messages import Choice, Report, TimelineState
 
 BESIDE = 1_000_000
 """So long after an overlay the hands share a narrow line with blocks, microseconds."""
+STILL = 1.5
+"""A block for which a narrow line has time takes it so many seconds at most: who plays on meanwhile waits for it."""
 
 
 class Playing:
@@ -81,9 +84,12 @@ class Playing:
         if held is None or held.motion != self.motion.id:
             return False
         self._told_of(min(len(self.motion.tracks) if held.tracks is None else held.tracks, self._wanted))
-        for nth, rate in enumerate(held.rates):
-            if rate >= 0:
-                self.pacer.has(0, (held.first + nth) % self.motion.track.blocks, rate)
+        # dances are the first tracks; of one that is yet to be told of nothing can be held
+        dances = self.motion.dances[: self._known]
+        for number, (dance, (first, rates)) in enumerate(zip(dances, held.performers, strict=False)):
+            for index, rate in enumerate(rates, first):
+                if rate >= 0:
+                    self.pacer.has(number, index % dance.track.blocks, rate)
         return True
 
     def described(self, far: bool) -> bytes:
@@ -123,10 +129,32 @@ class Playing:
         spare = not beside or flow.blocks_turn()
         net = narrow or flow.far
         better = not net or flow.net_came
-        due = self.pacer.next(state, clock, step.motion, audio=step.audio, net=net, spare=spare, better=better)
+        due = self.pacer.next(
+            state,
+            clock,
+            step.motion,
+            audio=step.audio,
+            net=net,
+            spare=spare,
+            better=better,
+            idle=step.motion if beside else self._idle_rate(flow),
+        )
         if not better and spare and (due is None or due.far):
             flow.net_went()
         return None if due is None else self.motion.packets[due.track][due.rate][due.index]
+
+    def _idle_rate(self, flow: Flow) -> int:
+        """The rate of what a line has time for: the highest of which a block takes it no longer than `STILL`, unless
+        what it carries is not why there is a lower one."""
+        step, carries = self.step, flow.carries
+        if flow.unknown or self._choosing.reason in ("hidden", "machine"):
+            return step.motion
+        highest = self.steps[-1].motion
+        if carries is None:
+            return highest
+        # what a second of one performer costs on the line
+        costs = (each.kbps * 125 / len(self.motion.dances) + HEADS for each in self._silent[: highest + 1])
+        return max([step.motion, *(rate for rate, cost in enumerate(costs) if cost <= STILL * carries)])
 
     def news(self) -> bytes | None:
         """The framed choice of a rate, where the viewer has not been told yet."""

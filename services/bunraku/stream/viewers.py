@@ -224,7 +224,7 @@ class Viewer:
                 elif self._in_step.cohort is None:
                     self._send(now)
                     self._look_ahead(now)
-                    self._join_cohort(now)
+                    self._join_cohort()
             self._turns.put(self, self._next_turn())
         except Exception:
             _log.exception("a viewer's turn failed")
@@ -333,19 +333,18 @@ class Viewer:
         return [] if state is None or playing is None else self._announcing.news(state, playing, self._flow.far)
 
     def _next_packet(self, now: int) -> bytes | None:
-        state = self._timelines.at(now)
+        # a timeline may lie a little ahead: what it begins with goes meanwhile
+        state = self._timelines.newest
         if state is None or self._playing is None:
             return None
         packet = self._playing.next_packet(state, now, self._flow, self._beside_at)
         self._attendance.blocks += packet is not None and packet[0] == Data.TYPE
         return packet
 
-    def _join_cohort(self, now: int) -> None:
+    def _join_cohort(self) -> None:
         """Go on with those who are in step, where this one will be for a while."""
         audience, playing, state, following = self.audience, self._playing, self._timelines.newest, self._following
-        if audience is None or playing is None or following is None or playing.unsaid:
-            return
-        if state is None or state is not self._timelines.at(now):
+        if audience is None or playing is None or state is None or following is None or playing.unsaid:
             return
         cohorts, phase = audience.cohorts, self._phase
         if self._in_step.join(cohorts, self._turns, state, playing, self._wanted, following, phase):
@@ -360,10 +359,11 @@ class Viewer:
     def _look_ahead(self, now: int) -> None:
         """All that is within reach was sent: when more will be."""
         self._following = None
-        state, flow = self._timelines.at(now), self._flow
+        state, flow = self._timelines.newest, self._flow
         if self.outlet.clear and state is not None and self._playing is not None:
-            wait = self._playing.pacer.wait(state, now, flow.far or flow.narrow)
-            self._following = None if wait is None else now + wait
+            at = max(now, state.clock)
+            wait = self._playing.pacer.wait(state, at, flow.far or flow.narrow)
+            self._following = None if wait is None else at + wait
 
     def _next_turn(self) -> int:
         """Clock time of the next turn: for the next block, or to ask for a sign of life."""

@@ -1,26 +1,42 @@
 /** Where a viewer connects that comes back after its line was lost (`proto/SPEC.md`, Sockets: `have`, `at`, `clock`). */
+import type { BlockStore } from "../playout/blocks";
 import { positionAt } from "../playout/timeline";
 import type { Tracks } from "../playout/tracks";
 import type { TimelineState } from "../wire/messages";
 
-/** Blocks that may be told of. */
+/** Blocks of each performer that may be told of. */
 const MOST = 64;
 
 /** `url` with what `tracks` hold of the motion of `timeline` at clock time `clock`, and where a private timeline then stands. */
 export function returningUrl(url: URL, tracks: Tracks, timeline: TimelineState, clock: number, ownTimeline: boolean): string {
   const address = new URL(url);
-  const { rates, track } = tracks.dance;
   const position = positionAt(timeline, clock);
+  const [first, ...others] = tracks.performers.map((store) => held(store, position));
+  // of the first all digits: servers that know of no others read that
+  const said = [timeline.motion, first, tracks.told, ...others.map(shortened)];
+  address.searchParams.set("have", said.join("."));
+  if (ownTimeline) {
+    address.searchParams.set("at", (position / 1e6).toFixed(6));
+    address.searchParams.set("clock", String(Math.round(clock)));
+  }
+  return address.href;
+}
+
+/** Of one performer the block at `position`, and from it on, around the end, a digit for the rate of each; of one that cannot be read nothing. */
+function held(store: BlockStore | null, position: number): string {
+  if (!store) return "0.";
+  const { rates, track } = store;
   const block = track.blockAt(position);
   let digits = "";
   for (let n = 0; n < Math.min(rates.length, MOST); n++) {
     const rate = rates[(block + n) % rates.length];
     digits += rate < 0 ? "-" : rate.toString(16);
   }
-  address.searchParams.set("have", `${timeline.motion}.${block}.${digits}.${tracks.told}`);
-  if (ownTimeline) {
-    address.searchParams.set("at", (position / 1e6).toFixed(6));
-    address.searchParams.set("clock", String(Math.round(clock)));
-  }
-  return address.href;
+  return `${block}.${digits}`;
+}
+
+/** With a letter, g to z, for 1 to 20 of the same digit that follow. */
+function shortened(said: string): string {
+  const [block, digits] = said.split(".");
+  return `${block}.${digits.replace(/(.)\1{1,20}/g, (run, digit: string) => digit + String.fromCharCode(101 + run.length))}`;
 }

@@ -99,6 +99,20 @@ test("one whose dance is shorter stands still past its end, and begins anew with
   expect(copyAt(1)).toEqual(start1);
 });
 
+test("of one who stands still a better block is shown when it comes", () => {
+  start(description());
+  Line.last.say({ name: "TimelineState", epoch: 2, motion: "dance", clock: UNIX, position: 500_000, playing: false, loop: true, duration: 2_600_000 });
+  Line.last.say(data(0, 0, lowest, 0), data(3, 0, lowest, 0));
+  now = 4_000;
+  const [one, third] = [copyAt(0), copyAt(2)];
+  expect(third).toEqual(one);
+  Line.last.say(data(3, 0, first));
+  expect(copyAt(0)).toEqual(one);
+  const wanted = restPose();
+  decodeBlock(goldenTrack(), first).at(15, wanted);
+  copyAt(2)!.rotations.forEach((value, i) => expect(value).toBeCloseTo(wanted.rotations[i], 9));
+});
+
 test("the line is judged by the first's blocks", () => {
   start(description());
   Line.last.say(data(0, 0, first), data(2, 0, short[0]), data(3, 0, lowest, 0));
@@ -145,13 +159,13 @@ describe("on a narrow line", () => {
     expect([copyAt(0), copyAt(1), copyAt(2)]).toEqual([pose, null, pose]);
   });
 
-  test("what comes back tells of the first's blocks alone", () => {
+  test("what comes back tells of all performers' blocks", () => {
     start(description());
     Line.last.say(data(0, 0, first), data(2, 1, short[1]));
     Line.last.end(1006);
     now += 250;
     vi.advanceTimersByTime(250);
-    expect(new URL(Line.last.url).searchParams.get("have")).toBe("dance.0.1--.4");
+    expect(new URL(Line.last.url).searchParams.get("have")).toBe("dance.0.1--.4.1.1-g.0.-h");
     Line.last.accept();
     start();
     expect(viewer.performers).toHaveLength(3);
