@@ -5,27 +5,30 @@
 import { MathUtils, PerspectiveCamera } from "three";
 import { createView, fovIn, mixViews, readView, type View } from "./view";
 
-/** `alone`: a stage without a page about it, so that nothing stands before it. */
-export type Framing = "desktop" | "phone" | "sheet" | "alone";
+/** `sideways`: a phone on its side. `alone`: a stage without a page about it, so that nothing stands before it. */
+export type Framing = "desktop" | "phone" | "sheet" | "sideways" | "alone";
 
 /** Visible height and the height looked at, metres for the standard figure. */
 const FRAMINGS: Readonly<Record<Framing, readonly [visible: number, look: number]>> = {
   desktop: [3.1, 1.005],
   phone: [3.95, 0.81],
   sheet: [4.7, 0.26],
+  sideways: [3.1, 1.005],
   alone: [3.1, 1.005],
 };
 /** Pixels from the bottom that the transport takes, and the window height the desktop framing was drawn for. */
-const TRANSPORT = 110;
-const DRAWN_FOR = 900;
+const TRANSPORT: Partial<Record<Framing, number>> = { desktop: 110, sideways: 76 };
+const DRAWN_WITH = 110 / 900;
 const HALF_FIELD = (13 * Math.PI) / 180;
 const EYE = 0.08;
 /** How far is seen from before one dancer, metres. */
 const FAR = 40;
 /** Metres that the standard figure takes to either side of its place, where there are several. */
 const ELBOW_ROOM = 0.9;
-/** Of the picture's width, what several dancers have at least, whatever stands before it. */
+/** Of the picture's width, what dancers have at least, whatever stands before it. */
 const LEAST_FREE = 0.4;
+/** What stands before so much of it from a side covers one alone, who is in the middle else. */
+const COVERED = 0.35;
 const YAW = (25 * Math.PI) / 180;
 const PITCH_LOW = (-5 * Math.PI) / 180;
 const PITCH_HIGH = (15 * Math.PI) / 180;
@@ -47,9 +50,10 @@ export class AudienceCamera {
   /** The furthest that dancers were to a side, and nearer, since the last cut, metres: the seat goes back for them, and not forth again. */
   #aside = 0;
   #near = 0;
-  /** Of the picture's width, what they have, and how far the middle of that is from the picture's. */
+  /** Of the picture's width, what they have, and how far the middle of that is from the picture's: and where one alone is. */
   #free = 1;
   #middle = 0;
+  #alone = 0;
   #shift = 0;
   #shifted = 0;
   /** Whether the seat is still to be taken for the first time since the last cut. */
@@ -74,19 +78,21 @@ export class AudienceCamera {
   #untouched = REST;
 
   /**
-   * What of a picture `width` pixels wide stands before it to the left and to the right, pixels: several dancers are seen between. One alone is in the middle.
+   * What of a picture `width` pixels wide stands before it to the left and to the right, pixels: several dancers are seen between. One alone is in the middle where
+   * that is free.
    */
   set sides({ left, right, width }: { left: number; right: number; width: number }) {
     const free = 1 - (left + right) / width;
     const narrow = free < LEAST_FREE;
     this.#free = narrow ? 1 : free;
     this.#middle = narrow ? 0 : (left - right) / 2 / width;
+    this.#alone = Math.max(left, right) / width > COVERED ? this.#middle : 0;
   }
 
   /** Changes the framing, eased over 0.6 s. In a window of few pixels the transport takes a larger share: the puppet makes room. */
   frame(framing: Framing, height: number): void {
     const [visible, look] = FRAMINGS[framing];
-    const lost = framing === "desktop" ? Math.max(0, TRANSPORT / height - TRANSPORT / DRAWN_FOR) : 0;
+    const lost = Math.max(0, (TRANSPORT[framing] ?? 0) / height - DRAWN_WITH);
     this.#goal = [visible / (1 - lost), look - (visible / (1 - lost)) * (lost / 2)];
   }
 
@@ -128,6 +134,7 @@ export class AudienceCamera {
     this.#hasShow = false;
     this.#over = 0;
     this.#aside = this.#near = 0;
+    this.#shift = this.#alone;
     this.#fresh = true;
   }
 
@@ -176,8 +183,8 @@ export class AudienceCamera {
     const one = ((visible / 2) * this.scale) / Math.tan(HALF_FIELD);
     const wide = (Math.max(one, this.#aside / (Math.tan(HALF_FIELD) * this.camera.aspect * this.#free)) + this.#near) / one;
     this.wide += (wide - this.wide) * (this.#fresh ? 1 : share);
-    const shift = this.#aside > 0 ? this.#middle : 0;
-    this.#shift += (shift - this.#shift) * (this.#fresh ? 1 : share);
+    const shift = this.#aside > 0 ? this.#middle : this.#alone;
+    this.#shift += (shift - this.#shift) * (this.#fresh && this.#aside > 0 ? 1 : share);
     this.#fresh &&= this.#aside === 0;
     this.#visible += (visible - this.#visible) * share;
     this.#height += (look - this.#height) * share;

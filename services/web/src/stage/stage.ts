@@ -262,7 +262,8 @@ export class Stage {
   /** Where a limb's bar is on the screen, CSS pixels; null while there is none. */
   bar(limb: number): Box | null {
     const at = this.strings.bar(limb);
-    return at && this.#box(at, BAR);
+    // drawn larger from further away, as all of the strings
+    return at && this.#box(at, BAR, Math.sqrt(this.audience.wide));
   }
 
   /** Where the faces are on the screen, CSS pixels. */
@@ -300,8 +301,9 @@ export class Stage {
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
-  #box(at: Vector3, { across, up, down }: Extent): Box {
-    const { camera, scale } = this.audience;
+  #box(at: Vector3, { across, up, down }: Extent, times = 1): Box {
+    const { camera } = this.audience;
+    const scale = this.audience.scale * times;
     return boxAround(at, { across: across * scale, up: up * scale, down: down * scale }, camera, this.#width, this.#height);
   }
 
@@ -320,7 +322,7 @@ export class Stage {
 
   /** The disc keeps its proportion to the dancer. */
   #placeDisc(): void {
-    const [radius, height] = this.#framing === "desktop" || this.#framing === "alone" ? [1.06, 1.3] : [0.98, 1.36];
+    const [radius, height] = this.#framing === "phone" || this.#framing === "sheet" ? [0.98, 1.36] : [1.06, 1.3];
     this.#backdrop.discRadius.value = radius * this.audience.scale;
     this.#backdrop.discCentre.value.set(0, height * this.audience.scale);
   }

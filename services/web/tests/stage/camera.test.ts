@@ -33,6 +33,13 @@ describe("the framing", () => {
     expect(above(audience, 1.75, height)).toBeLessThan(height * 0.85);
   });
 
+  test.each([320, 360, 430])("has room on a phone on its side for more, as all about it is lower, %d pixels high", (height) => {
+    const [sideways, desktop] = [seat("sideways", 2 * height, height), seat("desktop", 2 * height, height)];
+    expect(above(sideways, 0, height)).toBeGreaterThan(66);
+    expect(above(sideways, 1.75, height)).toBeLessThan(height * 0.85);
+    expect(above(sideways, 1.75, height) - above(sideways, 0, height)).toBeGreaterThan(above(desktop, 1.75, height) - above(desktop, 0, height));
+  });
+
   test("makes the puppet smaller on a phone, and lifts it over an open sheet", () => {
     const size = (framing: Framing) => above(seat(framing, 400, 800), 1.75, 800) - above(seat(framing, 400, 800), 0, 800);
     expect(size("phone")).toBeLessThan(size("desktop"));
@@ -231,6 +238,33 @@ describe("the show's camera", () => {
     const seen = rig.worldToLocal(audience.view.position.clone());
     expect(seen.distanceTo(audience.camera.position)).toBeLessThan(1e-9);
     expect(audience.camera.position.x).toBeCloseTo(0, 9);
+  });
+});
+
+describe("one alone", () => {
+  const middle = (audience: AudienceCamera, width: number) => (new Vector3(0, 1, 0).project(audience.camera).x * 0.5 + 0.5) * width;
+
+  test("is in the middle of what is free where a panel would cover it, and else in the middle", () => {
+    const audience = seat("sideways", 667, 375);
+    audience.sides = { left: 0, right: 340, width: 667 };
+    audience.update(0, 0);
+    expect(middle(audience, 667)).toBeCloseTo((667 - 340) / 2, 6);
+    audience.sides = { left: 0, right: 112, width: 667 };
+    audience.update(0, 0);
+    expect(middle(audience, 667)).toBeCloseTo(667 / 2, 6);
+  });
+
+  test("goes there calmly, and the next dance begins there", () => {
+    const audience = seat("sideways", 667, 375);
+    audience.still = false;
+    audience.sides = { left: 0, right: 340, width: 667 };
+    audience.update(1 / 60, 0);
+    expect(middle(audience, 667)).toBeGreaterThan(667 / 2 - 60);
+    run(audience, 3);
+    expect(middle(audience, 667)).toBeCloseTo((667 - 340) / 2, 1);
+    audience.cut();
+    audience.update(1 / 60, 0);
+    expect(middle(audience, 667)).toBeCloseTo((667 - 340) / 2, 2);
   });
 });
 
