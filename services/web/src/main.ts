@@ -248,7 +248,7 @@ function enter(id: string, place: Place = "sessions"): Room {
 function resize(): void {
   const { panels } = page;
   const framing = SIDEWAYS.matches ? "sideways" : !PHONE.matches ? "desktop" : panels.sheet ? "sheet" : "phone";
-  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio, framing === "desktop" || framing === "sideways" ? panels.sides : [0, 0]);
+  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio, framing === "desktop" || framing === "sideways" ? panels.sides : [0, 0], panels.below);
 }
 
 /** `window.bunraku`: the parts of the running page, for tests and for people who like to look inside. */

@@ -80,7 +80,7 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
     transport.expanded(name, open);
     strings.dock.hidden = panels.isOpen("strings") || panels.sheet;
     on.reframe();
-  });
+  }, on.reframe);
   const occupied = createOccupied([...header.parts, ...transport.parts, strings.dock, ...elements.values(), messages.element]);
   PHONE.addEventListener("change", () => {
     while (panels.closeLast());

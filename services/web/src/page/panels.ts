@@ -35,6 +35,8 @@ export interface Panels {
   readonly sheet: boolean;
   /** Pixels of a desktop, or of a phone on its side, that panels or the dock in their place take to the left and to the right. */
   readonly sides: readonly [left: number, right: number];
+  /** Pixels of a phone that a sheet takes from below. */
+  readonly below: number;
 }
 
 /** What a panel takes with its margin, and the dock with its own and some of the names beside it, pixels (art direction, section 6). */
@@ -44,8 +46,10 @@ const DOCK = 96;
 const [SHEET, SHEET_SHARE] = [340, 0.56];
 const SIDE_DOCK = 112;
 
-/** `changed` is told of every panel that opens or shuts. The button that opened a panel gets the focus back. */
-export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, changed: (name: PanelName, open: boolean) => void): Panels {
+/** `changed` is told of every panel that opens or shuts, and `grown` where one has another size. The button that opened a panel gets the focus back. */
+export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, changed: (name: PanelName, open: boolean) => void, grown: () => void): Panels {
+  const sizes = new ResizeObserver(grown);
+  for (const panel of panels.values()) sizes.observe(panel);
   const order: PanelName[] = [];
   const returns = new Map<PanelName, HTMLElement>();
   const set = (name: PanelName, open: boolean) => {
@@ -78,6 +82,9 @@ export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, change
     },
     get sheet() {
       return PHONE.matches && order.length > 0;
+    },
+    get below() {
+      return PHONE.matches && !SIDEWAYS.matches ? Math.max(0, ...order.map((name) => panels.get(name)?.offsetHeight ?? 0)) : 0;
     },
     get sides() {
       if (SIDEWAYS.matches) return [0, order.length > 0 ? Math.min(SHEET, SHEET_SHARE * innerWidth) : SIDE_DOCK] as const;

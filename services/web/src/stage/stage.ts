@@ -45,6 +45,8 @@ export class Stage {
   /** Where the audience's camera was, for keeping. */
   readonly trail = new CameraTrail();
   readonly renderer: WebGLRenderer;
+  /** Whose strings are at hand, by whom a narrow picture of several is framed; null: all are to be seen. */
+  chosen: number | null = null;
   /** Whether the graphics are done with a frame that has a dancer in it. */
   shown = false;
   readonly #troupe: Troupe;
@@ -158,8 +160,8 @@ export class Stage {
     if (this.puppet) this.#compile();
   }
 
-  /** CSS pixels; `sides` are those that something stands before to the left and to the right, between which several dancers are seen. */
-  resize(width: number, height: number, framing: Framing, pixelRatio: number, [left, right]: readonly [number, number] = [0, 0]): void {
+  /** CSS pixels; `sides` are those that something stands before to the left and to the right, between which several dancers are seen, and `below` a sheet's. */
+  resize(width: number, height: number, framing: Framing, pixelRatio: number, [left, right]: readonly [number, number] = [0, 0], below = 0): void {
     const sharpest = framing === "desktop" ? SHARPEST.desktop : SHARPEST.phone;
     this.#width = width;
     this.#height = height;
@@ -167,7 +169,7 @@ export class Stage {
     this.#setSize();
     this.#framing = framing;
     this.#placeDisc();
-    this.audience.frame(framing, height);
+    this.audience.frame(framing, height, below);
     this.audience.resize(width / height);
     this.audience.sides = { left, right, width };
   }
@@ -191,8 +193,9 @@ export class Stage {
       this.#floorAt.value = rig.group.position.y;
     }
     rig.group.updateMatrixWorld(true);
-    if (posed) audience.stand(shown.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))));
-    audience.update(seconds, posed ? this.#reach(shown) : 0, show);
+    const own = this.chosen === null ? -1 : shown.indexOf(this.performers[this.chosen]);
+    if (posed) audience.stand(shown.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))), own < 0 ? null : own);
+    audience.update(seconds, posed ? this.#reach(audience.partial ? [shown[own]] : shown) : 0, show);
     // what is about the dancers is as wide as the picture of them
     const { wide } = audience;
     this.#scenery.group.scale.setScalar(wide);
@@ -341,7 +344,11 @@ export class Stage {
   }
 
   #setSize(): void {
-    this.renderer.setPixelRatio(this.#sharpness * this.#quality.quality.sharpness);
+    const ratio = this.#sharpness * this.#quality.quality.sharpness;
+    const size = this.renderer.getSize(new Vector2());
+    // told again, it would empty the canvas until the next frame is drawn
+    if (ratio === this.renderer.getPixelRatio() && size.x === this.#width && size.y === this.#height) return;
+    this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(this.#width, this.#height, false);
   }
 
