@@ -166,7 +166,6 @@ export class Stage {
     this.#width = width;
     this.#height = height;
     this.#sharpness = Math.min(pixelRatio, sharpest);
-    this.#setSize();
     this.#framing = framing;
     this.#placeDisc();
     this.audience.frame(framing, height, below);
@@ -214,14 +213,12 @@ export class Stage {
     if (posed) this.#danced = true;
     else if ((this.#empty += seconds) < EMPTY_AFTER) return;
     if (this.shown || !this.#danced) this.#build();
+    this.#setSize();
     this.renderer.render(this.scene, audience.camera);
     this.#gate.close();
     const slow = posed && !this.#picturing && this.#quality.frame(this.#sinceDrawn);
     this.#sinceDrawn = 0;
-    if (slow) {
-      this.#setSize();
-      this.#furnish();
-    }
+    if (slow) this.#furnish();
   }
 
   /** Gives back all that the graphics hold; the stage and its canvas draw no more. */
@@ -343,10 +340,10 @@ export class Stage {
     this.#sinceDrawn = 0;
   }
 
+  /** Just before a frame is drawn, as it empties the canvas: and only where it is another. */
   #setSize(): void {
     const ratio = this.#sharpness * this.#quality.quality.sharpness;
     const size = this.renderer.getSize(new Vector2());
-    // told again, it would empty the canvas until the next frame is drawn
     if (ratio === this.renderer.getPixelRatio() && size.x === this.#width && size.y === this.#height) return;
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(this.#width, this.#height, false);
