@@ -21,7 +21,7 @@ import { isolated } from "./page/format";
 import { keepThis } from "./page/keep";
 import { ownName } from "./page/name";
 import { createPage } from "./page/page";
-import { PHONE } from "./page/panels";
+import { PHONE, SIDEWAYS } from "./page/panels";
 import { Pieces } from "./page/pieces";
 import { createTheme, type ThemeChoice } from "./page/theme";
 import { tell, uploadAll } from "./page/uploads";
@@ -253,8 +253,8 @@ function enter(id: string, place: Place = "sessions"): Room {
 
 function resize(): void {
   const { panels } = page;
-  const framing = PHONE.matches ? (panels.sheet ? "sheet" : "phone") : "desktop";
-  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio, framing === "desktop" ? panels.sides : [0, 0]);
+  const framing = SIDEWAYS.matches ? "sideways" : !PHONE.matches ? "desktop" : panels.sheet ? "sheet" : "phone";
+  stage?.resize(innerWidth, innerHeight, framing, devicePixelRatio, framing === "desktop" || framing === "sideways" ? panels.sides : [0, 0], panels.below);
 }
 
 /** `window.bunraku`: the parts of the running page, for tests and for people who like to look inside. */
@@ -328,7 +328,8 @@ function frame(): void {
   if (stage.shown || page.keys.open) pad?.update(now, !page.keys.listening);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
   const { pose, limbs } = performing.draw(now, focused);
-  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.faces);
+  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.faces, now, holding.chosen.performer);
+  page.messages.keepOff(stage.faces);
   if (pose) invite(now);
   if (stage.shown) arriving.arrived();
   page.transport.camera(stage.hasShow, stage.following);

@@ -94,6 +94,8 @@ export class Performing {
         behind: !own,
       };
     });
+    // under a finger that pulls the picture stays where it is
+    if (!pointer.pulling) stage.chosen = holding.watching ? null : chosen.performer;
     stage.draw(poses, states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.shownTime(now));
     return { pose: poses[0] ?? null, limbs };
   }

@@ -126,7 +126,7 @@ export class Drawing {
     const now = performance.now();
     const { pose, limbs } = performing.draw(now, this.focused);
     const { stage } = performing;
-    this.face.tags.render(limbs, pose ? limbs.map((_, limb) => stage.bar(limb)) : [], stage.faces);
+    this.face.tags.render(limbs, pose ? limbs.map((_, limb) => stage.bar(limb)) : [], stage.faces, now, this.holding.chosen.performer);
     this.#room?.viewer.drawn(performance.now() - now);
     if (!pose || this.#told) return;
     this.#told = true;

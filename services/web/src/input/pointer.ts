@@ -17,6 +17,8 @@ const DEPTH_LAG = 0.15;
 export interface PointerInput {
   /** The limb under the pointer, lit; null for none. */
   readonly near: number | null;
+  /** Whether a limb is being dragged. */
+  readonly pulling: boolean;
   /** Pulls again what is held: the dance moves under a resting pointer. Once a frame, with the time of events, milliseconds. */
   update(now: number): void;
 }
@@ -149,6 +151,9 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
   return {
     get near() {
       return near;
+    },
+    get pulling() {
+      return drags.size > 0;
     },
     update(now) {
       for (const [id, drag] of drags) {

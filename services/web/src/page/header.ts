@@ -3,7 +3,6 @@ import { element, setText } from "./dom";
 import { initial, isolated } from "./format";
 import { icon } from "./icons";
 import type { Presence } from "./model";
-import type { Box } from "../stage/boxes";
 import type { Theme } from "../stage/look";
 import { decimal } from "../words/numbers";
 import { language, series, say } from "../words/say";
@@ -15,8 +14,8 @@ export interface Header {
   piece(name: string): void;
   people(presence: Presence | null, self: string | null): void;
   theme(theme: Theme): void;
-  /** Where its parts are, CSS pixels. */
-  readonly boxes: readonly Box[];
+  /** What of it stands before the picture. */
+  readonly parts: readonly HTMLElement[];
 }
 
 export function createHeader(root: HTMLElement, on: { share(): void; keys(): void; language(): void; theme(): void }): Header {
@@ -34,9 +33,7 @@ export function createHeader(root: HTMLElement, on: { share(): void; keys(): voi
   const right = element("div", { class: "header-right" }, people, share, keys, other, theme);
   root.append(element("header", { class: "header" }, brand, right));
   return {
-    get boxes() {
-      return [brand, right].map((part) => part.getBoundingClientRect());
-    },
+    parts: [brand, right],
     piece(name) {
       setText(piece, name);
       document.title = name ? `${isolated(name)} - Bunraku` : "Bunraku";

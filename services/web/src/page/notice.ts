@@ -8,9 +8,9 @@ export type Subject = "access" | "graphics" | "dance";
 /** Says something about a subject in place of what was said about it; a title of null: there is nothing to say about it any more. */
 export type Notice = (about: Subject, title: string | null, text?: string) => void;
 
-export function createNotice(root: HTMLElement): Notice {
+export function createNotice(root: HTMLElement): { element: HTMLElement; notice: Notice } {
   const live = element("div", { class: "notice", role: "status", "aria-atomic": "false" });
   root.append(live);
   const say = createStanding<Subject>(live);
-  return (about, title, text = "") => say(about, title === null ? null : element("p", {}, element("b", {}, title), text));
+  return { element: live, notice: (about, title, text = "") => say(about, title === null ? null : element("p", {}, element("b", {}, title), text)) };
 }

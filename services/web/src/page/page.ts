@@ -8,8 +8,9 @@ import type { ChooseFile } from "./downloads";
 import type { KeysModal } from "./keys-modal";
 import { acceptDrops, createLibrary, type Library, type Piece } from "./library";
 import { createLineCard, type LineCard } from "./line-card";
-import { element } from "./dom";
+import { createMessages, type Messages } from "./messages";
 import { createNotice, type Notice } from "./notice";
+import { createOccupied } from "./occupied";
 import { createPanels, PHONE, type Panels } from "./panels";
 import { createStringsCard, type StringsActions, type StringsCard } from "./strings-card";
 import { createTags, type Tags } from "./tags";
@@ -53,19 +54,19 @@ export interface Page {
   readonly tags: Tags;
   readonly asks: Asks;
   readonly panels: Panels;
+  readonly messages: Messages;
   readonly toast: Toasts;
   readonly notice: Notice;
 }
 
 export function createPage(root: HTMLElement, on: PageActions): Page {
-  const tags = createTags(root, on.ask, undefined, () => header.boxes);
-  const notice = createNotice(root);
+  const tags = createTags(root, on.ask, undefined, () => occupied.boxes);
+  const { element: noticed, notice } = createNotice(root);
   const keys = createKeys(root, on.mapping, () => toast(say("The list of keys could not be fetched; try again when the line is back")));
   const header = createHeader(root, { share: on.share, language: on.language, theme: on.theme, keys: () => keys.show() });
-  const messages = element("div", { class: "messages" });
-  root.append(messages);
-  const asks = createAsks(messages, on.give);
-  const toast = createToast(messages);
+  const messages = createMessages(root, noticed, () => occupied.moved());
+  const asks = createAsks(messages.element, on.give);
+  const toast = createToast(messages.element);
   const library = createLibrary(root, { ...on, close: () => panels.close("library") });
   const strings = createStringsCard(root, { ...on, close: () => panels.close("strings"), keys: () => keys.show() });
   const line = createLineCard(root, () => panels.close("line"));
@@ -77,15 +78,16 @@ export function createPage(root: HTMLElement, on: PageActions): Page {
   ]);
   const panels = createPanels(elements, (name, open) => {
     transport.expanded(name, open);
-    strings.dock(!panels.isOpen("strings") && !panels.sheet);
+    strings.dock.hidden = panels.isOpen("strings") || panels.sheet;
     on.reframe();
-  });
+  }, on.reframe);
+  const occupied = createOccupied([...header.parts, ...transport.parts, strings.dock, ...elements.values(), messages.element]);
   PHONE.addEventListener("change", () => {
     while (panels.closeLast());
     on.reframe();
   });
   acceptDrops(root, on.files);
   return {
-    header, transport, library, strings, line, keys, tags, asks, panels, toast, notice,
+    header, transport, library, strings, line, keys, tags, asks, panels, messages, toast, notice,
   };
 }

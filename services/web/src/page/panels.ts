@@ -4,7 +4,11 @@ import { icon } from "./icons";
 import type { PanelName } from "./transport";
 import { say } from "../words/say";
 
-export const PHONE = matchMedia("(max-width: 720px)");
+/** A phone on its side: the window is so low that panels stand at its right, before all else. */
+const SIDE = "(max-height: 460px) and (orientation: landscape)";
+export const SIDEWAYS = matchMedia(SIDE);
+/** Panels are sheets, one at a time. */
+export const PHONE = matchMedia(`(max-width: 720px), ${SIDE}`);
 
 export interface Panel {
   readonly element: HTMLElement;
@@ -27,18 +31,25 @@ export interface Panels {
   close(name: PanelName): void;
   /** Shuts the panel opened last; false when none is open. */
   closeLast(): boolean;
-  /** Some panel covers the lower part of a phone. */
+  /** Some panel covers the lower part of a phone, or the right of one on its side. */
   readonly sheet: boolean;
-  /** Pixels of a desktop that panels, or the dock in their place, take to the left and to the right. */
+  /** Pixels of a desktop, or of a phone on its side, that panels or the dock in their place take to the left and to the right. */
   readonly sides: readonly [left: number, right: number];
+  /** Pixels of a phone that a sheet takes from below. */
+  readonly below: number;
 }
 
-/** What a panel takes with its margin, and the dock with its own, pixels (art direction, section 6). */
+/** What a panel takes with its margin, and the dock with its own and some of the names beside it, pixels (art direction, section 6). */
 const PANEL = 356;
-const DOCK = 76;
+const DOCK = 96;
+/** The same of a phone on its side, where a sheet is no wider than a share of the window (`style/sideways.css`). */
+const [SHEET, SHEET_SHARE] = [340, 0.56];
+const SIDE_DOCK = 112;
 
-/** `changed` is told of every panel that opens or shuts. The button that opened a panel gets the focus back. */
-export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, changed: (name: PanelName, open: boolean) => void): Panels {
+/** `changed` is told of every panel that opens or shuts, and `grown` where one has another size. The button that opened a panel gets the focus back. */
+export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, changed: (name: PanelName, open: boolean) => void, grown: () => void): Panels {
+  const sizes = new ResizeObserver(grown);
+  for (const panel of panels.values()) sizes.observe(panel);
   const order: PanelName[] = [];
   const returns = new Map<PanelName, HTMLElement>();
   const set = (name: PanelName, open: boolean) => {
@@ -52,10 +63,9 @@ export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, change
       if (PHONE.matches) for (const other of [...order]) set(other, false);
       order.push(name);
       if (before instanceof HTMLElement && before !== document.body) returns.set(name, before);
-    } else if (within) {
-      returns.get(name)?.focus();
     }
     document.body.classList.toggle("sheet-open", PHONE.matches && order.length > 0);
+    if (!open && within) returns.get(name)?.focus();
     changed(name, open);
   };
   return {
@@ -73,7 +83,11 @@ export function createPanels(panels: ReadonlyMap<PanelName, HTMLElement>, change
     get sheet() {
       return PHONE.matches && order.length > 0;
     },
+    get below() {
+      return PHONE.matches && !SIDEWAYS.matches ? Math.max(0, ...order.map((name) => panels.get(name)?.offsetHeight ?? 0)) : 0;
+    },
     get sides() {
+      if (SIDEWAYS.matches) return [0, order.length > 0 ? Math.min(SHEET, SHEET_SHARE * innerWidth) : SIDE_DOCK] as const;
       const taken = (...names: PanelName[]) => (names.some((name) => order.includes(name)) ? PANEL : DOCK);
       return [taken("library"), taken("strings", "line")] as const;
     },

@@ -16,7 +16,7 @@ export interface StringsCard {
   readonly panel: Panel;
   /** Shows the limbs of the `chosen` performer of all whose limbs these are; without `ready` nothing can be taken. */
   render(limbs: readonly LimbState[], ready: boolean, chosen?: number): void;
-  dock(shown: boolean): void;
+  readonly dock: HTMLElement;
   /** A quiet line about an input that was not taken as it came. */
   notice(text: string): void;
 }
@@ -93,9 +93,7 @@ export function createStringsCard(root: HTMLElement, on: StringsActions & { clos
   let fading: ReturnType<typeof setTimeout> | undefined;
   return {
     panel,
-    dock(shown) {
-      dock.hidden = !shown;
-    },
+    dock,
     notice(text) {
       clearTimeout(fading);
       setText(notice, text);

@@ -10,6 +10,8 @@ export type PanelName = "library" | "strings" | "line";
 export type Health = "good" | "poor" | "lost" | "none";
 
 export interface Transport {
+  /** What of it stands before the picture: on a phone some of its buttons are beside it. */
+  readonly parts: readonly HTMLElement[];
   readonly sound: SoundControl;
   timeline(playing: boolean, loop: boolean, ready: boolean): void;
   position(seconds: number, duration: number): void;
@@ -85,9 +87,11 @@ export function createTransport(root: HTMLElement, on: TransportActions): Transp
   );
   const tools = element("div", { class: "tools" }, loop, camera, sound.element, picture, keep, element("span", { class: "tools-rule" }), ...pills.values());
   const area = element("div", { class: "seek-area" }, element("div", { class: "times" }, now, end), seek.element);
-  root.append(element("section", { class: "transport", "aria-label": say("Transport") }, play, area, tools));
+  const bar = element("section", { class: "transport", "aria-label": say("Transport") }, play, area, tools);
+  root.append(bar);
   let shown = "";
   return {
+    parts: [bar, camera, picture, sound.element],
     sound,
     timeline(playing, looping, known) {
       ready = known;

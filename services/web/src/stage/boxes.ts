@@ -25,3 +25,8 @@ export function boxAround(at: Vector3, { across, up, down }: Extent, camera: Cam
   const metre = (camera.projectionMatrix.elements[5] * height) / 2 / depth;
   return { left: x - across * metre, top: y - up * metre, right: x + across * metre, bottom: y + down * metre };
 }
+
+/** Whether two boxes share any area, or would with `room` between them. */
+export function overlaps(a: Box, b: Box, room = 0): boolean {
+  return a.left - room < b.right && b.left < a.right + room && a.top - room < b.bottom && b.top < a.bottom + room;
+}

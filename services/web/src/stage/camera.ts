@@ -5,27 +5,37 @@
 import { MathUtils, PerspectiveCamera } from "three";
 import { createView, fovIn, mixViews, readView, type View } from "./view";
 
-/** `alone`: a stage without a page about it, so that nothing stands before it. */
-export type Framing = "desktop" | "phone" | "sheet" | "alone";
+/** `sideways`: a phone on its side. `alone`: a stage without a page about it, so that nothing stands before it. */
+export type Framing = "desktop" | "phone" | "sheet" | "sideways" | "alone";
 
 /** Visible height and the height looked at, metres for the standard figure. */
 const FRAMINGS: Readonly<Record<Framing, readonly [visible: number, look: number]>> = {
   desktop: [3.1, 1.005],
   phone: [3.95, 0.81],
   sheet: [4.7, 0.26],
+  sideways: [3.1, 1.005],
   alone: [3.1, 1.005],
 };
 /** Pixels from the bottom that the transport takes, and the window height the desktop framing was drawn for. */
-const TRANSPORT = 110;
-const DRAWN_FOR = 900;
+const TRANSPORT: Partial<Record<Framing, number>> = { desktop: 110, sideways: 76 };
+const DRAWN_WITH = 110 / 900;
+/** Pixels of the header over a phone's sheet; how high the standard figure is with some room over it, and without, metres; of the height, what is between its feet and the sheet; and what is seen at most, metres. */
+const HEADER = 80;
+const [ROOMY, TALL] = [2, 1.75];
+const UNDERFOOT = 0.03;
+const FURTHEST = 9;
 const HALF_FIELD = (13 * Math.PI) / 180;
 const EYE = 0.08;
 /** How far is seen from before one dancer, metres. */
 const FAR = 40;
 /** Metres that the standard figure takes to either side of its place, where there are several. */
 const ELBOW_ROOM = 0.9;
-/** Of the picture's width, what several dancers have at least, whatever stands before it. */
+/** What a narrow picture shows to either side where one of several is chosen, metres for the standard figure: it, one beside it, and some of the next. */
+const PAIR = 2.1;
+/** Of the picture's width, what dancers have at least, whatever stands before it. */
 const LEAST_FREE = 0.4;
+/** What stands before so much of it from a side covers one alone, who is in the middle else. */
+const COVERED = 0.35;
 const YAW = (25 * Math.PI) / 180;
 const PITCH_LOW = (-5 * Math.PI) / 180;
 const PITCH_HIGH = (15 * Math.PI) / 180;
@@ -47,9 +57,15 @@ export class AudienceCamera {
   /** The furthest that dancers were to a side, and nearer, since the last cut, metres: the seat goes back for them, and not forth again. */
   #aside = 0;
   #near = 0;
-  /** Of the picture's width, what they have, and how far the middle of that is from the picture's. */
+  /** Where the chosen one is of whom a narrow picture is, to the side; null where it is of all. And how far the seat is to be to the side for it, and is. */
+  #chosen: number | null = null;
+  #narrow = false;
+  #toSide = 0;
+  #side = 0;
+  /** Of the picture's width, what they have, and how far the middle of that is from the picture's: and where one alone is. */
   #free = 1;
   #middle = 0;
+  #alone = 0;
   #shift = 0;
   #shifted = 0;
   /** Whether the seat is still to be taken for the first time since the last cut. */
@@ -74,20 +90,23 @@ export class AudienceCamera {
   #untouched = REST;
 
   /**
-   * What of a picture `width` pixels wide stands before it to the left and to the right, pixels: several dancers are seen between. One alone is in the middle.
+   * What of a picture `width` pixels wide stands before it to the left and to the right, pixels: several dancers are seen between. One alone is in the middle where
+   * that is free.
    */
   set sides({ left, right, width }: { left: number; right: number; width: number }) {
     const free = 1 - (left + right) / width;
     const narrow = free < LEAST_FREE;
     this.#free = narrow ? 1 : free;
     this.#middle = narrow ? 0 : (left - right) / 2 / width;
+    this.#alone = Math.max(left, right) / width > COVERED ? this.#middle : 0;
   }
 
-  /** Changes the framing, eased over 0.6 s. In a window of few pixels the transport takes a larger share: the puppet makes room. */
-  frame(framing: Framing, height: number): void {
+  /** Changes the framing, eased over 0.6 s. In a window of few pixels the transport takes a larger share, as does a sheet `below`, pixels, where that is told: the puppet makes room. */
+  frame(framing: Framing, height: number, below = 0): void {
     const [visible, look] = FRAMINGS[framing];
-    const lost = framing === "desktop" ? Math.max(0, TRANSPORT / height - TRANSPORT / DRAWN_FOR) : 0;
-    this.#goal = [visible / (1 - lost), look - (visible / (1 - lost)) * (lost / 2)];
+    const lost = Math.max(0, (TRANSPORT[framing] ?? 0) / height - DRAWN_WITH);
+    this.#narrow = framing === "phone" || framing === "sheet";
+    this.#goal = framing === "sheet" && below > 0 ? overSheet(visible, below / height, HEADER / height) : [visible / (1 - lost), look - (visible / (1 - lost)) * (lost / 2)];
   }
 
   resize(aspect: number): void {
@@ -127,7 +146,8 @@ export class AudienceCamera {
     this.#met = false;
     this.#hasShow = false;
     this.#over = 0;
-    this.#aside = this.#near = 0;
+    this.#aside = this.#near = this.#toSide = this.#side = 0;
+    this.#shift = this.#alone;
     this.#fresh = true;
   }
 
@@ -136,8 +156,22 @@ export class AudienceCamera {
     return this.#aside;
   }
 
-  /** Where the dancers are, metres in the frame of the camera's parent. One alone has its picture; several have all theirs together. */
-  stand(dancers: readonly { x: number; z: number }[]): void {
+  /** Whether some of several dancers are out of the picture, which is of the chosen one. */
+  get partial(): boolean {
+    return this.#shownAside < this.#aside;
+  }
+
+  /** As far to the side as dancers are seen. */
+  get #shownAside(): number {
+    return this.#narrow && this.#chosen !== null ? Math.min(this.#aside, PAIR * this.scale) : this.#aside;
+  }
+
+  /**
+   * Where the dancers are, metres in the frame of the camera's parent. One alone has its picture; several have all theirs together, but in a narrow window, where they would
+   * be small: there it is of the `chosen` one and its neighbours, and goes to the side only where that one is not all in it.
+   */
+  stand(dancers: readonly { x: number; z: number }[], chosen: number | null = null): void {
+    this.#chosen = (chosen === null ? null : dancers[chosen]?.x) ?? null;
     if (dancers.length < 2) return;
     this.#aside = Math.max(this.#aside, ELBOW_ROOM * this.scale, ...dancers.map(({ x }) => Math.abs(x) + ELBOW_ROOM * this.scale));
     this.#near = Math.max(this.#near, ...dancers.map(({ z }) => z));
@@ -174,10 +208,15 @@ export class AudienceCamera {
     const share = this.still ? 1 : 1 - Math.exp((-4 / EASE) * seconds);
     // as far back as shows the dancers at the sides, and as far from the nearest as from one alone
     const one = ((visible / 2) * this.scale) / Math.tan(HALF_FIELD);
-    const wide = (Math.max(one, this.#aside / (Math.tan(HALF_FIELD) * this.camera.aspect * this.#free)) + this.#near) / one;
+    const aside = this.#shownAside;
+    const wide = (Math.max(one, aside / (Math.tan(HALF_FIELD) * this.camera.aspect * this.#free)) + this.#near) / one;
     this.wide += (wide - this.wide) * (this.#fresh ? 1 : share);
-    const shift = this.#aside > 0 ? this.#middle : 0;
-    this.#shift += (shift - this.#shift) * (this.#fresh ? 1 : share);
+    const shift = this.#aside > 0 ? this.#middle : this.#alone;
+    this.#shift += (shift - this.#shift) * (this.#fresh && this.#aside > 0 ? 1 : share);
+    // the whole of the chosen one, and no further than the dancers are
+    const [chosen, within, most] = [this.#chosen ?? 0, aside - ELBOW_ROOM * this.scale, this.#aside - aside];
+    this.#toSide = MathUtils.clamp(MathUtils.clamp(this.#toSide, chosen - within, chosen + within), -most, most);
+    this.#side += (this.#toSide - this.#side) * (this.#fresh ? 1 : share);
     this.#fresh &&= this.#aside === 0;
     this.#visible += (visible - this.#visible) * share;
     this.#height += (look - this.#height) * share;
@@ -194,9 +233,9 @@ export class AudienceCamera {
     const { position, gaze } = this.#own;
     const scale = this.scale * this.wide;
     const distance = ((this.#visible / 2) * scale * (1 + this.#back)) / Math.tan(HALF_FIELD);
-    gaze.set(0, this.#height * scale, 0);
+    gaze.set(this.#side, this.#height * scale, 0);
     const flat = distance * Math.cos(this.#pitch);
-    position.set(Math.sin(this.#yaw) * flat, gaze.y + EYE * scale + distance * Math.sin(this.#pitch), Math.cos(this.#yaw) * flat);
+    position.set(this.#side + Math.sin(this.#yaw) * flat, gaze.y + EYE * scale + distance * Math.sin(this.#pitch), Math.cos(this.#yaw) * flat);
     const { parent } = this.camera;
     if (parent) for (const place of [position, gaze]) parent.localToWorld(place);
     this.#own.fov = 2 * HALF_FIELD;
@@ -223,4 +262,11 @@ export class AudienceCamera {
     camera.lookAt(view.gaze);
     camera.updateMatrixWorld();
   }
+}
+
+/** The visible height, `least` or more, and the height looked at, metres, that show a dancer between a header and a sheet of such shares of the picture; where that is too little, the head. */
+function overSheet(least: number, sheet: number, header: number): readonly [visible: number, look: number] {
+  const foot = 1 - sheet - UNDERFOOT;
+  const visible = Math.min(FURTHEST, Math.max(least, ROOMY / Math.max(foot - header, 1e-3)));
+  return [visible, Math.max(visible * (foot - 0.5), TALL - visible * (0.5 - header))];
 }

@@ -46,6 +46,8 @@ export class Stage {
   /** Where the audience's camera was, for keeping. */
   readonly trail = new CameraTrail();
   readonly renderer: WebGLRenderer;
+  /** Whose strings are at hand, by whom a narrow picture of several is framed; null: all are to be seen. */
+  chosen: number | null = null;
   /** Whether the graphics are done with a frame that has a dancer in it. */
   shown = false;
   readonly #troupe: Troupe;
@@ -159,16 +161,15 @@ export class Stage {
     if (this.puppet) this.#compile();
   }
 
-  /** CSS pixels; `sides` are those that something stands before to the left and to the right, between which several dancers are seen. */
-  resize(width: number, height: number, framing: Framing, pixelRatio: number, [left, right]: readonly [number, number] = [0, 0]): void {
+  /** CSS pixels; `sides` are those that something stands before to the left and to the right, between which several dancers are seen, and `below` a sheet's. */
+  resize(width: number, height: number, framing: Framing, pixelRatio: number, [left, right]: readonly [number, number] = [0, 0], below = 0): void {
     const sharpest = framing === "desktop" ? SHARPEST.desktop : SHARPEST.phone;
     this.#width = width;
     this.#height = height;
     this.#sharpness = Math.min(pixelRatio, sharpest);
-    this.#setSize();
     this.#framing = framing;
     this.#placeDisc();
-    this.audience.frame(framing, height);
+    this.audience.frame(framing, height, below);
     this.audience.resize(width / height);
     this.audience.sides = { left, right, width };
   }
@@ -192,8 +193,9 @@ export class Stage {
       this.#floorAt.value = rig.group.position.y;
     }
     rig.group.updateMatrixWorld(true);
-    if (posed) audience.stand(shown.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))));
-    audience.update(seconds, posed ? this.#reach(shown) : 0, show);
+    const own = this.chosen === null ? -1 : shown.indexOf(this.performers[this.chosen]);
+    if (posed) audience.stand(shown.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))), own < 0 ? null : own);
+    audience.update(seconds, posed ? this.#reach(audience.partial ? [shown[own]] : shown) : 0, show);
     // what is about the dancers is as wide as the picture of them
     const { wide } = audience;
     this.#scenery.group.scale.setScalar(wide);
@@ -212,14 +214,12 @@ export class Stage {
     if (posed) this.#danced = true;
     else if ((this.#empty += seconds) < EMPTY_AFTER) return;
     if (this.shown || !this.#danced) this.#build();
+    this.#setSize();
     this.renderer.render(this.scene, audience.camera);
     this.#gate.close();
     const slow = posed && !this.#picturing && this.#quality.frame(this.#sinceDrawn);
     this.#sinceDrawn = 0;
-    if (slow) {
-      this.#setSize();
-      this.#furnish();
-    }
+    if (slow) this.#furnish();
   }
 
   /** Gives back all that the graphics hold; the stage and its canvas draw no more. */
@@ -263,7 +263,8 @@ export class Stage {
   /** Where a limb's bar is on the screen, CSS pixels; null while there is none. */
   bar(limb: number): Box | null {
     const at = this.strings.bar(limb);
-    return at && this.#box(at, BAR);
+    // drawn larger from further away, as all of the strings
+    return at && this.#box(at, BAR, Math.sqrt(this.audience.wide));
   }
 
   /** Where the faces are on the screen, CSS pixels. */
@@ -301,8 +302,9 @@ export class Stage {
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
-  #box(at: Vector3, { across, up, down }: Extent): Box {
-    const { camera, scale } = this.audience;
+  #box(at: Vector3, { across, up, down }: Extent, times = 1): Box {
+    const { camera } = this.audience;
+    const scale = this.audience.scale * times;
     return boxAround(at, { across: across * scale, up: up * scale, down: down * scale }, camera, this.#width, this.#height);
   }
 
@@ -321,7 +323,7 @@ export class Stage {
 
   /** The disc keeps its proportion to the dancer. */
   #placeDisc(): void {
-    const [radius, height] = this.#framing === "desktop" || this.#framing === "alone" ? [1.06, 1.3] : [0.98, 1.36];
+    const [radius, height] = this.#framing === "phone" || this.#framing === "sheet" ? [0.98, 1.36] : [1.06, 1.3];
     this.#backdrop.discRadius.value = radius * this.audience.scale;
     this.#backdrop.discCentre.value.set(0, height * this.audience.scale);
   }
@@ -339,9 +341,13 @@ export class Stage {
     this.#sinceDrawn = 0;
   }
 
+  /** Just before a frame is drawn, as it empties the canvas: and only where it is another. */
   #setSize(): void {
+    const ratio = this.#sharpness * this.#quality.quality.sharpness;
+    const size = this.renderer.getSize(new Vector2());
+    if (ratio === this.renderer.getPixelRatio() && size.x === this.#width && size.y === this.#height) return;
     // both at once: each time that its size changes a canvas waits for the graphics
-    this.renderer.setDrawingBufferSize(this.#width, this.#height, this.#sharpness * this.#quality.quality.sharpness);
+    this.renderer.setDrawingBufferSize(this.#width, this.#height, ratio);
   }
 
   /** Only the lacquer of the night mirrors, and only where the machine is up to it. */

@@ -73,8 +73,10 @@ test("a ring follows the pointer that took it, from where it was taken, and is l
   expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
   pointer.update(32);
   expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
+  expect(pointer.pulling).toBe(true);
   send("pointerup", at.x + 20, at.y - 40, 48);
   expect(hands.source(LEFT_HAND)).toBe(null);
+  expect(pointer.pulling).toBe(false);
 });
 
 test("of several performers the nearest ring is taken, whosever it is, but of none who is not seen", () => {

@@ -33,10 +33,33 @@ describe("the framing", () => {
     expect(above(audience, 1.75, height)).toBeLessThan(height * 0.85);
   });
 
+  test.each([320, 360, 430])("has room on a phone on its side for more, as all about it is lower, %d pixels high", (height) => {
+    const [sideways, desktop] = [seat("sideways", 2 * height, height), seat("desktop", 2 * height, height)];
+    expect(above(sideways, 0, height)).toBeGreaterThan(66);
+    expect(above(sideways, 1.75, height)).toBeLessThan(height * 0.85);
+    expect(above(sideways, 1.75, height) - above(sideways, 0, height)).toBeGreaterThan(above(desktop, 1.75, height) - above(desktop, 0, height));
+  });
+
   test("makes the puppet smaller on a phone, and lifts it over an open sheet", () => {
     const size = (framing: Framing) => above(seat(framing, 400, 800), 1.75, 800) - above(seat(framing, 400, 800), 0, 800);
     expect(size("phone")).toBeLessThan(size("desktop"));
     expect(above(seat("sheet", 400, 800), 0, 800)).toBeGreaterThan(above(seat("phone", 400, 800), 0, 800) + 50);
+  });
+
+  test.each([[844, 420], [844, 340], [640, 417], [640, 360]])("shows a dancer between the header and a sheet, %d pixels high with %d of it", (height, sheet) => {
+    const audience = seat("sheet", 390, height);
+    audience.frame("sheet", height, sheet);
+    audience.update(0, 0);
+    expect(above(audience, 0, height)).toBeGreaterThan(sheet);
+    expect(above(audience, 1.75, height)).toBeLessThan(height - 75);
+  });
+
+  test("shows at least the head over a sheet that leaves little room", () => {
+    const audience = seat("sheet", 390, 640);
+    audience.frame("sheet", 640, 486);
+    audience.update(0, 0);
+    expect(above(audience, 1.55, 640)).toBeGreaterThan(486);
+    expect(above(audience, 1.75, 640)).toBeLessThan(640 - 75);
   });
 
   test("shows a dancer twice the size in the same picture", () => {
@@ -234,6 +257,33 @@ describe("the show's camera", () => {
   });
 });
 
+describe("one alone", () => {
+  const middle = (audience: AudienceCamera, width: number) => (new Vector3(0, 1, 0).project(audience.camera).x * 0.5 + 0.5) * width;
+
+  test("is in the middle of what is free where a panel would cover it, and else in the middle", () => {
+    const audience = seat("sideways", 667, 375);
+    audience.sides = { left: 0, right: 340, width: 667 };
+    audience.update(0, 0);
+    expect(middle(audience, 667)).toBeCloseTo((667 - 340) / 2, 6);
+    audience.sides = { left: 0, right: 112, width: 667 };
+    audience.update(0, 0);
+    expect(middle(audience, 667)).toBeCloseTo(667 / 2, 6);
+  });
+
+  test("goes there calmly, and the next dance begins there", () => {
+    const audience = seat("sideways", 667, 375);
+    audience.still = false;
+    audience.sides = { left: 0, right: 340, width: 667 };
+    audience.update(1 / 60, 0);
+    expect(middle(audience, 667)).toBeGreaterThan(667 / 2 - 60);
+    run(audience, 3);
+    expect(middle(audience, 667)).toBeCloseTo((667 - 340) / 2, 1);
+    audience.cut();
+    audience.update(1 / 60, 0);
+    expect(middle(audience, 667)).toBeCloseTo((667 - 340) / 2, 2);
+  });
+});
+
 describe("several dancers", () => {
   const [LEFT, RIGHT] = [{ x: -3, z: 0 }, { x: 3, z: 0 }];
   const side = (audience: AudienceCamera, x: number, z = 0) => new Vector3(x, 1, z).project(audience.camera).x;
@@ -245,6 +295,45 @@ describe("several dancers", () => {
     expect(side(audience, 3.8)).toBeLessThan(1);
     expect(side(audience, -3.8)).toBeGreaterThan(-1);
     expect(above(audience, 0, height) / height).toBeCloseTo(above(seat(framing, width, height), 0, height) / height, 2);
+  });
+
+  describe("of whom one is chosen in a narrow window", () => {
+    const FOUR = [-2.7, -0.9, 0.9, 2.7].map((x) => ({ x, z: 0 }));
+    const chosen = (one: number | null, audience = seat("phone", 390, 844)) => {
+      audience.stand(FOUR, one);
+      audience.update(0, 0);
+      return audience;
+    };
+    const whole = (audience: AudienceCamera) => FOUR.map(({ x }) => Math.max(Math.abs(side(audience, x - 0.85)), Math.abs(side(audience, x + 0.85))) <= 1);
+
+    test("are seen by pairs, and nearer", () => {
+      expect(whole(chosen(0))).toEqual([true, true, false, false]);
+      expect(whole(chosen(3))).toEqual([false, false, true, true]);
+      expect(whole(chosen(null))).toEqual([true, true, true, true]);
+      expect(chosen(0).wide).toBeLessThan(0.65 * chosen(null).wide);
+      expect([chosen(0).partial, chosen(null).partial]).toEqual([true, false]);
+    });
+
+    test("are gone along only for one who is not all in the picture, and calmly", () => {
+      const audience = chosen(0);
+      const { x } = audience.camera.position;
+      expect(chosen(1, audience).camera.position.x).toBeCloseTo(x, 9);
+      audience.still = false;
+      audience.stand(FOUR, 2);
+      audience.update(1 / 60, 0);
+      expect(audience.camera.position.x).toBeGreaterThan(x);
+      expect(audience.camera.position.x).toBeLessThan(x + 0.4);
+      run(audience, 3);
+      expect(whole(audience)).toEqual([false, true, true, false]);
+    });
+
+    test("are all in a picture that is wide enough, and two in every one", () => {
+      expect(whole(chosen(0, seat("desktop", 1440, 900)))).toEqual([true, true, true, true]);
+      const two = seat("phone", 390, 844);
+      two.stand(FOUR.slice(1, 3), 0);
+      two.update(0, 0);
+      expect([two.partial, two.camera.position.x]).toEqual([false, 0]);
+    });
   });
 
   test("one alone, wherever it strays, has the picture of one", () => {
