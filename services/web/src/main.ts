@@ -1,6 +1,5 @@
 /** The only wiring: page, stage, inputs and the session they are about. */
 import "./style/page.css";
-import type { Vector3 } from "three";
 import { Arriving } from "./arriving";
 import { browserSound } from "./audio/preference";
 import { Castings } from "./casting";
@@ -13,6 +12,7 @@ import type { GamepadInput } from "./input/gamepad";
 import type { Hands } from "./input/hands";
 import { loadMapping, saveMapping } from "./input/mapping-store";
 import type { VelocityInputs } from "./input/velocity";
+import { Inviting } from "./inviting";
 import { addToStage } from "./joining";
 import { goOn, leave } from "./left";
 import { Listening } from "./listening";
@@ -35,8 +35,6 @@ import { browserStore } from "./storage/store";
 import { chooseOther, learnLanguage } from "./words/language";
 import { say } from "./words/say";
 
-const INVITED = "bunraku.invited";
-const INVITATION = 6_000;
 const SAMPLE_EVERY = 500;
 
 // first of all: the link's token leaves the address
@@ -62,7 +60,6 @@ let velocity: VelocityInputs | null = null;
 let pad: GamepadInput | null = null;
 let room: Room | null = null;
 let focused: number | null = null;
-let invitedAt: number | null = null;
 let theme: ThemeChoice | null = null;
 let mapping = loadMapping();
 
@@ -141,6 +138,7 @@ whenDenied(({ title, detail, hint }) => {
   denied = true;
   page.notice("access", title, hint ? say("{detail}; {hint}.", { detail, hint }) : detail);
 });
+const inviting = new Inviting(page.tags);
 const listening = new Listening((state) => page.transport.sound.render(state), page.transport.sound.element, browserSound);
 theme = createTheme((now) => {
   page.header.theme(now);
@@ -187,12 +185,6 @@ async function choose(id: string): Promise<void> {
 function renderPieces(): void {
   page.library.pieces(pieces.all, room?.viewer.motion ?? null);
   page.header.piece(pieces.find(room?.viewer.motion ?? null)?.name ?? "");
-}
-
-function endInvitation(): void {
-  invitedAt = -Infinity;
-  page.tags.invite(null);
-  browserStore.put(INVITED, "yes");
 }
 
 /** Watches a session, leaving the one before. */
@@ -290,7 +282,7 @@ async function openStage(): Promise<void> {
     line: () => page.panels.toggle("line"),
   };
   const changed = () => {
-    if (invitedAt !== -Infinity && hands?.any) endInvitation();
+    if (hands?.any) inviting.end();
     holding.render();
   };
   performing = new Performing(canvas, holding, { mapping: () => mapping, actions, changed, graphics });
@@ -328,9 +320,10 @@ function frame(): void {
   if (stage.shown || page.keys.open) pad?.update(now, !page.keys.listening);
   if (page.keys.open) page.keys.pad(pad?.pad ?? null);
   const { pose, limbs } = performing.draw(now, focused);
-  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], stage.faces, now, holding.chosen.performer);
-  page.messages.keepOff(stage.faces);
-  if (pose) invite(now);
+  const { faces } = stage;
+  page.tags.render(limbs, pose ? limbs.map((_, limb) => stage?.bar(limb) ?? null) : [], faces, now, holding.chosen.performer);
+  page.messages.keepOff(faces);
+  if (pose && !holding.watching) inviting.update(now, stage);
   if (stage.shown) arriving.arrived();
   page.transport.camera(stage.hasShow, stage.following);
   if (room && viewer) page.transport.position(room.position(now), viewer.duration);
@@ -341,22 +334,6 @@ function frame(): void {
     page.transport.health(page.line.health(line, holding.connected));
   }
   viewer?.drawn(performance.now() - now);
-}
-
-function screenPlace(at: Vector3 | null): { x: number; y: number } | null {
-  return at && stage ? stage.toScreen(at) : null;
-}
-
-/** On a first visit, six seconds of invitation by the hand nearer to the audience. */
-function invite(now: number): void {
-  if (holding.watching) return;
-  if (invitedAt === null) invitedAt = browserStore.get(INVITED) === null ? now : -Infinity;
-  if (invitedAt === -Infinity || !stage?.puppet) return;
-  if (now - invitedAt > INVITATION) {
-    endInvitation();
-    return;
-  }
-  page.tags.invite(screenPlace(stage.nearerHand()));
 }
 
 async function start(): Promise<void> {
