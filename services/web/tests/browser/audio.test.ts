@@ -84,8 +84,8 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
   ])("is heard where the stage is, %s", async (line, surroundings) => {
     const page = await open(motion.id, { ...surroundings, tapped: true });
     await heard(page, true);
-    expect(await loaded(page, /wasm-decoder/)).toBe(surroundings.decodes === false ? 1 : 0);
     const errors = await errorsOf(page);
+    expect(await loaded(page, /wasm-decoder/)).toBe(surroundings.decodes === false ? 1 : 0);
     expect(errors.length).toBeGreaterThanOrEqual(CLICKS);
     const sizes = errors.map(Math.abs).sort((a, b) => a - b);
     const share = (part: number) => Math.round(sizes[Math.ceil(part * sizes.length) - 1] * 10) / 10;
@@ -96,6 +96,8 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
   test("is heard by a script of our own where the browser decodes no Opus and the page lets no other run", async () => {
     const page = await open(motion.id, { decodes: false });
     await heard(page, true);
+    // there is a player, and by it the stage goes
+    await page.waitForFunction(() => window.bunraku.viewer.lead !== null);
     expect(await loaded(page, /wasm-decoder/)).toBe(1);
   });
 
@@ -114,7 +116,7 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
     await button.click();
     await heard(page, false);
     // who moves the slider wants to hear
-    await page.setViewportSize({ width: 1280, height: 320 });
+    await page.setViewportSize({ width: 1280, height: 480 });
     await page.getByRole("slider", { name: "Volume" }).fill("5");
     await heard(page, true);
     await page.waitForFunction(() => Math.abs(window.bunraku.listening.speaker!.output.gain.value - 0.25 ** 2) < 1e-3);
