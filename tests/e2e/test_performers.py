@@ -79,7 +79,7 @@ async def test_three_dance_side_by_side_and_each_has_strings_of_its_own(tmp_path
             dance = store.pose_at(position_at(state, reference), True, state.duration)
             assert dance is not None
             if pose is not None:
-                off = tips(store, pose) - tips(store, place.put(*dance))
+                off = tips(store, pose) - tips(store, place.bring(*dance))
                 pulled[nth].append(np.linalg.norm(off, axis=-1))
                 roots[nth].append(pose[0])
     assert all(len(frames) > 30 for frames in pulled)

@@ -42,7 +42,7 @@ def on_stage(motion: StoredMotion) -> list[np.ndarray]:
             for index, packet in packets
         ]
         root, rotations = (np.concatenate(part) for part in zip(*blocks, strict=True))
-        root, rotations = dance.place.put(root, rotations)
+        root, rotations = dance.place.bring(root, rotations)
         forward = rotation.rotate(rotations[:, 0], np.array([0.0, 0.0, 1.0])).mean(axis=0)
         assert np.arctan2(forward[0], forward[2]) == pytest.approx(0.0, abs=0.05)
         found.append(root)

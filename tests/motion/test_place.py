@@ -14,7 +14,7 @@ NUMBER = st.floats(-6.0, 6.0)
 
 def test_in_the_middle_nothing_is_moved() -> None:
     motion = wandering_motion(0.3, 30.0, 3)
-    root, rotations = MIDDLE.put(motion.root, motion.rotations)
+    root, rotations = MIDDLE.bring(motion.root, motion.rotations)
     assert root is motion.root
     assert rotations is motion.rotations
 
@@ -23,7 +23,7 @@ def test_in_the_middle_nothing_is_moved() -> None:
 def test_every_point_is_turned_from_z_towards_x_and_moved(x: float, z: float, turn: float) -> None:
     motion = wandering_motion(0.2, 30.0, 3)
     before = points(motion.figure, motion.root, motion.rotations)
-    after = points(motion.figure, *Place(x, z, turn).put(motion.root, motion.rotations))
+    after = points(motion.figure, *Place(x, z, turn).bring(motion.root, motion.rotations))
     sine, cosine = np.sin(turn), np.cos(turn)
     np.testing.assert_allclose(after[..., 0], cosine * before[..., 0] + sine * before[..., 2] + x, atol=1e-9)
     np.testing.assert_allclose(after[..., 1], before[..., 1], atol=1e-9)
@@ -33,8 +33,8 @@ def test_every_point_is_turned_from_z_towards_x_and_moved(x: float, z: float, tu
 def test_one_pose_is_put_as_many_are() -> None:
     motion = wandering_motion(0.2, 30.0, 4)
     place = Place(1.0, -2.0, 0.7)
-    root, rotations = place.put(motion.root, motion.rotations)
-    alone_root, alone_rotations = place.put(motion.root[2], motion.rotations[2])
+    root, rotations = place.bring(motion.root, motion.rotations)
+    alone_root, alone_rotations = place.bring(motion.root[2], motion.rotations[2])
     np.testing.assert_allclose(alone_root, root[2])
     np.testing.assert_allclose(alone_rotations, rotations[2])
 
@@ -69,7 +69,7 @@ def test_in_a_row_each_is_as_far_from_the_next_as_is_asked_and_all_are_about_the
     apart, turns = [far for _, _, far, _ in dances[1:]], [turn for *_, turn in dances]
     places = in_a_row(middles, apart, turns)
     at = [
-        place.put(np.array([x, 0.9, z]), np.tile([1.0, 0.0, 0.0, 0.0], (18, 1)))[0]
+        place.bring(np.array([x, 0.9, z]), np.tile([1.0, 0.0, 0.0, 0.0], (18, 1)))[0]
         for place, (x, z) in zip(places, middles, strict=True)
     ]
     np.testing.assert_allclose([z for _, _, z in at], 0.0, atol=1e-9)

@@ -169,7 +169,7 @@ class Viewer:
         pose = store.pose_at(position, state.loop, state.duration) if store is not None else None
         if pose is None:
             return None
-        root, rotations = tracks.places[performer].put(*pose)
+        root, rotations = tracks.places[performer].bring(*pose)
         return root, self._overlays.lay(rotations, reference, performer)
 
     def scene_at(self, reference: int, scene: int = 0) -> Array | None:

@@ -37,11 +37,6 @@ class Overlay:
         """The joints' rotations (n, 3, 4)."""
         return np.array(self.joints)
 
-    @property
-    def mask(self) -> int:
-        """Bit k stands for limb k."""
-        return sum(1 << limb for limb in self.limbs)
-
 
 def apply(rotations: Array, overlay: Overlay | None) -> Array:
     """The pose (18, 4) with the overlay's joints in place of the dance's; all others bit for bit as they were."""

@@ -33,7 +33,7 @@ class Place(NamedTuple):
             raise ValueError(f"x and z of a place are within {FURTHEST:g} metres")
         return cls(*numbers)
 
-    def put(self, root: Array, rotations: Array) -> tuple[Array, Array]:
+    def bring(self, root: Array, rotations: Array) -> tuple[Array, Array]:
         """Root positions (..., 3), metres, and joint rotations (..., 18, 4), as they are on the stage. Only the root's
         rotation is another."""
         if self == MIDDLE:

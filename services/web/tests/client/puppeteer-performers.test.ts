@@ -1,21 +1,18 @@
 /** A puppeteer with the limbs of several performers in hand. */
 
-import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { afterEach, beforeEach, describe, expect, test } from "vitest";
 import { marionette } from "../../src/client/marionette";
-import { Puppeteer } from "../../src/client/puppeteer";
-import { Viewer } from "../../src/client/viewer";
+import type { Puppeteer } from "../../src/client/puppeteer";
+import type { Viewer } from "../../src/client/viewer";
 import { copyPose, type Pose, restPose } from "../../src/motion/skeleton";
-import { type BlockVectors, goldenDescription } from "../golden";
+import { goldenDescription } from "../golden";
 import { table } from "../marionette/figure";
-import { bytes, vectors } from "../vectors";
-import { Line } from "./line";
+import { begin, end, now, pass } from "./controlled";
+import type { Line } from "./line";
 
-const UNIX = 1_774_000_000_000_000;
-const [block] = vectors<BlockVectors>("blocks").valid.map((vector) => bytes(vector.block));
 const free = (limbs: number) => Array.from({ length: limbs }, () => null);
 const nobody = (limbs: number): string[][] => Array.from({ length: limbs }, () => []);
 
-let now = 0;
 let viewer: Viewer;
 let stream: Line;
 let puppeteer: Puppeteer;
@@ -23,39 +20,12 @@ let line: Line;
 let told: unknown[];
 
 beforeEach(async () => {
-  Line.install();
-  now = 0;
+  ({ viewer, stream, puppeteer, line } = await begin([goldenDescription(), { ...goldenDescription(), place: [1, -2, 2.5] }]));
   told = [];
-  viewer = new Viewer({ url: "ws://stage/v1/sessions/s/stream", now: () => now, solver: (figure) => marionette(figure, [table, table]) });
-  stream = Line.last;
-  stream.accept();
-  stream.say(
-    { name: "ChannelHeader", motion: "d", now: UNIX, channels: 38, software: "0", version: 1, clock: "unix" },
-    { name: "Description", motion: "d", first: null, tracks: [goldenDescription(), { ...goldenDescription(), place: [1, -2, 2.5] }] },
-    { name: "TimelineState", epoch: 1, motion: "d", clock: UNIX, position: 0, playing: false, loop: true, duration: 2_600_000 },
-    { name: "Data", track: 0, rate: 1, index: 0, block }, { name: "Data", track: 1, rate: 1, index: 0, block },
-  );
-  poses();
-  // the solvers are made in their own time
-  await vi.advanceTimersByTimeAsync(0);
-  puppeteer = new Puppeteer({ url: "ws://stage/v1/sessions/s/control", viewer, now: () => now });
-  line = Line.last;
-  viewer.attach(puppeteer);
   for (const name of ["grant", "lapsed", "refusal"]) puppeteer.addEventListener(name, (event) => told.push([name, (event as CustomEvent).detail]));
-  line.accept();
-  line.say({ name: "Welcome", id: "a1", colour: 2, lead: 100_000 });
 });
 
-afterEach(() => {
-  puppeteer.close();
-  viewer.close();
-  Line.remove();
-});
-
-function pass(ms: number): void {
-  now += ms;
-  vi.advanceTimersByTime(ms);
-}
+afterEach(() => end({ viewer, stream, puppeteer, line }));
 
 /** Both poses as drawn now. */
 function poses(): Pose[] {

@@ -1,53 +1,22 @@
-import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { afterEach, beforeEach, describe, expect, test } from "vitest";
 import { marionette } from "../../src/client/marionette";
-import { Puppeteer } from "../../src/client/puppeteer";
-import { Viewer } from "../../src/client/viewer";
-import { type BlockVectors, goldenDescription } from "../golden";
+import type { Puppeteer } from "../../src/client/puppeteer";
+import type { Viewer } from "../../src/client/viewer";
+import { goldenDescription } from "../golden";
 import { table } from "../marionette/figure";
-import { bytes, vectors } from "../vectors";
+import { begin, end, now, pass, UNIX } from "./controlled";
 import { Line } from "./line";
 
-const UNIX = 1_774_000_000_000_000;
-const [block] = vectors<BlockVectors>("blocks").valid.map((vector) => bytes(vector.block));
-
-let now = 0;
 let viewer: Viewer;
 let stream: Line;
 let puppeteer: Puppeteer;
 let line: Line;
 
 beforeEach(async () => {
-  Line.install();
-  now = 0;
-  viewer = new Viewer({ url: "ws://stage/v1/sessions/s/stream", now: () => now, solver: (figure) => marionette(figure, [table, table]) });
-  stream = Line.last;
-  stream.accept();
-  stream.say(
-    { name: "ChannelHeader", motion: "d", now: UNIX, channels: 19, software: "0", version: 1, clock: "unix" },
-    { name: "Description", motion: "d", first: null, tracks: [goldenDescription()] },
-    { name: "TimelineState", epoch: 1, motion: "d", clock: UNIX, position: 0, playing: false, loop: true, duration: 2_600_000 },
-    { name: "Data", track: 0, rate: 1, index: 0, block },
-  );
-  // the solver is made from the first pose on, in its own time
-  viewer.poseAt(now);
-  await vi.advanceTimersByTimeAsync(0);
-  puppeteer = new Puppeteer({ url: "ws://stage/v1/sessions/s/control", viewer, now: () => now });
-  line = Line.last;
-  viewer.attach(puppeteer);
-  line.accept();
-  line.say({ name: "Welcome", id: "a1", colour: 2, lead: 100_000 });
+  ({ viewer, stream, puppeteer, line } = await begin([goldenDescription()]));
 });
 
-afterEach(() => {
-  puppeteer.close();
-  viewer.close();
-  Line.remove();
-});
-
-function pass(ms: number): void {
-  now += ms;
-  vi.advanceTimersByTime(ms);
-}
+afterEach(() => end({ viewer, stream, puppeteer, line }));
 
 /** Where the left hand is as drawn now. */
 function drawn(): number[] {
