@@ -9,6 +9,7 @@ export { Viewer, type LineFigures, type Presence, type Timeline, type ViewerOpti
 
 export type { LightState } from "./playout/scenes";
 export { Stage } from "./stage/stage";
+export { openGraphics, type Graphics } from "./stage/graphics";
 export type { Framing } from "./stage/camera";
 export type { Theme } from "./stage/look";
 export type { StringState } from "./stage/strings";
