@@ -1,6 +1,6 @@
 /** Dances as a file, made beside a page that stays alive. */
 
-import type { Figure } from "../motion/skeleton";
+import { lengthsOf, type Figure } from "../motion/skeleton";
 import type { BlockStore } from "../playout/blocks";
 import { atEase } from "./at-ease";
 import { writeBvh } from "./bvh";
@@ -53,8 +53,7 @@ function* cast(dances: readonly Dance[], { model }: Looks): Work<Danced[]> {
   const models = new Map<string, PuppetModel>();
   const danced: Danced[] = [];
   for (const dance of dances) {
-    const { offsets, tips } = dance.figure;
-    const lengths = `${offsets.join()} ${tips.join()}`;
+    const lengths = lengthsOf(dance.figure);
     const made = models.get(lengths) ?? model(dance.figure);
     models.set(lengths, made);
     danced.push({ dance, model: made });

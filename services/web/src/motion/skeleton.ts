@@ -32,6 +32,11 @@ export interface Figure {
   tips: Float64Array;
 }
 
+/** The same text for dancers of equal lengths, and for no others: what is made for one is made for all of them. */
+export function lengthsOf({ offsets, tips }: Figure): string {
+  return `${offsets.join()} ${tips.join()}`;
+}
+
 /** One pose: the root's position (3) in metres, and a local rotation w x y z for each joint (72). */
 export interface Pose {
   root: Float64Array;

@@ -1,6 +1,6 @@
 /** Where puppets are carved and dressed: those of one stage share their materials, and those of equal lengths their mesh. */
 import type { BufferGeometry, IUniform, Material } from "three";
-import { JOINTS, type Figure } from "../motion/skeleton";
+import { JOINTS, lengthsOf, type Figure } from "../motion/skeleton";
 import { Assembly } from "./assembly";
 import { fitTo } from "./fit";
 import { addArms } from "./parts/arms";
@@ -63,8 +63,4 @@ export class Workshop {
     this.keep([]);
     for (const material of [this.full, this.mirrored, this.#plain]) material?.dispose();
   }
-}
-
-function lengthsOf({ offsets, tips }: Figure): string {
-  return `${offsets.join()} ${tips.join()}`;
 }

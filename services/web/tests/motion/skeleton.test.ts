@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import { fromRotationVector } from "../../src/motion/rotation";
 import {
+  lengthsOf,
   copyPose, emptyWorld, JOINT_COUNT, JOINTS, LIMB_JOINTS, LIMBS, PARENTS, restPose, TIPS, world,
 } from "../../src/motion/skeleton";
 
@@ -44,4 +45,13 @@ test("a pose is copied whole", () => {
   copyPose(from, to);
   expect(to).toEqual(from);
   expect(to.root).not.toBe(from.root);
+});
+
+test("dancers of equal lengths are told apart from all others", () => {
+  const dancer = () => ({ offsets: Float64Array.from({ length: 54 }, (_, k) => k / 3), tips: new Float64Array(54) });
+  expect(lengthsOf(dancer())).toBe(lengthsOf(dancer()));
+  const [taller, longer] = [dancer(), dancer()];
+  taller.offsets[53] += 1e-12;
+  longer.tips[0] = 0.2;
+  expect(new Set([dancer(), taller, longer].map(lengthsOf)).size).toBe(3);
 });
