@@ -254,16 +254,26 @@ function expose(): void {
   Object.assign(window, { bunraku: { stage, viewer: room?.viewer ?? null, puppeteer: room?.puppeteer ?? null, hands, listening } });
 }
 
+/** The stage will not come: what waits for the puppet waits no longer. */
+function withoutStage(why: string): void {
+  arriving.arrived();
+  page.notice("graphics", say("This browser cannot draw the stage"), why);
+}
+
 async function openStage(): Promise<void> {
   let graphics: Graphics;
   try {
     graphics = openGraphics(canvas, query.get("quality") === "best");
   } catch {
-    arriving.arrived();
-    page.notice("graphics", say("This browser cannot draw the stage"), say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
+    withoutStage(say("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
     return;
   }
-  const { createGamepad, listenToKeyboard, listenToMouse, Performing } = await import("./theatre");
+  const theatre = await import("./theatre").catch(() => null);
+  if (!theatre) {
+    withoutStage(say("What draws it could not be loaded. Load this page again."));
+    return;
+  }
+  const { createGamepad, listenToKeyboard, listenToMouse, Performing } = theatre;
   // what came over the line meanwhile is first: what that asks for is on its way while the stage is built
   await new Promise((done) => setTimeout(done));
   const actions = {

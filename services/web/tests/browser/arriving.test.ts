@@ -32,4 +32,11 @@ describeInBrowser("arriving", { demo: true }, ({ open }) => {
     // what is about the dancer has come, too
     await page.waitForFunction(() => window.bunraku.stage.scene.getObjectByName("floor") && window.bunraku.stage.scene.getObjectByName("strings"));
   });
+
+  test("a page whose stage cannot be loaded says so, and is there all the same", async () => {
+    const page = await open("", { before: (page) => page.route("**/theatre-*.js", (route) => route.abort()) });
+    await page.getByText("What draws it could not be loaded").waitFor();
+    expect(await page.getByRole("button", { name: "Library" }).isVisible()).toBe(true);
+    await page.locator(".people-count").waitFor();
+  });
 });
