@@ -13,7 +13,7 @@ import hypothesis
 import pytest
 from httpx2._config import DEFAULT_TIMEOUT_CONFIG
 
-from tests.servers import clip, running
+from tests.servers import make_bvh_clip, run_server
 
 # how long an example takes says more of the machine than of the code
 hypothesis.settings.register_profile("bunraku", deadline=None)
@@ -25,31 +25,31 @@ DEFAULT_TIMEOUT_CONFIG.read = 60.0
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
-TALLIES = pytest.StashKey[list[str]]()
+SUMMARY_LINES = pytest.StashKey[list[str]]()
 
 
 @pytest.fixture
 def tally(pytestconfig: pytest.Config) -> Callable[[str], None]:
     """Says a line at the end of the run, when all is well too."""
-    return pytestconfig.stash.setdefault(TALLIES, []).append
+    return pytestconfig.stash.setdefault(SUMMARY_LINES, []).append
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Hands on what this process counted, where it is one of several."""
     if hasattr(session.config, "workeroutput"):
-        session.config.workeroutput["counted"] = session.config.stash.get(TALLIES, [])
+        session.config.workeroutput["counted"] = session.config.stash.get(SUMMARY_LINES, [])
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
     """Takes in what a process of several counted, when it has ended."""
     counted = getattr(node, "workeroutput", {}).get("counted", [])
-    node.config.stash.setdefault(TALLIES, []).extend(counted)
+    node.config.stash.setdefault(SUMMARY_LINES, []).extend(counted)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     """Prints what tests counted."""
-    lines = config.stash.get(TALLIES, [])
+    lines = config.stash.get(SUMMARY_LINES, [])
     if lines:
         terminalreporter.section("counted")
         for line in lines:
@@ -80,7 +80,7 @@ def shared() -> Path:
 @pytest.fixture(scope="session")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of a running server that all tests of this kind share."""
-    with running(tmp_path_factory.mktemp("server")) as url:
+    with run_server(tmp_path_factory.mktemp("server")) as url:
         yield url
 
 
@@ -88,5 +88,5 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 def clip_file(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """A small motion file, another for every test."""
     path = tmp_path / "clip.bvh"
-    path.write_bytes(clip(seed=zlib.crc32(request.node.nodeid.encode()) % 100_000))
+    path.write_bytes(make_bvh_clip(seed=zlib.crc32(request.node.nodeid.encode()) % 100_000))
     return path

@@ -19,12 +19,12 @@ from pathlib import Path
 
 import pytest
 
-STARTING = 30.0
-EACH = 1_000
+START_TIMEOUT_S = 30.0
+PORTS_PER_WORKER = 1_000
 """Ports that one of the processes of the tests has."""
 
 
-def needed(program: str, *folders: Path) -> str:
+def find_program(program: str, *folders: Path) -> str:
     """Where a program is; without it a test is skipped, and fails in CI."""
     found = shutil.which(program, path=os.pathsep.join([os.environ.get("PATH", ""), "/usr/sbin", *map(str, folders)]))
     if found is None:
@@ -46,15 +46,15 @@ def free_port() -> int:
 def _ports() -> Iterator[int]:
     """Those of this process of the tests, over and over: another begins elsewhere, and another run mostly so."""
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    first = 12_000 + EACH * (worker % 20)
+    first = 12_000 + PORTS_PER_WORKER * (worker % 20)
     for number in itertools.count(os.getpid()):
-        yield first + number % EACH
+        yield first + number % PORTS_PER_WORKER
 
 
 _PORTS = _ports()
 
 
-class Owned:
+class ServerProcess:
     """A server process that can be killed, stood still and started again at the same place."""
 
     def __init__(
@@ -71,7 +71,7 @@ class Owned:
             self._process = subprocess.Popen(
                 self.command, stdout=said, stderr=said, stdin=subprocess.DEVNULL, cwd=self.folder, user=self._user
             )
-        end = time.monotonic() + STARTING
+        end = time.monotonic() + START_TIMEOUT_S
         while time.monotonic() < end and self._process.poll() is None:
             try:
                 socket.create_connection(("127.0.0.1", self.port), 1).close()
@@ -91,34 +91,34 @@ class Owned:
 
     def pause(self) -> None:
         """It, and its own processes, stand still; returns when they do."""
-        everyone = self._everyone()
+        everyone = self._process_tree()
         for pid in everyone:
-            _send(pid, signal.SIGSTOP)
-        end = time.monotonic() + STARTING
-        while any(_state(pid) not in "TXZ" for pid in everyone):
+            _send_signal(pid, signal.SIGSTOP)
+        end = time.monotonic() + START_TIMEOUT_S
+        while any(_process_state(pid) not in "TXZ" for pid in everyone):
             assert time.monotonic() < end, "it does not stand still"
             time.sleep(0.005)
 
     def resume(self) -> None:
         """They go on."""
-        for pid in self._everyone():
-            _send(pid, signal.SIGCONT)
+        for pid in self._process_tree():
+            _send_signal(pid, signal.SIGCONT)
 
-    def _everyone(self) -> list[int]:
+    def _process_tree(self) -> list[int]:
         pid = self.pid
         return [pid, *map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())]
 
     def kill(self) -> None:
         """End it, and its own processes, as a power cut does."""
-        for pid in self._everyone():
-            _send(pid, signal.SIGKILL)
-        self._end(signal.SIGKILL)
+        for pid in self._process_tree():
+            _send_signal(pid, signal.SIGKILL)
+        self._terminate(signal.SIGKILL)
 
     def stop(self) -> None:
         """End it; nothing happens where it has ended."""
-        self._end(signal.SIGINT)
+        self._terminate(signal.SIGINT)
 
-    def _end(self, number: signal.Signals) -> None:
+    def _terminate(self, number: signal.Signals) -> None:
         if self._process is not None:
             self._process.send_signal(signal.SIGCONT)
             self._process.send_signal(number)
@@ -130,18 +130,18 @@ class Owned:
             self._process = None
 
 
-def processor_seconds(pid: int) -> float:
+def cpu_seconds(pid: int) -> float:
     """What a process has used of a processor in user and kernel mode, seconds, without its children's."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def _send(pid: int, number: signal.Signals) -> None:
+def _send_signal(pid: int, number: signal.Signals) -> None:
     with contextlib.suppress(ProcessLookupError):
         os.kill(pid, number)
 
 
-def _state(pid: int) -> str:
+def _process_state(pid: int) -> str:
     """T: stands still; X: is gone."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0].upper()
@@ -150,7 +150,7 @@ def _state(pid: int) -> str:
 
 
 @contextmanager
-def _owned(server: Owned) -> Iterator[Owned]:
+def _run(server: ServerProcess) -> Iterator[ServerProcess]:
     try:
         server.start()
         yield server
@@ -159,35 +159,35 @@ def _owned(server: Owned) -> Iterator[Owned]:
 
 
 @contextmanager
-def nats_server(folder: Path, *options: str) -> Iterator[Owned]:
+def run_nats_server(folder: Path, *options: str) -> Iterator[ServerProcess]:
     """A nats-server; skips the test where there is none."""
     port = free_port()
-    program = needed("nats-server")
-    with _owned(Owned([program, "-a", "127.0.0.1", "-p", str(port), *options], port, folder)) as server:
+    program = find_program("nats-server")
+    with _run(ServerProcess([program, "-a", "127.0.0.1", "-p", str(port), *options], port, folder)) as server:
         yield server
 
 
 @contextmanager
-def jetstream(folder: Path) -> Iterator[Owned]:
+def run_jetstream(folder: Path) -> Iterator[ServerProcess]:
     """A nats-server that keeps what it is given, also when it is killed; skips the test where there is none."""
     config = folder / "nats.conf"
     config.write_text(f'jetstream {{ store_dir: "{folder / "store"}" }}\n')
-    with nats_server(folder, "-c", str(config)) as server:
+    with run_nats_server(folder, "-c", str(config)) as server:
         yield server
 
 
-def url_of(server: Owned) -> str:
+def nats_url_of(server: ServerProcess) -> str:
     """The bus's address of a nats-server."""
     return f"nats://127.0.0.1:{server.port}"
 
 
 @contextmanager
-def postgres() -> Iterator[Owned]:
+def run_postgres() -> Iterator[ServerProcess]:
     """A PostgreSQL server without a password, its only user `postgres`; skips the test where there is none."""
     debian = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
-    initdb, program = needed("initdb", *debian), needed("postgres", *debian)
+    initdb, program = find_program("initdb", *debian), find_program("postgres", *debian)
     # it refuses to run as root, and whom it runs as has no way into the tests' own folder
-    user = _somebody() if os.geteuid() == 0 else None
+    user = _unprivileged_user() if os.geteuid() == 0 else None
     with tempfile.TemporaryDirectory(prefix="bunraku-postgres-", dir="/tmp") as name:
         folder = Path(name)
         if user is not None:
@@ -209,12 +209,12 @@ def postgres() -> Iterator[Owned]:
         }
         set_to = (word for option, value in options.items() for word in ("-c", f"{option}={value}"))
         command = [program, "-D", str(folder / "data"), *set_to]
-        ready = [needed("pg_isready", *debian), "-q", "-h", "127.0.0.1", "-p", str(port)]
-        with _owned(Owned(command, port, folder, user, ready)) as server:
+        ready = [find_program("pg_isready", *debian), "-q", "-h", "127.0.0.1", "-p", str(port)]
+        with _run(ServerProcess(command, port, folder, user, ready)) as server:
             yield server
 
 
-def _somebody() -> str:
+def _unprivileged_user() -> str:
     for name in ("postgres", "nobody"):
         try:
             pwd.getpwnam(name)
@@ -225,10 +225,10 @@ def _somebody() -> str:
 
 
 @contextmanager
-def s3_server(folder: Path) -> Iterator[Owned]:
+def run_s3_server(folder: Path) -> Iterator[ServerProcess]:
     """moto's server, which speaks the S3 API and keeps everything in memory."""
     port = free_port()
-    with _owned(
-        Owned([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)], port, folder)
+    with _run(
+        ServerProcess([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)], port, folder)
     ) as server:
         yield server

@@ -9,15 +9,15 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bunraku.backing.settings import Settings
+from bunraku.motion.bvh_writer import write_bvh
 from bunraku.motion.skeleton import Motion
-from bunraku.motion.writers import write_bvh
+from bunraku.runtime.settings import Settings
 from bunraku.serve import SERVICES, serve
-from tests.vectors.blocks import wandering_motion
+from tests.vectors.blocks import random_motion
 
 
 @contextmanager
-def running(
+def run_server(
     data: Path,
     *,
     demo: bool = False,
@@ -34,7 +34,7 @@ def running(
     def run() -> None:
         async def until_ended() -> None:
             given = Settings(data=data, **settings)  # type: ignore[arg-type]
-            serving = asyncio.create_task(serve(given, listening, demo=demo, ready=started.set, services=services))
+            serving = asyncio.create_task(serve(given, listening, demo=demo, on_ready=started.set, services=services))
             ending = asyncio.create_task(asyncio.to_thread(ended.wait))
             await asyncio.wait((serving, ending), return_when=asyncio.FIRST_COMPLETED)
             ended.set()
@@ -63,7 +63,7 @@ def running(
         assert not failures, failures
 
 
-def clip(seconds: float = 3.4, seed: int = 3, fps: float = 30.0) -> bytes:
+def make_bvh_clip(seconds: float = 3.4, seed: int = 3, fps: float = 30.0) -> bytes:
     """A small BVH file of arbitrary smooth movement."""
-    motion = wandering_motion(seconds, fps, seed)
+    motion = random_motion(seconds, fps, seed)
     return write_bvh(Motion(motion.figure, fps, motion.root * 0.1 + [0, 0.85, 0], motion.rotations))

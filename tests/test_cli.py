@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from bunraku import __version__
 from bunraku.cli import app
-from tests.sounds import tone, write
+from tests.audio import make_tone, write_audio
 
 RUN = CliRunner()
 
@@ -29,7 +29,7 @@ def test_upload_list_watch_and_version_speak_json(server: str, clip_file: Path) 
 
 
 def test_audio_is_added_and_told(server: str, clip_file: Path, tmp_path: Path) -> None:
-    song = str(write(tmp_path / "song.wav", tone(1.0, 48_000), 48_000))
+    song = str(write_audio(tmp_path / "song.wav", make_tone(1.0, 48_000), 48_000))
     motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
     added = RUN.invoke(app, ["audio", f"{server}/v1/motions/{motion}", song, "--json"])
     assert added.exit_code == 0, added.output

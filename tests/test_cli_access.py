@@ -14,12 +14,12 @@ import jwt
 import pytest
 from typer.testing import CliRunner
 
-from bunraku.backing.access import Role
-from bunraku.backing.secret import NAME, own_secret
-from bunraku.backing.tokens import Tokens
 from bunraku.cli import app
-from tests.guests import SECRET, headers, token
-from tests.servers import clip, running
+from bunraku.http.access_control import Role
+from bunraku.http.access_token import TokenSigner
+from bunraku.http.secret import SECRET_FILE_NAME, load_or_create_secret
+from tests.credentials import SECRET, bearer_headers, make_token
+from tests.servers import make_bvh_clip, run_server
 
 RUN = CliRunner()
 BUNRAKU = Path(sys.executable).parent / "bunraku"
@@ -28,9 +28,9 @@ BUNRAKU = Path(sys.executable).parent / "bunraku"
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, str]]:
     """A server with a secret, and a session at it."""
-    with running(tmp_path_factory.mktemp("guarded"), secret=SECRET) as url:
-        with httpx2.Client(base_url=url, headers=headers(token(subject="host")), timeout=60) as http:
-            motion = http.post("/v1/motions?filename=a.bvh", content=clip(2.0, 5)).json()["id"]
+    with run_server(tmp_path_factory.mktemp("guarded"), secret=SECRET) as url:
+        with httpx2.Client(base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=60) as http:
+            motion = http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(2.0, 5)).json()["id"]
             session = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
         yield url, session
 
@@ -40,7 +40,7 @@ def test_a_token_is_made_with_the_secret_of_the_environment_or_the_server_s_own(
 ) -> None:
     monkeypatch.setenv("BUNRAKU_SECRET", SECRET)
     made = RUN.invoke(app, ["token", "--role", "control", "--hours", "2", "--name", "aiko", "--session", "s1"])
-    access = Tokens(SECRET).read(made.stdout.strip(), time.time())
+    access = TokenSigner(SECRET).verify(made.stdout.strip(), time.time())
     assert (access.role, access.subject, access.session) == (Role.CONTROL, "aiko", "s1")
     assert access.expires == pytest.approx(time.time() + 7200, abs=60)
     told = json.loads(RUN.invoke(app, ["token", "--server", "https://stage.example/", "--json"]).stdout)
@@ -49,9 +49,9 @@ def test_a_token_is_made_with_the_secret_of_the_environment_or_the_server_s_own(
     link = RUN.invoke(app, ["token", "--server", "https://stage.example", "--session", "s1", "--role", "view"])
     assert link.stdout.startswith("https://stage.example/?session=s1#token=")
     monkeypatch.delenv("BUNRAKU_SECRET")
-    own = own_secret(tmp_path)
+    own = load_or_create_secret(tmp_path)
     made = RUN.invoke(app, ["token", "--data", str(tmp_path)])
-    assert Tokens(own).read(made.stdout.strip(), time.time()).role is Role.ADMIN
+    assert TokenSigner(own).verify(made.stdout.strip(), time.time()).role is Role.ADMIN
 
 
 def test_without_a_secret_or_with_a_bad_one_there_is_none_and_no_secret_is_said(
@@ -76,7 +76,7 @@ def test_links_for_viewers_are_made_listed_and_revoked(
     guarded: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     url, session = guarded
-    monkeypatch.setenv("BUNRAKU_TOKEN", token(Role.CONTROL, "host"))
+    monkeypatch.setenv("BUNRAKU_TOKEN", make_token(Role.CONTROL, "host"))
     made = json.loads(RUN.invoke(app, ["share", session, "--server", url, "--days", "1", "--json"]).stdout)
     assert made["link"] == f"{url}/?session={session}#share={made['token']}"
     shown = RUN.invoke(app, ["share", f"{url}/?session={session}"])
@@ -99,7 +99,7 @@ def test_commands_come_in_with_a_token_and_say_what_is_missing_without(
     refused = RUN.invoke(app, ["list", "--server", url])
     assert refused.exit_code == 1
     assert "A link is needed" in refused.output
-    viewer, sender = token(Role.VIEW), token(Role.INGEST)
+    viewer, sender = make_token(Role.VIEW), make_token(Role.INGEST)
     assert (
         "needs the role ingest"
         in RUN.invoke(app, ["upload", str(clip_file), "--server", url, "--token", viewer]).output
@@ -111,7 +111,7 @@ def test_commands_come_in_with_a_token_and_say_what_is_missing_without(
     assert (figures["joined"], figures["dropped"]) == (3, 0)
 
 
-def start(tmp_path: Path, *options: str, **environment: str) -> subprocess.Popen[str]:
+def start_up_command(tmp_path: Path, *options: str, **environment: str) -> subprocess.Popen[str]:
     given = {name: value for name, value in os.environ.items() if not name.startswith("BUNRAKU_")}
     return subprocess.Popen(
         [BUNRAKU, "up", "--port", "0", "--data", tmp_path / "data", *options],
@@ -122,7 +122,7 @@ def start(tmp_path: Path, *options: str, **environment: str) -> subprocess.Popen
     )
 
 
-def until(process: subprocess.Popen[str], pattern: str) -> str:
+def read_until(process: subprocess.Popen[str], pattern: str) -> str:
     assert process.stdout is not None
     for line in process.stdout:
         if found := re.search(pattern, line):
@@ -131,14 +131,14 @@ def until(process: subprocess.Popen[str], pattern: str) -> str:
 
 
 def test_bound_where_others_come_it_makes_a_secret_and_prints_the_link_that_lets_in(tmp_path: Path) -> None:
-    process = start(tmp_path, "--host", "0.0.0.0")
+    process = start_up_command(tmp_path, "--host", "0.0.0.0")
     try:
-        url = until(process, r"is at (http://\S+)/")
-        held = until(process, r"^http://\S+#token=(\S+)$")
-        assert (tmp_path / "data" / NAME).stat().st_mode & 0o777 == 0o600
+        url = read_until(process, r"is at (http://\S+)/")
+        held = read_until(process, r"^http://\S+#token=(\S+)$")
+        assert (tmp_path / "data" / SECRET_FILE_NAME).stat().st_mode & 0o777 == 0o600
         with httpx2.Client(base_url=url) as http:
             assert http.get("/v1/motions").status_code == 401
-            assert http.get("/v1/motions", headers=headers(held)).status_code == 200
+            assert http.get("/v1/motions", headers=bearer_headers(held)).status_code == 200
         assert jwt.decode(held, options={"verify_signature": False})["sub"] == "operator"
     finally:
         process.terminate()
@@ -148,12 +148,12 @@ def test_bound_where_others_come_it_makes_a_secret_and_prints_the_link_that_lets
 
 
 def test_with_a_secret_of_the_environment_it_asks_on_loopback_too_and_prints_no_token(tmp_path: Path) -> None:
-    process = start(tmp_path, BUNRAKU_SECRET=SECRET)
+    process = start_up_command(tmp_path, BUNRAKU_SECRET=SECRET)
     try:
-        url = until(process, r"is at (http://\S+)/")
-        assert "bunraku token --server" in until(process, r"(Who comes needs a link.*)")
+        url = read_until(process, r"is at (http://\S+)/")
+        assert "bunraku token --server" in read_until(process, r"(Who comes needs a link.*)")
         assert httpx2.get(f"{url}/v1/motions").status_code == 401
-        assert not (tmp_path / "data" / NAME).exists()
+        assert not (tmp_path / "data" / SECRET_FILE_NAME).exists()
     finally:
         process.terminate()
         process.wait(20)
@@ -162,7 +162,7 @@ def test_with_a_secret_of_the_environment_it_asks_on_loopback_too_and_prints_no_
 
 
 def test_several_processes_that_others_reach_need_a_secret_that_they_share(tmp_path: Path) -> None:
-    process = start(tmp_path, "--host", "0.0.0.0", BUNRAKU_BUS="nats://127.0.0.1:9")
+    process = start_up_command(tmp_path, "--host", "0.0.0.0", BUNRAKU_BUS="nats://127.0.0.1:9")
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 1
     assert "set BUNRAKU_SECRET" in said
@@ -171,9 +171,9 @@ def test_several_processes_that_others_reach_need_a_secret_that_they_share(tmp_p
 
 @pytest.mark.parametrize(("published", "asked"), [("127.0.0.1", False), ("0.0.0.0", True)])
 def test_in_a_container_it_matters_where_its_port_is_published(tmp_path: Path, published: str, asked: bool) -> None:
-    process = start(tmp_path, "--host", "0.0.0.0", BUNRAKU_PUBLISHED=published)
+    process = start_up_command(tmp_path, "--host", "0.0.0.0", BUNRAKU_PUBLISHED=published)
     try:
-        url = until(process, r"is at (http://\S+)/")
+        url = read_until(process, r"is at (http://\S+)/")
         assert httpx2.get(f"{url}/v1/motions").status_code == (401 if asked else 200)
     finally:
         process.terminate()
@@ -183,7 +183,7 @@ def test_in_a_container_it_matters_where_its_port_is_published(tmp_path: Path, p
 
 
 def test_a_secret_that_is_too_short_is_said_so_without_it(tmp_path: Path) -> None:
-    process = start(tmp_path, BUNRAKU_SECRET="tooshortasecret")
+    process = start_up_command(tmp_path, BUNRAKU_SECRET="tooshortasecret")
     said, _ = process.communicate(timeout=60)
     assert process.returncode != 0
     assert "32 bytes" in said

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.servers import clip
+from tests.servers import make_bvh_clip
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -23,7 +23,7 @@ def block(language: str, holding: str) -> str:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "dance.bvh").write_bytes(clip(2.0, 4242))
+    (tmp_path / "dance.bvh").write_bytes(make_bvh_clip(2.0, 4242))
     return tmp_path
 
 

@@ -7,8 +7,8 @@ import httpx2
 import pytest
 
 from bunraku import __version__, serve
-from bunraku.backing.settings import Settings
-from tests.servers import running
+from bunraku.runtime.settings import Settings
+from tests.servers import run_server
 
 
 async def test_everything_is_at_one_address_and_described(server: str) -> None:
@@ -35,7 +35,7 @@ async def test_everything_is_at_one_address_and_described(server: str) -> None:
 async def test_the_page_alone_describes_the_whole_interface(tmp_path: Path, server: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
         whole = (await http.get("/v1/openapi.json")).json()["paths"]
-    async with serve.compose(Settings(data=tmp_path), services=("page",)) as app:
+    async with serve.compose_app(Settings(data=tmp_path), services=("page",)) as app:
         transport = httpx2.ASGITransport(app)
         async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
             assert (await http.get("/v1/openapi.json")).json()["paths"] == whole
@@ -48,7 +48,7 @@ def test_a_server_may_have_as_many_viewers_as_its_system_lets_it(tmp_path: Path)
     few = min(512, hard)
     resource.setrlimit(resource.RLIMIT_NOFILE, (few, hard))
     try:
-        with running(tmp_path / "data", services=("stream",)):
+        with run_server(tmp_path / "data", services=("stream",)):
             assert resource.getrlimit(resource.RLIMIT_NOFILE) == (hard, hard)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
@@ -75,8 +75,8 @@ async def test_the_page_is_asked_for_anew_and_its_parts_are_kept(
     (page / "assets").mkdir(parents=True)
     (page / "index.html").write_text("<!doctype html><title>Bunraku</title>" + " " * 2000)
     (page / "assets" / "index-abc.js").write_text("export {};" * 500)
-    monkeypatch.setattr(serve, "PAGE", page)
-    with running(tmp_path / "data") as url:
+    monkeypatch.setattr(serve, "PAGE_FOLDER", page)
+    with run_server(tmp_path / "data") as url:
         async with httpx2.AsyncClient(base_url=url) as http:
             index = await http.get("/")
             script = await http.get("/assets/index-abc.js")
@@ -95,10 +95,10 @@ async def test_pages_of_every_site_may_load_the_element_and_only_that(
     (page / "embed" / "parts").mkdir(parents=True)
     for name in ("index.html", "assets/index-abc.js", "embed/bunraku-stage.js", "embed/parts/stage-abc.js"):
         (page / name).write_text("export {};" * 500)
-    monkeypatch.setattr(serve, "PAGE", page)
+    monkeypatch.setattr(serve, "PAGE_FOLDER", page)
     lasting = "public, max-age=31536000, immutable"
     for origins, known in (("", "*"), ("https://dance.example", "https://dance.example")):
-        with running(tmp_path / "data", origins=origins) as url:
+        with run_server(tmp_path / "data", origins=origins) as url:
             async with httpx2.AsyncClient(base_url=url) as http:
                 for asking, told in ((None, "*"), ("https://dance.example", known), ("https://other.example", "*")):
                     headers = {"Origin": asking} if asking else {}
@@ -117,8 +117,8 @@ async def test_pages_of_every_site_may_load_the_element_and_only_that(
 
 
 async def test_without_a_built_page_it_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serve, "PAGE", tmp_path / "nowhere")
-    async with serve.compose(Settings(data=tmp_path / "data")) as app:
+    monkeypatch.setattr(serve, "PAGE_FOLDER", tmp_path / "nowhere")
+    async with serve.compose_app(Settings(data=tmp_path / "data")) as app:
         transport = httpx2.ASGITransport(app)
         async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
             answer = await http.get("/")

@@ -10,10 +10,10 @@ import numpy as np
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import JOINTS, Figure, Motion
 
-_UNKNOWN = "origin not stated"
+_UNKNOWN_ORIGIN = "origin not stated"
 
 
-def names(corpus: Path) -> list[str]:
+def list_clips(corpus: Path) -> list[str]:
     """The clips of the folder; raises FileNotFoundError where there are none."""
     found = sorted(path.stem for path in (corpus / "hanim19").glob("*.npz"))
     if not found:
@@ -21,7 +21,7 @@ def names(corpus: Path) -> list[str]:
     return found
 
 
-def load(corpus: Path, name: str) -> Motion:
+def load_clip(corpus: Path, name: str) -> Motion:
     """One clip; metres, y up."""
     with np.load(corpus / "hanim19" / f"{name}.npz") as clip:
         figure = Figure(clip["off"].astype(np.float64), clip["tip"].astype(np.float64))
@@ -29,7 +29,7 @@ def load(corpus: Path, name: str) -> Motion:
         return Motion(figure, float(clip["fps"]), clip["root"].astype(np.float64), rotations)
 
 
-def family(name: str) -> str:
+def clip_family(name: str) -> str:
     """Clips that could share dancers, stages or tools; figures are told with priors that saw none of a clip's
     family."""
     for family in ("perfume", "isaac", "mass"):
@@ -38,17 +38,17 @@ def family(name: str) -> str:
     return "cmu"
 
 
-def licensed(corpus: Path) -> set[str]:
+def licensed_clips(corpus: Path) -> set[str]:
     """The clips that may be learned from: with a licence stated for the motion itself."""
     with (corpus / "CORPUS.csv").open(encoding="utf-8", newline="") as rows:
         return {
             row["clip"]
             for row in csv.DictReader(rows)
-            if row["licence_as_stated"] and _UNKNOWN not in row["licence_as_stated"]
+            if row["licence_as_stated"] and _UNKNOWN_ORIGIN not in row["licence_as_stated"]
         }
 
 
-def mirrored(motion: Motion) -> Motion:
+def mirror_motion(motion: Motion) -> Motion:
     """The same dance with left and right exchanged."""
     twin = [JOINTS.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2:]) for n in JOINTS]
     flip = np.array([-1.0, 1.0, 1.0])

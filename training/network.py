@@ -13,39 +13,49 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from bunraku.codec.prior import AXES, CLASSES, FEATURES, HAZARD_OF, HIDDEN, ROWS, SIGNS, UNARY, Prior
+from bunraku.codec.prior import (
+    CHANNEL_AXES,
+    FEATURE_COUNT,
+    FREQUENCY_CLASSES,
+    HAZARD_ROWS,
+    HAZARD_TABLE_OF,
+    HIDDEN_UNITS,
+    SIGN_CONTEXTS,
+    UNARY_DECISIONS,
+    Prior,
+)
 
 Array = npt.NDArray[np.float64]
 _LN2 = float(np.log(2))
-_RATES = (0.3, 1.0, 0.5, 0.5, 0.5, 0.3, 1.0)
-_DECAY = (5e-5, 5e-4, 5e-5, 5e-4, 0.0, 0.0, 0.0)
+_LEARNING_RATE_FACTORS = (0.3, 1.0, 0.5, 0.5, 0.5, 0.3, 1.0)
+_WEIGHT_DECAY = (5e-5, 5e-4, 5e-5, 5e-4, 0.0, 0.0, 0.0)
 # biases are drawn to their mean, the others to nothing
-_TO_MEAN = (False, True, False, True, False, False, False)
+_DECAYS_TO_MEAN = (False, True, False, True, False, False, False)
 
 
-def start(seed: int = 0) -> list[Array]:
+def initial_parameters(seed: int = 0) -> list[Array]:
     """Untrained parameters: linear, bias, hidden, hidden bias, hidden class, out, hazards (logits)."""
     random = np.random.default_rng(seed)
-    linear, bias = np.zeros((CLASSES, FEATURES)), np.full((CLASSES, AXES), -0.8)
+    linear, bias = np.zeros((FREQUENCY_CLASSES, FEATURE_COUNT)), np.full((FREQUENCY_CLASSES, CHANNEL_AXES), -0.8)
     linear[:, [24, 0, 3, 13, 27]] = 0.25, 0.25, 0.1, 0.2, 0.1
     linear[0, 22], bias[0] = -1.0, 9.0
-    width = 2.0 ** (-7 + np.arange(ROWS) / 4)
-    odds = np.repeat(np.exp(-1 / (width + 0.15))[:, None], UNARY, axis=1)
+    width = 2.0 ** (-7 + np.arange(HAZARD_ROWS) / 4)
+    odds = np.repeat(np.exp(-1 / (width + 0.15))[:, None], UNARY_DECISIONS, axis=1)
     return [
         linear,
         bias,
-        random.normal(0, 0.15, (HIDDEN, FEATURES)),
-        np.zeros((HIDDEN, AXES)),
-        random.normal(0, 0.1, (HIDDEN, CLASSES)),
-        random.normal(0, 0.02, (HIDDEN, CLASSES)),
-        np.tile(np.log(odds / (1 - odds)), (HAZARD_OF[-1] + 1, 1)),
+        random.normal(0, 0.15, (HIDDEN_UNITS, FEATURE_COUNT)),
+        np.zeros((HIDDEN_UNITS, CHANNEL_AXES)),
+        random.normal(0, 0.1, (HIDDEN_UNITS, FREQUENCY_CLASSES)),
+        random.normal(0, 0.02, (HIDDEN_UNITS, FREQUENCY_CLASSES)),
+        np.tile(np.log(odds / (1 - odds)), (HAZARD_TABLE_OF[-1] + 1, 1)),
     ]
 
 
 @njit(cache=True, fastmath=True)
-def _loss(
+def _accumulate_loss(
     features: npt.NDArray[np.int16],
-    where: npt.NDArray[np.int32],
+    labels: npt.NDArray[np.int32],
     rows: npt.NDArray[np.int64],
     linear: Array,
     bias: Array,
@@ -65,17 +75,17 @@ def _loss(
     """Nats of the sizes of all `rows`; adds the gradients."""
     odds = 1 / (1 + np.exp(-hazard))
     d_odds = np.zeros_like(odds)
-    inner, f, loss = np.zeros(HIDDEN), np.zeros(FEATURES), 0.0
+    inner, f, loss = np.zeros(HIDDEN_UNITS), np.zeros(FEATURE_COUNT), 0.0
     for example in range(len(rows)):
         row = rows[example]
-        group, axis, size = where[row, 0], where[row, 1], where[row, 2]
+        group, axis, size = labels[row, 0], labels[row, 1], labels[row, 2]
         scale = bias[group, axis]
-        for i in range(FEATURES):
+        for i in range(FEATURE_COUNT):
             f[i] = features[row, i] * 0.0625
             scale += linear[group, i] * f[i]
-        for j in range(HIDDEN):
+        for j in range(HIDDEN_UNITS):
             x = hidden_bias[j, axis] + hidden_class[j, group]
-            for i in range(FEATURES):
+            for i in range(FEATURE_COUNT):
                 x += hidden[j, i] * f[i]
             inner[j] = x
             if x > 0:
@@ -84,12 +94,12 @@ def _loss(
         scale = min(max(scale, -6.99), 13.99)
         shift = int(np.floor(scale)) - 3 if scale >= 4 else 0
         place = (scale - shift + 7) * 4
-        at = min(int(place), ROWS - 2)
+        at = min(int(place), HAZARD_ROWS - 2)
         weight = min(place - at, 1.0)
-        at += ROWS * HAZARD_OF[group]
+        at += HAZARD_ROWS * HAZARD_TABLE_OF[group]
         high, slope = size >> shift, 0.0
         loss += shift * _LN2
-        for value in range(UNARY):
+        for value in range(UNARY_DECISIONS):
             low_odds, high_odds = odds[at, value], odds[at + 1, value]
             p = low_odds * (1 - weight) + high_odds * weight
             if high > value:
@@ -104,22 +114,22 @@ def _loss(
             if high <= value:
                 break
         slope *= 4
-        if high >= UNARY:
+        if high >= UNARY_DECISIONS:
             # an escape's length goes down by two bits with every octave of the scale
-            loss += (2 * np.floor(np.log2(high - UNARY + 1)) + 1) * _LN2
+            loss += (2 * np.floor(np.log2(high - UNARY_DECISIONS + 1)) + 1) * _LN2
             slope -= 2 * _LN2
         # at the end of the table only a way back is followed
         if not (below and slope > 0) and not (above and slope < 0):
             d_bias[group, axis] += slope
-            for i in range(FEATURES):
+            for i in range(FEATURE_COUNT):
                 d_linear[group, i] += slope * f[i]
-            for j in range(HIDDEN):
+            for j in range(HIDDEN_UNITS):
                 if inner[j] > 0:
                     d_out[j, group] += slope * inner[j]
                     x = slope * out[j, group]
                     d_hidden_bias[j, axis] += x
                     d_hidden_class[j, group] += x
-                    for i in range(FEATURES):
+                    for i in range(FEATURE_COUNT):
                         d_hidden[j, i] += x * f[i]
     d_hazard += d_odds * odds * (1 - odds)
     return loss
@@ -127,12 +137,12 @@ def _loss(
 
 def train(
     features: npt.NDArray[np.int16],
-    where: npt.NDArray[np.int32],
+    labels: npt.NDArray[np.int32],
     parameters: list[Array],
     steps: int,
-    say: Callable[[str], None],
+    report: Callable[[str], None],
     seed: int = 0,
-    batch: int = 1 << 16,
+    batch_size: int = 1 << 16,
 ) -> list[Array]:
     """Adam over random batches of the examples, the rate warmed up and let down by a cosine."""
     random, parameters = np.random.default_rng(seed), [p.copy() for p in parameters]
@@ -140,26 +150,28 @@ def train(
     spent, began = 0.0, time.monotonic()
     for step in range(1, steps + 1):
         gradients = [np.zeros_like(p) for p in parameters]
-        rows = random.integers(0, len(where), batch)
-        spent += _loss(features, where, rows, *parameters, *gradients) / batch / _LN2
+        rows = random.integers(0, len(labels), batch_size)
+        spent += _accumulate_loss(features, labels, rows, *parameters, *gradients) / batch_size / _LN2
         rate = 0.03 * min(1.0, step / 30) * 0.5 * (1 + np.cos(np.pi * step / steps)) + 1e-4
         for i, p in enumerate(parameters):
-            m, v, share = first[i], second[i], _RATES[i]
-            g = gradients[i] / batch + _DECAY[i] * (p - p.mean(axis=1, keepdims=True) if _TO_MEAN[i] else p)
+            m, v, share = first[i], second[i], _LEARNING_RATE_FACTORS[i]
+            g = gradients[i] / batch_size + _WEIGHT_DECAY[i] * (
+                p - p.mean(axis=1, keepdims=True) if _DECAYS_TO_MEAN[i] else p
+            )
             m += 0.1 * (g - m)
             v += 0.01 * (g * g - v)
             p -= rate * share * (m / (1 - 0.9**step)) / (np.sqrt(v / (1 - 0.99**step)) + 1e-9)
         if step % 300 == 0:
-            say(f"  step {step}: {spent / 300:.4f} bits, {time.monotonic() - began:.0f} s")
+            report(f"  step {step}: {spent / 300:.4f} bits, {time.monotonic() - began:.0f} s")
             spent = 0.0
     return parameters
 
 
-def quantised(parameters: list[Array], where: npt.NDArray[np.int32]) -> Prior:
+def quantise_prior(parameters: list[Array], labels: npt.NDArray[np.int32]) -> Prior:
     """The integers of the coder; the signs' odds are counted in the examples."""
     linear, bias, hidden, hidden_bias, hidden_class, out, hazard = parameters
-    counts = np.full((CLASSES, SIGNS, 2), 20.0)
-    signed = where[where[:, 3] > 0]
+    counts = np.full((FREQUENCY_CLASSES, SIGN_CONTEXTS, 2), 20.0)
+    signed = labels[labels[:, 3] > 0]
     np.add.at(counts, (signed[:, 0], signed[:, 4], signed[:, 3] - 1), 1)
 
     def whole(array: Array, scale: float, most: int) -> npt.NDArray[np.int64]:

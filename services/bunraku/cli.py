@@ -14,8 +14,27 @@ from urllib.parse import urlsplit
 import typer
 
 from bunraku import __version__
-from bunraku.cli_access import HOURS, operator_link, secure, share, token, wrong_setting
-from bunraku.terminal import HERE, Json, Server, Token, ask, err, kind_of, out, read_address, say, show_figures
+from bunraku.cli_access import (
+    DEFAULT_TOKEN_HOURS,
+    describe_setting_error,
+    ensure_secret,
+    make_operator_link,
+    share,
+    token,
+)
+from bunraku.terminal import (
+    DEFAULT_SERVER,
+    JsonOption,
+    ServerOption,
+    TokenOption,
+    err,
+    find_resource_kind,
+    out,
+    parse_resource_address,
+    print_plain,
+    print_statistics,
+    run_request,
+)
 
 app = typer.Typer(
     help="A humanoid dances in the browser, and the people watching pull its strings.", no_args_is_help=True
@@ -36,9 +55,9 @@ def up(
     open_page: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
     """Run everything in one process, until Ctrl-C. Several processes meet over a bus: BUNRAKU_BUS=nats://..."""
-    from bunraku.backing import logs
-    from bunraku.backing.metrics import CannotListen
-    from bunraku.backing.settings import Settings
+    from bunraku.runtime import log
+    from bunraku.runtime.metrics import MetricsListenError
+    from bunraku.runtime.settings import Settings
     from bunraku.serve import SERVICES, serve
 
     services = SERVICES if service is None else tuple(service)
@@ -50,10 +69,10 @@ def up(
     try:
         settings = Settings() if data is None else Settings(data=data)
     except ValueError as error:
-        err.print(wrong_setting(error), markup=False)
+        err.print(describe_setting_error(error), markup=False)
         raise typer.Exit(1) from None
-    logs.configure(settings.logs, settings.log_level, "all" if service is None else ",".join(services))
-    own = secure(settings, host)
+    log.configure_logging(settings.logs, settings.log_level, "all" if service is None else ",".join(services))
+    own = ensure_secret(settings, host)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         listening = socket.create_server((host, port), family=family, backlog=1024)
@@ -67,16 +86,16 @@ def up(
         out.print(f"Bunraku {__version__} is at [link={url}]{url}[/link]", soft_wrap=True)
         out.print(f"It keeps its motions in {settings.data}. Ctrl-C ends it.", soft_wrap=True)
         guarded = bool(settings.secret.get_secret_value()) and "page" in services
-        link = operator_link(settings, url) if guarded else url
+        link = make_operator_link(settings, url) if guarded else url
         if guarded and (own or out.is_terminal):
-            say(f"Who comes needs a link. Yours, for {HOURS:g} hours:\n{link}")
+            print_plain(f"Who comes needs a link. Yours, for {DEFAULT_TOKEN_HOURS:g} hours:\n{link}")
         elif guarded:
             out.print(f"Who comes needs a link: `bunraku token --server {url}` makes one.", soft_wrap=True)
         if open_page:
             webbrowser.open(link)
 
     out.print("Setting the stage ..." if demo else "Starting ...")
-    serving = serve(settings, listening, demo=demo, ready=ready, services=services)
+    serving = serve(settings, listening, demo=demo, on_ready=ready, services=services)
     try:
         if sys.platform == "win32":
             asyncio.run(serving)
@@ -84,7 +103,7 @@ def up(
             import uvloop
 
             uvloop.run(serving)
-    except CannotListen as error:
+    except MetricsListenError as error:
         err.print(str(error), markup=False)
         raise typer.Exit(1) from None
     out.print("The curtain falls.")
@@ -93,14 +112,14 @@ def up(
 @app.command()
 def upload(
     file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True)],
-    server: Server = HERE,
-    token: Token = None,
-    as_json: Json = False,
+    server: ServerOption = DEFAULT_SERVER,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Upload a motion file, and say what was made of it."""
     from rich.table import Table
 
-    motion = _send(file, server, token, as_json, lambda client, *told: client.upload(file, *told))
+    motion = _send_file(file, server, token, as_json, lambda client, *told: client.upload(file, *told))
     if as_json:
         out.print_json(data=motion)
         return
@@ -119,34 +138,36 @@ def upload(
 def audio(
     motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
     file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="WAV, FLAC, MP3 or Ogg.")],
-    server: Server = HERE,
-    token: Token = None,
-    as_json: Json = False,
+    server: ServerOption = DEFAULT_SERVER,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Make a new motion of one and a sound, which begins with it."""
-    base, identity = _motion(motion, "sound is added to a motion: give one")
-    made = _send(file, base or server, token, as_json, lambda client, *told: client.add_audio(identity, file, *told))
+    base, identity = _parse_motion_address(motion, "sound is added to a motion: give one")
+    made = _send_file(
+        file, base or server, token, as_json, lambda client, *told: client.add_audio(identity, file, *told)
+    )
     if as_json:
         out.print_json(data=made)
         return
     rates = ", ".join(f"{rate['kbps']:.0f}" for rate in made["audio"]["rates"])
-    say(f"{made['audio']['seconds']:.1f} s of sound at {rates} kbit/s beside {made['name']}: {made['id']}")
+    print_plain(f"{made['audio']['seconds']:.1f} s of sound at {rates} kbit/s beside {made['name']}: {made['id']}")
 
 
 @app.command()
 def scene(
     motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
     file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="JSON: camera, lights.")],
-    server: Server = HERE,
-    token: Token = None,
-    as_json: Json = False,
+    server: ServerOption = DEFAULT_SERVER,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Make a new motion of one with a camera and lights, from keyframes."""
     import json
 
     from bunraku.client.api import Client
 
-    base, identity = _motion(motion, "a scene is added to a motion: give one")
+    base, identity = _parse_motion_address(motion, "a scene is added to a motion: give one")
     try:
         staging = json.loads(file.read_bytes())
     except ValueError as error:
@@ -156,11 +177,11 @@ def scene(
         async with Client(base or server, token) as client:
             return await client.add_scene(identity, staging)
 
-    made = ask(run, base or server)
+    made = run_request(run, base or server)
     if as_json:
         out.print_json(data=made)
         return
-    say(f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}")
+    print_plain(f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}")
 
 
 @app.command()
@@ -169,28 +190,28 @@ def perform(
     others: Annotated[
         list[str], typer.Argument(help="Ids of motions that dance beside it; the same one may come again.")
     ],
-    server: Server = HERE,
-    token: Token = None,
-    as_json: Json = False,
+    server: ServerOption = DEFAULT_SERVER,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Make a new motion in which several dance side by side, four at most."""
     from bunraku.client.api import Client
 
-    base, identity = _motion(motion, "motions dance side by side: give one")
+    base, identity = _parse_motion_address(motion, "motions dance side by side: give one")
 
     async def run() -> dict[str, Any]:
         async with Client(base or server, token) as client:
             return await client.add_performers(identity, others)
 
-    made = ask(run, base or server)
+    made = run_request(run, base or server)
     if as_json:
         out.print_json(data=made)
         return
-    say(f"{made['performers']} performers, {made['name']}: {made['id']}")
+    print_plain(f"{made['performers']} performers, {made['name']}: {made['id']}")
 
 
 @app.command(name="list")
-def list_motions(server: Server = HERE, token: Token = None, as_json: Json = False) -> None:
+def list_motions(server: ServerOption = DEFAULT_SERVER, token: TokenOption = None, as_json: JsonOption = False) -> None:
     """List the motions of a server."""
     from rich.table import Table
 
@@ -200,7 +221,7 @@ def list_motions(server: Server = HERE, token: Token = None, as_json: Json = Fal
         async with Client(server, token) as client:
             return await client.motions()
 
-    motions = ask(run, server)
+    motions = run_request(run, server)
     if as_json:
         out.print_json(data=motions)
         return
@@ -216,24 +237,24 @@ def list_motions(server: Server = HERE, token: Token = None, as_json: Json = Fal
 def watch(
     url: Annotated[str, typer.Argument(help="A motion or session: its id, its page, or its API address.")],
     seconds: Annotated[float, typer.Option(help="How long.", min=0.1, max=86400)] = 10.0,
-    server: Server = HERE,
-    token: Token = None,
-    as_json: Json = False,
+    server: ServerOption = DEFAULT_SERVER,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Watch without a screen, and print how it went."""
     from bunraku.client import Client, StreamEnded, Viewer
 
     async def run() -> dict[str, Any]:
         async with Client(server, token) as client:
-            viewer = Viewer(await _stream_url(client, url), token=token)
+            viewer = Viewer(await _resolve_stream_url(client, url), token=token)
         return (await viewer.watch(seconds)).as_json()
 
     try:
-        figures = ask(run, server)
+        figures = run_request(run, server)
     except StreamEnded as error:
         err.print(f"The stream ended: {error}")
         raise typer.Exit(1) from None
-    show_figures(figures, as_json)
+    print_statistics(figures, as_json)
 
 
 @app.command()
@@ -245,25 +266,25 @@ def keep(
     seconds: Annotated[
         float | None, typer.Option(help="How much of what was shown last; default: all that can be kept.", min=0.1)
     ] = None,
-    server: Server = HERE,
-    token: Token = None,
-    as_json: Json = False,
+    server: ServerOption = DEFAULT_SERVER,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Keep what a session has shown as a new motion, pulled limbs and all."""
     from bunraku.client.api import Client
 
     async def run() -> dict[str, Any]:
-        base, kind, identity = read_address(session)
+        base, kind, identity = parse_resource_address(session)
         if kind == "motions":
             raise typer.BadParameter("a motion is kept already: give a session", param_hint="SESSION")
         async with Client(base or server, token) as client:
-            return await client.keep(identity, name, seconds)
+            return await client.record(identity, name, seconds)
 
-    motion = ask(run, server)
+    motion = run_request(run, server)
     if as_json:
         out.print_json(data=motion)
         return
-    say(f"Kept {motion['duration']:.1f} s as {motion['id']}: {motion['name']}")
+    print_plain(f"Kept {motion['duration']:.1f} s as {motion['id']}: {motion['name']}")
 
 
 bench = typer.Typer(help="Load-test a server.", no_args_is_help=True)
@@ -284,22 +305,22 @@ def bench_viewers(
     ] = None,
     seconds: Annotated[float, typer.Option(help="How long they watch.", min=0.1, max=86400)] = 20.0,
     joins: Annotated[float, typer.Option(help="How many join in a second.", min=0.1, max=10_000)] = 200.0,
-    server: Server = HERE,
-    token: Token = None,
-    as_json: Json = False,
+    server: ServerOption = DEFAULT_SERVER,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Have many viewers watch at once, and print how they fared."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
     from bunraku.client.api import Client
-    from bunraku.client.crowd import TooMany, watch_together
+    from bunraku.client.load_generator import FileLimitExceeded, run_load
 
     async def run() -> dict[str, Any]:
         async with Client(server, token) as client:
             found = url or await client.first_session()
             if found is None:
                 raise typer.BadParameter(f"no session is open at {server}: name a motion", param_hint="--url")
-            stream = await _stream_url(client, found)
+            stream = await _resolve_stream_url(client, found)
         columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
         with Progress(*columns, console=err, disable=as_json or not err.is_terminal, transient=True) as progress:
             task = progress.add_task("joining", total=1)
@@ -307,20 +328,22 @@ def bench_viewers(
             def told(stage: str, share: float) -> None:
                 progress.update(task, description=stage, completed=share)
 
-            return (await watch_together(stream, viewers, seconds, joins=joins, token=token, told=told)).as_json()
+            return (
+                await run_load(stream, viewers, seconds, joins_per_second=joins, token=token, on_progress=told)
+            ).as_json()
 
     try:
-        figures = ask(run, server)
-    except TooMany as error:
+        figures = run_request(run, server)
+    except FileLimitExceeded as error:
         err.print(f"Too many viewers for one process: {error}")
         raise typer.Exit(1) from None
-    show_figures(figures, as_json)
+    print_statistics(figures, as_json)
     if figures["joined"] == 0:
         raise typer.Exit(1)
 
 
 @app.command()
-def version(as_json: Json = False) -> None:
+def version(as_json: JsonOption = False) -> None:
     """Print the version."""
     out.print_json(data={"version": __version__}) if as_json else out.print(__version__)
 
@@ -328,21 +351,21 @@ def version(as_json: Json = False) -> None:
 @app.command()
 def warm() -> None:
     """Compile reader, codec and what moves limbs once, so that nobody waits for it (done by `make setup`)."""
-    from bunraku.ingest import making  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
-    from bunraku.session import solving
+    from bunraku.ingest.jobs import motion  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
+    from bunraku.session import limb_solver
 
-    solving.warm()
+    limb_solver.warm_up_solver()
 
 
-def _motion(address: str, otherwise: str) -> tuple[str | None, str]:
+def _parse_motion_address(address: str, error_message: str) -> tuple[str | None, str]:
     """The server, if it is named, and the id of a motion; `otherwise` is said where a session is given."""
-    base, kind, identity = read_address(address)
+    base, kind, identity = parse_resource_address(address)
     if kind == "sessions":
-        raise typer.BadParameter(otherwise, param_hint="MOTION")
+        raise typer.BadParameter(error_message, param_hint="MOTION")
     return base, identity
 
 
-def _send(
+def _send_file(
     file: Path, server: str, token: str | None, quiet: bool, send: Callable[..., Awaitable[dict[str, Any]]]
 ) -> dict[str, Any]:
     """What the server makes of a file; `send` is told the client, and what to tell how far it is."""
@@ -366,20 +389,20 @@ def _send(
             async with Client(server, token) as client:
                 return await send(client, lambda sent, size: at("sending", sent / size), at)
 
-    made: dict[str, Any] = ask(run, server)
+    made: dict[str, Any] = run_request(run, server)
     return made
 
 
-async def _stream_url(client: Any, address: str) -> str:
+async def _resolve_stream_url(client: Any, address: str) -> str:
     """The socket of a motion or session, given by its address, its page or its id."""
     from bunraku.client.api import Client
 
     if urlsplit(address).scheme in ("ws", "wss"):
         return address
-    base, kind, identity = read_address(address)
+    base, kind, identity = parse_resource_address(address)
     if base is not None:
         return Client(base).socket_url(f"/v1/{kind}/{identity}/stream")
-    socket_url: str = client.socket_url(f"/v1/{await kind_of(client, identity)}/{identity}/stream")
+    socket_url: str = client.socket_url(f"/v1/{await find_resource_kind(client, identity)}/{identity}/stream")
     return socket_url
 
 

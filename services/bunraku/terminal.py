@@ -13,34 +13,34 @@ from rich.console import Console
 out = Console()
 err = Console(stderr=True)
 
-Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Server = Annotated[str, typer.Option("--server", envvar="BUNRAKU_SERVER", help="Address of a running Bunraku.")]
-Token = Annotated[
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+ServerOption = Annotated[str, typer.Option("--server", envvar="BUNRAKU_SERVER", help="Address of a running Bunraku.")]
+TokenOption = Annotated[
     str | None,
     typer.Option("--token", envvar="BUNRAKU_TOKEN", show_envvar=True, help="What lets in, if the server asks for it."),
 ]
-HERE = "http://127.0.0.1:8000"
+DEFAULT_SERVER = "http://127.0.0.1:8000"
 
 
-def say(words: str) -> None:
+def print_plain(text: str) -> None:
     """Print words as they stand."""
-    out.print(words, markup=False, highlight=False, soft_wrap=True)
+    out.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
-def show_figures(figures: dict[str, Any], as_json: bool) -> None:
+def print_statistics(statistics: dict[str, Any], as_json: bool) -> None:
     """Print figures by their names."""
     from rich.table import Table
 
     if as_json:
-        out.print_json(data=figures)
+        out.print_json(data=statistics)
         return
     table = Table(show_header=False, box=None)
-    for name, value in figures.items():
+    for name, value in statistics.items():
         table.add_row(name.replace("_", " "), "-" if value is None else str(value))
     out.print(table)
 
 
-def read_address(address: str) -> tuple[str | None, str | None, str]:
+def parse_resource_address(address: str) -> tuple[str | None, str | None, str]:
     """Server, kind (`motions` or `sessions`) and id of what is given by its page or its API address; of a mere id only
     that. Raises `typer.BadParameter` for an address of something else."""
     parts = urlsplit(address)
@@ -56,21 +56,21 @@ def read_address(address: str) -> tuple[str | None, str | None, str]:
     return base + found[1], found[2], unquote(found[3])
 
 
-async def kind_of(client: Any, identity: str) -> str:
+async def find_resource_kind(client: Any, resource_id: str) -> str:
     """Whether an id is of `sessions` or `motions`; raises `ServerProblem` where it is of neither."""
     from bunraku.client.api import ServerProblem
 
     try:
-        await client.session(identity)
+        await client.session(resource_id)
     except ServerProblem as problem:
         if problem.status != 404:
             raise
-        await client.motion(identity)
+        await client.motion(resource_id)
         return "motions"
     return "sessions"
 
 
-def ask(run: Any, server: str) -> Any:
+def run_request(request: Any, server: str) -> Any:
     """The result of `run`, its failures said in words."""
     import httpx2
     from websockets.exceptions import WebSocketException
@@ -78,7 +78,7 @@ def ask(run: Any, server: str) -> Any:
     from bunraku.client.api import ServerProblem
 
     try:
-        return asyncio.run(run())
+        return asyncio.run(request())
     except ServerProblem as problem:
         err.print(str(problem))
     except (httpx2.TransportError, OSError, WebSocketException) as error:

@@ -13,15 +13,23 @@ const SHADER = /\/\* glsl \*\/\s*`([^`$]*)`/g;
 
 /** Parts of the renderer for what the stage never does: goggles, other outputs than the canvas, blocks of uniforms. What the renderer asks of them all the same is answered. */
 const IDLE: Readonly<Record<string, string>> = {
-  "webxr/WebXRManager": "export class WebXRManager { enabled = false; isPresenting = false; addEventListener() {} removeEventListener() {} setAnimationLoop() {} getEnvironmentBlendMode() {} dispose() {} }",
+  "webxr/WebXRManager":
+    "export class WebXRManager { enabled = false; isPresenting = false; addEventListener() {} removeEventListener() {} setAnimationLoop() {} getEnvironmentBlendMode() {} dispose() {} }",
   "webgl/WebGLOutput": "export class WebGLOutput {}",
   "webgl/WebGLUniformsGroups": "export class WebGLUniformsGroups { dispose() {} }",
 };
 
 /** A shader's text without what is there for its readers. Lines of the preprocessor keep their spaces, and so do signs, of which two in a row are another. */
 function plain(text: string): string {
-  const lines = text.replace(/\/\*[\s\S]*?\*\/|\/\/.*/g, "").replace(/\s*\n\s*/g, "\n").split("\n");
-  return lines.map((line) => (line.startsWith("#") ? line : line.replace(/\s+/g, " ").replace(/ ?([,;(){}[\]=<>*/?:&|]) ?/g, "$1"))).join("\n");
+  const lines = text
+    .replace(/\/\*[\s\S]*?\*\/|\/\/.*/g, "")
+    .replace(/\s*\n\s*/g, "\n")
+    .split("\n");
+  return lines
+    .map((line) =>
+      line.startsWith("#") ? line : line.replace(/\s+/g, " ").replace(/ ?([,;(){}[\]=<>*/?:&|]) ?/g, "$1"),
+    )
+    .join("\n");
 }
 
 /** A file of three.js with its shaders' texts made small; `id` is its path. */
@@ -50,7 +58,13 @@ export const leanThree: Plugin = {
   async buildStart() {
     if (config.mode === STUDY) return;
     const { configFile, root } = config;
-    const { output } = (await build({ configFile: configFile ?? false, root, mode: STUDY, logLevel: "silent", build: { write: false, minify: false } })) as Rolldown.RolldownOutput;
+    const { output } = (await build({
+      configFile: configFile ?? false,
+      root,
+      mode: STUDY,
+      logLevel: "silent",
+      build: { write: false, minify: false },
+    })) as Rolldown.RolldownOutput;
     const modules = output.flatMap((file) => (file.type === "chunk" ? Object.entries(file.modules) : []));
     unused = unusedMembers(modules.map(([id, { code }]) => ({ code: code ?? "", cuttable: THREE.test(id) })));
   },

@@ -6,7 +6,7 @@ import { leanThree } from "./lean-three.ts";
 const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/package.ts" };
 
 /** What draws, and what is for the examples alone. */
-const LATER = /\/node_modules\/three\/|\/src\/(stage\/|package\.ts|page\/theme\.ts)|\/examples[./]/;
+const LATER = /\/node_modules\/three\/|\/src\/(stage\/|package\.ts|ui\/theme\.ts)|\/examples[./]/;
 
 export default defineConfig({
   plugins: [leanThree],

@@ -13,7 +13,8 @@ const { dependencies, devDependencies, engines, version } = own;
 const manifest = {
   name: "bunraku",
   version,
-  description: "A streamed dancing puppet whose hands and legs the people watching take: the element, the viewer, the puppeteer and the stage.",
+  description:
+    "A streamed dancing puppet whose hands and legs the people watching take: the element, the viewer, the puppeteer and the stage.",
   // nobody but the owner has been given leave yet
   license: "UNLICENSED",
   type: "module",
@@ -40,7 +41,8 @@ const pack: Plugin = {
   generateBundle() {
     const emit = (fileName: string, source: string) => this.emitFile({ type: "asset", fileName, source });
     for (const file of readdirSync(DECLARATIONS, { recursive: true, encoding: "utf8" })) {
-      if (file.endsWith(".d.ts")) emit(join("types", file), withEndings(readFileSync(join(DECLARATIONS, file), "utf8")));
+      if (file.endsWith(".d.ts"))
+        emit(join("types", file), withEndings(readFileSync(join(DECLARATIONS, file), "utf8")));
     }
     emit("package.json", `${JSON.stringify(manifest, null, 2)}\n`);
     emit("README.md", readFileSync("PACKAGE.md", "utf8"));

@@ -18,121 +18,124 @@ from pathlib import Path
 
 import numpy as np
 
-from bunraku.codec.decode import decode_block
-from bunraku.codec.encode import LADDER, encode_mean, encode_motion, warm
-from bunraku.codec.prior import Prior, parse, shipped
-from bunraku.codec.track import MotionTrack
+from bunraku.codec.motion_decoder import decode_motion_block
+from bunraku.codec.motion_encoder import ERROR_BOUNDS_MM, encode_motion, encode_motion_to_mean_error, warm_up
+from bunraku.codec.motion_track import MotionTrack
+from bunraku.codec.prior import Prior, load_shipped_prior, parse_prior
 from bunraku.motion.skeleton import Motion
 from bunraku.wire.messages import Data
-from tests.bench import peers, picture
+from tests.bench import chart, peer_results
 from training import corpus as clips
 
-GOALS = (("mean", 1.0), ("mean", 5.0), ("max", 10.0), ("max", 2.0))
+ERROR_GOALS = (("mean", 1.0), ("mean", 5.0), ("max", 10.0), ("max", 2.0))
 PEERS = {"acl": "acl", "meshopt": "meshopt_brotli"}
-COLUMNS = {"mean": peers.MEAN, "max": peers.MOST}
-DRAWN = {"mean": (0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0), "max": (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)}
-PRIORS = Path(__file__).with_name("priors")
+ERROR_COLUMNS = {"mean": peer_results.MEAN, "max": peer_results.MOST}
+CHART_ERRORS_MM = {"mean": (0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0), "max": (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)}
+PRIORS_FOLDER = Path(__file__).with_name("priors")
 
 
-def prior_for(name: str) -> Prior:
+def load_held_out_prior(name: str) -> Prior:
     """The prior that has not seen the clip's family."""
-    path = PRIORS / f"{clips.family(name)}.json"
-    return parse(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else shipped()
+    path = PRIORS_FOLDER / f"{clips.clip_family(name)}.json"
+    return parse_prior(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else load_shipped_prior()
 
 
-def received(track: MotionTrack, blocks: list[bytes]) -> int:
+def received_bytes(track: MotionTrack, blocks: list[bytes]) -> int:
     """Bytes of a motion on its way to a viewer."""
     packets = [len(Data(0, 0, index, block).pack()) for index, block in enumerate(blocks)]
     framed = sum(size + (2 if size < 126 else 4) for size in packets)
-    return framed + len(track.dancer.pack())
+    return framed + len(track.skeleton.pack())
 
 
-def ours(motion: Motion, goal: tuple[str, float], prior: Prior, block_seconds: float) -> float:
+def encode_to_goal(motion: Motion, goal: tuple[str, float], prior: Prior, block_seconds: float) -> float:
     """Our kbit/s for a goal."""
     kind, error = goal
     if kind == "mean":
-        track, rate = encode_mean(motion, error, block_seconds, prior)
+        track, rate = encode_motion_to_mean_error(motion, error, block_seconds, prior)
     else:
         encoded = encode_motion(motion, block_seconds, (error,), prior=prior)
-        track, rate = encoded.track, encoded.rates[0]
-    return received(track, rate.blocks) * 8e-3 / motion.duration
+        track, rate = encoded.track, encoded.ladder[0]
+    return received_bytes(track, rate.blocks) * 8e-3 / motion.duration
 
 
-def geometric(values: list[float]) -> float:
+def geometric_mean(values: list[float]) -> float:
     return float(np.exp(np.mean(np.log(values))))
 
 
-def draw(
+def draw_chart(
     motions: dict[str, Motion],
-    measured: dict[str, dict[str, peers.Rows]],
+    measured: dict[str, dict[str, peer_results.Rows]],
     rates: dict[tuple[str, float], list[float]],
     block_seconds: float,
 ) -> str:
     """The picture of rate over error; our `rates` (kbit/s of each clip) are added where they lack an error."""
     panels = []
     for kind, title in (("mean", "Mean error"), ("max", "Largest error, held in every block")):
-        for error in DRAWN[kind]:
+        for error in CHART_ERRORS_MM[kind]:
             goal = kind, error
             if goal not in rates:
-                rates[goal] = [ours(motion, goal, prior_for(name), block_seconds) for name, motion in motions.items()]
-            print(f"drawn: {kind} {error:g} mm, {geometric(rates[goal]):.2f} kbit/s", flush=True)
-        points = [(error, geometric(rates[kind, error])) for error in DRAWN[kind]]
-        curves = [picture.Curve("Bunraku", "#b3301f", points, measured=True)]
+                rates[goal] = [
+                    encode_to_goal(motion, goal, load_held_out_prior(name), block_seconds)
+                    for name, motion in motions.items()
+                ]
+            print(f"drawn: {kind} {error:g} mm, {geometric_mean(rates[goal]):.2f} kbit/s", flush=True)
+        points = [(error, geometric_mean(rates[kind, error])) for error in CHART_ERRORS_MM[kind]]
+        curves = [chart.Curve("Bunraku", "#b3301f", points, measured=True)]
         for name, peer, colour in (("meshoptimizer + brotli", "meshopt", "#27418f"), ("ACL", "acl", "#7d5a14")):
             rows = [measured[clip][PEERS[peer]] for clip in motions]
-            theirs = peers.curve(rows, COLUMNS[kind], points[0][0], points[-1][0])
-            curves.append(picture.Curve(name, colour, theirs))
-        panels.append(picture.Panel(title, curves, tuple(error for of, error in GOALS if of == kind)))
+            theirs = peer_results.mean_curve(rows, ERROR_COLUMNS[kind], points[0][0], points[-1][0])
+            curves.append(chart.Curve(name, colour, theirs))
+        panels.append(chart.Panel(title, curves, tuple(error for of, error in ERROR_GOALS if of == kind)))
     note = (
         f"Geometric means over {len(motions)} clips. Ours: all that a viewer receives, in independent blocks of "
         f"{block_seconds:g} s. The others: whole clips at once."
     )
-    return picture.draw((panels[0], panels[1]), note)
+    return chart.draw_chart((panels[0], panels[1]), note)
 
 
-def speeds(motions: dict[str, Motion]) -> dict[str, float]:
+def measure_speeds(motions: dict[str, Motion]) -> dict[str, float]:
     """Times real time over clips of 30 to 60 frames a second, of one live rate and of the whole ladder at its best, and
     milliseconds to decode a block."""
     usual = [motion for motion in motions.values() if 30 <= motion.fps <= 60]
     figures = {}
     seconds = sum(motion.duration for motion in usual)
-    warm()
+    warm_up()
     for key, grade, ladder in (
-        ("encode_times_real_time", "live", LADDER[2:3]),
-        ("encode_ladder_live_times_real_time", "live", LADDER),
-        ("encode_best_times_real_time", "best", LADDER),
+        ("encode_times_real_time", "live", ERROR_BOUNDS_MM[2:3]),
+        ("encode_ladder_live_times_real_time", "live", ERROR_BOUNDS_MM),
+        ("encode_best_times_real_time", "best", ERROR_BOUNDS_MM),
     ):
         began = time.perf_counter()
         for motion in usual:
-            encode_motion(motion, grade=grade, ladder=ladder)  # type: ignore[arg-type]
+            encode_motion(motion, grade=grade, error_bounds_mm=ladder)  # type: ignore[arg-type]
         figures[key] = seconds / (time.perf_counter() - began)
     spent = []
     for motion in motions.values():
-        track, rate = encode_mean(motion, 1.0)
+        track, rate = encode_motion_to_mean_error(motion, 1.0)
         for block in rate.blocks:
             # the best of three: others share the machine
             tries = []
             for _ in range(3):
                 began = time.perf_counter()
-                decode_block(track, block)
+                decode_motion_block(track, block)
                 tries.append(time.perf_counter() - began)
             spent.append(min(tries))
     figures["decode_ms_python"] = float(np.median(spent)) * 1e3
     return figures
 
 
-def decode_ms_typescript(motions: dict[str, Motion]) -> float | None:
+def measure_typescript_decode_ms(motions: dict[str, Motion]) -> float | None:
     """Median milliseconds in Node of a block at 1 mm, None where there is no Node."""
     web = Path(__file__).resolve().parents[2] / "services/web"
     coded = []
     for motion in motions.values():
-        track, rate = encode_mean(motion, 1.0)
+        track, rate = encode_motion_to_mean_error(motion, 1.0)
         described = {
             "fps": track.fps,
             "frames": track.frames,
             "blockFrames": track.block_frames,
             "firstFrames": track.first_frames,
-            "dancer": track.dancer.pack().hex(),
+            "dancer": track.skeleton.pack().hex(),
         }
         coded.append({"track": described, "blocks": [block.hex() for block in rate.blocks]})
     with tempfile.TemporaryDirectory() as folder:
@@ -154,36 +157,40 @@ def main() -> None:
     parser.add_argument("--block-seconds", type=float, default=1.0)
     asked = parser.parse_args()
     folder = Path(os.environ.get("CORPUS") or os.environ.get("BUNRAKU_SHARED", "../shared") + "/mocap")
-    measured = peers.read(folder)
-    names = [name for name in clips.names(folder) if name in measured][:: 3 if asked.quick else 1]
-    motions = {name: clips.load(folder, name) for name in names}
+    measured = peer_results.load_peer_results(folder)
+    names = [name for name in clips.list_clips(folder) if name in measured][:: 3 if asked.quick else 1]
+    motions = {name: clips.load_clip(folder, name) for name in names}
     ratios: dict[str, list[float]] = {}
     rates: dict[tuple[str, float], list[float]] = {}
     print(
         f"{'clip':<16}"
-        + "".join(f"{kind} {error:g} mm".rjust(12) + f"{'acl':>8}{'meshopt':>9}" for kind, error in GOALS)
+        + "".join(f"{kind} {error:g} mm".rjust(12) + f"{'acl':>8}{'meshopt':>9}" for kind, error in ERROR_GOALS)
     )
     for name, motion in motions.items():
         row = f"{name:<16}"
-        for kind, error in GOALS:
+        for kind, error in ERROR_GOALS:
             key = f"{kind}_{error:g}mm"
-            kbps = ours(motion, (kind, error), prior_for(name), asked.block_seconds)
+            kbps = encode_to_goal(motion, (kind, error), load_held_out_prior(name), asked.block_seconds)
             rates.setdefault((kind, error), []).append(kbps)
             row += f"{kbps:12.2f}"
             for peer, column in PEERS.items():
-                theirs = peers.kbps(measured[name][column], COLUMNS[kind], error)
+                theirs = peer_results.interpolate_kbps(measured[name][column], ERROR_COLUMNS[kind], error)
                 ratios.setdefault(f"{peer}_{key}", []).append(theirs / kbps)
                 row += f"{theirs / kbps:8.2f}" if peer == "acl" else f"{theirs / kbps:9.2f}"
         print(row, flush=True)
     told = ratios | {f"kbps_{kind}_{error:g}mm": values for (kind, error), values in rates.items()}
-    figures = {key: round(geometric(values), 3) for key, values in told.items()}
+    figures = {key: round(geometric_mean(values), 3) for key, values in told.items()}
     if os.environ.get("PICTURE"):
-        drawn = draw(motions, measured, rates, asked.block_seconds)
+        drawn = draw_chart(motions, measured, rates, asked.block_seconds)
         Path(os.environ["PICTURE"]).write_text(drawn, encoding="utf-8", newline="\n")
-    figures |= {key: round(value, 3) for key, value in speeds(motions).items()}
-    typescript = decode_ms_typescript(motions)
+    figures |= {key: round(value, 3) for key, value in measure_speeds(motions).items()}
+    typescript = measure_typescript_decode_ms(motions)
     figures["decode_ms_typescript"] = round(typescript, 3) if typescript is not None else -1.0
-    print(json.dumps(figures | {"clips": len(names), "ladder_mm": list(LADDER), "block_seconds": asked.block_seconds}))
+    print(
+        json.dumps(
+            figures | {"clips": len(names), "ladder_mm": list(ERROR_BOUNDS_MM), "block_seconds": asked.block_seconds}
+        )
+    )
 
 
 if __name__ == "__main__":

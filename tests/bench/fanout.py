@@ -35,23 +35,25 @@ from shutil import which
 from typing import Any
 
 from bunraku.client.api import Client
-from bunraku.client.message_socket import upgrade
-from bunraku.client.puppeteer import Puppeteer, Refused
-from tests.bench.fanout_processes import Told, ceiling
-from tests.bench.parts import asked
+from bunraku.client.message_socket import upgrade_request
+from bunraku.client.puppeteer import ControlRefused, Puppeteer
+from tests.bench.arguments import parse_parts
+from tests.bench.fanout_processes import LineProcess, start_c_sender
 
-LEAD_MS = 60.0
+OVERLAY_LEAD_MS = 60.0
 """How far ahead of their publishing overlays are due."""
-STREAM = "/v1/sessions/bench/stream"
+STREAM_PATH = "/v1/sessions/bench/stream"
 Figures = dict[str, float | None]
 
 
-def rates(viewers: int = 600, size: int = 120, hertz: int = 60, rounds: int = 7, seconds: float = 1.0) -> Figures:
+def measure_send_cost(
+    viewers: int = 600, size: int = 120, hertz: int = 60, rounds: int = 7, seconds: float = 1.0
+) -> Figures:
     """Processor time of who sends, side by side."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bunraku-bench-")))
-        senders: dict[str, Told] = {}
-        bare = stack.enter_context(ceiling(folder, viewers, size, hertz))
+        senders: dict[str, LineProcess] = {}
+        bare = stack.enter_context(start_c_sender(folder, viewers, size, hertz))
         if bare is not None:
             senders["c"] = bare
         else:
@@ -62,28 +64,30 @@ def rates(viewers: int = 600, size: int = 120, hertz: int = 60, rounds: int = 7,
         else:
             print("python-socketio is not installed: without Socket.IO")
         for kind in kinds:
-            senders[kind] = stack.enter_context(Told.module("fanout_senders", kind, size, hertz))
+            senders[kind] = stack.enter_context(LineProcess.start_module("fanout_senders", kind, size, hertz))
         if which("nats-server") is not None:
-            senders["nats"] = stack.enter_context(Told.module("fanout_nats", size, hertz))
+            senders["nats"] = stack.enter_context(LineProcess.start_module("fanout_nats", size, hertz))
         else:
             print("nats-server is not installed: without its WebSocket")
-        speech = {"c": ("raw",), "bunraku": ("bunraku", STREAM), "nats": ("nats", "/")}
+        speech = {"c": ("raw",), "bunraku": ("bunraku", STREAM_PATH), "nats": ("nats", "/")}
         speech["socketio"] = ("socketio", "/socket.io/?EIO=4&transport=websocket")
         drains = {}
         for kind, sender in senders.items():
             said = speech.get(kind, ("websocket", "/"))
-            drains[kind] = stack.enter_context(Told.module("fanout_drain", sender.line(), viewers, *said))
-            assert drains[kind].line() == "ready"
+            drains[kind] = stack.enter_context(
+                LineProcess.start_module("fanout_drain", sender.read_line(), viewers, *said)
+            )
+            assert drains[kind].read_line() == "ready"
         found: dict[str, list[float]] = {kind: [] for kind in senders}
         for turn in range(rounds + 1):
             for kind, sender in senders.items():
                 # what Socket.IO takes needs no seven rounds
                 if kind == "socketio" and turn > 2:
                     continue
-                drains[kind].ask("")
-                sent = sender.ask(seconds)
+                drains[kind].request("")
+                sent = sender.request(seconds)
                 time.sleep(0.1)
-                came = drains[kind].ask("")
+                came = drains[kind].request("")
                 assert came["open"] == viewers, f"{kind}: {came['open']} of {viewers} are still there"
                 assert came["frames"] >= 0.95 * sent["messages"] > 0, f"{kind}: {came} of {sent}"
                 if turn:
@@ -104,39 +108,42 @@ def rates(viewers: int = 600, size: int = 120, hertz: int = 60, rounds: int = 7,
     return figures
 
 
-def latency(viewers: int = 1000, hertz: int = 20, seconds: float = 8.0) -> Figures:
+def measure_latency(viewers: int = 1000, hertz: int = 20, seconds: float = 8.0) -> Figures:
     """From the publishing of an overlay to the viewers' sockets."""
-    with Told.module("fanout_senders", "bunraku", 66, hertz) as sender, _crowd(sender.line()) as crowd:
-        crowd.ask(f"join {viewers} 300")
-        sender.ask(1)
-        crowd.ask("count")
-        sent = sender.ask(seconds)
-        came = crowd.ask("figures")
+    with (
+        LineProcess.start_module("fanout_senders", "bunraku", 66, hertz) as sender,
+        _start_viewers(sender.read_line()) as crowd,
+    ):
+        crowd.request(f"join {viewers} 300")
+        sender.request(1)
+        crowd.request("count")
+        sent = sender.request(seconds)
+        came = crowd.request("figures")
     assert came["joined"] == viewers
     assert came["overlays"] >= 0.99 * sent["messages"]
     return {
-        "latency_ms_p50": _round(came["overlay_late_ms_p50"] + LEAD_MS),
-        "latency_ms_p99": _round(came["overlay_p99"] + LEAD_MS),
+        "latency_ms_p50": _round(came["overlay_late_ms_p50"] + OVERLAY_LEAD_MS),
+        "latency_ms_p99": _round(came["overlay_p99"] + OVERLAY_LEAD_MS),
         "latency_cores": _round(sent["cpu"] / seconds),
     }
 
 
-def blocks(viewers: int = 4000, sample: int = 200, seconds: float = 12.0) -> Figures:
+def measure_block_delivery(viewers: int = 4000, sample: int = 200, seconds: float = 12.0) -> Figures:
     """Blocks of a motion that plays: `sample` of the viewers are looked at, of the others what comes is counted."""
-    with Told.module("fanout_senders", "playing", 66, 20) as sender:
-        port = sender.line()
-        drain = Told.module("fanout_drain", port, viewers - sample, "bunraku", STREAM)
-        with drain, _crowd(port) as crowd:
-            assert drain.line() == "ready"
-            crowd.ask(f"join {sample} 100")
+    with LineProcess.start_module("fanout_senders", "playing", 66, 20) as sender:
+        port = sender.read_line()
+        drain = LineProcess.start_module("fanout_drain", port, viewers - sample, "bunraku", STREAM_PATH)
+        with drain, _start_viewers(port) as crowd:
+            assert drain.read_line() == "ready"
+            crowd.request(f"join {sample} 100")
             # what is sent ahead at first is not counted
             time.sleep(2)
-            drain.ask("")
-            crowd.ask("count")
+            drain.request("")
+            crowd.request("count")
             before, begun = sender.processor_seconds(), time.monotonic()
             time.sleep(seconds)
             passed, cores = time.monotonic() - begun, sender.processor_seconds() - before
-            came, seen = drain.ask(""), crowd.ask("figures")
+            came, seen = drain.request(""), crowd.request("figures")
     # pings of the silent are frames too, one in twelve seconds
     sent = came["frames"] + seen["blocks"]
     return {
@@ -149,39 +156,39 @@ def blocks(viewers: int = 4000, sample: int = 200, seconds: float = 12.0) -> Fig
     }
 
 
-def stalled(viewers: int = 300, hertz: int = 60, seconds: float = 10.0, rounds: int = 7) -> Figures:
+def measure_stalled_viewer(viewers: int = 300, hertz: int = 60, seconds: float = 10.0, rounds: int = 7) -> Figures:
     """One who stops reading, and one who never answers."""
-    with Told.module("fanout_senders", "bunraku", 228, hertz) as sender:
-        port = sender.line()
-        with _crowd(port) as crowd:
-            crowd.ask(f"join {viewers} 300")
-            sender.ask(1)
+    with LineProcess.start_module("fanout_senders", "bunraku", 228, hertz) as sender:
+        port = sender.read_line()
+        with _start_viewers(port) as crowd:
+            crowd.request(f"join {viewers} 300")
+            sender.request(1)
 
             def late() -> float:
-                crowd.ask("count")
-                sender.ask(3)
-                return float(crowd.ask("figures")["overlay_p99"]) + LEAD_MS
+                crowd.request("count")
+                sender.request(3)
+                return float(crowd.request("figures")["overlay_p99"]) + OVERLAY_LEAD_MS
 
             without, beside = [], []
             for _ in range(rounds):
                 without.append(late())
-                one = _viewer(int(port), 4096)
+                one = _open_viewer(int(port), 4096)
                 # until it is full
-                sender.ask(2)
+                sender.request(2)
                 beside.append(late())
                 one.close()
-            silent, stopped = _viewer(int(port)), _viewer(int(port), 4096)
+            silent, stopped = _open_viewer(int(port)), _open_viewer(int(port), 4096)
             begun = time.monotonic()
             most = 0
             while time.monotonic() - begun < seconds:
-                sender.ask(1)
-                most = max(most, sender.ask("waiting")["most"])
-                assert not _read(silent, 0.0)[1]
-            number = sender.ask("waiting")["number"]
-            data, ended = _read(stopped, 1.0)
+                sender.request(1)
+                most = max(most, sender.request("waiting")["most"])
+                assert not _read_available(silent, 0.0)[1]
+            number = sender.request("waiting")["number"]
+            data, ended = _read_available(stopped, 1.0)
             gone = None
             while gone is None and time.monotonic() - begun < 30:
-                if _read(silent, 0.2)[1]:
+                if _read_available(silent, 0.2)[1]:
                     gone = time.monotonic() - begun
     # overlays of 228 bytes: their heads, then the number
     found = re.finditer(rb"\x82\x7e\x00\xe4\x05.(..)", data, re.DOTALL)
@@ -198,32 +205,35 @@ def stalled(viewers: int = 300, hertz: int = 60, seconds: float = 10.0, rounds: 
     }
 
 
-def memory(viewers: int = 2000) -> Figures:
+def measure_memory(viewers: int = 2000) -> Figures:
     """What the server's process grows by."""
-    with Told.module("fanout_senders", "playing", 66, 20) as sender, _crowd(sender.line()) as crowd:
+    with (
+        LineProcess.start_module("fanout_senders", "playing", 66, 20) as sender,
+        _start_viewers(sender.read_line()) as crowd,
+    ):
         # what is made with the first viewers is not the others'
-        crowd.ask("join 20 100")
+        crowd.request("join 20 100")
         time.sleep(1)
         before = sender.resident_kilobytes()
-        joined = crowd.ask(f"join {viewers} 300")
+        joined = crowd.request(f"join {viewers} 300")
         time.sleep(3)
         after = sender.resident_kilobytes()
     return {"memory_kb_viewer": _round((after - before) / (joined["joined"] - 20)), "memory_viewers": joined["joined"]}
 
 
-def crowd(viewers: int = 1000, there: int = 50) -> Figures:
+def measure_join_burst(viewers: int = 1000, initial_viewers: int = 50) -> Figures:
     """A flash crowd and its going, with a limb pulled all the while."""
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         bunraku = str(Path(sys.executable).parent / "bunraku")
-        with Told([bunraku, "up", "--demo", "--port", "0", "--data", folder]) as server:
+        with LineProcess([bunraku, "up", "--demo", "--port", "0", "--data", folder]) as server:
             url = None
             while url is None:
-                found = re.search(r"is at (http://\S+)/", server.line())
+                found = re.search(r"is at (http://\S+)/", server.read_line())
                 url = found[1] if found else None
-            return asyncio.run(_flash(server, url, viewers, there))
+            return asyncio.run(_run_join_burst(server, url, viewers, initial_viewers))
 
 
-async def _flash(server: Told, url: str, viewers: int, there: int) -> Figures:
+async def _run_join_burst(server: LineProcess, url: str, viewers: int, initial_viewers: int) -> Figures:
     async with Client(url) as client:
         session = await client.first_session()
         assert session is not None
@@ -236,31 +246,34 @@ async def _flash(server: Told, url: str, viewers: int, there: int) -> Figures:
                 while not ended.is_set():
                     try:
                         await puppeteer.target("left_hand", 0.45, -0.2 + 0.2 * (number // 30 % 2), 0.5)
-                    except Refused:
+                    except ControlRefused:
                         # not yet, or lost while this process was kept from running
                         await puppeteer.claim("left_hand")
                     number += 1
                     await asyncio.sleep(1 / 60)
 
-        with Told.module("fanout_crowd", stream, "talk") as stay, Told.module("fanout_crowd", stream) as come:
+        with (
+            LineProcess.start_module("fanout_crowd", stream, "talk") as stay,
+            LineProcess.start_module("fanout_crowd", stream) as come,
+        ):
 
             async def during(what: Callable[[], Any], rest: float) -> tuple[dict[str, Any], float]:
-                await asyncio.to_thread(stay.ask, "count")
+                await asyncio.to_thread(stay.request, "count")
                 before, begun = server.processor_seconds(), time.monotonic()
                 await asyncio.to_thread(what)
                 await asyncio.sleep(rest)
                 cores = (server.processor_seconds() - before) / (time.monotonic() - begun)
-                return await asyncio.to_thread(stay.ask, "figures"), cores
+                return await asyncio.to_thread(stay.request, "figures"), cores
 
             pulling = asyncio.create_task(pull())
-            await asyncio.to_thread(stay.ask, f"join {there} 50")
+            await asyncio.to_thread(stay.request, f"join {initial_viewers} 50")
             # what is loaded after the start is loaded
             await asyncio.sleep(8)
             calm, _ = await during(lambda: None, 6)
-            flash, cores = await during(lambda: come.ask(f"join {viewers} {viewers / 5}"), 1)
-            joined = await asyncio.to_thread(come.ask, "figures")
+            flash, cores = await during(lambda: come.request(f"join {viewers} {viewers / 5}"), 1)
+            joined = await asyncio.to_thread(come.request, "figures")
             many, many_cores = await during(lambda: None, 5)
-            storm, _ = await during(lambda: come.ask(f"leave {viewers}"), 3)
+            storm, _ = await during(lambda: come.request(f"leave {viewers}"), 3)
             ended.set()
             await pulling
     return {
@@ -279,22 +292,22 @@ async def _flash(server: Told, url: str, viewers: int, there: int) -> Figures:
     }
 
 
-def _crowd(port: str) -> Told:
-    return Told.module("fanout_crowd", f"ws://127.0.0.1:{port}{STREAM}")
+def _start_viewers(port: str) -> LineProcess:
+    return LineProcess.start_module("fanout_crowd", f"ws://127.0.0.1:{port}{STREAM_PATH}")
 
 
-def _viewer(port: int, buffer: int | None = None) -> socket.socket:
+def _open_viewer(port: int, buffer: int | None = None) -> socket.socket:
     """A viewer of no more than a socket; `buffer` is what its system keeps for it."""
     viewer = socket.socket()
     if buffer is not None:
         viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
     viewer.settimeout(20)
     viewer.connect(("127.0.0.1", port))
-    viewer.sendall(upgrade(f"ws://127.0.0.1:{port}{STREAM}"))
+    viewer.sendall(upgrade_request(f"ws://127.0.0.1:{port}{STREAM_PATH}"))
     return viewer
 
 
-def _read(viewer: socket.socket, wait: float) -> tuple[bytes, bool]:
+def _read_available(viewer: socket.socket, wait: float) -> tuple[bytes, bool]:
     """What there is to be read, until nothing comes for `wait` seconds; and whether the server has ended it."""
     viewer.settimeout(wait)
     data = b""
@@ -312,18 +325,18 @@ def _round(value: float | None, digits: int = 2) -> float | None:
     return None if value is None else round(value, digits)
 
 
-PARTS: dict[str, Callable[[], Figures]] = {
-    "rates": rates,
-    "latency": latency,
-    "blocks": blocks,
-    "stalled": stalled,
-    "memory": memory,
-    "crowd": crowd,
+BENCHMARKS: dict[str, Callable[[], Figures]] = {
+    "rates": measure_send_cost,
+    "latency": measure_latency,
+    "blocks": measure_block_delivery,
+    "stalled": measure_stalled_viewer,
+    "memory": measure_memory,
+    "crowd": measure_join_burst,
 }
 
 
 def main() -> None:
-    parts = asked(__doc__, PARTS)
+    parts = parse_parts(__doc__, BENCHMARKS)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft < 16_384:
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 16_384), hard))
@@ -332,7 +345,7 @@ def main() -> None:
     figures: Figures = {}
     for part in parts:
         begun = time.monotonic()
-        found = PARTS[part]()
+        found = BENCHMARKS[part]()
         figures |= found
         print(f"{part}, {time.monotonic() - begun:.0f} s")
         for name, value in found.items():

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import uvloop
 
-from bunraku.client.crowd import Crowd
+from bunraku.client.load_generator import LoadGenerator
 
 
 async def run(url: str, quiet: bool) -> None:
     """Do what standard input says until its end."""
-    crowd = Crowd(url, quiet=quiet)
+    crowd = LoadGenerator(url, single_reporter=quiet)
     while line := await asyncio.to_thread(sys.stdin.readline):
         command, *numbers = line.split()
         said: dict[str, Any] = {}
@@ -30,10 +30,10 @@ async def run(url: str, quiet: bool) -> None:
         elif command == "leave":
             await crowd.leave(int(numbers[0]))
         elif command == "count":
-            crowd.count()
+            crowd.reset_statistics()
         else:
-            late, blocks = np.array(crowd.shared.overlays), np.array(crowd.shared.blocks)
-            said = crowd.figures().as_json()
+            late, blocks = np.array(crowd.state.overlay_lateness), np.array(crowd.state.block_lateness)
+            said = crowd.statistics().as_json()
             if late.size:
                 said |= {"overlay_p99": float(np.percentile(late, 99)) / 1e3, "overlay_max": float(late.max()) / 1e3}
             if blocks.size:

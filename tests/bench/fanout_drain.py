@@ -18,38 +18,38 @@ from dataclasses import dataclass, field
 from bunraku.wire.messages import SUBPROTOCOL
 
 
-def masked(opcode: int, payload: bytes) -> bytes:
+def encode_masked_frame(opcode: int, payload: bytes) -> bytes:
     """A client's frame of less than 126 bytes (RFC 6455, section 5.2); its mask is zero."""
     return bytes((0x80 | opcode, 0x80 | len(payload), 0, 0, 0, 0)) + payload
 
 
 @dataclass(slots=True)
-class Drain:
+class DrainClient:
     """One client: its socket, what came of a frame that is not whole yet, and bytes of the body still to come."""
 
     socket: socket.socket
-    rest: bytes = b""
-    skip: int = 0
+    partial_frame: bytes = b""
+    remaining_body_bytes: int = 0
 
 
 @dataclass
-class Drains:
+class DrainPool:
     """All clients of the process."""
 
-    speech: str
-    clients: dict[int, Drain] = field(default_factory=dict)
-    octets: int = 0
+    protocol: str
+    clients: dict[int, DrainClient] = field(default_factory=dict)
+    received_bytes: int = 0
     frames: int = 0
 
     def open(self, port: int, path: str) -> int:
         """One more client, its handshake done; its socket's number."""
         connection = socket.create_connection(("127.0.0.1", port), timeout=30)
-        client = Drain(connection)
-        if self.speech != "raw":
+        client = DrainClient(connection)
+        if self.protocol != "raw":
             key = base64.b64encode(os.urandom(16)).decode()
             lines = [f"GET {path} HTTP/1.1", f"Host: 127.0.0.1:{port}", "Upgrade: websocket", "Connection: Upgrade"]
             lines += [f"Sec-WebSocket-Key: {key}", "Sec-WebSocket-Version: 13"]
-            if self.speech == "bunraku":
+            if self.protocol == "bunraku":
                 lines.append(f"Sec-WebSocket-Protocol: {SUBPROTOCOL}")
             connection.sendall("\r\n".join([*lines, "", ""]).encode())
             answer = b""
@@ -61,27 +61,29 @@ class Drains:
             head, _, rest = answer.partition(b"\r\n\r\n")
             if b" 101 " not in head.split(b"\r\n", 1)[0]:
                 raise ConnectionError(head.decode(errors="replace"))
-            if self.speech == "socketio":
-                connection.sendall(masked(1, b"40"))
-            if self.speech == "nats":
-                connection.sendall(masked(2, b'CONNECT {"verbose":false,"pedantic":false}\r\nSUB overlay 1\r\n'))
-            self.walk(client, rest)
+            if self.protocol == "socketio":
+                connection.sendall(encode_masked_frame(1, b"40"))
+            if self.protocol == "nats":
+                connection.sendall(
+                    encode_masked_frame(2, b'CONNECT {"verbose":false,"pedantic":false}\r\nSUB overlay 1\r\n')
+                )
+            self.process_frames(client, rest)
         connection.setblocking(False)
         self.clients[connection.fileno()] = client
         return connection.fileno()
 
-    def walk(self, client: Drain, data: bytes) -> None:
+    def process_frames(self, client: DrainClient, data: bytes) -> None:
         """Count the frames in what came, and answer the pings."""
-        at, end = client.skip, len(data)
+        at, end = client.remaining_body_bytes, len(data)
         if at >= end:
-            client.skip -= end
+            client.remaining_body_bytes -= end
             return
-        if client.rest:
-            data, client.rest = client.rest + data[at:], b""
+        if client.partial_frame:
+            data, client.partial_frame = client.partial_frame + data[at:], b""
             at, end = 0, len(data)
         while at < end:
             if end - at < 10 and (end - at < 2 or end - at < {126: 4, 127: 10}.get(data[at + 1], 2)):
-                client.rest, client.skip = data[at:], 0
+                client.partial_frame, client.remaining_body_bytes = data[at:], 0
                 return
             size, body = data[at + 1], at + 2
             if size == 126:
@@ -90,14 +92,14 @@ class Drains:
                 size, body = int.from_bytes(data[at + 2 : at + 10], "big"), at + 10
             if data[at] == 0x89:
                 if body + size > end:
-                    client.rest, client.skip = data[at:], 0
+                    client.partial_frame, client.remaining_body_bytes = data[at:], 0
                     return
-                client.socket.send(masked(10, data[body : body + size]))
+                client.socket.send(encode_masked_frame(10, data[body : body + size]))
             self.frames += 1
             at = body + size
-        client.skip = at - end
+        client.remaining_body_bytes = at - end
 
-    def read(self, number: int, buffer: bytearray) -> None:
+    def read_client(self, number: int, buffer: bytearray) -> None:
         """Read what a socket holds."""
         client = self.clients[number]
         try:
@@ -110,32 +112,32 @@ class Drains:
             client.socket.close()
             del self.clients[number]
             return
-        self.octets += size
-        self.walk(client, bytes(memoryview(buffer)[:size]))
+        self.received_bytes += size
+        self.process_frames(client, bytes(memoryview(buffer)[:size]))
 
 
 def main() -> None:
     port, viewers, speech = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
     path = sys.argv[4] if len(sys.argv) > 4 else "/"
-    drains = Drains(speech)
+    drains = DrainPool(speech)
     waiting = select.epoll()
     buffer = bytearray(1 << 16)
     for _ in range(viewers):
         waiting.register(drains.open(port, path), select.EPOLLIN)
         # those who have joined are viewers already
         for number, _ in waiting.poll(0):
-            drains.read(number, buffer)
+            drains.read_client(number, buffer)
     print("ready", flush=True)
     waiting.register(0, select.EPOLLIN)
     while True:
         for number, _ in waiting.poll():
             if number:
-                drains.read(number, buffer)
+                drains.read_client(number, buffer)
             elif not os.read(0, 64):
                 return
             else:
-                said = {"bytes": drains.octets, "frames": drains.frames, "open": len(drains.clients)}
-                drains.octets = drains.frames = 0
+                said = {"bytes": drains.received_bytes, "frames": drains.frames, "open": len(drains.clients)}
+                drains.received_bytes = drains.frames = 0
                 print(json.dumps(said), flush=True)
 
 

@@ -15,12 +15,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tests.processes import Owned, free_port, needed
+from tests.processes import ServerProcess, find_program, free_port
 
 SUBJECT = "overlay"
 
 
-def settings(client: int, websocket: int, monitor: int) -> str:
+def server_config(client: int, websocket: int, monitor: int) -> str:
     """A server that asks nothing of its clients while a bench runs."""
     return f"""
 host: "127.0.0.1"
@@ -36,7 +36,7 @@ websocket {{
 """
 
 
-def connected(port: int) -> socket.socket:
+def connect_publisher(port: int) -> socket.socket:
     """A client of the server that may publish."""
     client = socket.create_connection(("127.0.0.1", port), timeout=10)
     client.sendall(b'CONNECT {"verbose":false,"pedantic":false}\r\nPING\r\n')
@@ -46,7 +46,7 @@ def connected(port: int) -> socket.socket:
     return client
 
 
-def sent(monitor: int) -> int:
+def sent_bytes(monitor: int) -> int:
     """How many messages it has sent to clients, as the server counts them."""
     with socket.create_connection(("127.0.0.1", monitor), timeout=10) as asked:
         asked.sendall(b"GET /varz HTTP/1.0\r\n\r\n")
@@ -55,7 +55,7 @@ def sent(monitor: int) -> int:
     return int(found["out_msgs"])
 
 
-def used(pid: int) -> float:
+def processor_seconds_of(pid: int) -> float:
     """Seconds of processor that the server has had, to the nanosecond, threads that have ended aside."""
     return sum(int(one.read_text().split()[0]) for one in Path(f"/proc/{pid}/task").glob("*/schedstat")) / 1e9
 
@@ -65,21 +65,21 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         client, websocket, monitor = free_port(), free_port(), free_port()
         config = Path(folder) / "nats.conf"
-        config.write_text(settings(client, websocket, monitor))
-        server = Owned([needed("nats-server"), "-c", str(config)], client, Path(folder))
+        config.write_text(server_config(client, websocket, monitor))
+        server = ServerProcess([find_program("nats-server"), "-c", str(config)], client, Path(folder))
         server.start()
         try:
-            publisher = connected(client)
+            publisher = connect_publisher(client)
             print(websocket, flush=True)
             message = f"PUB {SUBJECT} {size}\r\n".encode() + os.urandom(size) + b"\r\n"
             while line := sys.stdin.readline():
-                messages, before, begun = sent(monitor), used(server.pid), time.monotonic()
+                messages, before, begun = sent_bytes(monitor), processor_seconds_of(server.pid), time.monotonic()
                 for tick in range(round(float(line) * hertz)):
                     time.sleep(max(begun + tick / hertz - time.monotonic(), 0.0))
                     publisher.sendall(message)
                 time.sleep(1 / hertz)
-                cpu = used(server.pid) - before
-                print(json.dumps({"messages": sent(monitor) - messages, "cpu": round(cpu, 6)}), flush=True)
+                cpu = processor_seconds_of(server.pid) - before
+                print(json.dumps({"messages": sent_bytes(monitor) - messages, "cpu": round(cpu, 6)}), flush=True)
         finally:
             server.stop()
 

@@ -12,12 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-from tests.processes import processor_seconds
+from tests.processes import cpu_seconds
 
-HERE = Path(__file__).parent
+BENCH_FOLDER = Path(__file__).parent
 
 
-class Told:
+class LineProcess:
     """A process that answers each line with one line."""
 
     def __init__(self, command: list[str]) -> None:
@@ -27,7 +27,7 @@ class Told:
         )
 
     @classmethod
-    def module(cls, name: str, *arguments: object) -> Self:
+    def start_module(cls, name: str, *arguments: object) -> Self:
         """A module of the benches."""
         return cls([sys.executable, "-m", f"tests.bench.{name}", *map(str, arguments)])
 
@@ -46,7 +46,7 @@ class Told:
             self.process.wait(20)
         self.process.stdout.close()
 
-    def line(self) -> str:
+    def read_line(self) -> str:
         """Its next line; raises RuntimeError where it has ended."""
         assert self.process.stdout is not None
         found = self.process.stdout.readline()
@@ -54,20 +54,20 @@ class Told:
             raise RuntimeError(f"{self.process.args!r} ended")
         return found.strip()
 
-    def say(self, line: object) -> None:
+    def write_line(self, line: object) -> None:
         """Tell it something."""
         assert self.process.stdin is not None
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 
-    def ask(self, line: object) -> Any:
+    def request(self, line: object) -> Any:
         """Its answer."""
-        self.say(line)
-        return json.loads(self.line())
+        self.write_line(line)
+        return json.loads(self.read_line())
 
     def processor_seconds(self) -> float:
         """As `processes.processor_seconds`."""
-        return processor_seconds(self.process.pid)
+        return cpu_seconds(self.process.pid)
 
     def resident_kilobytes(self) -> int:
         """Its memory."""
@@ -76,13 +76,13 @@ class Told:
 
 
 @contextmanager
-def ceiling(folder: Path, viewers: int, size: int, hertz: int) -> Iterator[Told | None]:
+def start_c_sender(folder: Path, viewers: int, size: int, hertz: int) -> Iterator[LineProcess | None]:
     """The bare loop in C, None where there is no compiler."""
     compiler = shutil.which("cc")
     if compiler is None:
         yield None
         return
     program = folder / "ceiling"
-    subprocess.run([compiler, "-O2", "-o", program, HERE / "fanout_ceiling.c"], check=True)
-    with Told([str(program), str(viewers), str(size), str(hertz)]) as told:
+    subprocess.run([compiler, "-O2", "-o", program, BENCH_FOLDER / "fanout_ceiling.c"], check=True)
+    with LineProcess([str(program), str(viewers), str(size), str(hertz)]) as told:
         yield told

@@ -28,53 +28,53 @@ import uvicorn
 import uvloop
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 
-from bunraku.backing import together
-from bunraku.backing.backing import clock, open_backing
-from bunraku.backing.library import pack
-from bunraku.backing.outlet import Outlet
-from bunraku.backing.settings import Settings
 from bunraku.playout import timeline
+from bunraku.runtime.context import clock, open_context
+from bunraku.runtime.settings import Settings
+from bunraku.storage.motion_store import pack
+from bunraku.websocket import multicast
+from bunraku.websocket.connection import WebSocketConnection
 from bunraku.wire.messages import Presence
 from bunraku.wire.overlay import Overlay
 
 SESSION = "bench"
-DURATION = 90_000_000
-Send = Callable[[bytes], Awaitable[int]]
+MOTION_DURATION_US = 90_000_000
+SendMessage = Callable[[bytes], Awaitable[int]]
 """Sends to every client, and says how many those were."""
 
 
-def used() -> float:
+def processor_seconds() -> float:
     """Seconds of processor that this process has had."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_utime + usage.ru_stime
 
 
-async def conduct(
-    listening: socket.socket, send: Send, size: int, hertz: int, waiting: Callable[[], int] = lambda: 0
+async def run_sender(
+    listening: socket.socket, send: SendMessage, size: int, hertz: int, queued_bytes: Callable[[], int] = lambda: 0
 ) -> None:
     """Do what standard input says until its end."""
     print(listening.getsockname()[1], flush=True)
     number = 0
     while line := await asyncio.to_thread(sys.stdin.readline):
         if line.strip() == "waiting":
-            print(json.dumps({"most": waiting(), "number": number}), flush=True)
+            print(json.dumps({"most": queued_bytes(), "number": number}), flush=True)
             continue
-        messages, before, begun = 0, used(), time.monotonic()
+        messages, before, begun = 0, processor_seconds(), time.monotonic()
         for tick in range(round(float(line) * hertz)):
             await asyncio.sleep(max(begun + tick / hertz - time.monotonic(), 0.0))
             number += 1
-            messages += await send(message(number, size))
-        print(json.dumps({"messages": messages, "cpu": round(used() - before, 6)}), flush=True)
+            messages += await send(make_overlay(number, size))
+        print(json.dumps({"messages": messages, "cpu": round(processor_seconds() - before, 6)}), flush=True)
 
 
-def message(number: int, size: int) -> bytes:
+def make_overlay(number: int, size: int) -> bytes:
     """An overlay of `size` bytes: 12 and a multiple of 18; of others a likeness."""
     limbs, frames = next(((n, f) for n in (1, 2, 3, 4) for f in (1, 2, 3) if 12 + 18 * n * f == size), (0, 0))
     one: dict[int, tuple[int, ...]] = dict.fromkeys(range(limbs), (number & 0xFF,) * 9)
     return Overlay(number, clock() + 60_000, one, (one,) * (frames - 1)).pack() if limbs else bytes(size)
 
 
-async def serving(app: Any, listening: socket.socket, **options: Any) -> uvicorn.Server:
+async def start_server(app: Any, listening: socket.socket, **options: Any) -> uvicorn.Server:
     """A uvicorn server with its defaults, which listens when this returns."""
     server = uvicorn.Server(uvicorn.Config(app, log_level="warning", access_log=False, **options))
     _tasks.append(asyncio.create_task(server.serve(sockets=[listening])))
@@ -86,28 +86,30 @@ async def serving(app: Any, listening: socket.socket, **options: Any) -> uvicorn
 _tasks: list[asyncio.Task[None]] = []
 
 
-def most_waiting(server: uvicorn.Server) -> int:
+def max_queued_bytes(server: uvicorn.Server) -> int:
     """Bytes that wait for the viewer for whom most do: in the process, and in the kernel (SIOCOUTQ)."""
     most = 0
     for outlet in server.server_state.connections:
-        if isinstance(outlet, Outlet):
+        if isinstance(outlet, WebSocketConnection):
             bare = outlet._transport.get_extra_info("socket")
             held = struct.unpack("=i", fcntl.ioctl(bare.fileno(), termios.TIOCOUTQ, bytes(4)))[0]
-            most = max(most, outlet.waiting + held)
+            most = max(most, outlet.buffered_bytes + held)
     return most
 
 
-async def bunraku(listening: socket.socket, size: int, hertz: int, *, playing: bool = False) -> None:
+async def run_bunraku(listening: socket.socket, size: int, hertz: int, *, playing: bool = False) -> None:
     import bunraku.stream.app
-    from bunraku.codec.encode import encode_motion
-    from bunraku.serve import protocol
-    from tests.vectors.blocks import wandering_motion
+    from bunraku.codec.motion_encoder import encode_motion
+    from bunraku.serve import uvicorn_protocol_options
+    from tests.vectors.blocks import random_motion
 
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
-        async with open_backing(Settings(data=Path(folder))) as backing:
-            encoded = encode_motion(wandering_motion(DURATION / 1e6, 30.0, 9), ladder=(30.0, 5.0), grade="live")
-            await backing.library.put(SESSION, pack(SESSION, encoded))
-            state = timeline.start(SESSION, DURATION, clock())
+        async with open_context(Settings(data=Path(folder))) as backing:
+            encoded = encode_motion(
+                random_motion(MOTION_DURATION_US / 1e6, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live"
+            )
+            await backing.motion_store.put(SESSION, pack(SESSION, encoded))
+            state = timeline.start(SESSION, MOTION_DURATION_US, clock())
             # on a stage that stands what is measured is the overlay
             state = timeline.edit(state, clock(), playing=playing)
             viewers: dict[str, int] = {}
@@ -116,7 +118,7 @@ async def bunraku(listening: socket.socket, size: int, hertz: int, *, playing: b
                 packed: bytes = msgpack.packb([state.pack(), Presence(0, [], [None] * 4).pack(), None])
                 return packed
 
-            backing.bus.answer(f"session.{SESSION}.state", answer)
+            backing.bus.serve(f"session.{SESSION}.state", answer)
             backing.bus.subscribe(f"session.{SESSION}.viewers", lambda data: viewers.update([msgpack.unpackb(data)]))
 
             async def send(data: bytes) -> int:
@@ -124,16 +126,16 @@ async def bunraku(listening: socket.socket, size: int, hertz: int, *, playing: b
                 return sum(viewers.values())
 
             app = bunraku.stream.app.create_app(backing)
-            await asyncio.to_thread(together.warm)
-            server = await serving(app, listening, lifespan="off", **protocol())
-            await conduct(listening, send, size, hertz, lambda: most_waiting(server))
+            await asyncio.to_thread(multicast.warm_up)
+            server = await start_server(app, listening, lifespan="off", **uvicorn_protocol_options())
+            await run_sender(listening, send, size, hertz, lambda: max_queued_bytes(server))
 
 
-async def bunraku_playing(listening: socket.socket, size: int, hertz: int) -> None:
-    await bunraku(listening, size, hertz, playing=True)
+async def run_bunraku_playing(listening: socket.socket, size: int, hertz: int) -> None:
+    await run_bunraku(listening, size, hertz, playing=True)
 
 
-async def fastapi(listening: socket.socket, size: int, hertz: int) -> None:
+async def run_fastapi(listening: socket.socket, size: int, hertz: int) -> None:
     app = FastAPI()
     sockets: set[WebSocket] = set()
 
@@ -152,11 +154,11 @@ async def fastapi(listening: socket.socket, size: int, hertz: int) -> None:
             await one.send_bytes(data)
         return len(sockets)
 
-    await serving(app, listening)
-    await conduct(listening, send, size, hertz)
+    await start_server(app, listening)
+    await run_sender(listening, send, size, hertz)
 
 
-async def websockets(listening: socket.socket, size: int, hertz: int) -> None:
+async def run_websockets(listening: socket.socket, size: int, hertz: int) -> None:
     from websockets.asyncio.server import ServerConnection, broadcast, serve
 
     async def watch(connection: ServerConnection) -> None:
@@ -168,10 +170,10 @@ async def websockets(listening: socket.socket, size: int, hertz: int) -> None:
             broadcast(server.connections, data)
             return len(server.connections)
 
-        await conduct(listening, send, size, hertz)
+        await run_sender(listening, send, size, hertz)
 
 
-async def socketio(listening: socket.socket, size: int, hertz: int) -> None:
+async def run_socketio(listening: socket.socket, size: int, hertz: int) -> None:
     import socketio
 
     server = socketio.AsyncServer(async_mode="asgi", ping_interval=3600)
@@ -183,23 +185,23 @@ async def socketio(listening: socket.socket, size: int, hertz: int) -> None:
         await server.emit("overlay", data)
         return len(there)
 
-    await serving(socketio.ASGIApp(server), listening)
-    await conduct(listening, send, size, hertz)
+    await start_server(socketio.ASGIApp(server), listening)
+    await run_sender(listening, send, size, hertz)
 
 
-KINDS = {
-    "bunraku": bunraku,
-    "playing": bunraku_playing,
-    "fastapi": fastapi,
-    "websockets": websockets,
-    "socketio": socketio,
+SENDERS = {
+    "bunraku": run_bunraku,
+    "playing": run_bunraku_playing,
+    "fastapi": run_fastapi,
+    "websockets": run_websockets,
+    "socketio": run_socketio,
 }
 
 
 def main() -> None:
     kind, size, hertz = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     with socket.create_server(("127.0.0.1", 0), backlog=1024) as listening:
-        uvloop.run(KINDS[kind](listening, size, hertz))
+        uvloop.run(SENDERS[kind](listening, size, hertz))
 
 
 if __name__ == "__main__":

@@ -18,35 +18,42 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.marionette import arms, compiled, table
-from bunraku.marionette.arm import Table
-from bunraku.marionette.arms import Arms
+from bunraku.marionette import arm_batch, bend_table, jit
+from bunraku.marionette.arm import BendTable
+from bunraku.marionette.arm_batch import SolvedArms
 from bunraku.marionette.bodies import BODIES
 from bunraku.marionette.paper import PAPER_BYTES
-from bunraku.marionette.proportions import OUTER_RADIUS, Proportions
+from bunraku.marionette.proportions import MAX_TIP_DISTANCE, Proportions
 from bunraku.motion.rotation import Array
 from tests.bench import ik_accuracy, smoothness
-from tests.bench.ik_peers import Node, Slsqp, processor_rate
+from tests.bench.ik_peers import NodeProcess, SlsqpSolver, processor_rate
 
-ROUNDS = 5
-TARGETS = 20_000
-ACCURACY_TARGETS = 10_000
-SLSQP_TARGETS = 300
-AWKWARD = ((0.0, -0.7, 0.0), (0.0, 0.7, 0.0), (0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.01, 0.0, -0.01), (-0.3, -1.4, -0.2))
+ROUND_COUNT = 5
+TARGET_COUNT = 20_000
+ACCURACY_TARGET_COUNT = 10_000
+SLSQP_TARGET_COUNT = 300
+EDGE_CASE_TARGETS = (
+    (0.0, -0.7, 0.0),
+    (0.0, 0.7, 0.0),
+    (0.0, 0.0, 0.0),
+    (2.0, 0.0, 0.0),
+    (0.01, 0.0, -0.01),
+    (-0.3, -1.4, -0.2),
+)
 """Straight below and above, at the shoulder, out of reach, too near, beyond."""
 
 
-def path(proportions: Proportions, count: int) -> Array:
+def wandering_targets(proportions: Proportions, count: int) -> Array:
     """Places (count, 3) of a wandering hand at 60 Hz, on average half an arm's length a second."""
     t = np.arange(count) / 60.0
-    inner = proportions.inner_radius
-    r = 0.5 * (inner + OUTER_RADIUS) + 0.48 * (OUTER_RADIUS - inner) * np.sin(0.83 * t) * np.cos(0.11 * t)
+    inner = proportions.min_tip_distance
+    r = 0.5 * (inner + MAX_TIP_DISTANCE) + 0.48 * (MAX_TIP_DISTANCE - inner) * np.sin(0.83 * t) * np.cos(0.11 * t)
     beta, azimuth = 0.45 * pi * np.sin(0.57 * t + 2.0) * np.cos(0.05 * t), 2.2 * np.sin(0.36 * t) + np.sin(0.97 * t)
     level = r * np.cos(beta)
     return np.stack([level * np.sin(azimuth), r * np.sin(beta), level * np.cos(azimuth)], axis=-1)
 
 
-def accuracy(random: np.random.Generator) -> dict[str, float]:
+def measure_accuracy(random: np.random.Generator) -> dict[str, float]:
     """The worst of the bodies, each told on a line of its own: as their tables have them, in ten-thousandths, and
     once more as they are, their bends from that nearest table."""
     print(f"{'body':<22}{'tip max':>10}{'angles mean':>13}{'p99':>8}{'max':>7} deg{'paper: mean':>14}{'max':>7} %")
@@ -54,8 +61,8 @@ def accuracy(random: np.random.Generator) -> dict[str, float]:
     for after, shape in (("", Proportions.rounded), ("_nearest_table", lambda proportions: proportions)):
         for body in BODIES:
             proportions = shape(body.proportions)
-            stored = table.table_of(proportions.identity)
-            found = ik_accuracy.measure(proportions, stored, ACCURACY_TARGETS, random)
+            stored = bend_table.load_bend_table(proportions.identity)
+            found = ik_accuracy.measure_accuracy(proportions, stored, ACCURACY_TARGET_COUNT, random)
             paper = f"{100.0 * found.paper_tip_mean:18.4f}{100.0 * found.paper_tip_max:7.3f}"
             print(
                 f"{body.name + after.replace('_', ' '):<22}{found.tip_error_max:10.1e}"
@@ -69,46 +76,57 @@ def accuracy(random: np.random.Generator) -> dict[str, float]:
     return figures
 
 
-def languages_differ(bodies: list[tuple[Proportions, Array]], solved: list[Any]) -> float:
+def max_language_difference(bodies: list[tuple[Proportions, Array]], solved: list[Any]) -> float:
     """How far places and angles of the two languages are apart at most."""
     most = 0.0
     for (proportions, targets), rows in zip(bodies, solved, strict=True):
-        ours = arms.solve(proportions, table.table_of(proportions.identity), targets)
-        most = max(most, float(np.abs(np.concatenate([ours.solved, np.array(ours.angles())]).T - np.array(rows)).max()))
+        ours = arm_batch.solve_arms(proportions, bend_table.load_bend_table(proportions.identity), targets)
+        most = max(most, float(np.abs(np.concatenate([ours.rows, np.array(ours.angles())]).T - np.array(rows)).max()))
     return most
 
 
-def speeds(random: np.random.Generator) -> dict[str, float]:
+def measure_speeds(random: np.random.Generator) -> dict[str, float]:
     """Rates of all solvers in both orders, and how the languages differ."""
     # as their identities have them: TypeScript knows no others
     shapes = [body.proportions.rounded() for body in BODIES]
     proportions = shapes[-1]
-    stored = table.table_of(proportions.identity)
-    orders = {"jumps": ik_accuracy.reachable(proportions, TARGETS, random), "path": path(proportions, TARGETS)}
-    bodies = [(shape, np.concatenate([AWKWARD, ik_accuracy.reachable(shape, 1000, random)])) for shape in shapes]
-    slsqp = Slsqp(proportions)
+    stored = bend_table.load_bend_table(proportions.identity)
+    orders = {
+        "jumps": ik_accuracy.random_reachable_targets(proportions, TARGET_COUNT, random),
+        "path": wandering_targets(proportions, TARGET_COUNT),
+    }
+    bodies = [
+        (shape, np.concatenate([EDGE_CASE_TARGETS, ik_accuracy.random_reachable_targets(shape, 1000, random)]))
+        for shape in shapes
+    ]
+    slsqp = SlsqpSolver(proportions)
 
-    def batches(solve: Callable[[Proportions, Table, Array], Arms], targets: Array) -> float:
+    def batches(solve: Callable[[Proportions, BendTable, Array], SolvedArms], targets: Array) -> float:
         return processor_rate(lambda: sum(len(solve(proportions, stored, targets).tip) for _ in range(20)))
 
-    compiled.solve(proportions, stored, orders["jumps"])
+    jit.solve_arms(proportions, stored, orders["jumps"])
     rates: dict[str, dict[str, list[float]]] = {order: {} for order in orders}
     errors: dict[str, dict[str, float]] = {}
-    with Node() as node:
-        for nth in range(ROUNDS):
-            answer = node.round(bodies, orders)
+    with NodeProcess() as node:
+        for nth in range(ROUND_COUNT):
+            answer = node.run_round(bodies, orders)
             for order, targets in orders.items():
-                errors[order] = answer["orders"][order]["errors"] | {"slsqp": slsqp.error(targets[:SLSQP_TARGETS])}
+                errors[order] = answer["orders"][order]["errors"] | {
+                    "slsqp": slsqp.max_tip_error(targets[:SLSQP_TARGET_COUNT])
+                }
                 found = {name: median(turns) for name, turns in answer["orders"][order]["rates"].items()}
-                found["numpy"], found["compiled"] = batches(arms.solve, targets), batches(compiled.solve, targets)
-                few = targets[nth * SLSQP_TARGETS : (nth + 1) * SLSQP_TARGETS]
+                found["numpy"], found["compiled"] = (
+                    batches(arm_batch.solve_arms, targets),
+                    batches(jit.solve_arms, targets),
+                )
+                few = targets[nth * SLSQP_TARGET_COUNT : (nth + 1) * SLSQP_TARGET_COUNT]
                 found["slsqp"] = processor_rate(lambda few=few: slsqp.solve(few))  # type: ignore[misc]
                 for name, rate in found.items():
                     rates[order].setdefault(name, []).append(rate)
-    return tell(rates, errors) | {"languages_differ_max": languages_differ(bodies, answer["solved"])}
+    return report_speeds(rates, errors) | {"languages_differ_max": max_language_difference(bodies, answer["solved"])}
 
 
-def tell(rates: dict[str, dict[str, list[float]]], errors: dict[str, dict[str, float]]) -> dict[str, float]:
+def report_speeds(rates: dict[str, dict[str, list[float]]], errors: dict[str, dict[str, float]]) -> dict[str, float]:
     """Prints the table of solvers, and gives its figures."""
     figures = {}
     for order, found in rates.items():
@@ -134,10 +152,10 @@ def tell(rates: dict[str, dict[str, list[float]]], errors: dict[str, dict[str, f
 
 def main() -> None:
     random = np.random.default_rng(18)
-    figures = accuracy(random)
-    figures |= {"table_bytes": table.TABLE_BYTES, "paper_table_bytes": PAPER_BYTES}
-    figures |= speeds(random)
-    figures |= smoothness.measure()
+    figures = measure_accuracy(random)
+    figures |= {"table_bytes": bend_table.TABLE_BYTES, "paper_table_bytes": PAPER_BYTES}
+    figures |= measure_speeds(random)
+    figures |= smoothness.measure_smoothness()
     print()
     print(
         json.dumps(

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bunraku.marionette import arms
-from bunraku.marionette.arm import Table, bend_limits, close
-from bunraku.marionette.paper import build_paper_table, places, tip_error
-from bunraku.marionette.proportions import ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, Proportions
+from bunraku.marionette import arm_batch
+from bunraku.marionette.arm import BendTable, close_chain, wrist_bend_limits
+from bunraku.marionette.paper import build_paper_table, joint_positions, tip_error
+from bunraku.marionette.proportions import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD, Proportions
 from bunraku.motion.rotation import Array
 
-_SCAN = 257
-_GOLDEN = (5.0**0.5 - 1.0) / 2.0
+_SCAN_SAMPLES = 257
+_GOLDEN_RATIO = (5.0**0.5 - 1.0) / 2.0
 
 
 class Accuracy(NamedTuple):
@@ -30,16 +30,16 @@ class Accuracy(NamedTuple):
     paper_tip_max: float
 
 
-def reachable(proportions: Proportions, count: int, random: np.random.Generator) -> Array:
+def random_reachable_targets(proportions: Proportions, count: int, random: np.random.Generator) -> Array:
     """Hand tips (count, 3), even in distance, elevation and azimuth: more of them near the shoulder and its axis, where
     angles change fastest, than evenly in space."""
-    r = random.uniform(proportions.inner_radius, OUTER_RADIUS, count)
+    r = random.uniform(proportions.min_tip_distance, MAX_TIP_DISTANCE, count)
     beta, azimuth = random.uniform(-0.5 * pi, 0.5 * pi, count), random.uniform(-pi, pi, count)
     level = r * np.cos(beta)
     return np.stack([level * np.sin(azimuth), r * np.sin(beta), level * np.cos(azimuth)], axis=-1)
 
 
-def energy(proportions: Proportions, angles: tuple[Array, Array, Array]) -> Array:
+def potential_energy(proportions: Proportions, angles: tuple[Array, Array, Array]) -> Array:
     """The paper's E (4.2) of link angles, without g."""
     (l0, l1, l2), (m0, m1, m2) = proportions.lengths, proportions.masses
     s0, s1, s2 = (np.sin(angle) for angle in angles)
@@ -49,43 +49,45 @@ def energy(proportions: Proportions, angles: tuple[Array, Array, Array]) -> Arra
     return result
 
 
-def true_angles(proportions: Proportions, r: Array, beta: Array) -> Array:
+def minimum_energy_angles(proportions: Proportions, r: Array, beta: Array) -> Array:
     """The angles (3, n) of least E within the joints' limits, each target searched by itself: all bends, then the
     golden section between the lowest's neighbours. No table has a part in it."""
-    low, high = bend_limits(proportions, r)
+    low, high = wrist_bend_limits(proportions, r)
 
     def height(share: Array) -> Array:
-        return energy(proportions, close(proportions, r, beta, low + share * (high - low)))
+        return potential_energy(proportions, close_chain(proportions, r, beta, low + share * (high - low)))
 
     best, lowest = np.zeros(r.shape), np.full(r.shape, np.inf)
-    for share in np.linspace(0.0, 1.0, _SCAN):
+    for share in np.linspace(0.0, 1.0, _SCAN_SAMPLES):
         here = height(np.full(r.shape, share))
         best, lowest = np.where(here < lowest, share, best), np.minimum(here, lowest)
-    left, right = np.maximum(best - 1.0 / (_SCAN - 1), 0.0), np.minimum(best + 1.0 / (_SCAN - 1), 1.0)
+    left, right = np.maximum(best - 1.0 / (_SCAN_SAMPLES - 1), 0.0), np.minimum(best + 1.0 / (_SCAN_SAMPLES - 1), 1.0)
     for _ in range(40):
-        span = _GOLDEN * (right - left)
+        span = _GOLDEN_RATIO * (right - left)
         lower = height(right - span) < height(left + span)
         left, right = np.where(lower, left, right - span), np.where(lower, left + span, right)
-    return np.array(close(proportions, r, beta, low + 0.5 * (left + right) * (high - low)))
+    return np.array(close_chain(proportions, r, beta, low + 0.5 * (left + right) * (high - low)))
 
 
-def measure(proportions: Proportions, table: Table, count: int, random: np.random.Generator) -> Accuracy:
+def measure_accuracy(proportions: Proportions, table: BendTable, count: int, random: np.random.Generator) -> Accuracy:
     """The accuracy over `count` targets; their tips over ten times as many."""
-    many = reachable(proportions, 10 * count, random)
-    solved = arms.solve(proportions, table, many)
+    many = random_reachable_targets(proportions, 10 * count, random)
+    solved = arm_batch.solve_arms(proportions, table, many)
     t0, t1, t2 = solved.angles()
     elbow, wrist = t1 - t0, t2 - t1
     broken = max(
         float((-elbow).max()),
-        float((elbow - ELBOW_LIMIT).max()),
+        float((elbow - MAX_ELBOW_BEND_RAD).max()),
         float((-wrist).max()),
-        float((wrist - WRIST_LIMIT).max()),
+        float((wrist - MAX_WRIST_BEND_RAD).max()),
     )
     targets = many[:count]
     r, beta = np.linalg.norm(targets, axis=1), np.arctan2(targets[:, 1], np.hypot(targets[:, 0], targets[:, 2]))
-    off = np.degrees(np.abs(np.array([t0, t1, t2])[:, :count] - true_angles(proportions, r, beta))).max(axis=0)
+    off = np.degrees(np.abs(np.array([t0, t1, t2])[:, :count] - minimum_energy_angles(proportions, r, beta))).max(
+        axis=0
+    )
     # the tip as it was solved, and as the three angles alone put it
-    tip = places(proportions, np.array([t0, t1, t2]))[2]
+    tip = joint_positions(proportions, np.array([t0, t1, t2]))[2]
     wanted = np.hypot(many[:, 0], many[:, 2]) + 1j * many[:, 1]
     theirs = tip_error(
         proportions,

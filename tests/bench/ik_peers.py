@@ -16,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 from scipy.optimize import minimize
 
-from bunraku.marionette import table
+from bunraku.marionette import bend_table
 from bunraku.marionette.proportions import Proportions
 from bunraku.motion.rotation import Array
 
@@ -30,7 +30,7 @@ def processor_rate(solve: Callable[[], int]) -> float:
     return count / (time.process_time() - began)
 
 
-class Slsqp:
+class SlsqpSolver:
     """scipy's SLSQP: the paper's E as small as it gets with the tip on its target, from the arm before.
 
     Gradients are given, and the joints have no limits, which spares it a third of its time.
@@ -48,7 +48,7 @@ class Slsqp:
             self.reach(hypot(x, z), y)
         return len(targets)
 
-    def error(self, targets: Array) -> float:
+    def max_tip_error(self, targets: Array) -> float:
         """How far tips are from `targets` (n, 3) on average."""
         return float(np.mean([self.reach(hypot(x, z), y) for x, y, z in targets.tolist()]))
 
@@ -74,7 +74,7 @@ class Slsqp:
         return float(np.linalg.norm(off(self.angles)))
 
 
-class Node:
+class NodeProcess:
     """The script of the web client's bench, bundled once: `with Node() as node: node.round(...)`."""
 
     def __init__(self) -> None:
@@ -101,14 +101,16 @@ class Node:
     ) -> None:
         self._folder.cleanup()
 
-    def round(self, bodies: list[tuple[Proportions, Array]], orders: dict[str, Array]) -> dict[str, Any]:
+    def run_round(self, bodies: list[tuple[Proportions, Array]], orders: dict[str, Array]) -> dict[str, Any]:
         """One round: `orders`, for each its `rates` (solves a second, by solver and turn) and mean tip `errors`; and
         `solved`, what TypeScript makes of each body's targets (n, 3)."""
         asked = {
             "bodies": [
                 {
                     "proportions": proportions.identity,
-                    "table": base64.b64encode(table.to_bytes(table.table_of(proportions.identity))).decode(),
+                    "table": base64.b64encode(
+                        bend_table.pack_bend_table(bend_table.load_bend_table(proportions.identity))
+                    ).decode(),
                     "checked": targets.ravel().tolist(),
                 }
                 for proportions, targets in bodies

@@ -33,7 +33,7 @@ def narrowlink_path() -> Path:
     return Path(os.environ.get("BUNRAKU_SHARED") or REPOSITORY.parent / "shared") / "links" / "narrowlink.py"
 
 
-def missing() -> str | None:
+def missing_requirement() -> str | None:
     """Why lines cannot be emulated here, None where they can."""
     if not narrowlink_path().is_file():
         return f"there is no {narrowlink_path()}; set BUNRAKU_SHARED to the folder of shared material"
@@ -47,83 +47,87 @@ def missing() -> str | None:
 
 
 @dataclass(frozen=True)
-class Link:
+class EmulatedLink:
     """One line: bit/s both ways, one-way delay, and the router's buffer. `step` is 'seconds:bit/s,...', `trace` a file
     of milliseconds and kbit/s whose rates are multiplied with `scale`; both begin with `Network.start`. It is cut
     (nothing passes) between the two times of `cut`, seconds after the start."""
 
-    rate: float = 28_800.0
+    bitrate: float = 28_800.0
     delay_ms: float = 75.0
     queue_bytes: int = 8192
-    step: str = ""
+    bitrate_steps: str = ""
     trace: str = ""
-    scale: float = 1.0
-    cut: tuple[float, float] = (0.0, 0.0)
+    trace_scale: float = 1.0
+    outage_s: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass
-class Far:
+class FarEnd:
     """The far end of a line: sockets opened there reach the near end at `host`."""
 
     namespace: str
     host: str
-    link: Link
+    link: EmulatedLink
     device: str
-    counted: Any = field(default=None, repr=False)
+    byte_counters: Any = field(default=None, repr=False)
 
     def open_socket(self) -> socket.socket:
         """An unconnected TCP socket at the far end; the thread stays where it is."""
-        with _inside(self.namespace):
+        with _in_namespace(self.namespace):
             made = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         made.setblocking(False)
         made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return made
 
     @property
-    def received(self) -> int:
+    def received_bytes(self) -> int:
         """Bytes of IP packets that the line has carried to the far end."""
-        return int(self.counted[0])
+        return int(self.byte_counters[0])
 
 
-class Network:
+class EmulatedNetwork:
     """The near namespace, in which the server runs and this thread too, and the lines made so far."""
 
     def __init__(self, near: str) -> None:
-        self.near = near
-        self._made = 0
+        self.near_namespace = near
+        self._link_count = 0
         self._namespaces: list[str] = []
 
     def run(self, command: Sequence[str], **options: Any) -> subprocess.Popen[str]:
         """A process at the near end; options as of `subprocess.Popen`."""
-        return subprocess.Popen(["ip", "netns", "exec", self.near, *command], text=True, **options)
+        return subprocess.Popen(["ip", "netns", "exec", self.near_namespace, *command], text=True, **options)
 
     @contextmanager
-    def lines(self, links: Sequence[Link]) -> Iterator[list[Far]]:
+    def open_links(self, links: Sequence[EmulatedLink]) -> Iterator[list[FarEnd]]:
         """The far ends of these lines, which begin now and last until the block ends."""
-        module = _narrowlink()
+        module = _load_narrowlink()
         counted = multiprocessing.Array("q", 2 * len(links))
-        fars: list[Far] = []
+        fars: list[FarEnd] = []
         devices: list[tuple[int, int]] = []
-        begun = self._made
+        begun = self._link_count
         try:
             for nth, link in enumerate(links):
-                number, self._made = self._made, self._made + 1
-                far, near_host, far_host = f"{self.near}f{number}", _host(number, 1), _host(number, 2)
+                number, self._link_count = self._link_count, self._link_count + 1
+                far, near_host, far_host = (
+                    f"{self.near_namespace}f{number}",
+                    _host_address(number, 1),
+                    _host_address(number, 2),
+                )
                 names = [f"bn{os.getpid() % 100_000}x{number}{end}" for end in "ab"]
                 devices.append((module.tun(names[0]), module.tun(names[1])))
-                _ip(f"netns add {far}")
+                _run_ip(f"netns add {far}")
                 self._namespaces.append(far)
                 for namespace, name, host, peer in (
-                    (self.near, names[0], near_host, far_host),
+                    (self.near_namespace, names[0], near_host, far_host),
                     (far, names[1], far_host, near_host),
                 ):
-                    _ip(f"link set {name} netns {namespace}")
-                    _ip(f"-n {namespace} addr add {host} peer {peer} dev {name}")
-                    _ip(f"-n {namespace} link set {name} up mtu 1500 txqueuelen 1000")
-                fars.append(Far(far, near_host, link, names[1]))
-                fars[-1].counted = _Counter(counted, 2 * nth)
+                    _run_ip(f"link set {name} netns {namespace}")
+                    _run_ip(f"-n {namespace} addr add {host} peer {peer} dev {name}")
+                    _run_ip(f"-n {namespace} link set {name} up mtu 1500 txqueuelen 1000")
+                fars.append(FarEnd(far, near_host, link, names[1]))
+                fars[-1].byte_counters = _Counter(counted, 2 * nth)
             pump = multiprocessing.get_context("fork").Process(
-                target=_pump, args=(module, list(links), devices, counted), daemon=True
+                target=_run_links, args=(module, list(links), devices, counted), daemon=True
             )
             pump.start()
             try:
@@ -135,8 +139,8 @@ class Network:
             for pair in devices:
                 for fd in pair:
                     os.close(fd)
-            for number in range(begun, self._made):
-                self._remove(f"{self.near}f{number}")
+            for number in range(begun, self._link_count):
+                self._remove(f"{self.near_namespace}f{number}")
 
     def _remove(self, namespace: str) -> None:
         if namespace in self._namespaces:
@@ -155,45 +159,45 @@ class _Counter:
 
 
 @contextmanager
-def network() -> Iterator[Network]:
+def open_network() -> Iterator[EmulatedNetwork]:
     """A near end, which this thread is in until the block ends; threads and processes it starts meanwhile are too."""
     name = f"bunraku{os.getpid()}"
-    _ip(f"netns add {name}")
+    _run_ip(f"netns add {name}")
     try:
-        _ip(f"-n {name} link set lo up")
-        with _inside(name):
-            yield Network(name)
+        _run_ip(f"-n {name} link set lo up")
+        with _in_namespace(name):
+            yield EmulatedNetwork(name)
     finally:
-        _ip(f"netns del {name}")
+        _run_ip(f"netns del {name}")
 
 
-def _host(number: int, end: int) -> str:
+def _host_address(number: int, end: int) -> str:
     return f"10.{99 + number // 250}.{number % 250}.{end}"
 
 
-def _ip(arguments: str) -> None:
+def _run_ip(arguments: str) -> None:
     subprocess.run(["ip", *arguments.split()], check=True)
 
 
 @contextmanager
-def _inside(namespace: str) -> Iterator[None]:
+def _in_namespace(namespace: str) -> Iterator[None]:
     here = os.open(f"/proc/self/task/{threading.get_native_id()}/ns/net", os.O_RDONLY)
     there = os.open(f"/run/netns/{namespace}", os.O_RDONLY)
     try:
-        _enter(there)
+        _enter_namespace(there)
         yield
     finally:
-        _enter(here)
+        _enter_namespace(here)
         os.close(here)
         os.close(there)
 
 
-def _enter(fd: int) -> None:
+def _enter_namespace(fd: int) -> None:
     if _LIBC.setns(fd, _NEW_NETWORK) != 0:
         raise OSError(ctypes.get_errno(), "the network namespace cannot be entered")
 
 
-def _narrowlink() -> Any:
+def _load_narrowlink() -> Any:
     spec = importlib.util.spec_from_file_location("narrowlink", narrowlink_path())
     assert spec is not None
     assert spec.loader is not None
@@ -202,7 +206,7 @@ def _narrowlink() -> Any:
     return module
 
 
-def _pump(module: Any, links: list[Link], devices: list[tuple[int, int]], counted: Any) -> None:
+def _run_links(module: Any, links: list[EmulatedLink], devices: list[tuple[int, int]], counted: Any) -> None:
     """Carries the packets of all lines until it is ended; `counted` is told the bytes that went to each far end and to
     the near one."""
     os.nice(-15)
@@ -210,11 +214,11 @@ def _pump(module: Any, links: list[Link], devices: list[tuple[int, int]], counte
     ways: dict[int, Any] = {}
     cuts: dict[int, tuple[float, float]] = {}
     for link, (near, far) in zip(links, devices, strict=True):
-        given = Namespace(rate=link.rate, step=link.step, trace=link.trace, scale=link.scale)
+        given = Namespace(rate=link.bitrate, step=link.bitrate_steps, trace=link.trace, scale=link.trace_scale)
         rate_at = module.rates(given, begun)
         for source, sink in ((near, far), (far, near)):
             ways[source] = module.Direction(sink, rate_at, link.delay_ms / 1e3, link.queue_bytes, 0.0)
-            cuts[source] = link.cut
+            cuts[source] = link.outage_s
     order = [fd for pair in devices for fd in pair]
     while True:
         now = time.monotonic()

@@ -20,28 +20,28 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bunraku.backing.bus_nats import NatsBus
-from bunraku.backing.catalogue import Catalogue
-from bunraku.backing.register_nats import NatsRegister
 from bunraku.client import Client
-from tests.bench.fanout_processes import Told
+from bunraku.messaging.bus_nats import NatsBus
+from bunraku.messaging.key_value_nats import NatsKeyValueStore
+from bunraku.storage.catalogue import Catalogue
+from tests.bench.arguments import parse_parts
+from tests.bench.fanout_processes import LineProcess
 from tests.bench.fanout_senders import SESSION
-from tests.bench.parts import asked
 from tests.conftest import REPOSITORY
-from tests.processes import Owned, free_port, jetstream, postgres, processor_seconds, url_of
+from tests.processes import ServerProcess, cpu_seconds, free_port, nats_url_of, run_jetstream, run_postgres
 
 Figures = dict[str, float]
 
 
 @contextmanager
-def demo() -> Iterator[tuple[Told, str]]:
+def start_demo() -> Iterator[tuple[LineProcess, str]]:
     """A whole server in a process of its own, with the demo's dance on the stage; and where it is."""
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         bunraku = str(Path(sys.executable).parent / "bunraku")
-        with Told([bunraku, "up", "--demo", "--port", "0", "--data", folder]) as server:
+        with LineProcess([bunraku, "up", "--demo", "--port", "0", "--data", folder]) as server:
             found = None
             while found is None:
-                found = re.search(r"is at (http://\S+)/", server.line())
+                found = re.search(r"is at (http://\S+)/", server.read_line())
             # what it loads after its start is not the viewers'
             used = -1.0
             while server.processor_seconds() - used > 0.1:
@@ -50,7 +50,7 @@ def demo() -> Iterator[tuple[Told, str]]:
             yield server, found[1]
 
 
-async def _stage(url: str) -> tuple[str, str]:
+async def _find_demo_session(url: str) -> tuple[str, str]:
     """The demo's session and motion."""
     async with Client(url) as client:
         session = await client.first_session()
@@ -58,21 +58,21 @@ async def _stage(url: str) -> tuple[str, str]:
         return session, (await client.session(session))["motion"]
 
 
-def dance(viewers: int = 1000, seconds: float = 20.0) -> Figures:
+def measure_demo_delivery(viewers: int = 1000, seconds: float = 20.0) -> Figures:
     """Cores and bytes of a dance with sound, camera and lights, for each viewer."""
-    with demo() as (server, url):
-        session, _ = asyncio.run(_stage(url))
+    with start_demo() as (server, url):
+        session, _ = asyncio.run(_find_demo_session(url))
         path, port = f"/v1/sessions/{session}/stream", url.rpartition(":")[2]
         alone, joining = server.processor_seconds(), time.monotonic()
-        with Told.module("fanout_drain", port, viewers, "bunraku", path) as drain:
-            assert drain.line() == "ready"
+        with LineProcess.start_module("fanout_drain", port, viewers, "bunraku", path) as drain:
+            assert drain.read_line() == "ready"
             # what is sent ahead at first is the join's
             time.sleep(10)
-            drain.ask("")
+            drain.request("")
             before, begun = server.processor_seconds(), time.monotonic()
             time.sleep(seconds)
             passed, cores = time.monotonic() - begun, server.processor_seconds() - before
-            came = drain.ask("")
+            came = drain.request("")
     joined = before - alone - cores / passed * (begun - joining)
     assert came["open"] == viewers
     return {
@@ -86,7 +86,7 @@ def dance(viewers: int = 1000, seconds: float = 20.0) -> Figures:
 
 
 @contextmanager
-def gateway_to(port: str) -> Iterator[tuple[Told, int]]:
+def start_gateway(port: str) -> Iterator[tuple[LineProcess, int]]:
     """Caddy with our file, all services at one port of this machine; and its own port."""
     program, own = shutil.which("caddy"), free_port()
     if program is None:
@@ -97,7 +97,7 @@ def gateway_to(port: str) -> Iterator[tuple[Told, int]]:
         file = Path(folder) / "Caddyfile"
         file.write_text(text)
         set_to = [f"BUNRAKU_SITE=:{own}", f"XDG_DATA_HOME={folder}", f"XDG_CONFIG_HOME={folder}"]
-        with Told(["env", *set_to, program, "run", "--config", str(file), "--adapter", "caddyfile"]) as caddy:
+        with LineProcess(["env", *set_to, program, "run", "--config", str(file), "--adapter", "caddyfile"]) as caddy:
             while True:
                 try:
                     socket.create_connection(("127.0.0.1", own), 1).close()
@@ -107,21 +107,24 @@ def gateway_to(port: str) -> Iterator[tuple[Told, int]]:
             yield caddy, own
 
 
-def gateway(viewers: int = 600, hertz: int = 20, seconds: float = 10.0) -> Figures:
+def measure_gateway(viewers: int = 600, hertz: int = 20, seconds: float = 10.0) -> Figures:
     """Overlays of one limb, 66 bytes, by way of the gateway."""
     path = f"/v1/sessions/{SESSION}/stream"
-    with Told.module("fanout_senders", "bunraku", 66, hertz) as sender, gateway_to(sender.line()) as (caddy, own):
+    with (
+        LineProcess.start_module("fanout_senders", "bunraku", 66, hertz) as sender,
+        start_gateway(sender.read_line()) as (caddy, own),
+    ):
         before = caddy.resident_kilobytes()
-        with Told.module("fanout_drain", own, viewers, "bunraku", path) as drain:
-            assert drain.line() == "ready"
-            sender.ask(2)
-            drain.ask("")
+        with LineProcess.start_module("fanout_drain", own, viewers, "bunraku", path) as drain:
+            assert drain.read_line() == "ready"
+            sender.request(2)
+            drain.request("")
             used = caddy.processor_seconds()
-            sent = sender.ask(seconds)
+            sent = sender.request(seconds)
             cores = caddy.processor_seconds() - used
             memory = caddy.resident_kilobytes() - before
             time.sleep(0.5)
-            came = drain.ask("")
+            came = drain.request("")
     assert came["open"] == viewers
     assert came["frames"] >= 0.95 * sent["messages"] > 0
     return {
@@ -131,10 +134,10 @@ def gateway(viewers: int = 600, hertz: int = 20, seconds: float = 10.0) -> Figur
     }
 
 
-def origin(connections: int = 8, seconds: float = 8.0) -> Figures:
+def measure_origin(connections: int = 8, seconds: float = 8.0) -> Figures:
     """Blocks a second that one process gives over HTTP, and what they need of a processor."""
-    with demo() as (server, url):
-        _, motion = asyncio.run(_stage(url))
+    with start_demo() as (server, url):
+        _, motion = asyncio.run(_find_demo_session(url))
         host, port = url.removeprefix("http://").split(":")
         asked = f"GET /v1/motions/{motion}/blocks/4/1 HTTP/1.1\r\nHost: {host}\r\n\r\n".encode()
 
@@ -163,58 +166,58 @@ def origin(connections: int = 8, seconds: float = 8.0) -> Figures:
     return {"origin_blocks_second": round(fetched / seconds), "origin_us_block": round(used * 1e6 / fetched)}
 
 
-def register(sessions: int = 500, rounds: int = 10) -> Figures:
+def measure_key_value_store(sessions: int = 500, rounds: int = 10) -> Figures:
     """What each session costs each session replica, and NATS, at each beat."""
 
-    async def beats(server: Owned) -> Figures:
-        bus = NatsBus(url_of(server))
+    async def beats(server: ServerProcess) -> Figures:
+        bus = NatsBus(nats_url_of(server))
         await bus.open()
-        kept = NatsRegister(bus)
+        kept = NatsKeyValueStore(bus)
         for number in range(sessions):
             await kept.put(f"sessions.{number}", bytes(80))
-        own, nats = time.process_time(), processor_seconds(server.pid)
+        own, nats = time.process_time(), cpu_seconds(server.pid)
         for _ in range(rounds):
-            assert len(await kept.all("sessions")) == sessions
-        own, nats = time.process_time() - own, processor_seconds(server.pid) - nats
+            assert len(await kept.list_prefix("sessions")) == sessions
+        own, nats = time.process_time() - own, cpu_seconds(server.pid) - nats
         await bus.close()
         each = sessions * rounds * 1e-6
         return {"register_us_session": round(own / each), "register_nats_us_session": round(nats / each)}
 
-    with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder, jetstream(Path(folder)) as server:
+    with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder, run_jetstream(Path(folder)) as server:
         return asyncio.run(beats(server))
 
 
-def links(at_once: int = 5, lookups: int = 2000) -> Figures:
+def measure_share_links(concurrency: int = 5, lookups: int = 2000) -> Figures:
     """What it costs a service to look a link up in PostgreSQL."""
 
     async def look(url: str) -> Figures:
         catalogue = Catalogue(url)
         await catalogue.open()
         used = time.process_time()
-        for _ in range(lookups // at_once):
-            await asyncio.gather(*(catalogue.share("nothing") for _ in range(at_once)))
+        for _ in range(lookups // concurrency):
+            await asyncio.gather(*(catalogue.get_share("nothing") for _ in range(concurrency)))
         used = time.process_time() - used
         await catalogue.close()
         return {"link_us": round(used * 1e6 / lookups)}
 
-    with postgres() as server:
+    with run_postgres() as server:
         return asyncio.run(look(f"postgresql://postgres@127.0.0.1:{server.port}/postgres"))
 
 
-PARTS: dict[str, Callable[[], Figures]] = {
-    "dance": dance,
-    "gateway": gateway,
-    "origin": origin,
-    "register": register,
-    "links": links,
+BENCHMARKS: dict[str, Callable[[], Figures]] = {
+    "dance": measure_demo_delivery,
+    "gateway": measure_gateway,
+    "origin": measure_origin,
+    "register": measure_key_value_store,
+    "links": measure_share_links,
 }
 
 
 def main() -> None:
-    parts = asked(__doc__, PARTS)
+    parts = parse_parts(__doc__, BENCHMARKS)
     figures: Figures = {}
     for part in parts:
-        found = PARTS[part]()
+        found = BENCHMARKS[part]()
         figures |= found
         for name, value in found.items():
             print(f"{name:<32}{value:>10}")

@@ -30,94 +30,94 @@ import httpx2
 import numpy as np
 import uvloop
 
-from bunraku.backing.backing import clock
 from bunraku.client.api import Client
 from bunraku.client.message_socket import MessageSocket
-from bunraku.client.puppeteer import Puppeteer, Refused
-from bunraku.codec.track import read_track
+from bunraku.client.puppeteer import ControlRefused, Puppeteer
+from bunraku.codec.motion_track import parse_motion_track
 from bunraku.marionette import vector
-from bunraku.marionette.limbs import ArmRig, Limb
+from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.vector import Quaternion, Vector
 from bunraku.motion.skeleton import Figure
-from bunraku.playout.overlays import UNIT
-from bunraku.serve import LOAD_AFTER
+from bunraku.playout.overlay_buffer import RADIANS_PER_UNIT
+from bunraku.runtime.context import clock
+from bunraku.serve import WARM_UP_DELAY_S
 from bunraku.wire.messages import Description, unpack
 from bunraku.wire.overlay import Overlay
-from tests.processes import processor_seconds
+from tests.processes import cpu_seconds
 
-FRAME = 1e6 / 60.0
-WARM = 4.0
+FRAME_US = 1e6 / 60.0
+WARM_UP_S = 4.0
 """Seconds that limbs are held before the first pull that counts."""
-SETTLE = 60.0
+SETTLE_TIMEOUT_S = 60.0
 """Seconds that a server is waited for at most, until it has loaded all it needs."""
-EVERY = 0.5
+MOVE_INTERVAL_S = 0.5
 """Seconds between two pulls of a puppeteer."""
-PLACES = ((0.45, -0.2, 0.5), (0.45, 0.0, 0.5))
+HAND_TARGETS = ((0.45, -0.2, 0.5), (0.45, 0.0, 0.5))
 """Where a left hand is asked to be, arm lengths on the axes of vl5."""
-MOVED = 0.01
+MIN_VISIBLE_MOVE = 0.01
 """Arm lengths from where it stood: the hand is seen to move."""
-LOST = 1_000_000
+MOVE_TIMEOUT_US = 1_000_000
 """Microseconds: a pull that nobody saw by then is lost."""
 
 
-class Screen(MessageSocket):
+class RecordingSocket(MessageSocket):
     """One viewer's socket: messages are kept with the clock time at which they came."""
 
     def __init__(self, url: str) -> None:
         super().__init__(url)
         self.messages: list[tuple[int, bytes]] = []
-        self._now = 0
+        self._received_us = 0
 
     def data_received(self, data: bytes) -> None:
-        self._now = clock()
+        self._received_us = clock()
         super().data_received(data)
 
-    def take(self, message: bytes) -> None:
-        self.messages.append((self._now, message))
+    def on_message(self, message: bytes) -> None:
+        self.messages.append((self._received_us, message))
 
 
 @dataclass
-class Played:
+class SessionRun:
     """One session of the run: when its puppeteer pulled (clock times, µs), and what its viewers received."""
 
-    screens: list[Screen]
-    pulls: list[int] = field(default_factory=list)
-    taken_away: int = 0
+    viewers: list[RecordingSocket]
+    moves_us: list[int] = field(default_factory=list)
+    lost_claims: int = 0
     """Times that the limb was lost, its puppeteer or the server having stood still for half a second."""
 
 
-async def watch(client: Client, motion: str, viewers: int) -> tuple[str, Played]:
+async def open_watched_session(client: Client, motion: str, viewers: int) -> tuple[str, SessionRun]:
     """One session with its viewers."""
     session = (await client.open_session(motion))["id"]
     url = client.socket_url(f"/v1/sessions/{session}/stream?rate=0")
-    screens = [Screen(url) for _ in range(viewers)]
+    screens = [RecordingSocket(url) for _ in range(viewers)]
     for screen in screens:
         await asyncio.wait_for(screen.open(), 30)
-    return session, Played(screens)
+    return session, SessionRun(screens)
 
 
-async def pull(client: Client, session: str, played: Played, seconds: float, nth: int, share: float) -> None:
+async def move_hand(client: Client, session: str, run: SessionRun, seconds: float, nth: int, share: float) -> None:
     """The puppeteer of a session, from its coming to its going; `share` of a beat after the others."""
     loop = asyncio.get_running_loop()
     async with Puppeteer(client, session, f"puppeteer {nth}") as puppeteer:
         await puppeteer.claim("left_hand")
-        await puppeteer.target("left_hand", *PLACES[1])
+        await puppeteer.target("left_hand", *HAND_TARGETS[1])
         # each in its own beat
-        await asyncio.sleep(WARM + share * EVERY)
+        await asyncio.sleep(WARM_UP_S + share * MOVE_INTERVAL_S)
         begin = loop.time()
-        for number in range(int(seconds / EVERY)):
-            await asyncio.sleep(max(begin + number * EVERY - loop.time(), 0.0))
-            played.pulls.append(clock())
+        for number in range(int(seconds / MOVE_INTERVAL_S)):
+            await asyncio.sleep(max(begin + number * MOVE_INTERVAL_S - loop.time(), 0.0))
+            run.moves_us.append(clock())
             try:
-                await puppeteer.target("left_hand", *PLACES[number % 2])
-            except Refused:
+                await puppeteer.target("left_hand", *HAND_TARGETS[number % 2])
+            except ControlRefused:
                 # half a second went by in which this machine had no time for it: that pull nobody sees
-                played.taken_away += 1
+                run.lost_claims += 1
                 await puppeteer.claim("left_hand")
-        await asyncio.sleep(LOST * 1e-6)
+        await asyncio.sleep(MOVE_TIMEOUT_US * 1e-6)
 
 
-def hand_places(rig: ArmRig, messages: list[tuple[int, bytes]]) -> list[tuple[int, int, Vector]]:
+def extract_hand_positions(rig: ArmRig, messages: list[tuple[int, bytes]]) -> list[tuple[int, int, Vector]]:
     """Each overlay frame that came: when it came, when it was due, and where it has the left hand, arm lengths."""
     found: list[tuple[int, int, Vector]] = []
     for came, data in messages:
@@ -127,34 +127,34 @@ def hand_places(rig: ArmRig, messages: list[tuple[int, bytes]]) -> list[tuple[in
         frames = (*overlay.earlier, overlay.limbs)
         for nth, limbs in enumerate(frames):
             if 0 in limbs:
-                due = overlay.due - (len(frames) - 1 - nth) * Overlay.FRAME
-                joints = [_quaternion(limbs[0][3 * joint : 3 * joint + 3]) for joint in range(3)]
-                found.append((came, due, rig.target((joints[0], joints[1], joints[2]))))
+                due = overlay.due - (len(frames) - 1 - nth) * Overlay.FRAME_INTERVAL_US
+                joints = [_unpack_quaternion(limbs[0][3 * joint : 3 * joint + 3]) for joint in range(3)]
+                found.append((came, due, rig.tip_target((joints[0], joints[1], joints[2]))))
     return found
 
 
-def _quaternion(numbers: tuple[int, ...]) -> Quaternion:
-    x, y, z = (number * UNIT for number in numbers)
-    return vector.about(vector.unit((x, y, z), (1.0, 0.0, 0.0)), vector.length((x, y, z)))
+def _unpack_quaternion(numbers: tuple[int, ...]) -> Quaternion:
+    x, y, z = (number * RADIANS_PER_UNIT for number in numbers)
+    return vector.from_axis_angle(vector.unit((x, y, z), (1.0, 0.0, 0.0)), vector.length((x, y, z)))
 
 
-def seen(frames: list[tuple[int, int, Vector]], pull: int, phase: float) -> float:
+def move_latency_ms(frames: list[tuple[int, int, Vector]], move_us: int, phase: float) -> float:
     """Milliseconds from a pull to the first frame of a screen that shows the hand moving; NaN where none does."""
     dues = [due for _, due, _ in frames]
-    at = bisect_right(dues, pull)
+    at = bisect_right(dues, move_us)
     if at == 0:
         return float("nan")
     stood = frames[at - 1][2]
-    shown = pull + phase * FRAME
-    while shown - pull < LOST:
-        place = _place(frames, dues, shown)
-        if vector.length(vector.subtract(place, stood)) > MOVED:
-            return (shown - pull) / 1e3
-        shown += FRAME
+    shown = move_us + phase * FRAME_US
+    while shown - move_us < MOVE_TIMEOUT_US:
+        place = _position_at(frames, dues, shown)
+        if vector.length(vector.subtract(place, stood)) > MIN_VISIBLE_MOVE:
+            return (shown - move_us) / 1e3
+        shown += FRAME_US
     return float("nan")
 
 
-def _place(frames: list[tuple[int, int, Vector]], dues: list[int], shown: float) -> Vector:
+def _position_at(frames: list[tuple[int, int, Vector]], dues: list[int], shown: float) -> Vector:
     """Where a screen has the hand at a time: between the two frames that lie about it, or at the last that came."""
     after = bisect_right(dues, shown)
     # what has not come yet is not shown
@@ -169,37 +169,37 @@ def _place(frames: list[tuple[int, int, Vector]], dues: list[int], shown: float)
     return vector.add(one, vector.scale(vector.subtract(other, one), share))
 
 
-def settled(pid: int) -> None:
+def wait_until_idle(pid: int) -> None:
     """Waits until a server that has just begun has loaded what it needs, and has nothing more to do."""
-    end = time.monotonic() + SETTLE
+    end = time.monotonic() + SETTLE_TIMEOUT_S
     # it begins to load a little after it answers
-    time.sleep(LOAD_AFTER + 1.0)
-    before = processor_seconds(pid)
+    time.sleep(WARM_UP_DELAY_S + 1.0)
+    before = cpu_seconds(pid)
     while time.monotonic() < end:
         time.sleep(1.0)
-        now = processor_seconds(pid)
+        now = cpu_seconds(pid)
         if now - before < 0.1:
             return
         before = now
-    print(f"the server was still busy after {SETTLE:g} s", file=sys.stderr)
+    print(f"the server was still busy after {SETTLE_TIMEOUT_S:g} s", file=sys.stderr)
 
 
-async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -> dict[str, float]:
+async def run_sessions(url: str, pid: int, sessions: int, viewers: int, seconds: float) -> dict[str, float]:
     """The run, and its figures."""
     async with Client(url) as client:
         motion = (await client.motions())[0]["id"]
         async with httpx2.AsyncClient(base_url=url) as plain:
             description = unpack((await plain.get(f"/v1/motions/{motion}/description")).content)
         assert isinstance(description, Description)
-        figure: Figure = read_track(description.tracks[0]).figure
-        stages = [await watch(client, motion, viewers) for _ in range(sessions)]
-        before, begun, own = processor_seconds(pid), time.perf_counter(), time.process_time()
+        figure: Figure = parse_motion_track(description.tracks[0]).figure
+        stages = [await open_watched_session(client, motion, viewers) for _ in range(sessions)]
+        before, begun, own = cpu_seconds(pid), time.perf_counter(), time.process_time()
         async with asyncio.TaskGroup() as pulling:
             for nth, (session, one) in enumerate(stages):
-                pulling.create_task(pull(client, session, one, seconds, nth, nth / sessions))
+                pulling.create_task(move_hand(client, session, one, seconds, nth, nth / sessions))
         played = [one for _, one in stages]
         passed = time.perf_counter() - begun
-        busy, own = (processor_seconds(pid) - before) / passed, (time.process_time() - own) / passed
+        busy, own = (cpu_seconds(pid) - before) / passed, (time.process_time() - own) / passed
     rig = ArmRig(figure, Limb.LEFT_HAND)
     random = np.random.default_rng(1)
     delays: list[float] = []
@@ -207,20 +207,20 @@ async def run(url: str, pid: int, sessions: int, viewers: int, seconds: float) -
     gaps: list[float] = []
     messages = 0
     for one in played:
-        for screen in one.screens:
+        for screen in one.viewers:
             assert not screen.closed, "a viewer was dropped"
-            frames = hand_places(rig, screen.messages)
+            frames = extract_hand_positions(rig, screen.messages)
             messages += sum(data[0] == Overlay.TYPE for _, data in screen.messages)
             late += [(came - due) / 1e3 for came, due, _ in frames]
             gaps += [(b[1] - a[1]) / 1e3 for a, b in pairwise(frames)]
-            delays += [seen(frames, pull, float(random.random())) for pull in one.pulls]
+            delays += [move_latency_ms(frames, pull, float(random.random())) for pull in one.moves_us]
     known = np.array([delay for delay in delays if delay == delay])
     return {
         "sessions": sessions,
         "viewers": sessions * viewers,
         "pulls": len(delays),
         "lost": len(delays) - len(known),
-        "limbs_lost": sum(one.taken_away for one in played),
+        "limbs_lost": sum(one.lost_claims for one in played),
         "input_to_screen_ms_p50": round(float(np.percentile(known, 50)), 1),
         "input_to_screen_ms_p95": round(float(np.percentile(known, 95)), 1),
         "input_to_screen_ms_p99": round(float(np.percentile(known, 99)), 1),
@@ -250,10 +250,10 @@ def main() -> None:
         try:
             url = next(found[1] for line in server.stdout if (found := re.search(r"is at (http://\S+)/", line)))
             print(f"{given.sessions} sessions of one puppeteer and {given.viewers} viewers, {given.seconds:g} s")
-            settled(server.pid)
+            wait_until_idle(server.pid)
             # what is kept for later is not walked through meanwhile: that would stop the screens' clocks
             gc.disable()
-            figures = uvloop.run(run(url, server.pid, given.sessions, given.viewers, given.seconds))
+            figures = uvloop.run(run_sessions(url, server.pid, given.sessions, given.viewers, given.seconds))
         finally:
             server.terminate()
             server.wait(20)

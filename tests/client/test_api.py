@@ -6,8 +6,8 @@ import httpx2
 import pytest
 
 from bunraku.client import Client, ServerProblem, api
-from tests.servers import clip
-from tests.sounds import tone, write
+from tests.audio import make_tone, write_audio
+from tests.servers import make_bvh_clip
 
 
 async def test_upload_tells_how_far_it_is_and_what_was_made(server: str, clip_file: Path) -> None:
@@ -27,12 +27,12 @@ async def test_upload_tells_how_far_it_is_and_what_was_made(server: str, clip_fi
 async def test_upload_tells_what_the_server_does_with_it(
     server: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(api, "EVERY", 0.01)
+    monkeypatch.setattr(api, "PROGRESS_INTERVAL_S", 0.01)
     told: list[tuple[str, float]] = []
     path = tmp_path / "long.bvh"
-    path.write_bytes(clip(20.0, 77))
+    path.write_bytes(make_bvh_clip(20.0, 77))
     async with Client(server) as client:
-        await client.upload(path, made=lambda stage, share: told.append((stage, share)))
+        await client.upload(path, on_stage=lambda stage, share: told.append((stage, share)))
     assert {stage for stage, _ in told} <= {"waiting", "reading", "encoding"}
     shares = [share for stage, share in told if stage == "encoding"]
     assert len(set(shares)) > 1
@@ -41,7 +41,7 @@ async def test_upload_tells_what_the_server_does_with_it(
 
 async def test_sound_is_added_to_a_motion(server: str, clip_file: Path, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
-    song = write(tmp_path / "song.flac", tone(1.0, 44_100, 2), 44_100, "stereo")
+    song = write_audio(tmp_path / "song.flac", make_tone(1.0, 44_100, 2), 44_100, "stereo")
     async with Client(server) as client:
         motion = await client.upload(clip_file)
         sung = await client.add_audio(motion["id"], song, lambda sent, size: told.append((sent, size)))

@@ -7,22 +7,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.client.message_socket import MessageSocket, upgrade
+from bunraku.client.message_socket import MessageSocket, upgrade_request
 
-AGREED = b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n\r\n"
+UPGRADE_RESPONSE = b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n\r\n"
 URL = "ws://stage/v1/sessions/s1/stream?rate=0"
 
 
-class Kept(MessageSocket):
+class RecordingSocket(MessageSocket):
     def __init__(self, url: str) -> None:
         super().__init__(url)
         self.messages: list[bytes] = []
 
-    def take(self, message: bytes) -> None:
+    def on_message(self, message: bytes) -> None:
         self.messages.append(message)
 
 
-class Wire(asyncio.Transport):
+class RecordingTransport(asyncio.Transport):
     """The system's side of a connection: what was written, and whether it was closed."""
 
     def __init__(self) -> None:
@@ -59,12 +59,12 @@ MESSAGES = st.lists(
 def test_messages_come_whole_and_in_order_in_whatever_pieces_they_arrive(
     messages: list[bytes], cuts: list[float]
 ) -> None:
-    data = AGREED + b"".join(frame(2, message) for message in messages)
+    data = UPGRADE_RESPONSE + b"".join(frame(2, message) for message in messages)
     places = sorted({0, len(data), *(round(cut * len(data)) for cut in cuts)})
 
     async def run() -> None:
-        kept = Kept(URL)
-        kept.connection_made(Wire())
+        kept = RecordingSocket(URL)
+        kept.connection_made(RecordingTransport())
         for begin, end in pairwise(places):
             kept.data_received(data[begin:end])
         assert kept.messages == messages
@@ -73,10 +73,10 @@ def test_messages_come_whole_and_in_order_in_whatever_pieces_they_arrive(
 
 
 async def test_what_sockets_ask_of_each_other_is_answered_and_is_no_message() -> None:
-    kept, wire = Kept(URL), Wire()
+    kept, wire = RecordingSocket(URL), RecordingTransport()
     kept.connection_made(wire)
     wire.written = b""
-    kept.data_received(AGREED + frame(9, b"there?"))
+    kept.data_received(UPGRADE_RESPONSE + frame(9, b"there?"))
     assert wire.written == bytes((0x8A, 0x86, 0, 0, 0, 0)) + b"there?"
     wire.written = b""
     kept.send(b"one", b"two")
@@ -91,11 +91,11 @@ async def test_what_sockets_ask_of_each_other_is_answered_and_is_no_message() ->
 
 
 def test_its_request_names_the_target_the_host_and_what_else_it_is_given() -> None:
-    lines = upgrade(URL, {"Authorization": "Bearer t"}).decode().split("\r\n")
+    lines = upgrade_request(URL, {"Authorization": "Bearer t"}).decode().split("\r\n")
     assert lines[:2] == ["GET /v1/sessions/s1/stream?rate=0 HTTP/1.1", "Host: stage"]
     assert lines[-3:] == ["Authorization: Bearer t", "", ""]
     assert "Sec-WebSocket-Protocol: bunraku.v1" in lines
-    assert upgrade(URL) != upgrade(URL), "a key is used once (RFC 6455, section 4.1)"
+    assert upgrade_request(URL) != upgrade_request(URL), "a key is used once (RFC 6455, section 4.1)"
 
 
 @pytest.mark.parametrize(
@@ -116,4 +116,4 @@ async def test_a_server_that_will_not_talk_is_an_error_that_says_why(answer: byt
         port = server.sockets[0].getsockname()[1]
         async with asyncio.timeout(20):
             with pytest.raises(ConnectionError, match=says):
-                await Kept(f"ws://127.0.0.1:{port}/stream").open()
+                await RecordingSocket(f"ws://127.0.0.1:{port}/stream").open()

@@ -7,10 +7,10 @@ import httpx2
 import numpy as np
 import pytest
 
-from bunraku.client import Client, OneEuro, Puppeteer, Refused, Viewer
+from bunraku.client import Client, ControlRefused, OneEuro, Puppeteer, Viewer
 from bunraku.motion import rotation
-from bunraku.motion.skeleton import INDEX, world
-from bunraku.playout.blocks import Pose
+from bunraku.motion.skeleton import JOINT_INDEX, world_transforms
+from bunraku.playout.block_store import Pose
 from bunraku.wire.messages import Input, unpack
 
 
@@ -33,10 +33,10 @@ async def test_a_pulled_hand_is_seen_where_it_was_pulled_by_others(server: str, 
     assert viewer.track is not None
     figure = viewer.track.figure
     root, rotations = shown[max(shown)]
-    position, orientation = world(figure, root, rotations)
-    shoulder, wrist, chest = INDEX["l_shoulder"], INDEX["l_wrist"], INDEX["vl5"]
+    position, orientation = world_transforms(figure, root, rotations)
+    shoulder, wrist, chest = JOINT_INDEX["l_shoulder"], JOINT_INDEX["l_wrist"], JOINT_INDEX["vl5"]
     tip = position[wrist] + rotation.rotate(orientation[wrist], figure.tips[wrist])
-    length = sum(np.linalg.norm(figure.offsets[INDEX[j]]) for j in ("l_elbow", "l_wrist")) + np.linalg.norm(
+    length = sum(np.linalg.norm(figure.offsets[JOINT_INDEX[j]]) for j in ("l_elbow", "l_wrist")) + np.linalg.norm(
         figure.tips[wrist]
     )
     seen = rotation.rotate(rotation.conjugate(orientation[chest]), tip - position[shoulder]) / length
@@ -47,7 +47,7 @@ async def test_pulling_what_one_does_not_hold_is_refused(server: str, clip_file:
     async with Client(server) as client:
         session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
         async with Puppeteer(client, session) as puppeteer:
-            with pytest.raises(Refused, match="not held"):
+            with pytest.raises(ControlRefused, match="not held"):
                 await puppeteer.velocity("right_hand", 1)
 
 
@@ -86,7 +86,7 @@ async def test_a_held_limb_is_asked_for_and_given(server: str, clip_file: Path) 
             await aiko.release("left_hand")
             await asking
             await ben.target("left_hand", 0.3, 0.2, 0.4)
-            with pytest.raises(Refused, match="not given"):
+            with pytest.raises(ControlRefused, match="not given"):
                 await aiko.ask("left_hand", seconds=0.2)
             await ben.target("left_hand", 50.0, 0.2, 0.4)
             async with asyncio.timeout(10):

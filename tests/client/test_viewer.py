@@ -12,30 +12,30 @@ from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.typing import Subprotocol
 
-from bunraku.backing.library import Library, pack, with_audio
-from bunraku.backing.library import unpack as unpack_motion
 from bunraku.client import Client, StreamEnded, Viewer
-from bunraku.codec.decode import decode_block
-from bunraku.codec.encode import encode_motion
-from bunraku.codec.scene_encode import encode_scene
-from bunraku.ingest.opus import encode_audio
-from bunraku.motion.skeleton import points
-from bunraku.playout.blocks import BlockStore, Pose
-from bunraku.playout.held import Held
+from bunraku.codec.motion_decoder import decode_motion_block
+from bunraku.codec.motion_encoder import encode_motion
+from bunraku.codec.scene_encoder import encode_scene
+from bunraku.delivery.resume import ResumeState
+from bunraku.ingest.jobs.opus import encode_audio
+from bunraku.motion.skeleton import joint_and_tip_positions
+from bunraku.playout.block_store import MotionBlockStore, Pose
+from bunraku.storage.motion_store import MotionStore, pack, with_audio
+from bunraku.storage.motion_store import unpack as unpack_motion
 from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
-from tests.servers import running
-from tests.sounds import click, decode, onset
-from tests.vectors.blocks import wandering_motion
-from tests.vectors.scene import camera, light
+from tests.audio import decode_opus, find_onset, make_click
+from tests.servers import run_server
+from tests.vectors.blocks import random_motion
+from tests.vectors.scene import sample_camera, sample_light
 
 PROTOCOL = Subprotocol(SUBPROTOCOL)
 
 
 async def test_it_shows_the_dance_that_was_uploaded(server: str, tmp_path: Path) -> None:
-    from tests.servers import clip
+    from tests.servers import make_bvh_clip
 
     source = tmp_path / "clip.bvh"
-    source.write_bytes(clip(3.0, 77))
+    source.write_bytes(make_bvh_clip(3.0, 77))
     async with Client(server) as client:
         motion = await client.upload(source)
         viewer = Viewer(client.socket_url(f"/v1/motions/{motion['id']}/stream?rate=3"))
@@ -47,15 +47,15 @@ async def test_it_shows_the_dance_that_was_uploaded(server: str, tmp_path: Path)
     assert figures.rate == 3
     assert figures.bytes > 1000
     assert figures.clock_error_ms is not None
-    state = viewer.timelines.newest
+    state = viewer.timeline_history.newest
     assert state is not None
     assert viewer.track is not None
-    truth = wandering_motion(3.0, 30.0, 77)
+    truth = random_motion(3.0, 30.0, 77)
     late = max(t for t in shown if (t - state.clock) % 3_000_000 < 2_900_000)
     position = (late - state.clock) % 3_000_000
     frame = round(position * 30 / 1e6)
-    expected = points(truth.figure, truth.root[frame] * 0.1 + [0, 0.85, 0], truth.rotations[frame])
-    error = np.linalg.norm(points(viewer.track.figure, *shown[late]) - expected, axis=-1)
+    expected = joint_and_tip_positions(truth.figure, truth.root[frame] * 0.1 + [0, 0.85, 0], truth.rotations[frame])
+    error = np.linalg.norm(joint_and_tip_positions(viewer.track.figure, *shown[late]) - expected, axis=-1)
     assert error.mean() < 0.15  # within a frame's movement
 
 
@@ -82,18 +82,18 @@ async def test_a_stream_that_is_refused_says_why(server: str) -> None:
 
 
 async def test_it_shows_camera_and_light_beside_the_dance(tmp_path: Path) -> None:
-    encoded = encode_motion(wandering_motion(2.0, 30.0, 5), ladder=(30.0, 5.0), grade="live")
-    filmed, lit = camera(2.0, 30.0), light(2.0, 30.0)
-    scenes = [encode_scene(filmed, ladder=(20.0, 1.0)), encode_scene(lit, ladder=(20.0, 1.0))]
-    await Library.open(f"file://{tmp_path}/library").put("filmed", pack("filmed", encoded, scenes))
-    with running(tmp_path) as url:
+    encoded = encode_motion(random_motion(2.0, 30.0, 5), error_bounds_mm=(30.0, 5.0), grade="live")
+    filmed, lit = sample_camera(2.0, 30.0), sample_light(2.0, 30.0)
+    scenes = [encode_scene(filmed, error_bounds_mm=(20.0, 1.0)), encode_scene(lit, error_bounds_mm=(20.0, 1.0))]
+    await MotionStore.open(f"file://{tmp_path}/library").put("filmed", pack("filmed", encoded, scenes))
+    with run_server(tmp_path) as url:
         viewer = Viewer(Client(url).socket_url("/v1/motions/filmed/stream?rate=1"))
         seen: dict[int, list[np.ndarray | None]] = {}
         # the first block is sent again, better, only once the second is on show
         figures = await viewer.watch(0.5, lambda t, _: seen.update({t: [viewer.scene_at(t, n) for n in (0, 1)]}))
     assert [track.kind for track in viewer.scenes] == ["camera", "light"]
     assert (figures.blocks, figures.camera_blocks, figures.light_blocks) == (2, 2, 2)
-    state = viewer.timelines.newest
+    state = viewer.timeline_history.newest
     assert state is not None
     shown = 0
     for reference, (seen_camera, seen_light) in seen.items():
@@ -114,26 +114,26 @@ async def test_it_shows_camera_and_light_beside_the_dance(tmp_path: Path) -> Non
 
 
 async def test_it_holds_the_sound_beside_the_dance(tmp_path: Path) -> None:
-    shelf = Library.open(f"file://{tmp_path}/library")
-    encoded = encode_motion(wandering_motion(2.0, 30.0, 5), ladder=(30.0, 5.0), grade="live")
+    shelf = MotionStore.open(f"file://{tmp_path}/library")
+    encoded = encode_motion(random_motion(2.0, 30.0, 5), error_bounds_mm=(30.0, 5.0), grade="live")
     stored = unpack_motion("dance", pack("dance", encoded))
-    sound = click(2.0, 48_000, 1.5).astype(np.float32)
-    await shelf.put("sung", with_audio("sung", stored, encode_audio([sound], stored.track, 1))[0])
-    with running(tmp_path) as url:
+    sound = make_click(2.0, 48_000, 1.5).astype(np.float32)
+    await shelf.put("sung", with_audio("sung", stored, encode_audio([sound], stored.first_track, 1))[0])
+    with run_server(tmp_path) as url:
         viewer = Viewer(Client(url).socket_url("/v1/motions/sung/stream?rate=1"))
         ahead: dict[int, int] = {}
-        figures = await viewer.watch(1.0, lambda t, _: ahead.update({t: viewer.audio_ahead(t)}))
+        figures = await viewer.watch(1.0, lambda t, _: ahead.update({t: viewer.audio_buffered_us(t)}))
     assert (figures.blocks, figures.audio_blocks) == (2, 2)
     assert figures.audio_rate >= 0
-    state = viewer.timelines.newest
+    state = viewer.timeline_history.newest
     assert state is not None
     last = max(ahead)
     assert ahead[last] == 2_000_000 - (last - state.clock) % 1_000_000, "once around, from the block on show"
     assert viewer.audio is not None
     found = viewer.packets_from(state.clock)
-    assert [packet.number for packet in found] == list(range(viewer.audio.packets))
-    played = decode(packet.data for packet in found)[viewer.audio.pre_skip :]
-    assert abs(onset(played[:, 0]) - onset(sound[:, 0])) < 1e-3
+    assert [packet.number for packet in found] == list(range(viewer.audio.packet_count))
+    played = decode_opus(packet.data for packet in found)[viewer.audio.pre_skip :]
+    assert abs(find_onset(played[:, 0]) - find_onset(sound[:, 0])) < 1e-3
     late = viewer.packets_from(state.clock + 1_500_000)
     assert late == found[-len(late) :]
     assert viewer.audio.first_sample(late[0].number) <= 72_000 < viewer.audio.first_sample(late[1].number)
@@ -141,45 +141,45 @@ async def test_it_holds_the_sound_beside_the_dance(tmp_path: Path) -> None:
 
 def told(tracks: list[dict[str, object]]) -> Viewer:
     viewer = Viewer("ws://stage/stream")
-    viewer._take(Description("m", tracks).pack())
-    viewer._take(TimelineState(1, "m", 0, 0, False, True, 1_000_000).pack())
+    viewer._on_message(Description("m", tracks).pack())
+    viewer._on_message(TimelineState(1, "m", 0, 0, False, True, 1_000_000).pack())
     return viewer
 
 
 def test_blocks_of_tracks_that_it_does_not_know_are_skipped() -> None:
-    encoded = encode_motion(wandering_motion(1.0, 30.0, 5), ladder=(30.0,), grade="live")
-    filmed = encode_scene(camera(1.0, 30.0), ladder=(20.0,))
+    encoded = encode_motion(random_motion(1.0, 30.0, 5), error_bounds_mm=(30.0,), grade="live")
+    filmed = encode_scene(sample_camera(1.0, 30.0), error_bounds_mm=(20.0,))
     later = filmed.describe() | {"codec": "bunraku.scene/9"}
     sound: dict[str, object] = {"type": "audio", "codec": "bunraku.audio/9"}
     viewer = told([{"type": "scent"}, encoded.describe(), later, sound])
     for track in (0, 2, 3, 7):
-        viewer._take(Data(track, 0, 0, b"\1\2\3").pack())
+        viewer._on_message(Data(track, 0, 0, b"\1\2\3").pack())
     assert viewer.pose_at(0) is None
     assert viewer.scenes == []
     assert viewer.camera_at(0) is None
     assert viewer.audio is None
-    assert (viewer.audio_ahead(0), viewer.packets_from(0)) == (0, [])
-    viewer._take(Data(1, 0, 0, encoded.rates[0].blocks[0]).pack())
+    assert (viewer.audio_buffered_us(0), viewer.packets_from(0)) == (0, [])
+    viewer._on_message(Data(1, 0, 0, encoded.ladder[0].blocks[0]).pack())
     assert viewer.pose_at(0) is not None
-    assert (viewer.figures.blocks, viewer.figures.camera_blocks) == (1, 0)
+    assert (viewer.statistics.blocks, viewer.statistics.camera_blocks) == (1, 0)
 
 
 def test_a_stream_without_a_dance_says_so() -> None:
     with pytest.raises(StreamEnded, match="no motion track in it, only camera"):
-        told([encode_scene(camera(1.0, 30.0), ladder=(20.0,)).describe()])
+        told([encode_scene(sample_camera(1.0, 30.0), error_bounds_mm=(20.0,)).describe()])
     with pytest.raises(StreamEnded, match="only nothing"):
         told([])
     with pytest.raises(StreamEnded, match=r"bunraku\.motion/9"):
         told([{"type": "motion", "codec": "bunraku.motion/9"}])
 
 
-class Door:
+class CuttingProxy:
     """Stands before a stream, `behind` it: knows the queries of those who come and what they were sent, and can cut
     their lines; the numbers in `refused` are told to come again."""
 
     def __init__(self, behind: str, *refused: int) -> None:
-        self.behind = behind
-        self.refused = refused
+        self.upstream_url = behind
+        self.refused_connections = refused
         self.queries: list[str] = []
         self.sent: list[list[bytes]] = []
         self.cut = asyncio.Event()
@@ -187,11 +187,11 @@ class Door:
     async def __call__(self, viewer: ServerConnection) -> None:
         self.queries.append(viewer.request.path.partition("?")[2] if viewer.request else "")
         self.sent.append(sent := [])
-        if len(self.queries) in self.refused:
+        if len(self.queries) in self.refused_connections:
             await viewer.send(Problem("Not now", "the bus does not answer; come again").pack())
             await viewer.close(1013, "Not now")
             return
-        address = f"{self.behind}?{self.queries[-1]}"
+        address = f"{self.upstream_url}?{self.queries[-1]}"
         async with connect(address, subprotocols=[PROTOCOL], compression=None) as line:
 
             async def there() -> None:
@@ -221,7 +221,7 @@ class Door:
 async def test_who_is_told_to_come_again_does(server: str, clip_file: Path) -> None:
     async with Client(server) as client:
         motion = (await client.upload(clip_file))["id"]
-        door = Door(client.socket_url(f"/v1/motions/{motion}/stream"), 2)
+        door = CuttingProxy(client.socket_url(f"/v1/motions/{motion}/stream"), 2)
     async with door.open() as viewer:
         shown = asyncio.Event()
         watching = asyncio.create_task(viewer.watch(4.0, lambda _, __: shown.set()))
@@ -236,12 +236,12 @@ async def test_who_is_told_to_come_again_does(server: str, clip_file: Path) -> N
 
 async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what_it_holds(tmp_path: Path) -> None:
     first, second = (
-        encode_motion(wandering_motion(seconds, fps, seed), ladder=(30.0, 5.0), grade="live")
+        encode_motion(random_motion(seconds, fps, seed), error_bounds_mm=(30.0, 5.0), grade="live")
         for seconds, fps, seed in ((8.0, 30.0, 5), (9.0, 24.0, 6))
     )
-    await Library.open(f"file://{tmp_path}/library").put("pair", pack("pair", first, others=[second]))
-    with running(tmp_path) as url:
-        door = Door(Client(url).socket_url("/v1/motions/pair/stream"))
+    await MotionStore.open(f"file://{tmp_path}/library").put("pair", pack("pair", first, others=[second]))
+    with run_server(tmp_path) as url:
+        door = CuttingProxy(Client(url).socket_url("/v1/motions/pair/stream"))
         async with door.open("?rate=1") as viewer:
             shown, again = asyncio.Event(), asyncio.Event()
 
@@ -255,8 +255,8 @@ async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what
                 door.cut.set()
                 await again.wait()
             await watching
-    held = Held.read(dict(parse_qsl(door.queries[1]))["have"])
-    assert held.tracks == 2
+    held = ResumeState.parse(dict(parse_qsl(door.queries[1]))["have"])
+    assert held.track_count == 2
     assert [max(rates) for _, rates in held.performers] == [1, 1]
     before, after = ({one[:4] for one in sent if one[0] == Data.TYPE} for sent in door.sent)
     assert before
@@ -266,23 +266,26 @@ async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what
 
 def test_of_a_performer_that_cannot_be_played_it_holds_nothing() -> None:
     dances = [
-        encode_motion(wandering_motion(1.0, 30.0, seed), ladder=(30.0,), grade="live").describe() for seed in (5, 6, 7)
+        encode_motion(random_motion(1.0, 30.0, seed), error_bounds_mm=(30.0,), grade="live").describe()
+        for seed in (5, 6, 7)
     ]
     viewer = told([dances[0], dances[1] | {"codec": "bunraku.motion/9"}, dances[2]])
-    assert "?have=m.0.-.3.0..0.-&at=" in viewer._address()
+    assert "?have=m.0.-.3.0..0.-&at=" in viewer._make_url()
 
 
 async def test_of_a_paused_dance_the_best_of_every_performer_is_shown_soon(tmp_path: Path) -> None:
-    dances = [encode_motion(wandering_motion(8.0, 30.0, seed), ladder=(60.0, 5.0), grade="live") for seed in (5, 6)]
-    await Library.open(f"file://{tmp_path}/library").put("pair", pack("pair", dances[0], others=dances[1:]))
-    with running(tmp_path) as url:
+    dances = [
+        encode_motion(random_motion(8.0, 30.0, seed), error_bounds_mm=(60.0, 5.0), grade="live") for seed in (5, 6)
+    ]
+    await MotionStore.open(f"file://{tmp_path}/library").put("pair", pack("pair", dances[0], others=dances[1:]))
+    with run_server(tmp_path) as url:
         async with Client(url) as client:
             session = (await client.open_session("pair", playing=False))["id"]
             viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
             wanted = []
             for dance in dances:
-                store = BlockStore(dance.track)
-                store.put(0, 1, decode_block(dance.track, dance.rates[1].blocks[0]))
+                store = MotionBlockStore(dance.track)
+                store.put(0, 1, decode_motion_block(dance.track, dance.ladder[1].blocks[0]))
                 wanted.append(store.pose_at(0))
             best = asyncio.Event()
 

@@ -5,22 +5,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.timing import Timing, even_blocks, read_timing
+from bunraku.codec.timing import Timing, parse_timing, plan_timing
 
 
 @given(st.floats(1, 240), st.integers(1, 5000), st.floats(0.1, 3), st.none() | st.floats(0.01, 5))
 def test_blocks_tile_any_track_and_are_found_by_time(
     fps: float, frames: int, block: float, first: float | None
 ) -> None:
-    timing = even_blocks(fps, frames, block, first)
-    lengths = [timing.frames_in(index) for index in range(timing.blocks)]
+    timing = plan_timing(fps, frames, block, first)
+    lengths = [timing.frames_in(index) for index in range(timing.block_count)]
     assert sum(lengths) == frames
     assert 1 <= min(lengths) <= max(lengths) <= 512
-    for index in range(timing.blocks):
+    for index in range(timing.block_count):
         assert timing.first_frame(index) == sum(lengths[:index])
         assert timing.block_at(timing.start_us(index)) == index
     assert timing.block_at(-5) == 0
-    assert timing.block_at(timing.duration_us * 2) == timing.blocks - 1
+    assert timing.block_at(timing.duration_us * 2) == timing.block_count - 1
 
 
 @pytest.mark.parametrize(
@@ -38,6 +38,6 @@ def test_blocks_tile_any_track_and_are_found_by_time(
 )
 def test_a_wrong_timing_is_refused(key: str, value: object, says: str) -> None:
     described: dict[str, object] = {"fps": 30, "frames": 90, "block_frames": 30, "first_frames": 15}
-    assert read_timing(described, "light") == Timing(30.0, 90, 30, 15)
+    assert parse_timing(described, "light") == Timing(30.0, 90, 30, 15)
     with pytest.raises(DamagedBlock, match=says):
-        read_timing(described | {key: value}, "light")
+        parse_timing(described | {key: value}, "light")

@@ -17,12 +17,12 @@ from tests.conftest import REPOSITORY
 
 KUBERNETES = REPOSITORY / "deploy" / "kubernetes"
 OVERLAYS = ("laptop", "cluster")
-OLDEST = 5
+MIN_KUSTOMIZE_VERSION = 5
 """The version of kustomize, of which kubectl has had one since 1.27, that the README asks for."""
 Manifest = dict[str, Any]
 
 
-def commands(containing: str) -> str:
+def readme_commands(containing: str) -> str:
     """The block of commands of deploy/kubernetes/README.md that has this in it."""
     text = (KUBERNETES / "README.md").read_text()
     found: list[str] = [block for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL) if containing in block]
@@ -30,31 +30,33 @@ def commands(containing: str) -> str:
     return found[0]
 
 
-def kubectl() -> str:
+def find_kubectl() -> str:
     """Where a kubectl is that is new enough; else the test is skipped."""
     found = shutil.which("kubectl")
     if found is None:
         pytest.skip("kubectl is not installed")
     said = json.loads(subprocess.check_output([found, "version", "--client", "--output", "json"]))
     version = re.match(r"v(\d+)", said.get("kustomizeVersion", ""))
-    if version is None or int(version[1]) < OLDEST:
+    if version is None or int(version[1]) < MIN_KUSTOMIZE_VERSION:
         pytest.skip(f"kubectl is too old: {said}")
     return found
 
 
-def build(folder: Path, overlay: str) -> list[Manifest]:
+def render_overlay(folder: Path, overlay: str) -> list[Manifest]:
     """An overlay's manifests, with the files made by the README's own commands in a copy in `folder`."""
-    program = kubectl()
+    program = find_kubectl()
     shutil.copytree(KUBERNETES, folder / "kubernetes", ignore=shutil.ignore_patterns("secret.env"))
-    made = commands("> secret.env").replace("deploy/kubernetes/overlays/laptop", f"kubernetes/overlays/{overlay}")
+    made = readme_commands("> secret.env").replace(
+        "deploy/kubernetes/overlays/laptop", f"kubernetes/overlays/{overlay}"
+    )
     if overlay == "cluster":
-        made += commands("> settings.env")
+        made += readme_commands("> settings.env")
     subprocess.run(["sh", "-euc", made], cwd=folder, check=True)
     built = subprocess.check_output([program, "kustomize", f"kubernetes/overlays/{overlay}"], cwd=folder)
     return list(yaml.safe_load_all(built))
 
 
-class Built:
+class RenderedOverlay:
     """What an overlay makes."""
 
     def __init__(self, manifests: list[Manifest]) -> None:

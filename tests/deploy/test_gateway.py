@@ -13,14 +13,14 @@ import bunraku.ik.app
 import bunraku.ingest.app
 import bunraku.session.app
 import bunraku.stream.app
-from bunraku.backing.backing import open_backing
-from bunraku.backing.settings import Settings
+from bunraku.runtime.context import open_context
+from bunraku.runtime.settings import Settings
 from tests.conftest import REPOSITORY
 
 CADDYFILE = (REPOSITORY / "deploy" / "Caddyfile").read_text()
 
 
-def matchers() -> dict[str, re.Pattern[str]]:
+def read_matchers() -> dict[str, re.Pattern[str]]:
     """The named matchers, as expressions."""
     found = {}
     for name, kind, given in re.findall(r"^\t@(\w+) (path|path_regexp) (.+)$", CADDYFILE, re.MULTILINE):
@@ -32,7 +32,7 @@ def matchers() -> dict[str, re.Pattern[str]]:
     return found
 
 
-def handles() -> list[tuple[str, str]]:
+def read_handles() -> list[tuple[str, str]]:
     """What is handled, in order, and by which service."""
     return re.findall(
         r"^\thandle ?(\S*) \{\n\t\treverse_proxy \{\n\t\t\tdynamic a (\w+) 8000 \{", CADDYFILE, re.MULTILINE
@@ -41,8 +41,8 @@ def handles() -> list[tuple[str, str]]:
 
 def service_for(path: str) -> str:
     """Who answers a path."""
-    known = matchers()
-    for matcher, service in handles():
+    known = read_matchers()
+    for matcher, service in read_handles():
         if not matcher or matcher == path or (matcher in known and known[matcher].search(path)):
             return service
     raise AssertionError(f"nobody answers {path}")
@@ -81,7 +81,7 @@ APPS: dict[str, list[str]] = {
 
 async def paths(folder: Path, service: str) -> set[str]:
     """The paths of a service's app, but those with which it describes itself."""
-    async with open_backing(Settings(data=folder)) as backing:
+    async with open_context(Settings(data=folder)) as backing:
         made: dict[str, Callable[[], FastAPI]] = {
             "stream": lambda: bunraku.stream.app.create_app(backing),
             "ingest": lambda: bunraku.ingest.app.create_app(backing),
@@ -117,5 +117,5 @@ def test_all_else_is_the_pages(path: str) -> None:
 
 
 def test_each_way_comes_upon_replicas_as_they_come_and_go() -> None:
-    assert len(handles()) == CADDYFILE.count("reverse_proxy {") == CADDYFILE.count("\t\t\timport replicas\n") == 6
-    assert {service for _, service in handles()} == {*APPS, "page"}
+    assert len(read_handles()) == CADDYFILE.count("reverse_proxy {") == CADDYFILE.count("\t\t\timport replicas\n") == 6
+    assert {service for _, service in read_handles()} == {*APPS, "page"}

@@ -13,20 +13,20 @@ import yaml
 
 from bunraku.serve import SERVICES
 from tests.conftest import REPOSITORY
-from tests.deploy.manifests import KUBERNETES, OVERLAYS, Built, build, kubectl
+from tests.deploy.manifests import KUBERNETES, OVERLAYS, RenderedOverlay, find_kubectl, render_overlay
 from tests.deploy.test_compose import DOCKERFILE, OURS, STOCK
 from tests.deploy.test_compose import SERVICES as ALL_COMPOSED
-from tests.deploy.test_gateway import handles
+from tests.deploy.test_gateway import read_handles
 
 COMPOSED = {name: one for name, one in ALL_COMPOSED.items() if "profiles" not in one}
 """What Compose starts unasked."""
 SCHEMAS = ("1.27", "1.32", "1.37")
 """Versions of Kubernetes, the oldest that the README names first."""
-ELSEWHERE = {
+COMPOSE_ONLY = {
     "BUNRAKU_PUBLISHED": "a cluster always has a secret",
 }
 """What Compose alone says, and why."""
-HERE = {
+KUBERNETES_ONLY = {
     "BUNRAKU_BUS_PASSWORD": "addresses are made of it in the pod, not before",
     "BUNRAKU_CATALOGUE_PASSWORD": "as the other",
     "BUNRAKU_SITE": "of the gateway, among the settings of all",
@@ -36,42 +36,42 @@ HERE = {
     "PGDATA": "a volume of a cluster may have a folder in it already",
 }
 """What Kubernetes alone says, and why."""
-MEBI = {"m": 1, "g": 1024, "Mi": 1, "Gi": 1024}
+MEBIBYTES_PER_UNIT = {"m": 1, "g": 1024, "Mi": 1, "Gi": 1024}
 
 
 @pytest.fixture(scope="module", params=OVERLAYS)
-def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Built:
-    return Built(build(tmp_path_factory.mktemp("built"), request.param))
+def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> RenderedOverlay:
+    return RenderedOverlay(render_overlay(tmp_path_factory.mktemp("built"), request.param))
 
 
 @pytest.fixture(scope="module")
-def laptop(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    return Built(build(tmp_path_factory.mktemp("laptop"), "laptop"))
+def laptop(tmp_path_factory: pytest.TempPathFactory) -> RenderedOverlay:
+    return RenderedOverlay(render_overlay(tmp_path_factory.mktemp("laptop"), "laptop"))
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    return Built(build(tmp_path_factory.mktemp("cluster"), "cluster"))
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> RenderedOverlay:
+    return RenderedOverlay(render_overlay(tmp_path_factory.mktemp("cluster"), "cluster"))
 
 
 def mebibytes(size: str) -> int:
     found = re.fullmatch(r"(\d+)([A-Za-z]+)", size)
     assert found is not None, size
-    return int(found[1]) * MEBI[found[2]]
+    return int(found[1]) * MEBIBYTES_PER_UNIT[found[2]]
 
 
-def in_memory(service: dict[str, Any]) -> dict[str, int]:
+def tmpfs_sizes(service: dict[str, Any]) -> dict[str, int]:
     """Where Compose has folders in memory, and their largest size in MiB."""
     return {one.partition(":")[0]: mebibytes(one.partition("size=")[2].partition(",")[0]) for one in service["tmpfs"]}
 
 
 @pytest.mark.parametrize("version", SCHEMAS)
-def test_every_object_is_one_that_kubernetes_knows(built: Built, version: str) -> None:
+def test_every_object_is_one_that_kubernetes_knows(built: RenderedOverlay, version: str) -> None:
     for manifest in built.manifests:
         kubernetes_validate.validate(manifest, version, strict=True)
 
 
-def test_the_schemas_refuse_what_is_no_field(laptop: Built) -> None:
+def test_the_schemas_refuse_what_is_no_field(laptop: RenderedOverlay) -> None:
     wrong = yaml.safe_load(yaml.safe_dump(laptop.of("Deployment")["stream"]))
     wrong["spec"]["template"]["spec"]["containers"][0]["securityContext"]["readOnlyRoot"] = True
     with pytest.raises(kubernetes_validate.ValidationError):
@@ -80,26 +80,26 @@ def test_the_schemas_refuse_what_is_no_field(laptop: Built) -> None:
 
 @pytest.mark.parametrize("overlay", OVERLAYS)
 def test_without_secrets_of_ones_own_nothing_is_built(overlay: str, tmp_path: Path) -> None:
-    build(tmp_path, overlay)
+    render_overlay(tmp_path, overlay)
     folder = tmp_path / "kubernetes" / "overlays" / overlay
     (folder / "secret.env").unlink()
-    done = subprocess.run([kubectl(), "kustomize", str(folder)], capture_output=True, text=True)
+    done = subprocess.run([find_kubectl(), "kustomize", str(folder)], capture_output=True, text=True)
     assert done.returncode != 0
     assert "secret.env" in done.stderr
 
 
-def test_the_whole_house_is_there(built: Built) -> None:
+def test_the_whole_house_is_there(built: RenderedOverlay) -> None:
     assert set(built.pods()) == set(COMPOSED) == {*SERVICES, "gateway", "nats", "postgres"}
     assert {one["metadata"].get("namespace", "bunraku") for one in built.manifests} == {"bunraku"}
 
 
-def test_services_are_as_many_as_in_compose(laptop: Built) -> None:
+def test_services_are_as_many_as_in_compose(laptop: RenderedOverlay) -> None:
     replicas = {name: one["spec"]["replicas"] for name, one in laptop.of("Deployment", "StatefulSet").items()}
     assert replicas == {name: one.get("scale", 1) for name, one in COMPOSED.items()}
 
 
 @pytest.mark.parametrize("name", sorted(COMPOSED))
-def test_a_service_runs_as_in_compose(laptop: Built, name: str) -> None:
+def test_a_service_runs_as_in_compose(laptop: RenderedOverlay, name: str) -> None:
     composed, container, pod = COMPOSED[name], laptop.container(name), laptop.pods()[name]
     image, _, tag = container["image"].partition(":")
     assert image == composed["image"].partition(":")[0]
@@ -114,10 +114,10 @@ def test_a_service_runs_as_in_compose(laptop: Built, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(COMPOSED))
-def test_a_service_is_told_what_it_is_told_in_compose(laptop: Built, name: str) -> None:
+def test_a_service_is_told_what_it_is_told_in_compose(laptop: RenderedOverlay, name: str) -> None:
     composed, here = COMPOSED[name]["environment"], laptop.environment(name)
-    assert set(composed) - set(here) <= set(ELSEWHERE)
-    assert set(here) - set(composed) <= set(HERE)
+    assert set(composed) - set(here) <= set(COMPOSE_ONLY)
+    assert set(here) - set(composed) <= set(KUBERNETES_ONLY)
     for variable in set(composed) & set(here):
         # what may be said of it, or is said by default
         given = re.sub(r"\$\{(\w*PASSWORD):-bunraku\}", r"$(\1)", str(composed[variable]))
@@ -130,7 +130,7 @@ def test_a_service_is_told_what_it_is_told_in_compose(laptop: Built, name: str) 
             assert here[variable] == given, variable
 
 
-def test_addresses_are_made_of_what_stands_before_them(built: Built) -> None:
+def test_addresses_are_made_of_what_stands_before_them(built: RenderedOverlay) -> None:
     for name, container in built.containers():
         known: set[str] = set()
         for one in container.get("env", ()):
@@ -139,7 +139,7 @@ def test_addresses_are_made_of_what_stands_before_them(built: Built) -> None:
         assert set(re.findall(r"\$\((\w+)\)", " ".join(container.get("args", ())))) <= known, name
 
 
-def test_what_is_kept_and_what_is_in_memory_is_as_in_compose(laptop: Built) -> None:
+def test_what_is_kept_and_what_is_in_memory_is_as_in_compose(laptop: RenderedOverlay) -> None:
     claims = {*laptop.of("PersistentVolumeClaim")}
     for name, composed in COMPOSED.items():
         pod, container = laptop.pods()[name], laptop.container(name)
@@ -152,7 +152,7 @@ def test_what_is_kept_and_what_is_in_memory_is_as_in_compose(laptop: Built) -> N
             assert target in mounts, volume
             # certificates are not the gateway's here
             assert not source or name == "gateway" or mounts[target] == source in kept
-        memory = {**(in_memory(composed) if "tmpfs" in composed else {})}
+        memory = {**(tmpfs_sizes(composed) if "tmpfs" in composed else {})}
         if "shm_size" in composed:
             memory["/dev/shm"] = mebibytes(composed["shm_size"])
         held = {
@@ -163,7 +163,7 @@ def test_what_is_kept_and_what_is_in_memory_is_as_in_compose(laptop: Built) -> N
         assert held == memory
 
 
-def test_every_container_may_do_no_more_than_it_must(built: Built) -> None:
+def test_every_container_may_do_no_more_than_it_must(built: RenderedOverlay) -> None:
     level = "pod-security.kubernetes.io/enforce"
     assert built.of("Namespace")["bunraku"]["metadata"]["labels"][level] == "restricted"
     for name, pod in built.pods().items():
@@ -183,7 +183,7 @@ def test_every_container_may_do_no_more_than_it_must(built: Built) -> None:
         assert all("hostPort" not in port for port in container["ports"])
 
 
-def test_every_probe_asks_what_is_answered(built: Built) -> None:
+def test_every_probe_asks_what_is_answered(built: RenderedOverlay) -> None:
     program = (REPOSITORY / "services" / "bunraku" / "backing" / "readiness.py").read_text()
     for name, container in built.containers():
         ports = {port["name"]: port["containerPort"] for port in container["ports"]}
@@ -201,9 +201,9 @@ def test_every_probe_asks_what_is_answered(built: Built) -> None:
     assert f"handle {'/livez'} {{" in (REPOSITORY / "deploy" / "Caddyfile").read_text()
 
 
-def test_the_gateway_finds_each_replica_by_name(built: Built) -> None:
+def test_the_gateway_finds_each_replica_by_name(built: RenderedOverlay) -> None:
     services = built.of("Service")
-    wanted = {name for _, name in handles()} | {"page"}
+    wanted = {name for _, name in read_handles()} | {"page"}
     assert wanted == set(SERVICES)
     for name in wanted:
         spec = services[name]["spec"]
@@ -220,7 +220,7 @@ def test_the_gateway_finds_each_replica_by_name(built: Built) -> None:
         assert services[name]["spec"]["clusterIP"] == "None"
 
 
-def test_nothing_but_the_gateway_is_reached_from_outside(built: Built) -> None:
+def test_nothing_but_the_gateway_is_reached_from_outside(built: RenderedOverlay) -> None:
     kinds = {name: one["spec"].get("type", "ClusterIP") for name, one in built.of("Service").items()}
     assert {name for name, kind in kinds.items() if kind != "ClusterIP"} <= {"gateway"}
     policies = {name: one["spec"] for name, one in built.of("NetworkPolicy").items()}
@@ -244,7 +244,7 @@ def test_nothing_but_the_gateway_is_reached_from_outside(built: Built) -> None:
                     assert port["port"] in {each["name"] for each in pod["spec"]["containers"][0]["ports"]}
 
 
-def test_viewers_are_moved_one_pod_at_a_time(built: Built) -> None:
+def test_viewers_are_moved_one_pod_at_a_time(built: RenderedOverlay) -> None:
     budgets = built.of("PodDisruptionBudget")
     for name in (*SERVICES, "gateway", "nats"):
         assert budgets[name]["spec"]["maxUnavailable"] == 1
@@ -254,7 +254,7 @@ def test_viewers_are_moved_one_pod_at_a_time(built: Built) -> None:
         assert spec["minReadySeconds"] > 30
 
 
-def test_there_are_as_many_streams_as_there_are_viewers_for(cluster: Built) -> None:
+def test_there_are_as_many_streams_as_there_are_viewers_for(cluster: RenderedOverlay) -> None:
     scalers = cluster.of("HorizontalPodAutoscaler")
     assert set(scalers) == {"stream", "session", "gateway"}
     for name, scaler in scalers.items():
@@ -281,7 +281,7 @@ def test_there_are_as_many_streams_as_there_are_viewers_for(cluster: Built) -> N
     assert rule["metricsQuery"] == "sum(<<.Series>>{<<.LabelMatchers>>}) by (<<.GroupBy>>)"
 
 
-def test_the_autoscaler_counts_what_streams_tell(cluster: Built) -> None:
+def test_the_autoscaler_counts_what_streams_tell(cluster: RenderedOverlay) -> None:
     told = REPOSITORY / "services" / "bunraku" / "stream" / "metrics.py"
     if not told.exists():
         pytest.skip("streams tell nothing yet")
@@ -290,7 +290,7 @@ def test_the_autoscaler_counts_what_streams_tell(cluster: Built) -> None:
     assert {one["pods"]["metric"]["name"] for one in metrics if one["type"] == "Pods"} <= names
 
 
-def test_prometheus_finds_every_service_by_either_way(built: Built) -> None:
+def test_prometheus_finds_every_service_by_either_way(built: RenderedOverlay) -> None:
     monitor = yaml.safe_load((KUBERNETES / "prometheus" / "pod-monitor.yaml").read_text())
     (endpoint,) = monitor["spec"]["podMetricsEndpoints"]
     settings = built.one("ConfigMap", "settings")["data"]
@@ -302,14 +302,14 @@ def test_prometheus_finds_every_service_by_either_way(built: Built) -> None:
         assert template["metadata"]["annotations"]["prometheus.io/port"] == str(ports[endpoint["port"]])
 
 
-def test_several_nodes_share_no_volume(cluster: Built) -> None:
+def test_several_nodes_share_no_volume(cluster: RenderedOverlay) -> None:
     assert not cluster.of("PersistentVolumeClaim")
     for name in SERVICES:
         assert all("persistentVolumeClaim" not in one for one in cluster.pods()[name]["volumes"])
         assert cluster.environment(name)["BUNRAKU_LIBRARY"].startswith("s3://")
 
 
-def test_every_nats_server_is_named_wherever_all_are(cluster: Built) -> None:
+def test_every_nats_server_is_named_wherever_all_are(cluster: RenderedOverlay) -> None:
     count = cluster.of("StatefulSet")["nats"]["spec"]["replicas"]
     names = [f"nats-{number}.nats" for number in range(count)]
     assert re.findall(r"@([^:]+):4222", cluster.environment("stream")["BUNRAKU_BUS"]) == names
@@ -324,7 +324,7 @@ def test_every_nats_server_is_named_wherever_all_are(cluster: Built) -> None:
     assert {*filter(None, alone.splitlines()[1:])} <= {*own.splitlines()}
 
 
-def test_images_have_the_version_of_the_package(laptop: Built) -> None:
+def test_images_have_the_version_of_the_package(laptop: RenderedOverlay) -> None:
     version = re.search(r"^ARG VERSION=(\S+)$", DOCKERFILE, re.MULTILINE)
     assert version is not None
     for name, container in laptop.containers():

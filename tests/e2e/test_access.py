@@ -13,13 +13,13 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from bunraku.backing.access import Role
+from bunraku.http.access_control import Role
 from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Problem, Welcome, unpack
-from tests.guests import OTHER, SECRET, headers, signed, token, unsigned
-from tests.servers import clip, running
+from tests.credentials import OTHER_SECRET, SECRET, bearer_headers, make_token, make_unsigned_token, sign_token
+from tests.servers import make_bvh_clip, run_server
 
-PATIENCE = 20
-NONE = "x" * 20
+TIMEOUT_S = 20
+UNKNOWN_ID = "x" * 20
 """An id of nothing."""
 
 ROUTES: dict[tuple[str, str], Role | None] = {
@@ -52,37 +52,37 @@ ROUTES: dict[tuple[str, str], Role | None] = {
     ("GET", "/v1/uploads/{upload}"): Role.INGEST,
     ("DELETE", "/v1/motions/{motion}"): Role.INGEST,
 }
-SOCKETS: dict[str, Role] = {
+WEBSOCKETS: dict[str, Role] = {
     "/v1/motions/{motion}/stream": Role.VIEW,
     "/v1/sessions/{session}/stream": Role.VIEW,
     "/v1/sessions/{session}/control": Role.CONTROL,
 }
-BAD: dict[str, Callable[[], str | None]] = {
+INVALID_TOKENS: dict[str, Callable[[], str | None]] = {
     "none": lambda: None,
     "malformed": lambda: "not.a.token",
     "empty": lambda: ".",
-    "expired": lambda: signed(exp=int(time.time()) - 1),
-    "wrong audience": lambda: signed(aud="elsewhere"),
-    "wrong issuer": lambda: signed(iss="elsewhere"),
-    "wrong signature": lambda: signed(OTHER),
-    "alg none": unsigned,
-    "other algorithm": lambda: signed(algorithm="HS512"),
-    "no expiry": lambda: signed(exp=None),
-    "expiry of text": lambda: signed(exp="2999"),
-    "unknown role": lambda: signed(role="owner"),
-    "no role": lambda: signed(role=None),
-    "admin bound to a session": lambda: signed(session="s"),
-    "too long": lambda: signed(more="x" * 3_000),
+    "expired": lambda: sign_token(exp=int(time.time()) - 1),
+    "wrong audience": lambda: sign_token(aud="elsewhere"),
+    "wrong issuer": lambda: sign_token(iss="elsewhere"),
+    "wrong signature": lambda: sign_token(OTHER_SECRET),
+    "alg none": make_unsigned_token,
+    "other algorithm": lambda: sign_token(algorithm="HS512"),
+    "no expiry": lambda: sign_token(exp=None),
+    "expiry of text": lambda: sign_token(exp="2999"),
+    "unknown role": lambda: sign_token(role="owner"),
+    "no role": lambda: sign_token(role=None),
+    "admin bound to a session": lambda: sign_token(session="s"),
+    "too long": lambda: sign_token(more="x" * 3_000),
 }
 
 
-def unnamed(answer: httpx2.Response) -> str:
+def body_without_request_id(answer: httpx2.Response) -> str:
     """What is answered, but for what the request is called."""
     return answer.text.replace(answer.headers["x-request-id"], "")
 
 
 @dataclass
-class House:
+class GuardedServer:
     """A server with a secret, a motion, a session of it, and a link that was revoked."""
 
     url: str
@@ -90,7 +90,7 @@ class House:
     session: str
     revoked: str
 
-    def address(self, path: str) -> str:
+    def fill_path(self, path: str) -> str:
         """A path with what is there in its places."""
         places = {
             "motion": self.motion,
@@ -106,18 +106,18 @@ class House:
 
 
 @pytest.fixture(scope="module")
-def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
-    with running(tmp_path_factory.mktemp("guarded"), secret=SECRET, connects=0) as url:
-        with httpx2.Client(base_url=url, headers=headers(token(subject="host")), timeout=60) as http:
-            motion = http.post("/v1/motions?filename=a.bvh", content=clip(2.0, 5)).json()["id"]
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GuardedServer]:
+    with run_server(tmp_path_factory.mktemp("guarded"), secret=SECRET, connects=0) as url:
+        with httpx2.Client(base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=60) as http:
+            motion = http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(2.0, 5)).json()["id"]
             session = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
             share = http.post("/v1/shares", json={"session": session}).json()
-            assert http.get("/v1/sessions", headers=headers(share["token"])).status_code == 200
+            assert http.get("/v1/sessions", headers=bearer_headers(share["token"])).status_code == 200
             assert http.delete(f"/v1/shares/{share['id']}").status_code == 204
-        yield House(url, motion, session, share["token"])
+        yield GuardedServer(url, motion, session, share["token"])
 
 
-def test_the_table_has_every_route_and_socket_of_the_server(house: House) -> None:
+def test_the_table_has_every_route_and_socket_of_the_server(house: GuardedServer) -> None:
     described = httpx2.get(f"{house.url}/v1/openapi.json").json()
     told = {(method.upper(), path) for path, methods in described["paths"].items() for method in methods}
     assert told == {key for key in ROUTES if key[1] not in ("/v1/openapi.json", "/v1/docs")}
@@ -126,15 +126,15 @@ def test_the_table_has_every_route_and_socket_of_the_server(house: House) -> Non
         for path, methods in described["paths"].items()
         for method, said in methods.items()
     }
-    assert roles == {key: None if ROUTES[key] is None else ROUTES[key].word for key in told}  # type: ignore[union-attr]
+    assert roles == {key: None if ROUTES[key] is None else ROUTES[key].label for key in told}  # type: ignore[union-attr]
 
 
-@pytest.mark.parametrize("bad", [*BAD, "revoked"])
-def test_what_is_no_good_token_opens_nothing(house: House, bad: str) -> None:
-    held = house.revoked if bad == "revoked" else BAD[bad]()
-    with httpx2.Client(base_url=house.url, headers=headers(held)) as http:
+@pytest.mark.parametrize("bad", [*INVALID_TOKENS, "revoked"])
+def test_what_is_no_good_token_opens_nothing(house: GuardedServer, bad: str) -> None:
+    held = house.revoked if bad == "revoked" else INVALID_TOKENS[bad]()
+    with httpx2.Client(base_url=house.url, headers=bearer_headers(held)) as http:
         for (method, path), role in ROUTES.items():
-            answer = http.request(method, house.address(path))
+            answer = http.request(method, house.fill_path(path))
             if role is None:
                 assert answer.status_code == 200, path
                 continue
@@ -142,40 +142,42 @@ def test_what_is_no_good_token_opens_nothing(house: House, bad: str) -> None:
             assert answer.headers["www-authenticate"].startswith("Bearer realm=")
             assert answer.headers["content-type"] == "application/problem+json"
             # the same about what is there and what is not
-            other = http.request(method, house.address(path).replace(house.motion, NONE).replace(house.session, NONE))
-            assert (other.status_code, unnamed(other)) == (401, unnamed(answer))
+            other = http.request(
+                method, house.fill_path(path).replace(house.motion, UNKNOWN_ID).replace(house.session, UNKNOWN_ID)
+            )
+            assert (other.status_code, body_without_request_id(other)) == (401, body_without_request_id(answer))
             title = {"none": "A link is needed", "expired": "Link expired", "revoked": "Link revoked"}
             assert answer.json()["title"] == title.get(bad, "Link not valid")
 
 
 @pytest.mark.parametrize("role", Role)
-def test_each_role_may_do_what_the_table_says(house: House, role: Role) -> None:
-    with httpx2.Client(base_url=house.url, headers=headers(token(role)), timeout=60) as http:
+def test_each_role_may_do_what_the_table_says(house: GuardedServer, role: Role) -> None:
+    with httpx2.Client(base_url=house.url, headers=bearer_headers(make_token(role)), timeout=60) as http:
         for (method, path), needs in ROUTES.items():
             if method == "DELETE" and role >= (needs or Role.VIEW):
                 continue  # below, of things that may go
-            answer = http.request(method, house.address(path))
+            answer = http.request(method, house.fill_path(path))
             if needs is None or role >= needs:
                 assert answer.status_code not in (401, 403), (method, path, answer.text)
                 assert answer.status_code < 500
             else:
                 assert answer.status_code == 403, (method, path)
-                assert answer.json()["needed"] == needs.word
-                assert f'scope="{needs.word}"' in answer.headers["www-authenticate"]
-                other = http.request(method, house.address(path).replace(house.motion, NONE))
-                assert (other.status_code, unnamed(other)) == (403, unnamed(answer))
+                assert answer.json()["needed"] == needs.label
+                assert f'scope="{needs.label}"' in answer.headers["www-authenticate"]
+                other = http.request(method, house.fill_path(path).replace(house.motion, UNKNOWN_ID))
+                assert (other.status_code, body_without_request_id(other)) == (403, body_without_request_id(answer))
 
 
-async def to_its_end(socket: ClientConnection) -> None:
+async def read_until_closed(socket: ClientConnection) -> None:
     """Read until there is nothing more."""
-    async with asyncio.timeout(PATIENCE):
+    async with asyncio.timeout(TIMEOUT_S):
         while True:
             await socket.recv()
 
 
-async def said(url: str, given: dict[str, str]) -> tuple[object, int | None]:
+async def first_message(url: str, request_headers: dict[str, str]) -> tuple[object, int | None]:
     """The first message of a socket, and the code with which it was closed if it was."""
-    async with connect(url, subprotocols=[SUBPROTOCOL], compression=None, additional_headers=given) as socket:  # type: ignore[list-item]
+    async with connect(url, subprotocols=[SUBPROTOCOL], compression=None, additional_headers=request_headers) as socket:  # type: ignore[list-item]
         data = await socket.recv()
         assert isinstance(data, bytes)
         message = unpack(data)
@@ -188,56 +190,58 @@ async def said(url: str, given: dict[str, str]) -> tuple[object, int | None]:
         raise AssertionError("a problem is the last word")
 
 
-@pytest.mark.parametrize("bad", [*BAD, "revoked"])
-async def test_no_socket_opens_with_what_is_no_good_token(house: House, bad: str) -> None:
-    held = house.revoked if bad == "revoked" else BAD[bad]()
-    for path in SOCKETS:
-        address = house.url.replace("http", "ws") + house.address(path)
-        there = await said(address, headers(held))
+@pytest.mark.parametrize("bad", [*INVALID_TOKENS, "revoked"])
+async def test_no_socket_opens_with_what_is_no_good_token(house: GuardedServer, bad: str) -> None:
+    held = house.revoked if bad == "revoked" else INVALID_TOKENS[bad]()
+    for path in WEBSOCKETS:
+        address = house.url.replace("http", "ws") + house.fill_path(path)
+        there = await first_message(address, bearer_headers(held))
         assert isinstance(there[0], Problem)
         assert there[1] == 4401
-        away = await said(address.replace(house.motion, NONE).replace(house.session, NONE), headers(held))
+        away = await first_message(
+            address.replace(house.motion, UNKNOWN_ID).replace(house.session, UNKNOWN_ID), bearer_headers(held)
+        )
         assert away == there
 
 
 @pytest.mark.parametrize("role", Role)
 async def test_sockets_open_by_role_with_a_token_or_a_ticket_and_a_ticket_is_good_once(
-    house: House, role: Role
+    house: GuardedServer, role: Role
 ) -> None:
-    async with httpx2.AsyncClient(base_url=house.url, headers=headers(token(role))) as http:
-        for path, needs in SOCKETS.items():
-            address = house.url.replace("http", "ws") + house.address(path)
+    async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(make_token(role))) as http:
+        for path, needs in WEBSOCKETS.items():
+            address = house.url.replace("http", "ws") + house.fill_path(path)
             ticket = (await http.post("/v1/tickets")).json()["ticket"]
             assert len(ticket) < 64
-            by_token = await said(address, headers(token(role)))
-            by_ticket = await said(f"{address}?ticket={ticket}", {})
+            by_token = await first_message(address, bearer_headers(make_token(role)))
+            by_ticket = await first_message(f"{address}?ticket={ticket}", {})
             if role >= needs:
                 for message, _ in (by_token, by_ticket):
                     assert isinstance(message, ChannelHeader | Welcome)
-                again = await said(f"{address}?ticket={ticket}", {})
+                again = await first_message(f"{address}?ticket={ticket}", {})
                 assert again[1] == 4401
             else:
                 assert by_token[1] == by_ticket[1] == 4403
 
 
-async def test_one_who_speaks_another_protocol_is_told_that_first(house: House) -> None:
-    for path in SOCKETS:
-        async with connect(house.url.replace("http", "ws") + house.address(path)) as socket:
+async def test_one_who_speaks_another_protocol_is_told_that_first(house: GuardedServer) -> None:
+    for path in WEBSOCKETS:
+        async with connect(house.url.replace("http", "ws") + house.fill_path(path)) as socket:
             with pytest.raises(ConnectionClosed) as closed:
-                await to_its_end(socket)
+                await read_until_closed(socket)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 4406
 
 
-async def test_one_who_is_bound_sees_that_alone_and_of_the_rest_not_whether_it_is_there(house: House) -> None:
-    async with httpx2.AsyncClient(base_url=house.url, headers=headers(token()), timeout=60) as host:
-        other = (await host.post("/v1/motions?filename=b.bvh", content=clip(1.0, 6))).json()["id"]
+async def test_one_who_is_bound_sees_that_alone_and_of_the_rest_not_whether_it_is_there(house: GuardedServer) -> None:
+    async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(make_token()), timeout=60) as host:
+        other = (await host.post("/v1/motions?filename=b.bvh", content=make_bvh_clip(1.0, 6))).json()["id"]
         elsewhere = (await host.post("/v1/sessions", json={"motion": other})).json()["id"]
         for bound, shown in (("session", house.session), ("motion", house.motion)):
-            guest = token(
+            guest = make_token(
                 Role.CONTROL, session=shown if bound == "session" else None, motion=shown if bound == "motion" else None
             )
-            async with httpx2.AsyncClient(base_url=house.url, headers=headers(guest)) as http:
+            async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(guest)) as http:
                 motions = (await http.get("/v1/motions")).json()["items"]
                 assert [one["id"] for one in motions] == [house.motion]
                 sessions = (await http.get("/v1/sessions")).json()["items"]
@@ -251,92 +255,94 @@ async def test_one_who_is_bound_sees_that_alone_and_of_the_rest_not_whether_it_i
                     ("/v1/motions/{}/blocks/0/0", other),
                     ("/v1/sessions/{}", elsewhere),
                 ):
-                    seen, missing = await http.get(path.format(hidden)), await http.get(path.format(NONE))
+                    seen, missing = await http.get(path.format(hidden)), await http.get(path.format(UNKNOWN_ID))
                     assert seen.status_code == missing.status_code == 404
-                    assert unnamed(seen).replace(hidden, NONE) == unnamed(missing)
+                    assert body_without_request_id(seen).replace(hidden, UNKNOWN_ID) == body_without_request_id(missing)
                 for asked in ({"session": elsewhere}, {"motion": other}):
                     ((name, hidden),) = asked.items()
-                    seen, missing = [await http.post("/v1/shares", json={name: one}) for one in (hidden, NONE)]
+                    seen, missing = [await http.post("/v1/shares", json={name: one}) for one in (hidden, UNKNOWN_ID)]
                     assert seen.status_code == missing.status_code == 404
-                    assert unnamed(seen).replace(hidden, NONE) == unnamed(missing)
+                    assert body_without_request_id(seen).replace(hidden, UNKNOWN_ID) == body_without_request_id(missing)
                 # a guest neither opens, ends, nor changes a session
                 assert (await http.post("/v1/sessions", json={"motion": house.motion})).status_code == 403
-                edited = [await http.patch(f"/v1/sessions/{house.session}", json={"motion": m}) for m in (other, NONE)]
-                assert unnamed(edited[0]) == unnamed(edited[1])
+                edited = [
+                    await http.patch(f"/v1/sessions/{house.session}", json={"motion": m}) for m in (other, UNKNOWN_ID)
+                ]
+                assert body_without_request_id(edited[0]) == body_without_request_id(edited[1])
                 assert edited[0].status_code == (403 if bound == "session" else 404)
             for path, hidden in (("motions", other), ("sessions", elsewhere)):
                 address = house.url.replace("http", "ws") + f"/v1/{path}/{{}}/stream"
-                seen_there = await said(address.format(hidden), headers(guest))
-                seen_not = await said(address.format(NONE), headers(guest))
+                seen_there = await first_message(address.format(hidden), bearer_headers(guest))
+                seen_not = await first_message(address.format(UNKNOWN_ID), bearer_headers(guest))
                 assert seen_there[1] == seen_not[1] == 4404
-                assert str(seen_there[0]).replace(hidden, NONE) == str(seen_not[0])
+                assert str(seen_there[0]).replace(hidden, UNKNOWN_ID) == str(seen_not[0])
 
 
-def test_who_stores_removes_their_own_and_an_admin_all(house: House) -> None:
+def test_who_stores_removes_their_own_and_an_admin_all(house: GuardedServer) -> None:
     with httpx2.Client(base_url=house.url, timeout=60) as http:
-        mine, theirs = (headers(token(Role.INGEST, name)) for name in ("aiko", "ben"))
-        made = http.post("/v1/motions?filename=c.bvh", content=clip(1.0, 7), headers=mine).json()["id"]
+        mine, theirs = (bearer_headers(make_token(Role.INGEST, name)) for name in ("aiko", "ben"))
+        made = http.post("/v1/motions?filename=c.bvh", content=make_bvh_clip(1.0, 7), headers=mine).json()["id"]
         assert http.delete(f"/v1/motions/{made}", headers=theirs).status_code == 403
         assert http.delete(f"/v1/motions/{made}", headers=mine).status_code == 204
-        again = http.post("/v1/motions?filename=c.bvh", content=clip(1.0, 7), headers=mine).json()["id"]
-        assert http.delete(f"/v1/motions/{again}", headers=headers(token())).status_code == 204
+        again = http.post("/v1/motions?filename=c.bvh", content=make_bvh_clip(1.0, 7), headers=mine).json()["id"]
+        assert http.delete(f"/v1/motions/{again}", headers=bearer_headers(make_token())).status_code == 204
 
 
-def test_links_are_their_makers_and_the_admin_s(house: House) -> None:
+def test_links_are_their_makers_and_the_admin_s(house: GuardedServer) -> None:
     with httpx2.Client(base_url=house.url) as http:
-        mine, theirs = (headers(token(Role.CONTROL, name)) for name in ("aiko", "ben"))
+        mine, theirs = (bearer_headers(make_token(Role.CONTROL, name)) for name in ("aiko", "ben"))
         share = http.post("/v1/shares", json={"session": house.session, "seconds": 60}, headers=mine).json()
         assert "token" not in http.get("/v1/shares", headers=mine).text
         assert [one["id"] for one in http.get("/v1/shares", headers=mine).json()["items"]] == [share["id"]]
         assert http.get("/v1/shares", headers=theirs).json()["items"] == []
-        assert share["id"] in http.get("/v1/shares", headers=headers(token())).text
+        assert share["id"] in http.get("/v1/shares", headers=bearer_headers(make_token())).text
         hidden = http.delete(f"/v1/shares/{share['id']}", headers=theirs)
         missing = http.delete(f"/v1/shares/{'0' * 18}", headers=theirs)
         assert hidden.status_code == missing.status_code == 404
-        assert unnamed(hidden).replace(share["id"], "0" * 18) == unnamed(missing)
-        viewer = headers(share["token"])
+        assert body_without_request_id(hidden).replace(share["id"], "0" * 18) == body_without_request_id(missing)
+        viewer = bearer_headers(share["token"])
         assert http.get(f"/v1/sessions/{house.session}", headers=viewer).status_code == 200
         assert http.patch(f"/v1/sessions/{house.session}", json={"playing": False}, headers=viewer).status_code == 403
         assert http.delete(f"/v1/shares/{share['id']}", headers=mine).status_code == 204
         assert http.get(f"/v1/sessions/{house.session}", headers=viewer).json()["title"] == "Link revoked"
 
 
-async def test_what_is_open_with_a_link_that_is_revoked_is_ended(house: House) -> None:
-    async with httpx2.AsyncClient(base_url=house.url, headers=headers(token())) as http:
+async def test_what_is_open_with_a_link_that_is_revoked_is_ended(house: GuardedServer) -> None:
+    async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(make_token())) as http:
         share = (await http.post("/v1/shares", json={"session": house.session})).json()
-        ticket = (await http.post("/v1/tickets", headers=headers(share["token"]))).json()["ticket"]
-        unused = (await http.post("/v1/tickets", headers=headers(share["token"]))).json()["ticket"]
+        ticket = (await http.post("/v1/tickets", headers=bearer_headers(share["token"]))).json()["ticket"]
+        unused = (await http.post("/v1/tickets", headers=bearer_headers(share["token"]))).json()["ticket"]
         address = house.url.replace("http", "ws") + f"/v1/sessions/{house.session}/stream"
         async with connect(f"{address}?ticket={ticket}", subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
             await socket.recv()
             assert (await http.delete(f"/v1/shares/{share['id']}")).status_code == 204
             with pytest.raises(ConnectionClosed) as closed:
-                await to_its_end(socket)
+                await read_until_closed(socket)
             assert closed.value.rcvd is not None
             assert (closed.value.rcvd.code, closed.value.rcvd.reason[:12]) == (4401, "Link revoked")
         # a ticket that was given before is good no more
-        assert (await said(f"{address}?ticket={unused}", {}))[1] == 4401
+        assert (await first_message(f"{address}?ticket={unused}", {}))[1] == 4401
 
 
-async def test_an_open_socket_ends_with_its_token(house: House) -> None:
+async def test_an_open_socket_ends_with_its_token(house: GuardedServer) -> None:
     for path in ("stream", "control"):
         address = house.url.replace("http", "ws") + f"/v1/sessions/{house.session}/{path}"
-        held = headers(token(Role.CONTROL, seconds=2))
+        held = bearer_headers(make_token(Role.CONTROL, lifetime_s=2))
         async with connect(address, subprotocols=[SUBPROTOCOL], additional_headers=held) as socket:  # type: ignore[list-item]
             with pytest.raises(ConnectionClosed) as closed:
-                await to_its_end(socket)
+                await read_until_closed(socket)
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 4401
 
 
-async def test_what_needs_a_token_is_kept_by_no_cache_on_the_way(house: House) -> None:
-    async with httpx2.AsyncClient(base_url=house.url, headers=headers(token())) as http:
+async def test_what_needs_a_token_is_kept_by_no_cache_on_the_way(house: GuardedServer) -> None:
+    async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(make_token())) as http:
         for path in (f"/v1/motions/{house.motion}/blocks/0/0", "/v1/arms/393-351-256-560-320-120/table"):
             assert "private" in (await http.get(path)).headers["cache-control"]
 
 
 def test_a_server_that_is_open_lets_everybody_do_everything(tmp_path: Path) -> None:
-    with running(tmp_path) as url, httpx2.Client(base_url=url, headers=headers("whatever")) as http:
-        assert http.post("/v1/motions?filename=a.bvh", content=clip(1.0, 8)).status_code == 201
+    with run_server(tmp_path) as url, httpx2.Client(base_url=url, headers=bearer_headers("whatever")) as http:
+        assert http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 8)).status_code == 201
         assert http.post("/v1/tickets").status_code == 201
         assert http.post("/v1/shares", json={"motion": "a"}).status_code == 404

@@ -11,17 +11,17 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
-from bunraku.backing.access import Role
 from bunraku.client import Client
+from bunraku.http.access_control import Role
 from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Problem, unpack
-from tests.guests import SECRET, headers, token
-from tests.processes import jetstream, url_of
-from tests.servers import clip, running
+from tests.credentials import SECRET, bearer_headers, make_token
+from tests.processes import nats_url_of, run_jetstream
+from tests.servers import make_bvh_clip, run_server
 
-PATIENCE = 20
+TIMEOUT_S = 20
 
 
-async def first(url: str) -> object:
+async def first_message(url: str) -> object:
     """The first message of a socket."""
     async with connect(url, subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
         data = await socket.recv()
@@ -32,23 +32,23 @@ async def first(url: str) -> object:
 async def test_tickets_and_links_hold_across_replicas(tmp_path: Path) -> None:
     (tmp_path / "nats").mkdir()
     source = tmp_path / "a.bvh"
-    source.write_bytes(clip(2.0, 5))
+    source.write_bytes(make_bvh_clip(2.0, 5))
     with ExitStack() as stack:
-        nats = stack.enter_context(jetstream(tmp_path / "nats"))
-        given = {"bus": url_of(nats), "secret": SECRET}
-        one, two = [stack.enter_context(running(tmp_path / "data", **given)) for _ in range(2)]  # type: ignore[arg-type]
-        async with Client(one, token(Role.ADMIN)) as host, httpx2.AsyncClient(base_url=two) as other:
+        nats = stack.enter_context(run_jetstream(tmp_path / "nats"))
+        given = {"bus": nats_url_of(nats), "secret": SECRET}
+        one, two = [stack.enter_context(run_server(tmp_path / "data", **given)) for _ in range(2)]  # type: ignore[arg-type]
+        async with Client(one, make_token(Role.ADMIN)) as host, httpx2.AsyncClient(base_url=two) as other:
             motion = (await host.upload(source))["id"]
             session = (await host.open_session(motion))["id"]
             share = await host.share(session=session)
             stream = f"/v1/sessions/{session}/stream"
             for giver, taker in ((one, two), (two, one)):
-                async with httpx2.AsyncClient(base_url=giver, headers=headers(share["token"])) as viewer:
+                async with httpx2.AsyncClient(base_url=giver, headers=bearer_headers(share["token"])) as viewer:
                     ticket = (await viewer.post("/v1/tickets")).json()["ticket"]
                 address = taker.replace("http", "ws") + f"{stream}?ticket={ticket}"
-                assert isinstance(await first(address), ChannelHeader)
+                assert isinstance(await first_message(address), ChannelHeader)
                 for again in (address, address.replace(taker.replace("http", "ws"), giver.replace("http", "ws"))):
-                    refused = await first(again)
+                    refused = await first_message(again)
                     assert isinstance(refused, Problem)
                     assert refused.title == "Ticket not valid"
             # a link that is revoked at one replica is good no more at the other, and what is open there ends
@@ -56,13 +56,13 @@ async def test_tickets_and_links_hold_across_replicas(tmp_path: Path) -> None:
             async with connect(
                 watching,
                 subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
-                additional_headers=headers(share["token"]),
+                additional_headers=bearer_headers(share["token"]),
             ) as socket:
                 await socket.recv()
                 await host.revoke_share(share["id"])
 
                 async def to_its_end() -> None:
-                    async with asyncio.timeout(PATIENCE):
+                    async with asyncio.timeout(TIMEOUT_S):
                         while True:
                             await socket.recv()
 
@@ -70,5 +70,5 @@ async def test_tickets_and_links_hold_across_replicas(tmp_path: Path) -> None:
                     await to_its_end()
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 4401
-            answer = await other.get(f"/v1/sessions/{session}", headers=headers(share["token"]))
+            answer = await other.get(f"/v1/sessions/{session}", headers=bearer_headers(share["token"]))
             assert answer.json()["title"] == "Link revoked"

@@ -16,83 +16,87 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
 from bunraku.wire.messages import SUBPROTOCOL, Welcome, unpack
-from tests.guests import SECRET, headers, token
-from tests.processes import Owned, free_port, jetstream, url_of
-from tests.servers import clip
+from tests.credentials import SECRET, bearer_headers, make_token
+from tests.processes import ServerProcess, free_port, nats_url_of, run_jetstream
+from tests.servers import make_bvh_clip
 
-PATIENCE = 20
+TIMEOUT_S = 20
 SERVICES = ("ingest", "session 1", "session 2")
 
 
-class House:
+class Deployment:
     """Processes that log as in the stack, and more."""
 
     def __init__(self, folder: Path) -> None:
-        self.processes: dict[str, Owned] = {}
+        self.processes: dict[str, ServerProcess] = {}
         for name in SERVICES:
             port, service = free_port(), name.partition(" ")[0]
             command = [sys.executable, "-m", "bunraku.cli", "up", "--port", str(port), "--data", str(folder / "data")]
             (folder / name).mkdir()
-            self.processes[name] = Owned([*command, "--service", service], port, folder / name)
+            self.processes[name] = ServerProcess([*command, "--service", service], port, folder / name)
 
     def url(self, name: str) -> str:
         return f"http://127.0.0.1:{self.processes[name].port}"
 
-    def text(self, name: str) -> str:
+    def log_text(self, name: str) -> str:
         return (self.processes[name].folder / "log").read_text()
 
-    def lines(self, name: str, request: str | None = None) -> list[dict[str, Any]]:
+    def log_lines(self, name: str, request: str | None = None) -> list[dict[str, Any]]:
         """Those of a process, of one request."""
-        every = [json.loads(line) for line in self.text(name).splitlines() if line.startswith("{")]
+        every = [json.loads(line) for line in self.log_text(name).splitlines() if line.startswith("{")]
         return [line for line in every if request in (None, line.get("request_id"))]
 
-    async def told(self, name: str, request: str, event: str, **more: Any) -> None:
+    async def wait_for_log(self, name: str, request: str, event: str, **more: Any) -> None:
         """Wait until a process has told of a request."""
         wanted = {"event": event, **more}
-        async with asyncio.timeout(PATIENCE):
-            while not any(wanted.items() <= line.items() for line in self.lines(name, request)):  # noqa: ASYNC110
+        async with asyncio.timeout(TIMEOUT_S):
+            while not any(wanted.items() <= line.items() for line in self.log_lines(name, request)):  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
 
 
 @pytest.fixture
-def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
+def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Deployment]:
     (tmp_path / "nats").mkdir()
-    with ExitStack() as stack, jetstream(tmp_path / "nats") as nats:
+    with ExitStack() as stack, run_jetstream(tmp_path / "nats") as nats:
         for name, value in {
-            "NO_COLOR": "1", "BUNRAKU_BUS": url_of(nats), "BUNRAKU_LOGS": "json", "BUNRAKU_LOG_LEVEL": "debug",
+            "NO_COLOR": "1", "BUNRAKU_BUS": nats_url_of(nats), "BUNRAKU_LOGS": "json", "BUNRAKU_LOG_LEVEL": "debug",
             "BUNRAKU_SECRET": SECRET,
         }.items():  # fmt: skip
             monkeypatch.setenv(name, value)
-        built = House(tmp_path)
+        built = Deployment(tmp_path)
         for process in built.processes.values():
             stack.callback(process.stop)
             process.start()
         yield built
 
 
-async def test_one_request_has_one_name_in_every_process_and_nothing_secret_is_told(house: House) -> None:
-    held = token()
-    async with httpx2.AsyncClient(headers=headers(held), timeout=60) as http:
+async def test_one_request_has_one_name_in_every_process_and_nothing_secret_is_told(house: Deployment) -> None:
+    held = make_token()
+    async with httpx2.AsyncClient(headers=bearer_headers(held), timeout=60) as http:
 
         async def ask(method: str, name: str, path: str, request: str, **more: Any) -> Any:
             answer = await http.request(method, house.url(name) + path, headers={"X-Request-Id": request}, **more)
             assert answer.headers["x-request-id"] == request
             return answer.json()
 
-        motion = (await ask("POST", "ingest", "/v1/motions?filename=a.bvh", "upload-01", content=clip(4.0, 1)))["id"]
-        await house.told("ingest", "upload-01", "job", job="make", motion=motion, outcome="made", service="ingest")
-        await house.told("ingest", "upload-01", "request", route="/v1/motions", status=201, path="/v1/motions")
+        motion = (
+            await ask("POST", "ingest", "/v1/motions?filename=a.bvh", "upload-01", content=make_bvh_clip(4.0, 1))
+        )["id"]
+        await house.wait_for_log(
+            "ingest", "upload-01", "job", job="make", motion=motion, outcome="made", service="ingest"
+        )
+        await house.wait_for_log("ingest", "upload-01", "request", route="/v1/motions", status=201, path="/v1/motions")
 
         session = (await ask("POST", "session 1", "/v1/sessions", "opening-01", json={"motion": motion}))["id"]
         await ask("PATCH", "session 2", f"/v1/sessions/{session}", "editing-01", json={"loop": False})
-        await house.told("session 1", "editing-01", f"session {session}: edit", level="info", service="session")
-        await house.told("session 2", "editing-01", "request", method="PATCH", route="/v1/sessions/{session}")
+        await house.wait_for_log("session 1", "editing-01", f"session {session}: edit", level="info", service="session")
+        await house.wait_for_log("session 2", "editing-01", "request", method="PATCH", route="/v1/sessions/{session}")
 
         # through three of them: asked here, logged there, made at a third
         await ask("POST", "session 2", f"/v1/sessions/{session}/recordings", "keeping-01", json={"seconds": 0.5})
-        await house.told("session 1", "keeping-01", f"session {session}: log")
-        await house.told("ingest", "keeping-01", "job", job="keep", outcome="made")
-        await house.told("session 2", "keeping-01", "request", status=201)
+        await house.wait_for_log("session 1", "keeping-01", f"session {session}: log")
+        await house.wait_for_log("ingest", "keeping-01", "job", job="keep", outcome="made")
+        await house.wait_for_log("session 2", "keeping-01", "request", status=201)
 
         # a problem says it, too, whoever's it is
         wrong = await ask("PATCH", "session 2", f"/v1/sessions/{session}", "wrong-001", json={"motion": "none"})
@@ -109,21 +113,25 @@ async def test_one_request_has_one_name_in_every_process_and_nothing_secret_is_t
                 if not taken:
                     with pytest.raises(ConnectionClosed):
                         await socket.recv()
-        await house.told("session 1", "pulling-01", f"session {session}: join")
-        await house.told("session 2", "pulling-01", "request", method="WEBSOCKET", status=101)
-        await house.told("session 2", "pulling-02", f"refused '/v1/sessions/{session}/control': Ticket not valid")
+        await house.wait_for_log("session 1", "pulling-01", f"session {session}: join")
+        await house.wait_for_log("session 2", "pulling-01", "request", method="WEBSOCKET", status=101)
+        await house.wait_for_log(
+            "session 2", "pulling-02", f"refused '/v1/sessions/{session}/control': Ticket not valid"
+        )
 
-        expired = token(seconds=-5)
-        refused = await http.get(house.url("ingest") + "/v1/motions", headers=headers(expired))
+        expired = make_token(lifetime_s=-5)
+        refused = await http.get(house.url("ingest") + "/v1/motions", headers=bearer_headers(expired))
         assert refused.status_code == 401
         assert refused.json()["request_id"] == refused.headers["x-request-id"]
-        await house.told("ingest", refused.json()["request_id"], "refused '/v1/motions': Link expired", level="info")
+        await house.wait_for_log(
+            "ingest", refused.json()["request_id"], "refused '/v1/motions': Link expired", level="info"
+        )
 
     for name in SERVICES:
-        text = house.text(name)
+        text = house.log_text(name)
         for secret in (SECRET, held, expired, ticket, "ticket="):
             assert secret not in text, name
         # what goes on by itself is nobody's request, and what a process does for one has no other's name
-        requests = {line.get("request_id") for line in house.lines(name)}
+        requests = {line.get("request_id") for line in house.log_lines(name)}
         assert "pulling-02" not in requests or name == "session 2"
-        assert {"time", "level", "logger", "event", "service"} <= set.intersection(*map(set, house.lines(name)))
+        assert {"time", "level", "logger", "event", "service"} <= set.intersection(*map(set, house.log_lines(name)))

@@ -10,20 +10,20 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from bunraku.backing.frames import Opcode
-from bunraku.backing.settings import Settings
 from bunraku.client import Client, Puppeteer
+from bunraku.runtime.settings import Settings
+from bunraku.websocket.frame import Opcode
 from bunraku.wire.messages import SUBPROTOCOL, unpack
 from bunraku.wire.overlay import Overlay
-from tests.guests import SECRET, headers, token
+from tests.credentials import SECRET, bearer_headers, make_token
+from tests.metrics import scrape_metrics, scrape_until
 from tests.processes import free_port
-from tests.scrape import scrape, until
-from tests.servers import clip, running
+from tests.servers import make_bvh_clip, run_server
 
-PATIENCE = 20
+TIMEOUT_S = 20
 
 
-class Raw:
+class CountingViewer:
     """A viewer who counts every byte behind the handshake, and what the frames hold."""
 
     def __init__(self) -> None:
@@ -60,7 +60,7 @@ class Raw:
                 return
             self.bytes += 2 + wide + size
             if first & 15 == Opcode.PING:
-                self._say(Opcode.PONG, payload)
+                self._send_frame(Opcode.PONG, payload)
             if first & 15 == Opcode.BINARY:
                 self.types.append(payload[0])
                 if payload[0] == Overlay.TYPE:
@@ -69,21 +69,21 @@ class Raw:
                     self.limbs.append(len(overlay.limbs))
             self._more.set()
 
-    async def until(self, kind: int, number: int) -> None:
+    async def wait_for_messages(self, kind: int, number: int) -> None:
         """So many messages of a type are there."""
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             while self.types.count(kind) < number:
                 self._more.clear()
                 await self._more.wait()
 
-    def _say(self, opcode: Opcode, payload: bytes) -> None:
+    def _send_frame(self, opcode: Opcode, payload: bytes) -> None:
         # a client's frames are masked, and a mask may be nought
         self._writer.write(bytes([0x80 | opcode, 0x80 | len(payload), 0, 0, 0, 0]) + payload)
 
     async def close(self) -> None:
         """Say so, and read what still comes."""
-        self._say(Opcode.CLOSE, (1000).to_bytes(2))
-        async with asyncio.timeout(PATIENCE):
+        self._send_frame(Opcode.CLOSE, (1000).to_bytes(2))
+        async with asyncio.timeout(TIMEOUT_S):
             await self._reading
         self._writer.close()
 
@@ -91,21 +91,21 @@ class Raw:
 async def test_the_numbers_are_those_that_the_clients_counted(tmp_path: Path) -> None:
     port = free_port()
     source = tmp_path / "one.bvh"
-    source.write_bytes(clip(4.0, 1))
-    with running(tmp_path / "data", metrics=f"127.0.0.1:{port}") as url:
+    source.write_bytes(make_bvh_clip(4.0, 1))
+    with run_server(tmp_path / "data", metrics=f"127.0.0.1:{port}") as url:
 
         async def look(**wanted: float) -> None:
             """Wait for numbers, given as `name` or `name__label__value`."""
 
             def is_so() -> dict[str, float]:
-                found = scrape(port)
+                found = scrape_metrics(port)
                 told = {}
                 for key in wanted:
                     name, *labels = key.split("__")
                     told[key] = found.sum(name, **dict(zip(labels[::2], labels[1::2], strict=True)))
                 return told
 
-            end = asyncio.get_running_loop().time() + PATIENCE
+            end = asyncio.get_running_loop().time() + TIMEOUT_S
             while (told := await asyncio.to_thread(is_so)) != wanted:
                 assert asyncio.get_running_loop().time() < end, f"{told}, not {wanted}"
 
@@ -120,7 +120,7 @@ async def test_the_numbers_are_those_that_the_clients_counted(tmp_path: Path) ->
             session = (await client.open_session(motion))["id"]
             await look(sessions=1, sessions_moved_total__how__opened=1, puppeteers=0, bus_up=1)
 
-            alone, crowd = Raw(), [Raw() for _ in range(12)]
+            alone, crowd = CountingViewer(), [CountingViewer() for _ in range(12)]
             await alone.open(url, f"/v1/motions/{motion}/stream?rate=1")
             for viewer in crowd:
                 await viewer.open(url, f"/v1/sessions/{session}/stream?rate=0")
@@ -136,10 +136,10 @@ async def test_the_numbers_are_those_that_the_clients_counted(tmp_path: Path) ->
                 for step in range(20):
                     await puppeteer.target("left_hand", 0.3 + 0.005 * step, 0.1, 0.4)
                 await look(inputs_total=20)
-                await crowd[-1].until(Overlay.TYPE, 5)
+                await crowd[-1].wait_for_messages(Overlay.TYPE, 5)
             # they have gone, and the limb goes back to the dance
             await look(puppeteers=0, limbs_held=0)
-            async with asyncio.timeout(PATIENCE):
+            async with asyncio.timeout(TIMEOUT_S):
                 while crowd[0].limbs[-1]:  # noqa: ASYNC110
                     await asyncio.sleep(0.02)
 
@@ -150,13 +150,13 @@ async def test_the_numbers_are_those_that_the_clients_counted(tmp_path: Path) ->
             await alone.close()
             everyone = [alone, *crowd]
             await look(viewers=0, viewers_joined_total=13, watched_sessions=0)
-            found = scrape(port)
+            found = scrape_metrics(port)
             assert found.sum("sent_bytes_total") == sum(viewer.bytes for viewer in everyone)
             assert found.sum("sent_blocks_total") == sum(viewer.types.count(3) for viewer in everyone)
             assert found.sum("sent_overlays_total") == sum(viewer.types.count(5) for viewer in everyone)
             assert found.sum("sent_overlays_total") >= 12 * 5
             assert found.sum("solve_duration_seconds_count") >= 5
-            assert 0 < found.sum("solve_duration_seconds_sum") < PATIENCE
+            assert 0 < found.sum("solve_duration_seconds_sum") < TIMEOUT_S
             assert found.sum("slow_viewers") == found.sum("held_bytes") == found.sum("skipped_overlays_total") == 0
 
             # requests by their route, none by a path or an id
@@ -177,15 +177,15 @@ async def test_the_numbers_are_those_that_the_clients_counted(tmp_path: Path) ->
 
 def test_who_is_turned_away_is_counted_by_why(tmp_path: Path) -> None:
     port = free_port()
-    with running(tmp_path, metrics=f"127.0.0.1:{port}", secret=SECRET) as url:
+    with run_server(tmp_path, metrics=f"127.0.0.1:{port}", secret=SECRET) as url:
         with httpx2.Client(base_url=url) as http:
             assert http.get("/v1/motions").status_code == 401
-            assert http.get("/v1/motions", headers=headers(token(seconds=-5))).status_code == 401
-            assert http.get("/v1/motions", headers=headers("nonsense")).status_code == 401
-            assert http.get("/v1/nothing/here", headers=headers(token())).status_code == 404
-            assert http.request("BREW", "/v1/nothing", headers=headers(token())).status_code == 404
-            assert http.get("/v1/motions", headers=headers(token())).status_code == 200
-        found = until(port, lambda found: found.sum("request_duration_seconds_count") == 6)
+            assert http.get("/v1/motions", headers=bearer_headers(make_token(lifetime_s=-5))).status_code == 401
+            assert http.get("/v1/motions", headers=bearer_headers("nonsense")).status_code == 401
+            assert http.get("/v1/nothing/here", headers=bearer_headers(make_token())).status_code == 404
+            assert http.request("BREW", "/v1/nothing", headers=bearer_headers(make_token())).status_code == 404
+            assert http.get("/v1/motions", headers=bearer_headers(make_token())).status_code == 200
+        found = scrape_until(port, lambda found: found.sum("request_duration_seconds_count") == 6)
         assert found.sum("refusals_total") == 5
         assert found.sum("refusals_total", reason="A link is needed", status="401") == 1
         assert found.sum("refusals_total", reason="Link expired", status="401") == 1

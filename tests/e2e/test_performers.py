@@ -10,44 +10,44 @@ import httpx2
 import numpy as np
 
 from bunraku.client import Client, Puppeteer, Viewer
-from bunraku.codec.decode import decode_block
-from bunraku.codec.track import read_track
-from bunraku.motion.place import Place
-from bunraku.motion.skeleton import points
-from bunraku.playout.blocks import BlockStore, Pose
+from bunraku.codec.motion_decoder import decode_motion_block
+from bunraku.codec.motion_track import parse_motion_track
+from bunraku.motion.placement import Placement
+from bunraku.motion.skeleton import joint_and_tip_positions
+from bunraku.playout.block_store import MotionBlockStore, Pose
 from bunraku.playout.timeline import position_at
 from bunraku.wire.messages import Data, Description, unpack
-from tests.servers import clip, running
+from tests.servers import make_bvh_clip, run_server
 
 LEFT_TIP, RIGHT_TIP = 19, 20
 
 
-async def dance_of(http: httpx2.AsyncClient, motion: str, performer: int) -> tuple[BlockStore, Place]:
+async def load_performer(http: httpx2.AsyncClient, motion: str, performer: int) -> tuple[MotionBlockStore, Placement]:
     """What a performer dances, at the best rate, and where."""
     description = unpack((await http.get(f"/v1/motions/{motion}/description")).content)
     assert isinstance(description, Description)
     said = description.tracks[performer]
-    store, rate = BlockStore(read_track(said)), len(said["rates"]) - 1
-    for index in range(store.track.blocks):
+    store, rate = MotionBlockStore(parse_motion_track(said)), len(said["rates"]) - 1
+    for index in range(store.track.block_count):
         answer = await http.get(f"/v1/motions/{motion}/blocks/{rate}/{index}?track={performer}")
-        store.put(index, rate, decode_block(store.track, Data.unpack(answer.content).block))
-    return store, Place.read(said["place"])
+        store.put(index, rate, decode_motion_block(store.track, Data.unpack(answer.content).block))
+    return store, Placement.parse(said["place"])
 
 
-def tips(store: BlockStore, pose: Pose) -> np.ndarray:
+def tip_positions(store: MotionBlockStore, pose: Pose) -> np.ndarray:
     """World places of both hands' tips."""
-    return points(store.track.figure, *pose)[[LEFT_TIP, RIGHT_TIP]]
+    return joint_and_tip_positions(store.track.figure, *pose)[[LEFT_TIP, RIGHT_TIP]]
 
 
 async def test_three_dance_side_by_side_and_each_has_strings_of_its_own(tmp_path: Path) -> None:
     for name, seed in (("Swan", 91), ("Fox", 92)):
-        (tmp_path / f"{name}.bvh").write_bytes(clip(3.0, seed))
-    with running(tmp_path / "data") as url:
+        (tmp_path / f"{name}.bvh").write_bytes(make_bvh_clip(3.0, seed))
+    with run_server(tmp_path / "data") as url:
         async with Client(url) as client, httpx2.AsyncClient(base_url=url) as http:
             swan, fox = [await client.upload(tmp_path / f"{name}.bvh") for name in ("Swan", "Fox")]
             trio = await client.add_performers(swan["id"], [fox["id"], swan["id"]])
             session = (await client.open_session(trio["id"]))["id"]
-            dances = [await dance_of(http, trio["id"], nth) for nth in range(3)]
+            dances = [await load_performer(http, trio["id"], nth) for nth in range(3)]
             viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream?rate=4"))
             seen: list[tuple[int, list[Pose | None]]] = []
 
@@ -55,7 +55,7 @@ async def test_three_dance_side_by_side_and_each_has_strings_of_its_own(tmp_path
                 seen.append((reference, [viewer.pose_at(reference, nth) for nth in range(3)]))
 
             async with Puppeteer(client, session) as aiko, Puppeteer(client, session) as ben:
-                watching = asyncio.create_task(viewer.watch(3.0, note, frame=1 / 30))
+                watching = asyncio.create_task(viewer.watch(3.0, note, frame_interval=1 / 30))
                 await aiko.claim("left_hand")
                 await ben.claim(9)
                 loop = asyncio.get_running_loop()
@@ -67,19 +67,19 @@ async def test_three_dance_side_by_side_and_each_has_strings_of_its_own(tmp_path
                 assert viewer.presence is not None
                 assert [limb for limb, holder in enumerate(viewer.presence.limbs) if holder is not None] == [0, 9]
                 assert len(viewer.presence.limbs) == 12
-                kept = await client.keep(session, None, 2.0)
+                kept = await client.record(session, None, 2.0)
                 await watching
-    assert viewer.figures.gaps == 0
+    assert viewer.statistics.gaps == 0
     pulled: list[list[np.ndarray]] = [[], [], []]
     roots: list[list[np.ndarray]] = [[], [], []]
-    state = viewer.timelines.newest
+    state = viewer.timeline_history.newest
     assert state is not None
     for reference, poses in seen:
         for nth, ((store, place), pose) in enumerate(zip(dances, poses, strict=True)):
             dance = store.pose_at(position_at(state, reference), True, state.duration)
             assert dance is not None
             if pose is not None:
-                off = tips(store, pose) - tips(store, place.bring(*dance))
+                off = tip_positions(store, pose) - tip_positions(store, place.apply(*dance))
                 pulled[nth].append(np.linalg.norm(off, axis=-1))
                 roots[nth].append(pose[0])
     assert all(len(frames) > 30 for frames in pulled)

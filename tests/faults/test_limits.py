@@ -18,35 +18,36 @@ import httpx2
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.typing import Subprotocol
 
-from bunraku.backing import hasty
-from bunraku.backing.access import Role
-from bunraku.wire.messages import LARGEST_FROM_CLIENT, SUBPROTOCOL
-from tests.guests import SECRET, headers, token
-from tests.servers import clip, running
+from bunraku.http import header_timeout
+from bunraku.http.access_control import Role
+from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES, SUBPROTOCOL
+from tests.credentials import SECRET, bearer_headers, make_token
+from tests.servers import make_bvh_clip, run_server
 
-PATIENCE = 30
+TIMEOUT_S = 30
 
 
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     given: dict[str, Any] = {"secret": SECRET, "connects": 20.0, "body_seconds": 1.0, "quota_motions": 2}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hasty, "HEAD_SECONDS", 1.0)
-        with running(tmp_path_factory.mktemp("limits"), upload_bytes=1 << 20, **given) as url:
+        patch.setattr(header_timeout, "HEADER_TIMEOUT_S", 1.0)
+        with run_server(tmp_path_factory.mktemp("limits"), upload_bytes=1 << 20, **given) as url:
             yield url
 
 
-def put_away() -> set[Path]:
+def temporary_files() -> set[Path]:
     """What servers have put into the temporary folder."""
     return set(Path(tempfile.gettempdir()).iterdir())
 
 
-def stored(url: str) -> int:
-    return len(httpx2.get(f"{url}/v1/motions", headers=headers(token())).json()["items"])
+def motion_count(url: str) -> int:
+    return len(httpx2.get(f"{url}/v1/motions", headers=bearer_headers(make_token())).json()["items"])
 
 
-async def raw(url: str, *pieces: bytes, every: float = 0.0) -> bytes:
+async def send_raw(url: str, *pieces: bytes, interval_s: float = 0.0) -> bytes:
     """What a server answers to bytes, sent piece by piece, before it ends the connection."""
     parts = urlsplit(url)
     reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
@@ -56,11 +57,11 @@ async def raw(url: str, *pieces: bytes, every: float = 0.0) -> bytes:
             for piece in pieces:
                 writer.write(piece)
                 await writer.drain()
-                await asyncio.sleep(every)
+                await asyncio.sleep(interval_s)
 
     sending = asyncio.create_task(send())
     try:
-        async with asyncio.timeout(PATIENCE):
+        async with asyncio.timeout(TIMEOUT_S):
             said = b""
             with contextlib.suppress(OSError):
                 while more := await reader.read(65_536):
@@ -72,55 +73,59 @@ async def raw(url: str, *pieces: bytes, every: float = 0.0) -> bytes:
         writer.close()
 
 
-async def to_its_end(socket: ClientConnection) -> None:
+async def read_until_closed(socket: ClientConnection) -> None:
     """Read until there is nothing more."""
     while True:
         await socket.recv()
 
 
-def head(method: str, path: str, *lines: str, held: str | None = None) -> bytes:
-    given = [f"{name}: {value}" for name, value in headers(held or token()).items()]
+def request_head(method: str, path: str, *lines: str, bearer_token: str | None = None) -> bytes:
+    given = [f"{name}: {value}" for name, value in bearer_headers(bearer_token or make_token()).items()]
     return "\r\n".join([f"{method} {path} HTTP/1.1", "Host: stage", *given, *lines, "", ""]).encode()
 
 
-def status(said: bytes) -> int:
+def response_status(said: bytes) -> int:
     return int(said.split(b" ", 2)[1])
 
 
 async def test_an_upload_that_drips_is_refused_and_nothing_is_left(guarded: str) -> None:
-    before, away = stored(guarded), put_away()
-    begin = head("POST", "/v1/motions?filename=a.bvh", "Content-Length: 100000")
-    said = await raw(guarded, begin, *[b"x"] * 1_000, every=0.05)
-    assert status(said) == 408
+    before, away = motion_count(guarded), temporary_files()
+    begin = request_head("POST", "/v1/motions?filename=a.bvh", "Content-Length: 100000")
+    said = await send_raw(guarded, begin, *[b"x"] * 1_000, interval_s=0.05)
+    assert response_status(said) == 408
     assert b"too slowly" in said
-    chunked = head("POST", "/v1/motions?filename=a.bvh", "Transfer-Encoding: chunked")
-    assert status(await raw(guarded, chunked, *[b"1\r\nx\r\n"] * 1_000, every=0.05)) == 408
+    chunked = request_head("POST", "/v1/motions?filename=a.bvh", "Transfer-Encoding: chunked")
+    assert response_status(await send_raw(guarded, chunked, *[b"1\r\nx\r\n"] * 1_000, interval_s=0.05)) == 408
     # one that stops altogether
-    assert status(await raw(guarded, begin, b"x" * 500)) == 408
-    assert stored(guarded) == before
-    assert put_away() <= away
+    assert response_status(await send_raw(guarded, begin, b"x" * 500)) == 408
+    assert motion_count(guarded) == before
+    assert temporary_files() <= away
 
 
 @pytest.mark.parametrize("path", ["/v1/sessions", "/v1/solve", "/v1/shares"])
 async def test_any_body_that_drips_is_refused(guarded: str, path: str) -> None:
-    begin = head("POST", path, "Content-Length: 1000", "Content-Type: application/json")
-    assert status(await raw(guarded, begin, *[b" "] * 900, every=0.05)) == 408
+    begin = request_head("POST", path, "Content-Length: 1000", "Content-Type: application/json")
+    assert response_status(await send_raw(guarded, begin, *[b" "] * 900, interval_s=0.05)) == 408
 
 
 async def test_a_head_that_drips_is_cut_off_and_does_not_hold_up_others(guarded: str) -> None:
     begun = time.monotonic()
-    dripping = [asyncio.create_task(raw(guarded, b"GET /v1/health HTTP/1.1\r\n", *[b"a"] * 1_000, every=0.05))]
-    dripping.append(asyncio.create_task(raw(guarded)))
+    dripping = [
+        asyncio.create_task(send_raw(guarded, b"GET /v1/health HTTP/1.1\r\n", *[b"a"] * 1_000, interval_s=0.05))
+    ]
+    dripping.append(asyncio.create_task(send_raw(guarded)))
     async with httpx2.AsyncClient(base_url=guarded) as http:
         assert (await http.get("/v1/health")).status_code == 200
     assert await asyncio.gather(*dripping) == [b"", b""]
-    assert time.monotonic() - begun < PATIENCE
+    assert time.monotonic() - begun < TIMEOUT_S
 
 
 async def test_a_head_without_end_is_refused(guarded: str) -> None:
-    said = await raw(guarded, b"GET /v1/health HTTP/1.1\r\nHost: stage\r\n", *[b"a: " + b"b" * 1_000 + b"\r\n"] * 100)
-    assert status(said) in (400, 431)
-    assert status(await raw(guarded, b"GET /" + b"a" * 100_000)) in (400, 414, 431)
+    said = await send_raw(
+        guarded, b"GET /v1/health HTTP/1.1\r\nHost: stage\r\n", *[b"a: " + b"b" * 1_000 + b"\r\n"] * 100
+    )
+    assert response_status(said) in (400, 431)
+    assert response_status(await send_raw(guarded, b"GET /" + b"a" * 100_000)) in (400, 414, 431)
 
 
 @pytest.mark.parametrize(
@@ -136,30 +141,32 @@ async def test_a_head_without_end_is_refused(guarded: str) -> None:
     ],
 )
 async def test_a_body_of_a_byte_too_many_is_refused_before_it_is_read(guarded: str, path: str, most: int) -> None:
-    before = stored(guarded)
-    said = await raw(guarded, head("POST", path, f"Content-Length: {most + 1}", "Content-Type: application/json"))
-    assert status(said) == 413
+    before = motion_count(guarded)
+    said = await send_raw(
+        guarded, request_head("POST", path, f"Content-Length: {most + 1}", "Content-Type: application/json")
+    )
+    assert response_status(said) == 413
     assert b"application/problem+json" in said
-    assert stored(guarded) == before
+    assert motion_count(guarded) == before
 
 
 async def test_who_has_no_token_sends_no_body(guarded: str) -> None:
     for path in ("/v1/motions?filename=a.bvh", "/v1/solve"):
-        begin = head("POST", path, "Content-Length: 1000000", "Expect: 100-continue", held="guess")
-        said = await raw(guarded, begin, b"x" * 1_000)
-        assert status(said) == 401
+        begin = request_head("POST", path, "Content-Length: 1000000", "Expect: 100-continue", bearer_token="guess")
+        said = await send_raw(guarded, begin, b"x" * 1_000)
+        assert response_status(said) == 401
 
 
 @pytest.mark.parametrize("packed", [gzip.compress(b" " * 50_000_000), zlib.compress(b" " * 50_000_000)])
 @pytest.mark.parametrize("path", ["/v1/sessions", "/v1/solve", "/v1/motions?filename=a.bvh"])
 async def test_nothing_that_comes_packed_is_unpacked(guarded: str, path: str, packed: bytes) -> None:
-    before = stored(guarded)
-    given = {"Content-Encoding": "gzip", "Content-Type": "application/json", **headers(token())}
-    async with httpx2.AsyncClient(base_url=guarded, timeout=PATIENCE) as http:
+    before = motion_count(guarded)
+    given = {"Content-Encoding": "gzip", "Content-Type": "application/json", **bearer_headers(make_token())}
+    async with httpx2.AsyncClient(base_url=guarded, timeout=TIMEOUT_S) as http:
         answer = await http.post(path, content=packed, headers=given)
     assert 400 <= answer.status_code < 500
     assert answer.headers["content-type"] == "application/problem+json"
-    assert stored(guarded) == before
+    assert motion_count(guarded) == before
 
 
 @pytest.mark.parametrize(
@@ -168,8 +175,8 @@ async def test_nothing_that_comes_packed_is_unpacked(guarded: str, path: str, pa
 )
 @pytest.mark.parametrize("path", ["/v1/sessions", "/v1/shares", "/v1/solve"])
 async def test_json_that_means_harm_is_a_4xx(guarded: str, path: str, body: bytes) -> None:
-    given = {"Content-Type": "application/json", **headers(token())}
-    async with httpx2.AsyncClient(base_url=guarded, timeout=PATIENCE) as http:
+    given = {"Content-Type": "application/json", **bearer_headers(make_token())}
+    async with httpx2.AsyncClient(base_url=guarded, timeout=TIMEOUT_S) as http:
         answer = await http.post(path, content=body, headers=given)
     assert 400 <= answer.status_code < 500
     json.loads(answer.text)
@@ -180,7 +187,9 @@ async def test_who_connects_too_often_is_told_to_wait(guarded: str) -> None:
 
     async def come_again_and_again() -> None:
         for _ in range(400):
-            async with connect(address, subprotocols=[SUBPROTOCOL], additional_headers=headers(token())) as socket:  # type: ignore[list-item]
+            async with connect(
+                address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=bearer_headers(make_token())
+            ) as socket:
                 with contextlib.suppress(ConnectionClosed):
                     await socket.recv()
 
@@ -189,63 +198,63 @@ async def test_who_connects_too_often_is_told_to_wait(guarded: str) -> None:
     assert refused.value.response.status_code == 429
     assert refused.value.response.headers["Retry-After"] == "1"
     # requests with a token go on
-    assert (await asyncio.to_thread(stored, guarded)) >= 0
+    assert (await asyncio.to_thread(motion_count, guarded)) >= 0
 
 
 @pytest.mark.parametrize("origin", ["https://evil.example", "null", "http://[::1"])
 async def test_a_page_of_another_site_opens_no_socket(tmp_path: Path, origin: str) -> None:
-    with running(tmp_path) as url:
+    with run_server(tmp_path) as url:
         address = url.replace("http", "ws") + "/v1/sessions/none/control"
         with pytest.raises(InvalidStatus) as refused:
-            await connect(address, subprotocols=[SUBPROTOCOL], origin=origin)  # type: ignore[list-item, arg-type]
+            await connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=origin)  # type: ignore[list-item, arg-type]
         assert refused.value.response.status_code == 403
-        async with connect(address, subprotocols=[SUBPROTOCOL], origin=url) as socket:  # type: ignore[list-item, arg-type]
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=url) as socket:  # type: ignore[list-item, arg-type]
             with pytest.raises(ConnectionClosed) as closed:
-                await to_its_end(socket)
+                await read_until_closed(socket)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 4404
 
 
 @pytest.mark.parametrize("path", ["stream", "control"])
 async def test_a_frame_that_is_too_long_ends_the_socket(server: str, path: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=PATIENCE) as http:
-        motion = (await http.post("/v1/motions?filename=a.bvh", content=clip(1.0, 8))).json()["id"]
+    async with httpx2.AsyncClient(base_url=server, timeout=TIMEOUT_S) as http:
+        motion = (await http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 8))).json()["id"]
         session = (await http.post("/v1/sessions", json={"motion": motion})).json()["id"]
     address = server.replace("http", "ws") + f"/v1/sessions/{session}/{path}"
-    for size in (LARGEST_FROM_CLIENT + 1, 10_000_000):
-        async with connect(address, subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
+    for size in (MAX_CLIENT_MESSAGE_BYTES + 1, 10_000_000):
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)]) as socket:
             with contextlib.suppress(ConnectionClosed):
                 await socket.send(b"\x40" * size)
             with pytest.raises(ConnectionClosed) as closed:
-                await to_its_end(socket)
+                await read_until_closed(socket)
             assert closed.value.rcvd is None or closed.value.rcvd.code == 1009
 
 
 def test_a_quota_is_counted_for_each_and_what_is_beyond_leaves_nothing(guarded: str) -> None:
     with httpx2.Client(base_url=guarded, timeout=60) as http:
-        aiko, ben = (headers(token(Role.INGEST, name)) for name in ("aiko", "ben"))
-        before = stored(guarded)
+        aiko, ben = (bearer_headers(make_token(Role.INGEST, name)) for name in ("aiko", "ben"))
+        before = motion_count(guarded)
         made = [
-            http.post("/v1/motions?filename=a.bvh", content=clip(0.5, 40 + seed), headers=aiko).json()["id"]
+            http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5, 40 + seed), headers=aiko).json()["id"]
             for seed in range(2)
         ]
-        third = http.post("/v1/motions?filename=a.bvh", content=clip(0.5, 42), headers=aiko)
+        third = http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5, 42), headers=aiko)
         assert (third.status_code, third.json()["title"]) == (403, "Quota used up")
         assert "2 motions" in third.json()["detail"]
         light = {"time": 0, "position": [0, 1, 0], "colour": [1, 1, 1], "intensity": 1}
         lit = http.post(f"/v1/motions/{made[0]}/scene", json={"lights": [[light]]}, headers=aiko)
         assert lit.json()["title"] == "Quota used up"
-        assert stored(guarded) == before + 2
+        assert motion_count(guarded) == before + 2
         # what is there already costs nothing, and another has a quota of their own
-        again = http.post("/v1/motions?filename=a.bvh", content=clip(0.5, 42), headers=ben)
+        again = http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5, 42), headers=ben)
         assert again.status_code == 201
         http.delete(f"/v1/motions/{made[0]}", headers=aiko)
-        assert http.post("/v1/motions?filename=a.bvh", content=clip(0.5, 43), headers=aiko).status_code == 201
+        assert http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5, 43), headers=aiko).status_code == 201
 
 
 def test_a_quota_of_bytes_holds_for_all_also_without_a_secret(tmp_path: Path) -> None:
-    with running(tmp_path, total_bytes=9_000) as url, httpx2.Client(base_url=url, timeout=60) as http:
-        told = [http.post("/v1/motions?filename=a.bvh", content=clip(1.0, 60 + seed)) for seed in range(8)]
+    with run_server(tmp_path, total_bytes=9_000) as url, httpx2.Client(base_url=url, timeout=60) as http:
+        told = [http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 60 + seed)) for seed in range(8)]
         assert told[0].status_code == 201
         assert told[-1].status_code == 403
         assert "9000 bytes" in told[-1].json()["detail"]

@@ -14,24 +14,24 @@ from hypothesis.errors import Unsatisfiable
 from schemathesis.checks import not_a_server_error
 from schemathesis.generation import GenerationMode
 
-from tests.guests import SECRET, headers, token
-from tests.servers import running
+from tests.credentials import SECRET, bearer_headers, make_token
+from tests.servers import run_server
 
 EXAMPLES = 12
 """Of each operation, in each mode."""
-TOGETHER = 25.0
+TOTAL_TIMEOUT_S = 25.0
 """Seconds after which no more is tried."""
 
 
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with running(tmp_path_factory.mktemp("openapi"), secret=SECRET, connects=0, upload_seconds=2.0) as url:
+    with run_server(tmp_path_factory.mktemp("openapi"), secret=SECRET, connects=0, upload_seconds=2.0) as url:
         yield url
 
 
 def test_nothing_that_is_asked_makes_the_server_fail(guarded: str, tally: Callable[[str], None]) -> None:
     schema = schemathesis.openapi.from_url(f"{guarded}/v1/openapi.json")
-    held, begun, tried = headers(token(seconds=3_600)), time.monotonic(), 0
+    held, begun, tried = bearer_headers(make_token(lifetime_s=3_600)), time.monotonic(), 0
     operations: list[Any] = [found.ok() for found in schema.get_all_operations()]  # type: ignore[union-attr]
     for operation in operations:
         for mode in GenerationMode:
@@ -42,7 +42,7 @@ def test_nothing_that_is_asked_makes_the_server_fail(guarded: str, tally: Callab
             )
             def ask(case: Any) -> None:
                 nonlocal tried
-                if time.monotonic() - begun < TOGETHER:
+                if time.monotonic() - begun < TOTAL_TIMEOUT_S:
                     tried += 1
                     case.call_and_validate(headers=held, checks=[not_a_server_error])
 

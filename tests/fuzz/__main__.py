@@ -13,30 +13,30 @@ from pathlib import Path
 import atheris
 import numpy as np
 
-import bunraku.codec.kernels  # noqa: F401 - compiled, so it must be here before the instrumenting begins
+import bunraku.codec.entropy_coder  # noqa: F401 - compiled, so it must be here before the instrumenting begins
 
 INSTRUMENTED = [
     "bunraku.codec.audio",
     "bunraku.codec.coefficients",
-    "bunraku.codec.dancer",
-    "bunraku.codec.decode",
-    "bunraku.codec.numbers",
+    "bunraku.codec.skeleton_description",
+    "bunraku.codec.motion_decoder",
+    "bunraku.codec.integer_coder",
     "bunraku.codec.timing",
-    "bunraku.codec.track",
-    "bunraku.codec.weights",
+    "bunraku.codec.motion_track",
+    "bunraku.codec.channel_weights",
     "bunraku.wire.messages",
     "tests.fuzz.targets",
 ]
 
 with atheris.instrument_imports(include=INSTRUMENTED, enable_loader_override=False):
-    from tests.fuzz.targets import TARGETS, seeds
+    from tests.fuzz.targets import TARGETS, load_seeds
 
 
 def main() -> None:
     corpus, file, *options = sys.argv[1:]
     # libFuzzer ends the process without a word to Python: what is counted must be in the file at once
     counts = np.memmap(file, np.int64, "w+", shape=(len(TARGETS), 2))
-    for number, (target, data) in enumerate(seeds()):
+    for number, (target, data) in enumerate(load_seeds()):
         (Path(corpus) / f"{number:03}").write_bytes(bytes([target]) + data)
 
     def feed(data: bytes) -> None:

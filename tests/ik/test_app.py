@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from bunraku.ik.app import create_app
-from bunraku.marionette import arms, figures, leg, table
+from bunraku.marionette import arm_batch, bend_table, figures, leg
 from bunraku.marionette.proportions import Proportions
 
 IDENTITY = "396-352-252-560-320-120"
@@ -28,7 +28,9 @@ def test_the_table_is_immutable_and_known_by_its_content(client: TestClient) -> 
     assert answer.status_code == 200
     assert answer.headers["content-type"] == "application/octet-stream"
     assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
-    assert np.array_equal(table.from_bytes(answer.content), table.build_table(Proportions.parse(IDENTITY)))
+    assert np.array_equal(
+        bend_table.parse_bend_table(answer.content), bend_table.build_bend_table(Proportions.parse(IDENTITY))
+    )
     etag = answer.headers["etag"]
     assert etag == f'"{hashlib.sha256(answer.content).hexdigest()[:32]}"'
     other = client.get("/v1/arms/400-400-200-560-320-120/table")
@@ -51,7 +53,9 @@ def test_figures_are_immutable_pictures_of_this_arm(client: TestClient, name: st
     assert answer.status_code == 200
     assert answer.headers["content-type"] == "image/svg+xml"
     assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
-    assert answer.text == figures.draw(Proportions.parse(IDENTITY), "circle" if name == "circle" else "horizontal")
+    assert answer.text == figures.draw_figure(
+        Proportions.parse(IDENTITY), "circle" if name == "circle" else "horizontal"
+    )
     etag = answer.headers["etag"]
     assert client.get(f"/v1/arms/{IDENTITY}/figures/{name}", headers={"If-None-Match": etag}).status_code == 304
     other = client.get(f"/v1/arms/400-400-200-560-320-120/figures/{name}")
@@ -90,13 +94,15 @@ def test_a_batch_in_either_form(client: TestClient, said: str, heard: str) -> No
     assert answer.headers["content-type"] == heard
     got = answer.json() if heard == "application/json" else msgpack.unpackb(answer.content)
     proportions = Proportions.parse(IDENTITY)
-    wanted = arms.solve(proportions, table.build_table(proportions), np.array(asked["targets"], dtype=np.float64))
+    wanted = arm_batch.solve_arms(
+        proportions, bend_table.build_bend_table(proportions), np.array(asked["targets"], dtype=np.float64)
+    )
     for name in ("azimuth", "elbow", "wrist", "tip"):
         np.testing.assert_array_equal(got["arms"][name], getattr(wanted, name))
     for name, angle in zip(("t0", "t1", "t2"), wanted.angles(), strict=True):
         np.testing.assert_array_equal(got["arms"][name], angle)
     np.testing.assert_allclose(got["arms"]["tip"], asked["targets"], atol=1e-12)
-    assert got["legs"] == {"hip": [0.7, -0.2, leg.THIGH_GREATEST], "knee": [0.7, 0.0, leg.THIGH_GREATEST]}
+    assert got["legs"] == {"hip": [0.7, -0.2, leg.MAX_THIGH_ANGLE_RAD], "knee": [0.7, 0.0, leg.MAX_THIGH_ANGLE_RAD]}
 
 
 def test_the_answer_is_in_the_requests_form_unless_another_is_accepted(client: TestClient) -> None:

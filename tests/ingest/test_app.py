@@ -7,7 +7,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from tests.servers import clip, running
+from tests.servers import make_bvh_clip, run_server
 
 
 async def post(url: str, data: bytes, filename: str = "clip.bvh") -> httpx2.Response:
@@ -21,7 +21,7 @@ async def get(url: str, path: str) -> httpx2.Response:
 
 
 async def test_an_upload_becomes_a_motion_and_the_same_bytes_the_same_one(server: str) -> None:
-    data = clip(seed=41)
+    data = make_bvh_clip(seed=41)
     first = await post(server, data, "My dance.bvh")
     assert first.status_code == 201
     motion = first.json()
@@ -38,8 +38,8 @@ async def test_an_upload_becomes_a_motion_and_the_same_bytes_the_same_one(server
 
 
 async def test_motions_are_listed_newest_first_page_by_page_and_removed(tmp_path: Path) -> None:
-    with running(tmp_path) as url:
-        ids = [(await post(url, clip(0.4, seed))).json()["id"] for seed in range(3)]
+    with run_server(tmp_path) as url:
+        ids = [(await post(url, make_bvh_clip(0.4, seed))).json()["id"] for seed in range(3)]
         page = (await get(url, "/v1/motions?limit=2")).json()
         rest = (await get(url, f"/v1/motions?limit=2&cursor={page['next']}")).json()
         assert [m["id"] for m in page["items"] + rest["items"]] == ids[::-1]
@@ -51,7 +51,7 @@ async def test_motions_are_listed_newest_first_page_by_page_and_removed(tmp_path
             assert (await http.get(f"/v1/motions/{ids[0]}/blocks/0/0")).status_code == 404
 
 
-GOOD = clip(0.2)
+VALID_CLIP = make_bvh_clip(0.2)
 
 
 @pytest.mark.parametrize(
@@ -59,9 +59,12 @@ GOOD = clip(0.2)
     [
         (b"", "empty"),
         (b"this is no motion", ""),
-        (GOOD.replace(b"ROOT", b"ROOT", 1)[:200], ""),
-        (GOOD.replace(b"MOTION", GOOD.split(b"MOTION")[0].removeprefix(b"HIERARCHY\n") + b"MOTION", 1), "root"),
-        (GOOD[:-8] + b" nan\n", "nan"),
+        (VALID_CLIP.replace(b"ROOT", b"ROOT", 1)[:200], ""),
+        (
+            VALID_CLIP.replace(b"MOTION", VALID_CLIP.split(b"MOTION")[0].removeprefix(b"HIERARCHY\n") + b"MOTION", 1),
+            "root",
+        ),
+        (VALID_CLIP[:-8] + b" nan\n", "nan"),
     ],
 )
 async def test_what_cannot_be_read_is_refused_in_words_and_nothing_is_stored(
@@ -80,7 +83,7 @@ async def test_what_cannot_be_read_is_refused_in_words_and_nothing_is_stored(
 
 
 async def test_too_large_is_refused_while_it_comes(tmp_path: Path) -> None:
-    with running(tmp_path, upload_bytes=10_000) as url:
+    with run_server(tmp_path, upload_bytes=10_000) as url:
         assert (await post(url, bytes(10_001))).status_code == 413
 
         sent = 0
@@ -103,14 +106,14 @@ async def test_too_large_is_refused_while_it_comes(tmp_path: Path) -> None:
 
 
 async def test_what_takes_too_long_is_ended(tmp_path: Path) -> None:
-    with running(tmp_path, upload_seconds=0.001) as url:
-        answer = await post(url, clip(3.0, 77))
+    with run_server(tmp_path, upload_seconds=0.001) as url:
+        answer = await post(url, make_bvh_clip(3.0, 77))
     assert answer.status_code == 422
     assert "long" in answer.json()["title"]
 
 
 async def test_many_uploads_at_once_all_end_well_or_are_told_to_wait(server: str) -> None:
-    clips = [clip(0.3, 500 + seed % 4) for seed in range(8)]
+    clips = [make_bvh_clip(0.3, 500 + seed % 4) for seed in range(8)]
     answers = await asyncio.gather(*(post(server, data) for data in clips))
     assert {answer.status_code for answer in answers} <= {200, 201, 503}
     assert len({answer.json()["id"] for answer in answers if answer.status_code != 503}) <= 4

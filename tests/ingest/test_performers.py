@@ -4,20 +4,20 @@ import httpx2
 import pytest
 
 from bunraku.client.api import Client
-from bunraku.ingest.performers import named, together
+from bunraku.ingest.performers import combined_ladder, combined_name
 from bunraku.wire.messages import Description, unpack
-from tests.servers import clip
+from tests.servers import make_bvh_clip
 
 
-async def posted(http: httpx2.AsyncClient, seed: int, name: str = "dance") -> str:
-    answer = await http.post("/v1/motions", params={"filename": f"{name}.bvh"}, content=clip(2.0, seed))
+async def post_motion(http: httpx2.AsyncClient, seed: int, name: str = "dance") -> str:
+    answer = await http.post("/v1/motions", params={"filename": f"{name}.bvh"}, content=make_bvh_clip(2.0, seed))
     assert answer.status_code in (200, 201), answer.text
     return str(answer.json()["id"])
 
 
 async def test_others_dance_beside_in_another_motion_and_the_first_stays_as_it_is(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
-        one, two = await posted(http, 81, "crane"), await posted(http, 82, "fox")
+        one, two = await post_motion(http, 81, "crane"), await post_motion(http, 82, "fox")
         before = (await http.get(f"/v1/motions/{one}")).json()
         answer = await http.post(f"/v1/motions/{one}/performers", json={"motions": [two]})
         assert answer.status_code == 201, answer.text
@@ -45,7 +45,7 @@ async def test_others_dance_beside_in_another_motion_and_the_first_stays_as_it_i
 
 async def test_what_is_wrong_is_said_with_its_field(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
-        one = await posted(http, 83)
+        one = await post_motion(http, 83)
         two = (await http.post(f"/v1/motions/{one}/performers", json={"motions": [one]})).json()["id"]
         for asked, field in (
             ({}, "motions"),
@@ -69,7 +69,7 @@ async def test_what_is_wrong_is_said_with_its_field(server: str) -> None:
 
 async def test_the_sdk_adds_performers(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http, Client(server) as client:
-        one = await posted(http, 84)
+        one = await post_motion(http, 84)
         assert (await client.add_performers(one, [one, one]))["performers"] == 3
         assert (await client.add_performers(one, [one], [[-1, 0, 0], [1, 0, 0]]))["performers"] == 2
 
@@ -83,11 +83,14 @@ async def test_the_sdk_adds_performers(server: str) -> None:
     ],
 )
 def test_it_is_called_by_what_is_danced(pieces: list[str], name: str) -> None:
-    assert named(pieces) == name
-    assert len(named(pieces)) <= 200
+    assert combined_name(pieces) == name
+    assert len(combined_name(pieces)) <= 200
 
 
 def test_rates_of_several_cost_what_all_cost_and_keep_what_the_worst_keeps() -> None:
     one = [{"kbps": 1.0, "mean": 9.0, "max": 60.0}, {"kbps": 4.0, "mean": 1.0, "max": 8.0}]
     two = [{"kbps": 2.5, "mean": 7.0, "max": 30.0}]
-    assert together([one, two]) == [{"kbps": 3.5, "mean": 9.0, "max": 60.0}, {"kbps": 6.5, "mean": 7.0, "max": 30.0}]
+    assert combined_ladder([one, two]) == [
+        {"kbps": 3.5, "mean": 9.0, "max": 60.0},
+        {"kbps": 6.5, "mean": 7.0, "max": 30.0},
+    ]

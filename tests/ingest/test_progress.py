@@ -7,12 +7,14 @@ from typing import Any
 import httpx2
 import pytest
 
-from bunraku.ingest.progress import Progress
-from bunraku.ingest.uploads import WAITING
-from tests.servers import clip, running
+from bunraku.ingest.motion import MAX_ACTIVE_UPLOADS
+from bunraku.ingest.progress import UploadProgress
+from tests.servers import make_bvh_clip, run_server
 
 
-async def followed(http: httpx2.AsyncClient, upload: str, until: str | None, posting: asyncio.Task[Any]) -> list[Any]:
+async def poll_progress(
+    http: httpx2.AsyncClient, upload: str, until: str | None, posting: asyncio.Task[Any]
+) -> list[Any]:
     """What the server says of an upload, once after the other, up to a stage or to the end of `posting`."""
     said: list[Any] = []
     while not posting.done() and (until is None or not said or said[-1]["stage"] != until):
@@ -31,20 +33,20 @@ def post(http: httpx2.AsyncClient, upload: str, data: bytes) -> asyncio.Task[htt
 
 
 def test_a_stage_begins_at_nothing() -> None:
-    progress = Progress()
+    progress = UploadProgress()
     assert (progress.stage, progress.share) == ("receiving", 0.0)
-    progress.at("encoding", 0.5)
-    progress.at("waiting")
+    progress.advance_to("encoding", 0.5)
+    progress.advance_to("waiting")
     assert (progress.stage, progress.share) == ("waiting", 0.0)
 
 
 async def test_shares_rise_while_an_upload_is_encoded_and_end_with_it(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=120) as http:
-        posting = post(http, "upload-one", clip(12.0, 900))
-        said = await followed(http, "upload-one", None, posting)
+        posting = post(http, "upload-one", make_bvh_clip(12.0, 900))
+        said = await poll_progress(http, "upload-one", None, posting)
         assert (await posting).status_code == 201
         assert (await http.get("/v1/uploads/upload-one")).status_code == 404
-        again = post(http, "upload-one", clip(12.0, 900))
+        again = post(http, "upload-one", make_bvh_clip(12.0, 900))
         assert (await again).status_code == 200
     stages = [each["stage"] for each in said]
     order = ["receiving", "waiting", "reading", "encoding"]
@@ -56,11 +58,11 @@ async def test_shares_rise_while_an_upload_is_encoded_and_end_with_it(server: st
 
 
 async def test_who_goes_away_takes_the_upload_along(tmp_path: Path) -> None:
-    with running(tmp_path) as url:
+    with run_server(tmp_path) as url:
         async with httpx2.AsyncClient(base_url=url, timeout=120) as http:
-            posting = post(http, "upload-two", clip(60.0, 901))
-            await followed(http, "upload-two", "encoding", posting)
-            other = await post(http, "upload-two", clip(0.3))
+            posting = post(http, "upload-two", make_bvh_clip(60.0, 901))
+            await poll_progress(http, "upload-two", "encoding", posting)
+            other = await post(http, "upload-two", make_bvh_clip(0.3))
             assert other.status_code == 409
             assert other.json()["field"] == "upload"
             posting.cancel()
@@ -68,7 +70,10 @@ async def test_who_goes_away_takes_the_upload_along(tmp_path: Path) -> None:
                 pass
             assert (await http.get("/v1/motions")).json()["items"] == []
             # and its place is free
-            answers = [await post(http, f"upload-{number:02}", clip(0.2, 902)) for number in range(WAITING + 1)]
+            answers = [
+                await post(http, f"upload-{number:02}", make_bvh_clip(0.2, 902))
+                for number in range(MAX_ACTIVE_UPLOADS + 1)
+            ]
             assert {answer.status_code for answer in answers} == {200, 201}
 
 
@@ -78,5 +83,5 @@ async def test_names_are_plain(server: str, name: str) -> None:
         asked = await http.get(f"/v1/uploads/{name}")
         assert asked.status_code == 422
         assert asked.json()["field"] == "upload"
-        posted = await post(http, name, clip(0.2))
+        posted = await post(http, name, make_bvh_clip(0.2))
         assert posted.status_code == 422

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bunraku.marionette.bodies import BODIES
-from bunraku.marionette.limbs import ArmRig, Limb
+from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.motion.skeleton import standard_figure
 
 

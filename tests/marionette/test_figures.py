@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bunraku.marionette.bodies import BODIES
-from bunraku.marionette.figures import FIGURES, HEIGHT, WIDTH, Figure, draw, our_arm, papers_arm, path
+from bunraku.marionette.figures import FIGURES, HEIGHT, WIDTH, Figure, draw_figure, exact_arm, paper_arm, tip_path
 from bunraku.marionette.proportions import Proportions
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -20,7 +20,7 @@ H_ANIM = BODIES[2].proportions
 def test_the_pictures_in_the_docs_are_what_the_code_draws(name: Figure) -> None:
     """Numbers to a fifth of a pixel: the last digit of a sine is the machine's own. To draw them anew:
     `python -m tests.marionette.test_figures`."""
-    made, stored = draw(H_ANIM, name), (DOCS / f"arm-{name}.svg").read_text(encoding="utf-8")
+    made, stored = draw_figure(H_ANIM, name), (DOCS / f"arm-{name}.svg").read_text(encoding="utf-8")
     assert NUMBER.sub("#", made) == NUMBER.sub("#", stored)
     here, there = ([float(number) for number in NUMBER.findall(text)] for text in (made, stored))
     np.testing.assert_allclose(here, there, atol=0.2)
@@ -29,7 +29,7 @@ def test_the_pictures_in_the_docs_are_what_the_code_draws(name: Figure) -> None:
 @pytest.mark.parametrize("name", FIGURES)
 @pytest.mark.parametrize("identity", [*(body.proportions.identity for body in BODIES), "780-200-20-998-1-1"])
 def test_a_picture_stays_within_its_frame(name: Figure, identity: str) -> None:
-    image = ElementTree.fromstring(draw(Proportions.parse(identity), name))
+    image = ElementTree.fromstring(draw_figure(Proportions.parse(identity), name))
     for way in image.iter("{http://www.w3.org/2000/svg}path"):
         for x, y in (map(float, point.split(" ")) for point in way.attrib["d"][1:].split("L")):
             assert 0.0 < x < WIDTH
@@ -38,18 +38,18 @@ def test_a_picture_stays_within_its_frame(name: Figure, identity: str) -> None:
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_the_tip_runs_where_the_figure_says(name: Figure) -> None:
-    tips = path(name, 200)
+    tips = tip_path(name, 200)
     assert tips.real.min() > 0.0
     assert np.abs(tips).max() < 1.0
     if name == "circle":
         assert np.ptp(np.abs(tips - tips[:-1].mean())) < 0.01
     else:
         assert np.ptp(tips.imag) == 0.0
-    assert np.abs(our_arm(H_ANIM, tips)[2] - tips).max() < 1e-14
-    theirs = np.abs(papers_arm(H_ANIM, tips)[2] - tips)
+    assert np.abs(exact_arm(H_ANIM, tips)[2] - tips).max() < 1e-14
+    theirs = np.abs(paper_arm(H_ANIM, tips)[2] - tips)
     assert 1e-5 < theirs.max() < 0.003
 
 
 if __name__ == "__main__":
     for figure in FIGURES:
-        (DOCS / f"arm-{figure}.svg").write_text(draw(H_ANIM, figure), encoding="utf-8", newline="\n")
+        (DOCS / f"arm-{figure}.svg").write_text(draw_figure(H_ANIM, figure), encoding="utf-8", newline="\n")

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.marionette import handover, vector
-from bunraku.marionette.handover import RETURN, Handover, JointMix, Turn, acceleration_home
+from bunraku.marionette.handover import RETURN_DURATION_S, DirectionAlignment, Handover, JointBlend, return_acceleration
 from bunraku.marionette.vector import IDENTITY, Vector
 
 parts = st.floats(-1.0, 1.0)
@@ -41,17 +41,17 @@ def test_the_weight_rises_in_150_ms_and_falls_in_350() -> None:
 
 @given(st.floats(0.0, 0.6), st.floats(0.0, 3.0))
 def test_the_way_home_takes_as_long_as_it_may(distance: float, speed: float) -> None:
-    acceleration = acceleration_home(distance, speed, 1000.0)
+    acceleration = return_acceleration(distance, speed, 1000.0)
     turned = distance + speed * speed / (2.0 * acceleration)
     seconds = speed / acceleration + 2.0 * sqrt(turned / acceleration)
-    assert seconds <= RETURN + 1e-3
-    assert seconds >= RETURN - 1e-2 or acceleration < 7.0
-    assert acceleration_home(distance, speed, 20.0) <= 20.0
+    assert seconds <= RETURN_DURATION_S + 1e-3
+    assert seconds >= RETURN_DURATION_S - 1e-2 or acceleration < 7.0
+    assert return_acceleration(distance, speed, 20.0) <= 20.0
 
 
 @given(hands, hands)
 def test_a_turn_brings_one_direction_to_the_other(dance: Vector, pulled: Vector) -> None:
-    turn = Turn().follow(dance, pulled, 0.5)
+    turn = DirectionAlignment().update(dance, pulled, 0.5)
     along = vector.rotate(turn, vector.unit(dance, pulled))
     assert vector.length(vector.subtract(along, vector.unit(pulled, dance))) < 1e-6
 
@@ -59,13 +59,13 @@ def test_a_turn_brings_one_direction_to_the_other(dance: Vector, pulled: Vector)
 @given(st.floats(-0.2, 0.2).filter(lambda aside: abs(aside) > 1e-3))
 def test_hands_that_pass_opposite_each_other_do_not_throw_the_arm_round(aside: float) -> None:
     """By the shortest turn an elbow would be thrown across as they pass: half a circle within a frame or two."""
-    way, before = Turn(), None
+    way, before = DirectionAlignment(), None
     pulled = (0.0, -1.0, 0.0)
     for i in range(61):
         angle = 0.7 * pi + 0.01 * pi * i
         dance = vector.unit((aside, -cos(angle), sin(angle)), (0.0, 0.0, 1.0))
-        side = vector.unit(vector.square_to((1.0, 0.0, 0.0), dance), dance)
-        shown = vector.rotate(way.follow(dance, pulled, 0.999), side)
+        side = vector.unit(vector.reject_from((1.0, 0.0, 0.0), dance), dance)
+        shown = vector.rotate(way.update(dance, pulled, 0.999), side)
         if before is not None:
             assert vector.length(vector.subtract(shown, before)) < 0.15
         before = shown
@@ -73,29 +73,29 @@ def test_hands_that_pass_opposite_each_other_do_not_throw_the_arm_round(aside: f
 
 @given(hands, st.lists(hands, min_size=1, max_size=12))
 def test_a_hand_that_is_back_is_not_twisted(dance: Vector, way: list[Vector]) -> None:
-    turn = Turn()
+    turn = DirectionAlignment()
     for place in way:
-        turn.follow(dance, place, 0.7)
-    back = turn.follow(dance, dance, 0.0)
+        turn.update(dance, place, 0.7)
+    back = turn.update(dance, dance, 0.0)
     assert abs(abs(back[0]) - 1.0) < 1e-9
 
 
 def test_joints_mix_exactly_at_the_ends() -> None:
     dance = (IDENTITY, IDENTITY, IDENTITY)
-    half = vector.about((1.0, 0.0, 0.0), pi / 2.0)
+    half = vector.from_axis_angle((1.0, 0.0, 0.0), pi / 2.0)
     hung = (half, half, half)
-    mix = JointMix()
-    assert mix.mix(dance, hung, 0.0) is dance
-    quarter = vector.about((1.0, 0.0, 0.0), pi / 4.0)
-    np.testing.assert_allclose(mix.mix(dance, hung, 0.5)[1], quarter, atol=1e-12)
-    assert mix.mix(dance, hung, 1.0) is hung
+    mix = JointBlend()
+    assert mix.blend(dance, hung, 0.0) is dance
+    quarter = vector.from_axis_angle((1.0, 0.0, 0.0), pi / 4.0)
+    np.testing.assert_allclose(mix.blend(dance, hung, 0.5)[1], quarter, atol=1e-12)
+    assert mix.blend(dance, hung, 1.0) is hung
 
 
 def test_joints_that_come_to_be_opposite_are_not_thrown_across() -> None:
-    mix, before = JointMix(), None
+    mix, before = JointBlend(), None
     for step in range(60):
-        turned = vector.about((1.0, 0.0, 0.0), 2.4 + 0.03 * step)
-        joint = mix.mix((IDENTITY, IDENTITY, IDENTITY), (turned, turned, turned), 0.5)[0]
+        turned = vector.from_axis_angle((1.0, 0.0, 0.0), 2.4 + 0.03 * step)
+        joint = mix.blend((IDENTITY, IDENTITY, IDENTITY), (turned, turned, turned), 0.5)[0]
         if before is not None:
             assert abs(sum(a * b for a, b in zip(before, joint, strict=True))) > cos(0.02)
         before = joint

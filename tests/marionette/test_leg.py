@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.marionette import leg, vector
-from bunraku.marionette.limbs import Joints, LegRig, Limb
+from bunraku.marionette.limb_rig import JointRotations, LegRig, Limb
 from bunraku.marionette.vector import Vector
 from bunraku.motion.skeleton import standard_figure
-from tests.marionette.arms import dance
+from tests.marionette.fixtures import random_motion
 
 FIGURE = standard_figure()
-POSES = [rotations.tolist() for rotations in dance(12, seed=3)]
+POSES = [rotations.tolist() for rotations in random_motion(12, seed=3)]
 LEGS = {limb: LegRig(FIGURE, limb) for limb in (Limb.LEFT_LEG, Limb.RIGHT_LEG)}
 legs = st.sampled_from(sorted(LEGS))
 poses = st.integers(0, len(POSES) - 1)
@@ -23,8 +23,8 @@ angles = st.floats(-10.0, 10.0)
 
 @given(angles)
 def test_the_knee_bends_one_way_and_lets_the_shank_hang(theta: float) -> None:
-    hip, knee = leg.solve(np.array([theta]))
-    assert leg.THIGH_LEAST <= hip[0] <= leg.THIGH_GREATEST
+    hip, knee = leg.solve_legs(np.array([theta]))
+    assert leg.MIN_THIGH_ANGLE_RAD <= hip[0] <= leg.MAX_THIGH_ANGLE_RAD
     assert hip[0] == leg.clamp_thigh(theta)
     assert knee[0] == leg.knee_bend(leg.clamp_thigh(theta)) >= 0.0
     # the shank's own angle from straight down
@@ -33,17 +33,17 @@ def test_the_knee_bends_one_way_and_lets_the_shank_hang(theta: float) -> None:
 
 @given(angles, st.floats(0.0, 1.0))
 def test_the_leg_follows_its_input_without_jumps(theta: float, step: float) -> None:
-    hip, knee = leg.solve(np.array([theta, theta + step]))
+    hip, knee = leg.solve_legs(np.array([theta, theta + step]))
     for angle in (hip, knee):
         assert 0.0 <= angle[1] - angle[0] <= step + 1e-12
 
 
-def in_the_plane(rig: LegRig, index: int, joints: Joints) -> tuple[float, float, Vector, Vector]:
+def plane_angles(rig: LegRig, index: int, joints: JointRotations) -> tuple[float, float, Vector, Vector]:
     """Angles of thigh and shank from straight down, forwards, and both as unit vectors in the world."""
-    hips, level = rig.facing(POSES[index])
+    hips, level = rig.hip_facing(POSES[index])
     hip, knee, _ = joints
     thigh = vector.unit(vector.rotate(vector.multiply(hips, hip), rig.thigh), (0.0, 0.0, 0.0))
-    x, y, z = FIGURE.offsets[rig.joints[2]].tolist()
+    x, y, z = FIGURE.offsets[rig.joint_indices[2]].tolist()
     shank = vector.unit(vector.rotate(vector.multiply(vector.multiply(hips, hip), knee), (x, y, z)), (0.0, 0.0, 0.0))
     return (
         atan2(vector.dot(thigh, level), -thigh[1]),
@@ -56,7 +56,7 @@ def in_the_plane(rig: LegRig, index: int, joints: Joints) -> tuple[float, float,
 @given(legs, poses, angles)
 def test_a_figures_shank_hangs_plumb_and_its_knee_never_bends_backwards(limb: Limb, index: int, theta: float) -> None:
     rig = LEGS[limb]
-    thigh_angle, shank_angle, thigh, shank = in_the_plane(rig, index, rig.hang(theta, POSES[index]))
+    thigh_angle, shank_angle, thigh, shank = plane_angles(rig, index, rig.solve(theta, POSES[index]))
     lifted = leg.clamp_thigh(theta)
     assert thigh_angle == pytest.approx(lifted, abs=1e-9)
     if lifted >= 0.0:
@@ -64,20 +64,20 @@ def test_a_figures_shank_hangs_plumb_and_its_knee_never_bends_backwards(limb: Li
     else:
         assert shank == pytest.approx(thigh, abs=1e-9)
     assert shank_angle <= thigh_angle + 1e-9
-    _, level = rig.facing(POSES[index])
+    _, level = rig.hip_facing(POSES[index])
     assert thigh == pytest.approx((level[0] * sin(lifted), -cos(lifted), level[2] * sin(lifted)), abs=1e-9)
 
 
 @given(legs, poses, poses, angles, angles)
 def test_the_ankle_keeps_its_angle(limb: Limb, index: int, other: int, theta: float, another: float) -> None:
     rig = LEGS[limb]
-    assert rig.hang(theta, POSES[index])[2] == rig.hang(another, POSES[other])[2]
+    assert rig.solve(theta, POSES[index])[2] == rig.solve(another, POSES[other])[2]
 
 
 @given(legs, poses, angles, st.floats(0.0, 0.1))
 def test_a_figures_joints_turn_no_more_than_the_input(limb: Limb, index: int, theta: float, step: float) -> None:
     rig = LEGS[limb]
-    before, after = rig.hang(theta, POSES[index]), rig.hang(theta + step, POSES[index])
+    before, after = rig.solve(theta, POSES[index]), rig.solve(theta + step, POSES[index])
     for one, other in zip(before, after, strict=True):
         turn = vector.multiply(vector.conjugate(one), other)
         angle = 2.0 * atan2(vector.length((turn[1], turn[2], turn[3])), abs(turn[0]))

@@ -4,15 +4,23 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from bunraku.marionette.limbs import Limb
-from bunraku.marionette.ownership import ASK_LASTS, LOST_AFTER, Grant, Input, Outcome, Ownership, Refusal
+from bunraku.marionette.limb_rig import Limb
+from bunraku.marionette.ownership import (
+    ASK_LIFETIME_US,
+    INPUT_TIMEOUT_US,
+    InputOutcome,
+    LimbGrant,
+    LimbInput,
+    LimbRefusal,
+    Ownership,
+)
 
 PUPPETEERS = ("ada", "bo", "cy")
 limbs = st.sampled_from(list(Limb))
 people = st.sampled_from(PUPPETEERS)
 
 
-class Machine(RuleBasedStateMachine):
+class OwnershipMachine(RuleBasedStateMachine):
     """Any order of claims, inputs and silences: one holder a limb, rising epochs, and only that epoch moves it."""
 
     @initialize()
@@ -28,7 +36,7 @@ class Machine(RuleBasedStateMachine):
     def time_passes(self, step: int) -> None:
         self.now += step
         lost = self.ownership.expire(self.now)
-        due = {limb for limb in self.held if self.now - self.heard[limb] >= LOST_AFTER}
+        due = {limb for limb in self.held if self.now - self.heard[limb] >= INPUT_TIMEOUT_US}
         assert {limb for limb, _ in lost} == due
         for limb, who in lost:
             assert self.held.pop(limb)[0] == who
@@ -37,9 +45,9 @@ class Machine(RuleBasedStateMachine):
     def claim(self, limb: Limb, who: str) -> None:
         answer = self.ownership.claim(limb, who, self.now)
         if limb in self.held and self.held[limb][0] != who:
-            assert answer == Refusal(limb, self.held[limb][0], "held")
+            assert answer == LimbRefusal(limb, self.held[limb][0], "held")
             return
-        assert isinstance(answer, Grant)
+        assert isinstance(answer, LimbGrant)
         assert answer.epoch > self.epochs[limb]
         self.epochs[limb] = answer.epoch
         self.held[limb] = (who, answer.epoch)
@@ -63,7 +71,7 @@ class Machine(RuleBasedStateMachine):
 
     @rule(who=people, some=st.lists(limbs))
     def alive(self, who: str, some: list[Limb]) -> None:
-        self.ownership.alive(who, [*some, 17], self.now)
+        self.ownership.keep_alive(who, [*some, 17], self.now)
         for limb in some:
             if limb in self.held and self.held[limb][0] == who:
                 self.heard[limb] = self.now
@@ -75,28 +83,28 @@ class Machine(RuleBasedStateMachine):
         sequence=st.integers(0, 6),
         values=st.tuples(*[st.floats(-0.5, 0.5)] * 3),
     )
-    def give(self, limb: Limb, who: str, behind: int, sequence: int, values: tuple[float, float, float]) -> None:
-        steering = self.ownership.steering(limb)
+    def send_input(self, limb: Limb, who: str, behind: int, sequence: int, values: tuple[float, float, float]) -> None:
+        steering = self.ownership.target(limb)
         later = self.now + 10**9
-        before = steering.value(later) if steering else None
+        before = steering.value_at(later) if steering else None
         epoch = self.epochs[limb] - behind
-        outcome = self.ownership.input(who, Input(limb, 1, epoch, sequence, self.now, values), self.now)
+        outcome = self.ownership.apply_input(who, LimbInput(limb, 1, epoch, sequence, self.now, values), self.now)
         if self.held.get(limb, ("", 0))[0] != who:
-            assert outcome is Outcome.OWNER
+            assert outcome is InputOutcome.NOT_OWNER
         elif behind or sequence in self.sequences[limb]:
-            assert outcome is Outcome.LATE
+            assert outcome is InputOutcome.LATE
         else:
-            assert outcome in (Outcome.TAKEN, Outcome.REACH)
-        after = self.ownership.steering(limb)
+            assert outcome in (InputOutcome.ACCEPTED, InputOutcome.CLAMPED)
+        after = self.ownership.target(limb)
         assert after is steering
-        if outcome in (Outcome.TAKEN, Outcome.REACH):
+        if outcome in (InputOutcome.ACCEPTED, InputOutcome.CLAMPED):
             self.sequences[limb].add(sequence)
             self.heard[limb] = self.now
             assert after is not None
             if sequence == max(self.sequences[limb]):
-                assert after.value(later) == (values if limb.is_hand else (values[0], 0.0, 0.0))
+                assert after.value_at(later) == (values if limb.is_hand else (values[0], 0.0, 0.0))
         else:
-            assert (after.value(later) if after else None) == before
+            assert (after.value_at(later) if after else None) == before
 
     @invariant()
     def one_holder_each(self) -> None:
@@ -104,42 +112,42 @@ class Machine(RuleBasedStateMachine):
         assert self.ownership.holders() == wanted
 
 
-TestMachine = Machine.TestCase
+TestMachine = OwnershipMachine.TestCase
 
 
 def test_no_such_limb() -> None:
     ownership = Ownership()
-    assert ownership.claim(4, "ada", 0) == Refusal(4, None, "unknown")
+    assert ownership.claim(4, "ada", 0) == LimbRefusal(4, None, "unknown")
     assert not ownership.release(-1, "ada", 1, 0)
-    assert ownership.input("ada", Input(9, 1, 1, 1, 0, (0.0, 0.0, 0.0)), 0) is Outcome.OWNER
+    assert ownership.apply_input("ada", LimbInput(9, 1, 1, 1, 0, (0.0, 0.0, 0.0)), 0) is InputOutcome.NOT_OWNER
     assert not ownership.ask(7, "ada", True, 0)
 
 
 def test_an_unknown_kind_is_refused() -> None:
     ownership = Ownership()
     granted = ownership.claim(0, "ada", 0)
-    assert isinstance(granted, Grant)
+    assert isinstance(granted, LimbGrant)
     with pytest.raises(ValueError, match="2"):
-        ownership.input("ada", Input(0, 2, granted.epoch, 1, 0, (0.0, 0.0, 0.0)), 0)
+        ownership.apply_input("ada", LimbInput(0, 2, granted.epoch, 1, 0, (0.0, 0.0, 0.0)), 0)
 
 
 def test_who_asked_first_gets_a_limb_that_becomes_free() -> None:
     ownership = Ownership()
     granted = ownership.claim(0, "ada", 0)
-    assert isinstance(granted, Grant)
+    assert isinstance(granted, LimbGrant)
     assert ownership.ask(0, "bo", True, 1)
     assert ownership.ask(0, "cy", True, 2)
     assert not ownership.ask(0, "bo", True, 3)
     assert not ownership.ask(0, "ada", True, 3)
     assert not ownership.ask(1, "bo", True, 3)
     assert ownership.asks()[0] == ("bo", "cy")
-    assert ownership.settle(4) == ([], False)
-    assert ownership.claim(0, "cy", 4) == Refusal(0, "ada", "held")
+    assert ownership.grant_free_limbs(4) == ([], False)
+    assert ownership.claim(0, "cy", 4) == LimbRefusal(0, "ada", "held")
     ownership.release(0, "ada", granted.epoch, 5)
-    assert ownership.settle(6) == ([("bo", Grant(Limb.LEFT_HAND, granted.epoch + 1))], True)
+    assert ownership.grant_free_limbs(6) == ([("bo", LimbGrant(Limb.LEFT_HAND, granted.epoch + 1))], True)
     assert ownership.asks()[0] == ("cy",)
     ownership.leave("bo", 7)
-    assert ownership.settle(8) == ([("cy", Grant(Limb.LEFT_HAND, granted.epoch + 2))], True)
+    assert ownership.grant_free_limbs(8) == ([("cy", LimbGrant(Limb.LEFT_HAND, granted.epoch + 2))], True)
     assert ownership.holders()[0] == "cy"
 
 
@@ -152,18 +160,18 @@ def test_an_ask_ends_when_it_is_taken_back_forgotten_or_its_puppeteer_goes() -> 
     assert not ownership.ask(2, "bo", False, 1)
     ownership.leave("cy", 2)
     assert ownership.asks()[2] == ("di",)
-    assert ownership.settle(ASK_LASTS - 1) == ([], False)
-    assert ownership.settle(ASK_LASTS) == ([], True)
+    assert ownership.grant_free_limbs(ASK_LIFETIME_US - 1) == ([], False)
+    assert ownership.grant_free_limbs(ASK_LIFETIME_US) == ([], True)
     assert ownership.asks()[2] == ()
 
 
 def test_a_limb_let_go_is_remembered_until_it_is_back() -> None:
     ownership = Ownership()
     granted = ownership.claim(0, "ada", 0)
-    assert isinstance(granted, Grant)
-    ownership.forget(Limb.LEFT_HAND)
-    assert ownership.steering(Limb.LEFT_HAND) is not None
+    assert isinstance(granted, LimbGrant)
+    ownership.clear_target(Limb.LEFT_HAND)
+    assert ownership.target(Limb.LEFT_HAND) is not None
     ownership.release(0, "ada", granted.epoch, 10)
-    assert ownership.steering(Limb.LEFT_HAND) is not None
-    ownership.forget(Limb.LEFT_HAND)
-    assert ownership.steering(Limb.LEFT_HAND) is None
+    assert ownership.target(Limb.LEFT_HAND) is not None
+    ownership.clear_target(Limb.LEFT_HAND)
+    assert ownership.target(Limb.LEFT_HAND) is None

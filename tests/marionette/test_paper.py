@@ -5,13 +5,13 @@ import pytest
 
 from bunraku.marionette.bodies import BODIES, Body
 from bunraku.marionette.paper import (
-    DISTANCES,
-    ELEVATIONS,
+    DISTANCE_NODES,
+    ELEVATION_NODES,
     PAPER_BYTES,
     PaperTable,
     build_paper_table,
+    joint_positions,
     paper_angles,
-    places,
     tip_error,
 )
 from bunraku.marionette.proportions import Proportions
@@ -21,7 +21,7 @@ TABLES = {body.name: build_paper_table(body.proportions) for body in BODIES}
 each_body = pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
 
 
-def height(body: Body, angles: Array) -> Array:
+def potential(body: Body, angles: Array) -> Array:
     """The paper's E as it stands in 4.2, without g."""
     (l0, l1, l2), (m0, m1, m2) = body.proportions.lengths, body.proportions.masses
     t0, t1, t2 = np.sin(angles)
@@ -43,14 +43,14 @@ def test_the_tip_is_as_near_as_the_paper_says_and_nearer(body: Body) -> None:
 @each_body
 def test_nodes_reach_their_targets_in_the_pose_of_least_potential(body: Body) -> None:
     table: PaperTable = TABLES[body.name]
-    assert table.shape == (3, DISTANCES, ELEVATIONS)
+    assert table.shape == (3, DISTANCE_NODES, ELEVATION_NODES)
     assert table.nbytes == PAPER_BYTES == 23_028
     random = np.random.default_rng(5)
     for _ in range(60):
-        i, j = int(random.integers(1, DISTANCES - 1)), int(random.integers(1, ELEVATIONS - 1))
-        target = i / (DISTANCES - 1) * np.exp(1j * np.pi * (j / (ELEVATIONS - 1) - 0.5))
+        i, j = int(random.integers(1, DISTANCE_NODES - 1)), int(random.integers(1, ELEVATION_NODES - 1))
+        target = i / (DISTANCE_NODES - 1) * np.exp(1j * np.pi * (j / (ELEVATION_NODES - 1) - 0.5))
         angles = table[:, i, j].astype(np.float64)[:, None]
-        assert abs(places(body.proportions, angles)[2, 0] - target) < 2e-7
+        assert abs(joint_positions(body.proportions, angles)[2, 0] - target) < 2e-7
         # any other pose of the three links: the upper arm anywhere, the rest closed on the target by hand
         upper, fore, hand = body.proportions.lengths
         t0 = np.linspace(-np.pi, np.pi, 7201)
@@ -61,8 +61,8 @@ def test_nodes_reach_their_targets_in_the_pose_of_least_potential(body: Body) ->
         t2 = np.angle(line - fore * np.exp(1j * t1))
         # the elbow bends one way, as the wrist does here
         bent = np.mod(t1 - t0, 2.0 * np.pi) <= np.pi
-        lowest = height(body, np.array([t0, t1, t2])[:, bent]).min()
-        assert float(height(body, angles)[0]) <= lowest + 1e-7
+        lowest = potential(body, np.array([t0, t1, t2])[:, bent]).min()
+        assert float(potential(body, angles)[0]) <= lowest + 1e-7
 
 
 @each_body

@@ -14,13 +14,16 @@ masses = st.floats(0.002, 0.1)
 def test_identity_is_the_shape_whatever_the_size(
     lengths: tuple[float, float, float], heavy: tuple[float, float, float], size: float
 ) -> None:
-    arm = Proportions.of(lengths, heavy)
+    arm = Proportions.from_links(lengths, heavy)
     assert sum(arm.parts[:3]) == sum(arm.parts[3:]) == 10_000
     for exact, rounded in zip((*arm.lengths, *arm.masses), arm.parts, strict=True):
         assert abs(exact * 10_000.0 - rounded) <= 1.0
     assert Proportions.parse(arm.identity) == arm.rounded()
     a, b, c = (length * size for length in lengths)
-    assert max(abs(x - y) for x, y in zip(Proportions.of((a, b, c), heavy).lengths, arm.lengths, strict=True)) < 1e-12
+    assert (
+        max(abs(x - y) for x, y in zip(Proportions.from_links((a, b, c), heavy).lengths, arm.lengths, strict=True))
+        < 1e-12
+    )
 
 
 @given(st.integers(100, 780), st.data())
@@ -32,7 +35,7 @@ def test_parse_and_identity_are_inverse(upper: int, data: st.DataObject) -> None
     arm = Proportions.parse(identity)
     assert arm.identity == identity
     assert arm.rounded() == arm
-    assert 0.1 <= arm.inner_radius < 1.0
+    assert 0.1 <= arm.min_tip_distance < 1.0
 
 
 @pytest.mark.parametrize(
@@ -60,9 +63,9 @@ def test_refusals_name_the_field(identity: str, field: str) -> None:
 
 @given(st.tuples(links, links, links))
 def test_a_link_weighs_by_its_own_length(lengths: tuple[float, float, float]) -> None:
-    arm = Proportions.of(lengths)
-    reference = Proportions.of(WINTER_LENGTHS, WINTER_MASSES)
-    assert Proportions.of(WINTER_LENGTHS) == reference
+    arm = Proportions.from_links(lengths)
+    reference = Proportions.from_links(WINTER_LENGTHS, WINTER_MASSES)
+    assert Proportions.from_links(WINTER_LENGTHS) == reference
     heaviness = [mass / length for mass, length in zip(arm.masses, arm.lengths, strict=True)]
     usual = [mass / length for mass, length in zip(reference.masses, reference.lengths, strict=True)]
     for one, other in zip(heaviness, usual, strict=True):
@@ -70,17 +73,17 @@ def test_a_link_weighs_by_its_own_length(lengths: tuple[float, float, float]) ->
 
 
 def test_masses_that_are_given_win() -> None:
-    assert Proportions.of((1.0, 1.0, 1.0), (2.0, 1.0, 1.0)).identity == "3334-3333-3333-5000-2500-2500"
+    assert Proportions.from_links((1.0, 1.0, 1.0), (2.0, 1.0, 1.0)).identity == "3334-3333-3333-5000-2500-2500"
 
 
 def test_a_name_is_in_thousandths_where_they_say_the_same() -> None:
-    assert Proportions.of((0.4, 0.35, 0.25), (0.5, 0.3, 0.2)).identity == "400-350-250-500-300-200"
+    assert Proportions.from_links((0.4, 0.35, 0.25), (0.5, 0.3, 0.2)).identity == "400-350-250-500-300-200"
     assert Proportions.parse("4000-3500-2500-5000-3000-2000").identity == "400-350-250-500-300-200"
     assert Proportions.parse("4001-3500-2499-5000-3000-2000").identity == "4001-3500-2499-5000-3000-2000"
 
 
 def test_an_arm_without_a_hand_is_refused() -> None:
     with pytest.raises(ProportionsError, match="L2"):
-        Proportions.of((0.3, 0.3, 0.0))
+        Proportions.from_links((0.3, 0.3, 0.0))
     with pytest.raises(ProportionsError, match="above zero"):
-        Proportions.of((0.0, 0.0, 0.0))
+        Proportions.from_links((0.0, 0.0, 0.0))

@@ -33,13 +33,13 @@ def test_columns_give_the_rotation_back(q: Quaternion) -> None:
 
 @given(units, units)
 def test_between_brings_one_to_the_other(a: Vector, b: Vector) -> None:
-    np.testing.assert_allclose(vector.rotate(vector.between(a, b), a), b, atol=1e-6)
+    np.testing.assert_allclose(vector.rotate(vector.rotation_between(a, b), a), b, atol=1e-6)
 
 
 @given(units)
 def test_between_opposites_is_half_a_turn(a: Vector) -> None:
     opposite = vector.scale(a, -1.0)
-    np.testing.assert_allclose(vector.rotate(vector.between(a, opposite), a), opposite, atol=1e-12)
+    np.testing.assert_allclose(vector.rotate(vector.rotation_between(a, opposite), a), opposite, atol=1e-12)
 
 
 @given(quaternions, quaternions, st.floats(0.0, 1.0))
@@ -53,13 +53,13 @@ def test_slerp_agrees_with_the_arrays(a: Quaternion, b: Quaternion, t: float) ->
 
 @given(units)
 def test_across_is_square_and_unit(a: Vector) -> None:
-    square = vector.across(a)
+    square = vector.any_perpendicular(a)
     assert abs(vector.dot(square, a)) < 1e-12
     assert abs(vector.length(square) - 1.0) < 1e-12
 
 
 @given(quaternions, st.floats(0.0, 1.0))
 def test_a_part_of_a_turn_goes_its_own_way_round(q: Quaternion, share: float) -> None:
-    rest = vector.multiply(vector.part_of(q, 1.0 - share), vector.part_of(q, share))
+    rest = vector.multiply(vector.scale_rotation(q, 1.0 - share), vector.scale_rotation(q, share))
     np.testing.assert_allclose(rest, q, atol=1e-9)
-    assert vector.part_of(q, 0.0) == pytest.approx(vector.IDENTITY)
+    assert vector.scale_rotation(q, 0.0) == pytest.approx(vector.IDENTITY)

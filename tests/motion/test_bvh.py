@@ -5,38 +5,40 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bunraku.motion.bvh import Bvh, read
+from bunraku.motion.bvh import Bvh, parse_bvh
+from bunraku.motion.bvh_kinematics import forward_kinematics
+from bunraku.motion.bvh_writer import write_bvh
 from bunraku.motion.errors import UnreadableMotion
-from bunraku.motion.kinematics import pose
 from bunraku.motion.rotation import from_rotation_vector
-from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, Motion, standard_figure, world
-from bunraku.motion.writers import write_bvh
-from tests.motion.bvh_sources import HEAD, PLAIN, ROWS, VALUES, motion
+from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, Motion, standard_figure, world_transforms
+from tests.motion.bvh_samples import HIERARCHY_TEXT, MINIMAL_BVH, ROWS, VALUES, motion_section
 
 
 @pytest.mark.parametrize(
     "data",
     [
-        pytest.param(PLAIN, id="plain"),
-        pytest.param(PLAIN.replace(b"\n", b"\r\n"), id="CRLF"),
-        pytest.param(PLAIN.replace(b"\n", b"\r"), id="lone CR"),
-        pytest.param(b"\xef\xbb\xbf" + PLAIN, id="BOM"),
-        pytest.param(b"\xff\xfe" + PLAIN.decode().encode("utf-16-le"), id="UTF-16 little"),
-        pytest.param(b"\xfe\xff" + PLAIN.decode().encode("utf-16-be"), id="UTF-16 big"),
-        pytest.param(PLAIN.replace(b" ", b"\t").replace(b"End\tSite", b"End Site"), id="tabs"),
-        pytest.param(PLAIN.replace(b"\n", b"\n\n \t\n"), id="blank lines"),
-        pytest.param(PLAIN.replace(b"\n  {", b" {").replace(b"Hips\n{", b"Hips {"), id="brace on the line"),
-        pytest.param(PLAIN.lower().replace(b"hips", b"Hips").replace(b"spine", b"Spine"), id="lower case"),
-        pytest.param(PLAIN.replace(b"OFFSET", b"# a comment\nOFFSET"), id="comments"),
-        pytest.param(HEAD + motion(b" ".join(ROWS)), id="all on one line"),
-        pytest.param(HEAD + motion(*b" ".join(ROWS).split()), id="a value a line"),
-        pytest.param(HEAD + motion(b"1e0 .2E1 30e-1 4. +5 6 7 8 9.50", ROWS[1]), id="E-notation"),
-        pytest.param(PLAIN.replace(b".", b","), id="decimal commas"),
-        pytest.param(HEAD + motion(*(row.replace(b" ", b", ") for row in ROWS)), id="separating commas"),
+        pytest.param(MINIMAL_BVH, id="plain"),
+        pytest.param(MINIMAL_BVH.replace(b"\n", b"\r\n"), id="CRLF"),
+        pytest.param(MINIMAL_BVH.replace(b"\n", b"\r"), id="lone CR"),
+        pytest.param(b"\xef\xbb\xbf" + MINIMAL_BVH, id="BOM"),
+        pytest.param(b"\xff\xfe" + MINIMAL_BVH.decode().encode("utf-16-le"), id="UTF-16 little"),
+        pytest.param(b"\xfe\xff" + MINIMAL_BVH.decode().encode("utf-16-be"), id="UTF-16 big"),
+        pytest.param(MINIMAL_BVH.replace(b" ", b"\t").replace(b"End\tSite", b"End Site"), id="tabs"),
+        pytest.param(MINIMAL_BVH.replace(b"\n", b"\n\n \t\n"), id="blank lines"),
+        pytest.param(MINIMAL_BVH.replace(b"\n  {", b" {").replace(b"Hips\n{", b"Hips {"), id="brace on the line"),
+        pytest.param(MINIMAL_BVH.lower().replace(b"hips", b"Hips").replace(b"spine", b"Spine"), id="lower case"),
+        pytest.param(MINIMAL_BVH.replace(b"OFFSET", b"# a comment\nOFFSET"), id="comments"),
+        pytest.param(HIERARCHY_TEXT + motion_section(b" ".join(ROWS)), id="all on one line"),
+        pytest.param(HIERARCHY_TEXT + motion_section(*b" ".join(ROWS).split()), id="a value a line"),
+        pytest.param(HIERARCHY_TEXT + motion_section(b"1e0 .2E1 30e-1 4. +5 6 7 8 9.50", ROWS[1]), id="E-notation"),
+        pytest.param(MINIMAL_BVH.replace(b".", b","), id="decimal commas"),
+        pytest.param(
+            HIERARCHY_TEXT + motion_section(*(row.replace(b" ", b", ") for row in ROWS)), id="separating commas"
+        ),
     ],
 )
 def test_every_dialect_reads_as_the_plain_file(data: bytes) -> None:
-    bvh = read(data)
+    bvh = parse_bvh(data)
     assert bvh.names == ("Hips", "Spine")
     assert bvh.parents == (-1, 0)
     assert bvh.offsets.tolist() == [[0.0, 90.0, 0.0], [0.0, 10.5, 0.0]]
@@ -48,15 +50,15 @@ def test_every_dialect_reads_as_the_plain_file(data: bytes) -> None:
 @pytest.mark.parametrize("data", [b"", b" \r\n\t", b"\xef\xbb\xbf"])
 def test_an_empty_file_is_refused(data: bytes) -> None:
     with pytest.raises(UnreadableMotion, match="Empty file") as caught:
-        read(data)
+        parse_bvh(data)
     assert caught.value.hint
 
 
 def test_broken_utf16_and_no_channels_are_refused() -> None:
     with pytest.raises(UnreadableMotion, match="Broken text"):
-        read(b"\xff\xfeH\x00I")
+        parse_bvh(b"\xff\xfeH\x00I")
     with pytest.raises(UnreadableMotion, match="No channels"):
-        read(b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n1\n")
+        parse_bvh(b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n1\n")
 
 
 @pytest.mark.parametrize(
@@ -64,14 +66,14 @@ def test_broken_utf16_and_no_channels_are_refused() -> None:
     [(b".0083333", 120.0), (b"0.0333333", 30.0), (b"0.033367", pytest.approx(29.97, abs=1e-3)), (b"0.025000", 40.0)],
 )
 def test_a_rounded_frame_time_is_the_rate_it_was_rounded_from(time: bytes, fps: float) -> None:
-    assert read(HEAD + motion(time=b"Frame Time: " + time)).fps == fps
+    assert parse_bvh(HIERARCHY_TEXT + motion_section(time=b"Frame Time: " + time)).fps == fps
 
 
 def test_all_real_clips_read(shared: Path) -> None:
     clips = sorted((shared / "mocap" / "bvh").glob("*.bvh"))
     assert clips
     for clip in clips:
-        bvh = read(clip.read_bytes())
+        bvh = parse_bvh(clip.read_bytes())
         assert bvh.frames.shape == (len(bvh.frames), sum(map(len, bvh.channels)))
         assert len(bvh.frames) > 100
         assert bvh.fps in (40.0, 120.0)
@@ -92,9 +94,9 @@ def motions(draw: st.DrawFn) -> Motion:
 @settings(max_examples=25)
 @given(motions())
 def test_what_is_written_reads_as_the_same_motion(motion: Motion) -> None:
-    bvh: Bvh = read(write_bvh(motion))
+    bvh: Bvh = parse_bvh(write_bvh(motion))
     assert (bvh.names, bvh.notes, bvh.fps) == (JOINTS, (), motion.fps)
-    position, orientation = pose(bvh, list(range(JOINT_COUNT)))
-    true_position, true_orientation = world(motion.figure, motion.root, motion.rotations)
+    position, orientation = forward_kinematics(bvh, list(range(JOINT_COUNT)))
+    true_position, true_orientation = world_transforms(motion.figure, motion.root, motion.rotations)
     assert np.abs(position / 100.0 - true_position).max() < 1e-6
     assert np.abs(np.sum(orientation * true_orientation, axis=-1)).min() > 1.0 - 1e-9

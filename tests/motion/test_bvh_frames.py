@@ -1,29 +1,33 @@
 import pytest
 
-from bunraku.motion.bvh import read
+from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.errors import UnreadableMotion
-from tests.motion.bvh_sources import FIRST_FRAME_LINE, HEAD, ROWS, VALUES, motion
+from tests.motion.bvh_samples import FIRST_FRAME_LINE, HIERARCHY_TEXT, ROWS, VALUES, motion_section
 
-SHORT = b"1 2 3 4 5 6 7 8"
+INCOMPLETE_ROW = b"1 2 3 4 5 6 7 8"
 
 
 @pytest.mark.parametrize(
     ("data", "frames", "note"),
     [
-        (motion(frames=b"Frames: 5"), 2, "The file says 5 frames, but 2 are there and were used."),
-        (motion(frames=b"Frames: 1"), 2, "The file says 1 frames, but 2 are there and were used."),
-        (motion(frames=b"Frames: all"), 2, "The number of frames is not a number: 'all'."),
-        (motion(frames=b""), 2, "The number of frames is missing; 2 are there and were used."),
-        (motion(*ROWS, SHORT, frames=b"Frames: 3"), 2, "The last frame has 8 of 9 values; it was dropped."),
-        (motion(time=b""), 2, "The frame time is missing; 30 frames/s assumed."),
-        (motion(time=b"Frame Time:"), 2, "The frame time is missing; 30 frames/s assumed."),
-        (motion(time=b"Frame Time: 0"), 2, "The frame time is not above zero; 30 frames/s assumed."),
+        (motion_section(frames=b"Frames: 5"), 2, "The file says 5 frames, but 2 are there and were used."),
+        (motion_section(frames=b"Frames: 1"), 2, "The file says 1 frames, but 2 are there and were used."),
+        (motion_section(frames=b"Frames: all"), 2, "The number of frames is not a number: 'all'."),
+        (motion_section(frames=b""), 2, "The number of frames is missing; 2 are there and were used."),
+        (
+            motion_section(*ROWS, INCOMPLETE_ROW, frames=b"Frames: 3"),
+            2,
+            "The last frame has 8 of 9 values; it was dropped.",
+        ),
+        (motion_section(time=b""), 2, "The frame time is missing; 30 frames/s assumed."),
+        (motion_section(time=b"Frame Time:"), 2, "The frame time is missing; 30 frames/s assumed."),
+        (motion_section(time=b"Frame Time: 0"), 2, "The frame time is not above zero; 30 frames/s assumed."),
     ],
 )
 def test_what_is_there_is_used_and_noted(data: bytes, frames: int, note: str) -> None:
     if b"Frame Time:\n" in data:
         data = data.replace(b"Frame Time:\n1", b"Frame Time:\n\n1")
-    bvh = read(HEAD + data)
+    bvh = parse_bvh(HIERARCHY_TEXT + data)
     assert bvh.frames.tolist() == VALUES[:frames]
     assert note in bvh.notes
 
@@ -31,29 +35,29 @@ def test_what_is_there_is_used_and_noted(data: bytes, frames: int, note: str) ->
 @pytest.mark.parametrize(
     ("data", "title", "line"),
     [
-        (motion(ROWS[0], ROWS[1].replace(b"-3", b"nan")), "Not a finite number", 1),
-        (motion(ROWS[0], ROWS[1].replace(b"-3", b"-inf")), "Not a finite number", 1),
-        (motion(ROWS[0].replace(b"9.5", b"1.#QNAN"), ROWS[1]), "Not a finite number", 0),
-        (motion(ROWS[0].replace(b"9.5", b"-1.#IND00"), ROWS[1]), "Not a finite number", 0),
-        (motion(ROWS[0], ROWS[1].replace(b"-3", b"1e999")), "Not a finite number", 1),
-        (motion(ROWS[0], ROWS[1].replace(b"-3", b"x")), "Not a number", 1),
-        (motion(*ROWS, b"HIERARCHY"), "Two motions in one file", 2),
-        (motion(ROWS[0], SHORT, ROWS[1], ROWS[0]), "Wrong number of values", 1),
-        (motion(SHORT, ROWS[1]), "Wrong number of values", 0),
-        (motion(*[SHORT] * 9, frames=b"Frames: 9"), "Wrong number of values", 0),
-        (motion(ROWS[0], ROWS[1] + b" 1"), "Wrong number of values", 1),
-        (motion(b" ".join(ROWS) + b" 1"), "Wrong number of values", 0),
-        (motion(b"1 2 3"), "No whole frame", None),
-        (motion(b""), "No whole frame", None),
-        (motion(time=b"Frame Time: nan"), "Not a number", -1),
-        (motion(time=b"Frame Time: 1e-320"), "Frame time out of range", -1),
-        (motion(time=b"Frame Time: 33.3"), "Frame time out of range", -1),
-        (motion(frames=b"Frames: 2\n" * 100_000), "Not a number", None),
+        (motion_section(ROWS[0], ROWS[1].replace(b"-3", b"nan")), "Not a finite number", 1),
+        (motion_section(ROWS[0], ROWS[1].replace(b"-3", b"-inf")), "Not a finite number", 1),
+        (motion_section(ROWS[0].replace(b"9.5", b"1.#QNAN"), ROWS[1]), "Not a finite number", 0),
+        (motion_section(ROWS[0].replace(b"9.5", b"-1.#IND00"), ROWS[1]), "Not a finite number", 0),
+        (motion_section(ROWS[0], ROWS[1].replace(b"-3", b"1e999")), "Not a finite number", 1),
+        (motion_section(ROWS[0], ROWS[1].replace(b"-3", b"x")), "Not a number", 1),
+        (motion_section(*ROWS, b"HIERARCHY"), "Two motions in one file", 2),
+        (motion_section(ROWS[0], INCOMPLETE_ROW, ROWS[1], ROWS[0]), "Wrong number of values", 1),
+        (motion_section(INCOMPLETE_ROW, ROWS[1]), "Wrong number of values", 0),
+        (motion_section(*[INCOMPLETE_ROW] * 9, frames=b"Frames: 9"), "Wrong number of values", 0),
+        (motion_section(ROWS[0], ROWS[1] + b" 1"), "Wrong number of values", 1),
+        (motion_section(b" ".join(ROWS) + b" 1"), "Wrong number of values", 0),
+        (motion_section(b"1 2 3"), "No whole frame", None),
+        (motion_section(b""), "No whole frame", None),
+        (motion_section(time=b"Frame Time: nan"), "Not a number", -1),
+        (motion_section(time=b"Frame Time: 1e-320"), "Frame time out of range", -1),
+        (motion_section(time=b"Frame Time: 33.3"), "Frame time out of range", -1),
+        (motion_section(frames=b"Frames: 2\n" * 100_000), "Not a number", None),
     ],
 )
 def test_refusals_say_where_and_what_to_do(data: bytes, title: str, line: int | None) -> None:
     with pytest.raises(UnreadableMotion) as caught:
-        read(HEAD + data)
+        parse_bvh(HIERARCHY_TEXT + data)
     assert caught.value.title == title
     assert caught.value.hint
     if line is not None:
@@ -62,5 +66,5 @@ def test_refusals_say_where_and_what_to_do(data: bytes, title: str, line: int | 
 
 def test_a_long_line_of_one_word_is_refused_in_a_short_message() -> None:
     with pytest.raises(UnreadableMotion, match="Not a number") as caught:
-        read(HEAD + motion(b"x" * 20_000_000))
+        parse_bvh(HIERARCHY_TEXT + motion_section(b"x" * 20_000_000))
     assert len(str(caught.value)) < 300

@@ -1,29 +1,34 @@
 import pytest
 
-from bunraku.motion.bvh_hierarchy import DEPTH_LIMIT, JOINT_LIMIT, read_hierarchy
+from bunraku.motion.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS, parse_hierarchy
 from bunraku.motion.errors import UnreadableMotion
-from tests.motion.bvh_sources import HEAD, MOTION_LINE
+from tests.motion.bvh_samples import HIERARCHY_TEXT, MOTION_LINE
 
-TREE = HEAD + b"MOTION\n"
+HIERARCHY_WITH_MOTION = HIERARCHY_TEXT + b"MOTION\n"
 
 
 @pytest.mark.parametrize("name", ["ns:Spine", "Bip01 L Thigh", "upper_arm.L", "Hüfte", "腰"])
 def test_names_may_hold_colons_dots_spaces_and_any_letter(name: str) -> None:
-    assert read_hierarchy(TREE.replace(b"Spine", name.encode())).names == ("Hips", name)
+    assert parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"Spine", name.encode())).names == ("Hips", name)
 
 
 def test_latin_1_names() -> None:
-    assert read_hierarchy(TREE.replace(b"Spine", "Hüfte".encode("latin-1"))).names[1] == "Hüfte"
+    assert parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"Spine", "Hüfte".encode("latin-1"))).names[1] == "Hüfte"
 
 
 @pytest.mark.parametrize("end", [b"End Site Spine_end", b"END SITE", b"EndSite"])
 def test_end_sites_of_any_name(end: bytes) -> None:
-    assert [site.parent for site in read_hierarchy(TREE.replace(b"End Site", end)).ends] == [1]
+    assert [site.parent for site in parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"End Site", end)).ends] == [1]
 
 
 def test_an_end_site_may_be_missing() -> None:
-    at = TREE.index(b"    End Site")
-    assert read_hierarchy(TREE[:at] + TREE[TREE.index(b"  }\n}\n") :]).ends == ()
+    at = HIERARCHY_WITH_MOTION.index(b"    End Site")
+    assert (
+        parse_hierarchy(
+            HIERARCHY_WITH_MOTION[:at] + HIERARCHY_WITH_MOTION[HIERARCHY_WITH_MOTION.index(b"  }\n}\n") :]
+        ).ends
+        == ()
+    )
 
 
 @pytest.mark.parametrize(
@@ -36,13 +41,13 @@ def test_an_end_site_may_be_missing() -> None:
     ],
 )
 def test_channels_of_any_number_order_and_case(channels: bytes, read: str) -> None:
-    found = read_hierarchy(TREE.replace(b"3 Zrotation Xrotation Yrotation", channels)).channels[1]
+    found = parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"3 Zrotation Xrotation Yrotation", channels)).channels[1]
     assert " ".join(channel[:2] for channel in found) == read
 
 
 def test_brothers_of_one_name_are_noted() -> None:
-    tree = TREE.replace(b"  }\n}\n", b"  }\n  JOINT Spine { OFFSET 1 0 0 CHANNELS 0 }\n}\n")
-    hierarchy = read_hierarchy(tree)
+    tree = HIERARCHY_WITH_MOTION.replace(b"  }\n}\n", b"  }\n  JOINT Spine { OFFSET 1 0 0 CHANNELS 0 }\n}\n")
+    hierarchy = parse_hierarchy(tree)
     assert hierarchy.names == ("Hips", "Spine", "Spine")
     assert hierarchy.notes == ("Several joints have the same name: Spine.",)
 
@@ -76,24 +81,24 @@ def test_brothers_of_one_name_are_noted() -> None:
     ],
 )
 def test_refusals_say_where_and_what_to_do(old: bytes, new: bytes, title: str, line: int, field: str | None) -> None:
-    assert old in TREE
+    assert old in HIERARCHY_WITH_MOTION
     with pytest.raises(UnreadableMotion) as caught:
-        read_hierarchy(TREE.replace(old, new, 1))
+        parse_hierarchy(HIERARCHY_WITH_MOTION.replace(old, new, 1))
     assert (caught.value.title, caught.value.line, caught.value.field) == (title, line, field)
     assert caught.value.hint
 
 
 def test_a_million_joints_side_by_side_and_deep_are_refused() -> None:
     with pytest.raises(UnreadableMotion, match="Too many joints") as caught:
-        read_hierarchy(b"HIERARCHY\nROOT a {\n" + b"JOINT b { }\n" * 1_000_000)
-    assert caught.value.line == 2 + JOINT_LIMIT
+        parse_hierarchy(b"HIERARCHY\nROOT a {\n" + b"JOINT b { }\n" * 1_000_000)
+    assert caught.value.line == 2 + MAX_JOINTS
     with pytest.raises(UnreadableMotion, match="Too deep") as caught:
-        read_hierarchy(b"HIERARCHY\nROOT a {\n" + b"".join(b"JOINT b%d {\n" % i for i in range(1_000_000)))
-    assert caught.value.line == 2 + DEPTH_LIMIT
+        parse_hierarchy(b"HIERARCHY\nROOT a {\n" + b"".join(b"JOINT b%d {\n" % i for i in range(1_000_000)))
+    assert caught.value.line == 2 + MAX_DEPTH
     with pytest.raises(UnreadableMotion, match="Too many End Sites"):
-        read_hierarchy(b"HIERARCHY\nROOT a {\n" + b"End Site { }\n" * 1_000_000)
+        parse_hierarchy(b"HIERARCHY\nROOT a {\n" + b"End Site { }\n" * 1_000_000)
 
 
 def test_long_gaps_are_passed_over() -> None:
-    hierarchy = read_hierarchy(TREE.replace(b"MOTION", b"\n# x" * 1_000_000 + b"\nMOTION"))
-    assert hierarchy.end_line == MOTION_LINE + 1_000_001
+    hierarchy = parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"MOTION", b"\n# x" * 1_000_000 + b"\nMOTION"))
+    assert hierarchy.motion_line == MOTION_LINE + 1_000_001

@@ -4,13 +4,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.motion import easing
-from bunraku.motion.easing import Ease, Move
+from bunraku.motion.easing import EasedMove, EasingFunction
 
-EASES = [easing.minimum_jerk, easing.crisp, easing.falling]
+EASES = [easing.minimum_jerk, easing.ease_out, easing.ease_in]
 
 
 @pytest.mark.parametrize("ease", EASES)
-def test_an_ease_rises_from_0_to_1_and_rests_at_both_ends(ease: Ease) -> None:
+def test_an_ease_rises_from_0_to_1_and_rests_at_both_ends(ease: EasingFunction) -> None:
     u = np.linspace(-0.5, 1.5, 2001)
     eased = ease(u)
     assert np.all(eased[u <= 0.0] == 0.0)
@@ -21,15 +21,15 @@ def test_an_ease_rises_from_0_to_1_and_rests_at_both_ends(ease: Ease) -> None:
 
 def test_crisp_starts_sooner_and_ends_softer_than_minimum_jerk() -> None:
     early, late = np.array([0.2]), np.array([0.8])
-    assert easing.crisp(early)[0] > easing.minimum_jerk(early)[0] + 0.1
-    assert 1.0 - easing.crisp(late)[0] < 0.2 * (1.0 - easing.minimum_jerk(late)[0])
+    assert easing.ease_out(early)[0] > easing.minimum_jerk(early)[0] + 0.1
+    assert 1.0 - easing.ease_out(late)[0] < 0.2 * (1.0 - easing.minimum_jerk(late)[0])
 
 
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0.1, 5), st.floats(-3, 3)), max_size=6), st.floats(-2, 2))
 def test_a_track_begins_at_its_start_and_ends_with_all_moves_made(
     moves: list[tuple[float, float, float]], start: float
 ) -> None:
-    made = [Move(begin, duration, np.array([delta, -delta])) for begin, duration, delta in moves]
+    made = [EasedMove(begin, duration, np.array([delta, -delta])) for begin, duration, delta in moves]
     track = easing.superpose(np.array([0.0, 20.0]), np.array([start, 1.0]), made)
     total = sum(delta for _, _, delta in moves)
     assert np.allclose(track, [[start, 1.0], [start + total, 1.0 - total]], rtol=0, atol=1e-9)
@@ -37,7 +37,7 @@ def test_a_track_begins_at_its_start_and_ends_with_all_moves_made(
 
 def test_overlapping_moves_flow_through_the_key_between_them() -> None:
     time = np.linspace(0.0, 2.0, 401)
-    one, two = Move(0.0, 1.0, np.array([1.0])), Move(0.6, 1.0, np.array([1.0]))
+    one, two = EasedMove(0.0, 1.0, np.array([1.0])), EasedMove(0.6, 1.0, np.array([1.0]))
     speed = np.gradient(easing.superpose(time, np.zeros(1), [one, two])[:, 0], time)
     assert speed[(time > 0.4) & (time < 1.2)].min() > 0.5
 

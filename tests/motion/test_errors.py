@@ -1,4 +1,4 @@
-from bunraku.motion.errors import UnreadableMotion, shown
+from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 
 
 def test_the_message_says_what_where_and_what_to_do() -> None:
@@ -15,5 +15,5 @@ def test_the_message_says_what_where_and_what_to_do() -> None:
 
 
 def test_shown_text_is_short_and_printable() -> None:
-    assert shown(b"a\x00b\xff") == "'a\\x00b�'"
-    assert shown("x" * 50) == "'" + "x" * 40 + "…'"
+    assert quote_excerpt(b"a\x00b\xff") == "'a\\x00b�'"
+    assert quote_excerpt("x" * 50) == "'" + "x" * 40 + "…'"

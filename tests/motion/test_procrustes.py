@@ -11,11 +11,11 @@ from bunraku.motion.rotation import Array
 ONES = np.ones(3)
 
 
-def some_turns(random: np.random.Generator, n: int, size: float = 2.0) -> Array:
-    return rotation.from_rotation_vector(random.uniform(-size, size, (n, 3)))
+def random_rotations(random: np.random.Generator, n: int, max_angle: float = 2.0) -> Array:
+    return rotation.from_rotation_vector(random.uniform(-max_angle, max_angle, (n, 3)))
 
 
-def some_points(random: np.random.Generator) -> Array:
+def random_points(random: np.random.Generator) -> Array:
     """Three points (3, 3) that span a plane well."""
     return np.array([[0.0, 0.5, 0.0], [0.2, 0.4, 0.0], [-0.2, 0.4, 0.1]]) + random.uniform(-0.05, 0.05, (3, 3))
 
@@ -23,27 +23,27 @@ def some_points(random: np.random.Generator) -> Array:
 @given(seed=st.integers(0, 10_000))
 def test_kabsch_finds_the_turn_that_was_made(seed: int) -> None:
     random = np.random.default_rng(seed)
-    points, turn = some_points(random), some_turns(random, 20)
-    found = procrustes.kabsch(points, rotation.rotate(turn[:, None], points), np.array([1.0, 2.0, 2.0]))
+    points, turn = random_points(random), random_rotations(random, 20)
+    found = procrustes.solve_kabsch(points, rotation.rotate(turn[:, None], points), np.array([1.0, 2.0, 2.0]))
     np.testing.assert_allclose(np.abs(np.sum(found * turn, axis=-1)), 1.0, atol=1e-9)
 
 
 @given(seed=st.integers(0, 10_000))
 def test_no_turn_nearby_is_better_than_kabschs(seed: int) -> None:
     random = np.random.default_rng(seed)
-    points, weights = some_points(random), random.uniform(0.5, 2.0, 3)
-    targets = rotation.rotate(some_turns(random, 5)[:, None], points) + random.normal(0.0, 0.05, (5, 3, 3))
-    found = procrustes.kabsch(points, targets, weights)
-    least = procrustes.misfit(found, points, targets, weights)
-    beside = rotation.multiply(some_turns(random, 5, 0.1), found)
-    assert procrustes.misfit(beside, points, targets, weights) >= least - 1e-12
+    points, weights = random_points(random), random.uniform(0.5, 2.0, 3)
+    targets = rotation.rotate(random_rotations(random, 5)[:, None], points) + random.normal(0.0, 0.05, (5, 3, 3))
+    found = procrustes.solve_kabsch(points, targets, weights)
+    least = procrustes.rms_error(found, points, targets, weights)
+    beside = rotation.multiply(random_rotations(random, 5, 0.1), found)
+    assert procrustes.rms_error(beside, points, targets, weights) >= least - 1e-12
 
 
 @given(seed=st.integers(0, 10_000))
 def test_kabsch_never_mirrors(seed: int) -> None:
     random = np.random.default_rng(seed)
     points = random.normal(0.0, 1.0, (4, 3))
-    found = procrustes.kabsch(points, points * [-1.0, 1.0, 1.0], np.ones(4))
+    found = procrustes.solve_kabsch(points, points * [-1.0, 1.0, 1.0], np.ones(4))
     np.testing.assert_allclose(np.linalg.det(rotation.to_matrix(found)), 1.0, atol=1e-9)
 
 
@@ -51,17 +51,17 @@ def test_kabsch_never_mirrors(seed: int) -> None:
 def test_two_points_are_brought_over_one_another(seed: int) -> None:
     random = np.random.default_rng(seed)
     points = np.array([[0.2, 0.4, 0.0], [-0.2, 0.4, 0.0]])
-    targets = rotation.rotate(some_turns(random, 6)[:, None], points)
-    found = procrustes.kabsch(points, targets, np.ones(2))
+    targets = rotation.rotate(random_rotations(random, 6)[:, None], points)
+    found = procrustes.solve_kabsch(points, targets, np.ones(2))
     np.testing.assert_allclose(rotation.rotate(found[:, None], points), targets, atol=1e-9)
 
 
 @given(seed=st.integers(0, 10_000))
 def test_mean_places_are_where_rigid_points_lie(seed: int) -> None:
     random = np.random.default_rng(seed)
-    points, turn = some_points(random), some_turns(random, 20)
+    points, turn = random_points(random), random_rotations(random, 20)
     targets = rotation.rotate(turn[:, None], points)
-    np.testing.assert_allclose(procrustes.mean_places(turn, targets), points, atol=1e-12)
+    np.testing.assert_allclose(procrustes.mean_local_positions(turn, targets), points, atol=1e-12)
 
 
 def test_misfit_is_the_weighted_root_mean_square() -> None:
@@ -70,25 +70,25 @@ def test_misfit_is_the_weighted_root_mean_square() -> None:
     targets[0, 0, 0], targets[1, 1, 1] = 3.0, 4.0
     # the squares 9 (weight 1) and 16 (weight 3) over 2 frames and a weight of 4
     expected = np.sqrt((9.0 + 48.0) / 2.0 / 4.0)
-    assert procrustes.misfit(still, np.zeros((2, 3)), targets, np.array([1.0, 3.0])) == pytest.approx(expected)
+    assert procrustes.rms_error(still, np.zeros((2, 3)), targets, np.array([1.0, 3.0])) == pytest.approx(expected)
 
 
 @given(seed=st.integers(0, 10_000))
 def test_fitted_places_of_rigid_points_are_their_rest_whatever_the_beginning(seed: int) -> None:
     random = np.random.default_rng(seed)
-    points, turn = some_points(random), some_turns(random, 30, 0.6)
+    points, turn = random_points(random), random_rotations(random, 30, 0.6)
     targets = rotation.rotate(turn[:, None], points)
-    wrong = rotation.multiply(turn, some_turns(random, 30, 0.2))
-    np.testing.assert_allclose(procrustes.fitted_places(wrong, targets, ONES, points), points, atol=1e-6)
+    wrong = rotation.multiply(turn, random_rotations(random, 30, 0.2))
+    np.testing.assert_allclose(procrustes.fit_local_positions(wrong, targets, ONES, points), points, atol=1e-6)
 
 
 @given(seed=st.integers(0, 10_000))
 def test_fitted_places_are_no_worse_than_the_means_they_begin_with(seed: int) -> None:
     random = np.random.default_rng(seed)
-    points, turn = some_points(random), some_turns(random, 30, 0.6)
+    points, turn = random_points(random), random_rotations(random, 30, 0.6)
     targets = rotation.rotate(turn[:, None], points) + random.normal(0.0, 0.03, (30, 3, 3))
-    start = procrustes.mean_places(turn, targets)
-    fitted = procrustes.fitted_places(turn, targets, ONES, points)
-    before = procrustes.misfit(turn, start, targets, ONES)
-    after = procrustes.misfit(procrustes.kabsch(fitted, targets, ONES), fitted, targets, ONES)
+    start = procrustes.mean_local_positions(turn, targets)
+    fitted = procrustes.fit_local_positions(turn, targets, ONES, points)
+    before = procrustes.rms_error(turn, start, targets, ONES)
+    after = procrustes.rms_error(procrustes.solve_kabsch(fitted, targets, ONES), fitted, targets, ONES)
     assert after <= before + 1e-12

@@ -38,7 +38,7 @@ def test_every_form_of_a_rotation_leads_back(q: rotation.Array) -> None:
 
 def test_half_turns_keep_their_axis_through_a_matrix() -> None:
     for axis in range(3):
-        q = rotation.about_axis(axis, np.array(np.pi))
+        q = rotation.from_coordinate_axis(axis, np.array(np.pi))
         assert abs(abs(np.dot(rotation.from_matrix(rotation.to_matrix(q)), q)) - 1) < 1e-12
 
 
@@ -46,12 +46,12 @@ def test_half_turns_keep_their_axis_through_a_matrix() -> None:
 def test_between_brings_one_direction_to_the_other(a: rotation.Array, b: rotation.Array) -> None:
     a, b = rotation.normalise(a), rotation.normalise(b)
     if np.linalg.norm(a) > 0 and np.linalg.norm(b) > 0:
-        np.testing.assert_allclose(rotation.rotate(rotation.between(a, b), a), b, atol=1e-5)
+        np.testing.assert_allclose(rotation.rotate(rotation.rotation_between(a, b), a), b, atol=1e-5)
 
 
 def test_between_opposite_directions_is_a_half_turn() -> None:
     a = np.array([[1.0, 0, 0], [0, 0, -1.0]])
-    np.testing.assert_allclose(rotation.rotate(rotation.between(a, -a), a), -a, atol=1e-12)
+    np.testing.assert_allclose(rotation.rotate(rotation.rotation_between(a, -a), a), -a, atol=1e-12)
 
 
 @given(ROTATIONS, ROTATIONS, st.floats(0, 1))
@@ -66,6 +66,6 @@ def test_slerp_turns_at_an_even_speed(a: rotation.Array, b: rotation.Array, t: f
 
 def test_continuous_follows_three_whole_turns() -> None:
     angle = np.linspace(0, 6 * np.pi, 200)
-    wrapped = rotation.to_rotation_vector(rotation.about_axis(1, angle))
-    followed = rotation.continuous(wrapped)
+    wrapped = rotation.to_rotation_vector(rotation.from_coordinate_axis(1, angle))
+    followed = rotation.unwrap_rotation_vectors(wrapped)
     np.testing.assert_allclose(followed[:, 1], angle, atol=1e-9)

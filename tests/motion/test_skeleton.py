@@ -6,20 +6,20 @@ import pytest
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import (
     CHANNEL_COUNT,
-    INDEX,
     JOINT_COUNT,
+    JOINT_INDEX,
     PARENTS,
     Figure,
     Motion,
-    channels,
-    front,
-    points,
+    joint_and_tip_positions,
+    mean_facing,
     standard_figure,
-    world,
+    to_channels,
+    world_transforms,
 )
 
 
-def still(frames: int = 1) -> Motion:
+def rest_motion(frames: int = 1) -> Motion:
     return Motion(standard_figure(), 30.0, np.zeros((frames, 3)), np.tile(rotation.IDENTITY, (frames, JOINT_COUNT, 1)))
 
 
@@ -28,25 +28,25 @@ def test_parents_come_before_their_children() -> None:
 
 
 def test_standard_figure_stands_as_the_specification_says() -> None:
-    motion = still()
-    position, _ = world(motion.figure, motion.figure.offsets[0], motion.rotations[0])
-    np.testing.assert_allclose(position[INDEX["l_wrist"]], [0.1984, 0.8663, -0.0583], atol=1e-9)
-    np.testing.assert_allclose(position[INDEX["r_ankle"]], [-0.1101, 0.0656, -0.0736], atol=1e-9)
-    crown = points(motion.figure, motion.figure.offsets[0], motion.rotations[0])[18]
+    motion = rest_motion()
+    position, _ = world_transforms(motion.figure, motion.figure.offsets[0], motion.rotations[0])
+    np.testing.assert_allclose(position[JOINT_INDEX["l_wrist"]], [0.1984, 0.8663, -0.0583], atol=1e-9)
+    np.testing.assert_allclose(position[JOINT_INDEX["r_ankle"]], [-0.1101, 0.0656, -0.0736], atol=1e-9)
+    crown = joint_and_tip_positions(motion.figure, motion.figure.offsets[0], motion.rotations[0])[18]
     np.testing.assert_allclose(crown, [0.0050, 1.7504, 0.0055], atol=1e-9)
 
 
 def test_a_turned_parent_carries_its_children() -> None:
-    motion = still()
-    motion.rotations[0, INDEX["l_shoulder"]] = rotation.about_axis(2, np.array(np.pi / 2))
-    position, orientation = world(motion.figure, motion.root, motion.rotations)
-    arm = position[0, INDEX["l_elbow"]] - position[0, INDEX["l_shoulder"]]
+    motion = rest_motion()
+    motion.rotations[0, JOINT_INDEX["l_shoulder"]] = rotation.from_coordinate_axis(2, np.array(np.pi / 2))
+    position, orientation = world_transforms(motion.figure, motion.root, motion.rotations)
+    arm = position[0, JOINT_INDEX["l_elbow"]] - position[0, JOINT_INDEX["l_shoulder"]]
     assert arm[0] == pytest.approx(0.3019, abs=1e-3)  # from hanging down to pointing left
-    np.testing.assert_allclose(orientation[0, INDEX["l_wrist"]], orientation[0, INDEX["l_shoulder"]])
+    np.testing.assert_allclose(orientation[0, JOINT_INDEX["l_wrist"]], orientation[0, JOINT_INDEX["l_shoulder"]])
 
 
 def test_channels_are_the_papers_nineteen() -> None:
-    made = channels(still(5))
+    made = to_channels(rest_motion(5))
     assert len(made) == CHANNEL_COUNT
     assert made[0].shape == (5, 3)
     assert all(channel.shape == (5, 4) for channel in made[1:])
@@ -62,9 +62,9 @@ def test_wrong_shapes_are_refused() -> None:
 
 
 def test_the_front_is_the_mean_facing_and_none_for_one_who_turns() -> None:
-    motion = still(60)
-    assert front(motion) == 0
-    motion.rotations[:, 0] = rotation.about_axis(1, np.linspace(2.0, 2.6, 60))
-    assert front(motion) == pytest.approx(2.3, abs=0.01)
-    motion.rotations[:, 0] = rotation.about_axis(1, np.linspace(0, 2 * np.pi, 60))
-    assert front(motion) == 0
+    motion = rest_motion(60)
+    assert mean_facing(motion) == 0
+    motion.rotations[:, 0] = rotation.from_coordinate_axis(1, np.linspace(2.0, 2.6, 60))
+    assert mean_facing(motion) == pytest.approx(2.3, abs=0.01)
+    motion.rotations[:, 0] = rotation.from_coordinate_axis(1, np.linspace(0, 2 * np.pi, 60))
+    assert mean_facing(motion) == 0

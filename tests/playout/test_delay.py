@@ -9,29 +9,32 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.playout.delay import GREATEST, SLEW, PlayoutDelay
+from bunraku.playout.delay import MAX_DELAY_US, MAX_GROWTH_RATE, PlayoutDelay
 
-EVERY = 33_334
-AHEAD = 26_666
+FRAME_INTERVAL_US = 33_334
+OVERLAY_LEAD_US = 26_666
 NOISE = np.random.default_rng(4).random(2_000)
 
 
-def shown_late(way: Callable[[int], float], seconds: float, after: float) -> tuple[float, float]:
+def late_share(network_delay: Callable[[int], float], seconds: float, after: float) -> tuple[float, float]:
     """The part of the messages that came after they were needed on the delayed clock, from second `after` on, where the
     way of each takes what `way` says; and the delay in the end."""
     delay = PlayoutDelay()
-    sent = [(nth * EVERY, round(nth * EVERY + way(nth))) for nth in range(int(seconds * 1e6 / EVERY))]
+    sent = [
+        (nth * FRAME_INTERVAL_US, round(nth * FRAME_INTERVAL_US + network_delay(nth)))
+        for nth in range(int(seconds * 1e6 / FRAME_INTERVAL_US))
+    ]
     late = []
     for begun, at in sorted(sent, key=lambda message: message[1]):
-        needed = begun + AHEAD
+        needed = begun + OVERLAY_LEAD_US
         if at > after * 1e6:
             late.append(at - delay.at(at) > needed)
-        delay.heard(at - needed, at)
+        delay.add_lateness(at - needed, at)
     return sum(late) / len(late), delay.at(round(seconds * 1e6))
 
 
 def test_on_a_quick_line_there_is_none() -> None:
-    assert shown_late(lambda nth: 2_000 + 3_000 * NOISE[nth], 10, 0) == (0, 0)
+    assert late_share(lambda nth: 2_000 + 3_000 * NOISE[nth], 10, 0) == (0, 0)
 
 
 @pytest.mark.parametrize(
@@ -45,27 +48,27 @@ def test_on_a_quick_line_there_is_none() -> None:
     ids=["slow", "jittery", "long tails", "stalls"],
 )
 def test_on_a_bad_line_nearly_all_is_there_when_it_is_shown(way: Callable[[int], float]) -> None:
-    late, delay = shown_late(way, 40, 10)
+    late, delay = late_share(way, 40, 10)
     assert late <= 0.05
     assert 10_000 < delay < 160_000
 
 
 def test_it_goes_when_the_line_gets_well() -> None:
-    assert shown_late(lambda nth: 150_000 if nth < 300 else 5_000, 70, 0)[1] < 1_000
+    assert late_share(lambda nth: 150_000 if nth < 300 else 5_000, 70, 0)[1] < 1_000
 
 
 def test_old_news_sent_to_who_joins_says_nothing() -> None:
     delay = PlayoutDelay()
-    delay.heard(90_000, 0)
+    delay.add_lateness(90_000, 0)
     for nth in range(1, 60):
-        delay.heard(-20_000, nth * EVERY)
-        assert delay.at(nth * EVERY) == 0
+        delay.add_lateness(-20_000, nth * FRAME_INTERVAL_US)
+        assert delay.at(nth * FRAME_INTERVAL_US) == 0
 
 
 def test_with_nothing_pulled_it_stays() -> None:
     delay = PlayoutDelay()
     for nth in range(300):
-        delay.heard(50_000, nth * EVERY)
+        delay.add_lateness(50_000, nth * FRAME_INTERVAL_US)
     assert delay.at(10_000_000) == delay.at(3_600_000_000) == 60_000
 
 
@@ -75,8 +78,8 @@ def test_it_never_steps_and_stays_within_its_bounds(messages: list[tuple[int, in
     for passed, late in messages:
         local += passed
         shown = delay.at(local)
-        assert abs(shown - before) <= SLEW * passed + 1e-6
-        assert 0 <= shown <= GREATEST
-        delay.heard(late, local)
+        assert abs(shown - before) <= MAX_GROWTH_RATE * passed + 1e-6
+        assert 0 <= shown <= MAX_DELAY_US
+        delay.add_lateness(late, local)
         assert delay.at(local) == pytest.approx(shown, abs=1e-6)
         before = shown

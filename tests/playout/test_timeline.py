@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.playout.timeline import Timelines, change, edit, position_at, start
+from bunraku.playout.timeline import TimelineHistory, change_motion, edit, position_at, start
 
 NOW = 1_774_000_000_000_000
 SECOND = 1_000_000
@@ -39,7 +39,7 @@ def test_seeking_is_kept_within_the_motion() -> None:
 
 def test_another_motion_starts_from_its_beginning_with_the_next_epoch() -> None:
     state = edit(start("m", 10 * SECOND, NOW), NOW + SECOND, playing=False)
-    other = change(state, NOW + 2 * SECOND, "n", 5 * SECOND)
+    other = change_motion(state, NOW + 2 * SECOND, "n", 5 * SECOND)
     assert (other.motion, other.duration, other.epoch, other.playing) == ("n", 5 * SECOND, 3, False)
     assert position_at(other, NOW + 4 * SECOND) == 0
 
@@ -50,7 +50,7 @@ def test_a_motion_without_length_is_refused() -> None:
 
 
 def test_the_timeline_before_holds_until_the_next_begins() -> None:
-    timelines = Timelines()
+    timelines = TimelineHistory()
     first = start("m", 10 * SECOND, NOW)
     second = edit(first, NOW + 2 * SECOND, position=7 * SECOND)
     timelines.put(first)
@@ -62,7 +62,7 @@ def test_the_timeline_before_holds_until_the_next_begins() -> None:
 
 
 def test_after_a_new_connection_its_first_timeline_counts() -> None:
-    timelines = Timelines()
+    timelines = TimelineHistory()
     timelines.put(edit(edit(start("m", 9_000_000, 0), 5), 6))
     begun = start("m", 9_000_000, 7)
     timelines.put(begun)
@@ -70,4 +70,4 @@ def test_after_a_new_connection_its_first_timeline_counts() -> None:
     timelines.restart()
     timelines.put(begun)
     assert timelines.newest == begun
-    Timelines().restart()
+    TimelineHistory().restart()

@@ -6,14 +6,14 @@ import httpx2
 import pytest
 
 from bunraku.client import Client
-from tests.servers import clip, running
+from tests.servers import make_bvh_clip, run_server
 
 
 async def test_a_session_is_opened_edited_listed_and_ended(tmp_path: Path) -> None:
     source, other = tmp_path / "one.bvh", tmp_path / "two.bvh"
-    source.write_bytes(clip(2.0, 1))
-    other.write_bytes(clip(1.0, 2))
-    with running(tmp_path / "data") as url:
+    source.write_bytes(make_bvh_clip(2.0, 1))
+    other.write_bytes(make_bvh_clip(1.0, 2))
+    with run_server(tmp_path / "data") as url:
         async with Client(url) as client, httpx2.AsyncClient(base_url=url) as http:
             one, two = (await client.upload(source))["id"], (await client.upload(other))["id"]
             answer = await http.post("/v1/sessions", json={"motion": one, "playing": False})

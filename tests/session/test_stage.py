@@ -10,21 +10,21 @@ import msgpack
 import numpy as np
 import pytest
 
-from bunraku.backing.backing import clock
-from bunraku.backing.bus import MemoryBus
-from bunraku.backing.library import Library, StoredMotion, pack
-from bunraku.codec import decode
-from bunraku.codec.encode import encode_motion
-from bunraku.marionette.log import Log
-from bunraku.marionette.ownership import LOST_AFTER
+from bunraku.codec import motion_decoder
+from bunraku.codec.motion_encoder import encode_motion
+from bunraku.marionette.input_log import InputLog
+from bunraku.marionette.ownership import INPUT_TIMEOUT_US
+from bunraku.messaging.bus import MemoryBus
 from bunraku.motion import rotation
 from bunraku.playout import timeline
-from bunraku.playout.blocks import BlockStore
-from bunraku.playout.overlays import pack_joints
+from bunraku.playout.block_store import MotionBlockStore
+from bunraku.playout.overlay_buffer import pack_joints
 from bunraku.playout.timeline import position_at
-from bunraku.session import puppeteers
-from bunraku.session.puppeteers import Full, Puppeteer
-from bunraku.session.stage import EDIT_LEAD, FRAME, FRAMES, Stage, troupe_of
+from bunraku.runtime.context import clock
+from bunraku.session import puppeteer_roster
+from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
+from bunraku.session.stage import EDIT_LEAD_US, FRAME_INTERVAL_US, FRAMES_PER_MESSAGE, Stage, make_marionettes
+from bunraku.storage.motion_store import MotionStore, StoredMotion, pack
 from bunraku.wire.messages import (
     Alive,
     Ask,
@@ -40,41 +40,41 @@ from bunraku.wire.messages import (
     unpack,
 )
 from bunraku.wire.overlay import Overlay
-from tests.ingest.dances import DANCES
-from tests.vectors.blocks import wandering_motion
+from tests.ingest.jobs.motions import MOTIONS
+from tests.vectors.blocks import random_motion
 
 
-class Audience:
+class StageMessages:
     """What a stage says on the bus."""
 
     def __init__(self, bus: MemoryBus) -> None:
-        self.heard: list[object] = []
+        self.messages: list[object] = []
         self._more = asyncio.Event()
         for subject in ("timeline", "presence", "overlay"):
-            bus.subscribe(f"session.s.{subject}", self._hear)
+            bus.subscribe(f"session.s.{subject}", self._receive)
 
-    def _hear(self, message: bytes) -> None:
-        self.heard.append(unpack(message))
+    def _receive(self, message: bytes) -> None:
+        self.messages.append(unpack(message))
         self._more.set()
 
-    async def until(self, number: int, kind: type) -> list[object]:
+    async def wait_for(self, number: int, kind: type) -> list[object]:
         async with asyncio.timeout(10):
-            while len(found := [m for m in self.heard if isinstance(m, kind)]) < number:
+            while len(found := [m for m in self.messages if isinstance(m, kind)]) < number:
                 self._more.clear()
                 await self._more.wait()
         return found
 
-    async def alone(self) -> None:
+    async def wait_until_at_rest(self) -> None:
         """Until the dance is alone."""
         count = 1
-        while (found := await self.until(count, Overlay)) and found[-1].limbs:  # type: ignore[attr-defined]
+        while (found := await self.wait_for(count, Overlay)) and found[-1].limbs:  # type: ignore[attr-defined]
             count = len(found) + 1
 
 
-async def stored(name: str, seed: int) -> StoredMotion:
-    library = Library.open("memory:///")
+async def stored_motion(name: str, seed: int) -> StoredMotion:
+    library = MotionStore.open("memory:///")
     await library.put(
-        name, pack(name, encode_motion(wandering_motion(2.3, 30.0, seed), ladder=(30.0, 5.0), grade="live"))
+        name, pack(name, encode_motion(random_motion(2.3, 30.0, seed), error_bounds_mm=(30.0, 5.0), grade="live"))
     )
     motion = await library.get(name)
     assert motion is not None
@@ -88,42 +88,42 @@ async def bus() -> MemoryBus:
 
 @pytest.fixture
 async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
-    await asyncio.to_thread(decode.warm)
-    motion = await stored("one", 5)
-    state = timeline.start("one", motion.track.duration_us, clock())
-    opened = Stage("s", motion, troupe_of(motion), bus, state, state.clock)
+    await asyncio.to_thread(motion_decoder.warm_up)
+    motion = await stored_motion("one", 5)
+    state = timeline.start("one", motion.first_track.duration_us, clock())
+    opened = Stage("s", motion, make_marionettes(motion), bus, state, state.clock)
     yield opened
     await opened.close()
 
 
 @dataclass
-class Person:
+class JoinedPuppeteer:
     """One who came to a stage, and what they were told."""
 
-    at: Puppeteer
-    told: list[bytes]
+    puppeteer: Puppeteer
+    received: list[bytes]
 
     @property
     def id(self) -> str:
-        return self.at.id
+        return self.puppeteer.id
 
 
-def enter(stage: Stage, name: str) -> Person:
+def join_stage(stage: Stage, name: str) -> JoinedPuppeteer:
     told: list[bytes] = []
-    return Person(stage.join(name.lower(), name, told.append), told)
+    return JoinedPuppeteer(stage.join(name.lower(), name, told.append), told)
 
 
-def granted(person: Person) -> Grant:
-    return next(m for m in map(unpack, reversed(person.told)) if isinstance(m, Grant))
+def last_grant(person: JoinedPuppeteer) -> Grant:
+    return next(m for m in map(unpack, reversed(person.received)) if isinstance(m, Grant))
 
 
 @asynccontextmanager
-async def holding(stage: Stage, person: Person, limb: int) -> AsyncIterator[None]:
+async def keep_holding(stage: Stage, person: JoinedPuppeteer, limb: int) -> AsyncIterator[None]:
     """Meanwhile they say that they hold it, however long that takes."""
 
     async def alive() -> None:
         while True:
-            stage.hear(person.at, Alive([limb]))
+            stage.receive(person.puppeteer, Alive([limb]))
             await asyncio.sleep(0.05)
 
     speaking = asyncio.create_task(alive())
@@ -134,188 +134,192 @@ async def holding(stage: Stage, person: Person, limb: int) -> AsyncIterator[None
 
 
 async def test_overlays_carry_only_pulled_limbs_and_end_with_an_empty_one(stage: Stage, bus: MemoryBus) -> None:
-    audience = Audience(bus)
-    aiko = enter(stage, "Aiko")
-    stage.hear(aiko.at, Claim(0))
-    epoch = granted(aiko).epoch
-    await audience.until(5, Overlay)
-    stage.hear(aiko.at, Input(0, Input.TARGET, epoch, 1, 0, (0.5, 0.2, 0.4)))
-    await audience.until(20, Overlay)
-    stage.hear(aiko.at, Release(0, epoch))
-    await audience.alone()
-    overlays = [m for m in audience.heard if isinstance(m, Overlay)]
+    audience = StageMessages(bus)
+    aiko = join_stage(stage, "Aiko")
+    stage.receive(aiko.puppeteer, Claim(0))
+    epoch = last_grant(aiko).epoch
+    await audience.wait_for(5, Overlay)
+    stage.receive(aiko.puppeteer, Input(0, Input.TARGET, epoch, 1, 0, (0.5, 0.2, 0.4)))
+    await audience.wait_for(20, Overlay)
+    stage.receive(aiko.puppeteer, Release(0, epoch))
+    await audience.wait_until_at_rest()
+    overlays = [m for m in audience.messages if isinstance(m, Overlay)]
     assert {tuple(o.limbs) for o in overlays} == {(0,), ()}
     assert [o.sequence for o in overlays] == list(range(overlays[0].sequence, overlays[0].sequence + len(overlays)))
     dues = np.diff([o.due for o in overlays])
-    assert (dues % FRAME == 0).all()
-    assert (dues >= FRAME * FRAMES).all()
-    assert {len(o.earlier) for o in overlays if o.limbs} <= set(range(FRAMES))
-    assert max(len(o.earlier) for o in overlays) == FRAMES - 1
+    assert (dues % FRAME_INTERVAL_US == 0).all()
+    assert (dues >= FRAME_INTERVAL_US * FRAMES_PER_MESSAGE).all()
+    assert {len(o.earlier) for o in overlays if o.limbs} <= set(range(FRAMES_PER_MESSAGE))
+    assert max(len(o.earlier) for o in overlays) == FRAMES_PER_MESSAGE - 1
     assert overlays[-1].limbs == {}
 
 
 async def test_edits_hold_for_everyone_a_lead_from_now(stage: Stage, bus: MemoryBus) -> None:
-    audience = Audience(bus)
+    audience = StageMessages(bus)
     before = stage.timeline
-    stage.edit(playing=False, position=None, loop=None)
-    (state,) = await audience.until(1, TimelineState)
+    stage.edit_timeline(playing=False, position=None, loop=None)
+    (state,) = await audience.wait_for(1, TimelineState)
     assert isinstance(state, TimelineState)
     assert (state.epoch, state.playing) == (before.epoch + 1, False)
-    assert state.clock >= before.clock + EDIT_LEAD
+    assert state.clock >= before.clock + EDIT_LEAD_US
 
 
 async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: MemoryBus) -> None:
-    audience = Audience(bus)
-    aiko = enter(stage, "Aiko")
-    two = await stored("two", 6)
-    stage.hear(aiko.at, Claim(3))
-    async with holding(stage, aiko, 3):
-        await audience.until(2, Overlay)
-        await stage.change(two)
+    audience = StageMessages(bus)
+    aiko = join_stage(stage, "Aiko")
+    two = await stored_motion("two", 6)
+    stage.receive(aiko.puppeteer, Claim(3))
+    async with keep_holding(stage, aiko, 3):
+        await audience.wait_for(2, Overlay)
+        await stage.change_motion(two)
         assert stage.timeline.motion == "two"
         assert stage.presence.limbs[3] == aiko.id
-        count = len(await audience.until(1, Overlay))
-        await audience.until(count + 3, Overlay)
+        count = len(await audience.wait_for(1, Overlay))
+        await audience.wait_for(count + 3, Overlay)
 
 
 async def test_colours_are_given_in_order_and_again_when_free(stage: Stage) -> None:
-    people = [enter(stage, f"p{n}") for n in range(6)]
-    assert [p.at.colour for p in people] == [0, 1, 2, 3, 4, 0]
-    stage.leave(people[2].at)
-    assert enter(stage, "new").at.colour == 2
+    people = [join_stage(stage, f"p{n}") for n in range(6)]
+    assert [p.puppeteer.colour for p in people] == [0, 1, 2, 3, 4, 0]
+    stage.leave(people[2].puppeteer)
+    assert join_stage(stage, "new").puppeteer.colour == 2
 
 
 async def test_a_stage_is_full_some_day(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(puppeteers, "MOST", 2)
-    enter(stage, "a")
-    enter(stage, "b")
-    with pytest.raises(Full):
-        enter(stage, "c")
+    monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 2)
+    join_stage(stage, "a")
+    join_stage(stage, "b")
+    with pytest.raises(SessionFull):
+        join_stage(stage, "c")
 
 
 @pytest.mark.usefixtures("stage")
 async def test_presence_counts_viewers_of_all_replicas(bus: MemoryBus) -> None:
-    audience = Audience(bus)
+    audience = StageMessages(bus)
     for replica, count in (("a", 3), ("b", 4), ("a", 2), ("b", 0)):
         bus.publish("session.s.viewers", msgpack.packb([replica, count]))
     # the first at once; then those of half a second together, however many replicas there are
-    counts = [p.viewers for p in await audience.until(2, Presence) if isinstance(p, Presence)]
+    counts = [p.viewers for p in await audience.wait_for(2, Presence) if isinstance(p, Presence)]
     assert counts == [3, 2]
     bus.publish("session.s.viewers", msgpack.packb(["b", 1]))
-    counts = [p.viewers for p in await audience.until(3, Presence) if isinstance(p, Presence)]
+    counts = [p.viewers for p in await audience.wait_for(3, Presence) if isinstance(p, Presence)]
     assert counts == [3, 2, 3]
 
 
 async def test_an_asked_limb_goes_to_who_asked_when_it_is_let_go(stage: Stage, bus: MemoryBus) -> None:
-    audience = Audience(bus)
-    aiko, ben = enter(stage, "Aiko"), enter(stage, "Ben")
-    stage.hear(aiko.at, Claim(1))
-    stage.hear(ben.at, Claim(1))
-    assert unpack(ben.told[-1]) == Refusal(1, "held", aiko.id)
-    stage.hear(ben.at, Ask(1, True))
+    audience = StageMessages(bus)
+    aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
+    stage.receive(aiko.puppeteer, Claim(1))
+    stage.receive(ben.puppeteer, Claim(1))
+    assert unpack(ben.received[-1]) == Refusal(1, "held", aiko.id)
+    stage.receive(ben.puppeteer, Ask(1, True))
     assert stage.presence.asks == [[], [ben.id], [], []]
-    stage.hear(aiko.at, Release(1, granted(aiko).epoch))
-    assert granted(ben).limb == 1
+    stage.receive(aiko.puppeteer, Release(1, last_grant(aiko).epoch))
+    assert last_grant(ben).limb == 1
     assert stage.presence.limbs[1] == ben.id
     assert stage.presence.asks == [[]] * 4
-    presences = [m for m in audience.heard if isinstance(m, Presence)]
+    presences = [m for m in audience.messages if isinstance(m, Presence)]
     assert [ben.id] in [p.asks[1] for p in presences]
-    stage.leave(ben.at)
+    stage.leave(ben.puppeteer)
     assert stage.presence.limbs[1] is None
 
 
 @pytest.mark.parametrize("said", [Alive([0]), Input(0, Input.TARGET, 1, 5, 0, (0.1, 0.0, 0.0))])
 async def test_who_missed_that_a_limb_was_lost_is_told_again(stage: Stage, said: Alive | Input) -> None:
-    aiko = enter(stage, "Aiko")
-    ben = enter(stage, "Ben")
-    stage.hear(aiko.at, Claim(0))
+    aiko = join_stage(stage, "Aiko")
+    ben = join_stage(stage, "Ben")
+    stage.receive(aiko.puppeteer, Claim(0))
     # it is taken from her while nothing can be said
-    stage._troupe.release(0, aiko.id, granted(aiko).epoch, clock())
+    stage._marionettes.release(0, aiko.id, last_grant(aiko).epoch, clock())
     for _ in range(5):
-        stage.hear(aiko.at, said)
-        stage.hear(ben.at, said)
-    assert not [m for m in map(unpack, ben.told) if isinstance(m, Refusal)]
-    assert [m for m in map(unpack, aiko.told) if isinstance(m, Refusal)] == [Refusal(0, "lost")]
-    stage.hear(aiko.at, Claim(0))
-    told = len(aiko.told)
-    stage.hear(aiko.at, Alive([0]))
-    assert not [m for m in map(unpack, aiko.told[told:]) if isinstance(m, Refusal)]
+        stage.receive(aiko.puppeteer, said)
+        stage.receive(ben.puppeteer, said)
+    assert not [m for m in map(unpack, ben.received) if isinstance(m, Refusal)]
+    assert [m for m in map(unpack, aiko.received) if isinstance(m, Refusal)] == [Refusal(0, "lost")]
+    stage.receive(aiko.puppeteer, Claim(0))
+    told = len(aiko.received)
+    stage.receive(aiko.puppeteer, Alive([0]))
+    assert not [m for m in map(unpack, aiko.received[told:]) if isinstance(m, Refusal)]
 
 
 async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(stage: Stage) -> None:
-    aiko, ben = enter(stage, "Aiko"), enter(stage, "Ben")
-    stage.hear(aiko.at, Claim(0))
-    epoch = granted(aiko).epoch
+    aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
+    stage.receive(aiko.puppeteer, Claim(0))
+    epoch = last_grant(aiko).epoch
     for number in range(5):
-        stage.hear(aiko.at, Input(0, Input.TARGET, epoch, number, 0, (900.0, 0.0, 0.0)))
-        stage.hear(ben.at, Input(0, Input.TARGET, epoch, number, 0, (0.1, 0.0, 0.0)))
-    told = [m for m in map(unpack, aiko.told) if isinstance(m, Notice)]
+        stage.receive(aiko.puppeteer, Input(0, Input.TARGET, epoch, number, 0, (900.0, 0.0, 0.0)))
+        stage.receive(ben.puppeteer, Input(0, Input.TARGET, epoch, number, 0, (0.1, 0.0, 0.0)))
+    told = [m for m in map(unpack, aiko.received) if isinstance(m, Notice)]
     assert [(m.limb, m.reason) for m in told] == [(0, "reach")]
-    told = [m for m in map(unpack, ben.told) if isinstance(m, Notice)]
+    told = [m for m in map(unpack, ben.received) if isinstance(m, Notice)]
     assert [(m.limb, m.reason) for m in told] == [(0, "owner")]
     assert "left hand" in told[0].detail
 
 
 async def test_the_limbs_of_all_performers_are_pulled_and_one_message_tells_of_them(bus: MemoryBus) -> None:
-    motion, audience = DANCES["both"], Audience(bus)
-    state = timeline.start("both", motion.track.duration_us, clock())
-    stage = Stage("s", motion, troupe_of(motion), bus, state, state.clock)
-    aiko, ben = enter(stage, "Aiko"), enter(stage, "Ben")
-    stage.hear(aiko.at, Claim(1))
-    stage.hear(ben.at, Claim(6))
-    assert granted(ben).limb == 6
+    motion, audience = MOTIONS["both"], StageMessages(bus)
+    state = timeline.start("both", motion.first_track.duration_us, clock())
+    stage = Stage("s", motion, make_marionettes(motion), bus, state, state.clock)
+    aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
+    stage.receive(aiko.puppeteer, Claim(1))
+    stage.receive(ben.puppeteer, Claim(6))
+    assert last_grant(ben).limb == 6
     assert stage.presence.limbs == [None, aiko.id, None, None, None, None, ben.id, None]
     assert len(stage.presence.asks) == 8
-    stage.hear(ben.at, Claim(9))
-    assert unpack(ben.told[-1]) == Refusal(9, "unknown")
+    stage.receive(ben.puppeteer, Claim(9))
+    assert unpack(ben.received[-1]) == Refusal(9, "unknown")
     for number in range(8):
-        stage.hear(aiko.at, Input(1, Input.TARGET, 1, number, 16_000 * number, (-0.6, 0.3, 0.3)))
-        stage.hear(ben.at, Input(6, Input.VELOCITY, 1, number, 16_000 * number, (0.5, 0.0, 0.0)))
-        await audience.until(len([m for m in audience.heard if isinstance(m, Overlay)]) + 1, Overlay)
-    told = [m for m in audience.heard if isinstance(m, Overlay)]
+        stage.receive(aiko.puppeteer, Input(1, Input.TARGET, 1, number, 16_000 * number, (-0.6, 0.3, 0.3)))
+        stage.receive(ben.puppeteer, Input(6, Input.VELOCITY, 1, number, 16_000 * number, (0.5, 0.0, 0.0)))
+        await audience.wait_for(len([m for m in audience.messages if isinstance(m, Overlay)]) + 1, Overlay)
+    told = [m for m in audience.messages if isinstance(m, Overlay)]
     assert {tuple(overlay.limbs) for overlay in told} == {(1, 6)}
     # an input for a limb that is nobody's here is not taken, and said so by the limb's name
-    stage.hear(ben.at, Input(12, Input.VELOCITY, 1, 1, 0, (0.5, 0.0, 0.0)))
-    assert [m.detail for m in map(unpack, ben.told) if isinstance(m, Notice)] == [
+    stage.receive(ben.puppeteer, Input(12, Input.VELOCITY, 1, 1, 0, (0.5, 0.0, 0.0)))
+    assert [m.detail for m in map(unpack, ben.received) if isinstance(m, Notice)] == [
         "the left hand of dancer 4 is not yours: an input for it was refused"
     ]
     # the second performer goes, and Ben's leg with them; Aiko's hand stays in hers
-    async with holding(stage, aiko, 1):
-        await stage.change(await stored("two", 6))
+    async with keep_holding(stage, aiko, 1):
+        await stage.change_motion(await stored_motion("two", 6))
     assert stage.presence.limbs == [None, aiko.id, None, None]
-    assert Refusal(6, "lost") in map(unpack, ben.told)
-    await audience.until(1, TimelineState)
-    stage.hear(aiko.at, Release(1, 1))
-    await audience.alone()
+    assert Refusal(6, "lost") in map(unpack, ben.received)
+    await audience.wait_for(1, TimelineState)
+    stage.receive(aiko.puppeteer, Release(1, 1))
+    await audience.wait_until_at_rest()
     await stage.close()
 
 
 async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -> None:
     """Two people pull, let go, and pull again; every frame that was published comes again from the log's bytes."""
-    audience = Audience(bus)
-    aiko, ben = enter(stage, "Aiko"), enter(stage, "Ben")
+    audience = StageMessages(bus)
+    aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
     for passage in range(2):
-        stage.hear(aiko.at, Claim(0))
-        stage.hear(ben.at, Claim(3))
-        hand, leg = granted(aiko).epoch, granted(ben).epoch
+        stage.receive(aiko.puppeteer, Claim(0))
+        stage.receive(ben.puppeteer, Claim(3))
+        hand, leg = last_grant(aiko).epoch, last_grant(ben).epoch
         for number in range(12):
-            stage.hear(aiko.at, Input(0, Input.TARGET, hand, number, 16_000 * number, (0.4, 0.05 * number - 0.2, 0.3)))
-            stage.hear(ben.at, Input(3, Input.VELOCITY, leg, number, 16_000 * number, (0.5, 0.0, 0.0)))
-            count = len([m for m in audience.heard if isinstance(m, Overlay)])
-            await audience.until(count + 1, Overlay)
-        stage.hear(aiko.at, Release(0, hand))
-        stage.hear(ben.at, Release(3, leg))
-        await audience.alone()
-        assert passage == 0 or stage.log.begin is not None
+            stage.receive(
+                aiko.puppeteer, Input(0, Input.TARGET, hand, number, 16_000 * number, (0.4, 0.05 * number - 0.2, 0.3))
+            )
+            stage.receive(ben.puppeteer, Input(3, Input.VELOCITY, leg, number, 16_000 * number, (0.5, 0.0, 0.0)))
+            count = len([m for m in audience.messages if isinstance(m, Overlay)])
+            await audience.wait_for(count + 1, Overlay)
+        stage.receive(aiko.puppeteer, Release(0, hand))
+        stage.receive(ben.puppeteer, Release(3, leg))
+        await audience.wait_until_at_rest()
+        assert passage == 0 or stage.log.begin_us is not None
     shown: dict[int, dict[int, tuple[int, ...]]] = {}
-    for overlay in audience.heard:
+    for overlay in audience.messages:
         if isinstance(overlay, Overlay):
             frames = (*overlay.earlier, overlay.limbs)
-            shown |= {overlay.due - FRAME * (len(frames) - 1 - nth): limbs for nth, limbs in enumerate(frames)}
-    motion = await stored("one", 5)
-    blocks = BlockStore(motion.track)
-    for index, packet in enumerate(motion.dance[-1]):
-        blocks.put(index, 0, decode.decode_block(motion.track, Data.unpack(packet).block))
+            shown |= {
+                overlay.due - FRAME_INTERVAL_US * (len(frames) - 1 - nth): limbs for nth, limbs in enumerate(frames)
+            }
+    motion = await stored_motion("one", 5)
+    blocks = MotionBlockStore(motion.first_track)
+    for index, packet in enumerate(motion.first_packets[-1]):
+        blocks.put(index, 0, motion_decoder.decode_motion_block(motion.first_track, Data.unpack(packet).block))
     state = stage.timeline
 
     def poses_at(due: int) -> list[rotation.Array]:
@@ -325,32 +329,32 @@ async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -
 
     again = {
         due: {limb: pack_joints(joints) for limb, joints in laid.items()}
-        for due, laid in Log.unpack(stage.log.pack()).replay(lambda _: [motion.track.figure], poses_at)
+        for due, laid in InputLog.unpack(stage.log.pack()).replay(lambda _: [motion.first_track.figure], poses_at)
     }
     # once the dance is alone nothing is noted
     assert {due: again.get(due) or {} for due in shown} == shown
 
 
 async def test_a_holder_whom_a_stalled_server_could_not_hear_keeps_the_limb(stage: Stage, bus: MemoryBus) -> None:
-    audience = Audience(bus)
-    aiko = enter(stage, "Aiko")
-    stage.hear(aiko.at, Claim(0))
-    async with holding(stage, aiko, 0):
-        shown = len(await audience.until(2, Overlay))
+    audience = StageMessages(bus)
+    aiko = join_stage(stage, "Aiko")
+    stage.receive(aiko.puppeteer, Claim(0))
+    async with keep_holding(stage, aiko, 0):
+        shown = len(await audience.wait_for(2, Overlay))
     # the machine has something else to do for longer than a lease: what Aiko says meanwhile waits at the socket
-    time.sleep(1.5e-6 * LOST_AFTER)  # noqa: ASYNC251 - it is the loop that stands still
-    await audience.until(shown + 1, Overlay)
-    async with holding(stage, aiko, 0):
-        await audience.until(shown + 8, Overlay)
+    time.sleep(1.5e-6 * INPUT_TIMEOUT_US)  # noqa: ASYNC251 - it is the loop that stands still
+    await audience.wait_for(shown + 1, Overlay)
+    async with keep_holding(stage, aiko, 0):
+        await audience.wait_for(shown + 8, Overlay)
     assert stage.presence.limbs[0] == aiko.id
 
 
 async def test_one_that_goes_on_here_tells_where_it_is_and_that_nobody_holds_a_limb(
     stage: Stage, bus: MemoryBus
 ) -> None:
-    audience = Audience(bus)
-    stage.appear()
-    state, presence, overlay = audience.heard
+    audience = StageMessages(bus)
+    stage.announce_takeover()
+    state, presence, overlay = audience.messages
     assert state == stage.timeline
     assert isinstance(presence, Presence)
     assert presence.limbs == [None] * 4

@@ -10,7 +10,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from bunraku.client import Client
-from bunraku.codec.track import read_track
+from bunraku.codec.motion_track import parse_motion_track
 from bunraku.wire.messages import (
     SUBPROTOCOL,
     ChannelHeader,
@@ -27,7 +27,7 @@ from bunraku.wire.messages import (
     TimelineState,
     unpack,
 )
-from tests.servers import clip
+from tests.servers import make_bvh_clip
 
 
 def socket(server: str, path: str, protocol: str = SUBPROTOCOL) -> connect:
@@ -40,7 +40,7 @@ async def message(connection: ClientConnection) -> Message | None:
     return unpack(data)
 
 
-async def until(connection: ClientConnection, kind: type) -> Message:
+async def receive_until(connection: ClientConnection, kind: type) -> Message:
     while not isinstance(found := await message(connection), kind):
         assert not isinstance(found, Problem), found
     assert found is not None
@@ -63,7 +63,7 @@ async def test_the_server_speaks_first_in_the_papers_order(server: str, motion: 
     assert isinstance(description, Description)
     assert isinstance(timeline, TimelineState)
     assert abs(timeline.clock - header.now) < 1_000_000
-    track = read_track(description.tracks[0])
+    track = parse_motion_track(description.tracks[0])
     best = len(description.tracks[0]["rates"]) - 1
     assert [(d.index, d.rate) for d in data if isinstance(d, Data)] == [
         (0, 0),
@@ -80,7 +80,7 @@ async def test_a_pinned_rate_is_kept_after_the_first_block(server: str, motion: 
 
 async def test_without_the_motion_track_no_block_comes(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream?tracks=camera,light") as connection:
-        await until(connection, TimelineState)
+        await receive_until(connection, TimelineState)
         await connection.send(Ping(1, 2).pack())
         assert isinstance(await message(connection), Pong)
 
@@ -106,7 +106,7 @@ async def test_blocks_over_http_are_the_same_bytes_and_may_be_kept_for_ever(serv
 async def test_pings_are_answered_with_the_time(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream") as connection:
         await connection.send(Ping(7, 123).pack())
-        pong = await until(connection, Pong)
+        pong = await receive_until(connection, Pong)
         assert isinstance(pong, Pong)
         assert (pong.sequence, pong.sent) == (7, 123)
         assert pong.received <= pong.answered
@@ -114,14 +114,14 @@ async def test_pings_are_answered_with_the_time(server: str, motion: str) -> Non
 
 async def test_a_viewers_own_timeline_is_edited_by_its_messages(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream?at=1.5") as connection:
-        first = await until(connection, TimelineState)
+        first = await receive_until(connection, TimelineState)
         assert isinstance(first, TimelineState)
         assert first.position == 1_500_000
         await connection.send(Edit(playing=False, position=200_000).pack())
-        second = await until(connection, TimelineState)
+        second = await receive_until(connection, TimelineState)
         assert isinstance(second, TimelineState)
         assert (second.epoch, second.playing, second.position) == (first.epoch + 1, False, 200_000)
-        assert isinstance(await until(connection, Data), Data)
+        assert isinstance(await receive_until(connection, Data), Data)
 
 
 async def test_unknown_messages_are_skipped(server: str, motion: str) -> None:
@@ -129,7 +129,7 @@ async def test_unknown_messages_are_skipped(server: str, motion: str) -> None:
         await connection.send(b"\x7fnews")
         await connection.send(Claim(1).pack())
         await connection.send(Ping(1, 1).pack())
-        assert isinstance(await until(connection, Pong), Pong)
+        assert isinstance(await receive_until(connection, Pong), Pong)
 
 
 @pytest.mark.parametrize(
@@ -164,13 +164,13 @@ async def test_what_is_wrong_is_said_and_the_socket_closed(
 
 async def test_where_a_paused_session_is_sought_to_is_sent_at_once(server: str, tmp_path: Path) -> None:
     source = tmp_path / "long.bvh"
-    source.write_bytes(clip(8.0, 31))
+    source.write_bytes(make_bvh_clip(8.0, 31))
     async with Client(server) as client:
         session = await client.open_session((await client.upload(source))["id"], playing=False)
         async with socket(server, f"/v1/sessions/{session['id']}/stream") as connection:
-            await until(connection, Choice)
+            await receive_until(connection, Choice)
             await client.edit_session(session["id"], position=6_000_000)
-            found = await until(connection, Data)
+            found = await receive_until(connection, Data)
     assert isinstance(found, Data)
     assert found.index >= 5
 
@@ -198,18 +198,18 @@ async def test_of_a_stage_that_stands_the_blocks_on_show_of_all_performers_come_
 
 async def test_a_dance_that_is_paused_comes_at_its_best_where_it_stands(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream") as connection:
-        await until(connection, Choice)
+        await receive_until(connection, Choice)
         await connection.send(Edit(playing=False, position=100_000).pack())
-        data = await until(connection, Data)
+        data = await receive_until(connection, Data)
     assert isinstance(data, Data)
     assert (data.index, data.rate) == (0, 4)
 
 
-async def heard_before_answer(server: str, address: str) -> tuple[bool, list[tuple[int, int]]]:
+async def frames_before_upgrade(server: str, address: str) -> tuple[bool, list[tuple[int, int]]]:
     """Whether what comes back is described, and track and index of the blocks that come, until a Ping is answered."""
     described, blocks = False, []
     async with socket(server, address) as connection:
-        await until(connection, ChannelHeader)
+        await receive_until(connection, ChannelHeader)
         await connection.send(Ping(1, 2).pack())
         while not isinstance(found := await message(connection), Pong):
             described = described or isinstance(found, Description)
@@ -223,10 +223,10 @@ async def test_who_comes_back_is_sent_what_it_does_not_hold_of_any_performer(ser
         pair = (await client.add_performers(motion, [motion]))["id"]
     # all of a dance of 3.4 s is within reach, but what is not there is sent: of the second its last block
     stream = f"/v1/motions/{pair}/stream?tracks=motion"
-    assert await heard_before_answer(server, f"{stream}&have={pair}.0.4444.2.0.4h-") == (False, [(1, 3)])
-    assert await heard_before_answer(server, f"{stream}&have={pair}.0.4444.2.0.4i") == (False, [])
+    assert await frames_before_upgrade(server, f"{stream}&have={pair}.0.4444.2.0.4h-") == (False, [(1, 3)])
+    assert await frames_before_upgrade(server, f"{stream}&have={pair}.0.4444.2.0.4i") == (False, [])
     # clients that tell of the first alone are sent the others whole
-    assert await heard_before_answer(server, f"{stream}&have={pair}.0.4444.2") == (False, [(1, n) for n in range(4)])
+    assert await frames_before_upgrade(server, f"{stream}&have={pair}.0.4444.2") == (False, [(1, n) for n in range(4)])
 
 
 @pytest.mark.parametrize("have", ["2.1.2G", "2.1.g", "2.1", "2" + ".1.2" * 4, "2.1." + "2z" * 32])
@@ -243,7 +243,7 @@ async def test_what_cannot_be_read_of_what_is_held_is_said(server: str, motion: 
 
 async def test_more_may_be_said_to_be_held_than_there_is(server: str, motion: str) -> None:
     most = ".9999999.fzfzfzf" * 3
-    described, blocks = await heard_before_answer(
+    described, blocks = await frames_before_upgrade(
         server, f"/v1/motions/{motion}/stream?have={motion}.9999999.{'f' * 64}.99{most}"
     )
     assert (described, blocks) == (False, [])

@@ -5,42 +5,42 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bunraku.motion.skeleton import INDEX, world
-from tests.vectors.blocks import wandering_motion
+from bunraku.motion.skeleton import JOINT_INDEX, world_transforms
+from tests.vectors.blocks import random_motion
 from training import corpus
 
 
 def test_a_mirrored_dance_is_the_dance_in_a_mirror() -> None:
-    motion = wandering_motion(0.5, 30.0, 3)
-    twin = corpus.mirrored(motion)
-    here = world(motion.figure, motion.root, motion.rotations)[0]
-    there = world(twin.figure, twin.root, twin.rotations)[0]
+    motion = random_motion(0.5, 30.0, 3)
+    twin = corpus.mirror_motion(motion)
+    here = world_transforms(motion.figure, motion.root, motion.rotations)[0]
+    there = world_transforms(twin.figure, twin.root, twin.rotations)[0]
     flip = np.array([-1.0, 1.0, 1.0])
-    np.testing.assert_allclose(there[:, INDEX["l_wrist"]], here[:, INDEX["r_wrist"]] * flip, atol=1e-9)
-    np.testing.assert_allclose(there[:, INDEX["skullbase"]], here[:, INDEX["skullbase"]] * flip, atol=1e-9)
+    np.testing.assert_allclose(there[:, JOINT_INDEX["l_wrist"]], here[:, JOINT_INDEX["r_wrist"]] * flip, atol=1e-9)
+    np.testing.assert_allclose(there[:, JOINT_INDEX["skullbase"]], here[:, JOINT_INDEX["skullbase"]] * flip, atol=1e-9)
 
 
 def test_only_licensed_motion_is_learned_from(tmp_path: Path) -> None:
     (tmp_path / "CORPUS.csv").write_text(
         "clip,licence_as_stated\na,MIT\nb,repo LICENSE Apache-2.0; motion origin not stated\nc,\n", encoding="utf-8"
     )
-    assert corpus.licensed(tmp_path) == {"a"}
+    assert corpus.licensed_clips(tmp_path) == {"a"}
 
 
 def test_families_and_an_empty_folder(tmp_path: Path) -> None:
-    assert [corpus.family(name) for name in ("perfume_A", "isaac_01_01", "mass_cart", "13_07")] == [
+    assert [corpus.clip_family(name) for name in ("perfume_A", "isaac_01_01", "mass_cart", "13_07")] == [
         "perfume",
         "isaac",
         "mass",
         "cmu",
     ]
     with pytest.raises(FileNotFoundError, match="hanim19"):
-        corpus.names(tmp_path)
+        corpus.list_clips(tmp_path)
 
 
 def test_real_clips_are_read(shared: Path) -> None:
     folder = shared / "mocap"
-    assert corpus.licensed(folder) < set(corpus.names(folder))
-    motion = corpus.load(folder, "perfume_C")
-    assert (motion.fps, motion.frames) == (40.0, 1299)
+    assert corpus.licensed_clips(folder) < set(corpus.list_clips(folder))
+    motion = corpus.load_clip(folder, "perfume_C")
+    assert (motion.fps, motion.frame_count) == (40.0, 1299)
     np.testing.assert_allclose(np.linalg.norm(motion.rotations, axis=-1), 1, atol=1e-9)

@@ -2,8 +2,8 @@
 
 from tests.vectors import arm, golden
 
-for name, text in golden.files().items():
-    (golden.FOLDER / name).write_text(text, encoding="utf-8")
-    print(golden.FOLDER / name)
-arm.write()
-print(arm.FILE)
+for name, text in golden.render_files().items():
+    (golden.VECTORS_FOLDER / name).write_text(text, encoding="utf-8")
+    print(golden.VECTORS_FOLDER / name)
+arm.write_vectors()
+print(arm.VECTORS_FILE)

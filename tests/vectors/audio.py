@@ -6,11 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.codec.audio import AudioTrack, audio_track, describe_audio, in_blocks, most_samples, unpack_audio
+from bunraku.codec.audio import (
+    AudioTrack,
+    create_audio_track,
+    describe_audio_track,
+    max_samples,
+    pack_audio_level,
+    unpack_audio_block,
+)
 from bunraku.codec.timing import Timing
-from tests.vectors.blocks import text
+from tests.vectors.blocks import to_base64
 
-HEADS = b"\x18", b"\x58", b"\xff\x83", b"\xfb\x43"
+PACKET_PREFIXES = b"\x18", b"\x58", b"\xff\x83", b"\xfb\x43"
 """First bytes of packets of 60 ms: SILK of one frame, CELT of three."""
 TIMINGS = (
     Timing(30.0, 78, 30, 15),
@@ -20,34 +27,37 @@ TIMINGS = (
 """Of motions: a short first block; starts between microseconds; blocks shorter than a packet."""
 
 
-def packets(count: int, most: int, seed: int) -> list[bytes]:
+def random_packets(count: int, max_bytes: int, seed: int) -> list[bytes]:
     """Packets of 60 ms and up to `most` bytes."""
     random = np.random.default_rng(seed)
-    sizes = random.integers(2, most, count)
-    return [HEADS[random.integers(len(HEADS))] + random.bytes(int(size)) for size in sizes]
+    sizes = random.integers(2, max_bytes, count)
+    return [PACKET_PREFIXES[random.integers(len(PACKET_PREFIXES))] + random.bytes(int(size)) for size in sizes]
 
 
-def vector(track: AudioTrack, number: int, index: int, data: bytes) -> dict[str, Any]:
+def block_vector(track: AudioTrack, number: int, index: int, data: bytes) -> dict[str, Any]:
     """A valid block of track `number` and what it holds: of each packet its number, its first sample and its bytes."""
     return {
         "track": number,
         "index": index,
-        "block": text(data),
+        "block": to_base64(data),
         "packets": [
-            {"number": packet.number, "sample": track.first_sample(packet.number), "data": text(packet.data)}
-            for packet in unpack_audio(data)
+            {"number": packet.number, "sample": track.first_sample(packet.number), "data": to_base64(packet.data)}
+            for packet in unpack_audio_block(data)
         ],
     }
 
 
-def make() -> dict[str, Any]:
+def make_vectors() -> dict[str, Any]:
     """Tracks beside motions of some timing, blocks of each, and what is no block."""
     tracks = [
-        audio_track(TIMINGS[0], 2, 120, most_samples(TIMINGS[0])),
-        audio_track(TIMINGS[1], 1, 312, 100_000),
-        audio_track(TIMINGS[2], 1, 0, most_samples(TIMINGS[2])),
+        create_audio_track(TIMINGS[0], 2, 120, max_samples(TIMINGS[0])),
+        create_audio_track(TIMINGS[1], 1, 312, 100_000),
+        create_audio_track(TIMINGS[2], 1, 0, max_samples(TIMINGS[2])),
     ]
-    rates = [in_blocks(track, packets(track.packets, 3 + 200 * n * n, n)) for n, track in enumerate(tracks)]
+    rates = [
+        pack_audio_level(track, random_packets(track.packet_count, 3 + 200 * n * n, n))
+        for n, track in enumerate(tracks)
+    ]
     packet = b"\x18abc"
     invalid = {
         "no packet": b"\x05",
@@ -72,11 +82,13 @@ def make() -> dict[str, Any]:
             }
             for timing in TIMINGS
         ],
-        "tracks": [describe_audio(track, [round(rate.kbps, 3)]) for track, rate in zip(tracks, rates, strict=True)],
+        "tracks": [
+            describe_audio_track(track, [round(rate.kbps, 3)]) for track, rate in zip(tracks, rates, strict=True)
+        ],
         "valid": [
-            vector(track, number, index, block)
+            block_vector(track, number, index, block)
             for number, (track, rate) in enumerate(zip(tracks, rates, strict=True))
             for index, block in enumerate(rate.blocks)
         ],
-        "invalid": [{"why": why, "block": text(data)} for why, data in invalid.items()],
+        "invalid": [{"why": why, "block": to_base64(data)} for why, data in invalid.items()],
     }

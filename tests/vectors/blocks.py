@@ -9,21 +9,21 @@ from typing import Any, Literal
 import numpy as np
 
 from bunraku.codec import coefficients
-from bunraku.codec.coefficients import Head
-from bunraku.codec.decode import decode_block
-from bunraku.codec.prior import Integers, shipped
-from bunraku.codec.search import BlockEncoder
-from bunraku.codec.track import MotionTrack, plan
+from bunraku.codec.block_encoder import BlockEncoder
+from bunraku.codec.coefficients import BlockHeader
+from bunraku.codec.motion_decoder import decode_motion_block
+from bunraku.codec.motion_track import MotionTrack, plan_motion_track
+from bunraku.codec.prior import IntArray, load_shipped_prior
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import CHANNEL_COUNT, JOINT_COUNT, Motion, standard_figure
 
 
-def text(data: bytes) -> str:
+def to_base64(data: bytes) -> str:
     """Bytes in base64."""
     return base64.b64encode(data).decode()
 
 
-def wandering_motion(seconds: float, fps: float, seed: int) -> Motion:
+def random_motion(seconds: float, fps: float, seed: int) -> Motion:
     """Smooth arbitrary movement of every channel, whole turns of the root included."""
     random = np.random.default_rng(seed)
     frames = round(seconds * fps)
@@ -38,15 +38,15 @@ def wandering_motion(seconds: float, fps: float, seed: int) -> Motion:
     return Motion(standard_figure(), fps, root, rotation.from_rotation_vector(tracks[:, 1:]))
 
 
-def wild(random: np.random.Generator, count: int, most: int) -> Integers:
+def random_coefficients(random: np.random.Generator, count: int, max_magnitude: int) -> IntArray:
     """Sparse coefficients (19, 3, `count`) of every size from one to `most`."""
-    size = np.floor(2.0 ** random.uniform(0, np.log2(most + 1), (CHANNEL_COUNT, 3, count))).astype(np.int64)
+    size = np.floor(2.0 ** random.uniform(0, np.log2(max_magnitude + 1), (CHANNEL_COUNT, 3, count))).astype(np.int64)
     here = random.random(size.shape) < random.choice([0.05, 0.5, 0.95], (CHANNEL_COUNT, 1, 1))
-    quantised: Integers = size * here * random.choice([-1, 1], size.shape)
+    quantised: IntArray = size * here * random.choice([-1, 1], size.shape)
     return quantised
 
 
-def head(numbers: list[tuple[int, int]], frames: int | None = None, scene: bool = False) -> bytes:
+def encode_header(numbers: list[tuple[int, int]], frames: int | None = None, scene: bool = False) -> bytes:
     """The head of a block of `frames` frames (None: as usual) that says any `numbers` (value, bits) after them, by
     the definition of the range coder in whole numbers of any size; a `scene`'s has no bit for its channels. It is the
     lowest number of its interval, so zeros behind it read as ones for ever."""
@@ -65,16 +65,16 @@ def head(numbers: list[tuple[int, int]], frames: int | None = None, scene: bool 
     return low.to_bytes(size, "big")
 
 
-def vector(track: MotionTrack, number: int, data: bytes) -> dict[str, Any]:
+def block_vector(track: MotionTrack, number: int, data: bytes) -> dict[str, Any]:
     """A valid block of track `number` and what it decodes to."""
-    start, q = coefficients.decode(shipped(), data, track.block_frames, track.fps)
-    block, poses = decode_block(track, data), []
+    start, q = coefficients.decode_coefficients(load_shipped_prior(), data, track.block_frames, track.fps)
+    block, poses = decode_motion_block(track, data), []
     for instant in (0.0, start.frames / 3 - 0.5, start.frames - 1.0, start.frames - 0.5):
-        root, rotations = block.at(instant)
+        root, rotations = block.pose_at(instant)
         poses.append({"instant": instant, "root": root[0].tolist(), "rotations": rotations[0].ravel().tolist()})
     return {
         "track": number,
-        "block": text(data),
+        "block": to_base64(data),
         "frames": start.frames,
         "step": start.step,
         "heading": start.heading,
@@ -83,14 +83,14 @@ def vector(track: MotionTrack, number: int, data: bytes) -> dict[str, Any]:
     }
 
 
-def describe(track: MotionTrack) -> dict[str, Any]:
+def track_vector(track: MotionTrack) -> dict[str, Any]:
     """A track's fields as a Description has them, and its weights."""
     return {
         "fps": track.fps,
         "frames": track.frames,
         "block_frames": track.block_frames,
         "first_frames": track.first_frames,
-        "dancer": text(track.dancer.pack()),
+        "dancer": to_base64(track.skeleton.pack()),
         "offsets": track.figure.offsets.ravel().tolist(),
         "tips": track.figure.tips.ravel().tolist(),
         "reference": track.reference_rotations().ravel().tolist(),
@@ -98,14 +98,14 @@ def describe(track: MotionTrack) -> dict[str, Any]:
     }
 
 
-def make() -> dict[str, Any]:
+def make_vectors() -> dict[str, Any]:
     """Tracks; blocks of several lengths and steps with coefficients and poses; and broken ones with the reason."""
-    motion, swift = wandering_motion(2.6, 30.0, 7), wandering_motion(1.1, 59.94, 8)
-    even = replace(plan(motion), block_frames=30, first_frames=30)
-    quick = plan(swift, 0.5, 0.1, mean=2.0)
+    motion, swift = random_motion(2.6, 30.0, 7), random_motion(1.1, 59.94, 8)
+    even = replace(plan_motion_track(motion), block_frames=30, first_frames=30)
+    quick = plan_motion_track(swift, 0.5, 0.1, mean_error_mm=2.0)
     stood = np.repeat(motion.rotations[3:4], 20, axis=0)
     statue = Motion(standard_figure(), 24.0, motion.root[:20] * 0, stood)
-    still = plan(statue)
+    still = plan_motion_track(statue)
     tracks = [even, quick, still]
     valid = []
     goals: tuple[tuple[int, Motion, int, int, Literal["first", "mean"]], ...] = (
@@ -119,8 +119,8 @@ def make() -> dict[str, Any]:
         (2, statue, 0, 120, "mean"),
     )
     for number, of, index, step, goal in goals:
-        coded = BlockEncoder(tracks[number], of, shipped()).block(index, step, goal)
-        valid.append(vector(tracks[number], number, coded.data))
+        coded = BlockEncoder(tracks[number], of, load_shipped_prior()).encode_block(index, step, goal)
+        valid.append(block_vector(tracks[number], number, coded.data))
     random = np.random.default_rng(9)
     for number, frames, step, heading, count, most in (
         (0, 30, 0, 0, 0, 1),
@@ -132,21 +132,23 @@ def make() -> dict[str, Any]:
         (2, 512, 100, -1, 40, 1 << 8),
     ):
         track = tracks[number]
-        q = wild(random, count, most)
-        data = coefficients.encode(shipped(), Head(frames, step, heading), q, track.block_frames, track.fps)
-        valid.append(vector(track, number, data))
+        q = random_coefficients(random, count, most)
+        data = coefficients.encode_coefficients(
+            load_shipped_prior(), BlockHeader(frames, step, heading), q, track.block_frames, track.fps
+        )
+        valid.append(block_vector(track, number, data))
     rest = [(9, 8), (32, 6)]
     invalid = {
         "empty: more frequencies than frames": b"",
-        "no frames": head(rest, 0),
-        "too many frames": head([*rest, (4, 10)], 513),
-        "more frequencies than frames": head([*rest, (5, 3)], 4),
-        "more frequencies than the usual frames": head([*rest, (31, 5)]),
-        "an escape too long": head([*rest, (1, 5)]) + bytes(30),
+        "no frames": encode_header(rest, 0),
+        "too many frames": encode_header([*rest, (4, 10)], 513),
+        "more frequencies than frames": encode_header([*rest, (5, 3)], 4),
+        "more frequencies than the usual frames": encode_header([*rest, (31, 5)]),
+        "an escape too long": encode_header([*rest, (1, 5)]) + bytes(30),
         "too large": base64.b64decode(valid[-1]["block"]) + bytes(65_536),
     }
     return {
-        "tracks": [describe(track) for track in tracks],
+        "tracks": [track_vector(track) for track in tracks],
         "valid": valid,
-        "invalid": [{"why": why, "block": text(data)} for why, data in invalid.items()],
+        "invalid": [{"why": why, "block": to_base64(data)} for why, data in invalid.items()],
     }

@@ -31,40 +31,40 @@ from bunraku.wire.messages import (
     Welcome,
 )
 from bunraku.wire.overlay import Overlay
-from tests.vectors.blocks import text
+from tests.vectors.blocks import to_base64
 
-NOW = 1_774_000_000_123_456
+NOW_US = 1_774_000_000_123_456
 
 
-def _plain(value: Any) -> Any:
+def _to_json(value: Any) -> Any:
     if isinstance(value, bytes):
-        return {"base64": text(value)}
+        return {"base64": to_base64(value)}
     if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return {str(k): _to_json(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
+        return [_to_json(v) for v in value]
     return value
 
 
-def _vector(message: Message, data: bytes) -> dict[str, Any]:
+def _message_vector(message: Message, data: bytes) -> dict[str, Any]:
     fields = {f.name: getattr(message, f.name) for f in dataclasses.fields(message)}
-    return {"name": type(message).__name__, "type": message.TYPE, "fields": _plain(fields), "bytes": text(data)}
+    return {"name": type(message).__name__, "type": message.TYPE, "fields": _to_json(fields), "bytes": to_base64(data)}
 
 
-def make() -> dict[str, Any]:
+def make_vectors() -> dict[str, Any]:
     """One of every message with its fields, and broken ones with the reason."""
     examples: list[Message] = [
-        ChannelHeader(motion="k3v9q", now=NOW, channels=19, software="0.1.0"),
+        ChannelHeader(motion="k3v9q", now=NOW_US, channels=19, software="0.1.0"),
         Description("k3v9q", [{"type": "motion", "fps": 60.0, "figure": bytes(range(138))}]),
         Description("k3v9q", [{"type": "audio"}, {"type": "light"}], first=1),
         Data(0, 3, 86_399, b"\x01block"),
         Data(1, 0, 5, b""),
-        TimelineState(7, "k3v9q", NOW, 1_500_000, True, False, 32_475_000),
-        Overlay(65_535, NOW, {0: (1, -2, 3, -32_767, 32_767, 0, 7, 8, 9), 3: (0, 0, 0, 1, 1, 1, -5, -6, -7)}),
-        Overlay(0, NOW, {}),
+        TimelineState(7, "k3v9q", NOW_US, 1_500_000, True, False, 32_475_000),
+        Overlay(65_535, NOW_US, {0: (1, -2, 3, -32_767, 32_767, 0, 7, 8, 9), 3: (0, 0, 0, 1, 1, 1, -5, -6, -7)}),
+        Overlay(0, NOW_US, {}),
         Presence(3, [{"id": "a1", "name": "Aiko あ", "colour": 0}], ["a1", None, None, None]),
         Presence(0, [], [None] * 4, [["b2", "c3"], [], [], ["b2"]]),
-        Pong(4_000_000_000, 123_456_789_012, NOW, NOW + 31),
+        Pong(4_000_000_000, 123_456_789_012, NOW_US, NOW_US + 31),
         Problem("Too slow", "40 messages waited"),
         Welcome("a1", 4, 120_000),
         Grant(2, 9),
@@ -82,27 +82,27 @@ def make() -> dict[str, Any]:
         Ask(3, False),
         Overlay(
             7,
-            NOW,
+            NOW_US,
             {1: (3, 6, 9, -3, -6, -9, 32_767, 0, 1), 2: (0, 0, 30, 0, 0, 60, 0, 0, 90)},
             (
                 {1: (1, 2, 3, -1, -2, -3, 32_765, 0, -1), 2: (0, 0, 10, 0, 0, 20, 0, 0, 30)},
                 {1: (2, 4, 6, -2, -4, -6, 32_766, 0, 0), 2: (0, 0, 20, 0, 0, 40, 0, 0, 60)},
             ),
         ),
-        Overlay(8, NOW, {4: (5, -5, 5, -5, 5, -5, 5, -5, 5)}),
+        Overlay(8, NOW_US, {4: (5, -5, 5, -5, 5, -5, 5, -5, 5)}),
         Overlay(
             9,
-            NOW,
+            NOW_US,
             {0: (1, 2, 3, 4, 5, 6, 7, 8, 9), 6: (0, 0, 3, 0, 0, 6, 0, 0, 9), 15: (-1, 0, 0, -2, 0, 0, -3, 0, 0)},
             ({0: (0,) * 9, 6: (0, 0, 1, 0, 0, 2, 0, 0, 3), 15: (1, 0, 0, 2, 0, 0, 3, 0, 0)},),
         ),
         Claim(13),
-        Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)),
+        Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)),
         Choice(2, "line", 27_400),
         Choice(4, "best"),
-        Input(2, Input.VELOCITY, 9, 13, NOW, (-1.0, 0.0, 0.0)),
+        Input(2, Input.VELOCITY, 9, 13, NOW_US, (-1.0, 0.0, 0.0)),
     ]
-    target = Input(1, Input.TARGET, 9, 12, NOW, (0.5, -0.25, 0.125)).pack()
+    target = Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)).pack()
     invalid = {
         "empty": b"",
         "limb past the last": Claim(0).pack()[:-1] + b"\x10",
@@ -124,8 +124,8 @@ def make() -> dict[str, Any]:
     alone = Presence(3, [], ["a1", None, None, None])
     older = bytes([6]) + msgpack.packb({"viewers": 3, "puppeteers": [], "limbs": alone.limbs})
     return {
-        "valid": [_vector(message, message.pack()) for message in examples],
-        "older": [{"why": "presence without asks: nobody asks", **_vector(alone, older)}],
-        "skipped": [text(b"\x3f later"), text(b"\xff")],
-        "invalid": [{"why": why, "bytes": text(data)} for why, data in invalid.items()],
+        "valid": [_message_vector(message, message.pack()) for message in examples],
+        "older": [{"why": "presence without asks: nobody asks", **_message_vector(alone, older)}],
+        "skipped": [to_base64(b"\x3f later"), to_base64(b"\xff")],
+        "invalid": [{"why": why, "bytes": to_base64(data)} for why, data in invalid.items()],
     }

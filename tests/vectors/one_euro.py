@@ -9,7 +9,7 @@ import numpy as np
 from bunraku.client.one_euro import OneEuro
 
 
-def make() -> list[dict[str, Any]]:
+def make_vectors() -> list[dict[str, Any]]:
     """Runs of several settings, of vectors of one, two and three numbers."""
     random = np.random.default_rng(12)
     runs = []

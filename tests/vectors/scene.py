@@ -8,40 +8,42 @@ from typing import Any
 import numpy as np
 
 from bunraku.codec import coefficients
-from bunraku.codec.coefficients import SCENE_CHANNELS, Head
-from bunraku.codec.prior import Integers, shipped
-from bunraku.codec.scene import Scene, SceneTrack
-from bunraku.codec.scene_decode import decode_scene
-from bunraku.codec.scene_encode import encode_scene
-from tests.vectors.blocks import head, text
+from bunraku.codec.coefficients import SCENE_CHANNEL_COUNT, BlockHeader
+from bunraku.codec.prior import IntArray, load_shipped_prior
+from bunraku.codec.scene import SceneSamples, SceneTrack
+from bunraku.codec.scene_decoder import decode_scene_block
+from bunraku.codec.scene_encoder import encode_scene
+from tests.vectors.blocks import encode_header, to_base64
 
 
-def camera(seconds: float, fps: float) -> Scene:
+def sample_camera(seconds: float, fps: float) -> SceneSamples:
     """Round the dancer at about three metres, from either side, nearing and zooming."""
     t = np.arange(round(seconds * fps)) * (2 * np.pi / fps)
     angle, distance = 0.5 * np.sin(t / 11), 3.2 + 0.6 * np.sin(t / 7 + 1)
     position = [distance * np.sin(angle), 1.4 + 0.3 * np.sin(t / 9), distance * np.cos(angle)]
     gaze = [0.4 * np.sin(t / 5), 1.0 + 0.1 * np.sin(t / 2.3), 0.3 * np.cos(t / 6)]
-    return Scene("camera", fps, np.stack([*position, *gaze, np.radians(40 + 8 * np.sin(t / 8))], axis=1))
+    return SceneSamples("camera", fps, np.stack([*position, *gaze, np.radians(40 + 8 * np.sin(t / 8))], axis=1))
 
 
-def light(seconds: float, fps: float) -> Scene:
+def sample_light(seconds: float, fps: float) -> SceneSamples:
     """A lamp that sways, turns from warm to blue and is dimmed to nothing and up again; 800 at its full."""
     t = np.arange(round(seconds * fps)) * (2 * np.pi / fps)
     position = [2 + 0.2 * np.sin(t / 3), 4 + 0.1 * np.cos(t / 3), 1 + 0 * t]
     blue = 0.5 + 0.5 * np.sin(t / 4)
     intensity = 800 * np.maximum(0, np.cos(t / 5)) ** 2
-    return Scene("light", fps, np.stack([*position, 1 - 0.6 * blue, 0.8 - 0.2 * blue, blue, intensity], axis=1))
+    return SceneSamples("light", fps, np.stack([*position, 1 - 0.6 * blue, 0.8 - 0.2 * blue, blue, intensity], axis=1))
 
 
-def vector(track: SceneTrack, number: int, data: bytes) -> dict[str, Any]:
+def block_vector(track: SceneTrack, number: int, data: bytes) -> dict[str, Any]:
     """A valid block of track `number` and what it decodes to."""
-    start, q = coefficients.decode(shipped(), data, track.block_frames, track.fps, SCENE_CHANNELS)
+    start, q = coefficients.decode_coefficients(
+        load_shipped_prior(), data, track.block_frames, track.fps, SCENE_CHANNEL_COUNT
+    )
     instants = (0.0, start.frames / 3 - 0.5, start.frames - 1.0, start.frames - 0.5)
-    values = decode_scene(track, data).at(np.array(instants))
+    values = decode_scene_block(track, data).values_at(np.array(instants))
     return {
         "track": number,
-        "block": text(data),
+        "block": to_base64(data),
         "frames": start.frames,
         "step": start.step,
         "q": q.ravel().tolist(),
@@ -49,26 +51,28 @@ def vector(track: SceneTrack, number: int, data: bytes) -> dict[str, Any]:
     }
 
 
-def _wild(random: np.random.Generator, count: int, most: int) -> Integers:
-    size = np.floor(2.0 ** random.uniform(0, np.log2(most + 1), (SCENE_CHANNELS, 3, count))).astype(np.int64)
-    quantised: Integers = size * random.choice([-1, 0, 1], size.shape)
+def _random_coefficients(random: np.random.Generator, count: int, max_magnitude: int) -> IntArray:
+    size = np.floor(2.0 ** random.uniform(0, np.log2(max_magnitude + 1), (SCENE_CHANNEL_COUNT, 3, count))).astype(
+        np.int64
+    )
+    quantised: IntArray = size * random.choice([-1, 0, 1], size.shape)
     quantised[2, 1:] = 0
     return quantised
 
 
-def make() -> dict[str, Any]:
+def make_vectors() -> dict[str, Any]:
     """Tracks as in a Description; blocks of several lengths and steps; and broken ones of the first track."""
-    still = Scene("camera", 24.0, np.repeat(camera(0.1, 24.0).values[:1], 30, axis=0))
+    still = SceneSamples("camera", 24.0, np.repeat(sample_camera(0.1, 24.0).values[:1], 30, axis=0))
     scenes = (
-        encode_scene(camera(2.6, 30.0), ladder=(20.0, 1.0)),
-        encode_scene(light(2.6, 59.94), 0.5, ladder=(10.0,), first_seconds=0.1),
-        encode_scene(still, ladder=(1.0,)),
+        encode_scene(sample_camera(2.6, 30.0), error_bounds_mm=(20.0, 1.0)),
+        encode_scene(sample_light(2.6, 59.94), 0.5, error_bounds_mm=(10.0,), first_seconds=0.1),
+        encode_scene(still, error_bounds_mm=(1.0,)),
     )
     tracks = [scene.track for scene in scenes]
     valid = [
-        vector(tracks[number], number, data)
+        block_vector(tracks[number], number, data)
         for number, scene in enumerate(scenes)
-        for rate in scene.rates
+        for rate in scene.ladder
         for data in rate.blocks
     ]
     random = np.random.default_rng(10)
@@ -81,20 +85,22 @@ def make() -> dict[str, Any]:
         (0, 60, 255, 60, 1 << 19),
     ):
         track = tracks[number]
-        q = _wild(random, count, most)
-        data = coefficients.encode(shipped(), Head(frames, step, 0), q, track.block_frames, track.fps)
-        valid.append(vector(track, number, data))
+        q = _random_coefficients(random, count, most)
+        data = coefficients.encode_coefficients(
+            load_shipped_prior(), BlockHeader(frames, step, 0), q, track.block_frames, track.fps
+        )
+        valid.append(block_vector(track, number, data))
     usual = tracks[0].block_frames
     invalid = {
-        "no frames": head([(9, 8)], 0, scene=True),
-        "too many frames": head([(9, 8), (4, 10)], 513, scene=True),
-        "more frequencies than frames": head([(9, 8), (5, 3)], 4, scene=True),
-        "more frequencies than the usual frames": head([(9, 8), (usual + 1, usual.bit_length())], scene=True),
-        "an escape too long": head([(9, 8), (1, usual.bit_length())], scene=True) + bytes(30),
+        "no frames": encode_header([(9, 8)], 0, scene=True),
+        "too many frames": encode_header([(9, 8), (4, 10)], 513, scene=True),
+        "more frequencies than frames": encode_header([(9, 8), (5, 3)], 4, scene=True),
+        "more frequencies than the usual frames": encode_header([(9, 8), (usual + 1, usual.bit_length())], scene=True),
+        "an escape too long": encode_header([(9, 8), (1, usual.bit_length())], scene=True) + bytes(30),
         "too large": base64.b64decode(valid[-1]["block"]) + bytes(65_536),
     }
     return {
         "tracks": [scene.describe() for scene in scenes],
         "valid": valid,
-        "invalid": [{"why": why, "block": text(data)} for why, data in invalid.items()],
+        "invalid": [{"why": why, "block": to_base64(data)} for why, data in invalid.items()],
     }

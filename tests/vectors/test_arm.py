@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.marionette import table
+from bunraku.marionette import bend_table
 from tests.vectors import arm
 
 
@@ -29,17 +29,17 @@ def compare(made: Any, stored: Any, where: str) -> None:
 
 
 def test_making_them_again_gives_the_committed_file() -> None:
-    stored = json.loads(arm.FILE.read_text())
-    made = arm.make()
+    stored = json.loads(arm.VECTORS_FILE.read_text())
+    made = arm.make_vectors()
     compare(made, stored, "arm.json")
     for one, other in zip(made["arms"], stored["arms"], strict=True):
-        here, there = (table.from_bytes(base64.b64decode(vectors["table"])) for vectors in (one, other))
+        here, there = (bend_table.parse_bend_table(base64.b64decode(vectors["table"])) for vectors in (one, other))
         # one step of a float16 near 1, should a bisection end on the other side of a rounding
         assert float(np.abs(here.astype(np.float64) - there.astype(np.float64)).max()) <= 2.0**-11
 
 
 def test_the_committed_tables_are_what_their_digests_say() -> None:
-    for vectors in json.loads(arm.FILE.read_text())["arms"]:
+    for vectors in json.loads(arm.VECTORS_FILE.read_text())["arms"]:
         data = base64.b64decode(vectors["table"])
-        assert len(data) == table.TABLE_BYTES
+        assert len(data) == bend_table.TABLE_BYTES
         assert hashlib.sha256(data).hexdigest() == vectors["sha256"]

@@ -6,31 +6,31 @@ import base64
 
 import pytest
 
-from bunraku.codec.audio import pack_audio, read_audio, unpack_audio
+from bunraku.codec.audio import pack_audio_block, parse_audio_track, unpack_audio_block
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.timing import read_timing
+from bunraku.codec.timing import parse_timing
 from tests.vectors.test_golden import committed
 
 
 def test_golden_blocks_are_read_and_written_as_they_stand() -> None:
     ours = committed("audio.json")
     tracks = [
-        read_audio(track, read_timing(motion, "motion"))
+        parse_audio_track(track, parse_timing(motion, "motion"))
         for track, motion in zip(ours["tracks"], ours["motions"], strict=True)
     ]
     for valid in ours["valid"]:
         block = base64.b64decode(valid["block"])
-        packets = unpack_audio(block)
+        packets = unpack_audio_block(block)
         told = [
             {"number": number, "sample": tracks[valid["track"]].first_sample(number), "data": data}
             for number, data in packets
         ]
         assert told == [packet | {"data": base64.b64decode(packet["data"])} for packet in valid["packets"]]
         assert all(tracks[valid["track"]].block_of(packet.number) == valid["index"] for packet in packets)
-        assert pack_audio(packets[0].number if packets else 0, [packet.data for packet in packets]) == block
+        assert pack_audio_block(packets[0].number if packets else 0, [packet.data for packet in packets]) == block
 
 
 def test_broken_blocks_are_refused() -> None:
     for broken in committed("audio.json")["invalid"]:
         with pytest.raises(DamagedBlock):
-            unpack_audio(base64.b64decode(broken["block"]))
+            unpack_audio_block(base64.b64decode(broken["block"]))

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from bunraku.codec import coefficients
-from bunraku.codec.decode import decode_block
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import shipped
-from bunraku.codec.track import CODEC, read_track
+from bunraku.codec.motion_decoder import decode_motion_block
+from bunraku.codec.motion_track import MOTION_CODEC, parse_motion_track
+from bunraku.codec.prior import load_shipped_prior
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import unpack
 from tests.vectors import blocks, golden
@@ -30,12 +30,12 @@ def close(a: Any, b: Any) -> bool:
 
 
 def committed(name: str) -> Any:
-    return json.loads((golden.FOLDER / name).read_text(encoding="utf-8"))
+    return json.loads((golden.VECTORS_FOLDER / name).read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("name", sorted(set(golden.MAKERS) - {"blocks.json", "scene.json"}))
+@pytest.mark.parametrize("name", sorted(set(golden.GENERATORS) - {"blocks.json", "scene.json"}))
 def test_golden_files_are_what_the_code_makes(name: str) -> None:
-    assert close(committed(name), json.loads(golden.files()[name])), (
+    assert close(committed(name), json.loads(golden.render_files()[name])), (
         f"{name} differs: run `make vectors` and look at the change"
     )
 
@@ -43,25 +43,28 @@ def test_golden_files_are_what_the_code_makes(name: str) -> None:
 def test_golden_blocks_are_what_the_code_makes_of_them() -> None:
     """The encoder weighs floating-point numbers, so another machine may choose other coefficients; what a block says is
     the same everywhere, and so are its bytes once the coefficients are chosen."""
-    made, ours = blocks.make(), committed("blocks.json")
+    made, ours = blocks.make_vectors(), committed("blocks.json")
     assert close(ours["tracks"], json.loads(json.dumps(made["tracks"])))
     assert ours["invalid"] == made["invalid"]
     assert len(ours["valid"]) == len(made["valid"])
-    tracks = [read_track({"codec": CODEC, **t, "dancer": base64.b64decode(t["dancer"])}) for t in ours["tracks"]]
+    tracks = [
+        parse_motion_track({"codec": MOTION_CODEC, **t, "dancer": base64.b64decode(t["dancer"])})
+        for t in ours["tracks"]
+    ]
     for valid in ours["valid"]:
         track, data = tracks[valid["track"]], base64.b64decode(valid["block"])
-        assert close(valid, json.loads(json.dumps(blocks.vector(track, valid["track"], data))))
-        head, q = coefficients.decode(shipped(), data, track.block_frames, track.fps)
-        assert coefficients.encode(shipped(), head, q, track.block_frames, track.fps) == data
+        assert close(valid, json.loads(json.dumps(blocks.block_vector(track, valid["track"], data))))
+        head, q = coefficients.decode_coefficients(load_shipped_prior(), data, track.block_frames, track.fps)
+        assert coefficients.encode_coefficients(load_shipped_prior(), head, q, track.block_frames, track.fps) == data
 
 
 def test_broken_blocks_are_refused() -> None:
     vectors = committed("blocks.json")
     head = vectors["tracks"][0]
-    track = read_track({"codec": CODEC, **head, "dancer": base64.b64decode(head["dancer"])})
+    track = parse_motion_track({"codec": MOTION_CODEC, **head, "dancer": base64.b64decode(head["dancer"])})
     for broken in vectors["invalid"]:
         with pytest.raises(DamagedBlock):
-            decode_block(track, base64.b64decode(broken["block"]))
+            decode_motion_block(track, base64.b64decode(broken["block"]))
 
 
 def test_broken_messages_are_refused_and_unknown_ones_skipped() -> None:

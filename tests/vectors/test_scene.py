@@ -8,33 +8,35 @@ import json
 import pytest
 
 from bunraku.codec import coefficients
-from bunraku.codec.coefficients import SCENE_CHANNELS
+from bunraku.codec.coefficients import SCENE_CHANNEL_COUNT
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import shipped
-from bunraku.codec.scene import read_scene
-from bunraku.codec.scene_decode import decode_scene
+from bunraku.codec.prior import load_shipped_prior
+from bunraku.codec.scene import parse_scene_track
+from bunraku.codec.scene_decoder import decode_scene_block
 from tests.vectors import scene
 from tests.vectors.test_golden import close, committed
 
 
 def test_golden_scenes_are_what_the_code_makes_of_them() -> None:
     """As with the motion's blocks, another machine may choose other coefficients, but none reads them otherwise."""
-    made, ours = json.loads(json.dumps(scene.make())), committed("scene.json")
+    made, ours = json.loads(json.dumps(scene.make_vectors())), committed("scene.json")
     for new, old in zip(made["tracks"], ours["tracks"], strict=True):
         assert close(new | {"rates": []}, old | {"rates": []}), "run `make vectors` and look at the change"
     assert ours["invalid"] == made["invalid"]
     assert len(ours["valid"]) == len(made["valid"])
-    tracks = [read_scene(track) for track in ours["tracks"]]
+    tracks = [parse_scene_track(track) for track in ours["tracks"]]
     for valid in ours["valid"]:
         track, data = tracks[valid["track"]], base64.b64decode(valid["block"])
-        assert close(valid, json.loads(json.dumps(scene.vector(track, valid["track"], data))))
-        head, q = coefficients.decode(shipped(), data, track.block_frames, track.fps, SCENE_CHANNELS)
-        assert coefficients.encode(shipped(), head, q, track.block_frames, track.fps) == data
+        assert close(valid, json.loads(json.dumps(scene.block_vector(track, valid["track"], data))))
+        head, q = coefficients.decode_coefficients(
+            load_shipped_prior(), data, track.block_frames, track.fps, SCENE_CHANNEL_COUNT
+        )
+        assert coefficients.encode_coefficients(load_shipped_prior(), head, q, track.block_frames, track.fps) == data
 
 
 def test_broken_scenes_are_refused() -> None:
     vectors = committed("scene.json")
-    track = read_scene(vectors["tracks"][0])
+    track = parse_scene_track(vectors["tracks"][0])
     for broken in vectors["invalid"]:
         with pytest.raises(DamagedBlock):
-            decode_scene(track, base64.b64decode(broken["block"]))
+            decode_scene_block(track, base64.b64decode(broken["block"]))

@@ -18,13 +18,13 @@ from collections.abc import Coroutine
 from pathlib import Path
 
 from bunraku.client.api import Client
-from tests.servers import clip
-from tests.verify import faults, uploads
-from tests.verify.rows import Row
-from tests.verify.scene import INSIDE, opened
+from tests.servers import make_bvh_clip
+from tests.verify import process_fault, upload_fault
+from tests.verify.result import FaultResult
+from tests.verify.scenario import PROBE_SOURCE, open_scenario
 from tests.verify.stack import REPOSITORY, Stack
 
-CLIP = "mocap/bvh/cmu_12_01_walk.bvh"
+CLIP_PATH = "mocap/bvh/cmu_12_01_walk.bvh"
 
 
 def main() -> None:
@@ -44,18 +44,18 @@ def main() -> None:
 async def verify(asked: argparse.Namespace) -> int:
     """Everything; 1 where something did not hold."""
     stack = Stack(asked.port)
-    rows: list[Row] = []
+    rows: list[FaultResult] = []
     figures: dict[str, float] = {}
     try:
         figures["up_s"] = await stack.up()
         figures["image_mb"] = await stack.image_megabytes()
         with tempfile.TemporaryDirectory(prefix="bunraku-verify-") as name:
-            await _run(stack, asked, Path(name), rows, figures)
+            await _run_faults(stack, asked, Path(name), rows, figures)
     finally:
         if not asked.keep:
             await stack.down()
-    passed = sum(row.held for row in rows)
-    failed = sum(row.tried for row in rows) - passed
+    passed = sum(row.passed for row in rows)
+    failed = sum(row.attempts for row in rows) - passed
     worst = {row.fault: {name: round(value, 4) for name, value in row.worst.items()} for row in rows}
     told = {name: round(value, 3) for name, value in figures.items()}
     print(", ".join(f"{name} {value:g}" for name, value in told.items()))
@@ -63,30 +63,33 @@ async def verify(asked: argparse.Namespace) -> int:
     return int(failed > 0 or not rows)
 
 
-async def _run(
-    stack: Stack, asked: argparse.Namespace, folder: Path, rows: list[Row], figures: dict[str, float]
+async def _run_faults(
+    stack: Stack, asked: argparse.Namespace, folder: Path, rows: list[FaultResult], figures: dict[str, float]
 ) -> None:
     async with Client(stack.url) as client:
         began = time.monotonic()
-        motion = (await client.upload(_source(folder)))["id"]
+        motion = (await client.upload(_select_clip(folder)))["id"]
         figures["upload_s"] = time.monotonic() - began
         demo = await client.first_session()
         assert demo is not None, "no stage is open: the demo's is missing"
-    said = json.loads(await stack.inside("stream", 1, "python", "-", "hop", given=INSIDE))
+    said = json.loads(await stack.exec_in_replica("stream", 1, "python", "-", "hop", stdin=PROBE_SOURCE))
     figures |= {f"hop_{name}_ms": said[name] for name in ("p50", "p99")}
-    async with opened(stack, motion) as scene:
-        for watcher in scene.watchers:
-            assert watcher.figures.first_pose_ms is not None
-        figures["first_pose_ms"] = max(one.figures.first_pose_ms or 0.0 for one in scene.watchers)
-        ways: list[tuple[str, Coroutine[None, None, Row]]] = [
-            *((f"kill {name}", faults.killed(scene, name, folder, asked.rounds)) for name in faults.KILLED),
-            ("full", uploads.full(scene, asked.rounds)),
-            ("cut", uploads.cut(scene, asked.rounds)),
-            ("encoding", uploads.killed_encoding(scene, asked.rounds)),
-            ("moved", faults.moved(scene, asked.rounds)),
-            ("stop", faults.stopped(scene, asked.rounds)),
+    async with open_scenario(stack, motion) as scene:
+        for watcher in scene.viewers:
+            assert watcher.statistics.first_pose_ms is not None
+        figures["first_pose_ms"] = max(one.statistics.first_pose_ms or 0.0 for one in scene.viewers)
+        ways: list[tuple[str, Coroutine[None, None, FaultResult]]] = [
             *(
-                (f"gone {name}", faults.gone(scene, name, folder, asked.rounds, asked.outage))
+                (f"kill {name}", process_fault.kill_service(scene, name, folder, asked.rounds))
+                for name in process_fault.KILL_TARGETS
+            ),
+            ("full", upload_fault.fill_disk(scene, asked.rounds)),
+            ("cut", upload_fault.interrupt_upload(scene, asked.rounds)),
+            ("encoding", upload_fault.kill_while_encoding(scene, asked.rounds)),
+            ("moved", process_fault.stop_one_stream_replica(scene, asked.rounds)),
+            ("stop", process_fault.stop_stream_service(scene, asked.rounds)),
+            *(
+                (f"gone {name}", process_fault.run_outage(scene, name, folder, asked.rounds, asked.outage))
                 for name in ("nats", "postgres")
             ),
         ]
@@ -95,16 +98,16 @@ async def _run(
                 way.close()
                 continue
             rows.append(await way)
-            print(rows[-1].told(), flush=True)
+            print(rows[-1].format_row(), flush=True)
 
 
-def _source(folder: Path) -> Path:
+def _select_clip(folder: Path) -> Path:
     """A real clip where there are some, else one that is made."""
-    shared = Path(os.environ.get("BUNRAKU_SHARED") or REPOSITORY.parent / "shared") / CLIP
+    shared = Path(os.environ.get("BUNRAKU_SHARED") or REPOSITORY.parent / "shared") / CLIP_PATH
     if shared.is_file():
         return shared
     made = folder / "made.bvh"
-    made.write_bytes(clip(20.0, 7))
+    made.write_bytes(make_bvh_clip(20.0, 7))
     return made
 
 

@@ -13,12 +13,12 @@ from typing import Any
 REPOSITORY = Path(__file__).parents[2]
 OVERRIDE = Path(__file__).parent / "compose.yml"
 PROJECT = "bunraku-verify"
-_KILL = "kill -9 $(cat /proc/1/task/1/children)"
+_KILL_COMMAND = "kill -9 $(cat /proc/1/task/1/children)"
 """The first process ends with what it began: the container dies as by a fault, not by order, and is started anew."""
-_CONNECTED = "cat /proc/net/tcp /proc/net/tcp6 | awk '$2 ~ /:1F40$/ && $4 == \"01\"' | wc -l"
+_COUNT_CONNECTIONS_COMMAND = "cat /proc/net/tcp /proc/net/tcp6 | awk '$2 ~ /:1F40$/ && $4 == \"01\"' | wc -l"
 
 
-class Failed(Exception):
+class CommandFailed(Exception):
     """A command of Docker's that did not do what it should; the text is what it said."""
 
 
@@ -41,9 +41,9 @@ class Stack:
             *files,
         ]
 
-    async def compose(self, *words: str, given: bytes | None = None, seconds: float = 900.0) -> str:
+    async def compose(self, *arguments: str, stdin: bytes | None = None, seconds: float = 900.0) -> str:
         """What `docker compose` prints; raises `Failed`."""
-        return await self._run([*self._compose, *words], given, seconds)
+        return await self._run([*self._compose, *arguments], stdin, seconds)
 
     async def up(self) -> float:
         """Build and start everything, from nothing; the seconds until all is healthy."""
@@ -58,53 +58,53 @@ class Stack:
 
     async def kill(self, service: str, number: int = 1) -> None:
         """`kill -9` of a service's process; its container is started anew by itself."""
-        with contextlib.suppress(Failed):
+        with contextlib.suppress(CommandFailed):
             # who is killed takes the shell along
-            await self.inside(service, number, "sh", "-c", _KILL)
+            await self.exec_in_replica(service, number, "sh", "-c", _KILL_COMMAND)
 
     async def restarts(self, service: str, number: int = 1) -> int:
         """How often a container was started anew by itself."""
         name = f"{PROJECT}-{service}-{number}"
         return int(await self._run(["docker", "inspect", "--format", "{{.RestartCount}}", name], None, 30.0))
 
-    async def logged(self, service: str, number: int, words: str) -> str:
+    async def last_logged(self, service: str, number: int, text: str) -> str:
         """When a replica last said these words in its log, empty where it never did."""
         said = await self._run(["docker", "logs", "--timestamps", f"{PROJECT}-{service}-{number}"], None, 30.0)
-        return max((line.partition(" ")[0] for line in said.splitlines() if words in line), default="")
+        return max((line.partition(" ")[0] for line in said.splitlines() if text in line), default="")
 
-    async def take_away(self, service: str) -> None:
+    async def kill_all_replicas(self, service: str) -> None:
         """Kill a service, all of its replicas, and leave it so until `start`."""
         await self.compose("kill", "--signal", "KILL", service)
 
-    async def stop_one(self, service: str, number: int) -> None:
+    async def stop_replica(self, service: str, number: int) -> None:
         """Stop one replica in order, and leave it so."""
         await self._run(["docker", "stop", f"{PROJECT}-{service}-{number}"], None, 60.0)
 
-    async def inside(self, service: str, number: int, *command: str, given: bytes | None = None) -> str:
+    async def exec_in_replica(self, service: str, number: int, *command: str, stdin: bytes | None = None) -> str:
         """What a command prints in a replica of a service."""
         words = ("exec", "-T", "--index", str(number), service, *command)
-        return await self.compose(*words, given=given, seconds=60.0)
+        return await self.compose(*words, stdin=stdin, seconds=60.0)
 
-    async def connected(self, service: str, replicas: int = 2) -> list[int]:
+    async def count_connections(self, service: str, replicas: int = 2) -> list[int]:
         """The connections that each replica of a service has."""
-        asked = (self.inside(service, n + 1, "sh", "-c", _CONNECTED) for n in range(replicas))
+        asked = (self.exec_in_replica(service, n + 1, "sh", "-c", _COUNT_CONNECTIONS_COMMAND) for n in range(replicas))
         return [int(said) for said in await asyncio.gather(*asked)]
 
-    async def states(self) -> dict[str, str]:
+    async def container_states(self) -> dict[str, str]:
         """Of each container whether it is healthy, or what else it is."""
         said = await self.compose("ps", "--all", "--format", "json")
         found: list[dict[str, Any]] = [json.loads(line) for line in said.splitlines() if line.startswith("{")]
         return {one["Name"].removeprefix(f"{PROJECT}-"): one["Health"] or one["State"] for one in found}
 
-    async def healthy(self, seconds: float = 120.0) -> float:
+    async def wait_until_healthy(self, seconds: float = 120.0) -> float:
         """Wait until all are; the seconds that took."""
         began = time.monotonic()
         while True:
-            states = await self.states()
+            states = await self.container_states()
             if set(states.values()) == {"healthy"}:
                 return time.monotonic() - began
             if time.monotonic() - began > seconds:
-                raise Failed(f"not healthy after {seconds:g} s: {states}")
+                raise CommandFailed(f"not healthy after {seconds:g} s: {states}")
             await asyncio.sleep(0.3)
 
     async def image_megabytes(self) -> float:
@@ -132,5 +132,5 @@ class Stack:
         if command[1] == "logs":
             said += complained
         if process.returncode != 0:
-            raise Failed(f"{' '.join(command[-6:])}: {complained.decode(errors='replace')[-2000:]}")
+            raise CommandFailed(f"{' '.join(command[-6:])}: {complained.decode(errors='replace')[-2000:]}")
         return said.decode()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from bunraku.wire import messages
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.limbs import MOST_LIMBS
+from bunraku.wire.limbs import MAX_LIMBS
 from bunraku.wire.messages import (
     Alive,
     Ask,
@@ -39,7 +39,7 @@ from bunraku.wire.overlay import Overlay
 
 TIME = st.integers(0, (1 << 53) - 1)
 U32 = st.integers(0, 0xFFFFFFFF)
-LIMB = st.integers(0, MOST_LIMBS - 1)
+LIMB = st.integers(0, MAX_LIMBS - 1)
 TEXT = st.text(max_size=20)
 SINGLE = st.floats(allow_nan=False, allow_infinity=False, width=32)
 I16 = st.integers(-32768, 32767)

@@ -3,15 +3,15 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.wire.limbs import MOST_LIMBS
+from bunraku.wire.limbs import MAX_LIMBS
 from bunraku.wire.messages import unpack
-from bunraku.wire.overlay import Overlay, newest
+from bunraku.wire.overlay import Overlay, drop_earlier_frames
 
 TIME = st.integers(0, (1 << 53) - 1)
-LIMB = st.integers(0, MOST_LIMBS - 1)
+LIMB = st.integers(0, MAX_LIMBS - 1)
 
 
-def _frames(limbs: set[int], count: int, random: Random) -> list[dict[int, tuple[int, ...]]]:
+def _random_frames(limbs: set[int], count: int, random: Random) -> list[dict[int, tuple[int, ...]]]:
     return [{limb: tuple(random.randint(-32768, 32767) for _ in range(9)) for limb in limbs} for _ in range(count)]
 
 
@@ -19,7 +19,7 @@ def _frames(limbs: set[int], count: int, random: Random) -> list[dict[int, tuple
 def test_an_overlay_of_any_performers_comes_back_frame_by_frame(
     sequence: int, due: int, limbs: set[int], count: int, random: Random
 ) -> None:
-    frames = _frames(limbs, count, random)
+    frames = _random_frames(limbs, count, random)
     message = Overlay(sequence, due, frames[-1], tuple(frames[:-1]))
     assert unpack(message.pack()) == message
     # of the first performer alone it is what it was before there were several
@@ -30,6 +30,6 @@ def test_an_overlay_of_any_performers_comes_back_frame_by_frame(
 def test_the_newest_frame_of_an_overlay_is_an_overlay_of_it_alone(
     sequence: int, due: int, limbs: set[int], earlier: int, random: Random
 ) -> None:
-    frames = _frames(limbs, earlier + 1, random)
+    frames = _random_frames(limbs, earlier + 1, random)
     message = Overlay(sequence, due, frames[-1], tuple(frames[:-1]))
-    assert unpack(newest(message.pack())) == Overlay(sequence, due, frames[-1])
+    assert unpack(drop_earlier_frames(message.pack())) == Overlay(sequence, due, frames[-1])

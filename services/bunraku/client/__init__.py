@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bunraku.client.api import Client, ServerProblem
-    from bunraku.client.figures import Figures
-    from bunraku.client.line import StreamEnded
     from bunraku.client.one_euro import OneEuro
-    from bunraku.client.puppeteer import Puppeteer, Refused
+    from bunraku.client.puppeteer import ControlRefused, Puppeteer
+    from bunraku.client.reconnecting_connection import StreamEnded
     from bunraku.client.viewer import Viewer
+    from bunraku.client.viewer_statistics import ViewerStatistics
 
 _HOMES = {
     "Client": "api",
@@ -24,7 +24,16 @@ _HOMES = {
     "StreamEnded": "line",
     "Viewer": "viewer",
 }
-__all__ = ["Client", "Figures", "OneEuro", "Puppeteer", "Refused", "ServerProblem", "StreamEnded", "Viewer"]
+__all__ = [
+    "Client",
+    "ControlRefused",
+    "OneEuro",
+    "Puppeteer",
+    "ServerProblem",
+    "StreamEnded",
+    "Viewer",
+    "ViewerStatistics",
+]
 
 
 def __getattr__(name: str) -> Any:

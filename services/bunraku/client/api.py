@@ -13,10 +13,10 @@ from urllib.parse import quote, urlsplit, urlunsplit
 
 import httpx2
 
-TIMEOUT = httpx2.Timeout(10.0, read=130.0)
+REQUEST_TIMEOUT = httpx2.Timeout(10.0, read=130.0)
 """Seconds; an answer to an upload comes when it is encoded, and a session is kept within 120 s."""
-CHUNK = 1 << 16
-EVERY = 0.25
+CHUNK_BYTES = 1 << 16
+PROGRESS_INTERVAL_S = 0.25
 """Seconds between two questions how far an upload is."""
 
 
@@ -46,7 +46,7 @@ class Client:
     def __init__(self, url: str = "http://127.0.0.1:8000", token: str | None = None) -> None:
         self.url = url.rstrip("/")
         self.token = token
-        self._http = httpx2.AsyncClient(base_url=self.url, timeout=TIMEOUT, headers=authorization(token))
+        self._http = httpx2.AsyncClient(base_url=self.url, timeout=REQUEST_TIMEOUT, headers=authorization(token))
 
     async def __aenter__(self) -> Self:
         return self
@@ -58,28 +58,28 @@ class Client:
         self,
         path: Path,
         progress: Callable[[int, int], None] | None = None,
-        made: Callable[[str, float], None] | None = None,
+        on_stage: Callable[[str, float], None] | None = None,
     ) -> dict[str, Any]:
         """Upload a motion file and wait until it can be watched; `progress` is told bytes sent and in all, and `made`
         again and again what the server does with it (`waiting`, `reading`, `encoding`) and the share done, 0..1."""
-        return await self._send(path, "/v1/motions", progress, made)
+        return await self._upload_file(path, "/v1/motions", progress, on_stage)
 
     async def add_audio(
         self,
         motion: str,
         path: Path,
         progress: Callable[[int, int], None] | None = None,
-        made: Callable[[str, float], None] | None = None,
+        on_stage: Callable[[str, float], None] | None = None,
     ) -> dict[str, Any]:
         """Make a new motion that is `motion` with the sound of a WAV, FLAC, MP3 or Ogg file, and wait until it can be
         watched; the rest as of `upload`."""
-        return await self._send(path, f"/v1/motions/{quote(motion, safe='')}/audio", progress, made)
+        return await self._upload_file(path, f"/v1/motions/{quote(motion, safe='')}/audio", progress, on_stage)
 
     async def add_scene(self, motion: str, staging: dict[str, Any]) -> dict[str, Any]:
         """Make a new motion that is `motion` with a camera and lights: keyframes as `POST /v1/motions/{id}/scene` takes
         them."""
         path = f"/v1/motions/{quote(motion, safe='')}/scene"
-        return await self._ask("POST", path, json=staging)
+        return await self._request("POST", path, json=staging)
 
     async def add_performers(
         self, motion: str, motions: list[str], places: list[list[float]] | None = None
@@ -88,14 +88,14 @@ class Client:
         turn]` of each, metres and radians, its own first; in a row if not said."""
         path = f"/v1/motions/{quote(motion, safe='')}/performers"
         asked = {"motions": motions} | ({"places": places} if places is not None else {})
-        return await self._ask("POST", path, json=asked)
+        return await self._request("POST", path, json=asked)
 
     async def motions(self) -> list[dict[str, Any]]:
         """All motions, newest first."""
         items: list[dict[str, Any]] = []
         params: dict[str, Any] = {"limit": 200}
         while True:
-            page = await self._ask("GET", "/v1/motions", params=params)
+            page = await self._request("GET", "/v1/motions", params=params)
             items += page["items"]
             if page["next"] is None:
                 return items
@@ -103,30 +103,30 @@ class Client:
 
     async def motion(self, motion: str) -> dict[str, Any]:
         """One motion."""
-        return await self._ask("GET", f"/v1/motions/{quote(motion, safe='')}")
+        return await self._request("GET", f"/v1/motions/{quote(motion, safe='')}")
 
     async def delete_motion(self, motion: str) -> None:
         """Remove one motion."""
-        await self._ask("DELETE", f"/v1/motions/{quote(motion, safe='')}")
+        await self._request("DELETE", f"/v1/motions/{quote(motion, safe='')}")
 
     async def open_session(self, motion: str, *, playing: bool = True, loop: bool = True) -> dict[str, Any]:
         """A new session over a motion."""
-        return await self._ask("POST", "/v1/sessions", json={"motion": motion, "playing": playing, "loop": loop})
+        return await self._request("POST", "/v1/sessions", json={"motion": motion, "playing": playing, "loop": loop})
 
     async def session(self, session: str) -> dict[str, Any]:
         """One session."""
-        return await self._ask("GET", f"/v1/sessions/{quote(session, safe='')}")
+        return await self._request("GET", f"/v1/sessions/{quote(session, safe='')}")
 
     async def first_session(self) -> str | None:
         """The id of the session that is open longest, None where none is."""
-        items = (await self._ask("GET", "/v1/sessions", params={"limit": 1}))["items"]
+        items = (await self._request("GET", "/v1/sessions", params={"limit": 1}))["items"]
         return items[0]["id"] if items else None
 
     async def edit_session(self, session: str, **edit: Any) -> dict[str, Any]:
         """Edit a session: any of `playing`, `position` (microseconds), `loop`, `motion`."""
-        return await self._ask("PATCH", f"/v1/sessions/{quote(session, safe='')}", json=edit)
+        return await self._request("PATCH", f"/v1/sessions/{quote(session, safe='')}", json=edit)
 
-    async def keep(
+    async def record(
         self,
         session: str,
         name: str | None = None,
@@ -138,7 +138,7 @@ class Client:
         microseconds, `position` and `gaze` in metres in the dance's frame, `fov` in radians."""
         given = {"name": name, "seconds": seconds, "camera": [dict(key) for key in camera] or None}
         asked = {key: value for key, value in given.items() if value is not None}
-        return await self._ask("POST", f"/v1/sessions/{quote(session, safe='')}/recordings", json=asked)
+        return await self._request("POST", f"/v1/sessions/{quote(session, safe='')}/recordings", json=asked)
 
     async def share(
         self, *, session: str | None = None, motion: str | None = None, seconds: int | None = None
@@ -147,16 +147,16 @@ class Client:
         address, `id` is what it is revoked by."""
         given = {"session": session, "motion": motion, "seconds": seconds}
         asked = {key: value for key, value in given.items() if value is not None}
-        return await self._ask("POST", "/v1/shares", json=asked)
+        return await self._request("POST", "/v1/shares", json=asked)
 
     async def shares(self) -> list[dict[str, Any]]:
         """The newest links for viewers that one has made, or, as admin, all."""
-        items: list[dict[str, Any]] = (await self._ask("GET", "/v1/shares", params={"limit": 200}))["items"]
+        items: list[dict[str, Any]] = (await self._request("GET", "/v1/shares", params={"limit": 200}))["items"]
         return items
 
     async def revoke_share(self, share: str) -> None:
         """Revoke a link: who watches by it is ended."""
-        await self._ask("DELETE", f"/v1/shares/{quote(share, safe='')}")
+        await self._request("DELETE", f"/v1/shares/{quote(share, safe='')}")
 
     def socket_url(self, path: str) -> str:
         """The WebSocket address of a path of this server."""
@@ -164,12 +164,12 @@ class Client:
         scheme = {"http": "ws", "https": "wss"}.get(parts.scheme, parts.scheme)
         return urlunsplit((scheme, parts.netloc, parts.path.rstrip("/") + path, "", ""))
 
-    async def _send(
+    async def _upload_file(
         self,
         path: Path,
-        address: str,
+        endpoint: str,
         progress: Callable[[int, int], None] | None,
-        made: Callable[[str, float], None] | None,
+        on_stage: Callable[[str, float], None] | None,
     ) -> dict[str, Any]:
         """Send a file to an address that takes one, as `upload` says."""
         size = await asyncio.to_thread(os.path.getsize, path)
@@ -178,17 +178,17 @@ class Client:
         async def chunks() -> AsyncIterator[bytes]:
             sent = 0
             with path.open("rb") as file:
-                while chunk := file.read(CHUNK):
+                while chunk := file.read(CHUNK_BYTES):
                     yield chunk
                     sent += len(chunk)
                     if progress is not None:
                         progress(sent, size)
 
-        following = asyncio.create_task(self._follow(name, made)) if made is not None else None
+        following = asyncio.create_task(self._poll_progress(name, on_stage)) if on_stage is not None else None
         try:
-            return await self._ask(
+            return await self._request(
                 "POST",
-                address,
+                endpoint,
                 params={"filename": path.name, "upload": name},
                 content=chunks(),
                 headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
@@ -198,16 +198,16 @@ class Client:
                 following.cancel()
                 await asyncio.wait((following,))
 
-    async def _follow(self, upload: str, told: Callable[[str, float], None]) -> None:
+    async def _poll_progress(self, upload: str, on_stage: Callable[[str, float], None]) -> None:
         """Tell how far an upload is until cancelled. What fails in this is no matter: the upload's own answer tells."""
         while True:
-            await asyncio.sleep(EVERY)
+            await asyncio.sleep(PROGRESS_INTERVAL_S)
             with contextlib.suppress(ServerProblem, httpx2.TransportError):
-                said = await self._ask("GET", f"/v1/uploads/{upload}")
+                said = await self._request("GET", f"/v1/uploads/{upload}")
                 if said["stage"] != "receiving":
-                    told(said["stage"], said["share"])
+                    on_stage(said["stage"], said["share"])
 
-    async def _ask(self, method: str, path: str, **options: Any) -> dict[str, Any]:
+    async def _request(self, method: str, path: str, **options: Any) -> dict[str, Any]:
         response = await self._http.request(method, path, **options)
         if response.status_code == 204:
             return {}

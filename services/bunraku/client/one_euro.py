@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-SAME = 1e-6
+MIN_SAMPLE_INTERVAL_S = 1e-6
 """Samples nearer in time than this are of one time, seconds."""
 
 
@@ -34,8 +34,8 @@ class OneEuro:
         self.min_cutoff = min_cutoff
         self.beta = beta
         self.derivative_cutoff = derivative_cutoff
-        self._before: _State | None = None
-        self._now: _State | None = None
+        self._previous: _State | None = None
+        self._current: _State | None = None
 
     def filter(self, values: Sequence[float], seconds: float) -> tuple[float, ...]:
         """The smoothed value of a sample at a time.
@@ -46,35 +46,35 @@ class OneEuro:
         """
         if not (math.isfinite(seconds) and all(map(math.isfinite, values))):
             raise ValueError(f"a sample is finite numbers and a time, not {list(values)} at {seconds}")
-        if self._now is not None and len(values) != len(self._now.value):
-            raise ValueError(f"a sample had {len(self._now.value)} numbers before, and has {len(values)} now")
-        if self._now is not None:
-            if seconds - self._now.seconds >= SAME:
-                self._before = self._now
+        if self._current is not None and len(values) != len(self._current.value):
+            raise ValueError(f"a sample had {len(self._current.value)} numbers before, and has {len(values)} now")
+        if self._current is not None:
+            if seconds - self._current.seconds >= MIN_SAMPLE_INTERVAL_S:
+                self._previous = self._current
             else:
-                seconds = self._now.seconds
-        if self._before is None:
-            self._now = _State(seconds, tuple(map(float, values)), (0.0,) * len(values))
+                seconds = self._current.seconds
+        if self._previous is None:
+            self._current = _State(seconds, tuple(map(float, values)), (0.0,) * len(values))
         else:
-            self._now = self._follow(self._before, values, seconds)
-        return self._now.value
+            self._current = self._smooth(self._previous, values, seconds)
+        return self._current.value
 
     def reset(self) -> None:
         """Forget what came: the next sample is the first."""
-        self._before = self._now = None
+        self._previous = self._current = None
 
-    def _follow(self, before: _State, values: Sequence[float], seconds: float) -> _State:
+    def _smooth(self, before: _State, values: Sequence[float], seconds: float) -> _State:
         passed = seconds - before.seconds
-        slow = _weight(self.derivative_cutoff, passed)
+        slow = _smoothing_factor(self.derivative_cutoff, passed)
         change = zip(before.value, before.speed, values, strict=True)
         speed = tuple(speed + slow * ((new - old) / passed - speed) for old, speed, new in change)
-        much = _weight(self.min_cutoff + self.beta * math.hypot(*speed), passed)
+        much = _smoothing_factor(self.min_cutoff + self.beta * math.hypot(*speed), passed)
         # written so that a constant comes through to the last bit
         value = tuple(old + much * (new - old) for old, new in zip(before.value, values, strict=True))
         return _State(seconds, value, speed)
 
 
-def _weight(cutoff: float, passed: float) -> float:
+def _smoothing_factor(cutoff: float, elapsed: float) -> float:
     """What a new sample weighs in a low-pass of a cutoff in Hz, after some seconds."""
-    turned = 2 * math.pi * cutoff * passed
+    turned = 2 * math.pi * cutoff * elapsed
     return turned / (turned + 1)

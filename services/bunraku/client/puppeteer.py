@@ -15,7 +15,7 @@ from bunraku.client.api import Client, authorization
 from bunraku.client.one_euro import OneEuro
 from bunraku.wire.limbs import limb_number
 from bunraku.wire.messages import (
-    LARGEST_FROM_SERVER,
+    MAX_SERVER_MESSAGE_BYTES,
     SUBPROTOCOL,
     Alive,
     Ask,
@@ -31,14 +31,14 @@ from bunraku.wire.messages import (
     unpack,
 )
 
-ALIVE_EVERY = 0.1
-ASKED = 20.0
+ALIVE_INTERVAL_S = 0.1
+ASK_TIMEOUT_S = 20.0
 """Seconds after which an ask is forgotten."""
-ANSWER = 5.0
+ANSWER_TIMEOUT_S = 5.0
 """Seconds to wait for the server's word."""
 
 
-class Refused(Exception):
+class ControlRefused(Exception):
     """A limb that is another's, or a stage that is closed; the text says which."""
 
 
@@ -58,16 +58,16 @@ class Puppeteer:
         self.notice: Notice | None = None
         """What became of an input that was not taken as it came, last."""
         self._epochs: dict[int, int] = {}
-        self._said: dict[int, tuple[int, tuple[float, float, float]]] = {}
+        self._last_inputs: dict[int, tuple[int, tuple[float, float, float]]] = {}
         """What was last asked of each limb that is held: kind and values."""
-        self._lost: set[int] = set()
+        self._lost_limbs: set[int] = set()
         """Limbs that were lost and are claimed again."""
         self._sequence = 0
         self._answers: asyncio.Queue[Grant | Refusal] = asyncio.Queue(64)
         self._welcome = asyncio.Event()
         self._connection: ClientConnection | None = None
         self._tasks: list[asyncio.Task[None]] = []
-        self._ended = "the stage is not open"
+        self._close_reason = "the stage is not open"
 
     async def __aenter__(self) -> Self:
         self._connection = await connect(
@@ -75,20 +75,20 @@ class Puppeteer:
             subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
             additional_headers=self._headers,
             compression=None,
-            max_size=LARGEST_FROM_SERVER,
-            open_timeout=ANSWER,
+            max_size=MAX_SERVER_MESSAGE_BYTES,
+            open_timeout=ANSWER_TIMEOUT_S,
             close_timeout=1,
         )
-        self._tasks = [asyncio.create_task(self._listen()), asyncio.create_task(self._keep_alive())]
+        self._tasks = [asyncio.create_task(self._receive()), asyncio.create_task(self._send_alive())]
         try:
-            async with asyncio.timeout(ANSWER):
+            async with asyncio.timeout(ANSWER_TIMEOUT_S):
                 await self._welcome.wait()
         except TimeoutError:
             await self.__aexit__()
-            raise Refused(self._ended) from None
+            raise ControlRefused(self._close_reason) from None
         if self.id is None:
             await self.__aexit__()
-            raise Refused(self._ended)
+            raise ControlRefused(self._close_reason)
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -101,26 +101,26 @@ class Puppeteer:
     async def claim(self, limb: str | int) -> None:
         """Take a limb; raises `Refused` where another holds it."""
         number = limb_number(limb)
-        self._said.pop(number, None)
+        self._last_inputs.pop(number, None)
         await self._send(Claim(number).pack())
         try:
-            async with asyncio.timeout(ANSWER):
+            async with asyncio.timeout(ANSWER_TIMEOUT_S):
                 while (answer := await self._answers.get()).limb != number:
                     continue
         except TimeoutError:
-            raise Refused(f"no answer for {limb}: {self._ended}") from None
+            raise ControlRefused(f"no answer for {limb}: {self._close_reason}") from None
         if isinstance(answer, Refusal):
-            raise Refused(
+            raise ControlRefused(
                 f"{limb} is {answer.reason} by {answer.holder}" if answer.holder else f"{limb}: {answer.reason}"
             )
 
-    async def ask(self, limb: str | int, seconds: float = ASKED) -> None:
+    async def ask(self, limb: str | int, seconds: float = ASK_TIMEOUT_S) -> None:
         """Ask the holder of a limb for it, and wait until it is one's own; raises `Refused` where it was not given in
         `seconds`. A free limb is taken."""
         number = limb_number(limb)
         try:
             await self.claim(limb)
-        except Refused:
+        except ControlRefused:
             await self._send(Ask(number, True).pack())
         else:
             return
@@ -130,7 +130,7 @@ class Puppeteer:
                     continue
         except TimeoutError:
             await self._send(Ask(number, False).pack())
-            raise Refused(f"{limb} was asked for and not given") from None
+            raise ControlRefused(f"{limb} was asked for and not given") from None
 
     async def release(self, limb: str | int) -> None:
         """Let a limb go."""
@@ -147,56 +147,56 @@ class Puppeteer:
         """
         if smooth is not None:
             x, y, z = smooth.filter((x, y, z), time.monotonic())
-        await self._input(limb, Input.TARGET, (x, y, z))
+        await self._set_input(limb, Input.TARGET, (x, y, z))
 
     async def velocity(self, limb: str | int, x: float, y: float = 0.0, z: float = 0.0) -> None:
         """Move a held limb at -1..1 of full speed along each axis until told otherwise."""
-        await self._input(limb, Input.VELOCITY, (x, y, z))
+        await self._set_input(limb, Input.VELOCITY, (x, y, z))
 
-    async def _input(self, limb: str | int, kind: int, values: tuple[float, float, float]) -> None:
+    async def _set_input(self, limb: str | int, kind: int, values: tuple[float, float, float]) -> None:
         number = limb_number(limb)
         if number not in self._epochs:
-            raise Refused(f"{limb} is not held")
-        self._said[number] = kind, values
-        await self._say(number)
+            raise ControlRefused(f"{limb} is not held")
+        self._last_inputs[number] = kind, values
+        await self._send_input(number)
 
-    async def _say(self, number: int) -> None:
-        kind, values = self._said[number]
+    async def _send_input(self, number: int) -> None:
+        kind, values = self._last_inputs[number]
         self._sequence += 1
         sampled = time.time_ns() // 1000
         await self._send(Input(number, kind, self._epochs[number], self._sequence, sampled, values).pack())
 
     async def _send(self, data: bytes) -> None:
         if self._connection is None:
-            raise Refused(self._ended)
+            raise ControlRefused(self._close_reason)
         try:
             await self._connection.send(data)
         except ConnectionClosed:
-            raise Refused(self._ended) from None
+            raise ControlRefused(self._close_reason) from None
 
-    async def _listen(self) -> None:
+    async def _receive(self) -> None:
         assert self._connection is not None
-        with contextlib.suppress(ConnectionClosed, Refused):
+        with contextlib.suppress(ConnectionClosed, ControlRefused):
             async for data in self._connection:
                 message = unpack(data) if isinstance(data, bytes) else None
                 if isinstance(message, Welcome):
                     self.id = message.id
                     self._welcome.set()
                 elif isinstance(message, Grant):
-                    await self._granted(message)
+                    await self._on_grant(message)
                 elif isinstance(message, Refusal):
-                    await self._refused(message)
+                    await self._on_refusal(message)
                 elif isinstance(message, Notice):
                     self.notice = message
                 elif isinstance(message, Presence):
                     self.presence = message
                 elif isinstance(message, Problem):
-                    self._ended = f"{message.title}: {message.detail}"
+                    self._close_reason = f"{message.title}: {message.detail}"
         self._welcome.set()
 
-    async def _granted(self, grant: Grant) -> None:
-        limb, again = grant.limb, grant.limb in self._lost
-        self._lost.discard(limb)
+    async def _on_grant(self, grant: Grant) -> None:
+        limb, again = grant.limb, grant.limb in self._lost_limbs
+        self._lost_limbs.discard(limb)
         if again and limb not in self._epochs:
             # let go before the answer came
             await self._send(Release(limb, grant.epoch).pack())
@@ -204,25 +204,25 @@ class Puppeteer:
         self._epochs[limb] = grant.epoch
         if not again:
             self._answers.put_nowait(grant)
-        elif limb in self._said:
-            await self._say(limb)
+        elif limb in self._last_inputs:
+            await self._send_input(limb)
 
-    async def _refused(self, refusal: Refusal) -> None:
+    async def _on_refusal(self, refusal: Refusal) -> None:
         limb = refusal.limb
         if refusal.reason == "lost":
             if limb in self._epochs:
-                self._lost.add(limb)
+                self._lost_limbs.add(limb)
                 await self._send(Claim(limb).pack())
             return
         self._epochs.pop(limb, None)
-        if limb in self._lost:
-            self._lost.discard(limb)
+        if limb in self._lost_limbs:
+            self._lost_limbs.discard(limb)
         else:
             self._answers.put_nowait(refusal)
 
-    async def _keep_alive(self) -> None:
+    async def _send_alive(self) -> None:
         while True:
-            await asyncio.sleep(ALIVE_EVERY)
+            await asyncio.sleep(ALIVE_INTERVAL_S)
             if self._epochs:
-                with contextlib.suppress(Refused):
+                with contextlib.suppress(ControlRefused):
                     await self._send(Alive(list(self._epochs)).pack())

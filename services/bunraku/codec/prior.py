@@ -15,24 +15,24 @@ import numpy.typing as npt
 
 from bunraku.motion.skeleton import CHANNEL_COUNT, JOINTS, PARENTS
 
-Integers = npt.NDArray[np.int64]
+IntArray = npt.NDArray[np.int64]
 
-SHARED = 24
+SHARED_FEATURES = 24
 """Features of a frequency that its three axes share; `OWN` more are each axis's own."""
-OWN = 8
-FEATURES = SHARED + OWN
-HIDDEN = 8
-CLASSES = 7
+AXIS_FEATURES = 8
+FEATURE_COUNT = SHARED_FEATURES + AXIS_FEATURES
+HIDDEN_UNITS = 8
+FREQUENCY_CLASSES = 7
 """Classes of frequencies: 0, 1, 2, 3-4, 5-8, 9-15, 16 and above."""
-ROWS = 48
+HAZARD_ROWS = 48
 """Scales of the hazards: 2^-7 .. 2^4.75 in quarter octaves."""
-HAZARD_OF: Integers = np.array([0, 0, 0, 1, 1, 2, 2], dtype=np.int64)
+HAZARD_TABLE_OF: IntArray = np.array([0, 0, 0, 1, 1, 2, 2], dtype=np.int64)
 """Of each class the table of hazards: its sizes are spread alike."""
-UNARY = 18
+UNARY_DECISIONS = 18
 """Decisions "larger than this?" before an escape."""
-SIGNS = 15
+SIGN_CONTEXTS = 15
 """Sign contexts of a class: q[k-2] from -2 to 2, times the sign of q[k-4]."""
-AXES = 3 * CHANNEL_COUNT
+CHANNEL_AXES = 3 * CHANNEL_COUNT
 
 
 class Prior(NamedTuple):
@@ -43,32 +43,32 @@ class Prior(NamedTuple):
     (CLASSES, SIGNS) are probabilities of a 1 in 1/32768.
     """
 
-    linear: Integers
-    bias: Integers
-    hidden: Integers
-    hidden_bias: Integers
-    hidden_class: Integers
-    out: Integers
-    hazard: Integers
-    sign: Integers
+    linear: IntArray
+    bias: IntArray
+    hidden: IntArray
+    hidden_bias: IntArray
+    hidden_class: IntArray
+    out: IntArray
+    hazard: IntArray
+    sign: IntArray
 
 
 SHAPES = Prior(
-    linear=(CLASSES, FEATURES),  # type: ignore[arg-type]
-    bias=(CLASSES, AXES),  # type: ignore[arg-type]
-    hidden=(HIDDEN, FEATURES),  # type: ignore[arg-type]
-    hidden_bias=(HIDDEN, AXES),  # type: ignore[arg-type]
-    hidden_class=(HIDDEN, CLASSES),  # type: ignore[arg-type]
-    out=(HIDDEN, CLASSES),  # type: ignore[arg-type]
-    hazard=(3 * ROWS, UNARY),  # type: ignore[arg-type]
-    sign=(CLASSES, SIGNS),  # type: ignore[arg-type]
+    linear=(FREQUENCY_CLASSES, FEATURE_COUNT),  # type: ignore[arg-type]
+    bias=(FREQUENCY_CLASSES, CHANNEL_AXES),  # type: ignore[arg-type]
+    hidden=(HIDDEN_UNITS, FEATURE_COUNT),  # type: ignore[arg-type]
+    hidden_bias=(HIDDEN_UNITS, CHANNEL_AXES),  # type: ignore[arg-type]
+    hidden_class=(HIDDEN_UNITS, FREQUENCY_CLASSES),  # type: ignore[arg-type]
+    out=(HIDDEN_UNITS, FREQUENCY_CLASSES),  # type: ignore[arg-type]
+    hazard=(3 * HAZARD_ROWS, UNARY_DECISIONS),  # type: ignore[arg-type]
+    sign=(FREQUENCY_CLASSES, SIGN_CONTEXTS),  # type: ignore[arg-type]
 )
 """Shape of each array of a `Prior`."""
 
-_MIRROR = {"l": "r", "r": "l"}
+_MIRROR_SIDE = {"l": "r", "r": "l"}
 
 
-def _relatives() -> Integers:
+def _relative_channels() -> IntArray:
     """Of each channel its parent's, its mirror's and its grandparent's channel, -1 for none: (3, CHANNEL_COUNT).
 
     Only channels that come before count; a joint of the right side mirrors one of the left, any other the joint before.
@@ -82,24 +82,24 @@ def _relatives() -> Integers:
     return np.array([parent, mirror, grandparent], dtype=np.int64)
 
 
-RELATIVES: Integers = _relatives()
+RELATIVE_CHANNELS: IntArray = _relative_channels()
 
 
-def _level(size: int) -> int:
+def _magnitude_level(magnitude: int) -> int:
     """16 log2(1 + size) to the nearest whole, in integers: half of floor(32 log2), rounded."""
-    return (((size + 1) ** 32).bit_length()) >> 1
+    return (((magnitude + 1) ** 32).bit_length()) >> 1
 
 
-LEVELS: Integers = np.array([_level(size) for size in range(4096)], dtype=np.int64)
+MAGNITUDE_LEVELS: IntArray = np.array([_magnitude_level(size) for size in range(4096)], dtype=np.int64)
 """`_level` of 0 .. 4095; larger ones count as the last."""
 
-MOST_FRAMES = 512
+MAX_BLOCK_FRAMES = 512
 """Frames of a block, at most: two seconds at 240 a second, and what a browser decodes in a tenth of one."""
-CLASS_OF: Integers = np.digitize(np.arange(MOST_FRAMES + 1), [1, 2, 3, 5, 9, 16]).astype(np.int64)
+FREQUENCY_CLASS_OF: IntArray = np.digitize(np.arange(MAX_BLOCK_FRAMES + 1), [1, 2, 3, 5, 9, 16]).astype(np.int64)
 """Class of each frequency."""
 
 
-def parse(values: dict[str, Any]) -> Prior:
+def parse_prior(values: dict[str, Any]) -> Prior:
     """The prior in JSON values (lists of integers by name); raises ValueError where a shape is wrong."""
     arrays = {name: np.array(values[name], dtype=np.int64) for name in Prior._fields}
     for name, array in arrays.items():
@@ -108,7 +108,7 @@ def parse(values: dict[str, Any]) -> Prior:
     return Prior(**arrays)
 
 
-def dump(prior: Prior) -> str:
+def format_prior(prior: Prior) -> str:
     """`prior` as JSON, a row a line."""
     parts = []
     for name, array in prior._asdict().items():
@@ -118,6 +118,6 @@ def dump(prior: Prior) -> str:
 
 
 @cache
-def shipped() -> Prior:
+def load_shipped_prior() -> Prior:
     """The prior of the package, which every stream of `bunraku.motion/2` is coded with."""
-    return parse(json.loads(resources.files("bunraku.codec").joinpath("prior.json").read_text(encoding="utf-8")))
+    return parse_prior(json.loads(resources.files("bunraku.codec").joinpath("prior.json").read_text(encoding="utf-8")))

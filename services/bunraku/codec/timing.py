@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import MOST_FRAMES
+from bunraku.codec.prior import MAX_BLOCK_FRAMES
 
-MOST_FPS = 100_000
+MAX_FPS = 100_000
 """Frames a second, at most: instants are whole microseconds."""
-MOST_BLOCKS = 86_400
+MAX_BLOCKS = 86_400
 """Of a track: a day of seconds."""
-MOST_US = 1 << 48
+MAX_DURATION_US = 1 << 48
 """A track is shorter."""
 
 
@@ -27,7 +27,7 @@ class Timing:
     first_frames: int
 
     @property
-    def blocks(self) -> int:
+    def block_count(self) -> int:
         """Number of blocks."""
         return 1 - (-(self.frames - self.first_frames) // self.block_frames)
 
@@ -55,33 +55,37 @@ class Timing:
         # a start is rounded to the microsecond, and may be a little before its frame
         frame = (position_us + 1) * self.fps / 1e6
         index = int((frame - self.first_frames) // self.block_frames) + 1 if frame >= self.first_frames else 0
-        return min(max(index, 0), self.blocks - 1)
+        return min(max(index, 0), self.block_count - 1)
 
 
-def even_blocks(fps: float, frames: int, block_seconds: float = 1.0, first_seconds: float | None = None) -> Timing:
+def plan_timing(fps: float, frames: int, block_seconds: float = 1.0, first_seconds: float | None = None) -> Timing:
     """`frames` frames in even blocks of about `block_seconds`, the first of `first_seconds` where that is given."""
-    first = 0 if first_seconds is None else min(max(1, round(first_seconds * fps)), frames, MOST_FRAMES)
+    first = 0 if first_seconds is None else min(max(1, round(first_seconds * fps)), frames, MAX_BLOCK_FRAMES)
     pieces = max(1, round((frames - first) / (block_seconds * fps)))
-    block_frames = min(max(1, -(-(frames - first) // pieces)), MOST_FRAMES)
+    block_frames = min(max(1, -(-(frames - first) // pieces)), MAX_BLOCK_FRAMES)
     return Timing(fps, frames, block_frames, first or min(block_frames, frames))
 
 
-def read_timing(described: dict[str, Any], what: str) -> Timing:
+def parse_timing(description: dict[str, Any], track_name: str) -> Timing:
     """The timing that a Description's map of a track (`what`, for the message) tells; raises `DamagedBlock`."""
-    fps = described.get("fps")
-    frames, block_frames, first_frames = (described.get(key) for key in ("frames", "block_frames", "first_frames"))
+    fps = description.get("fps")
+    frames, block_frames, first_frames = (description.get(key) for key in ("frames", "block_frames", "first_frames"))
     if not (
         isinstance(fps, float | int)
         and isinstance(frames, int)
         and isinstance(block_frames, int)
         and isinstance(first_frames, int)
     ):
-        raise DamagedBlock(f"a {what}'s track has numbers fps, frames, block_frames and first_frames")
-    if not (0 < fps <= MOST_FPS and 0 < first_frames <= min(frames, MOST_FRAMES) and 0 < block_frames <= MOST_FRAMES):
+        raise DamagedBlock(f"a {track_name}'s track has numbers fps, frames, block_frames and first_frames")
+    if not (
+        0 < fps <= MAX_FPS
+        and 0 < first_frames <= min(frames, MAX_BLOCK_FRAMES)
+        and 0 < block_frames <= MAX_BLOCK_FRAMES
+    ):
         raise DamagedBlock(
-            f"a {what}'s track has fps above zero, at most {MOST_FPS}, frames above zero and blocks of "
-            f"1..{MOST_FRAMES} frames"
+            f"a {track_name}'s track has fps above zero, at most {MAX_FPS}, frames above zero and blocks of "
+            f"1..{MAX_BLOCK_FRAMES} frames"
         )
-    if frames > MOST_BLOCKS * block_frames or frames * 1e6 / fps >= MOST_US:
-        raise DamagedBlock(f"a {what} has at most {MOST_BLOCKS} blocks and less than 2^48 microseconds")
+    if frames > MAX_BLOCKS * block_frames or frames * 1e6 / fps >= MAX_DURATION_US:
+        raise DamagedBlock(f"a {track_name} has at most {MAX_BLOCKS} blocks and less than 2^48 microseconds")
     return Timing(float(fps), frames, block_frames, first_frames)

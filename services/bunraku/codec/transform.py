@@ -13,7 +13,7 @@ import numpy as np
 from bunraku.motion.rotation import Array
 
 
-def basis(frames: int, count: int, instants: Array) -> Array:
+def cosine_basis(frames: int, count: int, instants: Array) -> Array:
     """The first `count` cosines (m, count) of a block of `frames` frames at `instants` (m,), in frames."""
     k = np.arange(count, dtype=np.float64)
     scale = np.full(count, np.sqrt(2.0 / frames))
@@ -22,20 +22,20 @@ def basis(frames: int, count: int, instants: Array) -> Array:
     return cosines
 
 
-def forward(track: Array) -> Array:
+def forward_dct(track: Array) -> Array:
     """Coefficients (..., n) of tracks (n, ...), one value a frame."""
     frames = len(track)
     coefficients: Array = np.moveaxis(
-        np.tensordot(basis(frames, frames, np.arange(frames, dtype=np.float64)), track, (0, 0)), 0, -1
+        np.tensordot(cosine_basis(frames, frames, np.arange(frames, dtype=np.float64)), track, (0, 0)), 0, -1
     )
     return coefficients
 
 
-def inverse(coefficients: Array, frames: int, instants: Array) -> Array:
+def inverse_dct(coefficients: Array, frames: int, instants: Array) -> Array:
     """Tracks (m, ...) at `instants` (m,), in frames, of coefficients (..., count) of a block of `frames` frames; each
     to the last bit the same, whatever other instants are asked for with it: a log replays to what was shown."""
     *shape, count = coefficients.shape
     flat = np.ascontiguousarray(coefficients.reshape(math.prod(shape), count))
     # not by BLAS, whose sums depend on how many there are
-    tracks: Array = np.einsum("mk,ck->mc", basis(frames, count, instants), flat)
+    tracks: Array = np.einsum("mk,ck->mc", cosine_basis(frames, count, instants), flat)
     return tracks.reshape(len(instants), *shape)

@@ -11,43 +11,43 @@ from typing import Annotated
 from fastapi import FastAPI, Header, Request, Response
 
 from bunraku import __version__
-from bunraku.backing import problems
-from bunraku.backing.access import Role, needs
-from bunraku.backing.problems import ProblemError
+from bunraku.http import problem_details
+from bunraku.http.access_control import Role, requires
+from bunraku.http.problem_details import ProblemError
 from bunraku.ik import batch
-from bunraku.marionette import figures, table
+from bunraku.marionette import bend_table, figures
 from bunraku.marionette.proportions import Proportions, ProportionsError
 
-CACHED_TABLES = 256
+MAX_CACHED_TABLES = 256
 """Tables kept as bytes: 2 MB."""
-CACHED_FIGURES = 32
+MAX_CACHED_FIGURES = 32
 """Figures kept as text: 1 MB."""
-FOREVER = "public, max-age=31536000, immutable"
+IMMUTABLE_CACHE_CONTROL = "public, max-age=31536000, immutable"
 
 
 @dataclass(frozen=True, slots=True)
-class Stored:
+class CachedResource:
     """A resource as it is served: its bytes and the strong entity tag of them."""
 
     data: bytes
     etag: str
 
     @classmethod
-    def of(cls, data: bytes) -> Stored:
+    def from_bytes(cls, data: bytes) -> CachedResource:
         """These bytes, and the tag of them."""
         return cls(data, f'"{hashlib.sha256(data).hexdigest()[:32]}"')
 
 
-@lru_cache(maxsize=CACHED_TABLES)
-def stored_table(proportions: Proportions) -> Stored:
+@lru_cache(maxsize=MAX_CACHED_TABLES)
+def cached_table(proportions: Proportions) -> CachedResource:
     """The table of these proportions (already rounded to their identity), built the first time."""
-    return Stored.of(table.to_bytes(table.build_table(proportions)))
+    return CachedResource.from_bytes(bend_table.pack_bend_table(bend_table.build_bend_table(proportions)))
 
 
-@lru_cache(maxsize=CACHED_FIGURES)
-def stored_figure(proportions: Proportions, name: figures.Figure) -> Stored:
+@lru_cache(maxsize=MAX_CACHED_FIGURES)
+def cached_figure(proportions: Proportions, name: figures.Figure) -> CachedResource:
     """A figure of the arm with these proportions (already rounded), drawn the first time."""
-    return Stored.of(figures.draw(proportions, name).encode())
+    return CachedResource.from_bytes(figures.draw_figure(proportions, name).encode())
 
 
 def parse_proportions(identity: str) -> Proportions:
@@ -61,13 +61,13 @@ def parse_proportions(identity: str) -> Proportions:
 def create_app() -> FastAPI:
     """The service, standing alone: it keeps nothing but the tables it has built."""
     app = FastAPI(title="Bunraku inverse kinematics", version=__version__)
-    problems.install(app)
+    problem_details.install_problem_handlers(app)
     # building is plain arithmetic on small arrays, one at a time is enough; the loop stays free
     building = asyncio.Semaphore(1)
 
-    async def table_for(proportions: Proportions) -> Stored:
+    async def table_for(proportions: Proportions) -> CachedResource:
         async with building:
-            return await asyncio.to_thread(stored_table, proportions)
+            return await asyncio.to_thread(cached_table, proportions)
 
     @app.get(
         "/v1/arms/{proportions}/table",
@@ -75,15 +75,15 @@ def create_app() -> FastAPI:
         responses={
             200: {"content": {"application/octet-stream": {}}, "description": "64 x 64 float16, little-endian"},
             304: {"description": "the client has it"},
-            422: {"content": {problems.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
+            422: {"content": {problem_details.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
         },
     )
-    @needs(Role.VIEW, all=True)
+    @requires(Role.VIEW, allow_bound=True)
     async def arm_table(proportions: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
         """The table of bends of an arm with these proportions: `L0-L1-L2-M0-M1-M2` in thousandths or
         ten-thousandths."""
         stored = await table_for(parse_proportions(proportions))
-        return _resource(stored, "application/octet-stream", if_none_match)
+        return _resource_response(stored, "application/octet-stream", if_none_match)
 
     @app.get(
         "/v1/arms/{proportions}/figures/{name}",
@@ -91,11 +91,11 @@ def create_app() -> FastAPI:
         responses={
             200: {"content": {"image/svg+xml": {}}, "description": "the picture"},
             304: {"description": "the client has it"},
-            404: {"content": {problems.MEDIA_TYPE: {}}, "description": "no figure has this name"},
-            422: {"content": {problems.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
+            404: {"content": {problem_details.MEDIA_TYPE: {}}, "description": "no figure has this name"},
+            422: {"content": {problem_details.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
         },
     )
-    @needs(Role.VIEW, all=True)
+    @requires(Role.VIEW, allow_bound=True)
     async def arm_figure(
         proportions: str, name: str, if_none_match: Annotated[str | None, Header()] = None
     ) -> Response:
@@ -106,34 +106,34 @@ def create_app() -> FastAPI:
             hint = " or ".join(figures.FIGURES)
             raise ProblemError(404, "No such figure", f"there is no figure {name[:60]!r}", field="name", hint=hint)
         async with building:
-            stored = await asyncio.to_thread(stored_figure, arm, known)
-        return _resource(stored, "image/svg+xml", if_none_match)
+            stored = await asyncio.to_thread(cached_figure, arm, known)
+        return _resource_response(stored, "image/svg+xml", if_none_match)
 
-    @app.post("/v1/solve", response_model=batch.SolveAnswer, openapi_extra=batch.OPENAPI)
-    @needs(Role.VIEW, all=True, body=batch.LARGEST_BODY)
+    @app.post("/v1/solve", response_model=batch.SolveAnswer, openapi_extra=batch.OPENAPI_REQUEST_BODY)
+    @requires(Role.VIEW, allow_bound=True, max_body_bytes=batch.MAX_BODY_BYTES)
     async def solve(request: Request) -> Response:
         """Arms for hand targets and legs for thigh angles, in a batch; JSON or MessagePack."""
-        kind = batch.content_kind(request.headers.get("content-type"))
-        accepted = batch.accepted_kind(request.headers.get("accept"), kind)
+        kind = batch.parse_content_type(request.headers.get("content-type"))
+        accepted = batch.negotiate_media_type(request.headers.get("accept"), kind)
         body = await batch.read_body(request)
-        asked = await asyncio.to_thread(batch.decode, body, kind)
+        asked = await asyncio.to_thread(batch.decode_request, body, kind)
         proportions = parse_proportions(asked.proportions)
         stored = await table_for(proportions)
-        answer = await asyncio.to_thread(batch.solve, asked, proportions, stored.data, accepted)
+        answer = await asyncio.to_thread(batch.solve_batch, asked, proportions, stored.data, accepted)
         return Response(answer, media_type=accepted)
 
     return app
 
 
-def _resource(stored: Stored, media_type: str, if_none_match: str | None) -> Response:
+def _resource_response(stored: CachedResource, media_type: str, if_none_match: str | None) -> Response:
     """What never changes, or that the client has it."""
-    headers = {"ETag": stored.etag, "Cache-Control": FOREVER}
-    if if_none_match is not None and _matches(if_none_match, stored.etag):
+    headers = {"ETag": stored.etag, "Cache-Control": IMMUTABLE_CACHE_CONTROL}
+    if if_none_match is not None and _etag_matches(if_none_match, stored.etag):
         return Response(status_code=304, headers=headers)
     return Response(stored.data, headers=headers, media_type=media_type)
 
 
-def _matches(header: str, etag: str) -> bool:
+def _etag_matches(header: str, etag: str) -> bool:
     """Whether If-None-Match names `etag`, by the weak comparison of RFC 9110 13.1.2."""
     tags = [tag.strip().removeprefix("W/") for tag in header.split(",")]
     return "*" in tags or etag in tags

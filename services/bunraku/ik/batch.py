@@ -10,19 +10,19 @@ import numpy as np
 from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from bunraku.backing.problems import ProblemError, invalid_field
-from bunraku.marionette import arms, leg, table
+from bunraku.http.problem_details import ProblemError, invalid_field_problem
+from bunraku.marionette import arm_batch, bend_table, leg
 from bunraku.marionette.proportions import Proportions
 
 JSON = "application/json"
 MSGPACK = "application/msgpack"
-_NAMES = {JSON: JSON, MSGPACK: MSGPACK, "application/x-msgpack": MSGPACK, "application/vnd.msgpack": MSGPACK}
+_MEDIA_TYPES = {JSON: JSON, MSGPACK: MSGPACK, "application/x-msgpack": MSGPACK, "application/vnd.msgpack": MSGPACK}
 
-MOST_TARGETS = 100_000
-LARGEST_BODY = 16 * 1024 * 1024
+MAX_TARGETS = 100_000
+MAX_BODY_BYTES = 16 * 1024 * 1024
 
-Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
-Triple = tuple[Number, Number, Number]
+FiniteNumber = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
+Point = tuple[FiniteNumber, FiniteNumber, FiniteNumber]
 
 
 class SolveRequest(BaseModel):
@@ -33,11 +33,11 @@ class SolveRequest(BaseModel):
     proportions: str = Field(
         description="L0-L1-L2-M0-M1-M2 in thousandths or ten-thousandths", examples=["393-351-256-560-320-120"]
     )
-    targets: list[Triple] = Field(
-        default=[], max_length=MOST_TARGETS, description="hand tips from the shoulder, y up, in arm lengths"
+    targets: list[Point] = Field(
+        default=[], max_length=MAX_TARGETS, description="hand tips from the shoulder, y up, in arm lengths"
     )
-    legs: list[Number] = Field(
-        default=[], max_length=MOST_TARGETS, description="thighs' angles forwards from straight down, radians"
+    legs: list[FiniteNumber] = Field(
+        default=[], max_length=MAX_TARGETS, description="thighs' angles forwards from straight down, radians"
     )
 
 
@@ -68,7 +68,7 @@ class SolveAnswer(BaseModel):
     legs: Legs
 
 
-OPENAPI: dict[str, Any] = {
+OPENAPI_REQUEST_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
         "content": {kind: {"schema": SolveRequest.model_json_schema()} for kind in (JSON, MSGPACK)},
@@ -77,25 +77,25 @@ OPENAPI: dict[str, Any] = {
 """The request's body for OpenAPI: it is read by hand, as its kind depends on Content-Type."""
 
 
-def content_kind(header: str | None) -> str:
+def parse_content_type(header: str | None) -> str:
     """The media type of the request's body; raises `ProblemError` 415 for one not read here."""
     name = (header or JSON).split(";")[0].strip().lower()
-    if name not in _NAMES:
+    if name not in _MEDIA_TYPES:
         raise ProblemError(
             415, "Unsupported media type", f"{name} is not read here", field="Content-Type", hint=f"{JSON} or {MSGPACK}"
         )
-    return _NAMES[name]
+    return _MEDIA_TYPES[name]
 
 
-def accepted_kind(header: str | None, default: str) -> str:
+def negotiate_media_type(header: str | None, default: str) -> str:
     """The media type of the answer: the first known one that Accept names, else (no Accept, or a wildcard) that of the
     request; raises `ProblemError` 406 where none fits."""
     if header is None:
         return default
     for part in header.split(","):
         name = part.split(";")[0].strip().lower()
-        if name in _NAMES:
-            return _NAMES[name]
+        if name in _MEDIA_TYPES:
+            return _MEDIA_TYPES[name]
         if name in ("*/*", "application/*"):
             return default
     raise ProblemError(406, "Not acceptable", f"{header} is not said here", field="Accept", hint=f"{JSON} or {MSGPACK}")
@@ -106,39 +106,39 @@ async def read_body(request: Request) -> bytes:
     body = bytearray()
     async for chunk in request.stream():
         body += chunk
-        if len(body) > LARGEST_BODY:
+        if len(body) > MAX_BODY_BYTES:
             raise ProblemError(
-                413, "Too large", f"the body is more than {LARGEST_BODY} bytes", hint="send several batches"
+                413, "Too large", f"the body is more than {MAX_BODY_BYTES} bytes", hint="send several batches"
             )
     return bytes(body)
 
 
-def decode(body: bytes, kind: str) -> SolveRequest:
+def decode_request(body: bytes, media_type: str) -> SolveRequest:
     """The request in `body`; raises `ProblemError` 400 if it cannot be parsed, 422 with the field if it is not one."""
     try:
-        content = json.loads(body) if kind == JSON else msgpack.unpackb(body)
+        content = json.loads(body) if media_type == JSON else msgpack.unpackb(body)
     except (ValueError, RecursionError, msgpack.exceptions.UnpackException) as error:
-        raise ProblemError(400, "Unreadable body", f"the body is not {kind}: {error}") from error
+        raise ProblemError(400, "Unreadable body", f"the body is not {media_type}: {error}") from error
     try:
         return SolveRequest.model_validate(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise invalid_field(first["loc"], first["msg"]) from error
+        raise invalid_field_problem(first["loc"], first["msg"]) from error
 
 
-def solve(asked: SolveRequest, proportions: Proportions, data: bytes, kind: str) -> bytes:
+def solve_batch(request: SolveRequest, proportions: Proportions, table_bytes: bytes, media_type: str) -> bytes:
     """The answer as bytes of `kind`; `data` is the table's bytes."""
-    targets = np.array(asked.targets, dtype=np.float64).reshape(-1, 3)
-    solved = arms.solve(proportions, table.from_bytes(data), targets)
+    targets = np.array(request.targets, dtype=np.float64).reshape(-1, 3)
+    solved = arm_batch.solve_arms(proportions, bend_table.parse_bend_table(table_bytes), targets)
     t0, t1, t2 = solved.angles()
-    hip, knee = leg.solve(np.array(asked.legs, dtype=np.float64))
+    hip, knee = leg.solve_legs(np.array(request.legs, dtype=np.float64))
     hung = {"azimuth": solved.azimuth, "t0": t0, "t1": t1, "t2": t2}
     hung |= {"elbow": solved.elbow, "wrist": solved.wrist, "tip": solved.tip}
     answer = {
         "arms": {name: values.tolist() for name, values in hung.items()},
         "legs": {"hip": hip.tolist(), "knee": knee.tolist()},
     }
-    if kind == JSON:
+    if media_type == JSON:
         return json.dumps(answer, separators=(",", ":")).encode()
     packed: bytes = msgpack.packb(answer)
     return packed

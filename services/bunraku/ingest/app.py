@@ -11,117 +11,117 @@ from fastapi import FastAPI, Path, Query, Request, Response
 from fastapi.responses import JSONResponse
 from starlette.requests import ClientDisconnect
 
-from bunraku.backing import problems
-from bunraku.backing.access import Role, access_of, needs
-from bunraku.backing.backing import Backing
-from bunraku.backing.catalogue import BadCursor
-from bunraku.backing.missing import no_such_motion
-from bunraku.backing.problems import ProblemError
+from bunraku.http import problem_details
+from bunraku.http.access_control import Role, access_of, requires
+from bunraku.http.not_found import motion_not_found
+from bunraku.http.problem_details import ProblemError
 from bunraku.ingest import metrics
+from bunraku.ingest.audio import AudioOperation
 from bunraku.ingest.entry import entry_json
-from bunraku.ingest.keyframes import Staging
-from bunraku.ingest.performers import Gathering, Performers
-from bunraku.ingest.progress import Progress
-from bunraku.ingest.recordings import SUBJECT, Recordings
-from bunraku.ingest.soundtracks import Soundtracks
-from bunraku.ingest.stagings import Stagings
-from bunraku.ingest.uploads import Uploads
+from bunraku.ingest.keyframe import Staging
+from bunraku.ingest.motion import UploadOperation
+from bunraku.ingest.performers import PerformersOperation, PerformersRequest
+from bunraku.ingest.progress import UploadProgress
+from bunraku.ingest.recording import RECORDING_SUBJECT, RecordingOperation
+from bunraku.ingest.scene import SceneOperation
+from bunraku.runtime.context import ServiceContext
+from bunraku.storage.catalogue import InvalidCursor
 
-KEYFRAMES = 16 << 20
+MAX_KEYFRAMES_BYTES = 16 << 20
 """Bytes of a camera and lights."""
-NAME = r"^[A-Za-z0-9_-]{8,64}$"
+UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
 """Of an upload, chosen at random by its sender."""
 
 
-def create_app(backing: Backing) -> FastAPI:
+def create_app(backing: ServiceContext) -> FastAPI:
     """The service upon `backing`."""
-    uploads = Uploads(backing)
-    soundtracks = Soundtracks(backing, uploads)
-    stagings = Stagings(backing, uploads)
-    performers = Performers(backing, uploads)
-    recordings = Recordings(backing, uploads.places)
+    uploads = UploadOperation(backing)
+    soundtracks = AudioOperation(backing, uploads)
+    stagings = SceneOperation(backing, uploads)
+    performers = PerformersOperation(backing, uploads)
+    recordings = RecordingOperation(backing, uploads.worker_slots)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        metrics.register(backing.metrics, uploads)
-        answering = backing.bus.answer(SUBJECT, recordings.answer)
-        looking = asyncio.create_task(uploads.queue.run(), name="jobs of this replica")
+        metrics.register_metrics(backing.metrics, uploads)
+        answering = backing.bus.serve(RECORDING_SUBJECT, recordings.handle_message)
+        looking = asyncio.create_task(uploads.job_queue.run(), name="jobs of this replica")
         try:
             yield
         finally:
-            answering.end()
+            answering.unsubscribe()
             looking.cancel()
             await asyncio.wait((looking,))
-            await uploads.queue.close()
+            await uploads.job_queue.release_jobs()
 
     app = FastAPI(title="Bunraku ingest", lifespan=lifespan)
-    problems.install(app)
+    problem_details.install_problem_handlers(app)
 
-    @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BODY)
-    @needs(Role.INGEST, body=None)
+    @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
+    @requires(Role.INGEST, max_body_bytes=None)
     async def upload(
         request: Request,
         filename: Annotated[str, Query(min_length=1, max_length=255)],
-        upload: Annotated[str | None, Query(pattern=NAME)] = None,
+        upload: Annotated[str | None, Query(pattern=UPLOAD_NAME_PATTERN)] = None,
     ) -> Response:
         """Make a motion of the file in the request's body. The same bytes again give the same motion, with 200. With a
         random name in `upload`, `GET /v1/uploads/{upload}` says meanwhile how far it is."""
         try:
-            entry, new = await uploads.take(request, filename, upload)
+            entry, new = await uploads.upload_motion(request, filename, upload)
         except ClientDisconnect:
             # nobody is there to read this
             return Response(status_code=400)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
-    @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=_BODY)
-    @needs(Role.INGEST, body=None)
+    @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
+    @requires(Role.INGEST, max_body_bytes=None)
     async def add_audio(
         request: Request,
         motion: str,
         filename: Annotated[str, Query(min_length=1, max_length=255)],
-        upload: Annotated[str | None, Query(pattern=NAME)] = None,
+        upload: Annotated[str | None, Query(pattern=UPLOAD_NAME_PATTERN)] = None,
     ) -> Response:
         """Make a motion that is another with the sound of the file in the request's body: WAV, FLAC, MP3 or Ogg. What
         is beyond the motion's end is left out. The motion itself stays as it is; the same file again gives the same
         new motion, with 200. `upload` as of an uploaded motion."""
         try:
-            entry, new = await soundtracks.take(request, motion, filename, upload)
+            entry, new = await soundtracks.upload_audio(request, motion, filename, upload)
         except ClientDisconnect:
             # nobody is there to read this
             return Response(status_code=400)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
     @app.post("/v1/motions/{motion}/scene", status_code=201, tags=["motions"])
-    @needs(Role.INGEST, body=KEYFRAMES)
+    @requires(Role.INGEST, max_body_bytes=MAX_KEYFRAMES_BYTES)
     async def add_scene(motion: str, asked: Staging, request: Request) -> Response:
         """Make a motion that is another with a camera and lights, given as keyframes in motion time. What is left out
         stays as that motion has it. The motion itself stays as it is; the same keyframes again give the same new
         motion, with 200."""
-        entry, new = await stagings.add(motion, asked, access_of(request).subject)
+        entry, new = await stagings.add_scene(motion, asked, access_of(request).subject)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
     @app.post("/v1/motions/{motion}/performers", status_code=201, tags=["motions"])
-    @needs(Role.INGEST)
-    async def add_performers(motion: str, asked: Gathering, request: Request) -> Response:
+    @requires(Role.INGEST)
+    async def add_performers(motion: str, asked: PerformersRequest, request: Request) -> Response:
         """Make a motion in which the performers of others dance beside this one's, four of them at most. The motion
         itself stays as it is, with its sound, cameras and lights; the others' stay out. The same motions at the same
         places again give the same new motion, with 200."""
-        entry, new = await performers.add(motion, asked, access_of(request).subject)
+        entry, new = await performers.add_performers(motion, asked, access_of(request).subject)
         return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
 
     @app.get("/v1/uploads/{upload}", tags=["motions"])
-    @needs(Role.INGEST)
-    async def progress(upload: Annotated[str, Path(pattern=NAME)], response: Response) -> Progress:
+    @requires(Role.INGEST)
+    async def progress(upload: Annotated[str, Path(pattern=UPLOAD_NAME_PATTERN)], response: Response) -> UploadProgress:
         """How far an upload is that is under way: what is being done, and the share of that which is done. 404 before
         and after."""
-        found = uploads.progress(upload)
+        found = uploads.get_progress(upload)
         if found is None:
             raise ProblemError(404, "No such upload", f"no upload {upload!r} is under way here")
         response.headers["Cache-Control"] = "no-store"
         return found
 
     @app.get("/v1/motions", tags=["motions"])
-    @needs(Role.VIEW, all=True)
+    @requires(Role.VIEW, allow_bound=True)
     async def page(
         request: Request,
         limit: Annotated[int, Query(ge=1, le=200)] = 50,
@@ -129,41 +129,41 @@ def create_app(backing: Backing) -> FastAPI:
     ) -> dict[str, Any]:
         """Motions, newest first; `next` is the cursor of the next page. Who is bound to one sees that alone."""
         by = access_of(request)
-        if by.bound:
-            shown = by.motion if by.session is None else await backing.gate.on_show(by.session)
-            found = None if shown is None else await backing.catalogue.get(shown)
+        if by.is_bound:
+            shown = by.motion if by.session is None else await backing.authenticator.get_session_motion(by.session)
+            found = None if shown is None else await backing.catalogue.get_motion(shown)
             return {"items": [] if found is None else [entry_json(found)], "next": None}
         try:
-            entries, following = await backing.catalogue.page(limit, cursor)
-        except BadCursor as error:
+            entries, following = await backing.catalogue.list_motions(limit, cursor)
+        except InvalidCursor as error:
             raise ProblemError(422, "Bad cursor", str(error), field="cursor") from None
         return {"items": [entry_json(entry) for entry in entries], "next": following}
 
     @app.get("/v1/motions/{motion}", tags=["motions"])
-    @needs(Role.VIEW)
+    @requires(Role.VIEW)
     async def describe(motion: str) -> dict[str, Any]:
         """One motion."""
-        entry = await backing.catalogue.get(motion)
+        entry = await backing.catalogue.get_motion(motion)
         if entry is None:
-            raise no_such_motion(motion)
+            raise motion_not_found(motion)
         return entry_json(entry)
 
     @app.delete("/v1/motions/{motion}", status_code=204, tags=["motions"])
-    @needs(Role.INGEST)
+    @requires(Role.INGEST)
     async def remove(motion: str, request: Request) -> None:
         """Remove one motion; sessions that play it go on with what they have. Who is no admin removes their own."""
-        by, found = access_of(request), await backing.catalogue.get(motion)
+        by, found = access_of(request), await backing.catalogue.get_motion(motion)
         if found is not None and by.role < Role.ADMIN and found.subject != by.subject:
             detail = f"{motion} was stored by another; this needs the role admin"
             raise ProblemError(403, "Not allowed", detail, needed="admin")
-        if not await backing.catalogue.remove(motion):
-            raise no_such_motion(motion)
-        await backing.library.remove(motion)
+        if not await backing.catalogue.remove_motion(motion):
+            raise motion_not_found(motion)
+        await backing.motion_store.remove(motion)
 
     return app
 
 
-_BODY = {
+_BINARY_REQUEST_BODY = {
     "requestBody": {
         "required": True,
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},

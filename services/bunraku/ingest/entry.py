@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from bunraku.backing.catalogue import Entry
-from bunraku.backing.instants import instant
+from bunraku.http.timestamp import format_timestamp
+from bunraku.storage.catalogue import CatalogueEntry
 
 
-def entry_json(entry: Entry) -> dict[str, Any]:
+def entry_json(entry: CatalogueEntry) -> dict[str, Any]:
     """A motion as the API shows it."""
-    created = instant(entry.created / 1e6, "milliseconds")
+    created = format_timestamp(entry.created / 1e6, "milliseconds")
     return {"id": entry.id, "created": created, "tracks": ["motion"], **entry.description}

@@ -16,72 +16,72 @@ from math import atan2, cos, hypot, sin
 import numpy as np
 import numpy.typing as npt
 
-from bunraku.marionette import links
-from bunraku.marionette.links import Links
-from bunraku.marionette.proportions import ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT, Proportions
+from bunraku.marionette import planar_arm
+from bunraku.marionette.planar_arm import ArmGeometry
+from bunraku.marionette.proportions import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD, Proportions
 from bunraku.motion.rotation import Array
 
-Table = npt.NDArray[np.float16]
+BendTable = npt.NDArray[np.float16]
 
 
-def bend_limits(proportions: Proportions, r: Array) -> tuple[Array, Array]:
+def wrist_bend_limits(proportions: Proportions, r: Array) -> tuple[Array, Array]:
     """Least and greatest wrist bend (n,) in radians that reach `r` (n,) with elbow and wrist within their limits."""
     upper, fore, hand = proportions.lengths
     straight = upper + fore
-    high = np.minimum(WRIST_LIMIT, _acos((r**2 - straight**2 - hand**2) / (2.0 * straight * hand)))
+    high = np.minimum(MAX_WRIST_BEND_RAD, _clamped_acos((r**2 - straight**2 - hand**2) / (2.0 * straight * hand)))
     folded, lean = folded_elbow(proportions)
-    low = lean - ELBOW_LIMIT + _acos((r**2 - folded**2 - hand**2) / (2.0 * folded * hand))
+    low = lean - MAX_ELBOW_BEND_RAD + _clamped_acos((r**2 - folded**2 - hand**2) / (2.0 * folded * hand))
     return np.minimum(np.maximum(low, 0.0), high), high
 
 
 def folded_elbow(proportions: Proportions) -> tuple[float, float]:
     """From shoulder to wrist with the elbow bent to its limit: the distance, and its angle from the upper arm."""
     upper, fore, _ = proportions.lengths
-    x, y = upper + fore * cos(ELBOW_LIMIT), fore * sin(ELBOW_LIMIT)
+    x, y = upper + fore * cos(MAX_ELBOW_BEND_RAD), fore * sin(MAX_ELBOW_BEND_RAD)
     return hypot(x, y), atan2(y, x)
 
 
-def close(proportions: Proportions, r: Array, beta: Array, bend: Array) -> tuple[Array, Array, Array]:
+def close_chain(proportions: Proportions, r: Array, beta: Array, bend: Array) -> tuple[Array, Array, Array]:
     """Link angles t0, t1, t2 (n,) that bring the tip to (`r`, `beta`) with the wrist bent by `bend`, elbow below."""
     upper, fore, hand = proportions.lengths
     x, y = fore + hand * np.cos(bend), hand * np.sin(bend)
     lower = np.hypot(x, y)
-    t0: Array = beta - _acos((upper**2 + r**2 - lower**2) / (2.0 * upper * r))
-    t1: Array = t0 + _acos((r**2 - upper**2 - lower**2) / (2.0 * upper * lower)) - np.arctan2(y, x)
+    t0: Array = beta - _clamped_acos((upper**2 + r**2 - lower**2) / (2.0 * upper * r))
+    t1: Array = t0 + _clamped_acos((r**2 - upper**2 - lower**2) / (2.0 * upper * lower)) - np.arctan2(y, x)
     return t0, t1, t1 + bend
 
 
 class Arm:
     """One arm at a time, in plain floats: the path for a stage that solves at 60 Hz."""
 
-    def __init__(self, proportions: Proportions, table: Table) -> None:
+    def __init__(self, proportions: Proportions, table: BendTable) -> None:
         self.proportions = proportions
-        self.inner = proportions.inner_radius
-        self.links: Links = (*proportions.lengths, self.inner, *folded_elbow(proportions))
-        self.nodes: Array = table.astype(np.float64)
+        self.min_tip_distance = proportions.min_tip_distance
+        self.geometry: ArmGeometry = (*proportions.lengths, self.min_tip_distance, *folded_elbow(proportions))
+        self.bend_nodes: Array = table.astype(np.float64)
         """The table (SIDE, SIDE)."""
 
-    def clamp(self, r: float) -> float:
+    def clamp_distance(self, r: float) -> float:
         """The nearest distance that is solved for."""
-        return min(max(r, self.inner), OUTER_RADIUS)
+        return min(max(r, self.min_tip_distance), MAX_TIP_DISTANCE)
 
-    def limits(self, r: float) -> tuple[float, float]:
-        """As `links.limits`; `r` is clamped."""
-        return links.limits(self.links, r)
+    def bend_limits(self, r: float) -> tuple[float, float]:
+        """As `planar_arm.limits`; `r` is clamped."""
+        return planar_arm.bend_limits(self.geometry, r)
 
-    def bend(self, r: float, beta: float) -> float:
-        """As `links.gravity`, from this arm's table."""
-        return links.gravity(self.links, self.nodes, r, beta)
+    def gravity_bend(self, r: float, beta: float) -> float:
+        """As `planar_arm.gravity`, from this arm's table."""
+        return planar_arm.gravity_bend(self.geometry, self.bend_nodes, r, beta)
 
-    def close(self, r: float, beta: float, bend: float) -> tuple[float, float, float]:
-        """As `links.close`."""
-        return links.close(self.links, r, beta, bend)
+    def close_chain(self, r: float, beta: float, bend: float) -> tuple[float, float, float]:
+        """As `planar_arm.close`."""
+        return planar_arm.close_chain(self.geometry, r, beta, bend)
 
-    def angles(self, r: float, beta: float) -> tuple[float, float, float]:
+    def solve_angles(self, r: float, beta: float) -> tuple[float, float, float]:
         """Link angles t0, t1, t2 for a tip at distance `r` (already clamped) and elevation `beta`, -pi/2..pi/2."""
-        return self.close(r, beta, self.bend(r, beta))
+        return self.close_chain(r, beta, self.gravity_bend(r, beta))
 
 
-def _acos(x: Array) -> Array:
+def _clamped_acos(x: Array) -> Array:
     angle: Array = np.arccos(np.clip(x, -1.0, 1.0))
     return angle

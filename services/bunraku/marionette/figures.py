@@ -12,25 +12,25 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from bunraku.marionette import arms
-from bunraku.marionette.paper import build_paper_table, paper_angles, places
+from bunraku.marionette import arm_batch
+from bunraku.marionette.bend_table import build_bend_table
+from bunraku.marionette.paper import build_paper_table, joint_positions, paper_angles
 from bunraku.marionette.proportions import Proportions
-from bunraku.marionette.table import build_table
 
 Figure = Literal["circle", "horizontal"]
 FIGURES: tuple[Figure, ...] = get_args(Figure)
 """What the tip does: names of the figures."""
 
-Places = npt.NDArray[np.complex128]
+PlanarPoints = npt.NDArray[np.complex128]
 
 WIDTH, HEIGHT = 1000, 540
-_SCALE = 340.0
+_PIXELS_PER_ARM_LENGTH = 340.0
 """Pixels of an arm's length."""
-_SHOULDERS = (96.0, 576.0)
+_SHOULDER_XS = (96.0, 576.0)
 _SHOULDER_Y = 268.0
-_CENTRE, _RADIUS = 0.52 - 0.12j, 0.34
-_LINE = (0.12 - 0.3j, 0.92 - 0.3j)
-_POSES = 24
+_CIRCLE_CENTRE, _CIRCLE_RADIUS = 0.52 - 0.12j, 0.34
+_LINE_ENDS = (0.12 - 0.3j, 0.92 - 0.3j)
+_POSE_COUNT = 24
 
 _PAPER, _INK, _MUTED, _GOLD, _HAIRLINE = "#f6ecd8", "#231d17", "#655b4e", "#e8b765", "#3c2a14"
 _TIP, _WRIST, _ELBOW = "#b3301f", "#7d5a14", "#27418f"
@@ -42,31 +42,31 @@ _TITLES: dict[Figure, str] = {
 }
 
 
-def path(name: Figure, count: int) -> Places:
+def tip_path(name: Figure, count: int) -> PlanarPoints:
     """Places (count,) of the tip on its way, as x + iy in the arm's plane, in arm lengths; a circle ends where it
     began."""
     way = np.linspace(0.0, 1.0, count)
     if name == "circle":
-        return np.asarray(_CENTRE + _RADIUS * np.exp(2j * pi * way))
-    return np.asarray(_LINE[0] + (_LINE[1] - _LINE[0]) * way)
+        return np.asarray(_CIRCLE_CENTRE + _CIRCLE_RADIUS * np.exp(2j * pi * way))
+    return np.asarray(_LINE_ENDS[0] + (_LINE_ENDS[1] - _LINE_ENDS[0]) * way)
 
 
-def papers_arm(proportions: Proportions, tips: Places) -> Places:
+def paper_arm(proportions: Proportions, tips: PlanarPoints) -> PlanarPoints:
     """Elbow, wrist and tip (3, n) of the paper's arm for tips (n,)."""
     table = build_paper_table(proportions)
-    return places(proportions, paper_angles(table, np.abs(tips), np.angle(tips)))
+    return joint_positions(proportions, paper_angles(table, np.abs(tips), np.angle(tips)))
 
 
-def our_arm(proportions: Proportions, tips: Places) -> Places:
+def exact_arm(proportions: Proportions, tips: PlanarPoints) -> PlanarPoints:
     """Elbow, wrist and tip (3, n) of our arm for tips (n,)."""
     targets = np.stack([np.zeros(len(tips)), tips.imag, tips.real], axis=-1)
-    solved = arms.solve(proportions, build_table(proportions), targets)
+    solved = arm_batch.solve_arms(proportions, build_bend_table(proportions), targets)
     return np.stack([joint[:, 2] + 1j * joint[:, 1] for joint in (solved.elbow, solved.wrist, solved.tip)])
 
 
-def draw(proportions: Proportions, name: Figure) -> str:
+def draw_figure(proportions: Proportions, name: Figure) -> str:
     """The figure as SVG."""
-    way, poses = path(name, 241), path(name, _POSES + 1)[: _POSES if name == "circle" else None]
+    way, poses = tip_path(name, 241), tip_path(name, _POSE_COUNT + 1)[: _POSE_COUNT if name == "circle" else None]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="{_SANS}" font-size="13" '
         f'fill="{_MUTED}" role="img" aria-label="{_TITLES[name]}">',
@@ -77,25 +77,27 @@ def draw(proportions: Proportions, name: Figure) -> str:
         f"{_TITLES[name]}</text>",
     ]
     for x, arm, words in zip(
-        _SHOULDERS, (papers_arm, our_arm), ("As in the paper", "Exact, and within the joints' limits"), strict=True
+        _SHOULDER_XS, (paper_arm, exact_arm), ("As in the paper", "Exact, and within the joints' limits"), strict=True
     ):
         parts += _panel(x, arm(proportions, poses), arm(proportions, way), words)
     parts += _legend(proportions)
     return "\n".join([*parts, "</svg>", ""])
 
 
-def _panel(left: float, poses: Places, ways: Places, words: str) -> list[str]:
+def _panel(left: float, poses: PlanarPoints, joint_paths: PlanarPoints, caption: str) -> list[str]:
     """One arm: the half disc it reaches, its joints' ways, and its poses one over the other."""
 
     def at(place: complex) -> str:
-        return f"{left + _SCALE * place.real:.1f} {_SHOULDER_Y - _SCALE * place.imag:.1f}"
+        return (
+            f"{left + _PIXELS_PER_ARM_LENGTH * place.real:.1f} {_SHOULDER_Y - _PIXELS_PER_ARM_LENGTH * place.imag:.1f}"
+        )
 
     def line(joints: list[complex], look: str) -> str:
         return f'<path d="M{"L".join(at(place) for place in joints)}" fill="none" {look}/>'
 
     disc = [0.55 * np.exp(1j * angle) for angle in np.linspace(-0.5, 0.5, 2) * pi]
     parts = [
-        f'<text x="{left + 10:.1f}" y="92" font-size="15" fill="{_INK}">{words}</text>',
+        f'<text x="{left + 10:.1f}" y="92" font-size="15" fill="{_INK}">{caption}</text>',
         line(disc, f'stroke="{_HAIRLINE}" stroke-opacity="0.34" stroke-dasharray="1 5" stroke-linecap="round"'),
     ]
     for nth in range(poses.shape[1]):
@@ -103,7 +105,7 @@ def _panel(left: float, poses: Places, ways: Places, words: str) -> list[str]:
         bold = nth % 6 == 0
         look = f'stroke="{_INK}" stroke-opacity="{0.8 if bold else 0.2}" stroke-width="{2.6 if bold else 1.4}"'
         parts.append(line(joints, look + ' stroke-linejoin="round" stroke-linecap="round"'))
-    for joint, colour in zip(ways, (_ELBOW, _WRIST, _TIP), strict=True):
+    for joint, colour in zip(joint_paths, (_ELBOW, _WRIST, _TIP), strict=True):
         parts.append(line(joint.tolist(), f'stroke="{colour}" stroke-width="2.2" stroke-linejoin="round"'))
     for nth in range(0, poses.shape[1], 6):
         for joint, colour in zip(poses[:, nth].tolist(), (_ELBOW, _WRIST, _TIP), strict=True):

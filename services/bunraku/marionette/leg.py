@@ -11,15 +11,15 @@ import numpy as np
 
 from bunraku.motion.rotation import Array
 
-THIGH_LEAST = -pi / 4.0
+MIN_THIGH_ANGLE_RAD = -pi / 4.0
 """The farthest back a thigh is pulled."""
-THIGH_GREATEST = 2.0 * pi / 3.0
+MAX_THIGH_ANGLE_RAD = 2.0 * pi / 3.0
 """The farthest up a thigh is pulled."""
 
 
 def clamp_thigh(theta: float) -> float:
     """The nearest angle a thigh is pulled to."""
-    return min(max(theta, THIGH_LEAST), THIGH_GREATEST)
+    return min(max(theta, MIN_THIGH_ANGLE_RAD), MAX_THIGH_ANGLE_RAD)
 
 
 def knee_bend(theta: float) -> float:
@@ -27,7 +27,7 @@ def knee_bend(theta: float) -> float:
     return max(0.0, theta)
 
 
-def solve(theta: Array) -> tuple[Array, Array]:
+def solve_legs(theta: Array) -> tuple[Array, Array]:
     """Hip and knee angles (n,) for thigh angles (n,), within the thigh's limits."""
-    hip: Array = np.clip(theta, THIGH_LEAST, THIGH_GREATEST)
+    hip: Array = np.clip(theta, MIN_THIGH_ANGLE_RAD, MAX_THIGH_ANGLE_RAD)
     return hip, np.maximum(0.0, hip)

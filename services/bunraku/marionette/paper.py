@@ -18,15 +18,15 @@ import numpy.typing as npt
 from bunraku.marionette.proportions import Proportions
 from bunraku.motion.rotation import Array
 
-DISTANCES, ELEVATIONS = 101, 19
+DISTANCE_NODES, ELEVATION_NODES = 101, 19
 """Nodes along r, 0..1, and along beta, -pi/2..pi/2."""
-PAPER_BYTES = DISTANCES * ELEVATIONS * 3 * 4
+PAPER_BYTES = DISTANCE_NODES * ELEVATION_NODES * 3 * 4
 """Of a table: 23,028. The paper says "within 8 kB", which one of the three angles takes."""
 
 PaperTable = npt.NDArray[np.float32]
-_SCAN = 181
-_HALVINGS = 40
-_ASIDE = 1e-6
+_SCAN_SAMPLES = 181
+_BISECTIONS = 40
+_AXIS_OFFSET_RAD = 1e-6
 """Straight up and down an arm may bow to either side. A node there is taken this little from it, radians, so that the
 arm bows to the side it does beside it."""
 
@@ -36,34 +36,36 @@ def build_paper_table(proportions: Proportions) -> PaperTable:
 
     A node nearer than an arm with one long link can fold has the angles of the nearest place that it does reach.
     """
-    r, beta = np.meshgrid(np.linspace(0.0, 1.0, DISTANCES), np.linspace(-0.5, 0.5, ELEVATIONS) * pi, indexing="ij")
+    r, beta = np.meshgrid(
+        np.linspace(0.0, 1.0, DISTANCE_NODES), np.linspace(-0.5, 0.5, ELEVATION_NODES) * pi, indexing="ij"
+    )
     r = np.maximum(r, 2.0 * max(proportions.lengths) - 1.0 + 1e-9)
-    beta = np.clip(beta, -0.5 * pi + _ASIDE, 0.5 * pi - _ASIDE)
-    step = 2.0 * pi / (_SCAN - 1)
+    beta = np.clip(beta, -0.5 * pi + _AXIS_OFFSET_RAD, 0.5 * pi - _AXIS_OFFSET_RAD)
+    step = 2.0 * pi / (_SCAN_SAMPLES - 1)
     best, lowest = np.zeros(r.shape), np.full(r.shape, np.inf)
 
     def look(turn: Array) -> None:
         nonlocal best, lowest
-        height = _height(proportions, _close(proportions, r, beta, turn))
+        height = _potential(proportions, _close_chain(proportions, r, beta, turn))
         # by more than rounding: poses that are alike keep their order
         lower = height < lowest - 1e-13
         best, lowest = np.where(lower, turn, best), np.where(lower, height, lowest)
 
-    for nth in range(_SCAN):
+    for nth in range(_SCAN_SAMPLES):
         look(np.full(r.shape, nth * step))
-    for _ in range(_HALVINGS):
+    for _ in range(_BISECTIONS):
         step *= 0.5
         middle = best
         look(middle - step)
         look(middle + step)
-    return _close(proportions, r, beta, best).astype(np.float32)
+    return _close_chain(proportions, r, beta, best).astype(np.float32)
 
 
 def paper_angles(table: PaperTable, r: Array, beta: Array) -> Array:
     """Angles t0, t1, t2 (3, n) for tips at (`r`, `beta`), 0..1 and -pi/2..pi/2: bilinear between four nodes."""
-    u, v = r * (DISTANCES - 1), (beta / pi + 0.5) * (ELEVATIONS - 1)
-    i = np.clip(u.astype(np.int64), 0, DISTANCES - 2)
-    j = np.clip(v.astype(np.int64), 0, ELEVATIONS - 2)
+    u, v = r * (DISTANCE_NODES - 1), (beta / pi + 0.5) * (ELEVATION_NODES - 1)
+    i = np.clip(u.astype(np.int64), 0, DISTANCE_NODES - 2)
+    j = np.clip(v.astype(np.int64), 0, ELEVATION_NODES - 2)
     p, q = u - i, v - j
     nodes = table.astype(np.float64)
     angles: Array = (nodes[:, i, j] * (1.0 - q) + nodes[:, i, j + 1] * q) * (1.0 - p)
@@ -71,7 +73,7 @@ def paper_angles(table: PaperTable, r: Array, beta: Array) -> Array:
     return angles
 
 
-def places(proportions: Proportions, angles: Array) -> npt.NDArray[np.complex128]:
+def joint_positions(proportions: Proportions, angles: Array) -> npt.NDArray[np.complex128]:
     """Elbow, wrist and tip (3, n) of link angles (3, n), as x + iy in the arm's plane."""
     links = np.array(proportions.lengths)[:, None] * np.exp(1j * angles)
     joints: npt.NDArray[np.complex128] = np.cumsum(links, axis=0)
@@ -80,11 +82,11 @@ def places(proportions: Proportions, angles: Array) -> npt.NDArray[np.complex128
 
 def tip_error(proportions: Proportions, table: PaperTable, r: Array, beta: Array) -> Array:
     """How far (n,) tips are from their targets, in arm lengths: the paper's measure (4.3)."""
-    error: Array = np.abs(places(proportions, paper_angles(table, r, beta))[2] - r * np.exp(1j * beta))
+    error: Array = np.abs(joint_positions(proportions, paper_angles(table, r, beta))[2] - r * np.exp(1j * beta))
     return error
 
 
-def _close(proportions: Proportions, r: Array, beta: Array, turn: Array) -> Array:
+def _close_chain(proportions: Proportions, r: Array, beta: Array, turn: Array) -> Array:
     """Link angles (3, ...) that bring the tip to (`r`, `beta`) with the upper arm turned down by `turn` from its
     direction; NaN where the rest does not reach, or a joint would bend against its sense."""
     upper, fore, hand = proportions.lengths
@@ -100,7 +102,7 @@ def _close(proportions: Proportions, r: Array, beta: Array, turn: Array) -> Arra
     return np.where(possible, np.array([t0, t0 + elbow, t0 + elbow + bend]), np.nan)
 
 
-def _height(proportions: Proportions, angles: Array) -> Array:
+def _potential(proportions: Proportions, angles: Array) -> Array:
     """The part of the paper's E that a pose can change, twice and without g; infinite where there is no pose."""
     upper, fore, _ = proportions.lengths
     m0, m1, m2 = proportions.masses

@@ -10,11 +10,11 @@ import re
 from dataclasses import dataclass
 from math import atan2, cos, hypot, radians, sin
 
-ELBOW_LIMIT = radians(150.0)
+MAX_ELBOW_BEND_RAD = radians(150.0)
 """The elbow bends from 0 to this."""
-WRIST_LIMIT = radians(80.0)
+MAX_WRIST_BEND_RAD = radians(80.0)
 """The wrist bends from 0 to this."""
-OUTER_RADIUS = 1.0 - 1e-6
+MAX_TIP_DISTANCE = 1.0 - 1e-6
 """The farthest a hand tip is solved for, in arm lengths: a fully straight arm has no bend left to choose."""
 
 WINTER_MASSES = (0.028, 0.016, 0.006)
@@ -22,10 +22,10 @@ WINTER_MASSES = (0.028, 0.016, 0.006)
 WINTER_LENGTHS = (0.186, 0.146, 0.108)
 """Lengths of the same as parts of the body's height (Drillis and Contini 1966, in Winter, figure 4.1)."""
 
-_NAMES = ("L0", "L1", "L2", "M0", "M1", "M2")
-_LEAST = (100, 100, 20, 1, 1, 1)
+_PART_NAMES = ("L0", "L1", "L2", "M0", "M1", "M2")
+_MIN_PARTS = (100, 100, 20, 1, 1, 1)
 """Of a thousand."""
-_WHOLE = 10_000
+_TOTAL_PARTS = 10_000
 
 
 class ProportionsError(ValueError):
@@ -45,7 +45,9 @@ class Proportions:
     masses: tuple[float, float, float]
 
     @classmethod
-    def of(cls, lengths: tuple[float, float, float], masses: tuple[float, float, float] | None = None) -> Proportions:
+    def from_links(
+        cls, lengths: tuple[float, float, float], masses: tuple[float, float, float] | None = None
+    ) -> Proportions:
         """From lengths and masses in any unit; without masses each link weighs by its length what Winter's does.
 
         Raises `ProportionsError` where a link is too short for a table.
@@ -76,7 +78,7 @@ class Proportions:
                 "proportions",
                 "write L0-L1-L2-M0-M1-M2, such as 393-351-256-560-320-120",
             )
-        return _checked(tuple(int(part) for part in identity.split("-")))
+        return _validate_parts(tuple(int(part) for part in identity.split("-")))
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -93,10 +95,10 @@ class Proportions:
 
     def rounded(self) -> Proportions:
         """These proportions as their identity has them. Raises `ProportionsError` as `parse` does."""
-        return _checked(self.parts)
+        return _validate_parts(self.parts)
 
     @property
-    def inner_radius(self) -> float:
+    def min_tip_distance(self) -> float:
         """The nearest to the shoulder that a hand tip is solved for, in arm lengths.
 
         A quarter farther than the nearest point the limits of elbow and wrist allow (the wrist taken degree by
@@ -104,19 +106,19 @@ class Proportions:
         """
         upper, fore, hand = self.lengths
         nearest = 1.0
-        for degrees in range(round(WRIST_LIMIT / radians(1.0)) + 1):
+        for degrees in range(round(MAX_WRIST_BEND_RAD / radians(1.0)) + 1):
             bend = radians(degrees)
             x, y = fore + hand * cos(bend), hand * sin(bend)
-            elbow = min(ELBOW_LIMIT, radians(180.0) - atan2(y, x))
+            elbow = min(MAX_ELBOW_BEND_RAD, radians(180.0) - atan2(y, x))
             lower = hypot(x, y)
             turn = elbow + atan2(y, x)
             nearest = min(nearest, hypot(upper + lower * cos(turn), lower * sin(turn)))
         return max(0.1, 1.25 * nearest)
 
 
-def _checked(parts: tuple[int, ...]) -> Proportions:
-    whole = 1000 if sum(parts[:3]) < 5000 else _WHOLE
-    for name, part, least in zip(_NAMES, parts, _LEAST, strict=True):
+def _validate_parts(parts: tuple[int, ...]) -> Proportions:
+    whole = 1000 if sum(parts[:3]) < 5000 else _TOTAL_PARTS
+    for name, part, least in zip(_PART_NAMES, parts, _MIN_PARTS, strict=True):
         if part * 1000 < least * whole:
             raise ProportionsError(
                 f"{name} is {part} of {whole}", name, f"at least {least * whole // 1000}: the link is too short"
@@ -131,11 +133,11 @@ def _checked(parts: tuple[int, ...]) -> Proportions:
 
 
 def _apportion(shares: tuple[float, float, float]) -> list[int]:
-    floors = [int(share * _WHOLE) for share in shares]
-    remainders = [share * _WHOLE - floor for share, floor in zip(shares, floors, strict=True)]
+    floors = [int(share * _TOTAL_PARTS) for share in shares]
+    remainders = [share * _TOTAL_PARTS - floor for share, floor in zip(shares, floors, strict=True)]
     # 1e-6 keeps 0.393 * 10000 = 3929.9999999999995 from losing its part to another
     whole = [floor + (remainder > 1.0 - 1e-6) for floor, remainder in zip(floors, remainders, strict=True)]
     order = sorted(range(3), key=lambda i: (-(remainders[i] % (1.0 - 1e-6)), i))
-    for i in order[: _WHOLE - sum(whole)]:
+    for i in order[: _TOTAL_PARTS - sum(whole)]:
         whole[i] += 1
     return whole

@@ -44,18 +44,18 @@ def length(a: Vector) -> float:
     return sqrt(dot(a, a))
 
 
-def unit(a: Vector, otherwise: Vector) -> Vector:
+def unit(a: Vector, fallback: Vector) -> Vector:
     """`a` at unit length; `otherwise` where `a` is shorter than 1e-12."""
     size = length(a)
-    return scale(a, 1.0 / size) if size > 1e-12 else otherwise
+    return scale(a, 1.0 / size) if size > 1e-12 else fallback
 
 
-def square_to(a: Vector, axis: Vector) -> Vector:
+def reject_from(a: Vector, axis: Vector) -> Vector:
     """The part of `a` square to the unit vector `axis`."""
     return subtract(a, scale(axis, dot(a, axis)))
 
 
-def across(axis: Vector) -> Vector:
+def any_perpendicular(axis: Vector) -> Vector:
     """Some unit vector square to the unit vector `axis`."""
     seed = (1.0, 0.0, 0.0) if abs(axis[0]) < 0.9 else (0.0, 1.0, 0.0)
     return unit(cross(axis, seed), seed)
@@ -92,17 +92,17 @@ def rotate(q: Quaternion, v: Vector) -> Vector:
     return (a + w * p + y * s - z * r, b + w * r + z * p - x * s, c + w * s + x * r - y * p)
 
 
-def about(axis: Vector, angle: float) -> Quaternion:
+def from_axis_angle(axis: Vector, angle: float) -> Quaternion:
     """A turn by `angle` radians about the unit vector `axis`."""
     s = sin(0.5 * angle)
     return (cos(0.5 * angle), axis[0] * s, axis[1] * s, axis[2] * s)
 
 
-def between(a: Vector, b: Vector) -> Quaternion:
+def rotation_between(a: Vector, b: Vector) -> Quaternion:
     """The shortest rotation from the unit vector `a` to the unit vector `b`; opposite ones turn about `across(a)`."""
     w = 1.0 + dot(a, b)
     if w < 1e-14:
-        return about(across(a), 3.141592653589793)
+        return from_axis_angle(any_perpendicular(a), 3.141592653589793)
     x, y, z = cross(a, b)
     return normalise((w, x, y, z))
 
@@ -121,11 +121,11 @@ def from_columns(x: Vector, y: Vector, z: Vector) -> Quaternion:
     return normalise(q)
 
 
-def part_of(q: Quaternion, share: float) -> Quaternion:
+def scale_rotation(q: Quaternion, fraction: float) -> Quaternion:
     """The turn about `q`'s axis by a share of its angle, which is up to 2 pi: `q` and -`q` go different ways."""
     axis = (q[1], q[2], q[3])
     half = atan2(length(axis), q[0])
-    return about(unit(axis, (1.0, 0.0, 0.0)), 2.0 * half * share)
+    return from_axis_angle(unit(axis, (1.0, 0.0, 0.0)), 2.0 * half * fraction)
 
 
 def slerp(a: Quaternion, b: Quaternion, t: float) -> Quaternion:

@@ -8,18 +8,26 @@ import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.bvh import Bvh
-from bunraku.motion.fitting import Fit
-from bunraku.motion.kinematics import pose
-from bunraku.motion.limbs import place_arm, place_leg
-from bunraku.motion.naming import by_name, common_ancestor
-from bunraku.motion.rest import find_rest, sample, sides
-from bunraku.motion.shape import by_shape, find_head
-from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, PARENTS, Figure, Motion, points, world
-from bunraku.motion.trunk import place_trunk
+from bunraku.motion.bvh_kinematics import forward_kinematics
+from bunraku.motion.fit import FigureFit
+from bunraku.motion.limb_fit import fit_arm, fit_leg
+from bunraku.motion.name_mapping import common_ancestor, map_by_name
+from bunraku.motion.rest_pose import find_rest_pose, resolve_sides, sample_frames
+from bunraku.motion.shape_mapping import find_head, map_by_shape
+from bunraku.motion.skeleton import (
+    JOINT_COUNT,
+    JOINTS,
+    PARENTS,
+    Figure,
+    Motion,
+    joint_and_tip_positions,
+    world_transforms,
+)
+from bunraku.motion.trunk_fit import fit_trunk
 
-FLOOR_ERROR = 0.5
+FLOOR_TOLERANCE_M = 0.5
 """The height is left alone while the lowest point of the feet is within this of the floor, metres."""
-APART = (0.05, 4.0)
+CALIBRATION_POSE_LIMITS = (0.05, 4.0)
 """A first frame is no part of the dance if its joints are, on average, this many metres from the second and this many
 times the largest step after."""
 
@@ -36,12 +44,12 @@ class Analysis:
 
     motion: Motion
     profile: str
-    mapped: dict[str, str]
-    rest: str
+    source_joints: dict[str, str]
+    rest_pose: str
     unit: str
-    guessed: list[str]
-    fit_mean: float
-    fit_max: float
+    assumptions: list[str]
+    mean_fit_error_mm: float
+    max_fit_error_mm: float
 
 
 def analyse(bvh: Bvh) -> Analysis:
@@ -51,41 +59,41 @@ def analyse(bvh: Bvh) -> Analysis:
     below the joint before, so that an elbow bends about -x and a knee about x. Raises `UnreadableMotion` where the
     skeleton is no humanoid.
     """
-    naming = by_name(bvh.names, bvh.parents) or by_shape(bvh)
-    guessed = [*bvh.notes, *naming.guessed]
-    frames = sample(bvh)
-    position, orientation = pose(bvh, list(range(len(bvh.names))), frames)
-    joints, exchanged = sides(position, naming.joints)
+    naming = map_by_name(bvh.names, bvh.parents) or map_by_shape(bvh)
+    guessed = [*bvh.notes, *naming.assumptions]
+    frames = sample_frames(bvh)
+    position, orientation = forward_kinematics(bvh, list(range(len(bvh.names))), frames)
+    joints, exchanged = resolve_sides(position, naming.joints)
     guessed += exchanged
-    joints = _completed(bvh, joints, guessed)
-    rest = find_rest(bvh, joints, frames, position, orientation)
-    guessed += rest.guessed
-    fit = Fit.begin(bvh, joints, rest)
-    if _first_is_apart(fit):
+    joints = _complete_mapping(bvh, joints, guessed)
+    rest = find_rest_pose(bvh, joints, frames, position, orientation)
+    guessed += rest.assumptions
+    fit = FigureFit.from_bvh(bvh, joints, rest)
+    if _starts_with_calibration_pose(fit):
         guessed.append("The first frame is a pose apart from the dance; it was left out.")
-        fit = fit.without_first()
+        fit = fit.without_first_frame()
     _move_to_floor(fit, guessed)
-    place_trunk(fit)
+    fit_trunk(fit)
     for side in "lr":
-        place_leg(fit, side)
-        place_arm(fit, side)
-    motion = _motion(fit, bvh.fps)
-    placed, _ = world(motion.figure, motion.root, motion.rotations)
+        fit_leg(fit, side)
+        fit_arm(fit, side)
+    motion = _build_motion(fit, bvh.fps)
+    placed, _ = world_transforms(motion.figure, motion.root, motion.rotations)
     mapped = sorted(fit.joints)
     apart = 1000.0 * np.linalg.norm(placed[:, mapped] - fit.position[:, [fit.joints[j] for j in mapped]], axis=-1)
     return Analysis(
         motion=motion,
         profile=naming.profile,
-        mapped={JOINTS[joint]: bvh.names[fit.joints[joint]] for joint in mapped},
-        rest=rest.pose,
+        source_joints={JOINTS[joint]: bvh.names[fit.joints[joint]] for joint in mapped},
+        rest_pose=rest.pose,
         unit=rest.unit,
-        guessed=guessed,
-        fit_mean=float(apart.mean()),
-        fit_max=float(apart.max()),
+        assumptions=guessed,
+        mean_fit_error_mm=float(apart.mean()),
+        max_fit_error_mm=float(apart.max()),
     )
 
 
-def _completed(bvh: Bvh, joints: dict[str, int], guessed: list[str]) -> dict[str, int]:
+def _complete_mapping(bvh: Bvh, joints: dict[str, int], assumptions: list[str]) -> dict[str, int]:
     """The mapping with root and head, where names or shape left them open.
 
     The root is where legs and trunk part, whatever it is called: files have a joint on the floor above it, or a
@@ -95,7 +103,7 @@ def _completed(bvh: Bvh, joints: dict[str, int], guessed: list[str]) -> dict[str
     hips = [joints["l_hip"], joints["r_hip"]]
     if "skullbase" not in joints and (head := find_head(bvh, joints)) is not None:
         joints["skullbase"] = head
-        guessed.append(f"No joint is named as the head; {bvh.names[head]} was taken for it.")
+        assumptions.append(f"No joint is named as the head; {bvh.names[head]} was taken for it.")
     root = common_ancestor(bvh.parents, [*hips, joints["l_shoulder"], joints["r_shoulder"]])
     pelvis = common_ancestor(bvh.parents, hips)
     joints["humanoid_root"] = root
@@ -105,34 +113,36 @@ def _completed(bvh: Bvh, joints: dict[str, int], guessed: list[str]) -> dict[str
         joints["sacroiliac"] = pelvis
     missing = [name for name in JOINTS if name not in joints and name not in ("sacroiliac", "vl5")]
     if missing:
-        guessed.append(f"The source has no {', '.join(missing)}; they keep a fixed place.")
+        assumptions.append(f"The source has no {', '.join(missing)}; they keep a fixed place.")
     return joints
 
 
-def _first_is_apart(fit: Fit) -> bool:
+def _starts_with_calibration_pose(fit: FigureFit) -> bool:
     """Whether the first frame is a pose to calibrate by, set before a dance that is smooth without it."""
     if len(fit.position) < 4:
         return False
     local = fit.position[:, list(fit.joints.values())] - fit.position[:, [fit.joints[0]]]
     step = np.linalg.norm(np.diff(local, axis=0), axis=-1).mean(axis=-1)
-    return bool(step[0] > APART[0] and step[0] > APART[1] * step[1:].max())
+    return bool(step[0] > CALIBRATION_POSE_LIMITS[0] and step[0] > CALIBRATION_POSE_LIMITS[1] * step[1:].max())
 
 
-def _move_to_floor(fit: Fit, guessed: list[str]) -> None:
+def _move_to_floor(fit: FigureFit, assumptions: list[str]) -> None:
     feet = [source for joint, source in fit.joints.items() if JOINTS[joint][2:] in ("ankle", "midtarsal")]
     lowest = float(fit.position[:, feet or list(fit.joints.values()), 1].min())
-    if abs(lowest) > FLOOR_ERROR:
-        guessed.append(f"The lowest point of the feet was {lowest:.2f} m from the floor; the dance was moved onto it.")
+    if abs(lowest) > FLOOR_TOLERANCE_M:
+        assumptions.append(
+            f"The lowest point of the feet was {lowest:.2f} m from the floor; the dance was moved onto it."
+        )
         fit.position[..., 1] -= lowest
 
 
-def _motion(fit: Fit, fps: float) -> Motion:
+def _build_motion(fit: FigureFit, fps: float) -> Motion:
     """The figure's channels; at rest its lowest point is on the floor."""
-    rotations = fit.oriented.copy()
-    parents = fit.oriented[:, PARENTS[1:]]
-    rotations[:, 1:] = rotation.multiply(rotation.conjugate(parents), fit.oriented[:, 1:])
+    rotations = fit.joint_orientations.copy()
+    parents = fit.joint_orientations[:, PARENTS[1:]]
+    rotations[:, 1:] = rotation.multiply(rotation.conjugate(parents), fit.joint_orientations[:, 1:])
     still = np.tile(rotation.IDENTITY, (JOINT_COUNT, 1))
     offsets = fit.offsets.copy()
     offsets[0] = 0.0
-    offsets[0, 1] = -points(Figure(offsets, fit.tips), np.zeros(3), still)[:, 1].min()
-    return Motion(Figure(offsets, fit.tips), fps, fit.placed[:, 0].copy(), rotation.normalise(rotations))
+    offsets[0, 1] = -joint_and_tip_positions(Figure(offsets, fit.tips), np.zeros(3), still)[:, 1].min()
+    return Motion(Figure(offsets, fit.tips), fps, fit.joint_positions[:, 0].copy(), rotation.normalise(rotations))

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bunraku.motion.bvh_frames import read_frames
-from bunraku.motion.bvh_hierarchy import EndSite, read_hierarchy
+from bunraku.motion.bvh_frames import parse_frames
+from bunraku.motion.bvh_hierarchy import EndSite, parse_hierarchy
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.rotation import Array
 
-MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
+BYTE_ORDER_MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Bvh:
     parents: tuple[int, ...]
     offsets: Array
     channels: tuple[tuple[str, ...], ...]
-    lines: tuple[int, ...]
+    joint_lines: tuple[int, ...]
     ends: tuple[EndSite, ...]
     frames: Array
     frame_time: float
@@ -52,29 +52,29 @@ class Bvh:
         return rate
 
 
-def read(data: bytes) -> Bvh:
+def parse_bvh(data: bytes) -> Bvh:
     """The BVH file in `data`, in UTF-8, UTF-16 with a byte order mark or Latin-1.
 
     Raises `UnreadableMotion` for what is not a BVH file or has no sound motion in it.
     """
-    text = _plain(data)
+    text = _normalise_text(data)
     if not text or text.isspace():
         raise UnreadableMotion(
             "Empty file", "there is nothing in it", hint="export the motion again and send that file"
         )
-    hierarchy = read_hierarchy(text)
+    hierarchy = parse_hierarchy(text)
     width = sum(len(channels) for channels in hierarchy.channels)
     if width == 0:
         raise UnreadableMotion(
             "No channels", "no joint has a channel, so nothing can move", hint="export with rotations of the joints"
         )
-    frames, frame_time, notes = read_frames(text, hierarchy.end, hierarchy.end_line, width)
+    frames, frame_time, notes = parse_frames(text, hierarchy.motion_start, hierarchy.motion_line, width)
     return Bvh(
         names=hierarchy.names,
         parents=hierarchy.parents,
         offsets=hierarchy.offsets,
         channels=hierarchy.channels,
-        lines=hierarchy.lines,
+        joint_lines=hierarchy.joint_lines,
         ends=hierarchy.ends,
         frames=frames,
         frame_time=frame_time,
@@ -82,9 +82,9 @@ def read(data: bytes) -> Bvh:
     )
 
 
-def _plain(data: bytes) -> bytes:
+def _normalise_text(data: bytes) -> bytes:
     """`data` without byte order mark, in an encoding that keeps ASCII, lines ending in a line feed."""
-    for mark, encoding in MARKS:
+    for mark, encoding in BYTE_ORDER_MARKS:
         if data.startswith(mark):
             data = data[len(mark) :]
             if encoding != "utf-8":

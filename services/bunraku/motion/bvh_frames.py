@@ -7,22 +7,29 @@ import re
 
 import numpy as np
 
-from bunraku.motion.bvh_numbers import DECIMAL_COMMA, NO_COMMA, SEPARATING_COMMA, Lines, count, parse
-from bunraku.motion.errors import UnreadableMotion, shown
+from bunraku.motion.bvh_numbers import (
+    DECIMAL_COMMA,
+    NO_COMMA,
+    SEPARATING_COMMA,
+    LineStatistics,
+    measure_lines,
+    parse_numbers,
+)
+from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 from bunraku.motion.rotation import Array
 
-FRAME_TIME = 1.0 / 30.0
+DEFAULT_FRAME_TIME_S = 1.0 / 30.0
 """Seconds a frame, where the file does not say."""
-SHORTEST, LONGEST = 0.001, 10.0
+MIN_FRAME_TIME_S, MAX_FRAME_TIME_S = 0.001, 10.0
 """Seconds a frame: what lies outside is no motion capture."""
 
 # not the # of 1.#QNAN, which is a number gone wrong
 _COMMENT = re.compile(rb"(?<!\S)(?:#|//)[^\n]*")
 _DECIMAL = re.compile(rb"(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?")
-_SETTING = re.compile(rb"\s*(frames|frame[ \t]*time)[ \t]*:?[ \t]*([^\s]*)", re.IGNORECASE)
+_HEADER_FIELD = re.compile(rb"\s*(frames|frame[ \t]*time)[ \t]*:?[ \t]*([^\s]*)", re.IGNORECASE)
 
 
-def read_frames(text: bytes, start: int, line: int, width: int) -> tuple[Array, float, list[str]]:
+def parse_frames(text: bytes, start: int, line: int, channel_count: int) -> tuple[Array, float, list[str]]:
     """Channel values (n, width), seconds a frame, and sentences on what was not as it should be.
 
     `text` is the whole file (line feeds only), `start` the byte after the word MOTION, which stands on `line`.
@@ -34,45 +41,45 @@ def read_frames(text: bytes, start: int, line: int, width: int) -> tuple[Array, 
     frame_time: float | None = None
     position = start
     seen: set[bool] = set()
-    while (setting := _SETTING.match(text, position)) and (counts := setting[1].lower() == b"frames") not in seen:
+    while (setting := _HEADER_FIELD.match(text, position)) and (counts := setting[1].lower() == b"frames") not in seen:
         seen.add(counts)
         line += text.count(b"\n", position, setting.end())
         position = setting.end()
         if counts:
-            declared = _frame_count(setting[2], notes)
+            declared = _parse_frame_count(setting[2], notes)
         else:
-            frame_time = _frame_time(setting[2], line)
+            frame_time = _parse_frame_time(setting[2], line)
     if frame_time is None or frame_time <= 0.0:
         notes.append(f"The frame time is {'missing' if frame_time is None else 'not above zero'}; 30 frames/s assumed.")
-        frame_time = FRAME_TIME
+        frame_time = DEFAULT_FRAME_TIME_S
     data = np.frombuffer(text, dtype=np.uint8)[position:]
-    comma = _meaning_of_comma(text, position)
-    lines = count(data, comma, width)
-    values, bad = parse(data, lines.words, comma)
+    comma = _detect_comma_role(text, position)
+    lines = measure_lines(data, comma, channel_count)
+    values, bad = parse_numbers(data, lines.word_count, comma)
     if bad >= 0:
-        raise _bad_value(text, position + bad, line + text.count(b"\n", position, position + bad))
-    whole = _whole_frames(lines, declared, width, line, notes)
-    return values[: whole * width].reshape(whole, width), frame_time, notes
+        raise _invalid_value_error(text, position + bad, line + text.count(b"\n", position, position + bad))
+    whole = _count_complete_frames(lines, declared, channel_count, line, notes)
+    return values[: whole * channel_count].reshape(whole, channel_count), frame_time, notes
 
 
-def _frame_count(word: bytes, notes: list[str]) -> int | None:
+def _parse_frame_count(word: bytes, notes: list[str]) -> int | None:
     if word.isdigit() and len(word) <= 18:
         return int(word)
-    notes.append(f"The number of frames is not a number: {shown(word)}.")
+    notes.append(f"The number of frames is not a number: {quote_excerpt(word)}.")
     return None
 
 
-def _frame_time(word: bytes, line: int) -> float | None:
+def _parse_frame_time(word: bytes, line: int) -> float | None:
     if not word:
         return None
     try:
         seconds = float(word.replace(b",", b".")) if b"_" not in word else math.nan
     except ValueError:
         seconds = math.nan
-    if 0.0 < seconds < math.inf and not SHORTEST <= seconds <= LONGEST:
+    if 0.0 < seconds < math.inf and not MIN_FRAME_TIME_S <= seconds <= MAX_FRAME_TIME_S:
         raise UnreadableMotion(
             "Frame time out of range",
-            f"{shown(word)} is not between {SHORTEST} and {LONGEST} seconds",
+            f"{quote_excerpt(word)} is not between {MIN_FRAME_TIME_S} and {MAX_FRAME_TIME_S} seconds",
             line=line,
             field="Frame Time",
             hint="write the seconds of one frame, such as 0.0333333",
@@ -80,7 +87,7 @@ def _frame_time(word: bytes, line: int) -> float | None:
     if not math.isfinite(seconds):
         raise UnreadableMotion(
             "Not a number",
-            f"the frame time is {shown(word)}",
+            f"the frame time is {quote_excerpt(word)}",
             line=line,
             field="Frame Time",
             hint="write the seconds of one frame, such as 0.0333333",
@@ -88,7 +95,7 @@ def _frame_time(word: bytes, line: int) -> float | None:
     return seconds
 
 
-def _meaning_of_comma(text: bytes, position: int) -> int:
+def _detect_comma_role(text: bytes, position: int) -> int:
     """Decimal commas stand between digits where no point does; others separate."""
     if text.find(b",", position) < 0:
         return NO_COMMA
@@ -97,7 +104,7 @@ def _meaning_of_comma(text: bytes, position: int) -> int:
     return DECIMAL_COMMA
 
 
-def _bad_value(text: bytes, position: int, line: int) -> UnreadableMotion:
+def _invalid_value_error(text: bytes, position: int, line: int) -> UnreadableMotion:
     found = re.compile(rb"\S+").match(text, position)
     word = found.group() if found else b""
     lower = word.lower().lstrip(b"+-")
@@ -109,40 +116,42 @@ def _bad_value(text: bytes, position: int, line: int) -> UnreadableMotion:
         title, hint = "Two motions in one file", "send one motion a file"
     else:
         title, hint = "Not a number", "a frame holds decimal numbers only"
-    return UnreadableMotion(title, f"{shown(word)} stands where a channel value should", line=line, hint=hint)
+    return UnreadableMotion(title, f"{quote_excerpt(word)} stands where a channel value should", line=line, hint=hint)
 
 
-def _whole_frames(lines: Lines, declared: int | None, width: int, line: int, notes: list[str]) -> int:
+def _count_complete_frames(
+    lines: LineStatistics, declared: int | None, channel_count: int, line: int, notes: list[str]
+) -> int:
     """The number of whole frames on `lines`, the first of them line `line` of the file, or a refusal where they cannot
     be frames of `width` values.
 
     One frame a line is usual, and then each line is checked. Frames that share lines or run over several are only
     checked in sum.
     """
-    if lines.words < width:
+    if lines.word_count < channel_count:
         raise UnreadableMotion(
             "No whole frame",
-            f"the channels take {width} values a frame, and there are {lines.words} in all",
+            f"the channels take {channel_count} values a frame, and there are {lines.word_count} in all",
             line=line,
             hint="the file may be cut short; export it again",
         )
-    whole, rest = divmod(lines.words, width)
-    if odd := _odd_line(lines, declared, width):
+    whole, rest = divmod(lines.word_count, channel_count)
+    if odd := _find_inconsistent_line(lines, declared, channel_count):
         raise UnreadableMotion(
             "Wrong number of values",
-            f"this line has {odd[1]} values, the channels take {width}",
+            f"this line has {odd[1]} values, the channels take {channel_count}",
             line=line + odd[0],
             hint="every frame needs one value for each channel; check the CHANNELS lines against the export",
         )
-    if rest and (lines.odd >= 0 or lines.rows == 1) and (declared is None or whole >= declared):
+    if rest and (lines.first_mismatch >= 0 or lines.nonblank_lines == 1) and (declared is None or whole >= declared):
         raise UnreadableMotion(
             "Wrong number of values",
-            f"{lines.words:,} values do not divide by the {width} channels",
-            line=line + (lines.odd if lines.odd >= 0 else lines.last),
+            f"{lines.word_count:,} values do not divide by the {channel_count} channels",
+            line=line + (lines.first_mismatch if lines.first_mismatch >= 0 else lines.last_line),
             hint="every frame needs one value for each channel; check the CHANNELS lines against the export",
         )
     if rest:
-        notes.append(f"The last frame has {rest} of {width} values; it was dropped.")
+        notes.append(f"The last frame has {rest} of {channel_count} values; it was dropped.")
     if declared is None:
         notes.append(f"The number of frames is missing; {whole} are there and were used.")
     elif declared != whole:
@@ -150,14 +159,22 @@ def _whole_frames(lines: Lines, declared: int | None, width: int, line: int, not
     return whole
 
 
-def _odd_line(lines: Lines, declared: int | None, width: int) -> tuple[int, int] | None:
+def _find_inconsistent_line(lines: LineStatistics, declared: int | None, channel_count: int) -> tuple[int, int] | None:
     """The line that shows that the values are not frames of `width`, and how many it has."""
-    rest = lines.words % width
-    first_odd = (lines.odd, lines.odd_words) if lines.odd >= 0 else (lines.last, lines.last_words)
-    if lines.right == 0:
-        even = lines.rows > 1 and lines.fewest == lines.most
-        return first_odd if even and (lines.rows == declared or (rest and width % lines.most)) else None
-    if lines.odd >= 0:
-        mostly = 2 * lines.right >= lines.rows
-        return first_odd if mostly and (rest or lines.words // width != declared) else None
-    return first_odd if rest and lines.last_words > width else None
+    rest = lines.word_count % channel_count
+    first_odd = (
+        (lines.first_mismatch, lines.first_mismatch_words)
+        if lines.first_mismatch >= 0
+        else (lines.last_line, lines.last_line_words)
+    )
+    if lines.matching_lines == 0:
+        even = lines.nonblank_lines > 1 and lines.min_words == lines.max_words
+        return (
+            first_odd
+            if even and (lines.nonblank_lines == declared or (rest and channel_count % lines.max_words))
+            else None
+        )
+    if lines.first_mismatch >= 0:
+        mostly = 2 * lines.matching_lines >= lines.nonblank_lines
+        return first_odd if mostly and (rest or lines.word_count // channel_count != declared) else None
+    return first_odd if rest and lines.last_line_words > channel_count else None

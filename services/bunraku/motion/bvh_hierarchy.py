@@ -9,17 +9,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bunraku.motion.errors import UnreadableMotion, shown
+from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 from bunraku.motion.rotation import Array
 
-JOINT_LIMIT = 1_000
-DEPTH_LIMIT = 256
-NAME_LIMIT = 200
+MAX_JOINTS = 1_000
+MAX_DEPTH = 256
+MAX_NAME_BYTES = 200
 AXES = "xyz"
 ORIGIN = (0.0, 0.0, 0.0)
 CHANNEL_NAMES = {f"{axis}{kind}": f"{axis.upper()}{kind}" for kind in ("position", "rotation") for axis in AXES}
 
-_BETWEEN = re.compile(rb"(?:\s++|(?:#|//)[^\n]*+)*+")
+_SEPARATOR = re.compile(rb"(?:\s++|(?:#|//)[^\n]*+)*+")
 _WORD = re.compile(rb"[{}]|[^\s{}]+")
 _NAME = re.compile(rb"[^\n{}]*")
 _DECIMAL_COMMA = re.compile(rb"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
@@ -41,47 +41,47 @@ class Hierarchy:
     parents: tuple[int, ...]
     offsets: Array
     channels: tuple[tuple[str, ...], ...]
-    lines: tuple[int, ...]
+    joint_lines: tuple[int, ...]
     ends: tuple[EndSite, ...]
     notes: tuple[str, ...]
-    end: int
-    end_line: int
+    motion_start: int
+    motion_line: int
 
 
 @dataclass(slots=True)
-class _Words:
+class _Tokenizer:
     """The words of `text` one after the other, with the line of the last."""
 
     text: bytes
     position: int = 0
     line: int = 1
 
-    def skip(self) -> None:
+    def skip_separators(self) -> None:
         """Go on to the next word, over space, blank lines and comments (# or //)."""
-        if between := _BETWEEN.match(self.text, self.position):
+        if between := _SEPARATOR.match(self.text, self.position):
             self.line += self.text.count(b"\n", self.position, between.end())
             self.position = between.end()
 
     def peek(self) -> bytes:
         """The next word, not taken; empty at the end of the file."""
-        self.skip()
+        self.skip_separators()
         word = _WORD.match(self.text, self.position)
         return word.group() if word else b""
 
-    def take(self) -> bytes:
+    def next_token(self) -> bytes:
         """The next word; empty at the end of the file."""
         word = self.peek()
         self.position += len(word)
         return word
 
-    def name(self) -> bytes:
+    def next_name(self) -> bytes:
         """The rest of the line up to a brace, without the space around it: names may hold spaces."""
         rest = _NAME.match(self.text, self.position)
         name = rest.group().strip() if rest else b""
-        if len(name) > NAME_LIMIT:
+        if len(name) > MAX_NAME_BYTES:
             raise UnreadableMotion(
                 "Name too long",
-                f"the name {shown(name)} has over {NAME_LIMIT} bytes",
+                f"the name {quote_excerpt(name)} has over {MAX_NAME_BYTES} bytes",
                 line=self.line,
                 hint="shorten it, or begin a new line after it",
             )
@@ -90,7 +90,7 @@ class _Words:
 
 
 @dataclass(slots=True)
-class _Tree:
+class _HierarchyBuilder:
     """What has been read so far; `stack` is the way from the root to the open brace, None for an End Site.
 
     `offsets`, `channels` and the offsets of `ends` are None until the file gives them.
@@ -100,40 +100,40 @@ class _Tree:
     parents: list[int] = field(default_factory=list)
     offsets: list[tuple[float, float, float] | None] = field(default_factory=list)
     channels: list[tuple[str, ...] | None] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
+    joint_lines: list[int] = field(default_factory=list)
     ends: list[tuple[int, tuple[float, float, float] | None]] = field(default_factory=list)
     stack: list[int | None] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
 
-def read_hierarchy(text: bytes) -> Hierarchy:
+def parse_hierarchy(text: bytes) -> Hierarchy:
     """The joints of the BVH file `text` (line feeds only, encoding that keeps ASCII)."""
-    words = _Words(text)
-    tree = _Tree()
+    words = _Tokenizer(text)
+    tree = _HierarchyBuilder()
     first = words.peek().lower()
     if first == b"hierarchy":
-        words.take()
+        words.next_token()
     elif first != b"root":
         raise UnreadableMotion(
             "Not a BVH file",
-            f"it begins with {shown(words.peek())}",
+            f"it begins with {quote_excerpt(words.peek())}",
             line=words.line,
             hint="a BVH file begins with the word HIERARCHY; export the motion as BVH",
         )
     while True:
-        word = words.take()
+        word = words.next_token()
         line = words.line
         match word.lower():
             case b"root":
-                _root(tree, words)
+                _parse_root(tree, words)
             case b"joint":
-                _joint(tree, words)
+                _parse_joint(tree, words)
             case b"end" | b"endsite":
-                _end_site(tree, words)
+                _parse_end_site(tree, words)
             case b"offset":
-                _offset(tree, words)
+                _parse_offset(tree, words)
             case b"channels":
-                _channels(tree, words)
+                _parse_channels(tree, words)
             case b"}":
                 if not tree.stack:
                     raise UnreadableMotion(
@@ -149,7 +149,7 @@ def read_hierarchy(text: bytes) -> Hierarchy:
             case _:
                 raise UnreadableMotion(
                     "Unknown word",
-                    f"{shown(word)} is not part of a BVH hierarchy",
+                    f"{quote_excerpt(word)} is not part of a BVH hierarchy",
                     line=line,
                     hint="expected JOINT, End Site, OFFSET, CHANNELS, a brace or MOTION",
                 )
@@ -159,12 +159,12 @@ def read_hierarchy(text: bytes) -> Hierarchy:
             "Unbalanced braces",
             f"{len(tree.stack)} braces are still open at MOTION",
             line=words.line,
-            field=_decoded(tree.names)[open_joint],
+            field=_decode_names(tree.names)[open_joint],
             hint="add the missing }",
         )
     if not tree.names:
         raise UnreadableMotion("No joints", "the hierarchy has no ROOT", line=words.line, hint="export a skeleton")
-    names = _decoded(tree.names)
+    names = _decode_names(tree.names)
     repeated = [name for name, count in Counter(names).items() if count > 1]
     if repeated:
         tree.notes.append(f"Several joints have the same name: {', '.join(repeated[:5])}.")
@@ -173,116 +173,120 @@ def read_hierarchy(text: bytes) -> Hierarchy:
         parents=tuple(tree.parents),
         offsets=np.array([offset or ORIGIN for offset in tree.offsets]),
         channels=tuple(channels or () for channels in tree.channels),
-        lines=tuple(tree.lines),
+        joint_lines=tuple(tree.joint_lines),
         ends=tuple(EndSite(parent, np.array(offset or ORIGIN)) for parent, offset in tree.ends),
         notes=tuple(tree.notes),
-        end=words.position,
-        end_line=words.line,
+        motion_start=words.position,
+        motion_line=words.line,
     )
 
 
-def _root(tree: _Tree, words: _Words) -> None:
-    if tree.names:
+def _parse_root(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
+    if builder.names:
         raise UnreadableMotion(
             "Two roots",
             "a second ROOT begins here",
-            line=words.line,
-            field=_decoded([words.name()])[0],
+            line=tokens.line,
+            field=_decode_names([tokens.next_name()])[0],
             hint="send one figure a file",
         )
-    _add(tree, words, -1)
+    _open_joint(builder, tokens, -1)
 
 
-def _joint(tree: _Tree, words: _Words) -> None:
-    line = words.line
-    if not tree.stack or tree.stack[-1] is None:
-        inside = "an End Site" if tree.stack else "no joint"
+def _parse_joint(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
+    line = tokens.line
+    if not builder.stack or builder.stack[-1] is None:
+        inside = "an End Site" if builder.stack else "no joint"
         raise UnreadableMotion(
             "Joint in the wrong place",
             f"this joint is inside {inside}",
             line=line,
-            field=_decoded([words.name()])[0],
+            field=_decode_names([tokens.next_name()])[0],
             hint="every JOINT belongs between the braces of its parent; check the braces above",
         )
-    _add(tree, words, tree.stack[-1])
+    _open_joint(builder, tokens, builder.stack[-1])
 
 
-def _add(tree: _Tree, words: _Words, parent: int) -> None:
+def _open_joint(builder: _HierarchyBuilder, tokens: _Tokenizer, parent: int) -> None:
     """Open a joint below `parent`."""
-    line = words.line
-    if len(tree.names) >= JOINT_LIMIT:
+    line = tokens.line
+    if len(builder.names) >= MAX_JOINTS:
         raise UnreadableMotion(
-            "Too many joints", f"over {JOINT_LIMIT:,} joints", line=line, hint="export the body's joints only"
+            "Too many joints", f"over {MAX_JOINTS:,} joints", line=line, hint="export the body's joints only"
         )
-    if len(tree.stack) >= DEPTH_LIMIT:
+    if len(builder.stack) >= MAX_DEPTH:
         raise UnreadableMotion(
-            "Too deep", f"joints nested over {DEPTH_LIMIT} deep", line=line, hint="a } may be missing above"
+            "Too deep", f"joints nested over {MAX_DEPTH} deep", line=line, hint="a } may be missing above"
         )
-    name = words.name() or f"joint {len(tree.names)}".encode()
+    name = tokens.next_name() or f"joint {len(builder.names)}".encode()
     ancestor: int = parent
     while ancestor >= 0:
-        if tree.names[ancestor] == name:
+        if builder.names[ancestor] == name:
             raise UnreadableMotion(
                 "Cycle of joints",
-                f"{shown(name)} lies inside itself (see line {tree.lines[ancestor]})",
+                f"{quote_excerpt(name)} lies inside itself (see line {builder.joint_lines[ancestor]})",
                 line=line,
-                field=_decoded([name])[0],
+                field=_decode_names([name])[0],
                 hint="a joint cannot be its own ancestor; rename it or check the braces",
             )
-        ancestor = tree.parents[ancestor]
-    _brace(words, name)
-    tree.stack.append(len(tree.names))
-    tree.names.append(name)
-    tree.parents.append(parent)
-    tree.offsets.append(None)
-    tree.channels.append(None)
-    tree.lines.append(line)
+        ancestor = builder.parents[ancestor]
+    _expect_open_brace(tokens, name)
+    builder.stack.append(len(builder.names))
+    builder.names.append(name)
+    builder.parents.append(parent)
+    builder.offsets.append(None)
+    builder.channels.append(None)
+    builder.joint_lines.append(line)
 
 
-def _end_site(tree: _Tree, words: _Words) -> None:
-    line = words.line
-    name = words.name()
-    if not tree.stack or tree.stack[-1] is None:
+def _parse_end_site(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
+    line = tokens.line
+    name = tokens.next_name()
+    if not builder.stack or builder.stack[-1] is None:
         raise UnreadableMotion(
             "End Site in the wrong place",
             "this End Site belongs to no joint",
             line=line,
             hint="an End Site stands inside the last joint of a chain; check the braces above",
         )
-    if len(tree.ends) >= JOINT_LIMIT:
+    if len(builder.ends) >= MAX_JOINTS:
         raise UnreadableMotion(
-            "Too many End Sites", f"over {JOINT_LIMIT:,} of them", line=line, hint="export the body's joints only"
+            "Too many End Sites", f"over {MAX_JOINTS:,} of them", line=line, hint="export the body's joints only"
         )
-    _brace(words, name)
-    tree.ends.append((tree.stack[-1], None))
-    tree.stack.append(None)
+    _expect_open_brace(tokens, name)
+    builder.ends.append((builder.stack[-1], None))
+    builder.stack.append(None)
 
 
-def _brace(words: _Words, name: bytes) -> None:
-    line = words.line
-    if words.take() != b"{":
+def _expect_open_brace(tokens: _Tokenizer, name: bytes) -> None:
+    line = tokens.line
+    if tokens.next_token() != b"{":
         raise UnreadableMotion(
-            "Missing brace", f"no {{ after {shown(name)}", line=line, field=_decoded([name])[0], hint="add the {"
+            "Missing brace",
+            f"no {{ after {quote_excerpt(name)}",
+            line=line,
+            field=_decode_names([name])[0],
+            hint="add the {",
         )
 
 
-def _offset(tree: _Tree, words: _Words) -> None:
-    if not tree.stack:
+def _parse_offset(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
+    if not builder.stack:
         raise UnreadableMotion(
-            "OFFSET in the wrong place", "it belongs to no joint", line=words.line, hint="check the braces above"
+            "OFFSET in the wrong place", "it belongs to no joint", line=tokens.line, hint="check the braces above"
         )
-    line = words.line
-    joint = tree.stack[-1]
-    if (tree.ends[-1][1] if joint is None else tree.offsets[joint]) is not None:
-        raise _twice("OFFSET", line)
-    offset = (_number(words, line), _number(words, line), _number(words, line))
+    line = tokens.line
+    joint = builder.stack[-1]
+    if (builder.ends[-1][1] if joint is None else builder.offsets[joint]) is not None:
+        raise _duplicate_keyword_error("OFFSET", line)
+    offset = (_parse_number(tokens, line), _parse_number(tokens, line), _parse_number(tokens, line))
     if joint is None:
-        tree.ends[-1] = (tree.ends[-1][0], offset)
+        builder.ends[-1] = (builder.ends[-1][0], offset)
     else:
-        tree.offsets[joint] = offset
+        builder.offsets[joint] = offset
 
 
-def _twice(keyword: str, line: int) -> UnreadableMotion:
+def _duplicate_keyword_error(keyword: str, line: int) -> UnreadableMotion:
     return UnreadableMotion(
         f"{keyword} twice",
         f"this joint has {keyword} already",
@@ -292,18 +296,18 @@ def _twice(keyword: str, line: int) -> UnreadableMotion:
     )
 
 
-def _number(words: _Words, line: int) -> float:
+def _parse_number(tokens: _Tokenizer, line: int) -> float:
     """The next word, of the OFFSET on `line`, as a finite number; a decimal comma is as good as a point."""
-    word = words.take()
+    word = tokens.next_token()
     plain = word.replace(b",", b".") if _DECIMAL_COMMA.fullmatch(word) else word.rstrip(b",")
     try:
-        value = float(plain) if len(plain) <= NAME_LIMIT and b"_" not in plain else math.nan
+        value = float(plain) if len(plain) <= MAX_NAME_BYTES and b"_" not in plain else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
         raise UnreadableMotion(
             "Not a number",
-            f"OFFSET needs three finite numbers, not {shown(word)}",
+            f"OFFSET needs three finite numbers, not {quote_excerpt(word)}",
             line=line,
             field="OFFSET",
             hint="write the three lengths as plain decimal numbers",
@@ -311,38 +315,40 @@ def _number(words: _Words, line: int) -> float:
     return value
 
 
-def _channels(tree: _Tree, words: _Words) -> None:
-    line = words.line
-    joint = tree.stack[-1] if tree.stack else None
+def _parse_channels(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
+    line = tokens.line
+    joint = builder.stack[-1] if builder.stack else None
     if joint is None:
         raise UnreadableMotion(
             "CHANNELS in the wrong place", "they belong to no joint", line=line, hint="only joints have channels"
         )
-    if tree.channels[joint] is not None:
-        raise _twice("CHANNELS", line)
-    word = words.take()
+    if builder.channels[joint] is not None:
+        raise _duplicate_keyword_error("CHANNELS", line)
+    word = tokens.next_token()
     if not word.isdigit() or len(word) > 3:
         raise UnreadableMotion(
             "Not a number",
-            f"CHANNELS needs a count, not {shown(word)}",
+            f"CHANNELS needs a count, not {quote_excerpt(word)}",
             line=line,
             field="CHANNELS",
             hint="write how many channels follow",
         )
     count = int(word)
     found: list[str] = []
-    while name := CHANNEL_NAMES.get(words.peek()[:10].decode("latin-1").lower()):
-        words.take()
+    while name := CHANNEL_NAMES.get(tokens.peek()[:10].decode("latin-1").lower()):
+        tokens.next_token()
         found.append(name)
     if len(found) != count:
-        following = words.peek().lower()
+        following = tokens.peek().lower()
         known = following in (b"", b"{", b"}", b"joint", b"end", b"offset", b"channels", b"motion")
-        detail = f"CHANNELS says {count}, but {len(found)} follow" + ("" if known else f", then {shown(following)}")
+        detail = f"CHANNELS says {count}, but {len(found)} follow" + (
+            "" if known else f", then {quote_excerpt(following)}"
+        )
         raise UnreadableMotion(
             "Wrong number of channels",
             detail,
             line=line,
-            field=_decoded(tree.names)[joint],
+            field=_decode_names(builder.names)[joint],
             hint="name as many of Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation as it counts",
         )
     if len(set(found)) != len(found):
@@ -350,13 +356,13 @@ def _channels(tree: _Tree, words: _Words) -> None:
             "Channel named twice",
             "a joint has each channel once at most",
             line=line,
-            field=_decoded(tree.names)[joint],
+            field=_decode_names(builder.names)[joint],
             hint="name each channel once",
         )
-    tree.channels[joint] = tuple(found)
+    builder.channels[joint] = tuple(found)
 
 
-def _decoded(names: list[bytes]) -> tuple[str, ...]:
+def _decode_names(names: list[bytes]) -> tuple[str, ...]:
     """The names as text: UTF-8 if all of them are, else Latin-1."""
     try:
         return tuple(name.decode("utf-8") for name in names)

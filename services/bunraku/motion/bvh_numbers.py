@@ -12,11 +12,11 @@ import numpy.typing as npt
 from bunraku.motion.rotation import Array
 
 Bytes = npt.NDArray[np.uint8]
-POWERS: Array = np.array([float(f"1e{e}") for e in range(309)])
+POWERS_OF_TEN: Array = np.array([float(f"1e{e}") for e in range(309)])
 NO_COMMA, DECIMAL_COMMA, SEPARATING_COMMA = 0, 1, 2
 
 
-def _parse(data: Bytes, comma: int, powers: Array, out: Array) -> int:
+def _parse_numbers(data: Bytes, comma: int, powers: Array, out: Array) -> int:
     """Fill `out` with the numbers in `data`; the byte where the first word begins that is no finite number, or -1.
 
     A number is [+-]digits[.digits][e[+-]digits] with a digit before or after the point. Up to 15 significant digits
@@ -90,25 +90,25 @@ def _parse(data: Bytes, comma: int, powers: Array, out: Array) -> int:
         word += 1
 
 
-class Lines(NamedTuple):
+class LineStatistics(NamedTuple):
     """How words lie on the lines that have any: lines are counted from 0 where the data begins, -1 is none."""
 
-    words: int
+    word_count: int
     """Words in all."""
-    rows: int
+    nonblank_lines: int
     """Lines that have any word."""
-    right: int
+    matching_lines: int
     """Lines that have as many words as a frame has values."""
-    fewest: int
-    most: int
-    odd: int
+    min_words: int
+    max_words: int
+    first_mismatch: int
     """The first line, the last one apart, that has another number of words than a frame has values."""
-    odd_words: int
-    last: int
-    last_words: int
+    first_mismatch_words: int
+    last_line: int
+    last_line_words: int
 
 
-def _count(data: Bytes, comma: int, width: int) -> tuple[int, int, int, int, int, int, int, int, int]:
+def _count_words(data: Bytes, comma: int, channel_count: int) -> tuple[int, int, int, int, int, int, int, int, int]:
     """The fields of `Lines`, for frames of `width` values."""
     words = rows = right = fewest = most = 0
     odd, odd_words, last, last_words = -1, 0, -1, 0
@@ -118,7 +118,7 @@ def _count(data: Bytes, comma: int, width: int) -> tuple[int, int, int, int, int
         space = c <= 32 or (comma == 2 and c == 44)
         if between and not space:
             if here == 0:
-                if odd < 0 and last_words > 0 and last_words != width:
+                if odd < 0 and last_words > 0 and last_words != channel_count:
                     odd, odd_words = last, last_words
                 fewest = last_words if rows == 1 else min(fewest, last_words)
                 rows += 1
@@ -127,34 +127,34 @@ def _count(data: Bytes, comma: int, width: int) -> tuple[int, int, int, int, int
         if c == 10:
             if here > 0:
                 words += here
-                right += here == width
+                right += here == channel_count
                 most = max(most, here)
                 last, last_words = line, here
             here = 0
             line += 1
     if here > 0:
         words += here
-        right += here == width
+        right += here == channel_count
         most = max(most, here)
         last, last_words = line, here
     fewest = last_words if rows <= 1 else min(fewest, last_words)
     return words, rows, right, fewest, most, odd, odd_words, last, last_words
 
 
-_parse_compiled: Callable[..., int] = numba.njit(cache=True, nogil=True)(_parse)
-_count_compiled: Callable[..., tuple[int, ...]] = numba.njit(cache=True, nogil=True)(_count)
+_parse_numbers_compiled: Callable[..., int] = numba.njit(cache=True, nogil=True)(_parse_numbers)
+_count_words_compiled: Callable[..., tuple[int, ...]] = numba.njit(cache=True, nogil=True)(_count_words)
 
 
-def parse(data: Bytes, count: int, comma: int) -> tuple[Array, int]:
+def parse_numbers(data: Bytes, count: int, comma: int) -> tuple[Array, int]:
     """The `count` numbers of `data`, and the byte where the first bad word begins (-1: there is none).
 
     `comma` says what a comma is: `NO_COMMA` (never right), `DECIMAL_COMMA` or `SEPARATING_COMMA`.
     """
     out = np.empty(count)
-    bad = _parse_compiled(data, comma, POWERS, out)
+    bad = _parse_numbers_compiled(data, comma, POWERS_OF_TEN, out)
     return out, bad
 
 
-def count(data: Bytes, comma: int, width: int) -> Lines:
+def measure_lines(data: Bytes, comma: int, channel_count: int) -> LineStatistics:
     """How words lie on the lines of `data` (lines end in a line feed), for frames of `width` values."""
-    return Lines(*_count_compiled(data, comma, width))
+    return LineStatistics(*_count_words_compiled(data, comma, channel_count))

@@ -14,7 +14,7 @@ import numpy as np
 
 from bunraku.motion.rotation import Array
 
-Ease = Callable[[Array], Array]
+EasingFunction = Callable[[Array], Array]
 
 
 def minimum_jerk(u: Array) -> Array:
@@ -24,34 +24,34 @@ def minimum_jerk(u: Array) -> Array:
     return eased
 
 
-def crisp(u: Array) -> Array:
+def ease_out(u: Array) -> Array:
     """0 to 1 with a sharp start and a soft end, as a puppet moves: speed 20 u (1 - u)^3, at its most at u = 1/4."""
     u = np.clip(u, 0.0, 1.0)
     eased: Array = u * u * (10.0 + u * (-20.0 + u * (15.0 - 4.0 * u)))
     return eased
 
 
-def falling(u: Array) -> Array:
+def ease_in(u: Array) -> Array:
     """`crisp` backwards: a soft start and a sharp end, as a stamping foot comes down."""
-    eased: Array = 1.0 - crisp(1.0 - np.asarray(u))
+    eased: Array = 1.0 - ease_out(1.0 - np.asarray(u))
     return eased
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class EasedMove:
     """A change by `delta` (k,) that begins at `begin` and takes `duration`, above zero, both in seconds."""
 
-    begin: float
+    start: float
     duration: float
     delta: Array
-    ease: Ease = minimum_jerk
+    ease: EasingFunction = minimum_jerk
 
 
-def superpose(time: Array, start: Array, moves: Sequence[Move]) -> Array:
+def superpose(time: Array, start: Array, moves: Sequence[EasedMove]) -> Array:
     """The track (n, k) over `time` (n,) seconds that begins at `start` (k,) and makes all `moves`."""
     track = np.tile(np.asarray(start, dtype=np.float64), (len(time), 1))
     for move in moves:
-        track += move.ease((time - move.begin) / move.duration)[:, None] * move.delta
+        track += move.ease((time - move.start) / move.duration)[:, None] * move.delta
     return track
 
 

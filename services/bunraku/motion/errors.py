@@ -23,7 +23,7 @@ class UnreadableMotion(Exception):
         self.hint = hint
 
 
-def shown(text: bytes | str, limit: int = 40) -> str:
+def quote_excerpt(text: bytes | str, limit: int = 40) -> str:
     """`text` in quotes for a message, unprintable characters escaped, cut to `limit` characters."""
     if isinstance(text, bytes):
         text = text[: 4 * limit].decode("utf-8", "replace")

@@ -12,10 +12,10 @@ import numpy as np
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 
-ROUNDS = 12
+PROCRUSTES_ITERATIONS = 12
 
 
-def kabsch(points: Array, targets: Array, weights: Array) -> Array:
+def solve_kabsch(points: Array, targets: Array, weights: Array) -> Array:
     """Rotations (..., 4) that bring `points` (m, 3) nearest to `targets` (..., m, 3); `weights` (m) of the squares."""
     covariance = np.einsum("m,...mi,mj->...ij", weights, targets, points)
     u, _, v = np.linalg.svd(covariance)
@@ -24,26 +24,26 @@ def kabsch(points: Array, targets: Array, weights: Array) -> Array:
     return rotation.from_matrix(u @ v)
 
 
-def mean_places(orientation: Array, targets: Array) -> Array:
+def mean_local_positions(orientation: Array, targets: Array) -> Array:
     """Where points `targets` (n, m, 3), relative to a joint, lie in it on average (m, 3); `orientation` (n, 4)."""
     places: Array = rotation.rotate(rotation.conjugate(orientation)[:, None], targets).mean(axis=0)
     return places
 
 
-def misfit(orientation: Array, places: Array, targets: Array, weights: Array) -> float:
+def rms_error(orientation: Array, local_positions: Array, targets: Array, weights: Array) -> float:
     """Weighted RMS distance of `places` (m, 3), turned by `orientation` (n, 4), from `targets` (n, m, 3)."""
-    apart = np.sum((rotation.rotate(orientation[:, None], places) - targets) ** 2, axis=-1)
+    apart = np.sum((rotation.rotate(orientation[:, None], local_positions) - targets) ** 2, axis=-1)
     return float(np.sqrt((apart @ weights).mean() / weights.sum()))
 
 
-def fitted_places(orientation: Array, targets: Array, weights: Array, rested: Array) -> Array:
+def fit_local_positions(orientation: Array, targets: Array, weights: Array, rest_positions: Array) -> Array:
     """Places (m, 3) that, turned afresh in every frame, come nearest to `targets` (n, m, 3).
 
     `orientation` (n, 4) is where to begin. The places are turned as a whole to lie nearest to `rested` (m, 3), so that
     the joint's identity is the source's rest.
     """
-    places = mean_places(orientation, targets)
-    for _ in range(ROUNDS):
-        places = mean_places(kabsch(places, targets, weights), targets)
-    turned: Array = rotation.rotate(kabsch(places, rested[None], weights)[0], places)
+    places = mean_local_positions(orientation, targets)
+    for _ in range(PROCRUSTES_ITERATIONS):
+        places = mean_local_positions(solve_kabsch(places, targets, weights), targets)
+    turned: Array = rotation.rotate(solve_kabsch(places, rest_positions[None], weights)[0], places)
     return turned

@@ -91,7 +91,7 @@ def from_axis_angle(a: Array) -> Array:
     return from_rotation_vector(a[..., :3] * a[..., 3:])
 
 
-def about_axis(axis: int, angle: Array) -> Array:
+def from_coordinate_axis(axis: int, angle: Array) -> Array:
     """Quaternion (..., 4) of a turn by `angle` (...) radians about x, y or z (`axis` 0, 1, 2)."""
     angle = np.asarray(angle, dtype=np.float64)
     q = np.zeros((*angle.shape, 4))
@@ -100,7 +100,7 @@ def about_axis(axis: int, angle: Array) -> Array:
     return q
 
 
-def between(a: Array, b: Array) -> Array:
+def rotation_between(a: Array, b: Array) -> Array:
     """The shortest rotation (..., 4) that brings the direction of `a` (..., 3) to that of `b`.
 
     Opposite directions turn about an axis square to `a`; a zero vector turns nothing.
@@ -146,7 +146,7 @@ def slerp(a: Array, b: Array, t: Array | float) -> Array:
     return multiply(a, from_rotation_vector(to_rotation_vector(multiply(conjugate(a), b)) * t[..., None]))
 
 
-def continuous(v: Array) -> Array:
+def unwrap_rotation_vectors(v: Array) -> Array:
     """Rotation vectors (n, ..., 3) of the same rotations, each the nearest equivalent to the one before.
 
     A rotation vector may be lengthened by any multiple of 2 pi along its axis; choosing the nearest leaves a track

@@ -37,15 +37,15 @@ JOINTS: tuple[str, ...] = (
 """Channel order: index 0 is the root (channels 1 and 2), index k > 0 is channel k + 2."""
 
 PARENTS: tuple[int, ...] = (-1, 0, 1, 2, 3, 4, 1, 6, 7, 8, 0, 10, 10, 12, 13, 10, 15, 16)
-INDEX: dict[str, int] = {name: index for index, name in enumerate(JOINTS)}
+JOINT_INDEX: dict[str, int] = {name: index for index, name in enumerate(JOINTS)}
 JOINT_COUNT = len(JOINTS)
 CHANNEL_COUNT = 19
-TIPS: tuple[int, ...] = (
-    INDEX["skullbase"],
-    INDEX["l_wrist"],
-    INDEX["r_wrist"],
-    INDEX["l_midtarsal"],
-    INDEX["r_midtarsal"],
+TIP_JOINTS: tuple[int, ...] = (
+    JOINT_INDEX["skullbase"],
+    JOINT_INDEX["l_wrist"],
+    JOINT_INDEX["r_wrist"],
+    JOINT_INDEX["l_midtarsal"],
+    JOINT_INDEX["r_midtarsal"],
 )
 """Joints that carry a tip beyond them: crown, finger tips, toe tips."""
 
@@ -84,7 +84,7 @@ class Motion:
             raise ValueError("a motion has a frame rate above zero")
 
     @property
-    def frames(self) -> int:
+    def frame_count(self) -> int:
         """Number of frames."""
         return len(self.root)
 
@@ -117,14 +117,14 @@ def standard_figure() -> Figure:
     offsets = position.copy()
     offsets[1:] -= position[list(PARENTS[1:])]
     tips = np.zeros((JOINT_COUNT, 3))
-    tips[INDEX["skullbase"]] = np.array([0.0050, 1.7504, 0.0055]) - position[INDEX["skullbase"]]
-    tips[INDEX["l_wrist"]] = np.array([0.2056, 0.6743, -0.0482]) - position[INDEX["l_wrist"]]
-    tips[INDEX["r_wrist"]] = tips[INDEX["l_wrist"]] * [-1.0, 1.0, 1.0]
-    tips[INDEX["l_midtarsal"]] = tips[INDEX["r_midtarsal"]] = (0.0, 0.0, 0.07)
+    tips[JOINT_INDEX["skullbase"]] = np.array([0.0050, 1.7504, 0.0055]) - position[JOINT_INDEX["skullbase"]]
+    tips[JOINT_INDEX["l_wrist"]] = np.array([0.2056, 0.6743, -0.0482]) - position[JOINT_INDEX["l_wrist"]]
+    tips[JOINT_INDEX["r_wrist"]] = tips[JOINT_INDEX["l_wrist"]] * [-1.0, 1.0, 1.0]
+    tips[JOINT_INDEX["l_midtarsal"]] = tips[JOINT_INDEX["r_midtarsal"]] = (0.0, 0.0, 0.07)
     return Figure(offsets, tips)
 
 
-def world(figure: Figure, root: Array, rotations: Array) -> tuple[Array, Array]:
+def world_transforms(figure: Figure, root: Array, rotations: Array) -> tuple[Array, Array]:
     """World positions (..., 18, 3) in metres and orientations (..., 18, 4) of all joints.
 
     `root` (..., 3) and `rotations` (..., 18, 4) are one pose or many, as in `Motion`.
@@ -140,20 +140,20 @@ def world(figure: Figure, root: Array, rotations: Array) -> tuple[Array, Array]:
     return position, orientation
 
 
-def points(figure: Figure, root: Array, rotations: Array) -> Array:
+def joint_and_tip_positions(figure: Figure, root: Array, rotations: Array) -> Array:
     """World positions (..., 23, 3) in metres of the 18 joints and the 5 tips: where the codec's error is measured."""
-    position, orientation = world(figure, root, rotations)
-    tip = [position[..., k, :] + rotation.rotate(orientation[..., k, :], figure.tips[k]) for k in TIPS]
+    position, orientation = world_transforms(figure, root, rotations)
+    tip = [position[..., k, :] + rotation.rotate(orientation[..., k, :], figure.tips[k]) for k in TIP_JOINTS]
     return np.concatenate([position, np.stack(tip, axis=-2)], axis=-2)
 
 
-def channels(motion: Motion) -> list[Array]:
+def to_channels(motion: Motion) -> list[Array]:
     """The paper's 19 channels: root position (n, 3) in metres, then root and 17 joints as axis and angle (n, 4)."""
     turned = rotation.to_axis_angle(motion.rotations)
     return [motion.root, *(turned[:, k] for k in range(JOINT_COUNT))]
 
 
-def front(motion: Motion) -> float:
+def mean_facing(motion: Motion) -> float:
     """Where the dance faces over its length: radians about y from z towards x; 0 where it has no one front.
 
     The mean of the pelvis's forward direction on the floor; a dance that turns about has a short mean, and no front.

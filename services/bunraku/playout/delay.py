@@ -10,19 +10,19 @@ from __future__ import annotations
 import math
 from collections import deque
 
-SHARE = 0.95
+ON_TIME_QUANTILE = 0.95
 """Of the last messages, this part is to come in time."""
-MARGIN = 10_000
+DELAY_MARGIN_US = 10_000
 """Beyond that."""
-GREATEST = 400_000
+MAX_DELAY_US = 400_000
 """No stage is shown later."""
-KEPT = 128
+LATENESS_SAMPLES = 128
 """Messages that are remembered: four seconds, at thirty a second."""
-LEAST = 20
+MIN_LATENESS_SAMPLES = 20
 """Nothing is said by fewer: the first one may be an old one, sent to who joins."""
-SLEW = 0.05
+MAX_GROWTH_RATE = 0.05
 """Microseconds a microsecond."""
-SHRINKING = 10_000_000
+SHRINK_TIME_CONSTANT_US = 10_000_000
 """Time constant on the way down."""
 
 
@@ -30,27 +30,27 @@ class PlayoutDelay:
     """The delay of one viewer."""
 
     def __init__(self) -> None:
-        self._late: deque[float] = deque(maxlen=KEPT)
+        self._lateness: deque[float] = deque(maxlen=LATENESS_SAMPLES)
         # the delay in use was `_from` at local time `_since`, and goes to `_goal`
-        self._from = 0.0
-        self._since = 0
-        self._goal = 0.0
+        self._start = 0.0
+        self._started_at = 0
+        self._target = 0.0
 
-    def heard(self, late: float, local: int) -> None:
+    def add_lateness(self, lateness: float, local: int) -> None:
         """At local time `local` a message came `late` after it was first needed, below zero before. With none the delay
         stays as it is."""
-        self._late.append(late)
-        if len(self._late) < LEAST:
+        self._lateness.append(lateness)
+        if len(self._lateness) < MIN_LATENESS_SAMPLES:
             return
-        enough = sorted(self._late)[math.ceil(SHARE * len(self._late)) - 1] + MARGIN
-        self._from = self.at(local)
-        self._since = max(local, self._since)
-        self._goal = min(max(enough, 0.0), GREATEST)
+        enough = sorted(self._lateness)[math.ceil(ON_TIME_QUANTILE * len(self._lateness)) - 1] + DELAY_MARGIN_US
+        self._start = self.at(local)
+        self._started_at = max(local, self._started_at)
+        self._target = min(max(enough, 0.0), MAX_DELAY_US)
 
     def at(self, local: int) -> float:
         """The delay in use at local time `local`: on its way to what is enough."""
-        passed, away = max(local - self._since, 0), self._goal - self._from
+        passed, away = max(local - self._started_at, 0), self._target - self._start
         if away >= 0.0:
-            return min(self._from + SLEW * passed, self._goal)
+            return min(self._start + MAX_GROWTH_RATE * passed, self._target)
         # no more than the greatest delay over the time constant: within the slew
-        return self._goal - away * math.exp(-passed / SHRINKING)
+        return self._target - away * math.exp(-passed / SHRINK_TIME_CONSTANT_US)

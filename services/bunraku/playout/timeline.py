@@ -53,22 +53,22 @@ def edit(
     )
 
 
-def change(state: TimelineState, clock: int, motion: str, duration: int) -> TimelineState:
+def change_motion(state: TimelineState, clock: int, motion: str, duration: int) -> TimelineState:
     """The timeline from `clock` on with another motion, from its start."""
     return replace(start(motion, duration, clock, playing=state.playing, loop=state.loop), epoch=state.epoch + 1)
 
 
-class Timelines:
+class TimelineHistory:
     """The timeline that holds at a clock time: the newest, or while that lies ahead the one before it."""
 
     def __init__(self) -> None:
-        self._before: TimelineState | None = None
+        self._previous: TimelineState | None = None
         self._newest: TimelineState | None = None
 
     def put(self, state: TimelineState) -> None:
         """Take in a timeline; one of an older epoch than the newest is ignored."""
         if self._newest is None or state.epoch > self._newest.epoch:
-            self._before, self._newest = self._newest, state
+            self._previous, self._newest = self._newest, state
 
     def restart(self) -> None:
         """A new connection: its first timeline counts, whatever its epoch."""
@@ -82,7 +82,7 @@ class Timelines:
 
     def at(self, clock: int) -> TimelineState | None:
         """The timeline that holds at `clock`, None where none was put yet."""
-        before, newest = self._before, self._newest
+        before, newest = self._previous, self._newest
         if newest is not None and before is not None and clock < newest.clock and before.motion == newest.motion:
             return before
         return newest

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from bunraku.backing.metrics import Metrics
-from bunraku.session.sessions import Sessions
+from bunraku.runtime.metrics import Metrics
+from bunraku.session.session_manager import SessionManager
 
 
-def register(metrics: Metrics, sessions: Sessions) -> None:
+def register_metrics(metrics: Metrics, sessions: SessionManager) -> None:
     """Have the stages of this replica counted."""
-    tally = sessions.tally
+    tally = sessions.counters
 
     def held() -> int:
         return sum(holder is not None for stage in sessions.stages for holder in stage.holders)
@@ -24,5 +24,7 @@ def register(metrics: Metrics, sessions: Sessions) -> None:
         lambda: {(outcome,): number for outcome, number in tally.inputs.copy().items()},
         ("outcome",),
     )
-    metrics.distribution("solve_duration_seconds", "What one tick of a stage takes: limbs of all frames", tally.solving)
-    metrics.distribution("stage_late_seconds", "How much later than planned a tick began", tally.late)
+    metrics.histogram(
+        "solve_duration_seconds", "What one tick of a stage takes: limbs of all frames", tally.tick_duration_s
+    )
+    metrics.histogram("stage_late_seconds", "How much later than planned a tick began", tally.tick_lateness_s)

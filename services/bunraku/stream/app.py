@@ -9,66 +9,67 @@ from typing import Annotated
 from fastapi import FastAPI, Query, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
-from bunraku.backing import problems, sockets
-from bunraku.backing.access import Role, access_of, needs
-from bunraku.backing.backing import Backing, clock
-from bunraku.backing.bus import NobodyAnswers, is_word
-from bunraku.backing.direct import take
-from bunraku.backing.library import StoredMotion
-from bunraku.backing.line import line_of
-from bunraku.backing.missing import no_such_motion
-from bunraku.backing.outlet import Outlet
-from bunraku.backing.problems import ProblemError
-from bunraku.backing.register import SESSIONS, Register
-from bunraku.backing.sockets import Refusal
-from bunraku.backing.unavailable import Unavailable
+from bunraku.delivery.resume import ResumeState
+from bunraku.http import problem_details
+from bunraku.http.access_control import Role, access_of, requires
+from bunraku.http.not_found import motion_not_found
+from bunraku.http.problem_details import ProblemError
+from bunraku.messaging.bus import NoResponse, is_subject_token
+from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
 from bunraku.playout import timeline
-from bunraku.playout.held import Held
+from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.context import ServiceContext, clock
+from bunraku.storage.motion_store import StoredMotion
 from bunraku.stream import metrics
-from bunraku.stream.attendance import Attendance
-from bunraku.stream.flow import Readable
-from bunraku.stream.sessions import WatchedSessions
-from bunraku.stream.tracks import TRACKS
-from bunraku.stream.turns import Turns
-from bunraku.stream.viewers import Viewer
+from bunraku.stream.counters import StreamCounters
+from bunraku.stream.flow_control import Link
+from bunraku.stream.tick_scheduler import TickScheduler
+from bunraku.stream.track_selection import TRACK_TYPES
+from bunraku.stream.viewer_connection import ViewerConnection
+from bunraku.stream.watched_session import WatchedSessions
+from bunraku.websocket import subprotocol
+from bunraku.websocket.connection import WebSocketConnection
+from bunraku.websocket.handoff import detach
+from bunraku.websocket.link import link_of
+from bunraku.websocket.subprotocol import CloseConnection
 
-IMMUTABLE = {"Cache-Control": "public, max-age=31536000, immutable"}
+IMMUTABLE_HEADERS = {"Cache-Control": "public, max-age=31536000, immutable"}
 
-RateQuery = Annotated[int | None, Query(ge=0, le=15)]
+LevelQuery = Annotated[int | None, Query(ge=0, le=15)]
 TracksQuery = Annotated[str, Query(max_length=64)]
-HaveQuery = Annotated[str, Query(max_length=400)]
-RETURN = 60_000_000
+ResumeQuery = Annotated[str, Query(max_length=400)]
+MAX_RESUME_AGE_US = 60_000_000
 """Who says when a private timeline began says so within this of now, microseconds."""
 
 
-def create_app(backing: Backing) -> FastAPI:
+def create_app(context: ServiceContext) -> FastAPI:
     """The service upon `backing`."""
-    attendance = Attendance()
-    sessions = WatchedSessions(backing.bus, backing.library, attendance)
-    turns = Turns()
+    attendance = StreamCounters()
+    sessions = WatchedSessions(context.bus, context.motion_store, attendance)
+    turns = TickScheduler()
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        metrics.register(backing.metrics, attendance, sessions)
+        metrics.register_metrics(context.metrics, attendance, sessions)
         yield
 
     app = FastAPI(title="Bunraku stream", lifespan=lifespan)
-    problems.install(app)
+    problem_details.install_problem_handlers(app)
 
     async def stored(motion: str) -> StoredMotion:
-        found = await backing.library.get(motion)
+        found = await context.motion_store.get(motion)
         if found is None:
-            raise no_such_motion(motion)
+            raise motion_not_found(motion)
         return found
 
     @app.get("/v1/motions/{motion}/description", tags=["blocks"], response_class=Response)
-    @needs(Role.VIEW)
+    @requires(Role.VIEW)
     async def description(motion: str) -> Response:
         """The motion's Description (message 2), for those who fetch blocks over HTTP."""
-        return Response((await stored(motion)).description, media_type=_BYTES, headers=IMMUTABLE)
+        return Response((await stored(motion)).description, media_type=_OCTET_STREAM, headers=IMMUTABLE_HEADERS)
 
     @app.get("/v1/motions/{motion}/blocks/{rate}/{index}", tags=["blocks"], response_class=Response)
-    @needs(Role.VIEW)
+    @requires(Role.VIEW)
     async def block(motion: str, rate: int, index: int, track: int = 0) -> Response:
         """One Data message (message 3): the same bytes as over a socket, to be kept for ever. `track` is the track's
         index in the Description: 0 is the motion."""
@@ -80,112 +81,131 @@ def create_app(backing: Backing) -> FastAPI:
             raise ProblemError(
                 404, "No such block", f"rates are 0..{len(packets) - 1}, blocks 0..{len(packets[0]) - 1}"
             )
-        return Response(packets[rate][index], media_type=_BYTES, headers=IMMUTABLE)
+        return Response(packets[rate][index], media_type=_OCTET_STREAM, headers=IMMUTABLE_HEADERS)
 
     @app.websocket("/v1/motions/{motion}/stream")
-    @needs(Role.VIEW)
+    @requires(Role.VIEW)
     async def watch_motion(
         socket: WebSocket,
         motion: str,
-        rate: RateQuery = None,
+        rate: LevelQuery = None,
         tracks: TracksQuery = "",
-        have: HaveQuery = "",
+        have: ResumeQuery = "",
         at: float = 0.0,
         clock_at: Annotated[int | None, Query(alias="clock")] = None,
     ) -> None:
         try:
-            viewer = Viewer(turns, rate, _wanted(tracks), private=True, held=_held(have), attendance=attendance)
-            found = await backing.library.get(motion)
+            viewer = ViewerConnection(
+                turns,
+                rate,
+                _parse_track_types(tracks),
+                has_own_timeline=True,
+                resume_state=_parse_resume_state(have),
+                counters=attendance,
+            )
+            found = await context.motion_store.get(motion)
             if found is None:
-                raise Refusal(sockets.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
+                raise CloseConnection(subprotocol.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
             # NaN and infinities start at the beginning
             position = round(min(at, 1e6) * 1e6) if at > 0 else 0
-            outlet, line = await _come(socket, viewer)
-            attendance.count(outlet)
+            outlet, line = await _accept_viewer(socket, viewer)
+            attendance.count_writes(outlet)
             now = clock()
             # who comes back goes on where it was, however long the way here took
-            began = now if clock_at is None or abs(now - clock_at) > RETURN else clock_at
-            viewer.timeline(timeline.start(motion, found.track.duration_us, began, position=position), found)
+            began = now if clock_at is None or abs(now - clock_at) > MAX_RESUME_AGE_US else clock_at
+            viewer.set_timeline(timeline.start(motion, found.first_track.duration_us, began, position=position), found)
             viewer.open(outlet, line)
-            outlet.ended = attendance.come(viewer, "motion", backing.gate.stay(access_of(socket), viewer.refuse))
+            outlet.on_ended = attendance.add_viewer(
+                viewer, "motion", context.authenticator.register_connection(access_of(socket), viewer.disconnect)
+            )
         except WebSocketDisconnect:
             # gone before anything was said
             pass
-        except Refusal as refusal:
-            await sockets.close(socket, refusal)
+        except CloseConnection as refusal:
+            await subprotocol.close_with_problem(socket, refusal)
 
     @app.websocket("/v1/sessions/{session}/stream")
-    @needs(Role.VIEW)
+    @requires(Role.VIEW)
     async def watch_session(
-        socket: WebSocket, session: str, rate: RateQuery = None, tracks: TracksQuery = "", have: HaveQuery = ""
+        socket: WebSocket, session: str, rate: LevelQuery = None, tracks: TracksQuery = "", have: ResumeQuery = ""
     ) -> None:
         try:
-            viewer = Viewer(turns, rate, _wanted(tracks), held=_held(have), attendance=attendance)
+            viewer = ViewerConnection(
+                turns, rate, _parse_track_types(tracks), resume_state=_parse_resume_state(have), counters=attendance
+            )
             try:
                 watched = await sessions.open(session)
-            except NobodyAnswers:
-                raise await _unanswered(backing.register, session) from None
-            except Unavailable as error:
-                raise Refusal(sockets.TOO_SLOW, "Not now", f"{error.what} does not answer; come again") from None
+            except NoResponse:
+                raise await _explain_unanswered_session(context.key_values, session) from None
+            except BackendUnavailable as error:
+                raise CloseConnection(
+                    subprotocol.TRY_AGAIN_LATER, "Not now", f"{error.backend} does not answer; come again"
+                ) from None
             try:
-                outlet, line = await _come(socket, viewer)
-                attendance.count(outlet)
-                watched.join(viewer)
+                outlet, line = await _accept_viewer(socket, viewer)
+                attendance.count_writes(outlet)
+                watched.add_viewer(viewer)
                 viewer.open(outlet, line)
-                outlet.ended = attendance.come(viewer, "session", backing.gate.stay(access_of(socket), viewer.refuse))
+                outlet.on_ended = attendance.add_viewer(
+                    viewer, "session", context.authenticator.register_connection(access_of(socket), viewer.disconnect)
+                )
             finally:
-                sessions.close(session)
+                sessions.close_if_empty(session)
         except WebSocketDisconnect:
             # gone before anything was said
             pass
-        except Refusal as refusal:
-            await sockets.close(socket, refusal)
+        except CloseConnection as refusal:
+            await subprotocol.close_with_problem(socket, refusal)
 
     return app
 
 
-_BYTES = "application/octet-stream"
+_OCTET_STREAM = "application/octet-stream"
 
 
-async def _unanswered(register: Register, session: str) -> Refusal:
+async def _explain_unanswered_session(key_values: KeyValueStore, session: str) -> CloseConnection:
     """Why nobody answers for a session: there is none, or its server is gone or on its way back to the bus."""
     try:
-        known = is_word(session) and await register.get(f"{SESSIONS}.{session}") is not None
-    except Unavailable as error:
-        return Refusal(sockets.TOO_SLOW, "Not now", f"{error.what} does not answer; come again")
+        known = is_subject_token(session) and await key_values.get(f"{SESSION_KEY_PREFIX}.{session}") is not None
+    except BackendUnavailable as error:
+        return CloseConnection(subprotocol.TRY_AGAIN_LATER, "Not now", f"{error.backend} does not answer; come again")
     if known:
-        return Refusal(sockets.TOO_SLOW, "Session not here yet", "its server does not answer now; come again")
-    return Refusal(sockets.NOT_FOUND, "No such session", f"there is no session {session[:40]!r}")
+        return CloseConnection(
+            subprotocol.TRY_AGAIN_LATER, "Session not here yet", "its server does not answer now; come again"
+        )
+    return CloseConnection(subprotocol.NOT_FOUND, "No such session", f"there is no session {session[:40]!r}")
 
 
-async def _come(socket: WebSocket, viewer: Viewer) -> tuple[Outlet, Readable | None]:
+async def _accept_viewer(socket: WebSocket, viewer: ViewerConnection) -> tuple[WebSocketConnection, Link | None]:
     """Accept a viewer's socket and take it. What is written is held until `Viewer.open` lets it go: the answer to the
-    handshake and the first block share a packet. Raises as `sockets.accept` and `take` do."""
-    line = line_of(socket)
+    handshake and the first block share a packet. Raises as `subprotocol.accept` and `take` do."""
+    line = link_of(socket)
     if line is not None:
-        line.hold(True)
+        line.set_corked(True)
     try:
-        await sockets.accept(socket)
-        return take(socket, viewer), line
+        await subprotocol.accept(socket)
+        return detach(socket, viewer), line
     except BaseException:
         if line is not None:
-            line.hold(False)
+            line.set_corked(False)
         raise
 
 
-def _held(have: str) -> Held | None:
+def _parse_resume_state(have: str) -> ResumeState | None:
     """What a viewer says it has; raises `Refusal` where it cannot be read."""
     try:
-        return Held.read(have) if have else None
+        return ResumeState.parse(have) if have else None
     except ValueError as error:
-        raise Refusal(sockets.BROKEN, "Unreadable query", str(error)) from None
+        raise CloseConnection(subprotocol.POLICY_VIOLATION, "Unreadable query", str(error)) from None
 
 
-def _wanted(tracks: str) -> tuple[str, ...]:
+def _parse_track_types(tracks: str) -> tuple[str, ...]:
     """The types of tracks that `tracks` asks for, all of them where it names none; raises `Refusal` for a name that is
     no track."""
     wanted = tuple(name for name in tracks.split(",") if name)
-    unknown = [name for name in wanted if name not in TRACKS]
+    unknown = [name for name in wanted if name not in TRACK_TYPES]
     if unknown:
-        raise Refusal(sockets.BROKEN, "Unknown track", f"tracks are {', '.join(TRACKS)}, not {unknown[0]!r}")
-    return wanted or TRACKS
+        raise CloseConnection(
+            subprotocol.POLICY_VIOLATION, "Unknown track", f"tracks are {', '.join(TRACK_TYPES)}, not {unknown[0]!r}"
+        )
+    return wanted or TRACK_TYPES

@@ -2,8 +2,8 @@
 
 LIMBS: tuple[str, ...] = ("left_hand", "right_hand", "left_leg", "right_leg")
 """Of each performer."""
-MOST_PERFORMERS = 4
-MOST_LIMBS = len(LIMBS) * MOST_PERFORMERS
+MAX_PERFORMERS = 4
+MAX_LIMBS = len(LIMBS) * MAX_PERFORMERS
 
 
 def limb_number(limb: str | int) -> int:

@@ -15,21 +15,21 @@ import msgpack
 from pydantic import Field, TypeAdapter, ValidationError
 
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.limbs import MOST_LIMBS
+from bunraku.wire.limbs import MAX_LIMBS
 from bunraku.wire.overlay import Overlay
 
-VERSION = 1
+PROTOCOL_VERSION = 1
 SUBPROTOCOL = "bunraku.v1"
-CLOCK = "unix"
-LARGEST_FROM_CLIENT = 1_024
-LARGEST_FROM_SERVER = 1 << 20
-Limb = Annotated[int, Field(strict=True, ge=0, lt=MOST_LIMBS)]
+CLOCK_NAME = "unix"
+MAX_CLIENT_MESSAGE_BYTES = 1_024
+MAX_SERVER_MESSAGE_BYTES = 1 << 20
+LimbNumber = Annotated[int, Field(strict=True, ge=0, lt=MAX_LIMBS)]
 """Limb l of performer k is 4 k + l."""
-Count = Annotated[int, Field(strict=True, ge=0, lt=1 << 53)]
+SafeInteger = Annotated[int, Field(strict=True, ge=0, lt=1 << 53)]
 """A count or a time: what JavaScript's numbers hold exactly."""
 
 
-class _Packed:
+class _MapMessage:
     """A message of one type byte and a MessagePack map of the fields that are not None."""
 
     TYPE: ClassVar[int]
@@ -43,50 +43,50 @@ class _Packed:
 
 
 @dataclass(frozen=True, slots=True)
-class ChannelHeader(_Packed):
+class ChannelHeader(_MapMessage):
     """What will come, the first message of a stream (paper 3): `now` clock time, `channels` the total of all tracks."""
 
     TYPE = 1
     motion: str
-    now: Count
-    channels: Count
+    now: SafeInteger
+    channels: SafeInteger
     software: str
-    version: int = VERSION
-    clock: str = CLOCK
+    version: int = PROTOCOL_VERSION
+    clock: str = CLOCK_NAME
 
 
 @dataclass(frozen=True, slots=True)
-class Description(_Packed):
+class Description(_MapMessage):
     """The type of every track and what its blocks have in common (paper 3); of those from index `first` on, where that
     is not None."""
 
     TYPE = 2
     motion: str
     tracks: list[dict[str, Any]]
-    first: Count | None = None
+    first: SafeInteger | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class TimelineState(_Packed):
+class TimelineState(_MapMessage):
     """Where the stage stands: at clock time `clock` at `position` of the motion. Times in microseconds."""
 
     TYPE = 4
-    epoch: Count
+    epoch: SafeInteger
     motion: str
-    clock: Count
-    position: Count
+    clock: SafeInteger
+    position: SafeInteger
     playing: bool
     loop: bool
-    duration: Count
+    duration: SafeInteger
 
 
 @dataclass(frozen=True, slots=True)
-class Presence(_Packed):
+class Presence(_MapMessage):
     """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS` of each performer, `asks`
     the ids of those who ask for it, first come first."""
 
     TYPE = 6
-    viewers: Count
+    viewers: SafeInteger
     puppeteers: list[dict[str, Any]]
     limbs: list[str | None]
     asks: list[list[str]] = field(default_factory=list)
@@ -98,7 +98,7 @@ class Presence(_Packed):
 
 
 @dataclass(frozen=True, slots=True)
-class Problem(_Packed):
+class Problem(_MapMessage):
     """Why the socket is about to be closed."""
 
     TYPE = 8
@@ -107,108 +107,108 @@ class Problem(_Packed):
 
 
 @dataclass(frozen=True, slots=True)
-class Welcome(_Packed):
+class Welcome(_MapMessage):
     """A puppeteer's id, colour (0-4) and the lead of overlays over now, microseconds."""
 
     TYPE = 9
     id: str
-    colour: Count
-    lead: Count
+    colour: SafeInteger
+    lead: SafeInteger
 
 
 @dataclass(frozen=True, slots=True)
-class Grant(_Packed):
+class Grant(_MapMessage):
     """The limb is yours; inputs carry `epoch`."""
 
     TYPE = 10
-    limb: Limb
-    epoch: Count
+    limb: LimbNumber
+    epoch: SafeInteger
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal(_Packed):
+class Refusal(_MapMessage):
     """The limb is not, or no longer, yours; `reason` is `held`, `lost` or `unknown`."""
 
     TYPE = 11
-    limb: Limb
+    limb: LimbNumber
     reason: str
     holder: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Notice(_Packed):
+class Notice(_MapMessage):
     """An input was not taken as it came: brought within `reach`, refused for want of an `owner`'s right, or dropped for
     its `rate`; `reason` is one of these three words, `detail` says it to a person."""
 
     TYPE = 12
-    limb: Limb
+    limb: LimbNumber
     reason: str
     detail: str
 
 
 @dataclass(frozen=True, slots=True)
-class Choice(_Packed):
+class Choice(_MapMessage):
     """Which rate the server chose and why: `reason` is one of SPEC.md's words; `line` bit/s that a narrow line carries,
     heads included, left out where it is not narrow."""
 
     TYPE = 13
-    rate: Count
+    rate: SafeInteger
     reason: str
-    line: Count | None = None
+    line: SafeInteger | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Edit(_Packed):
+class Edit(_MapMessage):
     """Edits of a viewer's private timeline; None leaves a thing as it is."""
 
     TYPE = 65
     playing: bool | None = None
-    position: Count | None = None
+    position: SafeInteger | None = None
     loop: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Report(_Packed):
+class Report(_MapMessage):
     """How a viewer fares: microseconds ready ahead, to decode a block, to draw a frame; whether its tab is hidden."""
 
     TYPE = 66
-    buffer: Count
-    decode: Count = 0
-    frame: Count = 0
+    buffer: SafeInteger
+    decode: SafeInteger = 0
+    frame: SafeInteger = 0
     hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Claim(_Packed):
+class Claim(_MapMessage):
     """Asks for a limb."""
 
     TYPE = 67
-    limb: Limb
+    limb: LimbNumber
 
 
 @dataclass(frozen=True, slots=True)
-class Release(_Packed):
+class Release(_MapMessage):
     """Lets a limb go."""
 
     TYPE = 68
-    limb: Limb
-    epoch: Count
+    limb: LimbNumber
+    epoch: SafeInteger
 
 
 @dataclass(frozen=True, slots=True)
-class Alive(_Packed):
+class Alive(_MapMessage):
     """Still holding `limbs` with nothing new to say."""
 
     TYPE = 69
-    limbs: Annotated[list[Limb], Field(max_length=MOST_LIMBS)] = field(default_factory=list)
+    limbs: Annotated[list[LimbNumber], Field(max_length=MAX_LIMBS)] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
-class Ask(_Packed):
+class Ask(_MapMessage):
     """Asks the holder of a limb for it, or no longer."""
 
     TYPE = 71
-    limb: Limb
+    limb: LimbNumber
     wanted: Annotated[bool, Field(strict=True)]
 
 
@@ -256,7 +256,7 @@ class Ping:
     @classmethod
     def unpack(cls, data: bytes) -> Ping:
         """The message of `pack`."""
-        _, sequence, sent = _fixed(cls.LAYOUT, data, "Ping")
+        _, sequence, sent = _unpack_fixed(cls.LAYOUT, data, "Ping")
         return cls(sequence, sent)
 
 
@@ -278,7 +278,7 @@ class Pong:
     @classmethod
     def unpack(cls, data: bytes) -> Pong:
         """The message of `pack`."""
-        _, *values = _fixed(cls.LAYOUT, data, "Pong")
+        _, *values = _unpack_fixed(cls.LAYOUT, data, "Pong")
         return cls(*values)
 
 
@@ -305,9 +305,9 @@ class Input:
     @classmethod
     def unpack(cls, data: bytes) -> Input:
         """The message of `pack`; numbers that are not finite are malformed."""
-        _, limb, kind, epoch, sequence, sampled, *values = _fixed(cls.LAYOUT, data, "Input")
-        if limb >= MOST_LIMBS or kind > cls.TARGET:
-            raise MalformedMessage(f"Input names limb {limb}, kind {kind}; there are {MOST_LIMBS} limbs and 2 kinds")
+        _, limb, kind, epoch, sequence, sampled, *values = _unpack_fixed(cls.LAYOUT, data, "Input")
+        if limb >= MAX_LIMBS or kind > cls.TARGET:
+            raise MalformedMessage(f"Input names limb {limb}, kind {kind}; there are {MAX_LIMBS} limbs and 2 kinds")
         if not all(map(math.isfinite, values)):
             raise MalformedMessage("Input holds a number that is not finite")
         return cls(limb, kind, epoch, sequence, sampled, (values[0], values[1], values[2]))
@@ -318,8 +318,10 @@ Message = (
     | Notice | Choice | Ping | Edit | Report | Claim | Release | Alive | Ask | Input
 )  # fmt: skip
 
-_FIXED = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)} | {Overlay.SEVERAL: Overlay}
-_MAPS: dict[int, TypeAdapter[Any]] = {
+_FIXED_MESSAGES = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)} | {
+    Overlay.MULTI_PERFORMER_TYPE: Overlay
+}
+_MAP_ADAPTERS: dict[int, TypeAdapter[Any]] = {
     kind.TYPE: TypeAdapter(kind)
     for kind in (
         ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Choice, Edit,
@@ -328,7 +330,7 @@ _MAPS: dict[int, TypeAdapter[Any]] = {
 }  # fmt: skip
 
 
-def _fixed(layout: struct.Struct, data: bytes, name: str) -> tuple[Any, ...]:
+def _unpack_fixed(layout: struct.Struct, data: bytes, name: str) -> tuple[Any, ...]:
     if len(data) != layout.size:
         raise MalformedMessage(f"{name} has {layout.size} bytes, not {len(data)}")
     return layout.unpack(data)
@@ -338,13 +340,13 @@ def unpack(data: bytes) -> Message | None:
     """The message in `data`, None where the type is not known here; raises `MalformedMessage`."""
     if not data:
         raise MalformedMessage("an empty message has no type")
-    if data[0] in _FIXED:
-        return _FIXED[data[0]].unpack(data)
-    if data[0] not in _MAPS:
+    if data[0] in _FIXED_MESSAGES:
+        return _FIXED_MESSAGES[data[0]].unpack(data)
+    if data[0] not in _MAP_ADAPTERS:
         return None
     try:
         values = msgpack.unpackb(data[1:], strict_map_key=True)
-        message: Message = _MAPS[data[0]].validate_python(values)
+        message: Message = _MAP_ADAPTERS[data[0]].validate_python(values)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "map"

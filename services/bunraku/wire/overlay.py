@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.limbs import LIMBS, MOST_LIMBS
+from bunraku.wire.limbs import LIMBS, MAX_LIMBS
 
-_ONE = struct.Struct("<BBHQ")
-_SEVERAL = struct.Struct("<BBHQH")
+_SINGLE_PERFORMER_HEADER = struct.Struct("<BBHQ")
+_MULTI_PERFORMER_HEADER = struct.Struct("<BBHQH")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +21,9 @@ class Overlay:
     """
 
     TYPE: ClassVar[int] = 5
-    SEVERAL: ClassVar[int] = 14
+    MULTI_PERFORMER_TYPE: ClassVar[int] = 14
     """The type where limbs of others than the first performer are among them."""
-    FRAME: ClassVar[int] = 16_667
+    FRAME_INTERVAL_US: ClassVar[int] = 16_667
     sequence: int
     due: int
     limbs: dict[int, tuple[int, ...]]
@@ -36,21 +36,24 @@ class Overlay:
         numbers = [n for frame in (*self.earlier, self.limbs) for limb in limbs for n in frame[limb]]
         frames = struct.pack(f"<{len(numbers)}h", *numbers)
         if mask < 1 << len(LIMBS):
-            return _ONE.pack(self.TYPE, mask | more, self.sequence & 0xFFFF, self.due) + frames
-        return _SEVERAL.pack(self.SEVERAL, more, self.sequence & 0xFFFF, self.due, mask) + frames
+            return _SINGLE_PERFORMER_HEADER.pack(self.TYPE, mask | more, self.sequence & 0xFFFF, self.due) + frames
+        return (
+            _MULTI_PERFORMER_HEADER.pack(self.MULTI_PERFORMER_TYPE, more, self.sequence & 0xFFFF, self.due, mask)
+            + frames
+        )
 
     @classmethod
     def unpack(cls, data: bytes) -> Overlay:
         """The message of `pack`."""
-        begin = _head(data)
+        begin = _header_size(data)
         if len(data) < begin:
             raise MalformedMessage(f"Overlay has {begin} bytes at least")
-        limbs = _limbs(data)
+        limbs = _limb_numbers(data)
         count = (data[1] >> 4) + 1
         size = begin + 18 * len(limbs) * count
         if len(data) != size:
             raise MalformedMessage(f"Overlay of {len(limbs)} limbs has {size} bytes, not {len(data)}")
-        _, _, sequence, due = _ONE.unpack_from(data)
+        _, _, sequence, due = _SINGLE_PERFORMER_HEADER.unpack_from(data)
         numbers = struct.unpack_from(f"<{(size - begin) // 2}h", data, begin)
         parts = [tuple(numbers[at : at + 9]) for at in range(0, len(numbers), 9)]
         frames = [
@@ -60,16 +63,16 @@ class Overlay:
         return cls(sequence, due, frames[-1], tuple(frames[:-1]))
 
 
-def _head(data: bytes) -> int:
-    return (_ONE if data[0] == Overlay.TYPE else _SEVERAL).size
+def _header_size(data: bytes) -> int:
+    return (_SINGLE_PERFORMER_HEADER if data[0] == Overlay.TYPE else _MULTI_PERFORMER_HEADER).size
 
 
-def _limbs(data: bytes) -> list[int]:
+def _limb_numbers(data: bytes) -> list[int]:
     mask = data[1] & 15 if data[0] == Overlay.TYPE else data[12] | data[13] << 8
-    return [limb for limb in range(MOST_LIMBS) if mask >> limb & 1]
+    return [limb for limb in range(MAX_LIMBS) if mask >> limb & 1]
 
 
-def newest(overlay: bytes) -> bytes:
+def drop_earlier_frames(message: bytes) -> bytes:
     """An Overlay's message with its last frame alone, for a line that does not carry all."""
-    begin, limbs = _head(overlay), _limbs(overlay)
-    return bytes((overlay[0], overlay[1] & 15)) + overlay[2:begin] + overlay[len(overlay) - 18 * len(limbs) :]
+    begin, limbs = _header_size(message), _limb_numbers(message)
+    return bytes((message[0], message[1] & 15)) + message[2:begin] + message[len(message) - 18 * len(limbs) :]

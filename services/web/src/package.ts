@@ -1,23 +1,21 @@
 /** What the package `bunraku` gives: the element, what draws, what comes over the line, and what reads it. */
-export { BunrakuStage, type BunrakuStageEvents, type ThemeWish } from "./element/stage-element";
-export { readSource, type Source } from "./element/source";
 
-export { Access, tabToken, type Role } from "./client/access";
+export { Access, type Role, tabToken } from "./client/access";
 export { ProblemError } from "./client/problem";
 export { Puppeteer, type PuppeteerOptions } from "./client/puppeteer";
-export { Viewer, type LineFigures, type Presence, type Timeline, type ViewerOptions } from "./client/viewer";
-
-export type { LightState } from "./playout/scenes";
-export { Stage } from "./stage/stage";
-export { openGraphics, type Graphics } from "./stage/graphics";
-export type { Framing } from "./stage/camera";
-export type { Theme } from "./stage/look";
-export type { StringState } from "./stage/strings";
-
-export type { PerformerTrack, Place } from "./motion/performer";
-export { JOINTS, LIMBS, restPose, type Figure, type Pose } from "./motion/skeleton";
-export { decodeBlock, MotionBlock } from "./codec/decode";
+export { type Presence, type Timeline, Viewer, type ViewerOptions, type ViewerStatistics } from "./client/viewer";
 export { DamagedBlock } from "./codec/errors";
-export { MotionTrack } from "./codec/track";
+export { decodeMotionBlock as decodeBlock, MotionBlock } from "./codec/motion-decoder";
+export { MotionTrack } from "./codec/motion-track";
+export { parseStageAddress as readSource, type StageAddress as Source } from "./element/stage-address";
+export { BunrakuStage, type BunrakuStageEvents, type ThemePreference as ThemeWish } from "./element/stage-element";
+export type { Placement as Place, StagedPerformer as PerformerTrack } from "./motion/placement";
+export { type Figure, JOINTS, LIMBS, type Pose, restPose } from "./motion/skeleton";
+export type { LightState } from "./playout/light-state";
+export type { Framing } from "./stage/camera/audience-camera";
+export { type Graphics, openGraphics } from "./stage/rendering/graphics";
+export type { Theme } from "./stage/scenery/look";
+export { Stage } from "./stage/stage";
+export type { StringState } from "./stage/strings/strings";
 export { pack, unpack } from "./wire/codec";
-export { SUBPROTOCOL, type ClientMessage, type Message } from "./wire/messages";
+export { type ClientMessage, type Message, SUBPROTOCOL } from "./wire/messages";

@@ -71,10 +71,16 @@ function run(command: string, options: string[], cwd: string): string {
 beforeAll(() => {
   folder = mkdtempSync(join(tmpdir(), "bunraku-package-"));
   run("npm", ["run", "--silent", "build:package"], WEB);
-  const [{ filename }] = JSON.parse(run("npm", ["pack", "--silent", "--json", "--pack-destination", folder], join(WEB, "dist"))) as { filename: string }[];
+  const [{ filename }] = JSON.parse(
+    run("npm", ["pack", "--silent", "--json", "--pack-destination", folder], join(WEB, "dist")),
+  ) as { filename: string }[];
   writeFileSync(join(folder, "package.json"), '{ "private": true, "type": "module" }');
   // three.js is the installer's to choose; here it is that of this project, as there is no line to fetch one by
-  run("npm", ["install", `./${filename}`, "--offline", "--legacy-peer-deps", "--no-audit", "--no-fund", "--silent"], folder);
+  run(
+    "npm",
+    ["install", `./${filename}`, "--offline", "--legacy-peer-deps", "--no-audit", "--no-fund", "--silent"],
+    folder,
+  );
   symlinkSync(join(WEB, "node_modules/three"), join(folder, "node_modules/three"));
   mkdirSync(join(folder, "node_modules/@types"));
   symlinkSync(join(WEB, "node_modules/@types/three"), join(folder, "node_modules/@types/three"));
@@ -83,17 +89,38 @@ beforeAll(() => {
 
 afterAll(() => rmSync(folder, { recursive: true, force: true }));
 
-test.each([["bundler", "ESNext"], ["nodenext", "NodeNext"]])("a program that uses it is checked against its types, by the resolution %s", (resolution, module) => {
-  const options = { target: "ES2023", lib: ["ES2023", "DOM", "DOM.Iterable"], module, moduleResolution: resolution, strict: true, noEmit: true, skipLibCheck: true, types: [] };
-  writeFileSync(join(folder, "tsconfig.json"), JSON.stringify({ compilerOptions: options, files: ["program.ts"] }));
-  expect(run(process.execPath, [COMPILER, "-p", "."], folder)).toBe("");
-}, 60_000);
+test.each([
+  ["bundler", "ESNext"],
+  ["nodenext", "NodeNext"],
+])(
+  "a program that uses it is checked against its types, by the resolution %s",
+  (resolution, module) => {
+    const options = {
+      target: "ES2023",
+      lib: ["ES2023", "DOM", "DOM.Iterable"],
+      module,
+      moduleResolution: resolution,
+      strict: true,
+      noEmit: true,
+      skipLibCheck: true,
+      types: [],
+    };
+    writeFileSync(join(folder, "tsconfig.json"), JSON.stringify({ compilerOptions: options, files: ["program.ts"] }));
+    expect(run(process.execPath, [COMPILER, "-p", "."], folder)).toBe("");
+  },
+  60_000,
+);
 
 test("it can be loaded where there is no page, and reads what comes over the line", () => {
   const program = `
     const { JOINTS, pack, unpack, BunrakuStage, MotionTrack } = await import("bunraku");
     console.log(JSON.stringify([JOINTS.length, unpack(pack({ name: "Claim", limb: 3 })), typeof BunrakuStage, typeof MotionTrack.fromDescription]));`;
-  expect(JSON.parse(run(process.execPath, ["--input-type=module", "-e", program], folder))).toEqual([18, { name: "Claim", limb: 3 }, "function", "function"]);
+  expect(JSON.parse(run(process.execPath, ["--input-type=module", "-e", program], folder))).toEqual([
+    18,
+    { name: "Claim", limb: 3 },
+    "function",
+    "function",
+  ]);
 });
 
 test("it says what it is, and holds nothing but what is built", () => {
@@ -105,7 +132,14 @@ test("it says what it is, and holds nothing but what is built", () => {
   expect(readFileSync(join(installed, "LICENSES.md"), "utf8")).toContain("@msgpack/msgpack");
   const files = run("npm", ["pack", "--dry-run", "--json", "--silent"], installed);
   const [{ files: packed, size }] = JSON.parse(files) as { files: { path: string }[]; size: number }[];
-  expect(packed.map(({ path }) => path).filter((path) => !/^(package\.json|(README|LICENSES)\.md|bunraku(-stage)?\.js|parts\/.+\.js|types\/.+\.d\.ts)$/.test(path))).toEqual([]);
+  expect(
+    packed
+      .map(({ path }) => path)
+      .filter(
+        (path) =>
+          !/^(package\.json|(README|LICENSES)\.md|bunraku(-stage)?\.js|parts\/.+\.js|types\/.+\.d\.ts)$/.test(path),
+      ),
+  ).toEqual([]);
   // a quarter of it is the decoder for browsers that have none, which no other fetches
   expect(size).toBeLessThan(300_000);
 });

@@ -18,7 +18,9 @@ class Place {
 export { Place };`;
 
 function unused(...programs: string[]): string[] {
-  return [...unusedMembers([{ code: LIBRARY, cuttable: true }, ...programs.map((code) => ({ code, cuttable: false }))])].sort();
+  return [
+    ...unusedMembers([{ code: LIBRARY, cuttable: true }, ...programs.map((code) => ({ code, cuttable: false }))]),
+  ].sort();
 }
 
 test("a member stays while anything that stays says its name", () => {
@@ -35,12 +37,28 @@ test("words of texts are names too", () => {
 });
 
 test("members of classes that may not be cut stay, and keep what they say", () => {
-  expect(unused("class Own { never() { return this.place.deep(); } }")).toEqual(["again", "first", "made", "reset", "round", "told", "width"]);
+  expect(unused("class Own { never() { return this.place.deep(); } }")).toEqual([
+    "again",
+    "first",
+    "made",
+    "reset",
+    "round",
+    "told",
+    "width",
+  ]);
 });
 
 test("what is left of a module runs", async () => {
-  const rest = withoutMembers(LIBRARY, unusedMembers([{ code: LIBRARY, cuttable: true }, { code: "place.reset()", cuttable: false }]));
-  const { Place } = (await import(/* @vite-ignore */ `data:text/javascript,${encodeURIComponent(rest)}`)) as { Place: new () => Record<string, unknown> & { reset(): void } };
+  const rest = withoutMembers(
+    LIBRARY,
+    unusedMembers([
+      { code: LIBRARY, cuttable: true },
+      { code: "place.reset()", cuttable: false },
+    ]),
+  );
+  const { Place } = (await import(/* @vite-ignore */ `data:text/javascript,${encodeURIComponent(rest)}`)) as {
+    Place: new () => Record<string, unknown> & { reset(): void };
+  };
   const place = new Place();
   place.reset();
   expect([place["x"], String(place), [...(place as unknown as Iterable<unknown>)]]).toEqual([1, "place", []]);

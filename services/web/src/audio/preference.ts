@@ -1,7 +1,7 @@
 /** Whether the sound is wanted, and how loud; remembered. */
-import { browserStore } from "../storage/store";
+import { browserStorage } from "../storage/web-storage";
 
-const KEY = "bunraku.sound";
+const STORAGE_KEY = "bunraku.sound";
 
 export interface SoundPreference {
   readonly on: boolean;
@@ -10,21 +10,26 @@ export interface SoundPreference {
 }
 
 /** Where it is kept whether sound is wanted. */
-export interface SoundMemory {
+export interface SoundPreferenceStore {
   load(): SoundPreference;
   save(preference: SoundPreference): void;
 }
 
-const DEFAULT: SoundPreference = { on: true, volume: 0.8 };
+const DEFAULT_PREFERENCE: SoundPreference = { on: true, volume: 0.8 };
 
 /** The page's: kept until the person clears it. */
-export const browserSound: SoundMemory = {
+export const browserSoundPreference: SoundPreferenceStore = {
   load() {
-    const { on, volume } = (browserStore.getJson(KEY) ?? {}) as Partial<Record<keyof SoundPreference, unknown>>;
+    const { on, volume } = (browserStorage.getJson(STORAGE_KEY) ?? {}) as Partial<
+      Record<keyof SoundPreference, unknown>
+    >;
     const good = typeof volume === "number" && volume >= 0 && volume <= 1;
-    return { on: typeof on === "boolean" ? on : DEFAULT.on, volume: good ? volume : DEFAULT.volume };
+    return {
+      on: typeof on === "boolean" ? on : DEFAULT_PREFERENCE.on,
+      volume: good ? volume : DEFAULT_PREFERENCE.volume,
+    };
   },
   save(preference) {
-    browserStore.putJson(KEY, preference);
+    browserStorage.putJson(STORAGE_KEY, preference);
   },
 };

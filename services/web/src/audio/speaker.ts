@@ -1,12 +1,12 @@
 /** One audio device: how loud, and whether it may be heard yet. */
 
-export const FRAMES_A_SECOND = 48_000;
+export const FRAMES_PER_SECOND = 48_000;
 
 /** Time constant of changes of loudness, seconds. */
-const EASE = 0.015;
+const VOLUME_TIME_CONSTANT_S = 0.015;
 
 export class Speaker {
-  readonly context = new AudioContext({ sampleRate: FRAMES_A_SECOND, latencyHint: "interactive" });
+  readonly context = new AudioContext({ sampleRate: FRAMES_PER_SECOND, latencyHint: "interactive" });
   readonly output: GainNode = this.context.createGain();
 
   /** `changed` is told when it begins or ends to be heard. */
@@ -36,6 +36,6 @@ export class Speaker {
 
   /** How loud, 0 to 1 as it is heard; loudness goes with about the square root of the amplitude. */
   set volume(volume: number) {
-    this.output.gain.setTargetAtTime(volume ** 2, this.context.currentTime, EASE);
+    this.output.gain.setTargetAtTime(volume ** 2, this.context.currentTime, VOLUME_TIME_CONSTANT_S);
   }
 }

@@ -1,17 +1,17 @@
 /** Opus by libopus in WebAssembly, for browsers without a decoder of their own and for pages that are not served securely. */
 
 import { OpusDecoder } from "opus-decoder";
-import { PACKET } from "../codec/audio";
-import type { MakeDecoder } from "./packet-decoder";
+import { PACKET_SAMPLES } from "../codec/audio";
+import type { DecoderFactory } from "./packet-decoder";
 
-export function wasmDecoder(channels: number): MakeDecoder {
+export function createWasmDecoder(channels: number): DecoderFactory {
   return (emit) => {
     const decoder = new OpusDecoder({ channels, preSkip: 0 });
     let ended = false;
     let waiting: [number: number, packet: Uint8Array][] | null = [];
     const decode = (number: number, packet: Uint8Array) => {
       const { channelData, samplesDecoded } = decoder.decodeFrame(packet);
-      emit(number, samplesDecoded === PACKET ? channelData.map((plane) => plane.slice()) : null);
+      emit(number, samplesDecoded === PACKET_SAMPLES ? channelData.map((plane) => plane.slice()) : null);
     };
     void decoder.ready.then(() => {
       for (const [number, packet] of waiting ?? []) decode(number, packet);
@@ -23,7 +23,7 @@ export function wasmDecoder(channels: number): MakeDecoder {
         if (waiting) waiting.push([number, packet]);
         else decode(number, packet);
       },
-      end() {
+      close() {
         ended = true;
         if (!waiting) decoder.free();
       },

@@ -1,13 +1,13 @@
 /** Opus by the browser's own decoder (W3C WebCodecs, and its registration of Opus). */
 
 import { SAMPLE_RATE } from "../codec/audio";
-import type { MakeDecoder } from "./packet-decoder";
+import type { DecoderFactory } from "./packet-decoder";
 
 /** Microseconds of a packet. */
 const PACKET_US = 60_000;
 
 /** What makes decoders for `channels` (1 or 2), null where this browser cannot. */
-export async function webCodecsDecoder(channels: number): Promise<MakeDecoder | null> {
+export async function findWebCodecsDecoder(channels: number): Promise<DecoderFactory | null> {
   if (typeof AudioDecoder === "undefined") return null;
   // without the head of an Ogg file, so nothing is cut off at the beginning
   const config: AudioDecoderConfig = { codec: "opus", sampleRate: SAMPLE_RATE, numberOfChannels: channels };
@@ -43,10 +43,16 @@ export async function webCodecsDecoder(channels: number): Promise<MakeDecoder | 
         }
         waiting.add(number);
         // Opus has no packets that need another: where decoding starts is for the caller to say
-        decoder.decode(new EncodedAudioChunk({ type: "key", timestamp: number * PACKET_US, duration: PACKET_US, data: packet }));
+        decoder.decode(
+          new EncodedAudioChunk({ type: "key", timestamp: number * PACKET_US, duration: PACKET_US, data: packet }),
+        );
       },
-      end() {
-        if (decoder.state !== "closed") void decoder.flush().then(() => decoder.close(), () => undefined);
+      close() {
+        if (decoder.state !== "closed")
+          void decoder.flush().then(
+            () => decoder.close(),
+            () => undefined,
+          );
       },
     };
   };

@@ -1,32 +1,40 @@
 /** How an avatar's materials take the stage's light. */
 import type { MToonMaterial } from "@pixiv/three-vrm";
-import { Mesh, MeshLambertMaterial, type MeshPhysicalMaterial, MeshStandardMaterial, type Material, type Object3D } from "three";
+import {
+  type Material,
+  Mesh,
+  MeshLambertMaterial,
+  type MeshPhysicalMaterial,
+  MeshStandardMaterial,
+  type Object3D,
+} from "three";
 
 /** Of a cartoon's colours, in the light and in the shade. */
-const LIT = 0.55;
-const SHADED = 0.15;
+const LIT_COLOUR_SCALE = 0.55;
+const SHADE_COLOUR_SCALE = 0.15;
 
 /** Cartoons (MToon) take all of a light wherever it comes from, from behind as shade: before the stage's four they would be washed out. */
-export function dimCartoons(materials: Iterable<Material>): void {
+export function dimMToonMaterials(materials: Iterable<Material>): void {
   for (const material of materials) {
     if (!("isMToonMaterial" in material)) continue;
     const { color, shadeColorFactor } = material as MToonMaterial;
-    color.multiplyScalar(LIT);
-    shadeColorFactor.multiplyScalar(SHADED);
+    color.multiplyScalar(LIT_COLOUR_SCALE);
+    shadeColorFactor.multiplyScalar(SHADE_COLOUR_SCALE);
   }
 }
 
 /** What is left to see of clear glass, as an opacity. */
-const GLASS = 0.25;
+const GLASS_OPACITY = 0.25;
 
 /** Materials as the stage can draw them: without what its shaders were freed of (`lean-three.ts`), with which they would be drawn wrongly or not at all. Glass is thin. */
-export function simplify(materials: Iterable<Material>): void {
+export function simplifyMaterials(materials: Iterable<Material>): void {
   for (const material of materials) {
-    if (material instanceof MeshStandardMaterial) material.bumpMap = material.lightMap = material.alphaMap = material.displacementMap = null;
+    if (material instanceof MeshStandardMaterial)
+      material.bumpMap = material.lightMap = material.alphaMap = material.displacementMap = null;
     if (!("isMeshPhysicalMaterial" in material)) continue;
     const physical = material as MeshPhysicalMaterial;
     if (physical.transmission > 0) {
-      physical.opacity *= 1 - (1 - GLASS) * physical.transmission;
+      physical.opacity *= 1 - (1 - GLASS_OPACITY) * physical.transmission;
       physical.transparent = true;
     }
     physical.transmission = physical.dispersion = physical.iridescence = 0;
@@ -34,37 +42,66 @@ export function simplify(materials: Iterable<Material>): void {
 }
 
 /** Plain materials for machines that draw in software: colours and light, without gloss, bumps and reflections. */
-export class PlainMaterials {
-  readonly #full = new Map<Mesh, Material | Material[]>();
-  readonly #plain = new Map<Material, Material>();
+export class SimpleMaterials {
+  readonly #originals = new Map<Mesh, Material | Material[]>();
+  readonly #simple = new Map<Material, Material>();
 
   constructor(model: Object3D) {
     model.traverse((object) => {
-      if (object instanceof Mesh) this.#full.set(object, object.material as Material | Material[]);
+      if (object instanceof Mesh) this.#originals.set(object, object.material as Material | Material[]);
     });
   }
 
   /** Puts the model's own materials on it, or plain ones in the place of those that shade physically. */
-  show(plain: boolean): void {
-    const wanted = (material: Material) => (plain ? this.#plainOf(material) : material);
-    for (const [mesh, material] of this.#full) mesh.material = Array.isArray(material) ? material.map(wanted) : wanted(material);
+  useSimple(plain: boolean): void {
+    const wanted = (material: Material) => (plain ? this.#simpleOf(material) : material);
+    for (const [mesh, material] of this.#originals)
+      mesh.material = Array.isArray(material) ? material.map(wanted) : wanted(material);
   }
 
   dispose(): void {
-    this.show(false);
-    for (const [material, plain] of this.#plain) if (plain !== material) plain.dispose();
-    this.#plain.clear();
+    this.useSimple(false);
+    for (const [material, plain] of this.#simple) if (plain !== material) plain.dispose();
+    this.#simple.clear();
   }
 
-  #plainOf(material: Material): Material {
-    let plain = this.#plain.get(material);
+  #simpleOf(material: Material): Material {
+    let plain = this.#simple.get(material);
     if (!plain) {
       plain = material;
       if (material instanceof MeshStandardMaterial) {
-        const { name, color, map, alphaMap, emissive, emissiveMap, emissiveIntensity, vertexColors, side, transparent, opacity, alphaTest, depthWrite } = material;
-        plain = new MeshLambertMaterial({ name, color, map, alphaMap, emissive, emissiveMap, emissiveIntensity, vertexColors, side, transparent, opacity, alphaTest, depthWrite });
+        const {
+          name,
+          color,
+          map,
+          alphaMap,
+          emissive,
+          emissiveMap,
+          emissiveIntensity,
+          vertexColors,
+          side,
+          transparent,
+          opacity,
+          alphaTest,
+          depthWrite,
+        } = material;
+        plain = new MeshLambertMaterial({
+          name,
+          color,
+          map,
+          alphaMap,
+          emissive,
+          emissiveMap,
+          emissiveIntensity,
+          vertexColors,
+          side,
+          transparent,
+          opacity,
+          alphaTest,
+          depthWrite,
+        });
       }
-      this.#plain.set(material, plain);
+      this.#simple.set(material, plain);
     }
     return plain;
   }

@@ -3,45 +3,49 @@
  * The token comes in the URL's fragment, which no server sees; that of the page's own address is kept for this tab alone.
  */
 
-import { tabStore } from "../storage/store";
-import { pageSpeech, type Speech } from "../words/say";
+import { pageTranslator, type Translator } from "../i18n/translator";
+import { tabStorage } from "../storage/web-storage";
 import { ProblemError } from "./problem";
 
 /** Roles, each of which may do what those before it may. */
 export const ROLES = ["view", "control", "ingest", "admin"] as const;
 export type Role = (typeof ROLES)[number];
 
-const KEY = "bunraku.token";
+const TOKEN_STORAGE_KEY = "bunraku.token";
 /** A ticket that has not come by then is asked for again, milliseconds. */
-const ANSWER = 8_000;
+const TICKET_TIMEOUT_MS = 8_000;
 
-interface Claims {
+interface TokenClaims {
   role: Role;
   session: string | null;
   motion: string | null;
 }
 
-const EVERYTHING: Claims = { role: "admin", session: null, motion: null };
+const FULL_ACCESS: TokenClaims = { role: "admin", session: null, motion: null };
 
 /** What may be done at one server, and how that is said there. */
 export class Access {
   #token: string | null = null;
-  #claims = EVERYTHING;
-  #denied: ((problem: ProblemError) => void) | null = null;
+  #claims = FULL_ACCESS;
+  #onUnauthorized: ((problem: ProblemError) => void) | null = null;
 
   /** At `server`, an origin such as `https://stage.example`, or "" for that of this page; with a token, or without. What the server says is told in `speech`. */
-  constructor(readonly server = "", token: string | null = null, readonly speech: Speech = pageSpeech) {
-    this.hold(token);
+  constructor(
+    readonly server = "",
+    token: string | null = null,
+    readonly translator: Translator = pageTranslator,
+  ) {
+    this.setToken(token);
   }
 
   /** Comes in with a token, or without. */
-  hold(held: string | null): void {
-    this.#token = held;
-    this.#claims = held === null ? EVERYTHING : read(held);
+  setToken(token: string | null): void {
+    this.#token = token;
+    this.#claims = token === null ? FULL_ACCESS : parseClaims(token);
   }
 
   /** Whether there is a token: the server asks for it. */
-  get guarded(): boolean {
+  get hasToken(): boolean {
     return this.#token !== null;
   }
 
@@ -51,12 +55,12 @@ export class Access {
   }
 
   /** Whether this is for one session or motion. */
-  get bound(): boolean {
+  get isRestricted(): boolean {
     return this.#claims.session !== null || this.#claims.motion !== null;
   }
 
   /** Whether what needs a role may be done: only what is offered goes by it, the server decides. */
-  may(role: Role): boolean {
+  allows(role: Role): boolean {
     return ROLES.indexOf(this.#claims.role) >= ROLES.indexOf(role);
   }
 
@@ -75,31 +79,34 @@ export class Access {
     try {
       answer = await fetch(url, { ...options, headers: { ...this.authorization(), ...options.headers } });
     } catch {
-      throw ProblemError.unreachable(this.speech);
+      throw ProblemError.unreachable(this.translator);
     }
-    if (!answer.ok) throw this.refusedWith(ProblemError.from(answer.status, await answer.text(), this.speech));
+    if (!answer.ok) throw this.reportProblem(ProblemError.from(answer.status, await answer.text(), this.translator));
     return answer;
   }
 
   /** Calls `told` when the server does not let in what is held here, any more. */
-  whenDenied(told: (problem: ProblemError) => void): void {
-    this.#denied = told;
+  onUnauthorized(listener: (problem: ProblemError) => void): void {
+    this.#onUnauthorized = listener;
   }
 
   /** What the server answered in place of what was asked, told to whoever wants to know. */
-  refusedWith(problem: ProblemError): ProblemError {
-    if (problem.status === 401) this.#denied?.(problem);
+  reportProblem(problem: ProblemError): ProblemError {
+    if (problem.status === 401) this.#onUnauthorized?.(problem);
     return problem;
   }
 
   /** The address of a socket, with a ticket where there is a token: it is good for one connection. Rejects with ProblemError. */
-  ticketed(url: string): string | Promise<string> {
-    return this.#token === null ? url : this.#withTicket(url);
+  authorizeSocketUrl(url: string): string | Promise<string> {
+    return this.#token === null ? url : this.#fetchTicket(url);
   }
 
-  async #withTicket(url: string): Promise<string> {
+  async #fetchTicket(url: string): Promise<string> {
     const address = new URL(url);
-    const answer = await this.request(`${address.origin.replace(/^ws/, "http")}/v1/tickets`, { method: "POST", signal: AbortSignal.timeout(ANSWER) });
+    const answer = await this.request(`${address.origin.replace(/^ws/, "http")}/v1/tickets`, {
+      method: "POST",
+      signal: AbortSignal.timeout(TICKET_TIMEOUT_MS),
+    });
     address.searchParams.set("ticket", ((await answer.json()) as { ticket: string }).ticket);
     return address.href;
   }
@@ -109,41 +116,41 @@ export class Access {
 export const pageAccess = new Access();
 
 /** Takes the token out of the address, or that of this tab from before. Returns whether one came with the address. */
-export function comeIn(): boolean {
-  const found = tokenIn(location.hash);
+export function consumeUrlToken(): boolean {
+  const found = parseUrlToken(location.hash);
   if (found !== null) {
     // at once, so that it is not seen, copied or kept in the history
     history.replaceState(history.state, "", location.pathname + location.search);
-    tabStore.put(KEY, found);
+    tabStorage.put(TOKEN_STORAGE_KEY, found);
   }
   hold(found ?? tabToken());
   return found !== null;
 }
 
 /** The token in the fragment of a link, or null. */
-export function tokenIn(hash: string): string | null {
+export function parseUrlToken(hash: string): string | null {
   return /^#(?:token|share)=([\w.-]+)$/.exec(hash)?.[1] ?? null;
 }
 
 /** The token that this tab came in with to the server of its page, or null. */
 export function tabToken(): string | null {
-  return tabStore.get(KEY);
+  return tabStorage.get(TOKEN_STORAGE_KEY);
 }
 
 /** As `Access` has them, for this page. */
-export const hold = (held: string | null): void => pageAccess.hold(held);
-export const guarded = (): boolean => pageAccess.guarded;
-export const may = (role: Role): boolean => pageAccess.may(role);
-export const ownRole = (): Role => pageAccess.role;
-export const bound = (): boolean => pageAccess.bound;
+export const hold = (held: string | null): void => pageAccess.setToken(held);
+export const guarded = (): boolean => pageAccess.hasToken;
+export const may = (role: Role): boolean => pageAccess.allows(role);
+export const currentRole = (): Role => pageAccess.role;
+export const bound = (): boolean => pageAccess.isRestricted;
 export const authorization = (): Record<string, string> => pageAccess.authorization();
 export const request: Access["request"] = (url, options) => pageAccess.request(url, options);
-export const whenDenied: Access["whenDenied"] = (told) => pageAccess.whenDenied(told);
-export const refusedWith: Access["refusedWith"] = (problem) => pageAccess.refusedWith(problem);
-export const ticketed: Access["ticketed"] = (url) => pageAccess.ticketed(url);
+export const whenDenied: Access["onUnauthorized"] = (told) => pageAccess.onUnauthorized(told);
+export const refusedWith: Access["reportProblem"] = (problem) => pageAccess.reportProblem(problem);
+export const ticketed: Access["authorizeSocketUrl"] = (url) => pageAccess.authorizeSocketUrl(url);
 
 /** What a token says of itself; one that cannot be read lets see, and the server says what is wrong with it. */
-function read(held: string): Claims {
+function parseClaims(held: string): TokenClaims {
   try {
     const body = held.split(".")[1].replace(/-/g, "+").replace(/_/g, "/");
     const said = JSON.parse(atob(body)) as Record<string, unknown>;

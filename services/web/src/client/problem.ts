@@ -1,4 +1,4 @@
-import { pageSpeech } from "../words/say";
+import { pageTranslator } from "../i18n/translator";
 
 /** What went wrong over HTTP, in words for the person who gets it (RFC 9457). `status` is 0 where no server answered. */
 export class ProblemError extends Error {
@@ -11,14 +11,14 @@ export class ProblemError extends Error {
     readonly hint: string | null = null,
     readonly line: number | null = null,
     readonly field: string | null = null,
-    { say } = pageSpeech,
+    { translate } = pageTranslator,
   ) {
-    super(say("{title}: {detail}", { title, detail }));
+    super(translate("{title}: {detail}", { title, detail }));
   }
 
   /** The problem in the body of an answer of `status`, of whatever form, in words of `speech`. */
-  static from(status: number, body: string, speech = pageSpeech): ProblemError {
-    const { say, heard } = speech;
+  static from(status: number, body: string, speech = pageTranslator): ProblemError {
+    const { translate, translateServerText } = speech;
     let said: Record<string, unknown> = {};
     try {
       const parsed: unknown = JSON.parse(body);
@@ -26,15 +26,28 @@ export class ProblemError extends Error {
     } catch {
       // a proxy's page, or nothing: the status has to do
     }
-    const text = (value: unknown) => (typeof value === "string" ? heard(value) : null);
+    const text = (value: unknown) => (typeof value === "string" ? translateServerText(value) : null);
     return new ProblemError(
-      status, text(said.title) ?? say("The server refused"), text(said.detail) ?? say("it answered {status}", { status }), text(said.hint),
-      typeof said.line === "number" ? said.line : null, typeof said.field === "string" ? said.field : null, speech,
+      status,
+      text(said.title) ?? translate("The server refused"),
+      text(said.detail) ?? translate("it answered {status}", { status }),
+      text(said.hint),
+      typeof said.line === "number" ? said.line : null,
+      typeof said.field === "string" ? said.field : null,
+      speech,
     );
   }
 
-  static unreachable(speech = pageSpeech): ProblemError {
-    const { say } = speech;
-    return new ProblemError(0, say("No answer"), say("the server cannot be reached"), say("look at the line, then try again"), null, null, speech);
+  static unreachable(speech = pageTranslator): ProblemError {
+    const { translate } = speech;
+    return new ProblemError(
+      0,
+      translate("No answer"),
+      translate("the server cannot be reached"),
+      translate("look at the line, then try again"),
+      null,
+      null,
+      speech,
+    );
   }
 }

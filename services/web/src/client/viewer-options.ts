@@ -1,5 +1,5 @@
 import type { Access } from "./access";
-import type { SolverOf } from "./solver";
+import type { SolverFactory } from "./solver";
 
 /** What a viewer watches, and with what. */
 export interface ViewerOptions {
@@ -11,7 +11,7 @@ export interface ViewerOptions {
    * Makes what a puppeteer's own limbs are solved with: the marionette, if nothing else is said. With null, and until it is
    * there, they are seen as everyone sees them.
    */
-  solver?: SolverOf | null;
+  solver?: SolverFactory | null;
   /** How it comes in at the server: this page's own, if nothing else is said. */
   access?: Access;
 }

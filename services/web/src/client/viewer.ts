@@ -2,39 +2,37 @@
 
 import { DamagedBlock } from "../codec/errors";
 import type { SceneTrack } from "../codec/scene";
-import type { Rate } from "../codec/timing";
-import type { PerformerTrack } from "../motion/performer";
+import type { BitrateLevel } from "../codec/timing";
+import type { Translator } from "../i18n/translator";
+import type { StagedPerformer } from "../motion/placement";
 import type { Figure, Pose } from "../motion/skeleton";
-import type { BlockStore } from "../playout/blocks";
+import type { AudioBlockStore } from "../playout/audio-store";
+import type { MotionBlockStore } from "../playout/block-store";
 import { ReferenceClock } from "../playout/clock";
 import { PlayoutDelay } from "../playout/delay";
-import { Following, type Lead } from "../playout/following";
-import { type LightState, lightStates } from "../playout/scenes";
-import type { AudioStore } from "../playout/sounds";
-import { positionAt, Timelines } from "../playout/timeline";
-import { Tracks } from "../playout/tracks";
-import {
-  type Choice, type Data, type Description, type Edit, type Message, type Presence, type Report, type TimelineState,
-} from "../wire/messages";
-import { type Overlay, OVERLAY_FRAME } from "../wire/overlay";
-import type { Speech } from "../words/say";
+import { type LightState, lightStates } from "../playout/light-state";
+import { type LeaderTime, PresentationClock } from "../playout/presentation-clock";
+import { positionAt, TimelineHistory } from "../playout/timeline";
+import { TrackSet } from "../playout/track-set";
+import type { Choice, Data, Description, Edit, Message, Presence, Report, TimelineState } from "../wire/messages";
+import { OVERLAY_FRAME_INTERVAL_US, type Overlay } from "../wire/overlay";
 import { pageAccess } from "./access";
-import { Asking } from "./asking";
-import { Connection } from "./connection";
-import type { LineFigures } from "./line-figures";
-import { Meter } from "./meter";
+import { BitrateMeter } from "./bitrate-meter";
+import { PerformerViewSet } from "./performer-view-set";
 import type { Puppeteer } from "./puppeteer";
-import { marionetteBy, OwnSolver } from "./own-solver";
-import { Performances } from "./performances";
-import { reasonOf } from "./reasons";
-import { returningUrl } from "./returning";
+import { ReconnectingConnection } from "./reconnecting-connection";
+import { ViewerReporter } from "./reporter";
+import { buildResumeUrl } from "./resume-url";
+import { marionetteSolverFactory, SolverLoader } from "./solver-loader";
 import type { ViewerOptions } from "./viewer-options";
+import type { ViewerStatistics } from "./viewer-statistics";
+import { describeStatus } from "./viewer-status";
 
 export type Timeline = TimelineState;
-export type { LineFigures, Presence, ViewerOptions };
+export type { Presence, ViewerOptions, ViewerStatistics };
 
 /** Weight of the newest in running means. */
-const NEWEST = 1 / 8;
+const NEWEST_WEIGHT = 1 / 8;
 
 const NO_BLOCKS = new Int8Array(0);
 
@@ -43,64 +41,68 @@ export class Viewer extends EventTarget {
   /** The reference clock, in microseconds of local time. */
   readonly clock = new ReferenceClock();
   /** Messages and blocks that could not be read. */
-  damaged = 0;
+  damagedCount = 0;
   /** Whether the line is closed for good. */
-  ended = false;
+  isClosed = false;
   presence: Presence | null = null;
   motion: string | null = null;
   puppeteer: Puppeteer | null = null;
   /** Which timelines hold, and will. */
-  readonly timelines = new Timelines();
+  readonly timelineHistory = new TimelineHistory();
   /** What the stage follows while it is there: the stage time of the sound that is heard at local `nowMs`. */
-  lead: ((nowMs: number) => Lead | null) | null = null;
+  leader: ((nowMs: number) => LeaderTime | null) | null = null;
 
   private readonly url: URL;
-  private readonly speech: Speech;
+  private readonly translator: Translator;
   private readonly now: () => number;
-  private readonly performances: Performances;
-  private readonly connection: Connection;
+  private readonly performerViews: PerformerViewSet;
+  private readonly connection: ReconnectingConnection;
   private readonly started: number;
   private readonly delay = new PlayoutDelay();
-  private readonly following = new Following();
-  private readonly meter = new Meter();
-  private readonly asking: Asking;
-  private tracks: Tracks | null = null;
-  private latency: number | null = null;
+  private readonly presentationClock = new PresentationClock();
+  private readonly bitrateMeter = new BitrateMeter();
+  private readonly reporter: ViewerReporter;
+  private tracks: TrackSet | null = null;
+  private latencyMs: number | null = null;
   private decodeMs = 0;
   private frameMs = 0;
   private choice: Choice | null = null;
   private closedReason: string | null = null;
   /** The private timeline to go on with when the line comes back. */
-  private resume: TimelineState | null = null;
+  private resumeTimeline: TimelineState | null = null;
 
   constructor(options: ViewerOptions) {
     super();
     this.url = new URL(options.url);
     this.now = options.now ?? (() => performance.now());
-    const { access = pageAccess, solver = marionetteBy(access) } = options;
-    this.speech = access.speech;
+    const { access = pageAccess, solver = marionetteSolverFactory(access) } = options;
+    this.translator = access.translator;
     const origin = this.url.origin.replace(/^ws/, "http");
-    this.performances = new Performances((figure) => new OwnSolver(figure, origin, solver));
+    this.performerViews = new PerformerViewSet((figure) => new SolverLoader(figure, origin, solver));
     this.started = this.now();
-    this.connection = new Connection({
-      url: () => access.ticketed(this.address()),
-      answered: true,
-      speech: this.speech,
-      onOpen: (replaced) => this.opened(replaced),
-      onMessage: (message, bytes) => this.receive(message, bytes),
-      onMalformed: () => void this.damaged++,
-      onClosed: (reason, final) => this.lost(reason, final),
+    this.connection = new ReconnectingConnection({
+      url: () => access.authorizeSocketUrl(this.makeUrl()),
+      expectsAnswers: true,
+      translator: this.translator,
+      onOpen: (replaced) => this.onOpen(replaced),
+      onMessage: (message, bytes) => this.onMessage(message, bytes),
+      onMalformed: () => void this.damagedCount++,
+      onClosed: (reason, final) => this.onClosed(reason, final),
     });
-    this.asking = new Asking((message) => this.connection.send(message), this.now, () => this.fares());
+    this.reporter = new ViewerReporter(
+      (message) => this.connection.send(message),
+      this.now,
+      () => this.makeReport(),
+    );
   }
 
-  private get store(): BlockStore | null {
-    return this.tracks?.dance ?? null;
+  private get store(): MotionBlockStore | null {
+    return this.tracks?.firstPerformer ?? null;
   }
 
   /** Those who dance, by number, as far as they are known; null one whose track cannot be read. The first is the show's. */
-  get performers(): readonly (PerformerTrack | null)[] {
-    return this.performances.all;
+  get performers(): readonly (StagedPerformer | null)[] {
+    return this.performerViews.all;
   }
 
   /** The first dancer's lengths, null before the first Description. */
@@ -115,7 +117,7 @@ export class Viewer extends EventTarget {
 
   /** The newest timeline. */
   get timeline(): Timeline | null {
-    return this.timelines.newest;
+    return this.timelineHistory.newest;
   }
 
   /** Length of the motion in seconds, 0 before it is known. */
@@ -125,27 +127,27 @@ export class Viewer extends EventTarget {
 
   /** Per block of the first dance: -1 missing, else the best rate held. It is the live array. */
   get blocks(): Int8Array {
-    return this.store?.rates ?? NO_BLOCKS;
+    return this.store?.levels ?? NO_BLOCKS;
   }
 
   /** The blocks of a performer's dance in `motion`, null where another is watched. */
-  held(motion: string, performer = 0): BlockStore | null {
+  blocksOf(motion: string, performer = 0): MotionBlockStore | null {
     return (motion === this.motion && this.tracks?.performers[performer]) || null;
   }
 
   /** What each rate costs and keeps, from the lowest to the highest. */
-  get rates(): readonly Rate[] {
-    return this.store?.track.rates ?? [];
+  get ladder(): readonly BitrateLevel[] {
+    return this.store?.track.ladder ?? [];
   }
 
   /** The reference time at local `nowMs`, microseconds; null before the server has told the time. */
   clockTime(nowMs: number): number | null {
-    return this.clock.ready ? this.clock.at(nowMs * 1000) : null;
+    return this.clock.hasEstimate ? this.clock.at(nowMs * 1000) : null;
   }
 
   /** The reference time that the stage shows at local `nowMs`, microseconds: its own, or while sound is heard the sound's. */
-  shownTime(nowMs: number): number {
-    return this.following.at(this.ownTime(nowMs), this.lead?.(nowMs) ?? null, nowMs * 1000);
+  presentationTime(nowMs: number): number {
+    return this.presentationClock.at(this.ownTime(nowMs), this.leader?.(nowMs) ?? null, nowMs * 1000);
   }
 
   /** What `shownTime` is without sound: the reference time less the play-out delay. */
@@ -154,14 +156,14 @@ export class Viewer extends EventTarget {
   }
 
   /** The sound of the motion, null where it has none. */
-  get sound(): AudioStore | null {
-    return this.tracks?.sound ?? null;
+  get audio(): AudioBlockStore | null {
+    return this.tracks?.audio ?? null;
   }
 
   /** Seconds in the motion at local `nowMs`. */
   positionAt(nowMs: number): number {
-    const clock = this.shownTime(nowMs);
-    const timeline = this.timelines.at(clock);
+    const clock = this.presentationTime(nowMs);
+    const timeline = this.timelineHistory.at(clock);
     return timeline ? positionAt(timeline, clock) / 1e6 : 0;
   }
 
@@ -171,10 +173,10 @@ export class Viewer extends EventTarget {
    * storage is used again by the next call for this performer.
    */
   poseAt(nowMs: number, performer = 0): Pose | null {
-    const clock = this.shownTime(nowMs);
-    const timeline = this.timelines.at(clock);
+    const clock = this.presentationTime(nowMs);
+    const timeline = this.timelineHistory.at(clock);
     if (!timeline || timeline.motion !== this.motion) return null;
-    return this.performances.poseAt(performer, clock, timeline, this.puppeteer, nowMs);
+    return this.performerViews.poseAt(performer, clock, timeline, this.puppeteer, nowMs);
   }
 
   /** Cameras and lights of the motion, in the Description's order. */
@@ -187,15 +189,18 @@ export class Viewer extends EventTarget {
    * are any; where the block needed is missing they stand still. The storage is used again by the next call.
    */
   sceneAt(nowMs: number, scene = 0): Float64Array | null {
-    const clock = this.shownTime(nowMs);
-    const timeline = this.timelines.at(clock);
+    const clock = this.presentationTime(nowMs);
+    const timeline = this.timelineHistory.at(clock);
     if (!timeline || timeline.motion !== this.motion) return null;
     return this.tracks?.scenes[scene]?.sceneAt(positionAt(timeline, clock), timeline.loop, timeline.duration) ?? null;
   }
 
   /** As `sceneAt`, of the show's camera: the first there is. */
   cameraAt(nowMs: number): Float64Array | null {
-    return this.sceneAt(nowMs, this.scenes.findIndex(({ kind }) => kind === "camera"));
+    return this.sceneAt(
+      nowMs,
+      this.scenes.findIndex(({ kind }) => kind === "camera"),
+    );
   }
 
   /** As `sceneAt`, of every light of which anything is known yet. */
@@ -216,32 +221,40 @@ export class Viewer extends EventTarget {
   }
 
   /** How the line fares now. */
-  line(): LineFigures {
-    const { clock, store, performances } = this;
-    const { firstPoseMs, rate } = performances;
+  statistics(): ViewerStatistics {
+    const { clock, store, performerViews: performances } = this;
+    const { firstPoseMs, level: rate } = performances;
     const now = this.now();
-    const timeline = this.timelines.newest;
-    const ahead = store && timeline ? store.ahead(this.positionAt(now) * 1e6, timeline.loop) : 0;
-    const known = Number.isFinite(clock.error);
+    const timeline = this.timelineHistory.newest;
+    const ahead = store && timeline ? store.bufferedUs(this.positionAt(now) * 1e6, timeline.loop) : 0;
+    const known = Number.isFinite(clock.errorBound);
     return {
       rate: rate < 0 ? -1 : (this.choice?.rate ?? rate),
-      kbps: this.meter.kbps(now),
+      kbps: this.bitrateMeter.kbps(now),
       bufferSeconds: ahead / 1e6,
       clockOffsetMs: known ? clock.offset / 1000 - performance.timeOrigin : null,
-      clockErrorMs: known ? clock.error / 1000 : null,
-      latencyMs: this.latency,
+      clockErrorMs: known ? clock.errorBound / 1000 : null,
+      latencyMs: this.latencyMs,
       playoutDelayMs: this.delay.at(now * 1000) / 1000,
       firstPoseMs: firstPoseMs === null ? null : firstPoseMs - this.started,
       gaps: performances.gaps,
-      reason: reasonOf({
-        closed: this.closedReason, damaged: this.damaged, shown: performances.shown, missing: performances.waiting, choice: this.choice, pinned: this.url.searchParams.has("rate"),
-      }, this.speech),
+      reason: describeStatus(
+        {
+          closeReason: this.closedReason,
+          damagedCount: this.damagedCount,
+          hasPose: performances.hasPose,
+          isStalled: performances.isStalled,
+          choice: this.choice,
+          isPinned: this.url.searchParams.has("rate"),
+        },
+        this.translator,
+      ),
     };
   }
 
   /** A frame was drawn and took `frameMs`: the server heeds it when it chooses a rate. */
-  drawn(frameMs: number): void {
-    this.frameMs += NEWEST * (frameMs - this.frameMs);
+  recordFrame(frameMs: number): void {
+    this.frameMs += NEWEST_WEIGHT * (frameMs - this.frameMs);
   }
 
   /** Ends it for good. */
@@ -249,139 +262,141 @@ export class Viewer extends EventTarget {
     this.connection.close();
   }
 
-  private address(): string {
+  private makeUrl(): string {
     const { tracks } = this;
-    const timeline = this.timelines.newest;
+    const timeline = this.timelineHistory.newest;
     if (!tracks || !timeline || timeline.motion !== this.motion) return this.url.href;
-    return returningUrl(this.url, tracks, timeline, this.clock.at(this.now() * 1000), !this.connectsToSession);
+    return buildResumeUrl(this.url, tracks, timeline, this.clock.at(this.now() * 1000), !this.isSession);
   }
 
-  private get connectsToSession(): boolean {
+  private get isSession(): boolean {
     return this.url.pathname.includes("/sessions/");
   }
 
-  private opened(replaced: boolean): void {
+  private onOpen(replaced: boolean): void {
     this.closedReason = null;
-    this.resume = this.timelines.newest;
+    this.resumeTimeline = this.timelineHistory.newest;
     this.clock.restart();
-    this.timelines.restart();
-    this.asking.begin();
-    this.performances.prepare();
-    this.tell("open");
-    if (replaced) this.tell("replaced");
+    this.timelineHistory.restart();
+    this.reporter.restart();
+    this.performerViews.loadSolvers();
+    this.dispatch("open");
+    if (replaced) this.dispatch("replaced");
   }
 
-  private lost(reason: string, final: boolean): void {
+  private onClosed(reason: string, final: boolean): void {
     this.closedReason = reason;
-    this.ended = final;
-    if (final) this.asking.end();
-    else this.asking.pause();
+    this.isClosed = final;
+    if (final) this.reporter.close();
+    else this.reporter.pause();
     this.dispatchEvent(new CustomEvent("closed", { detail: reason }));
   }
 
-  private fares(): Omit<Report, "name"> {
+  private makeReport(): Omit<Report, "name"> {
     return {
-      buffer: Math.round(this.line().bufferSeconds * 1e6),
+      buffer: Math.round(this.statistics().bufferSeconds * 1e6),
       decode: Math.round(this.decodeMs * 1000),
       frame: Math.round(this.frameMs * 1000),
       hidden: typeof document !== "undefined" && document.hidden,
     };
   }
 
-  private receive(message: Message, bytes: number): void {
+  private onMessage(message: Message, bytes: number): void {
     const now = this.now();
-    this.meter.add(now, bytes);
+    this.bitrateMeter.add(now, bytes);
     switch (message.name) {
       case "ChannelHeader":
-        this.clock.greeting(message.now, now * 1000);
+        this.clock.setEstimate(message.now, now * 1000);
         break;
       case "Description":
-        this.describe(message);
+        this.onDescription(message);
         break;
       case "TimelineState":
-        this.retime(message);
+        this.onTimeline(message);
         break;
       case "Data":
-        this.keep(message, now);
+        this.storeBlock(message, now);
         break;
       case "Overlay":
-        this.overlay(message, now);
+        this.onOverlay(message, now);
         break;
       case "Presence":
         this.presence = message;
-        this.tell("presence");
+        this.dispatch("presence");
         break;
       case "Choice":
         this.choice = message;
         break;
       case "Pong":
-        this.clock.pong(message.sent, message.received, message.answered, now * 1000);
-        this.asking.answered(message.sequence);
+        this.clock.addSample(message.sent, message.received, message.answered, now * 1000);
+        this.reporter.onPong(message.sequence);
         break;
       default:
         break;
     }
   }
 
-  private describe(message: Description): void {
+  private onDescription(message: Description): void {
     // what an id names never changes, so the blocks of the same motion are good still
     if (message.motion === this.motion && this.tracks) {
-      const { told } = this.tracks;
+      const { describedCount: told } = this.tracks;
       this.tracks.add(message.first ?? 0, message.tracks);
-      this.performances.add(this.tracks);
-      if (this.tracks.told > told) this.tell("tracks");
+      this.performerViews.add(this.tracks);
+      if (this.tracks.describedCount > told) this.dispatch("tracks");
       return;
     }
     // the rest of one that was not told of
     if (message.first) return;
     try {
-      this.tracks = new Tracks(message.tracks);
+      this.tracks = new TrackSet(message.tracks);
     } catch (error) {
       if (!(error instanceof DamagedBlock)) throw error;
       this.connection.close(error.message);
       return;
     }
     this.motion = message.motion;
-    this.performances.begin(this.tracks);
-    this.tell("figure");
-    this.tell("blocks");
+    this.performerViews.reset(this.tracks);
+    this.dispatch("figure");
+    this.dispatch("blocks");
   }
 
-  private retime(message: TimelineState): void {
-    if (!this.timelines.put(message)) return;
-    const { resume } = this;
-    this.resume = null;
-    if (resume && !this.connectsToSession && (resume.playing !== message.playing || resume.loop !== message.loop)) {
+  private onTimeline(message: TimelineState): void {
+    if (!this.timelineHistory.put(message)) return;
+    const { resumeTimeline: resume } = this;
+    this.resumeTimeline = null;
+    if (resume && !this.isSession && (resume.playing !== message.playing || resume.loop !== message.loop)) {
       this.edit({ playing: resume.playing, loop: resume.loop });
     }
-    this.tell("timeline");
+    this.dispatch("timeline");
   }
 
-  private keep(message: Data, now: number): void {
+  private storeBlock(message: Data, now: number): void {
     const store = this.tracks?.store(message.track);
     if (!store) return;
     try {
       if (!store.put(message.index, message.rate, message.block)) return;
     } catch (error) {
       if (!(error instanceof DamagedBlock)) throw error;
-      this.damaged++;
+      this.damagedCount++;
       return;
     }
     if (store !== this.store) return;
     const took = this.now() - now;
-    this.decodeMs += (this.decodeMs === 0 ? 1 : NEWEST) * (took - this.decodeMs);
-    this.tell("blocks");
+    this.decodeMs += (this.decodeMs === 0 ? 1 : NEWEST_WEIGHT) * (took - this.decodeMs);
+    this.dispatch("blocks");
   }
 
-  private overlay(message: Overlay, now: number): void {
-    this.performances.overlays.put(message);
+  private onOverlay(message: Overlay, now: number): void {
+    this.performerViews.overlays.put(message);
     const late = this.clock.at(now * 1000) - message.due;
-    this.latency = this.latency === null ? late / 1000 : this.latency + NEWEST * (late / 1000 - this.latency);
+    this.latencyMs =
+      this.latencyMs === null ? late / 1000 : this.latencyMs + NEWEST_WEIGHT * (late / 1000 - this.latencyMs);
     // its first frame is gone to from the last one of the message before
-    if (Number.isFinite(this.clock.error)) this.delay.heard(late + (message.earlier.length + 1) * OVERLAY_FRAME, now * 1000);
+    if (Number.isFinite(this.clock.errorBound))
+      this.delay.addLateness(late + (message.earlier.length + 1) * OVERLAY_FRAME_INTERVAL_US, now * 1000);
   }
 
-  private tell(event: string): void {
+  private dispatch(event: string): void {
     this.dispatchEvent(new Event(event));
   }
 }

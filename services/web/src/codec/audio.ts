@@ -6,7 +6,7 @@
  */
 
 import { DamagedBlock } from "./errors";
-import { type Described, Timing } from "./timing";
+import { Timing, type TrackDescription } from "./timing";
 
 export const AUDIO_CODEC = "bunraku.audio/1";
 
@@ -14,18 +14,18 @@ export const AUDIO_CODEC = "bunraku.audio/1";
 export const SAMPLE_RATE = 48_000;
 
 /** Samples of a packet: 60 ms. */
-export const PACKET = 2_880;
+export const PACKET_SAMPLES = 2_880;
 
-const LARGEST_BLOCK = 65_536;
-const MOST_PRE_SKIP = 2 * PACKET;
-const MOST_RATES = 16;
+const MAX_BLOCK_BYTES = 65_536;
+const MAX_PRE_SKIP_SAMPLES = 2 * PACKET_SAMPLES;
+const MAX_LEVELS = 16;
 // what four bytes number
-const MOST_PACKETS = 2 ** 28;
+const MAX_PACKETS = 2 ** 28;
 // a track is shorter than 2^48 microseconds
-const MOST_SAMPLES = 0.048 * 2 ** 48;
+const MAX_SAMPLES = 0.048 * 2 ** 48;
 
-const SILK_MS = [10, 20, 40, 60];
-const CELT_MS = [2.5, 5, 10, 20];
+const SILK_FRAME_MS = [10, 20, 40, 60];
+const CELT_FRAME_MS = [2.5, 5, 10, 20];
 
 /** One Opus packet: its number in the track, and its bytes (a view of the block's). */
 export interface AudioPacket {
@@ -36,7 +36,7 @@ export interface AudioPacket {
 /** Constants of an audio track, as in the Description; its blocks are the motion's. */
 export class AudioTrack extends Timing {
   /** Packets of each rate. */
-  readonly packets: number;
+  readonly packetCount: number;
 
   /**
    * @param motion frames and blocks of the motion
@@ -53,22 +53,22 @@ export class AudioTrack extends Timing {
     readonly kbps: readonly number[] = [],
   ) {
     super(motion.fps, motion.frames, motion.blockFrames, motion.firstFrames);
-    this.packets = Math.ceil((samples + preSkip) / PACKET);
+    this.packetCount = Math.ceil((samples + preSkip) / PACKET_SAMPLES);
   }
 
   /** The sample with which packet `number` starts, at motion time 0 sample 0; of packet 0 it is negative. */
   firstSample(number: number): number {
-    return PACKET * number - this.preSkip;
+    return PACKET_SAMPLES * number - this.preSkip;
   }
 
   /** Motion time at which packet `number` starts, microseconds, not always a whole number; of packet 0 it is negative. */
-  packetUs(number: number): number {
+  packetStartUs(number: number): number {
     return (this.firstSample(number) * 1e6) / SAMPLE_RATE;
   }
 
   /** The packet whose sound is heard at motion time `positionUs`, microseconds; there may be none of that number any more. */
   packetAt(positionUs: number): number {
-    return Math.floor(((positionUs * SAMPLE_RATE) / 1e6 + this.preSkip) / PACKET);
+    return Math.floor(((positionUs * SAMPLE_RATE) / 1e6 + this.preSkip) / PACKET_SAMPLES);
   }
 
   /**
@@ -76,16 +76,18 @@ export class AudioTrack extends Timing {
    *
    * @throws DamagedBlock where it tells of none that can be played here
    */
-  static fromDescription(map: Described, motion: Timing): AudioTrack {
-    const { codec, channels, pre_skip: preSkip, samples, rates } = map;
-    if (codec !== AUDIO_CODEC) throw new DamagedBlock(`audio is of codec ${String(codec)}; this client reads ${AUDIO_CODEC}`);
+  static fromDescription(description: TrackDescription, motion: Timing): AudioTrack {
+    const { codec, channels, pre_skip: preSkip, samples, rates } = description;
+    if (codec !== AUDIO_CODEC)
+      throw new DamagedBlock(`audio is of codec ${String(codec)}; this client reads ${AUDIO_CODEC}`);
     const whole = (value: unknown, least: number, most: number) =>
       Number.isInteger(value) && Number(value) >= least && Number(value) <= most;
     if (!whole(channels, 1, 2)) throw new DamagedBlock("audio needs channels, 1 or 2");
-    if (!whole(preSkip, 0, MOST_PRE_SKIP)) throw new DamagedBlock(`audio needs pre_skip, 0..${MOST_PRE_SKIP} samples`);
-    if (!whole(samples, 1, MOST_SAMPLES)) throw new DamagedBlock("audio needs samples, one at least");
-    if (!Array.isArray(rates) || rates.length < 1 || rates.length > MOST_RATES) {
-      throw new DamagedBlock(`audio needs rates, 1..${MOST_RATES} of them`);
+    if (!whole(preSkip, 0, MAX_PRE_SKIP_SAMPLES))
+      throw new DamagedBlock(`audio needs pre_skip, 0..${MAX_PRE_SKIP_SAMPLES} samples`);
+    if (!whole(samples, 1, MAX_SAMPLES)) throw new DamagedBlock("audio needs samples, one at least");
+    if (!Array.isArray(rates) || rates.length < 1 || rates.length > MAX_LEVELS) {
+      throw new DamagedBlock(`audio needs rates, 1..${MAX_LEVELS} of them`);
     }
     const kbps = rates.map((rate: { kbps?: unknown } | null, nth) => {
       if (!Number.isFinite(rate?.kbps)) throw new DamagedBlock(`rate ${nth} of audio needs kbps, a number`);
@@ -100,8 +102,9 @@ export class AudioTrack extends Timing {
  *
  * @throws DamagedBlock on what cannot be a block
  */
-export function unpackAudio(data: Uint8Array): AudioPacket[] {
-  if (data.length > LARGEST_BLOCK) throw new DamagedBlock(`an audio block has at most ${LARGEST_BLOCK} bytes, not ${data.length}`);
+export function unpackAudioBlock(data: Uint8Array): AudioPacket[] {
+  if (data.length > MAX_BLOCK_BYTES)
+    throw new DamagedBlock(`an audio block has at most ${MAX_BLOCK_BYTES} bytes, not ${data.length}`);
   const packets: AudioPacket[] = [];
   if (data.length === 0) return packets;
   let at = 0;
@@ -120,22 +123,22 @@ export function unpackAudio(data: Uint8Array): AudioPacket[] {
     if (size === 0 || packet.length < size) {
       throw new DamagedBlock(`packet ${number} of an audio block has ${packet.length} of its ${size} bytes`);
     }
-    const ms = milliseconds(packet);
+    const ms = packetDurationMs(packet);
     if (ms !== 60) throw new DamagedBlock(`packet ${number} of an audio block lasts ${ms} ms, not 60`);
     packets.push({ number, data: packet });
     at += size;
   }
-  if (packets.length === 0 || number > MOST_PACKETS) {
+  if (packets.length === 0 || number > MAX_PACKETS) {
     throw new DamagedBlock("an audio block has packets, numbered below 2^28, or no bytes at all");
   }
   return packets;
 }
 
 /** How long an Opus packet sounds, by its first bytes (RFC 6716, section 3.1). */
-export function milliseconds(packet: Uint8Array): number {
+export function packetDurationMs(packet: Uint8Array): number {
   const kind = packet[0] >> 3;
   const code = packet[0] & 3;
-  const frame = kind < 12 ? SILK_MS[kind & 3] : kind < 16 ? SILK_MS[kind & 1] : CELT_MS[kind & 3];
+  const frame = kind < 12 ? SILK_FRAME_MS[kind & 3] : kind < 16 ? SILK_FRAME_MS[kind & 1] : CELT_FRAME_MS[kind & 3];
   if (code < 3) return code === 0 ? frame : 2 * frame;
   return packet.length > 1 ? frame * (packet[1] & 63) : 0;
 }

@@ -4,30 +4,33 @@
  */
 
 import { CHANNEL_COUNT } from "../motion/skeleton";
-import { CLASS_OF, Contexts, signContext } from "./contexts";
+import { ContextModel, FREQUENCY_CLASS_OF, signContext } from "./context-model";
 import { DamagedBlock } from "./errors";
-import { level } from "./levels";
-import { HAZARD_OF, type Prior, ROWS, SIGNS, UNARY } from "./prior";
-import { EVEN, RangeDecoder } from "./rangecoder";
+import { magnitudeLevel } from "./magnitude-level";
+import { HAZARD_ROWS, HAZARD_TABLE_OF, type Prior, SIGN_CONTEXTS, UNARY_DECISIONS } from "./prior";
+import { HALF_PROBABILITY, RangeDecoder } from "./range-coder";
 
 /** Most bytes of a block. */
-export const LARGEST_BLOCK = 65_536;
+export const MAX_BLOCK_BYTES = 65_536;
 
 /** Most frames of a block. */
-export const MOST_FRAMES = 512;
+export const MAX_BLOCK_FRAMES = 512;
 
-const FRAMES_AS_USUAL = 32440;
-const ROOT_ALONE = 512;
-const ESCAPE = 20;
+const NOMINAL_FRAMES_PROBABILITY = 32440;
+const ROOT_ONLY_PROBABILITY = 512;
+const MAX_ESCAPE_BITS = 20;
 
 /** Of each frequency where its table of hazards starts. */
-const HAZARD_AT = Uint16Array.from(CLASS_OF, (group) => HAZARD_OF[group] * ROWS * UNARY);
+const HAZARD_OFFSET_OF = Uint16Array.from(
+  FREQUENCY_CLASS_OF,
+  (group) => HAZARD_TABLE_OF[group] * HAZARD_ROWS * UNARY_DECISIONS,
+);
 
 /** Channels of a camera's or a light's block; a motion's has 19. */
-export const SCENE_CHANNELS = 3;
+export const SCENE_CHANNEL_COUNT = 3;
 
 /** A block as it stands in its bytes. */
-export interface Coefficients {
+export interface BlockCoefficients {
   frames: number;
   /** Step index, 0..255. */
   step: number;
@@ -40,8 +43,8 @@ export interface Coefficients {
 }
 
 /** Level of a block's duration in sixteenths of a second: a feature of its contexts. */
-export function lengthLevel(frames: number, fps: number): number {
-  return level(Math.floor((16 * frames) / fps + 0.5));
+export function durationLevel(frames: number, fps: number): number {
+  return magnitudeLevel(Math.floor((16 * frames) / fps + 0.5));
 }
 
 /**
@@ -52,63 +55,73 @@ export function lengthLevel(frames: number, fps: number): number {
  * @throws DamagedBlock
  */
 export function decodeCoefficients(
-  prior: Prior, data: Uint8Array, usual: number, fps: number, all = CHANNEL_COUNT,
-): Coefficients {
-  if (data.length > LARGEST_BLOCK) {
-    throw new DamagedBlock(`a block has at most ${LARGEST_BLOCK} bytes, not ${data.length}`);
+  prior: Prior,
+  data: Uint8Array,
+  nominalFrames: number,
+  fps: number,
+  channelCount = CHANNEL_COUNT,
+): BlockCoefficients {
+  if (data.length > MAX_BLOCK_BYTES) {
+    throw new DamagedBlock(`a block has at most ${MAX_BLOCK_BYTES} bytes, not ${data.length}`);
   }
   const decoder = new RangeDecoder(data);
-  const frames = decoder.bit(FRAMES_AS_USUAL) ? usual : decoder.number(10);
-  if (frames < 1 || frames > MOST_FRAMES) {
-    throw new DamagedBlock(`block says ${frames} frames; 1..${MOST_FRAMES} are allowed`);
+  const frames = decoder.decodeBit(NOMINAL_FRAMES_PROBABILITY) ? nominalFrames : decoder.decodeBits(10);
+  if (frames < 1 || frames > MAX_BLOCK_FRAMES) {
+    throw new DamagedBlock(`block says ${frames} frames; 1..${MAX_BLOCK_FRAMES} are allowed`);
   }
-  const scene = all === SCENE_CHANNELS;
-  const channels = !scene && decoder.bit(ROOT_ALONE) ? 2 : all;
-  const step = decoder.number(8);
-  const heading = scene ? 0 : decoder.number(6) - 32;
-  const count = decoder.number(32 - Math.clz32(frames));
+  const scene = channelCount === SCENE_CHANNEL_COUNT;
+  const channels = !scene && decoder.decodeBit(ROOT_ONLY_PROBABILITY) ? 2 : channelCount;
+  const step = decoder.decodeBits(8);
+  const heading = scene ? 0 : decoder.decodeBits(6) - 32;
+  const count = decoder.decodeBits(32 - Math.clz32(frames));
   if (count > frames) throw new DamagedBlock(`block says ${count} frequencies for ${frames} frames`);
-  const q = new Float64Array(all * 3 * count);
-  const contexts = new Contexts(prior, count, step, lengthLevel(frames, fps));
+  const q = new Float64Array(channelCount * 3 * count);
+  const contexts = new ContextModel(prior, count, step, durationLevel(frames, fps));
   for (let channel = 0; channel < channels; channel++) {
     const axes = scene && channel === 2 ? 1 : 3;
     for (let k = 0; k < count; k++) {
-      contexts.share(channel, k);
+      contexts.computeSharedSums(channel, k);
       for (let axis = 0; axis < axes; axis++) {
-        const size = decodeSize(decoder, prior.hazard, HAZARD_AT[k], contexts.scale(channel, axis, k));
+        const size = decodeMagnitude(
+          decoder,
+          prior.hazard,
+          HAZARD_OFFSET_OF[k],
+          contexts.predictScale(channel, axis, k),
+        );
         if (size > 0) {
           const at = (channel * 3 + axis) * count + k;
-          const odds = prior.sign[CLASS_OF[k] * SIGNS + signContext(q, at, k)];
-          q[at] = decoder.bit(odds) ? -size : size;
+          const odds = prior.sign[FREQUENCY_CLASS_OF[k] * SIGN_CONTEXTS + signContext(q, at, k)];
+          q[at] = decoder.decodeBit(odds) ? -size : size;
         }
-        contexts.see(channel, axis, k, size);
+        contexts.updateMagnitude(channel, axis, k, size);
       }
-      contexts.seeFrequency(channel, k);
+      contexts.finishFrequency(channel, k);
     }
-    contexts.seeChannel(channel);
+    contexts.finishChannel(channel);
   }
   return { frames, step, heading, count, q };
 }
 
 /** A coefficient's size where about 2^(`scale` / 256) is expected, by the table of hazards that starts at `table`. */
-function decodeSize(decoder: RangeDecoder, hazard: Int32Array, table: number, scale: number): number {
+function decodeMagnitude(decoder: RangeDecoder, hazard: Int32Array, tableOffset: number, scale: number): number {
   const shift = scale >= 1024 ? (scale >> 8) - 3 : 0;
   const place = (scale - shift * 256 + 7 * 256) * 4;
-  let row = place >> 8, weight = place & 255;
-  if (row > ROWS - 2) {
-    row = ROWS - 2;
+  let row = place >> 8,
+    weight = place & 255;
+  if (row > HAZARD_ROWS - 2) {
+    row = HAZARD_ROWS - 2;
     weight = 256;
   }
   let value = 0;
-  for (let at = table + row * UNARY; value < UNARY; value++, at++) {
-    if (!decoder.bit((hazard[at] * (256 - weight) + hazard[at + UNARY] * weight) >> 8)) break;
+  for (let at = tableOffset + row * UNARY_DECISIONS; value < UNARY_DECISIONS; value++, at++) {
+    if (!decoder.decodeBit((hazard[at] * (256 - weight) + hazard[at + UNARY_DECISIONS] * weight) >> 8)) break;
   }
-  if (value === UNARY) {
+  if (value === UNARY_DECISIONS) {
     let length = 0;
-    while (length < ESCAPE && decoder.bit(EVEN)) length++;
-    if (length === ESCAPE) throw new DamagedBlock(`block holds a number longer than ${ESCAPE} bits`);
-    value += ((1 << length) | decoder.number(length)) - 1;
+    while (length < MAX_ESCAPE_BITS && decoder.decodeBit(HALF_PROBABILITY)) length++;
+    if (length === MAX_ESCAPE_BITS) throw new DamagedBlock(`block holds a number longer than ${MAX_ESCAPE_BITS} bits`);
+    value += ((1 << length) | decoder.decodeBits(length)) - 1;
   }
   // no shift of bits: the largest sizes need 32
-  return shift > 0 ? value * (1 << shift) + decoder.number(shift) : value;
+  return shift > 0 ? value * (1 << shift) + decoder.decodeBits(shift) : value;
 }

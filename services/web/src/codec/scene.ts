@@ -5,27 +5,27 @@
  * vertical field of view 6 in radians; of a light, the colour 3-5 in linear RGB and the intensity 6.
  */
 
-import { decodeCoefficients, MOST_FRAMES, SCENE_CHANNELS } from "./coefficients";
-import { reconstruct, stepSize } from "./decode";
+import { decodeCoefficients, MAX_BLOCK_FRAMES, SCENE_CHANNEL_COUNT } from "./coefficients";
 import { DamagedBlock } from "./errors";
-import { type Prior, shippedPrior } from "./prior";
-import { type Described, type Rate, readRates, readTiming, Timing } from "./timing";
-import { basis } from "./transform";
+import { reconstruct, stepSize } from "./motion-decoder";
+import { loadShippedPrior, type Prior } from "./prior";
+import { type BitrateLevel, parseLadder, parseTiming, Timing, type TrackDescription } from "./timing";
+import { cosineBasis } from "./transform";
 
 export const SCENE_CODEC = "bunraku.scene/1";
 
 /** Numbers of a camera or a light at an instant. */
-export const NUMBERS = 7;
+export const SCENE_VALUE_COUNT = 7;
 
 /** No number of a track is larger, so that nothing decoded is beyond all numbers. */
-const LARGEST = 1e6;
+const MAX_SCENE_VALUE = 1e6;
 
 /** What each channel was multiplied with before it was quantised. */
-const WEIGHTS = { camera: [1, 1, 1.15], light: [0.5, 1, 1] } as const;
+const CHANNEL_WEIGHTS = { camera: [1, 1, 1.15], light: [0.5, 1, 1] } as const;
 
-export type SceneKind = keyof typeof WEIGHTS;
+export type SceneKind = keyof typeof CHANNEL_WEIGHTS;
 
-const cosines = new Float64Array(MOST_FRAMES);
+const cosines = new Float64Array(MAX_BLOCK_FRAMES);
 
 /** Constants of a camera's or a light's blocks, as in the Description. */
 export class SceneTrack extends Timing {
@@ -34,14 +34,14 @@ export class SceneTrack extends Timing {
    * @param kind what it is
    * @param full the intensity that counts as one; 1 for a camera
    * @param reference seven coded numbers that the blocks are relative to
-   * @param rates what each rate costs and keeps, from the lowest to the highest
+   * @param ladder what each rate costs and keeps, from the lowest to the highest
    */
   constructor(
     timing: Timing,
     readonly kind: SceneKind,
     readonly full: number,
     readonly reference: Float64Array,
-    readonly rates: readonly Rate[] = [],
+    readonly ladder: readonly BitrateLevel[] = [],
   ) {
     super(timing.fps, timing.frames, timing.blockFrames, timing.firstFrames);
   }
@@ -51,17 +51,22 @@ export class SceneTrack extends Timing {
    *
    * @throws DamagedBlock where it tells of none that can be played here
    */
-  static fromDescription(map: Described): SceneTrack {
-    const { type: kind, codec, full, reference } = map;
-    if (kind !== "camera" && kind !== "light") throw new DamagedBlock(`a scene is a camera or a light, not ${String(kind)}`);
-    if (codec !== SCENE_CODEC) throw new DamagedBlock(`${kind} is of codec ${String(codec)}; this client reads ${SCENE_CODEC}`);
-    const timing = readTiming(map, kind);
-    const small = (value: unknown) => Number.isFinite(value) && Math.abs(Number(value)) <= LARGEST;
-    if (!small(full) || Number(full) <= 0) throw new DamagedBlock(`${kind} needs full, a number above zero and at most ${LARGEST}`);
-    if (!Array.isArray(reference) || reference.length !== NUMBERS || !reference.every(small)) {
-      throw new DamagedBlock(`${kind} needs a reference of ${NUMBERS} numbers, none beyond ${LARGEST}`);
+  static fromDescription(description: TrackDescription): SceneTrack {
+    const { type: kind, codec, full, reference } = description;
+    if (kind !== "camera" && kind !== "light")
+      throw new DamagedBlock(`a scene is a camera or a light, not ${String(kind)}`);
+    if (codec !== SCENE_CODEC)
+      throw new DamagedBlock(`${kind} is of codec ${String(codec)}; this client reads ${SCENE_CODEC}`);
+    const timing = parseTiming(description, kind);
+    const small = (value: unknown) => Number.isFinite(value) && Math.abs(Number(value)) <= MAX_SCENE_VALUE;
+    if (!small(full) || Number(full) <= 0)
+      throw new DamagedBlock(`${kind} needs full, a number above zero and at most ${MAX_SCENE_VALUE}`);
+    if (!Array.isArray(reference) || reference.length !== SCENE_VALUE_COUNT || !reference.every(small)) {
+      throw new DamagedBlock(
+        `${kind} needs a reference of ${SCENE_VALUE_COUNT} numbers, none beyond ${MAX_SCENE_VALUE}`,
+      );
     }
-    return new SceneTrack(timing, kind, Number(full), Float64Array.from(reference), readRates(map, kind));
+    return new SceneTrack(timing, kind, Number(full), Float64Array.from(reference), parseLadder(description, kind));
   }
 }
 
@@ -80,11 +85,11 @@ export class SceneBlock {
   ) {}
 
   /** The seven numbers at `t`, in frames from the block's first, any real in [-1/2, frames - 1/2], written into `out`. */
-  at(t: number, out: Float64Array): void {
+  valuesAt(t: number, out: Float64Array): void {
     const { count, values } = this;
     const { kind, full, reference } = this.track;
-    basis(cosines, this.frames, count, t);
-    for (let number = 0, at = 0; number < NUMBERS; number++) {
+    cosineBasis(cosines, this.frames, count, t);
+    for (let number = 0, at = 0; number < SCENE_VALUE_COUNT; number++) {
       let sum = 0;
       for (let k = 0; k < count; k++) sum += values[at++] * cosines[k];
       out[number] = sum + reference[number];
@@ -93,7 +98,7 @@ export class SceneBlock {
       // the Gudermannian function: 2 atan(exp(x)) without the overflow
       out[6] = Math.PI / 2 + 2 * Math.atan(Math.tanh(out[6] / 2));
     } else {
-      for (let number = 3; number < NUMBERS; number++) out[number] **= 2;
+      for (let number = 3; number < SCENE_VALUE_COUNT; number++) out[number] **= 2;
       out[6] *= full;
     }
   }
@@ -104,13 +109,13 @@ export class SceneBlock {
  *
  * @throws DamagedBlock on what cannot be one
  */
-export function decodeScene(track: SceneTrack, data: Uint8Array, prior: Prior = shippedPrior()): SceneBlock {
-  const { frames, step, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps, SCENE_CHANNELS);
+export function decodeSceneBlock(track: SceneTrack, data: Uint8Array, prior: Prior = loadShippedPrior()): SceneBlock {
+  const { frames, step, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps, SCENE_CHANNEL_COUNT);
   const size = stepSize(step, frames);
   // the last channel's other two axes are not seen
-  const values = new Float64Array(NUMBERS * count);
-  for (let number = 0, at = 0; number < NUMBERS; number++) {
-    const weight = WEIGHTS[track.kind][Math.floor(number / 3)];
+  const values = new Float64Array(SCENE_VALUE_COUNT * count);
+  for (let number = 0, at = 0; number < SCENE_VALUE_COUNT; number++) {
+    const weight = CHANNEL_WEIGHTS[track.kind][Math.floor(number / 3)];
     for (let k = 0; k < count; k++, at++) values[at] = (reconstruct(q[at]) * size) / weight;
   }
   return new SceneBlock(track, frames, count, values);

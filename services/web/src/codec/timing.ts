@@ -1,17 +1,17 @@
 /** When the blocks of a track are, the same of a motion and of the scene about it (`proto/SPEC.md`, Description). */
 
-import { MOST_FRAMES } from "./coefficients";
+import { MAX_BLOCK_FRAMES } from "./coefficients";
 import { DamagedBlock } from "./errors";
 
 // instants are whole microseconds, a track is shorter than 2^48 of them
-const MOST_FPS = 100_000;
-const MOST_US = 2 ** 48;
+const MAX_FPS = 100_000;
+const MAX_DURATION_US = 2 ** 48;
 // a day of 1 s blocks; and as many rates as a Data Packet can number
-const MOST_BLOCKS = 86_400;
-const MOST_RATES = 16;
+const MAX_BLOCKS = 86_400;
+const MAX_LEVELS = 16;
 
 /** One encoding of a track: kbit/s of blocks over the duration, mean error in mm (SPEC.md says of what), and what none exceeds. */
-export interface Rate {
+export interface BitrateLevel {
   kbps: number;
   mean: number;
   max: number;
@@ -20,7 +20,7 @@ export interface Rate {
 /** Frames and blocks of a track. */
 export class Timing {
   /** Number of blocks. */
-  readonly blocks: number;
+  readonly blockCount: number;
 
   /**
    * @param fps frames per second
@@ -28,8 +28,13 @@ export class Timing {
    * @param blockFrames frames of every block but the first and perhaps the last
    * @param firstFrames frames of the first block
    */
-  constructor(readonly fps: number, readonly frames: number, readonly blockFrames: number, readonly firstFrames: number) {
-    this.blocks = 1 + Math.ceil((frames - firstFrames) / blockFrames);
+  constructor(
+    readonly fps: number,
+    readonly frames: number,
+    readonly blockFrames: number,
+    readonly firstFrames: number,
+  ) {
+    this.blockCount = 1 + Math.ceil((frames - firstFrames) / blockFrames);
   }
 
   /** Length in microseconds. */
@@ -57,29 +62,33 @@ export class Timing {
     // a block's start is rounded to the microsecond
     const frame = ((positionUs + 1) * this.fps) / 1e6;
     const index = frame >= this.firstFrames ? Math.floor((frame - this.firstFrames) / this.blockFrames) + 1 : 0;
-    return Math.min(index, this.blocks - 1);
+    return Math.min(index, this.blockCount - 1);
   }
 }
 
 /** A Description's map of one track. */
-export type Described = Readonly<Record<string, unknown>>;
+export type TrackDescription = Readonly<Record<string, unknown>>;
 
 /**
  * The timing that the map of a track tells of; `what` names it in messages.
  *
  * @throws DamagedBlock where it tells of none that can be played here
  */
-export function readTiming(map: Described, what: string): Timing {
-  const { fps, frames, block_frames: blockFrames, first_frames: firstFrames } = map;
-  const whole = (value: unknown, most: number) => Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
-  if (!(Number.isFinite(fps) && Number(fps) > 0 && Number(fps) <= MOST_FPS)) {
-    throw new DamagedBlock(`${what} needs fps, a number above zero and at most ${MOST_FPS}`);
+export function parseTiming(description: TrackDescription, trackName: string): Timing {
+  const { fps, frames, block_frames: blockFrames, first_frames: firstFrames } = description;
+  const whole = (value: unknown, most: number) =>
+    Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
+  if (!(Number.isFinite(fps) && Number(fps) > 0 && Number(fps) <= MAX_FPS)) {
+    throw new DamagedBlock(`${trackName} needs fps, a number above zero and at most ${MAX_FPS}`);
   }
-  if (!whole(blockFrames, MOST_FRAMES)) throw new DamagedBlock(`${what} needs block_frames, 1..${MOST_FRAMES}`);
-  if (!whole(frames, Number(blockFrames) * MOST_BLOCKS)) throw new DamagedBlock(`${what} needs frames, at least one`);
-  if ((Number(frames) * 1e6) / Number(fps) >= MOST_US) throw new DamagedBlock(`${what} needs to last less than 2^48 microseconds`);
-  if (!whole(firstFrames, Math.min(Number(frames), MOST_FRAMES))) {
-    throw new DamagedBlock(`${what} needs first_frames, 1..${MOST_FRAMES} and no more than its frames`);
+  if (!whole(blockFrames, MAX_BLOCK_FRAMES))
+    throw new DamagedBlock(`${trackName} needs block_frames, 1..${MAX_BLOCK_FRAMES}`);
+  if (!whole(frames, Number(blockFrames) * MAX_BLOCKS))
+    throw new DamagedBlock(`${trackName} needs frames, at least one`);
+  if ((Number(frames) * 1e6) / Number(fps) >= MAX_DURATION_US)
+    throw new DamagedBlock(`${trackName} needs to last less than 2^48 microseconds`);
+  if (!whole(firstFrames, Math.min(Number(frames), MAX_BLOCK_FRAMES))) {
+    throw new DamagedBlock(`${trackName} needs first_frames, 1..${MAX_BLOCK_FRAMES} and no more than its frames`);
   }
   return new Timing(Number(fps), Number(frames), Number(blockFrames), Number(firstFrames));
 }
@@ -89,13 +98,14 @@ export function readTiming(map: Described, what: string): Timing {
  *
  * @throws DamagedBlock
  */
-export function readRates({ rates }: Described, what: string): Rate[] {
-  if (!Array.isArray(rates) || rates.length < 1 || rates.length > MOST_RATES) {
-    throw new DamagedBlock(`${what} needs rates, 1..${MOST_RATES} of them`);
+export function parseLadder({ rates }: TrackDescription, trackName: string): BitrateLevel[] {
+  if (!Array.isArray(rates) || rates.length < 1 || rates.length > MAX_LEVELS) {
+    throw new DamagedBlock(`${trackName} needs rates, 1..${MAX_LEVELS} of them`);
   }
-  return rates.map((rate: Partial<Rate> | null, nth): Rate => {
+  return rates.map((rate: Partial<BitrateLevel> | null, nth): BitrateLevel => {
     const { kbps, mean, max } = rate ?? {};
-    if (![kbps, mean, max].every(Number.isFinite)) throw new DamagedBlock(`rate ${nth} needs kbps, mean and max, numbers`);
+    if (![kbps, mean, max].every(Number.isFinite))
+      throw new DamagedBlock(`rate ${nth} needs kbps, mean and max, numbers`);
     return { kbps: kbps!, mean: mean!, max: max! };
   });
 }

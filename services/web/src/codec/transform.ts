@@ -4,8 +4,8 @@
  */
 
 /** The first `count` cosines, scaled, of a block of `frames` frames at instant `t` in frames, into `out`. */
-export function basis(out: Float64Array, frames: number, count: number, t: number): void {
-  const angle = (Math.PI / frames) * (t + 0.5);
+export function cosineBasis(out: Float64Array, frames: number, count: number, instant: number): void {
+  const angle = (Math.PI / frames) * (instant + 0.5);
   const scale = Math.sqrt(2 / frames);
   out[0] = Math.sqrt(1 / frames);
   for (let k = 1; k < count; k++) out[k] = scale * Math.cos(angle * k);

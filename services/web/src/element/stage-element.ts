@@ -2,14 +2,14 @@
 import type { SoundPreference } from "../audio/preference";
 import type { Puppeteer } from "../client/puppeteer";
 import type { Viewer } from "../client/viewer";
-import type { Presence } from "../page/model";
+import { loadJapaneseTranslator } from "../i18n/language";
+import { type Language, Translator } from "../i18n/translator";
 import type { Stage } from "../stage/stage";
-import { japaneseSpeech } from "../words/language";
-import { type Language, Speech } from "../words/say";
-import { Showing } from "./showing";
+import type { Presence } from "../ui/limb-state";
+import { ElementController } from "./controller";
 
 /** Night or day, or as the system wishes. */
-export type ThemeWish = "night" | "day" | "auto";
+export type ThemePreference = "night" | "day" | "auto";
 
 /** What its listeners are told, by the name of the event. */
 export interface BunrakuStageEvents {
@@ -27,26 +27,27 @@ export interface BunrakuStageEvents {
   volumechange: Event;
 }
 
-const Base: typeof HTMLElement = typeof HTMLElement === "undefined" ? (class {} as typeof HTMLElement) : HTMLElement;
+const ElementBase: typeof HTMLElement =
+  typeof HTMLElement === "undefined" ? (class {} as typeof HTMLElement) : HTMLElement;
 
 /**
  * Attributes, each of which may change at any time: `src` (a page, session or motion of a server, with `#share=...` where it asks for a link), `theme`
  * (`night`, `day`, or `auto`), `controls` (limbs can be taken, and the dance paused; else it is only watched), `still` (less motion; `prefers-reduced-motion` does the same),
  * `muted` (put there or taken away it is followed; left out it is muted at first all the same), `volume`, and `lang`, its own or that of what it stands in: it speaks Japanese or English.
  */
-export class BunrakuStage extends Base {
+export class BunrakuStage extends ElementBase {
   static readonly observedAttributes = ["src", "theme", "controls", "still", "muted", "volume", "lang"] as const;
 
-  #showing: Showing | null = null;
+  #controller: ElementController | null = null;
   /** What it speaks, or will once it has the words; null while it is in no document. */
   #language: Language | null = null;
   /** Counts its beginnings: words that come too late are not spoken. */
-  #beginning = 0;
-  readonly #day = globalThis.matchMedia?.("(prefers-color-scheme: light)");
-  readonly #calm = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)");
-  readonly #dress = () => this.#dressed();
-  #languages: MutationObserver | null = null;
-  #waiting = false;
+  #startCount = 0;
+  readonly #lightScheme = globalThis.matchMedia?.("(prefers-color-scheme: light)");
+  readonly #reducedMotion = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)");
+  readonly #onAppearanceChange = () => this.#applyAppearance();
+  #languageObserver: MutationObserver | null = null;
+  #showQueued = false;
   #muted = true;
 
   /** The address of what is shown, as the attribute has it. */
@@ -58,12 +59,12 @@ export class BunrakuStage extends Base {
     this.setAttribute("src", src);
   }
 
-  get theme(): ThemeWish {
+  get theme(): ThemePreference {
     const theme = this.getAttribute("theme");
     return theme === "night" || theme === "day" ? theme : "auto";
   }
 
-  set theme(theme: ThemeWish) {
+  set theme(theme: ThemePreference) {
     this.setAttribute("theme", theme);
   }
 
@@ -94,12 +95,12 @@ export class BunrakuStage extends Base {
   set muted(muted: boolean) {
     if (muted === this.#muted) return;
     this.#muted = muted;
-    this.#sound();
+    this.#applySoundPreference();
   }
 
   /** How loud, 0 to 1, as it is heard: 1 if nothing else is said. Throws `IndexSizeError` for another number, as `<video>` does. */
   get volume(): number {
-    return volumeOf(this.getAttribute("volume"));
+    return parseVolume(this.getAttribute("volume"));
   }
 
   set volume(volume: number) {
@@ -109,26 +110,26 @@ export class BunrakuStage extends Base {
 
   /** What comes over the line; null while there is none. It changes with `src`. */
   get viewer(): Viewer | null {
-    return this.#showing?.room?.viewer ?? null;
+    return this.#controller?.playback?.viewer ?? null;
   }
 
   /** One's own hands; null while there is no line. */
   get puppeteer(): Puppeteer | null {
-    return this.#showing?.room?.puppeteer ?? null;
+    return this.#controller?.playback?.puppeteer ?? null;
   }
 
   /** What draws; null before it is there, and where the browser cannot. */
   get stage(): Stage | null {
-    return this.#showing?.drawing.performing?.stage ?? null;
+    return this.#controller?.renderer.stageController?.stage ?? null;
   }
 
   get playing(): boolean {
-    return this.#showing?.playing ?? false;
+    return this.#controller?.playing ?? false;
   }
 
   /** Seconds in the dance. */
   get position(): number {
-    return this.#showing?.room?.position(performance.now()) ?? 0;
+    return this.#controller?.playback?.position(performance.now()) ?? 0;
   }
 
   /** Seconds; 0 before it is known. */
@@ -138,40 +139,44 @@ export class BunrakuStage extends Base {
 
   /** Plays; a session for everyone who watches it, where the link allows that. */
   play(): void {
-    this.#showing?.play(true);
+    this.#controller?.setPlaying(true);
   }
 
   /** Pauses, likewise. */
   pause(): void {
-    this.#showing?.play(false);
+    this.#controller?.setPlaying(false);
   }
 
   /** Goes to a time of the dance, in seconds; likewise. */
   seek(seconds: number): void {
-    this.#showing?.seek(seconds);
+    this.#controller?.seek(seconds);
   }
 
   connectedCallback(): void {
     // whatever it stands in may come to speak another
-    this.#languages ??= new MutationObserver(() => void this.#begin());
-    this.#languages.observe(document, { subtree: true, attributeFilter: ["lang"] });
-    void this.#begin();
+    this.#languageObserver ??= new MutationObserver(() => void this.#start());
+    this.#languageObserver.observe(document, { subtree: true, attributeFilter: ["lang"] });
+    void this.#start();
   }
 
   disconnectedCallback(): void {
     queueMicrotask(() => {
       if (this.isConnected) return;
-      this.#languages?.disconnect();
-      this.#end();
+      this.#languageObserver?.disconnect();
+      this.#stop();
     });
   }
 
   /** Moved by `moveBefore`: nothing is to be done. */
   connectedMoveCallback(): void {}
 
-  attributeChangedCallback(name: (typeof BunrakuStage.observedAttributes)[number], before: string | null, now: string | null): void {
+  attributeChangedCallback(
+    name: (typeof BunrakuStage.observedAttributes)[number],
+    before: string | null,
+    now: string | null,
+  ): void {
     if (name === "lang") {
-      if (this.#language) void this.#begin();
+      if (this.#language) void this.#start();
       return;
     }
     if (name === "muted") {
@@ -179,77 +184,90 @@ export class BunrakuStage extends Base {
       return;
     }
     if (name === "volume") {
-      if (volumeOf(before) !== volumeOf(now)) this.#sound();
+      if (parseVolume(before) !== parseVolume(now)) this.#applySoundPreference();
       return;
     }
-    if (!this.#showing || before === now) return;
-    if (name === "theme" || name === "still") this.#dressed();
-    else if (name === "src" || (before === null) !== (now === null)) this.#show();
+    if (!this.#controller || before === now) return;
+    if (name === "theme" || name === "still") this.#applyAppearance();
+    else if (name === "src" || (before === null) !== (now === null)) this.#scheduleShow();
   }
 
   /** Begins in the language of where it stands; what speaks that already, as it was but moved, goes on. */
-  async #begin(): Promise<void> {
+  async #start(): Promise<void> {
     // by the nearest `lang`, or what the document came with
     const language = this.matches(":lang(ja)") ? "ja" : "en";
     if (language === this.#language) return;
-    this.#end();
+    this.#stop();
     this.#language = language;
-    const beginning = this.#beginning;
-    const speech = language === "ja" ? await japaneseSpeech() : new Speech();
-    if (beginning !== this.#beginning) return;
+    const beginning = this.#startCount;
+    const speech = language === "ja" ? await loadJapaneseTranslator() : new Translator();
+    if (beginning !== this.#startCount) return;
     const root = this.shadowRoot ?? this.attachShadow({ mode: "open" });
-    const memory = { load: () => ({ on: !this.#muted, volume: this.volume }), save: ({ on }: SoundPreference) => void (this.muted = !on) };
-    this.#showing = new Showing(root, speech, memory, (event, detail) => this.dispatchEvent(new CustomEvent(event, { detail })));
-    this.#day.addEventListener("change", this.#dress);
-    this.#calm.addEventListener("change", this.#dress);
-    this.#dressed();
-    this.#show();
+    const memory = {
+      load: () => ({ on: !this.#muted, volume: this.volume }),
+      save: ({ on }: SoundPreference) => void (this.muted = !on),
+    };
+    this.#controller = new ElementController(root, speech, memory, (event, detail) =>
+      this.dispatchEvent(new CustomEvent(event, { detail })),
+    );
+    this.#lightScheme.addEventListener("change", this.#onAppearanceChange);
+    this.#reducedMotion.addEventListener("change", this.#onAppearanceChange);
+    this.#applyAppearance();
+    this.#scheduleShow();
   }
 
-  #end(): void {
-    this.#beginning++;
+  #stop(): void {
+    this.#startCount++;
     this.#language = null;
-    this.#showing?.close();
-    this.#showing = null;
-    this.#day.removeEventListener("change", this.#dress);
-    this.#calm.removeEventListener("change", this.#dress);
+    this.#controller?.close();
+    this.#controller = null;
+    this.#lightScheme.removeEventListener("change", this.#onAppearanceChange);
+    this.#reducedMotion.removeEventListener("change", this.#onAppearanceChange);
   }
 
-  #sound(): void {
-    this.#showing?.listening.prefer({ on: !this.#muted, volume: this.volume });
+  #applySoundPreference(): void {
+    this.#controller?.soundController.setPreference({ on: !this.#muted, volume: this.volume });
     // what is there from the beginning is no change
     if (this.#language) this.dispatchEvent(new Event("volumechange"));
   }
 
   /** Once for several attributes that change together. */
-  #show(): void {
-    if (this.#waiting) return;
-    this.#waiting = true;
+  #scheduleShow(): void {
+    if (this.#showQueued) return;
+    this.#showQueued = true;
     queueMicrotask(() => {
-      this.#waiting = false;
-      void this.#showing?.show(this.getAttribute("src"), this.controls);
+      this.#showQueued = false;
+      void this.#controller?.show(this.getAttribute("src"), this.controls);
     });
   }
 
-  #dressed(): void {
+  #applyAppearance(): void {
     const { theme } = this;
-    const shown = theme === "auto" ? (this.#day.matches ? "day" : "night") : theme;
+    const shown = theme === "auto" ? (this.#lightScheme.matches ? "day" : "night") : theme;
     this.setAttribute("data-shown", shown);
-    if (!this.#showing) return;
-    this.#showing.drawing.theme = shown;
-    this.#showing.drawing.still = this.still || this.#calm.matches;
+    if (!this.#controller) return;
+    this.#controller.renderer.theme = shown;
+    this.#controller.renderer.still = this.still || this.#reducedMotion.matches;
   }
 }
 
 /** The volume that an attribute says; what is none says 1. */
-function volumeOf(said: string | null): number {
-  const volume = parseFloat(said ?? "");
+function parseVolume(attribute: string | null): number {
+  const volume = parseFloat(attribute ?? "");
   return volume >= 0 && volume <= 1 ? volume : 1;
 }
 
 export interface BunrakuStage {
-  addEventListener<K extends keyof BunrakuStageEvents>(type: K, listener: (this: BunrakuStage, event: BunrakuStageEvents[K]) => void, options?: boolean | AddEventListenerOptions): void;
-  addEventListener(type: string, listener: EventListenerOrEventListenerObject, options?: boolean | AddEventListenerOptions): void;
+  addEventListener<K extends keyof BunrakuStageEvents>(
+    type: K,
+    listener: (this: BunrakuStage, event: BunrakuStageEvents[K]) => void,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
 }
 
 declare global {

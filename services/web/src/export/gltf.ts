@@ -1,11 +1,20 @@
 /** A glTF 2.0 asset put together piece by piece, and its one file, GLB (Khronos, glTF 2.0 specification). */
 
-const COMPONENTS = new Map<unknown, number>([[Uint8Array, 5121], [Uint16Array, 5123], [Uint32Array, 5125], [Float32Array, 5126]]);
-const WIDTHS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 } as const;
+const COMPONENT_TYPES = new Map<unknown, number>([
+  [Uint8Array, 5121],
+  [Uint16Array, 5123],
+  [Uint32Array, 5125],
+  [Float32Array, 5126],
+]);
+const COMPONENTS_PER_ELEMENT = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 } as const;
 /** What a view of the buffer is for. */
-const TARGETS = { vertices: 34962, indices: 34963 } as const;
+const BUFFER_TARGETS = { vertices: 34962, indices: 34963 } as const;
 
-export type Values = Uint8Array<ArrayBuffer> | Uint16Array<ArrayBuffer> | Uint32Array<ArrayBuffer> | Float32Array<ArrayBuffer>;
+export type GltfArray =
+  | Uint8Array<ArrayBuffer>
+  | Uint16Array<ArrayBuffer>
+  | Uint32Array<ArrayBuffer>
+  | Float32Array<ArrayBuffer>;
 
 export interface GltfNode {
   name: string;
@@ -17,11 +26,11 @@ export interface GltfNode {
   skin?: number;
 }
 
-type Path = "translation" | "rotation";
+type ChannelPath = "translation" | "rotation";
 
-export class Gltf {
+export class GltfBuilder {
   /** What else the asset says: meshes, materials, skins, extensions. */
-  readonly more: Record<string, unknown> = {};
+  readonly extraProperties: Record<string, unknown> = {};
   readonly nodes: GltfNode[] = [];
   readonly #accessors: Record<string, unknown>[] = [];
   readonly #views: Record<string, unknown>[] = [];
@@ -31,16 +40,25 @@ export class Gltf {
   #length = 0;
 
   /** Index of a new view of the buffer with these bytes. */
-  view(values: Values, target?: keyof typeof TARGETS): number {
+  addBufferView(values: GltfArray, target?: keyof typeof BUFFER_TARGETS): number {
     const bytes = new Uint8Array(values.buffer, values.byteOffset, values.byteLength);
-    this.#views.push({ buffer: 0, byteOffset: this.#length, byteLength: bytes.length, ...(target ? { target: TARGETS[target] } : {}) });
+    this.#views.push({
+      buffer: 0,
+      byteOffset: this.#length,
+      byteLength: bytes.length,
+      ...(target ? { target: BUFFER_TARGETS[target] } : {}),
+    });
     this.#append(bytes, 0);
     return this.#views.length - 1;
   }
 
   /** Index of a new accessor of these values; `bounded` ones say their least and most, as positions and times must. */
-  accessor(values: Values, type: keyof typeof WIDTHS, { target, bounded = false }: { target?: keyof typeof TARGETS; bounded?: boolean } = {}): number {
-    const width = WIDTHS[type];
+  addAccessor(
+    values: GltfArray,
+    type: keyof typeof COMPONENTS_PER_ELEMENT,
+    { target, bounded = false }: { target?: keyof typeof BUFFER_TARGETS; bounded?: boolean } = {},
+  ): number {
+    const width = COMPONENTS_PER_ELEMENT[type];
     const each = (of: (...numbers: number[]) => number) =>
       Array.from({ length: width }, (_, part) => {
         let found = values[part];
@@ -48,34 +66,50 @@ export class Gltf {
         return found;
       });
     const bounds = bounded ? { min: each(Math.min), max: each(Math.max) } : {};
-    this.#accessors.push({ bufferView: this.view(values, target), componentType: COMPONENTS.get(values.constructor), count: values.length / width, type, ...bounds });
+    this.#accessors.push({
+      bufferView: this.addBufferView(values, target),
+      componentType: COMPONENT_TYPES.get(values.constructor),
+      count: values.length / width,
+      type,
+      ...bounds,
+    });
     return this.#accessors.length - 1;
   }
 
   /** Moves a node along straight lines between `values` at the times of an accessor. */
-  animate(node: number, path: Path, times: number, values: Float32Array<ArrayBuffer>): void {
-    this.#samplers.push({ input: times, output: this.accessor(values, path === "rotation" ? "VEC4" : "VEC3"), interpolation: "LINEAR" });
+  addChannel(node: number, path: ChannelPath, times: number, values: Float32Array<ArrayBuffer>): void {
+    this.#samplers.push({
+      input: times,
+      output: this.addAccessor(values, path === "rotation" ? "VEC4" : "VEC3"),
+      interpolation: "LINEAR",
+    });
     this.#channels.push({ sampler: this.#samplers.length - 1, target: { node, path } });
   }
 
   /** The file, in parts: `roots` are the nodes of its scene, `dance` is its animation's name. */
-  file(roots: readonly number[], dance: string): Uint8Array<ArrayBuffer>[] {
+  build(roots: readonly number[], animationName: string): Uint8Array<ArrayBuffer>[] {
     const json = {
       asset: { version: "2.0", generator: "Bunraku" },
       scene: 0,
       scenes: [{ nodes: roots }],
       nodes: this.nodes,
-      animations: [{ name: dance, samplers: this.#samplers, channels: this.#channels }],
+      animations: [{ name: animationName, samplers: this.#samplers, channels: this.#channels }],
       accessors: this.#accessors,
       bufferViews: this.#views,
       buffers: [{ byteLength: this.#length }],
-      ...this.more,
+      ...this.extraProperties,
     };
     const text = new TextEncoder().encode(JSON.stringify(json));
     const said = new Uint8Array(Math.ceil(text.length / 4) * 4).fill(0x20);
     said.set(text);
     const whole = 12 + 8 + said.length + 8 + this.#length;
-    return [words(0x46546c67, 2, whole), words(said.length, 0x4e4f534a), said, words(this.#length, 0x004e4942), ...this.#parts];
+    return [
+      uint32Bytes(0x46546c67, 2, whole),
+      uint32Bytes(said.length, 0x4e4f534a),
+      said,
+      uint32Bytes(this.#length, 0x004e4942),
+      ...this.#parts,
+    ];
   }
 
   #append(bytes: Uint8Array<ArrayBuffer>, filler: number): void {
@@ -87,7 +121,7 @@ export class Gltf {
 }
 
 /** Whole numbers of 32 bits, little-endian on every machine. */
-function words(...numbers: number[]): Uint8Array<ArrayBuffer> {
+function uint32Bytes(...numbers: number[]): Uint8Array<ArrayBuffer> {
   const view = new DataView(new ArrayBuffer(numbers.length * 4));
   numbers.forEach((number, at) => view.setUint32(at * 4, number, true));
   return new Uint8Array(view.buffer);
@@ -102,10 +136,11 @@ export function frameTimes(frames: number, fps: number): Float32Array<ArrayBuffe
  * The quaternion w x y z at `at` written as glTF's x y z w at `outAt`, of its two signs the one nearer to that before it: a
  * reader that does not look for the shorter way finds it too.
  */
-export function putRotation(out: Float32Array, outAt: number, q: Float64Array, at: number): void {
+export function writeRotation(out: Float32Array, outAt: number, q: Float64Array, at: number): void {
   const [w, x, y, z] = [q[at], q[at + 1], q[at + 2], q[at + 3]];
   const before = outAt - 4;
-  const sign = before >= 0 && out[before] * x + out[before + 1] * y + out[before + 2] * z + out[before + 3] * w < 0 ? -1 : 1;
+  const sign =
+    before >= 0 && out[before] * x + out[before + 1] * y + out[before + 2] * z + out[before + 3] * w < 0 ? -1 : 1;
   const scale = sign / Math.hypot(w, x, y, z);
   out[outAt] = x * scale;
   out[outAt + 1] = y * scale;

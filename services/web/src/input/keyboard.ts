@@ -1,19 +1,32 @@
 /** Everything by keyboard alone: what keys are bound to, and Escape and ? that are fixed. */
-import type { Commands } from "./commands";
+import type { CommandDispatcher } from "./command-dispatcher";
 import { isPadControl, type Mapping } from "./mapping";
-import type { VelocityInputs } from "./velocity";
+import type { VelocityInputs } from "./velocity-input";
 
 export interface KeyboardActions {
   /** Shows what the keys do. */
-  keys(): void;
+  showKeys(): void;
   /** Escape with nothing held: shut what is open. */
-  escape(): void;
+  onEscape(): void;
 }
 
 /** Listens to the keys of a window, or of an element that has the focus or something in it that has. */
-export function listenToKeyboard(target: GlobalEventHandlers, commands: Commands, velocity: VelocityInputs, mapping: () => Mapping, actions: KeyboardActions): void {
+export function listenToKeyboard(
+  target: GlobalEventHandlers,
+  commands: CommandDispatcher,
+  velocity: VelocityInputs,
+  mapping: () => Mapping,
+  actions: KeyboardActions,
+): void {
   target.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || typing(event.target) || document.querySelector("dialog[open]")) return;
+    if (
+      event.ctrlKey ||
+      event.metaKey ||
+      event.altKey ||
+      isTextField(event.target) ||
+      document.querySelector("dialog[open]")
+    )
+      return;
     if (press(event)) event.preventDefault();
   });
   const press = (event: KeyboardEvent): boolean => {
@@ -24,11 +37,11 @@ export function listenToKeyboard(target: GlobalEventHandlers, commands: Commands
     }
     if (event.repeat) return false;
     if (code === "Escape") {
-      if (!velocity.letAllGo()) actions.escape();
+      if (!velocity.releaseAll()) actions.onEscape();
       return true;
     }
     if (event.key === "?") {
-      actions.keys();
+      actions.showKeys();
       return true;
     }
     // a button or link that has the focus is pressed by these two
@@ -37,9 +50,14 @@ export function listenToKeyboard(target: GlobalEventHandlers, commands: Commands
     return commands.press(code, mapping().bindings[code] ?? [], 1, event.timeStamp);
   };
   target.addEventListener("keyup", (event) => commands.release(event.code, event.timeStamp));
-  target.addEventListener("tagName" in target ? "focusout" : "blur", () => commands.forget((control) => !isPadControl(control)));
+  target.addEventListener("tagName" in target ? "focusout" : "blur", () =>
+    commands.releaseAll((control) => !isPadControl(control)),
+  );
 }
 
-function typing(target: EventTarget | null): boolean {
-  return target instanceof HTMLElement && (target.isContentEditable || target.matches("input:not([type=range]), textarea, select"));
+function isTextField(target: EventTarget | null): boolean {
+  return (
+    target instanceof HTMLElement &&
+    (target.isContentEditable || target.matches("input:not([type=range]), textarea, select"))
+  );
 }

@@ -13,19 +13,22 @@ export interface OneEuroSettings {
 }
 
 /** Samples nearer in time than this are of one time, seconds. */
-const SAME = 1e-6;
+const MIN_INTERVAL_S = 1e-6;
 
-interface State {
+interface FilterState {
   seconds: number;
   value: Float64Array;
   speed: Float64Array;
 }
 
 export class OneEuro {
-  #before: State | null = null;
-  #now: State | null = null;
+  #previous: FilterState | null = null;
+  #current: FilterState | null = null;
 
-  constructor(private readonly size: number, public settings: OneEuroSettings) {}
+  constructor(
+    private readonly dimensions: number,
+    public settings: OneEuroSettings,
+  ) {}
 
   /**
    * The smoothed value of a sample at a time. The first comes through as it is, and so does a constant. Times may be irregular; of several samples of one
@@ -34,26 +37,30 @@ export class OneEuro {
    * @throws RangeError for another number of values, or one that is not finite
    */
   filter(values: ArrayLike<number>, seconds: number): Float64Array {
-    if (values.length !== this.size || !Array.from(values).every(Number.isFinite) || !Number.isFinite(seconds)) {
-      throw new RangeError(`a sample is ${this.size} finite numbers and a time, not ${Array.from(values).join(", ")} at ${seconds}`);
+    if (values.length !== this.dimensions || !Array.from(values).every(Number.isFinite) || !Number.isFinite(seconds)) {
+      throw new RangeError(
+        `a sample is ${this.dimensions} finite numbers and a time, not ${Array.from(values).join(", ")} at ${seconds}`,
+      );
     }
-    if (this.#now && seconds - this.#now.seconds >= SAME) this.#before = this.#now;
-    else if (this.#now) seconds = this.#now.seconds;
-    this.#now = this.#before ? this.#follow(this.#before, values, seconds) : { seconds, value: Float64Array.from(values), speed: new Float64Array(this.size) };
-    return this.#now.value.slice();
+    if (this.#current && seconds - this.#current.seconds >= MIN_INTERVAL_S) this.#previous = this.#current;
+    else if (this.#current) seconds = this.#current.seconds;
+    this.#current = this.#previous
+      ? this.#step(this.#previous, values, seconds)
+      : { seconds, value: Float64Array.from(values), speed: new Float64Array(this.dimensions) };
+    return this.#current.value.slice();
   }
 
   /** Forgets what came: the next sample is the first. */
   reset(): void {
-    this.#before = this.#now = null;
+    this.#previous = this.#current = null;
   }
 
-  #follow(before: State, values: ArrayLike<number>, seconds: number): State {
+  #step(before: FilterState, values: ArrayLike<number>, seconds: number): FilterState {
     const { minCutoff, beta, derivativeCutoff } = this.settings;
     const passed = seconds - before.seconds;
-    const slow = weight(derivativeCutoff, passed);
+    const slow = lowPassWeight(derivativeCutoff, passed);
     const speed = before.speed.map((old, axis) => old + slow * ((values[axis] - before.value[axis]) / passed - old));
-    const much = weight(minCutoff + beta * Math.hypot(...speed), passed);
+    const much = lowPassWeight(minCutoff + beta * Math.hypot(...speed), passed);
     // written so that a constant comes through to the last bit
     const value = before.value.map((old, axis) => old + much * (values[axis] - old));
     return { seconds, value, speed };
@@ -61,16 +68,20 @@ export class OneEuro {
 }
 
 /** What a new sample weighs in a low-pass of a cutoff in Hz, after some seconds. */
-function weight(cutoff: number, passed: number): number {
-  const turned = 2 * Math.PI * cutoff * passed;
+function lowPassWeight(cutoff: number, interval: number): number {
+  const turned = 2 * Math.PI * cutoff * interval;
   return turned / (turned + 1);
 }
 
 /** Cutoffs at rest of the least and the most smoothing, Hz. */
-const CUTOFFS = [8, 0.6] as const;
+const REST_CUTOFFS_HZ = [8, 0.6] as const;
 
 /** A person's wish for smoothness, 0 (none) to 1, as settings; `beta` depends on the unit. Null for none. */
-export function smoothness(wish: number, beta: number): OneEuroSettings | null {
-  if (!(wish > 0)) return null;
-  return { minCutoff: CUTOFFS[0] * (CUTOFFS[1] / CUTOFFS[0]) ** Math.min(wish, 1), beta, derivativeCutoff: 1 };
+export function smoothingSettings(amount: number, beta: number): OneEuroSettings | null {
+  if (!(amount > 0)) return null;
+  return {
+    minCutoff: REST_CUTOFFS_HZ[0] * (REST_CUTOFFS_HZ[1] / REST_CUTOFFS_HZ[0]) ** Math.min(amount, 1),
+    beta,
+    derivativeCutoff: 1,
+  };
 }

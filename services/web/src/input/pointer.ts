@@ -1,24 +1,24 @@
 /** Mouse and touch on the stage: a ring or hand is dragged, anything else turns the view. */
 import { Vector3 } from "three";
-import { limbNumber, limbOf, performerOf } from "../wire/limbs";
 import type { Stage } from "../stage/stage";
-import type { Hands } from "./hands";
-import { OneEuro, smoothness } from "./one-euro";
+import { limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
+import type { LimbController } from "./limb-controller";
+import { OneEuro, smoothingSettings } from "./one-euro";
 
 /** How near a handle a pointer takes hold, CSS pixels, whatever size the ring is drawn. */
-export const GRAB = 44;
-const ORBIT = 0.005;
+export const GRAB_RADIUS_PX = 44;
+const ORBIT_RAD_PER_PX = 0.005;
 /** Of the smoothing of what is pulled, Hz for each metre a second. */
-const BETA = 12;
+const PULL_BETA = 12;
 /** Full speed nearer and further, metres a second, and how far the limb may lag behind it, metres. */
-const DEPTH_SPEED = 0.7;
-const DEPTH_LAG = 0.15;
+const DEPTH_SPEED_M_PER_S = 0.7;
+const MAX_DEPTH_LAG_M = 0.15;
 
 export interface PointerInput {
   /** The limb under the pointer, lit; null for none. */
-  readonly near: number | null;
+  readonly hoveredLimb: number | null;
   /** Whether a limb is being dragged. */
-  readonly pulling: boolean;
+  readonly isDragging: boolean;
   /** Pulls again what is held: the dance moves under a resting pointer. Once a frame, with the time of events, milliseconds. */
   update(now: number): void;
 }
@@ -33,29 +33,34 @@ interface Drag {
   /** Of the place it is pulled to. */
   filter: OneEuro;
   /** How much nearer to the audience than the handle it is pulled, metres, and when that was, milliseconds. */
-  ahead: number;
+  depthLead: number;
   /** How near that is, metres towards the audience. */
   depth: number;
-  at: number;
+  updatedAt: number;
 }
 
 /**
  * Whether a limb can be taken, and who is told when not, and when it was; how much a pull is smoothed, 0 to 1; how fast a limb goes nearer meanwhile, -1 to 1, by keys or wheel.
  */
 export interface PointerOptions {
-  may(limb: number): boolean;
-  refused(limb: number): void;
-  taken(limb: number): void;
+  canClaim(limb: number): boolean;
+  onRefused(limb: number): void;
+  onClaimed(limb: number): void;
   smoothing(): number;
-  nearer(limb: number): number;
+  depthInput(limb: number): number;
 }
 
-export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Hands, { may, refused, taken, smoothing, nearer }: PointerOptions): PointerInput {
+export function createPointerInput(
+  canvas: HTMLCanvasElement,
+  stage: Stage,
+  limbController: LimbController,
+  { canClaim: may, onRefused: refused, onClaimed: taken, smoothing, depthInput: nearer }: PointerOptions,
+): PointerInput {
   const drags = new Map<number, Drag>();
   let near: number | null = null;
   let orbiting: { id: number; x: number; y: number } | null = null;
   const handle = new Vector3();
-  const handleAt = (limb: number) => stage.performers[performerOf(limb)].handle(limbOf(limb), handle);
+  const handleAt = (limb: number) => stage.performers[performerOfLimb(limb)].handle(limbWithinPerformer(limb), handle);
 
   /** Where in the picture an event is, CSS pixels: the canvas may stand anywhere in a page. */
   const placeOf = (event: PointerEvent): { x: number; y: number } => {
@@ -64,7 +69,7 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
   };
   const nearest = (x: number, y: number): number | null => {
     let best: number | null = null;
-    let least = GRAB;
+    let least = GRAB_RADIUS_PX;
     stage.performers.forEach(({ group }, k) => {
       for (let limb = limbNumber(k, 0); group.visible && limb < limbNumber(k + 1, 0); limb++) {
         const at = stage.toScreen(handleAt(limb));
@@ -81,28 +86,28 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
   };
   const pull = (drag: Drag, now: number) => {
     const { limb, x, y, dx, dy, filter } = drag;
-    if (!stage.performers[performerOf(limb)]) return;
+    if (!stage.performers[performerOfLimb(limb)]) return;
     handleAt(limb);
     deepen(drag, now);
-    const place = stage.fromScreen(x + dx, y + dy, handle.addScaledVector(stage.back(), drag.ahead));
+    const place = stage.fromScreen(x + dx, y + dy, handle.addScaledVector(stage.back(), drag.depthLead));
     if (!place) return;
-    const settings = smoothness(smoothing(), BETA);
+    const settings = smoothingSettings(smoothing(), PULL_BETA);
     if (settings) {
       filter.settings = settings;
       place.fromArray(filter.filter(place.toArray(), now / 1000));
     }
-    hands.pullTo(limb, place);
+    limbController.pullTo(limb, place);
   };
 
   /** Goes nearer or further at a speed, whose start is where the handle is; at rest the handle's own depth is kept. */
   const deepen = (drag: Drag, now: number) => {
-    const speed = nearer(drag.limb) * DEPTH_SPEED;
+    const speed = nearer(drag.limb) * DEPTH_SPEED_M_PER_S;
     const depth = handle.dot(stage.back());
-    const from = drag.ahead === 0 ? depth : drag.depth;
-    drag.depth = from + (speed * Math.max(now - drag.at, 0)) / 1000;
-    drag.ahead = speed === 0 ? 0 : Math.min(DEPTH_LAG, Math.max(-DEPTH_LAG, drag.depth - depth));
-    drag.depth = depth + drag.ahead;
-    drag.at = now;
+    const from = drag.depthLead === 0 ? depth : drag.depth;
+    drag.depth = from + (speed * Math.max(now - drag.updatedAt, 0)) / 1000;
+    drag.depthLead = speed === 0 ? 0 : Math.min(MAX_DEPTH_LAG_M, Math.max(-MAX_DEPTH_LAG_M, drag.depth - depth));
+    drag.depth = depth + drag.depthLead;
+    drag.updatedAt = now;
   };
 
   canvas.addEventListener("pointerdown", (event) => {
@@ -119,10 +124,20 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
       refused(limb);
       return;
     }
-    if (!hands.take(limb, "pointer")) return;
+    if (!limbController.claim(limb, "pointer")) return;
     taken(limb);
     const at = stage.toScreen(handleAt(limb));
-    drags.set(pointerId, { limb, x, y, dx: at.x - x, dy: at.y - y, filter: new OneEuro(3, { minCutoff: 1, beta: BETA, derivativeCutoff: 1 }), ahead: 0, depth: 0, at: event.timeStamp });
+    drags.set(pointerId, {
+      limb,
+      x,
+      y,
+      dx: at.x - x,
+      dy: at.y - y,
+      filter: new OneEuro(3, { minCutoff: 1, beta: PULL_BETA, derivativeCutoff: 1 }),
+      depthLead: 0,
+      depth: 0,
+      updatedAt: event.timeStamp,
+    });
     canvas.dataset.pulling = "";
   });
   canvas.addEventListener("pointermove", (event) => {
@@ -131,7 +146,10 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
       Object.assign(drag, placeOf(event));
       pull(drag, event.timeStamp);
     } else if (orbiting?.id === event.pointerId) {
-      stage.audience.orbit((orbiting.x - event.clientX) * ORBIT, (event.clientY - orbiting.y) * ORBIT);
+      stage.audience.orbit(
+        (orbiting.x - event.clientX) * ORBIT_RAD_PER_PX,
+        (event.clientY - orbiting.y) * ORBIT_RAD_PER_PX,
+      );
       orbiting = { id: event.pointerId, x: event.clientX, y: event.clientY };
     } else if (event.pointerType !== "touch") {
       const { x, y } = placeOf(event);
@@ -141,7 +159,7 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
   const end = (event: PointerEvent) => {
     const drag = drags.get(event.pointerId);
     drags.delete(event.pointerId);
-    if (drag && hands.source(drag.limb) === "pointer") hands.letGo(drag.limb);
+    if (drag && limbController.source(drag.limb) === "pointer") limbController.release(drag.limb);
     if (orbiting?.id === event.pointerId) orbiting = null;
     if (drags.size === 0) delete canvas.dataset.pulling;
   };
@@ -149,15 +167,15 @@ export function createPointer(canvas: HTMLCanvasElement, stage: Stage, hands: Ha
   canvas.addEventListener("pointercancel", end);
   canvas.addEventListener("pointerleave", () => light(null));
   return {
-    get near() {
+    get hoveredLimb() {
       return near;
     },
-    get pulling() {
+    get isDragging() {
       return drags.size > 0;
     },
     update(now) {
       for (const [id, drag] of drags) {
-        if (hands.source(drag.limb) === "pointer") pull(drag, now);
+        if (limbController.source(drag.limb) === "pointer") pull(drag, now);
         else drags.delete(id);
       }
     },

@@ -6,22 +6,35 @@
  * `marionette/blend.py`.
  */
 
-import { conjugate, multiply, rotate, slerp, type Numbers } from "../motion/rotation";
-import { about, across, addScaled, apart, between, cross, dot, length, normalise, put, squareTo, unit } from "../motion/vector";
-import type { ArmRig } from "./limbs";
-import { FARTHEST, FASTEST, ROUND, Spins } from "./spin";
+import { conjugate, multiply, type Numbers, rotate, slerp } from "../motion/rotation";
+import {
+  addScaled,
+  anyPerpendicular,
+  cross,
+  distanceBetween,
+  dot,
+  fromAxisAngle,
+  length,
+  normalise,
+  rejectFrom,
+  rotationBetween,
+  setVector,
+  unit,
+} from "../motion/vector";
+import type { ArmRig } from "./limb-rig";
+import { FULL_TURN_RAD, MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S, TwistLimiter } from "./twist";
 
 /** Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more. */
-const FRESH = 0.05;
+const SWIVEL_RESET_WEIGHT = 0.05;
 /** An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned quite otherwise, at any weight. */
-const AWAY = 2;
+const DISTANCE_WEIGHT = 2;
 
 /** One arm on its way. It remembers which way round the elbow swings, and how far its links are turned. */
 export class ArmBlend {
-  private swivel: number | null = null;
+  private swivelRad: number | null = null;
   /** Radians about the chord that the elbow is shown ahead of its way, and goes back. */
-  private ahead = 0;
-  private readonly spins: Spins;
+  private swivelOffsetRad = 0;
+  private readonly twistLimiter: TwistLimiter;
   private readonly own = new Float64Array(3);
   private readonly direction = new Float64Array(3);
   private readonly ownNormal = new Float64Array(3);
@@ -35,14 +48,14 @@ export class ArmBlend {
   private readonly before = new Float64Array(4);
 
   constructor(private readonly rig: ArmRig) {
-    this.spins = new Spins(rig.links);
+    this.twistLimiter = new TwistLimiter(rig.bones);
   }
 
   /** Forgets the way it went. */
-  forget(): void {
-    this.swivel = null;
-    this.ahead = 0;
-    this.spins.forget();
+  reset(): void {
+    this.swivelRad = null;
+    this.swivelOffsetRad = 0;
+    this.twistLimiter.reset();
   }
 
   /**
@@ -54,101 +67,117 @@ export class ArmBlend {
    * that. Between, the elbow goes to the nearest place from which forearm and hand reach the target; where the mixed wrist
    * leaves none, the tip comes as near as it can.
    */
-  joints(
-    out: Numbers, outAt: number, dance: Numbers, danceAt: number, bent: Numbers,
-    target: Numbers, turn: Numbers, normal: Numbers, weight: number, seconds: number,
+  blend(
+    out: Numbers,
+    outAt: number,
+    motionJoints: Numbers,
+    motionJointsAt: number,
+    solvedJoints: Numbers,
+    target: Numbers,
+    alignment: Numbers,
+    normal: Numbers,
+    weight: number,
+    seconds: number,
   ): void {
     const { rig, own, direction, frame, carried } = this;
-    rig.direction(direction, 0, target, 0);
-    rig.target(own, 0, dance, danceAt);
+    rig.targetDirection(direction, 0, target, 0);
+    rig.tipTarget(own, 0, motionJoints, motionJointsAt);
     // nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
-    const share = Math.min(Math.max(Math.cbrt(weight), AWAY * apart(target, 0, own, 0)), 1);
-    const most = Math.min(Math.abs(this.ahead), ROUND * share);
-    this.ahead = Math.sign(this.ahead) * Math.max(most - FASTEST * seconds, 0);
+    const share = Math.min(Math.max(Math.cbrt(weight), DISTANCE_WEIGHT * distanceBetween(target, 0, own, 0)), 1);
+    const most = Math.min(Math.abs(this.swivelOffsetRad), FULL_TURN_RAD * share);
+    this.swivelOffsetRad = Math.sign(this.swivelOffsetRad) * Math.max(most - MAX_TWIST_SPEED_RAD_S * seconds, 0);
     if (weight >= 1) {
-      this.swivel = null;
-      about(frame, 0, direction, 0, this.ahead);
+      this.swivelRad = null;
+      fromAxisAngle(frame, 0, direction, 0, this.swivelOffsetRad);
       rotate(carried, 0, frame, 0, normal, 0);
-      rig.chord(frame, 0, direction, this.ahead === 0 ? normal : carried);
-      multiply(out, outAt, frame, 0, bent, 0);
+      rig.chordFrame(frame, 0, direction, this.swivelOffsetRad === 0 ? normal : carried);
+      multiply(out, outAt, frame, 0, solvedJoints, 0);
       normalise(out, outAt);
-      for (let i = 4; i < 12; i++) out[outAt + i] = bent[i];
+      for (let i = 4; i < 12; i++) out[outAt + i] = solvedJoints[i];
     } else {
-      rig.direction(own, 0, own, 0);
-      this.mixed(out, outAt, dance, danceAt, bent, target, turn, normal, weight);
+      rig.targetDirection(own, 0, own, 0);
+      this.blendJoints(out, outAt, motionJoints, motionJointsAt, solvedJoints, target, alignment, normal, weight);
     }
-    this.spins.follow(out, outAt, share, seconds);
+    this.twistLimiter.limit(out, outAt, share, seconds);
   }
 
   /** The joints (12) below weight 1, the directions of the target and of the dance's own hand being known. */
-  private mixed(
-    out: Numbers, outAt: number, dance: Numbers, danceAt: number, bent: Numbers,
-    target: Numbers, turn: Numbers, normal: Numbers, weight: number,
+  private blendJoints(
+    out: Numbers,
+    outAt: number,
+    motionJoints: Numbers,
+    motionJointsAt: number,
+    solvedJoints: Numbers,
+    target: Numbers,
+    alignment: Numbers,
+    normal: Numbers,
+    weight: number,
   ): void {
     const { rig, direction, own, ownNormal, carried, side, frame } = this;
-    rig.bendAxis(ownNormal, 0, dance, danceAt);
-    squareTo(ownNormal, 0, ownNormal, 0, own, 0);
-    if (!unit(ownNormal, 0, ownNormal, 0)) across(ownNormal, 0, own, 0);
-    rotate(carried, 0, turn, 0, ownNormal, 0);
+    rig.planeNormal(ownNormal, 0, motionJoints, motionJointsAt);
+    rejectFrom(ownNormal, 0, ownNormal, 0, own, 0);
+    if (!unit(ownNormal, 0, ownNormal, 0)) anyPerpendicular(ownNormal, 0, own, 0);
+    rotate(carried, 0, alignment, 0, ownNormal, 0);
     cross(side, 0, carried, 0, normal, 0);
     let swivel = Math.atan2(dot(side, 0, direction, 0), dot(carried, 0, normal, 0));
-    if (this.swivel !== null) {
-      const onwards = swivel + ROUND * Math.round((this.swivel - swivel) / ROUND);
-      if (weight > FRESH && Math.abs(onwards) <= FARTHEST) swivel = onwards;
+    if (this.swivelRad !== null) {
+      const onwards = swivel + FULL_TURN_RAD * Math.round((this.swivelRad - swivel) / FULL_TURN_RAD);
+      if (weight > SWIVEL_RESET_WEIGHT && Math.abs(onwards) <= MAX_TWIST_LAG_RAD) swivel = onwards;
       else {
         // the other way round from here on; it is shown where it was, and comes over
-        this.ahead += weight * (onwards - swivel);
-        this.ahead -= ROUND * Math.round(this.ahead / ROUND);
+        this.swivelOffsetRad += weight * (onwards - swivel);
+        this.swivelOffsetRad -= FULL_TURN_RAD * Math.round(this.swivelOffsetRad / FULL_TURN_RAD);
       }
     }
-    this.swivel = swivel;
+    this.swivelRad = swivel;
     if (weight <= 0) {
-      for (let i = 0; i < 12; i++) out[outAt + i] = dance[danceAt + i];
+      for (let i = 0; i < 12; i++) out[outAt + i] = motionJoints[motionJointsAt + i];
       return;
     }
-    rig.chord(frame, 0, own, ownNormal);
+    rig.chordFrame(frame, 0, own, ownNormal);
     conjugate(frame, 0, frame, 0);
-    multiply(out, outAt, frame, 0, dance, danceAt);
-    for (let i = 4; i < 12; i++) out[outAt + i] = dance[danceAt + i];
+    multiply(out, outAt, frame, 0, motionJoints, motionJointsAt);
+    for (let i = 4; i < 12; i++) out[outAt + i] = motionJoints[motionJointsAt + i];
     for (let i = 0; i < 12; i += 4) {
-      slerp(out, outAt + i, out, outAt + i, bent, i, weight);
+      slerp(out, outAt + i, out, outAt + i, solvedJoints, i, weight);
       normalise(out, outAt + i);
     }
-    this.close(out, outAt, length(target, 0));
-    about(frame, 0, direction, 0, swivel * weight + this.ahead);
+    this.closeOnTip(out, outAt, length(target, 0));
+    fromAxisAngle(frame, 0, direction, 0, swivel * weight + this.swivelOffsetRad);
     rotate(carried, 0, frame, 0, carried, 0);
-    rig.chord(frame, 0, direction, carried);
+    rig.chordFrame(frame, 0, direction, carried);
     multiply(out, outAt, frame, 0, out, outAt);
     normalise(out, outAt);
   }
 
   /** Turns shoulder and elbow by as little as brings the tip to `reach` arm lengths along the chord. */
-  private close(joints: Numbers, at: number, reach: number): void {
+  private closeOnTip(joints: Numbers, at: number, reach: number): void {
     const { rig, rest, place, goal, turn, before, side: mixed } = this;
-    const { links } = rig;
+    const { bones: links } = rig;
     rotate(rest, 0, joints, at + 8, links, 6);
     addScaled(rest, 0, links, 3, rest, 0, 1);
-    const near = length(links, 0), far = length(rest, 0);
-    const chord = Math.max(reach * rig.scale, 1e-9);
+    const near = length(links, 0),
+      far = length(rest, 0);
+    const chord = Math.max(reach * rig.armLengthM, 1e-9);
     const along = Math.min(Math.max((near * near + chord * chord - far * far) / (2 * chord), -near), near);
     const off = Math.sqrt(Math.max(near * near - along * along, 0));
     rotate(mixed, 0, joints, at, links, 0);
     // where the elbow has to go farther off the chord, it goes to the side of -y: a straight arm leaves open which, and that of
     // the bent arm is there
-    put(place, 0, 0, mixed[1] - Math.max(off - Math.hypot(mixed[1], mixed[2]), 0), mixed[2]);
-    if (!unit(place, 0, place, 0)) put(place, 0, 0, -1, 0);
-    put(place, 0, along, off * place[1], off * place[2]);
+    setVector(place, 0, 0, mixed[1] - Math.max(off - Math.hypot(mixed[1], mixed[2]), 0), mixed[2]);
+    if (!unit(place, 0, place, 0)) setVector(place, 0, 0, -1, 0);
+    setVector(place, 0, along, off * place[1], off * place[2]);
     multiply(before, 0, joints, at, joints, at + 4);
-    put(goal, 0, place[0] / near, place[1] / near, place[2] / near);
+    setVector(goal, 0, place[0] / near, place[1] / near, place[2] / near);
     for (let i = 0; i < 3; i++) mixed[i] /= near;
-    between(turn, 0, mixed, 0, goal, 0);
+    rotationBetween(turn, 0, mixed, 0, goal, 0);
     multiply(joints, at, turn, 0, joints, at);
     // what is below the elbow, as it lies and as it should
     rotate(rest, 0, before, 0, rest, 0);
-    if (!unit(rest, 0, rest, 0)) put(rest, 0, 1, 0, 0);
-    put(goal, 0, chord - place[0], -place[1], -place[2]);
-    if (!unit(goal, 0, goal, 0)) put(goal, 0, 1, 0, 0);
-    between(turn, 0, rest, 0, goal, 0);
+    if (!unit(rest, 0, rest, 0)) setVector(rest, 0, 1, 0, 0);
+    setVector(goal, 0, chord - place[0], -place[1], -place[2]);
+    if (!unit(goal, 0, goal, 0)) setVector(goal, 0, 1, 0, 0);
+    rotationBetween(turn, 0, rest, 0, goal, 0);
     multiply(before, 0, turn, 0, before, 0);
     conjugate(turn, 0, joints, at);
     multiply(joints, at + 4, turn, 0, before, 0);

@@ -7,45 +7,57 @@
  * stretch. As `marionette/elbow.py`, which says more.
  */
 
-import { rotate, type Numbers } from "../motion/rotation";
-import { across, addScaled, apart, between, combine, cross, dot, length, put, squareTo, unit } from "../motion/vector";
+import { type Numbers, rotate } from "../motion/rotation";
+import {
+  addScaled,
+  anyPerpendicular,
+  combine,
+  cross,
+  distanceBetween,
+  dot,
+  length,
+  rejectFrom,
+  rotationBetween,
+  setVector,
+  unit,
+} from "../motion/vector";
 import type { Arm } from "./arm";
-import { ELBOW_LIMIT, OUTER_RADIUS, WRIST_LIMIT } from "./proportions";
-import type { Shoulder } from "./shoulder";
+import { MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD } from "./proportions";
+import type { ShoulderLimit } from "./shoulder";
 
 /** Distance from the vertical axis, in arm lengths, at which the plane is drawn half as fast as far away. */
-const NEAR_AXIS = 0.05;
+const HALF_SWING_DISTANCE = 0.05;
 /** Seconds in which the swing left to do halves, far from the axis. */
-const HALF_LIFE = 0.08;
+const SWING_HALF_LIFE_S = 0.08;
 /** Radians per second that the plane swings at most. */
-const FASTEST = 2 * Math.PI;
+const MAX_SWING_SPEED_RAD_S = 2 * Math.PI;
 /** Arm lengths per second: what the hand's way and the change of bend leave of this is there for the swing. */
-export const SPEED = 1.68;
+export const MAX_ELBOW_SPEED = 1.68;
 /** Arm lengths that the elbow is off the chord at most, for each arm length that the tip is short of full stretch. */
-const SLOPE = 2.4;
+const MAX_OFFSET_PER_SLACK = 2.4;
 /** Arm lengths per second that are there for the swing in any case. */
-const LEAST_SPEED = 0.1;
+const MIN_SWING_SPEED = 0.1;
 /** Radians that an upper arm keeps from where no shoulder goes. */
-const CLEAR = 1e-7;
+const CAP_CLEARANCE_RAD = 1e-7;
 /** Arm lengths per second that the elbow leaves or nears the chord beyond what the tip asks for. */
-const LIFT_SPEED = 1.2;
+const MAX_LIFT_SPEED = 1.2;
 
 /**
  * An arm's freedoms settled: where the `tip` (3) is, in arm lengths (not where it was asked to be only while the shoulder's
  * limit leaves no other way), the unit `normal` (3) of the arm's plane, square to it, and the wrist's `bend`.
  */
-export interface Hanging {
+export interface ArmConfiguration {
   readonly tip: Float64Array;
   readonly normal: Float64Array;
   bend: number;
 }
 
-function within(least: number, value: number, most: number): number {
-  return Math.min(Math.max(value, least), most);
+function clamp(min: number, value: number, max: number): number {
+  return Math.min(Math.max(value, min), max);
 }
 
-function acos(x: number): number {
-  return Math.acos(within(-1, x, 1));
+function clampedAcos(x: number): number {
+  return Math.acos(clamp(-1, x, 1));
 }
 
 /**
@@ -56,7 +68,7 @@ export function verticalNormal(out: Numbers, direction: Numbers, up: Numbers): b
   const [x, y, z] = out;
   cross(out, 0, direction, 0, up, 0);
   if (unit(out, 0, out, 0, 1e-9)) return true;
-  put(out, 0, x, y, z);
+  setVector(out, 0, x, y, z);
   return false;
 }
 
@@ -64,19 +76,19 @@ const level = new Float64Array(3);
 
 /** The angle of a unit vector (3) above the horizontal, radians, -pi/2..pi/2. */
 export function elevation(direction: Numbers, up: Numbers): number {
-  squareTo(level, 0, direction, 0, up, 0);
+  rejectFrom(level, 0, direction, 0, up, 0);
   return Math.atan2(dot(direction, 0, up, 0), length(level, 0));
 }
 
 /** How far an elbow (3, from the shoulder, any length) is off the unit `direction` of the tip, radians. */
-export function liftBetween(elbow: Numbers, direction: Numbers): number {
+export function liftAngle(elbow: Numbers, direction: Numbers): number {
   const along = dot(elbow, 0, direction, 0);
   return Math.atan2(Math.sqrt(Math.max(dot(elbow, 0, elbow, 0) - along * along, 0)), along);
 }
 
 /** The angle between two unit vectors (3), radians; by the half chord, as the arc cosine loses small angles. */
 export function angleBetween(a: Numbers, b: Numbers): number {
-  return 2 * Math.asin(Math.min(0.5 * apart(a, 0, b, 0), 1));
+  return 2 * Math.asin(Math.min(0.5 * distanceBetween(a, 0, b, 0), 1));
 }
 
 /** One arm's elbow, in the shoulder's frame so that a turning body carries it. */
@@ -84,11 +96,11 @@ export class Elbow {
   private readonly direction = new Float64Array(3);
   private readonly normal = Float64Array.of(1, 0, 0);
   private lift = 0;
-  private begun = false;
+  private isStarted = false;
   /** Where the upper arm was shown last, and whether it was. */
-  private readonly was = new Float64Array(3);
-  private shown = false;
-  private readonly hanging: Hanging = { tip: new Float64Array(3), normal: new Float64Array(3), bend: 0 };
+  private readonly lastUpperArm = new Float64Array(3);
+  private hasLastUpperArm = false;
+  private readonly configuration: ArmConfiguration = { tip: new Float64Array(3), normal: new Float64Array(3), bend: 0 };
   private readonly before = new Float64Array(3);
   private readonly upperArm = new Float64Array(3);
   private readonly wanted = new Float64Array(3);
@@ -97,16 +109,19 @@ export class Elbow {
   private readonly carry = new Float64Array(4);
   private readonly limits = new Float64Array(2);
 
-  constructor(private readonly arm: Arm, private readonly shoulder: Shoulder) {}
+  constructor(
+    private readonly arm: Arm,
+    private readonly shoulder: ShoulderLimit,
+  ) {}
 
   /** The next call of `begin` starts anew. */
-  forget(): void {
-    this.begun = this.shown = false;
+  reset(): void {
+    this.isStarted = this.hasLastUpperArm = false;
   }
 
   /** Whether it has begun. */
-  get known(): boolean {
-    return this.begun;
+  get hasBegun(): boolean {
+    return this.isStarted;
   }
 
   /**
@@ -115,88 +130,101 @@ export class Elbow {
    */
   begin(direction: Numbers, normal: Numbers, lift: number): void {
     this.direction.set(direction);
-    this.makeSquare(normal, direction);
+    this.setNormal(normal, direction);
     this.lift = lift;
-    this.begun = true;
+    this.isStarted = true;
   }
 
   /**
    * The arm once the tip has come to the unit `direction` at `reach` arm lengths, `seconds` after the last. `up` is the world's
    * up, a unit vector in the same frame. The storage is used again by the next call.
    */
-  follow(direction: Numbers, reach: number, up: Numbers, seconds: number): Hanging {
-    const { arm, shoulder, normal, before, upperArm, hanging, wanted } = this;
+  step(direction: Numbers, reach: number, up: Numbers, seconds: number): ArmConfiguration {
+    const { arm, shoulder, normal, before, upperArm, configuration: hanging, wanted } = this;
     const { upper } = arm.proportions;
-    this.toUpperArm(before, this.direction, normal, this.lift);
-    between(this.carry, 0, this.direction, 0, direction, 0);
+    this.computeUpperArm(before, this.direction, normal, this.lift);
+    rotationBetween(this.carry, 0, this.direction, 0, direction, 0);
     rotate(normal, 0, this.carry, 0, normal, 0);
-    this.makeSquare(normal, direction);
+    this.setNormal(normal, direction);
     this.direction.set(direction);
-    let r = arm.clamp(reach);
+    let r = arm.clampDistance(reach);
     // towards full stretch the lift ends anyhow: evenly, and not within the last frames
-    const goal = Math.min(this.liftOf(r, arm.bend(r, elevation(direction, up))), (SLOPE * (OUTER_RADIUS - r)) / upper);
-    const step = (LIFT_SPEED * seconds) / upper;
-    let lift = within(this.lift - step, goal, this.lift + step);
-    lift = within(this.leastLift(r), lift, this.greatestLift(r));
-    this.toUpperArm(upperArm, direction, normal, lift);
+    const goal = Math.min(
+      this.liftForBend(r, arm.gravityBend(r, elevation(direction, up))),
+      (MAX_OFFSET_PER_SLACK * (MAX_TIP_DISTANCE - r)) / upper,
+    );
+    const step = (MAX_LIFT_SPEED * seconds) / upper;
+    let lift = clamp(this.lift - step, goal, this.lift + step);
+    lift = clamp(this.minLift(r), lift, this.maxLift(r));
+    this.computeUpperArm(upperArm, direction, normal, lift);
     const moved = angleBetween(upperArm, before) * upper;
-    const left = Math.max(SPEED * seconds - moved, LEAST_SPEED * seconds);
-    this.swing(direction, up, r, lift, seconds, left);
+    const left = Math.max(MAX_ELBOW_SPEED * seconds - moved, MIN_SWING_SPEED * seconds);
+    this.swingNormal(direction, up, r, lift, seconds, left);
     this.lift = lift;
-    let turn = shoulder.turn(direction, normal, lift);
+    let turn = shoulder.minAllowedTurn(direction, normal, lift);
     if (turn === null) {
       // no turn helps: more bend of the elbow may, and where it does not, a hand that is nearer
-      const away = shoulder.away(direction) + CLEAR;
-      if (away > this.greatestLift(r)) r = this.nearer(r, away);
-      lift = Math.min(Math.max(lift, away), this.greatestLift(r));
-      turn = shoulder.turn(direction, normal, lift);
-      this.turnBy(direction, turn ?? 0);
+      const away = shoulder.angleToAllowed(direction) + CAP_CLEARANCE_RAD;
+      if (away > this.maxLift(r)) r = this.maxDistanceForLift(r, away);
+      lift = Math.min(Math.max(lift, away), this.maxLift(r));
+      turn = shoulder.minAllowedTurn(direction, normal, lift);
+      this.rotateNormal(direction, turn ?? 0);
     } else if (turn !== 0) {
-      this.turnBy(direction, turn);
+      this.rotateNormal(direction, turn);
     }
-    this.toUpperArm(upperArm, direction, normal, lift);
+    this.computeUpperArm(upperArm, direction, normal, lift);
     const most = (moved + left) / upper;
     hanging.normal.set(normal);
-    if (this.shown && (turn === null || angleBetween(upperArm, this.was) > most)) {
+    if (this.hasLastUpperArm && (turn === null || angleBetween(upperArm, this.lastUpperArm) > most)) {
       // the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow; where it leaves none,
       // close to the shoulder, the elbow waits too
-      if (turn !== null) shoulder.toward(this.was, this.was, upperArm, most);
+      if (turn !== null) shoulder.stepToward(this.lastUpperArm, this.lastUpperArm, upperArm, most);
       for (let i = 0; i < 3; i++) wanted[i] = direction[i] * reach;
-      this.reachOut(this.was, wanted);
+      this.reachFromUpperArm(this.lastUpperArm, wanted);
     } else {
-      this.was.set(upperArm);
+      this.lastUpperArm.set(upperArm);
       for (let i = 0; i < 3; i++) hanging.tip[i] = direction[i] * r;
-      hanging.bend = this.bendOf(r, lift);
+      hanging.bend = this.bendForLift(r, lift);
     }
-    this.shown = true;
+    this.hasLastUpperArm = true;
     return hanging;
   }
 
-  private makeSquare(normal: Numbers, direction: Numbers): void {
-    squareTo(this.normal, 0, normal, 0, direction, 0);
-    if (!unit(this.normal, 0, this.normal, 0)) across(this.normal, 0, direction, 0);
+  private setNormal(normal: Numbers, direction: Numbers): void {
+    rejectFrom(this.normal, 0, normal, 0, direction, 0);
+    if (!unit(this.normal, 0, this.normal, 0)) anyPerpendicular(this.normal, 0, direction, 0);
   }
 
   /** The unit vector (3) from the shoulder to the elbow. */
-  private toUpperArm(out: Numbers, direction: Numbers, normal: Numbers, lift: number): void {
+  private computeUpperArm(out: Numbers, direction: Numbers, normal: Numbers, lift: number): void {
     cross(this.side, 0, direction, 0, normal, 0);
     combine(out, 0, direction, 0, Math.cos(lift), this.side, 0, Math.sin(lift));
   }
 
   /** Swings the normal about the chord towards the vertical plane's by as much as the elbow may move. */
-  private swing(direction: Numbers, up: Numbers, r: number, lift: number, seconds: number, left: number): void {
+  private swingNormal(
+    direction: Numbers,
+    up: Numbers,
+    r: number,
+    lift: number,
+    seconds: number,
+    maxTravel: number,
+  ): void {
     const { normal, wanted, side } = this;
     if (!verticalNormal(wanted, direction, up)) return;
-    squareTo(side, 0, direction, 0, up, 0);
+    rejectFrom(side, 0, direction, 0, up, 0);
     const off = length(side, 0) * r;
-    const pull = (off * off) / (off * off + NEAR_AXIS * NEAR_AXIS);
+    const pull = (off * off) / (off * off + HALF_SWING_DISTANCE * HALF_SWING_DISTANCE);
     cross(side, 0, normal, 0, wanted, 0);
     const swing = Math.atan2(dot(side, 0, direction, 0), dot(normal, 0, wanted, 0));
-    const most = Math.min(FASTEST * seconds, left / Math.max(this.arm.proportions.upper * Math.sin(lift), 1e-3));
-    this.turnBy(direction, within(-most, swing * (1 - 2 ** ((-seconds * pull) / HALF_LIFE)), most));
+    const most = Math.min(
+      MAX_SWING_SPEED_RAD_S * seconds,
+      maxTravel / Math.max(this.arm.proportions.upper * Math.sin(lift), 1e-3),
+    );
+    this.rotateNormal(direction, clamp(-most, swing * (1 - 2 ** ((-seconds * pull) / SWING_HALF_LIFE_S)), most));
   }
 
-  private turnBy(direction: Numbers, turn: number): void {
+  private rotateNormal(direction: Numbers, turn: number): void {
     const { normal, side } = this;
     cross(side, 0, direction, 0, normal, 0);
     combine(normal, 0, normal, 0, Math.cos(turn), side, 0, Math.sin(turn));
@@ -204,66 +232,67 @@ export class Elbow {
   }
 
   /** What hangs, where forearm and hand come nearest to `target` from an upper arm that is on its way. */
-  private reachOut(upperArm: Numbers, target: Numbers): void {
-    const { upper, fore, hand } = this.arm.proportions;
-    const { hanging, side, along, before: way, wanted: direction } = this;
+  private reachFromUpperArm(upperArm: Numbers, target: Numbers): void {
+    const { upper, forearm: fore, hand } = this.arm.proportions;
+    const { configuration: hanging, side, along, before: way, wanted: direction } = this;
     const { tip, normal } = hanging;
     addScaled(way, 0, target, 0, upperArm, 0, -upper);
-    const shortest = Math.sqrt(fore * fore + hand * hand + 2 * fore * hand * Math.cos(WRIST_LIMIT));
-    const reach = within(shortest, length(way, 0), fore + hand);
+    const shortest = Math.sqrt(fore * fore + hand * hand + 2 * fore * hand * Math.cos(MAX_WRIST_BEND_RAD));
+    const reach = clamp(shortest, length(way, 0), fore + hand);
     // where forearm and hand are straight, the cosine has lost the digits that tell the bend
-    const bend = reach < fore + hand ? acos((reach * reach - fore * fore - hand * hand) / (2 * fore * hand)) : 0;
+    const bend = reach < fore + hand ? clampedAcos((reach * reach - fore * fore - hand * hand) / (2 * fore * hand)) : 0;
     const lean = Math.atan2(hand * Math.sin(bend), fore + hand * Math.cos(bend));
-    squareTo(side, 0, way, 0, upperArm, 0);
+    rejectFrom(side, 0, way, 0, upperArm, 0);
     if (!unit(side, 0, side, 0)) cross(side, 0, normal, 0, upperArm, 0);
     let angle = Math.atan2(dot(way, 0, side, 0), dot(way, 0, upperArm, 0));
-    angle = within(lean, angle, Math.min(ELBOW_LIMIT + lean, Math.PI));
+    angle = clamp(lean, angle, Math.min(MAX_ELBOW_BEND_RAD + lean, Math.PI));
     combine(along, 0, upperArm, 0, Math.cos(angle), side, 0, Math.sin(angle));
     combine(tip, 0, upperArm, 0, upper, along, 0, reach);
-    const r = Math.min(length(tip, 0), OUTER_RADIUS);
+    const r = Math.min(length(tip, 0), MAX_TIP_DISTANCE);
     if (!unit(direction, 0, tip, 0)) direction.set(upperArm);
-    squareTo(side, 0, upperArm, 0, direction, 0);
+    rejectFrom(side, 0, upperArm, 0, direction, 0);
     if (!unit(side, 0, side, 0)) cross(side, 0, direction, 0, normal, 0);
     cross(normal, 0, side, 0, direction, 0);
     for (let i = 0; i < 3; i++) tip[i] = direction[i] * r;
-    this.arm.limits(this.limits, 0, r);
-    hanging.bend = within(this.limits[0], bend, this.limits[1]);
+    this.arm.bendLimits(this.limits, 0, r);
+    hanging.bend = clamp(this.limits[0], bend, this.limits[1]);
   }
 
   /** The farthest tip, no farther than `r`, whose upper arm is lifted `away` radians off the chord. */
-  private nearer(r: number, away: number): number {
-    let near = this.arm.inner, far = r;
+  private maxDistanceForLift(r: number, minLift: number): number {
+    let near = this.arm.minTipDistance,
+      far = r;
     for (let i = 0; i < 40; i++) {
       const middle = 0.5 * (near + far);
-      if (this.greatestLift(middle) >= away) near = middle;
+      if (this.maxLift(middle) >= minLift) near = middle;
       else far = middle;
     }
     return near;
   }
 
   /** The least lift that reaches `r` with elbow and wrist within their limits. */
-  private leastLift(r: number): number {
-    this.arm.limits(this.limits, 0, r);
-    return this.liftOf(r, this.limits[1]);
+  private minLift(r: number): number {
+    this.arm.bendLimits(this.limits, 0, r);
+    return this.liftForBend(r, this.limits[1]);
   }
 
   /** The greatest. */
-  private greatestLift(r: number): number {
-    this.arm.limits(this.limits, 0, r);
-    return this.liftOf(r, this.limits[0]);
+  private maxLift(r: number): number {
+    this.arm.bendLimits(this.limits, 0, r);
+    return this.liftForBend(r, this.limits[0]);
   }
 
-  private liftOf(r: number, bend: number): number {
-    const { upper, fore, hand } = this.arm.proportions;
+  private liftForBend(r: number, bend: number): number {
+    const { upper, forearm: fore, hand } = this.arm.proportions;
     const square = fore * fore + hand * hand + 2 * fore * hand * Math.cos(bend);
-    return acos((upper * upper + r * r - square) / (2 * upper * r));
+    return clampedAcos((upper * upper + r * r - square) / (2 * upper * r));
   }
 
-  private bendOf(r: number, lift: number): number {
-    const { upper, fore, hand } = this.arm.proportions;
+  private bendForLift(r: number, lift: number): number {
+    const { upper, forearm: fore, hand } = this.arm.proportions;
     // at a limit the cosine has lost the digits that tell the bend
-    if (lift >= this.greatestLift(r)) return this.limits[0];
+    if (lift >= this.maxLift(r)) return this.limits[0];
     const square = upper * upper + r * r - 2 * upper * r * Math.cos(lift);
-    return within(this.limits[0], acos((square - fore * fore - hand * hand) / (2 * fore * hand)), this.limits[1]);
+    return clamp(this.limits[0], clampedAcos((square - fore * fore - hand * hand) / (2 * fore * hand)), this.limits[1]);
   }
 }

@@ -4,33 +4,34 @@
  * dance's way of reaching a place to the marionette's (`blend`), by the weight given here. As `marionette/handover.py`.
  */
 
-import { conjugate, multiply, rotate, type Numbers } from "../motion/rotation";
-import { between, dot, normalise, put, unit } from "../motion/vector";
+import { conjugate, multiply, type Numbers, rotate } from "../motion/rotation";
+import { dot, normalise, rotationBetween, setVector, unit } from "../motion/vector";
 
 /** Seconds from the dance's way of holding a limb to the marionette's. */
-export const TAKE = 0.15;
+export const BLEND_IN_S = 0.15;
 /** Seconds from the marionette's way to the dance's. */
-export const GIVE_BACK = 0.35;
+export const BLEND_OUT_S = 0.35;
 /** Arm lengths per second squared: a quarter of an arm is crossed in 0.11 s. */
 export const HAND_ACCELERATION = 79;
 /** Radians per second squared. */
 export const THIGH_ACCELERATION = 60;
 /** Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds. */
-const RETURN = 0.28;
+const RETURN_DURATION_S = 0.28;
 /** Cosine of half the angle (of 270 degrees) that a joint goes round at most where the other way is shorter by now. */
-const LONGEST_WAY = -0.7;
-const LEAST_ACCELERATION = 6;
+const MIN_HALF_ANGLE_COSINE = -0.7;
+const MIN_RETURN_ACCELERATION = 6;
 
 /**
  * What brings a limb back in `RETURN` that is `distance` away and goes away at `speed`, by braking, speeding up and braking
  * again; within `LEAST_ACCELERATION` and `most`.
  */
-export function accelerationHome(distance: number, speed: number, most: number): number {
-  let low = LEAST_ACCELERATION, high = most;
+export function returnAcceleration(distance: number, speed: number, maxAcceleration: number): number {
+  let low = MIN_RETURN_ACCELERATION,
+    high = maxAcceleration;
   for (let i = 0; i < 20; i++) {
     const middle = 0.5 * (low + high);
     const turned = distance + (speed * speed) / (2 * middle);
-    if (speed / middle + 2 * Math.sqrt(turned / middle) > RETURN) low = middle;
+    if (speed / middle + 2 * Math.sqrt(turned / middle) > RETURN_DURATION_S) low = middle;
     else high = middle;
   }
   return high;
@@ -51,8 +52,8 @@ export class Handover {
   }
 
   /** `seconds` later, with the limb held or not. */
-  advance(held: boolean, seconds: number): void {
-    const step = held ? seconds / TAKE : -seconds / GIVE_BACK;
+  advance(isHeld: boolean, seconds: number): void {
+    const step = isHeld ? seconds / BLEND_IN_S : -seconds / BLEND_OUT_S;
     this.progress = Math.min(Math.max(this.progress + step, 0), 1);
   }
 }
@@ -61,17 +62,17 @@ export class Handover {
  * The turn that brings the direction of the dance's hand to that of the pulled one, on a way round the shoulder. It is carried
  * on from call to call, so that two hands that pass opposite each other do not make it change sides.
  */
-export class Turn {
-  private readonly turn = new Float64Array(4);
-  private known = false;
+export class DirectionAlignment {
+  private readonly rotation = new Float64Array(4);
+  private hasRotation = false;
   private readonly here = new Float64Array(3);
   private readonly there = new Float64Array(3);
   private readonly onwards = new Float64Array(4);
   private readonly shortest = new Float64Array(4);
 
   /** Forgets the way it went. */
-  rest(): void {
-    this.known = false;
+  reset(): void {
+    this.hasRotation = false;
   }
 
   /**
@@ -79,18 +80,19 @@ export class Turn {
    * round, is at most half a circle times `weight`: so it is the shortest turn when the hand is back. All the way there, at
    * `weight` 1, it starts afresh from the shortest.
    */
-  follow(out: Numbers, outAt: number, dance: Numbers, pulled: Numbers, weight: number): void {
-    const { turn, here, there, onwards, shortest } = this;
-    if (!unit(here, 0, dance, 0)) put(here, 0, 0, -1, 0);
-    if (!unit(there, 0, pulled, 0)) put(there, 0, 0, -1, 0);
-    between(shortest, 0, here, 0, there, 0);
-    if (this.known) {
+  update(out: Numbers, outAt: number, motionTarget: Numbers, controlledTarget: Numbers, weight: number): void {
+    const { rotation: turn, here, there, onwards, shortest } = this;
+    if (!unit(here, 0, motionTarget, 0)) setVector(here, 0, 0, -1, 0);
+    if (!unit(there, 0, controlledTarget, 0)) setVector(there, 0, 0, -1, 0);
+    rotationBetween(shortest, 0, here, 0, there, 0);
+    if (this.hasRotation) {
       rotate(here, 0, turn, 0, here, 0);
-      between(onwards, 0, here, 0, there, 0);
+      rotationBetween(onwards, 0, here, 0, there, 0);
       multiply(turn, 0, onwards, 0, turn, 0);
       conjugate(onwards, 0, shortest, 0);
       multiply(onwards, 0, turn, 0, onwards, 0);
-      const whole = 2 * Math.PI, most = Math.PI * weight;
+      const whole = 2 * Math.PI,
+        most = Math.PI * weight;
       let twist = 2 * Math.atan2(dot(onwards, 1, there, 0), onwards[0]);
       twist -= whole * Math.round(twist / whole);
       if (Math.abs(twist) > most) {
@@ -103,7 +105,7 @@ export class Turn {
     } else {
       turn.set(shortest);
     }
-    this.known = weight < 1;
+    this.hasRotation = weight < 1;
     for (let i = 0; i < 4; i++) out[outAt + i] = turn[i];
   }
 }
@@ -112,43 +114,52 @@ export class Turn {
  * The joints of a limb between the dance's and the marionette's. Each turns on the way that it took first, as long as that is
  * not much the longer: by the shortest way it would be thrown across when the two come to be opposite each other.
  */
-export class JointMix {
-  private readonly ways = new Float64Array(12);
+export class JointBlend {
+  private readonly previousRotations = new Float64Array(12);
   private readonly way = new Float64Array(4);
-  private known = false;
+  private hasPreviousRotations = false;
 
   /** Forgets the ways that were taken. */
-  rest(): void {
-    this.known = false;
+  reset(): void {
+    this.hasPreviousRotations = false;
   }
 
   /** The joints (12) at `weight`; exactly either at 0 and 1, and all the way there it starts afresh. */
-  mix(out: Numbers, outAt: number, dance: Numbers, danceAt: number, hung: Numbers, hungAt: number, weight: number): void {
+  blend(
+    out: Numbers,
+    outAt: number,
+    motionJoints: Numbers,
+    motionJointsAt: number,
+    solvedJoints: Numbers,
+    solvedJointsAt: number,
+    weight: number,
+  ): void {
     if (weight >= 1) {
-      this.known = false;
-      for (let i = 0; i < 12; i++) out[outAt + i] = hung[hungAt + i];
+      this.hasPreviousRotations = false;
+      for (let i = 0; i < 12; i++) out[outAt + i] = solvedJoints[solvedJointsAt + i];
       return;
     }
-    const { ways, way } = this;
+    const { previousRotations: ways, way } = this;
     for (let at = 0; at < 12; at += 4) {
-      conjugate(way, 0, dance, danceAt + at);
-      multiply(way, 0, way, 0, hung, hungAt + at);
+      conjugate(way, 0, motionJoints, motionJointsAt + at);
+      multiply(way, 0, way, 0, solvedJoints, solvedJointsAt + at);
       let onwards = way[0];
-      if (this.known) onwards = way.reduce((sum, part, i) => sum + part * ways[at + i], 0);
+      if (this.hasPreviousRotations) onwards = way.reduce((sum, part, i) => sum + part * ways[at + i], 0);
       let sign = onwards < 0 ? -1 : 1;
-      if (sign * way[0] < LONGEST_WAY) sign = -sign;
+      if (sign * way[0] < MIN_HALF_ANGLE_COSINE) sign = -sign;
       for (let i = 0; i < 4; i++) ways[at + i] = way[i] *= sign;
-      const sine = Math.hypot(way[1], way[2], way[3]), half = Math.atan2(sine, way[0]) * weight;
+      const sine = Math.hypot(way[1], way[2], way[3]),
+        half = Math.atan2(sine, way[0]) * weight;
       const scale = sine > 1e-12 ? Math.sin(half) / sine : 0;
       way[0] = Math.cos(half);
       for (let i = 1; i < 4; i++) way[i] *= scale;
       if (weight <= 0) {
-        for (let i = 0; i < 4; i++) out[outAt + at + i] = dance[danceAt + at + i];
+        for (let i = 0; i < 4; i++) out[outAt + at + i] = motionJoints[motionJointsAt + at + i];
         continue;
       }
-      multiply(out, outAt + at, dance, danceAt + at, way, 0);
+      multiply(out, outAt + at, motionJoints, motionJointsAt + at, way, 0);
       normalise(out, outAt + at);
     }
-    this.known = true;
+    this.hasPreviousRotations = true;
   }
 }

@@ -1,13 +1,13 @@
 /** The leg (paper 4): the thigh is lifted by an angle (radians) from straight down, the shank hangs, the ankle is fixed. */
 
 /** The farthest back a thigh is pulled. */
-export const THIGH_LEAST = -Math.PI / 4;
+export const MIN_THIGH_ANGLE_RAD = -Math.PI / 4;
 /** The farthest up a thigh is pulled. */
-export const THIGH_GREATEST = (2 * Math.PI) / 3;
+export const MAX_THIGH_ANGLE_RAD = (2 * Math.PI) / 3;
 
 /** The nearest angle a thigh is pulled to. */
 export function clampThigh(theta: number): number {
-  return Math.min(Math.max(theta, THIGH_LEAST), THIGH_GREATEST);
+  return Math.min(Math.max(theta, MIN_THIGH_ANGLE_RAD), MAX_THIGH_ANGLE_RAD);
 }
 
 /** How far the knee bends so that the shank hangs; a thigh pulled back keeps it straight, as knees bend one way. */

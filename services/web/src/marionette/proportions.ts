@@ -1,20 +1,20 @@
 /** The proportions of an arm, in arm lengths and parts of its mass, and the name by which its table is known. */
 
 /** The elbow bends from 0 to this, radians. */
-export const ELBOW_LIMIT = (150 * Math.PI) / 180;
+export const MAX_ELBOW_BEND_RAD = (150 * Math.PI) / 180;
 /** The wrist bends from 0 to this, radians. */
-export const WRIST_LIMIT = (80 * Math.PI) / 180;
+export const MAX_WRIST_BEND_RAD = (80 * Math.PI) / 180;
 /** The farthest a hand tip is solved for, in arm lengths. */
-export const OUTER_RADIUS = 1 - 1e-6;
+export const MAX_TIP_DISTANCE = 1 - 1e-6;
 
-const WHOLE = 10_000;
+const TOTAL_PARTS = 10_000;
 /** Masses of upper arm, forearm and hand as parts of the body's (Winter), over their lengths as parts of its height. */
 const MASS_PER_LENGTH = [0.028 / 0.186, 0.016 / 0.146, 0.006 / 0.108];
 
 /** Lengths of upper arm, forearm and hand with sum 1, and the identity `L0-L1-L2-M0-M1-M2` of their table. */
 export interface Proportions {
   readonly upper: number;
-  readonly fore: number;
+  readonly forearm: number;
   readonly hand: number;
   readonly identity: string;
 }
@@ -23,12 +23,15 @@ export interface Proportions {
  * From lengths and masses in any unit; without masses each link weighs by its length what Winter's does. Throws
  * `RangeError` for an arm without length or mass.
  */
-export function proportionsOf(
-  upper: number, fore: number, hand: number, masses?: readonly [number, number, number],
+export function proportionsFromLinks(
+  upper: number,
+  forearm: number,
+  hand: number,
+  masses?: readonly [number, number, number],
 ): Proportions {
-  const links = [upper, fore, hand];
-  const whole = upper + fore + hand;
-  if (!(upper > 0 && fore > 0 && hand > 0)) throw new RangeError("an arm's three links need lengths above zero");
+  const links = [upper, forearm, hand];
+  const whole = upper + forearm + hand;
+  if (!(upper > 0 && forearm > 0 && hand > 0)) throw new RangeError("an arm's three links need lengths above zero");
   const weights = masses ?? links.map((length, link) => length * MASS_PER_LENGTH[link]);
   const heavy = weights[0] + weights[1] + weights[2];
   if (!(heavy > 0)) throw new RangeError("an arm's three links need masses above zero");
@@ -36,27 +39,29 @@ export function proportionsOf(
   const parts = [...apportion(lengths), ...apportion(weights.map((mass) => mass / heavy))];
   // in thousandths where they say the same
   const identity = (parts.every((part) => part % 10 === 0) ? parts.map((part) => part / 10) : parts).join("-");
-  return { upper: lengths[0], fore: lengths[1], hand: lengths[2], identity };
+  return { upper: lengths[0], forearm: lengths[1], hand: lengths[2], identity };
 }
 
 /** From an identity, as the service knows it. Throws `RangeError` for text that is not one. */
 export function parseProportions(identity: string): Proportions {
   const parts = /^\d{1,4}(-\d{1,4}){5}$/.test(identity) ? identity.split("-").map(Number) : [];
   const whole = parts[0] + parts[1] + parts[2];
-  if (whole !== 1000 && whole !== WHOLE) {
+  if (whole !== 1000 && whole !== TOTAL_PARTS) {
     throw new RangeError(`proportions ${identity} are not L0-L1-L2-M0-M1-M2 in thousandths or ten-thousandths`);
   }
-  return { upper: parts[0] / whole, fore: parts[1] / whole, hand: parts[2] / whole, identity };
+  return { upper: parts[0] / whole, forearm: parts[1] / whole, hand: parts[2] / whole, identity };
 }
 
 /** The nearest to the shoulder that a tip is solved for: a quarter beyond what the joints allow, at least 0.1. */
-export function innerRadius({ upper, fore, hand }: Proportions): number {
+export function minTipDistance({ upper, forearm: fore, hand }: Proportions): number {
   let nearest = 1;
   for (let degrees = 0; degrees <= 80; degrees++) {
     const bend = (degrees * Math.PI) / 180;
-    const x = fore + hand * Math.cos(bend), y = hand * Math.sin(bend);
-    const lower = Math.hypot(x, y), lean = Math.atan2(y, x);
-    const turn = Math.min(ELBOW_LIMIT, Math.PI - lean) + lean;
+    const x = fore + hand * Math.cos(bend),
+      y = hand * Math.sin(bend);
+    const lower = Math.hypot(x, y),
+      lean = Math.atan2(y, x);
+    const turn = Math.min(MAX_ELBOW_BEND_RAD, Math.PI - lean) + lean;
     nearest = Math.min(nearest, Math.hypot(upper + lower * Math.cos(turn), lower * Math.sin(turn)));
   }
   return Math.max(0.1, 1.25 * nearest);
@@ -64,9 +69,11 @@ export function innerRadius({ upper, fore, hand }: Proportions): number {
 
 /** Ten-thousandths that sum to 10,000, by the largest remainder. */
 function apportion(shares: readonly number[]): number[] {
-  const whole = shares.map((share) => Math.floor(share * WHOLE + 1e-6));
-  const order = [0, 1, 2].sort((i, j) => shares[j] * WHOLE - whole[j] - (shares[i] * WHOLE - whole[i]) || i - j);
-  const left = WHOLE - whole[0] - whole[1] - whole[2];
+  const whole = shares.map((share) => Math.floor(share * TOTAL_PARTS + 1e-6));
+  const order = [0, 1, 2].sort(
+    (i, j) => shares[j] * TOTAL_PARTS - whole[j] - (shares[i] * TOTAL_PARTS - whole[i]) || i - j,
+  );
+  const left = TOTAL_PARTS - whole[0] - whole[1] - whole[2];
   for (let k = 0; k < left; k++) whole[order[k]] += 1;
   return whole;
 }

@@ -4,61 +4,62 @@
  * x to the left, y up, z forwards. As `marionette/shoulder.py`.
  */
 
-import { rotate, type Numbers } from "../motion/rotation";
-import { about, across, combine, cross, dot, length, squareTo, unit } from "../motion/vector";
+import { type Numbers, rotate } from "../motion/rotation";
+import { anyPerpendicular, combine, cross, dot, fromAxisAngle, length, rejectFrom, unit } from "../motion/vector";
 
-const EDGE = 1e-9;
-const ROUND = 2 * Math.PI;
+const EDGE_MARGIN_RAD = 1e-9;
+const FULL_TURN_RAD = 2 * Math.PI;
 
 /** Directions within `radius` radians of the unit vector `axis` (3), where no upper arm goes. */
-export interface Cap {
+export interface ExclusionCap {
   readonly axis: Float64Array;
   readonly radius: number;
 }
 
-function cap(side: number, up: number, forwards: number, degrees: number): Cap {
+function makeCap(side: number, up: number, forwards: number, degrees: number): ExclusionCap {
   const axis = Float64Array.of(side, up, forwards);
   unit(axis, 0, axis, 0);
   return { axis, radius: (degrees * Math.PI) / 180 };
 }
 
 /** Where no left upper arm goes. Ranges: American Academy of Orthopaedic Surgeons, Joint Motion (1965), rounded out. */
-const LEFT: readonly Cap[] = [
+const LEFT_CAPS: readonly ExclusionCap[] = [
   // straight back: extension ends at 60 degrees, horizontal abduction 45 to 50 behind the side
-  cap(0, 0.2, -1, 42),
+  makeCap(0, 0.2, -1, 42),
   // up and back: flexion and abduction end overhead, at 180 degrees
-  cap(0, 0.75, -0.85, 47),
+  makeCap(0, 0.75, -0.85, 47),
   // across the back: no farther than the arm's own side
-  cap(-1, -0.1, -0.75, 46),
+  makeCap(-1, -0.1, -0.75, 46),
   // across the chest: horizontal adduction ends at 130 to 140 degrees from the side
-  cap(-1, 0.15, -0.05, 42),
+  makeCap(-1, 0.15, -0.05, 42),
 ];
 
-const product = new Float64Array(3);
+const crossProduct = new Float64Array(3);
 
 /** The angle of two unit vectors (3), radians. */
-function angleOf(a: Numbers, b: Numbers): number {
-  cross(product, 0, a, 0, b, 0);
-  return Math.atan2(length(product, 0), dot(a, 0, b, 0));
+function angleBetween(a: Numbers, b: Numbers): number {
+  cross(crossProduct, 0, a, 0, b, 0);
+  return Math.atan2(length(crossProduct, 0), dot(a, 0, b, 0));
 }
 
-function wrapped(angle: number): number {
-  const rest = (angle + Math.PI) % ROUND;
-  return (rest < 0 ? rest + ROUND : rest) - Math.PI;
+function wrapAngle(angle: number): number {
+  const rest = (angle + Math.PI) % FULL_TURN_RAD;
+  return (rest < 0 ? rest + FULL_TURN_RAD : rest) - Math.PI;
 }
 
-function depthIn({ axis, radius }: Cap, direction: Numbers): number {
-  return radius - angleOf(axis, direction);
+function depthInCap({ axis, radius }: ExclusionCap, direction: Numbers): number {
+  return radius - angleBetween(axis, direction);
 }
 
 /** Where the edges of two caps cross: none, or two unit vectors. */
-function corners(one: Cap, other: Cap): Float64Array[] {
+function capCorners(one: ExclusionCap, other: ExclusionCap): Float64Array[] {
   const d = dot(one.axis, 0, other.axis, 0);
   const square = 1 - d * d;
-  if (square < EDGE) return [];
+  if (square < EDGE_MARGIN_RAD) return [];
   const a = (Math.cos(one.radius) - d * Math.cos(other.radius)) / square;
   const b = (Math.cos(other.radius) - d * Math.cos(one.radius)) / square;
-  const middle = new Float64Array(3), side = new Float64Array(3);
+  const middle = new Float64Array(3),
+    side = new Float64Array(3);
   combine(middle, 0, one.axis, 0, a, other.axis, 0, b);
   const left = 1 - dot(middle, 0, middle, 0);
   if (left <= 0) return [];
@@ -68,12 +69,12 @@ function corners(one: Cap, other: Cap): Float64Array[] {
 }
 
 /** One shoulder's limit. `Elbow` says where the elbow goes. */
-export class Shoulder {
-  readonly caps: readonly Cap[];
+export class ShoulderLimit {
+  readonly caps: readonly ExclusionCap[];
   private readonly corners: readonly Float64Array[];
   /** Turns that a cap closes: of each its middle and half its width. */
-  private readonly middles: Float64Array;
-  private readonly halves: Float64Array;
+  private readonly blockedMiddles: Float64Array;
+  private readonly blockedHalfWidths: Float64Array;
   private readonly edge = new Float64Array(3);
   private readonly side = new Float64Array(3);
   private readonly step = new Float64Array(3);
@@ -81,65 +82,70 @@ export class Shoulder {
 
   /** The right shoulder's caps are the left one's, mirrored. */
   constructor(right: boolean) {
-    this.caps = right ? LEFT.map(({ axis, radius }) => ({ axis: Float64Array.of(-axis[0], axis[1], axis[2]), radius })) : LEFT;
+    this.caps = right
+      ? LEFT_CAPS.map(({ axis, radius }) => ({ axis: Float64Array.of(-axis[0], axis[1], axis[2]), radius }))
+      : LEFT_CAPS;
     this.corners = this.caps
-      .flatMap((one, i) => this.caps.slice(i + 1).flatMap((other) => corners(one, other)))
-      .filter((corner) => this.depth(corner) <= EDGE);
-    this.middles = new Float64Array(this.caps.length);
-    this.halves = new Float64Array(this.caps.length);
+      .flatMap((one, i) => this.caps.slice(i + 1).flatMap((other) => capCorners(one, other)))
+      .filter((corner) => this.depthInCaps(corner) <= EDGE_MARGIN_RAD);
+    this.blockedMiddles = new Float64Array(this.caps.length);
+    this.blockedHalfWidths = new Float64Array(this.caps.length);
   }
 
   /** How far a unit vector (3) is inside a cap, radians; not above zero where a shoulder goes. */
-  depth(direction: Numbers): number {
+  depthInCaps(direction: Numbers): number {
     let depth = -Infinity;
-    for (const one of this.caps) depth = Math.max(depth, depthIn(one, direction));
+    for (const one of this.caps) depth = Math.max(depth, depthInCap(one, direction));
     return depth;
   }
 
   /** The angle from a unit vector (3) to the nearest direction that a shoulder has, radians. */
-  away(direction: Numbers): number {
-    if (this.depth(direction) <= 0) return 0;
+  angleToAllowed(direction: Numbers): number {
+    if (this.depthInCaps(direction) <= 0) return 0;
     let nearest = Infinity;
     for (const one of this.caps) {
-      this.toEdge(direction, one, one.radius);
-      if (this.depth(this.edge) <= EDGE) nearest = Math.min(nearest, angleOf(this.edge, direction));
+      this.computeEdge(direction, one, one.radius);
+      if (this.depthInCaps(this.edge) <= EDGE_MARGIN_RAD)
+        nearest = Math.min(nearest, angleBetween(this.edge, direction));
     }
-    for (const corner of this.corners) nearest = Math.min(nearest, angleOf(corner, direction));
+    for (const corner of this.corners) nearest = Math.min(nearest, angleBetween(corner, direction));
     return nearest;
   }
 
   /** Into `out` (3) the unit vector `most` radians from `begin` on a way to `end` round the caps; `end` where it is nearer. */
-  toward(out: Numbers, begin: Numbers, end: Numbers, most: number): void {
-    if (angleOf(begin, end) <= most) {
+  stepToward(out: Numbers, begin: Numbers, end: Numbers, maxAngle: number): void {
+    if (angleBetween(begin, end) <= maxAngle) {
       out.set(end);
       return;
     }
     const { step, side, spin } = this;
     cross(side, 0, begin, 0, end, 0);
-    if (!unit(side, 0, side, 0)) across(side, 0, begin, 0);
-    about(spin, 0, side, 0, most);
+    if (!unit(side, 0, side, 0)) anyPerpendicular(side, 0, begin, 0);
+    fromAxisAngle(spin, 0, side, 0, maxAngle);
     rotate(step, 0, spin, 0, begin, 0);
     for (const one of this.caps) {
-      if (!(depthIn(one, step) > 0 && depthIn(one, begin) <= 0)) continue;
+      if (!(depthInCap(one, step) > 0 && depthInCap(one, begin) <= 0)) continue;
       // along the edge, to the side that leads on
-      this.toEdge(step, one, one.radius + EDGE);
+      this.computeEdge(step, one, one.radius + EDGE_MARGIN_RAD);
       step.set(this.edge);
     }
     // in a corner of two caps it stays where it is
-    out.set(this.depth(step) <= Math.max(this.depth(begin), 0) ? step : begin);
+    out.set(this.depthInCaps(step) <= Math.max(this.depthInCaps(begin), 0) ? step : begin);
   }
 
   /**
    * The least turn about the unit `chord` from shoulder to tip, radians, that brings the upper arm where a shoulder goes; null
    * where none does. The upper arm is `lift` radians off the chord, below it in the plane of the unit `normal` (square to it).
    */
-  turn(chord: Numbers, normal: Numbers, lift: number): number | null {
-    const { middles, halves, side } = this;
-    const along = Math.cos(lift), off = Math.sin(lift);
+  minAllowedTurn(chord: Numbers, normal: Numbers, lift: number): number | null {
+    const { blockedMiddles: middles, blockedHalfWidths: halves, side } = this;
+    const along = Math.cos(lift),
+      off = Math.sin(lift);
     cross(side, 0, chord, 0, normal, 0);
     let closed = 0;
     for (const { axis, radius } of this.caps) {
-      const a = dot(axis, 0, side, 0), b = -dot(axis, 0, normal, 0);
+      const a = dot(axis, 0, side, 0),
+        b = -dot(axis, 0, normal, 0);
       const swing = off * Math.hypot(a, b);
       const over = Math.cos(radius) - along * dot(axis, 0, chord, 0);
       if (over >= swing) continue;
@@ -147,29 +153,29 @@ export class Shoulder {
       middles[closed] = Math.atan2(b, a);
       halves[closed++] = Math.acos(over / swing);
     }
-    if (this.allowed(0, closed)) return 0;
+    if (this.isAllowed(0, closed)) return 0;
     let least: number | null = null;
     for (let i = 0; i < closed; i++) {
       for (const sign of [-1, 1]) {
-        const turn = wrapped(middles[i] + sign * (halves[i] + EDGE));
-        if (this.allowed(turn, closed) && (least === null || Math.abs(turn) < Math.abs(least))) least = turn;
+        const turn = wrapAngle(middles[i] + sign * (halves[i] + EDGE_MARGIN_RAD));
+        if (this.isAllowed(turn, closed) && (least === null || Math.abs(turn) < Math.abs(least))) least = turn;
       }
     }
     return least;
   }
 
-  private allowed(turn: number, closed: number): boolean {
+  private isAllowed(turn: number, closed: number): boolean {
     for (let i = 0; i < closed; i++) {
-      if (!(Math.abs(wrapped(turn - this.middles[i])) >= this.halves[i])) return false;
+      if (!(Math.abs(wrapAngle(turn - this.blockedMiddles[i])) >= this.blockedHalfWidths[i])) return false;
     }
     return true;
   }
 
   /** Into `edge` the direction `radius` radians from the cap's axis, on the side of `direction`. */
-  private toEdge(direction: Numbers, { axis }: Cap, radius: number): void {
+  private computeEdge(direction: Numbers, { axis }: ExclusionCap, radius: number): void {
     const { edge } = this;
-    squareTo(edge, 0, direction, 0, axis, 0);
-    if (!unit(edge, 0, edge, 0)) across(edge, 0, axis, 0);
+    rejectFrom(edge, 0, direction, 0, axis, 0);
+    if (!unit(edge, 0, edge, 0)) anyPerpendicular(edge, 0, axis, 0);
     combine(edge, 0, axis, 0, Math.cos(radius), edge, 0, Math.sin(radius));
   }
 }

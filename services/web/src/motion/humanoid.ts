@@ -13,23 +13,42 @@ import { type Figure, JOINT_COUNT, JOINTS, PARENTS, type Pose } from "./skeleton
 
 /** Names of the humanoid's bones; parents come before their children. */
 export const BONES: readonly string[] = [
-  "hips", "leftUpperLeg", "leftLowerLeg", "leftFoot", "leftToes", "rightUpperLeg", "rightLowerLeg", "rightFoot", "rightToes",
-  "spine", "head", "leftUpperArm", "leftLowerArm", "leftHand", "rightUpperArm", "rightLowerArm", "rightHand",
+  "hips",
+  "leftUpperLeg",
+  "leftLowerLeg",
+  "leftFoot",
+  "leftToes",
+  "rightUpperLeg",
+  "rightLowerLeg",
+  "rightFoot",
+  "rightToes",
+  "spine",
+  "head",
+  "leftUpperArm",
+  "leftLowerArm",
+  "leftHand",
+  "rightUpperArm",
+  "rightLowerArm",
+  "rightHand",
 ];
 
 export const BONE_COUNT = JOINT_COUNT - 1;
 
 /** Each bone's parent; -1 for the hips. */
-export const BONE_PARENTS: readonly number[] = PARENTS.slice(1).map((parent, bone) => (bone === 0 ? -1 : Math.max(0, parent - 1)));
+export const BONE_PARENTS: readonly number[] = PARENTS.slice(1).map((parent, bone) =>
+  bone === 0 ? -1 : Math.max(0, parent - 1),
+);
 
-const SACROILIAC = JOINTS.indexOf("sacroiliac"), SPINE = JOINTS.indexOf("vl5");
-const LEFT_ARM = JOINTS.indexOf("l_shoulder"), RIGHT_ARM = JOINTS.indexOf("r_shoulder");
+const SACROILIAC = JOINTS.indexOf("sacroiliac"),
+  SPINE = JOINTS.indexOf("vl5");
+const LEFT_ARM = JOINTS.indexOf("l_shoulder"),
+  RIGHT_ARM = JOINTS.indexOf("r_shoulder");
 
 /** The turn from the T-pose to our rest of each joint's bone (72): of an arm the quarter about z that lays it down. */
-const LAID = new Float64Array(JOINT_COUNT * 4);
+const T_POSE_TO_REST = new Float64Array(JOINT_COUNT * 4);
 for (let joint = 0; joint < JOINT_COUNT; joint++) {
-  LAID[joint * 4] = joint < LEFT_ARM ? 1 : Math.SQRT1_2;
-  LAID[joint * 4 + 3] = joint < LEFT_ARM ? 0 : joint < RIGHT_ARM ? -Math.SQRT1_2 : Math.SQRT1_2;
+  T_POSE_TO_REST[joint * 4] = joint < LEFT_ARM ? 1 : Math.SQRT1_2;
+  T_POSE_TO_REST[joint * 4 + 3] = joint < LEFT_ARM ? 0 : joint < RIGHT_ARM ? -Math.SQRT1_2 : Math.SQRT1_2;
 }
 
 /** One pose: the hips' world position (3) in metres, and a rotation w x y z for each bone (68): the hips' in the world, the others' in their parent's frame. */
@@ -39,11 +58,11 @@ export interface HumanoidPose {
 }
 
 /** Storage for `toHumanoid`. */
-export function emptyHumanoidPose(): HumanoidPose {
+export function createHumanoidPose(): HumanoidPose {
   return { hips: new Float64Array(3), rotations: new Float64Array(BONE_COUNT * 4) };
 }
 
-const backward = new Float64Array(4);
+const inverseRotation = new Float64Array(4);
 
 /** `pose` of `figure` as a humanoid's, written into `out` and returned. */
 export function toHumanoid(figure: Figure, pose: Pose, out: HumanoidPose): HumanoidPose {
@@ -56,12 +75,12 @@ export function toHumanoid(figure: Figure, pose: Pose, out: HumanoidPose): Human
     if (joint === SACROILIAC) {
       multiply(rotations, at, ours, 0, ours, joint * 4);
     } else if (joint === SPINE) {
-      conjugate(backward, 0, ours, SACROILIAC * 4);
-      multiply(rotations, at, backward, 0, ours, joint * 4);
+      conjugate(inverseRotation, 0, ours, SACROILIAC * 4);
+      multiply(rotations, at, inverseRotation, 0, ours, joint * 4);
     } else {
-      conjugate(backward, 0, LAID, PARENTS[joint] * 4);
-      multiply(rotations, at, backward, 0, ours, joint * 4);
-      multiply(rotations, at, rotations, at, LAID, joint * 4);
+      conjugate(inverseRotation, 0, T_POSE_TO_REST, PARENTS[joint] * 4);
+      multiply(rotations, at, inverseRotation, 0, ours, joint * 4);
+      multiply(rotations, at, rotations, at, T_POSE_TO_REST, joint * 4);
     }
   }
   return out;
@@ -74,21 +93,22 @@ export interface HumanoidFigure {
 }
 
 /** `figure` in the T-pose. */
-export function tPose(figure: Figure): HumanoidFigure {
-  const offsets = figure.offsets.slice(3), tips = figure.tips.slice(3);
+export function tPoseFigure(figure: Figure): HumanoidFigure {
+  const offsets = figure.offsets.slice(3),
+    tips = figure.tips.slice(3);
   for (let i = 0; i < 3; i++) {
     offsets[i] += figure.offsets[i];
     offsets[(SPINE - 1) * 3 + i] -= figure.offsets[SACROILIAC * 3 + i];
   }
   for (let joint = LEFT_ARM; joint < JOINT_COUNT; joint++) {
-    raise(offsets, (joint - 1) * 3, PARENTS[joint]);
-    raise(tips, (joint - 1) * 3, joint);
+    rotateToTPose(offsets, (joint - 1) * 3, PARENTS[joint]);
+    rotateToTPose(tips, (joint - 1) * 3, joint);
   }
   return { offsets, tips };
 }
 
 /** The vector at `at`, which `joint` carries at our rest, as it carries it in the T-pose. */
-function raise(vectors: Numbers, at: number, joint: number): void {
-  conjugate(backward, 0, LAID, joint * 4);
-  rotate(vectors, at, backward, 0, vectors, at);
+function rotateToTPose(vectors: Numbers, at: number, joint: number): void {
+  conjugate(inverseRotation, 0, T_POSE_TO_REST, joint * 4);
+  rotate(vectors, at, inverseRotation, 0, vectors, at);
 }

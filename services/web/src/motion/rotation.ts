@@ -8,8 +8,14 @@ export type Numbers = Float64Array;
 
 /** The rotation `b` followed by `a`. */
 export function multiply(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
-  const aw = a[aAt], ax = a[aAt + 1], ay = a[aAt + 2], az = a[aAt + 3];
-  const bw = b[bAt], bx = b[bAt + 1], by = b[bAt + 2], bz = b[bAt + 3];
+  const aw = a[aAt],
+    ax = a[aAt + 1],
+    ay = a[aAt + 2],
+    az = a[aAt + 3];
+  const bw = b[bAt],
+    bx = b[bAt + 1],
+    by = b[bAt + 2],
+    bz = b[bAt + 3];
   out[outAt] = aw * bw - ax * bx - ay * by - az * bz;
   out[outAt + 1] = aw * bx + ax * bw + ay * bz - az * by;
   out[outAt + 2] = aw * by - ax * bz + ay * bw + az * bx;
@@ -26,9 +32,16 @@ export function conjugate(out: Numbers, outAt: number, q: Numbers, qAt: number):
 
 /** The vector `v` (3) turned by the quaternion `q`. */
 export function rotate(out: Numbers, outAt: number, q: Numbers, qAt: number, v: Numbers, vAt: number): void {
-  const w = q[qAt], x = q[qAt + 1], y = q[qAt + 2], z = q[qAt + 3];
-  const a = v[vAt], b = v[vAt + 1], c = v[vAt + 2];
-  const tx = 2 * (y * c - z * b), ty = 2 * (z * a - x * c), tz = 2 * (x * b - y * a);
+  const w = q[qAt],
+    x = q[qAt + 1],
+    y = q[qAt + 2],
+    z = q[qAt + 3];
+  const a = v[vAt],
+    b = v[vAt + 1],
+    c = v[vAt + 2];
+  const tx = 2 * (y * c - z * b),
+    ty = 2 * (z * a - x * c),
+    tz = 2 * (x * b - y * a);
   out[outAt] = a + w * tx + y * tz - z * ty;
   out[outAt + 1] = b + w * ty + z * tx - x * tz;
   out[outAt + 2] = c + w * tz + x * ty - y * tx;
@@ -36,7 +49,10 @@ export function rotate(out: Numbers, outAt: number, q: Numbers, qAt: number, v: 
 
 /** The rotation as a matrix [3][3] (nine numbers); its columns are the turned axes. */
 export function toMatrix(out: Numbers, outAt: number, q: Numbers, qAt: number): void {
-  const w = q[qAt], x = q[qAt + 1], y = q[qAt + 2], z = q[qAt + 3];
+  const w = q[qAt],
+    x = q[qAt + 1],
+    y = q[qAt + 2],
+    z = q[qAt + 3];
   out[outAt] = 1 - 2 * (y * y + z * z);
   out[outAt + 1] = 2 * (x * y - w * z);
   out[outAt + 2] = 2 * (x * z + w * y);
@@ -62,7 +78,9 @@ export function fromRotationVector(out: Numbers, outAt: number, x: number, y: nu
 /** The shortest rotation vector (3), of at most pi radians, of a unit quaternion. */
 export function toRotationVector(out: Numbers, outAt: number, q: Numbers, qAt: number): void {
   const sign = q[qAt] < 0 ? -1 : 1;
-  const x = q[qAt + 1], y = q[qAt + 2], z = q[qAt + 3];
+  const x = q[qAt + 1],
+    y = q[qAt + 2],
+    z = q[qAt + 3];
   const sine = Math.sqrt(x * x + y * y + z * z);
   const scale = sign * (sine < 1e-8 ? 2 : (2 * Math.atan2(sine, sign * q[qAt])) / sine);
   out[outAt] = scale * x;
@@ -71,16 +89,16 @@ export function toRotationVector(out: Numbers, outAt: number, q: Numbers, qAt: n
 }
 
 /** From `a` at t = 0 to `b` at t = 1 by the shorter way, at even angular speed. */
-export function slerp(
-  out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number, t: number,
-): void {
+export function slerp(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number, t: number): void {
   let dot = a[aAt] * b[bAt] + a[aAt + 1] * b[bAt + 1] + a[aAt + 2] * b[bAt + 2] + a[aAt + 3] * b[bAt + 3];
   const sign = dot < 0 ? -1 : 1;
   dot *= sign;
-  let u = 1 - t, v = t;
+  let u = 1 - t,
+    v = t;
   // nearly the same rotation: a straight line differs by less than rounding, and the sine below would be zero
   if (dot < 1 - 1e-12) {
-    const angle = Math.acos(dot), sine = Math.sin(angle);
+    const angle = Math.acos(dot),
+      sine = Math.sin(angle);
     u = Math.sin(u * angle) / sine;
     v = Math.sin(t * angle) / sine;
   }

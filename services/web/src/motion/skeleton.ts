@@ -7,15 +7,31 @@ import { multiply, rotate } from "./rotation";
 
 /** Joint names in the order of the contract; channel c >= 2 is joint c - 1. */
 export const JOINTS: readonly string[] = [
-  "humanoid_root", "sacroiliac", "l_hip", "l_knee", "l_ankle", "l_midtarsal", "r_hip", "r_knee", "r_ankle",
-  "r_midtarsal", "vl5", "skullbase", "l_shoulder", "l_elbow", "l_wrist", "r_shoulder", "r_elbow", "r_wrist",
+  "humanoid_root",
+  "sacroiliac",
+  "l_hip",
+  "l_knee",
+  "l_ankle",
+  "l_midtarsal",
+  "r_hip",
+  "r_knee",
+  "r_ankle",
+  "r_midtarsal",
+  "vl5",
+  "skullbase",
+  "l_shoulder",
+  "l_elbow",
+  "l_wrist",
+  "r_shoulder",
+  "r_elbow",
+  "r_wrist",
 ];
 
 /** Each joint's parent; -1 for the root. */
 export const PARENTS: readonly number[] = [-1, 0, 1, 2, 3, 4, 1, 6, 7, 8, 0, 10, 10, 12, 13, 10, 15, 16];
 
 /** The joints that carry a tip: crown, left hand, right hand, left toes, right toes. */
-export const TIPS: readonly number[] = [11, 14, 17, 5, 9];
+export const TIP_JOINTS: readonly number[] = [11, 14, 17, 5, 9];
 
 export const JOINT_COUNT = 18;
 export const CHANNEL_COUNT = 19;
@@ -24,7 +40,7 @@ export const CHANNEL_COUNT = 19;
 export const LIMBS: readonly string[] = ["left_hand", "right_hand", "left_leg", "right_leg"];
 
 /** First of the three joints of each limb; the others follow it: shoulder elbow wrist, or hip knee ankle. */
-export const LIMB_JOINTS: readonly number[] = [12, 15, 2, 6];
+export const LIMB_FIRST_JOINTS: readonly number[] = [12, 15, 2, 6];
 
 /** Lengths of one dancer, metres in the rest pose: each joint from its parent (54), each tip from its joint (54, zero where none). */
 export interface Figure {
@@ -33,7 +49,7 @@ export interface Figure {
 }
 
 /** The same text for dancers of equal lengths, and for no others: what is made for one is made for all of them. */
-export function lengthsOf({ offsets, tips }: Figure): string {
+export function figureKey({ offsets, tips }: Figure): string {
   return `${offsets.join()} ${tips.join()}`;
 }
 
@@ -44,7 +60,7 @@ export interface Pose {
 }
 
 /** World positions (54) in metres and orientations (72) of all joints. */
-export interface World {
+export interface WorldTransforms {
   positions: Float64Array;
   orientations: Float64Array;
 }
@@ -63,12 +79,12 @@ export function copyPose(from: Pose, to: Pose): void {
 }
 
 /** Storage for `world`. */
-export function emptyWorld(): World {
+export function createWorldTransforms(): WorldTransforms {
   return { positions: new Float64Array(JOINT_COUNT * 3), orientations: new Float64Array(JOINT_COUNT * 4) };
 }
 
 /** World positions and orientations of `pose` on `figure`, written into `out` and returned. */
-export function world(figure: Figure, pose: Pose, out: World): World {
+export function worldTransforms(figure: Figure, pose: Pose, out: WorldTransforms): WorldTransforms {
   const { positions, orientations } = out;
   for (let i = 0; i < 3; i++) positions[i] = pose.root[i];
   for (let i = 0; i < 4; i++) orientations[i] = pose.rotations[i];

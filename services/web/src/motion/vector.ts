@@ -16,27 +16,42 @@ export function length(a: Numbers, aAt: number): number {
 }
 
 /** The distance of two places (3). */
-export function apart(a: Numbers, aAt: number, b: Numbers, bAt: number): number {
-  const x = a[aAt] - b[bAt], y = a[aAt + 1] - b[bAt + 1], z = a[aAt + 2] - b[bAt + 2];
+export function distanceBetween(a: Numbers, aAt: number, b: Numbers, bAt: number): number {
+  const x = a[aAt] - b[bAt],
+    y = a[aAt + 1] - b[bAt + 1],
+    z = a[aAt + 2] - b[bAt + 2];
   return Math.sqrt(x * x + y * y + z * z);
 }
 
 /** `a` and `factor` times `b` (3). */
 export function addScaled(
-  out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number, factor: number,
+  out: Numbers,
+  outAt: number,
+  a: Numbers,
+  aAt: number,
+  b: Numbers,
+  bAt: number,
+  factor: number,
 ): void {
   for (let i = 0; i < 3; i++) out[outAt + i] = a[aAt + i] + b[bAt + i] * factor;
 }
 
 /** `a` times `factor` and `b` times `other` (3). */
 export function combine(
-  out: Numbers, outAt: number, a: Numbers, aAt: number, factor: number, b: Numbers, bAt: number, other: number,
+  out: Numbers,
+  outAt: number,
+  a: Numbers,
+  aAt: number,
+  factor: number,
+  b: Numbers,
+  bAt: number,
+  other: number,
 ): void {
   for (let i = 0; i < 3; i++) out[outAt + i] = a[aAt + i] * factor + b[bAt + i] * other;
 }
 
 /** A vector from its parts. */
-export function put(out: Numbers, outAt: number, x: number, y: number, z: number): void {
+export function setVector(out: Numbers, outAt: number, x: number, y: number, z: number): void {
   out[outAt] = x;
   out[outAt + 1] = y;
   out[outAt + 2] = z;
@@ -44,33 +59,42 @@ export function put(out: Numbers, outAt: number, x: number, y: number, z: number
 
 /** Vector product, right-handed. */
 export function cross(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
-  const ax = a[aAt], ay = a[aAt + 1], az = a[aAt + 2];
-  const bx = b[bAt], by = b[bAt + 1], bz = b[bAt + 2];
-  put(out, outAt, ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
+  const ax = a[aAt],
+    ay = a[aAt + 1],
+    az = a[aAt + 2];
+  const bx = b[bAt],
+    by = b[bAt + 1],
+    bz = b[bAt + 2];
+  setVector(out, outAt, ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
 }
 
 /** `a` at unit length; false, and nothing written, where it is shorter than `least`. */
-export function unit(out: Numbers, outAt: number, a: Numbers, aAt: number, least = 1e-12): boolean {
+export function unit(out: Numbers, outAt: number, a: Numbers, aAt: number, minLength = 1e-12): boolean {
   const size = length(a, aAt);
-  if (size <= least) return false;
-  put(out, outAt, a[aAt] / size, a[aAt + 1] / size, a[aAt + 2] / size);
+  if (size <= minLength) return false;
+  setVector(out, outAt, a[aAt] / size, a[aAt + 1] / size, a[aAt + 2] / size);
   return true;
 }
 
 /** The part of `a` square to the unit vector `axis`. */
-export function squareTo(out: Numbers, outAt: number, a: Numbers, aAt: number, axis: Numbers, axisAt: number): void {
+export function rejectFrom(out: Numbers, outAt: number, a: Numbers, aAt: number, axis: Numbers, axisAt: number): void {
   const along = dot(a, aAt, axis, axisAt);
-  put(
-    out, outAt,
-    a[aAt] - axis[axisAt] * along, a[aAt + 1] - axis[axisAt + 1] * along, a[aAt + 2] - axis[axisAt + 2] * along,
+  setVector(
+    out,
+    outAt,
+    a[aAt] - axis[axisAt] * along,
+    a[aAt + 1] - axis[axisAt + 1] * along,
+    a[aAt + 2] - axis[axisAt + 2] * along,
   );
 }
 
 /** Some unit vector square to the unit vector `axis`: its product with x, or with y where it lies along x. */
-export function across(out: Numbers, outAt: number, axis: Numbers, axisAt: number): void {
-  const x = axis[axisAt], y = axis[axisAt + 1], z = axis[axisAt + 2];
-  if (Math.abs(x) < 0.9) put(out, outAt, 0, z, -y);
-  else put(out, outAt, -z, 0, x);
+export function anyPerpendicular(out: Numbers, outAt: number, axis: Numbers, axisAt: number): void {
+  const x = axis[axisAt],
+    y = axis[axisAt + 1],
+    z = axis[axisAt + 2];
+  if (Math.abs(x) < 0.9) setVector(out, outAt, 0, z, -y);
+  else setVector(out, outAt, -z, 0, x);
   unit(out, outAt, out, outAt);
 }
 
@@ -81,25 +105,27 @@ export function normalise(q: Numbers, at: number): void {
 }
 
 /** A turn by `angle` radians about an axis of the frame: 0, 1, 2 for x, y, z. */
-export function aboutAxis(out: Numbers, outAt: number, axis: 0 | 1 | 2, angle: number): void {
+export function fromCoordinateAxis(out: Numbers, outAt: number, axis: 0 | 1 | 2, angle: number): void {
   out[outAt] = Math.cos(0.5 * angle);
-  put(out, outAt + 1, 0, 0, 0);
+  setVector(out, outAt + 1, 0, 0, 0);
   out[outAt + 1 + axis] = Math.sin(0.5 * angle);
 }
 
 /** A turn (4) by `angle` radians about the unit vector `axis` (3). */
-export function about(out: Numbers, outAt: number, axis: Numbers, axisAt: number, angle: number): void {
+export function fromAxisAngle(out: Numbers, outAt: number, axis: Numbers, axisAt: number, angle: number): void {
   const s = Math.sin(0.5 * angle);
-  const x = axis[axisAt] * s, y = axis[axisAt + 1] * s, z = axis[axisAt + 2] * s;
+  const x = axis[axisAt] * s,
+    y = axis[axisAt + 1] * s,
+    z = axis[axisAt + 2] * s;
   out[outAt] = Math.cos(0.5 * angle);
-  put(out, outAt + 1, x, y, z);
+  setVector(out, outAt + 1, x, y, z);
 }
 
 /** The shortest rotation (4) from the unit vector `a` to the unit vector `b`; opposite ones turn about `across(a)`. */
-export function between(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
+export function rotationBetween(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
   const w = 1 + dot(a, aAt, b, bAt);
   if (w < 1e-14) {
-    across(out, outAt + 1, a, aAt);
+    anyPerpendicular(out, outAt + 1, a, aAt);
     out[outAt] = 0;
     return;
   }
@@ -110,22 +136,28 @@ export function between(out: Numbers, outAt: number, a: Numbers, aAt: number, b:
 
 /** The rotation (4) that brings the axes to right-handed unit vectors, nine numbers at `at` (Shepperd 1978). */
 export function fromColumns(out: Numbers, outAt: number, c: Numbers, at: number): void {
-  const xx = c[at], xy = c[at + 1], xz = c[at + 2];
-  const yx = c[at + 3], yy = c[at + 4], yz = c[at + 5];
-  const zx = c[at + 6], zy = c[at + 7], zz = c[at + 8];
+  const xx = c[at],
+    xy = c[at + 1],
+    xz = c[at + 2];
+  const yx = c[at + 3],
+    yy = c[at + 4],
+    yz = c[at + 5];
+  const zx = c[at + 6],
+    zy = c[at + 7],
+    zz = c[at + 8];
   const trace = xx + yy + zz;
   if (trace >= Math.max(xx, yy, zz)) {
     out[outAt] = 1 + trace;
-    put(out, outAt + 1, yz - zy, zx - xz, xy - yx);
+    setVector(out, outAt + 1, yz - zy, zx - xz, xy - yx);
   } else if (xx >= Math.max(yy, zz)) {
     out[outAt] = yz - zy;
-    put(out, outAt + 1, 1 + 2 * xx - trace, xy + yx, xz + zx);
+    setVector(out, outAt + 1, 1 + 2 * xx - trace, xy + yx, xz + zx);
   } else if (yy >= zz) {
     out[outAt] = zx - xz;
-    put(out, outAt + 1, xy + yx, 1 + 2 * yy - trace, yz + zy);
+    setVector(out, outAt + 1, xy + yx, 1 + 2 * yy - trace, yz + zy);
   } else {
     out[outAt] = xy - yx;
-    put(out, outAt + 1, xz + zx, yz + zy, 1 + 2 * zz - trace);
+    setVector(out, outAt + 1, xz + zx, yz + zy, 1 + 2 * zz - trace);
   }
   normalise(out, outAt);
 }

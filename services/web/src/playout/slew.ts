@@ -4,42 +4,42 @@
  */
 
 /** Time constant, unless another is asked for: a difference of 100 ms is made good to a frame within half a second. */
-const GENTLE = 250e3;
+const SLEW_TIME_CONSTANT_US = 250e3;
 
 /** How much slower than real the clock may run. */
-const SLOWEST = 0.9;
+const MAX_SLEW_RATE = 0.9;
 
 export class Slew {
   // the difference was `from` at local time `since`, and goes to `goal`
-  private from = 0;
-  private since = 0;
-  private goal = 0;
+  private initial = 0;
+  private startedAt = 0;
+  private target = 0;
 
-  constructor(private readonly constant = GENTLE) {}
+  constructor(private readonly timeConstant = SLEW_TIME_CONSTANT_US) {}
 
   /** At local time `local` the difference is `from`, at once, and goes to `goal`. */
-  start(from: number, goal: number, local: number): void {
-    this.from = from;
-    this.since = local;
-    this.goal = goal;
+  start(initial: number, target: number, local: number): void {
+    this.initial = initial;
+    this.startedAt = local;
+    this.target = target;
   }
 
   /** From local time `local` on it goes to `goal`. */
-  aim(goal: number, local: number): void {
-    this.start(this.at(local), goal, local);
+  slewTo(target: number, local: number): void {
+    this.start(this.at(local), target, local);
   }
 
   /** The difference at `local`. */
   at(local: number): number {
-    const { constant } = this;
-    let away = this.from - this.goal;
-    let elapsed = Math.max(local - this.since, 0);
-    if (away > SLOWEST * constant) {
+    const { timeConstant: constant } = this;
+    let away = this.initial - this.target;
+    let elapsed = Math.max(local - this.startedAt, 0);
+    if (away > MAX_SLEW_RATE * constant) {
       // far ahead: the exponential would run backwards, so go at the slowest speed until it no longer does
-      const until = Math.min((away - SLOWEST * constant) / SLOWEST, elapsed);
-      away -= SLOWEST * until;
+      const until = Math.min((away - MAX_SLEW_RATE * constant) / MAX_SLEW_RATE, elapsed);
+      away -= MAX_SLEW_RATE * until;
       elapsed -= until;
     }
-    return this.goal + away * Math.exp(-elapsed / constant);
+    return this.target + away * Math.exp(-elapsed / constant);
   }
 }

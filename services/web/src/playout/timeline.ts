@@ -13,8 +13,8 @@ export function positionAt(state: TimelineState, clock: number): number {
 }
 
 /** The timeline that holds at a clock time: the newest, or while that lies ahead the one before it. */
-export class Timelines {
-  private before: TimelineState | null = null;
+export class TimelineHistory {
+  private previous: TimelineState | null = null;
   private latest: TimelineState | null = null;
 
   /** The timeline of the highest epoch. */
@@ -25,14 +25,14 @@ export class Timelines {
   /** Takes in a timeline; false where one of this epoch or a newer one is here already. */
   put(state: TimelineState): boolean {
     if (this.latest !== null && state.epoch <= this.latest.epoch) return false;
-    this.before = this.latest;
+    this.previous = this.latest;
     this.latest = state;
     return true;
   }
 
   /** The timeline that holds at `clock`, null where none was put yet. */
   at(clock: number): TimelineState | null {
-    const { before, latest } = this;
+    const { previous: before, latest } = this;
     if (latest !== null && before !== null && clock < latest.clock && before.motion === latest.motion) return before;
     return latest;
   }

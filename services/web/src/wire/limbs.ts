@@ -3,8 +3,8 @@
 import { LIMBS } from "../motion/skeleton";
 
 /** Dancers of a motion, one for each of its first tracks `motion`. */
-export const MOST_PERFORMERS = 4;
-export const MOST_LIMBS = LIMBS.length * MOST_PERFORMERS;
+export const MAX_PERFORMERS = 4;
+export const MAX_LIMBS = LIMBS.length * MAX_PERFORMERS;
 
 /** The number of a performer's limb; `limb` counts as `LIMBS`. */
 export function limbNumber(performer: number, limb: number): number {
@@ -12,11 +12,11 @@ export function limbNumber(performer: number, limb: number): number {
 }
 
 /** Whose the limb of this number is. */
-export function performerOf(number: number): number {
+export function performerOfLimb(number: number): number {
   return Math.floor(number / LIMBS.length);
 }
 
 /** Which limb of its performer it is, as in `LIMBS`. */
-export function limbOf(number: number): number {
+export function limbWithinPerformer(number: number): number {
   return number % LIMBS.length;
 }

@@ -3,9 +3,9 @@
  * microseconds on the clock or in the motion, as each field says. They are numbers: all lie below 2^53.
  */
 
-import { OVERLAY, type Overlay } from "./overlay";
+import { OVERLAY_TYPE, type Overlay } from "./overlay";
 
-export const VERSION = 1;
+export const PROTOCOL_VERSION = 1;
 export const SUBPROTOCOL = "bunraku.v1";
 
 /** What will come, the first message of a stream: `now` clock time, `channels` the total over the tracks. */
@@ -175,8 +175,8 @@ export interface Ask {
   wanted: boolean;
 }
 
-export const VELOCITY = 0;
-export const TARGET = 1;
+export const INPUT_VELOCITY = 0;
+export const INPUT_TARGET = 1;
 
 /** One sample of the 14 inputs: `kind` a velocity of -1..1, or a target; `sampled` clock time. */
 export interface Input {
@@ -190,13 +190,43 @@ export interface Input {
 }
 
 export type ServerMessage =
-  | ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-  | Notice | Choice;
+  | ChannelHeader
+  | Description
+  | Data
+  | TimelineState
+  | Overlay
+  | Presence
+  | Pong
+  | Problem
+  | Welcome
+  | Grant
+  | Refusal
+  | Notice
+  | Choice;
 export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Ask | Input;
 export type Message = ServerMessage | ClientMessage;
 
 /** The type byte of each message. */
-export const TYPES: Readonly<Record<Message["name"], number>> = {
-  ChannelHeader: 1, Description: 2, Data: 3, TimelineState: 4, Overlay: OVERLAY, Presence: 6, Pong: 7, Problem: 8, Welcome: 9,
-  Grant: 10, Refusal: 11, Notice: 12, Choice: 13, Ping: 64, Edit: 65, Report: 66, Claim: 67, Release: 68, Alive: 69, Input: 70, Ask: 71,
+export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
+  ChannelHeader: 1,
+  Description: 2,
+  Data: 3,
+  TimelineState: 4,
+  Overlay: OVERLAY_TYPE,
+  Presence: 6,
+  Pong: 7,
+  Problem: 8,
+  Welcome: 9,
+  Grant: 10,
+  Refusal: 11,
+  Notice: 12,
+  Choice: 13,
+  Ping: 64,
+  Edit: 65,
+  Report: 66,
+  Claim: 67,
+  Release: 68,
+  Alive: 69,
+  Input: 70,
+  Ask: 71,
 };

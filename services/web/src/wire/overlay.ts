@@ -1,9 +1,9 @@
 /** Messages 5 and 14: pulled limbs at an instant (`proto/SPEC.md`, Overlay), to bytes and back. */
 
 import { LIMBS } from "../motion/skeleton";
+import { allocateMessage, dataViewOf, getU64, setU64 } from "./byte-layout";
 import { MalformedMessage } from "./errors";
-import { empty, getU64, setU64, viewOf } from "./layout";
-import { MOST_LIMBS } from "./limbs";
+import { MAX_LIMBS } from "./limbs";
 
 /** Pulled limbs at clock time `due`: for each limb its number and nine numbers, three rotation vectors in pi/32767. */
 export interface Overlay {
@@ -17,28 +17,31 @@ export interface Overlay {
 }
 
 /** Microseconds from one frame of an overlay to the next. */
-export const OVERLAY_FRAME = 16_667;
+export const OVERLAY_FRAME_INTERVAL_US = 16_667;
 
 /** The type byte where only limbs of the first performer are told of, and otherwise. */
-export const OVERLAY = 5;
-export const OVERLAY_OF_SEVERAL = 14;
+export const OVERLAY_TYPE = 5;
+export const MULTI_PERFORMER_OVERLAY_TYPE = 14;
 
 /** Bytes before the frames: the second has its mask behind the rest. */
-const HEADER = 12;
-const HEADER_OF_SEVERAL = 14;
-const LIMB_NUMBERS = 9;
+const SINGLE_PERFORMER_HEADER_BYTES = 12;
+const MULTI_PERFORMER_HEADER_BYTES = 14;
+const VALUES_PER_LIMB = 9;
 
 export function packOverlay(message: Overlay): Uint8Array<ArrayBuffer> {
   const limbs = [...message.limbs.keys()].sort((a, b) => a - b);
   const frames = [...message.earlier, message.limbs];
   const mask = limbs.reduce((sum, limb) => sum | (1 << limb), 0);
   const several = mask >> LIMBS.length !== 0;
-  const begin = several ? HEADER_OF_SEVERAL : HEADER;
-  const [bytes, view] = empty(several ? OVERLAY_OF_SEVERAL : OVERLAY, begin + frames.length * limbs.length * LIMB_NUMBERS * 2);
+  const begin = several ? MULTI_PERFORMER_HEADER_BYTES : SINGLE_PERFORMER_HEADER_BYTES;
+  const [bytes, view] = allocateMessage(
+    several ? MULTI_PERFORMER_OVERLAY_TYPE : OVERLAY_TYPE,
+    begin + frames.length * limbs.length * VALUES_PER_LIMB * 2,
+  );
   bytes[1] = message.earlier.length << 4;
   view.setUint16(2, message.sequence, true);
   setU64(view, 4, message.due);
-  if (several) view.setUint16(HEADER, mask, true);
+  if (several) view.setUint16(SINGLE_PERFORMER_HEADER_BYTES, mask, true);
   else bytes[1] |= mask;
   const numbers = frames.flatMap((frame) => limbs.flatMap((limb) => [...frame.get(limb)!]));
   numbers.forEach((number, i) => view.setInt16(begin + 2 * i, number, true));
@@ -46,26 +49,37 @@ export function packOverlay(message: Overlay): Uint8Array<ArrayBuffer> {
 }
 
 export function unpackOverlay(bytes: Uint8Array): Overlay {
-  const several = bytes[0] === OVERLAY_OF_SEVERAL;
-  const begin = several ? HEADER_OF_SEVERAL : HEADER;
+  const several = bytes[0] === MULTI_PERFORMER_OVERLAY_TYPE;
+  const begin = several ? MULTI_PERFORMER_HEADER_BYTES : SINGLE_PERFORMER_HEADER_BYTES;
   if (bytes.length < begin) throw new MalformedMessage(`Overlay has ${begin} bytes at least`);
-  const view = viewOf(bytes);
-  const mask = several ? view.getUint16(HEADER, true) : bytes[1] & 15;
+  const view = dataViewOf(bytes);
+  const mask = several ? view.getUint16(SINGLE_PERFORMER_HEADER_BYTES, true) : bytes[1] & 15;
   const held: number[] = [];
-  for (let limb = 0; limb < MOST_LIMBS; limb++) if ((mask >> limb) & 1) held.push(limb);
+  for (let limb = 0; limb < MAX_LIMBS; limb++) if ((mask >> limb) & 1) held.push(limb);
   const frames = (bytes[1] >> 4) + 1;
-  const size = begin + frames * held.length * LIMB_NUMBERS * 2;
+  const size = begin + frames * held.length * VALUES_PER_LIMB * 2;
   if (bytes.length !== size) {
-    throw new MalformedMessage(`Overlay of ${frames} frames of ${held.length} limbs has ${size} bytes, not ${bytes.length}`);
+    throw new MalformedMessage(
+      `Overlay of ${frames} frames of ${held.length} limbs has ${size} bytes, not ${bytes.length}`,
+    );
   }
   const earlier = Array.from({ length: frames }, (_, frame) => {
     const limbs = new Map<number, Int16Array>();
     held.forEach((limb, nth) => {
-      const at = begin + (frame * held.length + nth) * LIMB_NUMBERS * 2;
-      limbs.set(limb, Int16Array.from({ length: LIMB_NUMBERS }, (_, i) => view.getInt16(at + 2 * i, true)));
+      const at = begin + (frame * held.length + nth) * VALUES_PER_LIMB * 2;
+      limbs.set(
+        limb,
+        Int16Array.from({ length: VALUES_PER_LIMB }, (_, i) => view.getInt16(at + 2 * i, true)),
+      );
     });
     return limbs;
   });
   const limbs = earlier.pop()!;
-  return { name: "Overlay", sequence: view.getUint16(2, true), due: getU64(view, 4, "Overlay's due time"), limbs, earlier };
+  return {
+    name: "Overlay",
+    sequence: view.getUint16(2, true),
+    due: getU64(view, 4, "Overlay's due time"),
+    limbs,
+    earlier,
+  };
 }

@@ -1,11 +1,11 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 import { AudioPlayer } from "../../src/audio/player";
-import { PACKET } from "../../src/codec/audio";
-import type { AudioStore } from "../../src/playout/sounds";
-import { positionAt, Timelines } from "../../src/playout/timeline";
+import { PACKET_SAMPLES } from "../../src/codec/audio";
+import type { AudioBlockStore } from "../../src/playout/audio-store";
+import { positionAt, TimelineHistory } from "../../src/playout/timeline";
 import type { TimelineState } from "../../src/wire/messages";
-import { Device } from "./device";
-import { tone, toneDecoder, trackOf } from "./tones";
+import { FakeAudioContext } from "./fake-audio-context";
+import { createToneDecoder, createTrack, toneSample } from "./tone";
 
 const UNIX = 1_774_000_000_000_000;
 const STEP = 25;
@@ -14,19 +14,19 @@ const SECONDS = 6.03;
 /** No two samples of the tones differ by more. */
 const STEEP = 0.056;
 
-const track = trackOf(SECONDS);
-let device: Device;
+const track = createTrack(SECONDS);
+let device: FakeAudioContext;
 let now: number;
-let timelines: Timelines;
+let timelines: TimelineHistory;
 let missing: Set<number>;
 let ownOffset: number;
 let player: AudioPlayer;
 
 beforeEach(() => {
   vi.useFakeTimers();
-  device = new Device(5_000);
+  device = new FakeAudioContext(5_000);
   now = 5_000;
-  timelines = new Timelines();
+  timelines = new TimelineHistory();
   missing = new Set();
   ownOffset = 0;
 });
@@ -41,22 +41,41 @@ function own(nowMs: number): number {
 
 function retime(change: Partial<TimelineState> = {}): void {
   timelines.put({
-    name: "TimelineState", epoch: (timelines.newest?.epoch ?? 0) + 1, motion: "dance", clock: own(5_000), position: 0, playing: true, loop: true,
-    duration: track.durationUs, ...change,
+    name: "TimelineState",
+    epoch: (timelines.newest?.epoch ?? 0) + 1,
+    motion: "dance",
+    clock: own(5_000),
+    position: 0,
+    playing: true,
+    loop: true,
+    duration: track.durationUs,
+    ...change,
   });
 }
 
 function start(settled = () => true): void {
-  const store = { track, packet: (number: number) => (number < track.packets && !missing.has(number) ? Uint8Array.of(1) : null) };
-  player = new AudioPlayer(device as unknown as AudioContext, new EventTarget() as AudioNode, {
-    store: store as AudioStore, timelines, ownTime: own, settled,
-  }, toneDecoder(track).make, () => now);
+  const store = {
+    track,
+    packet: (number: number) => (number < track.packetCount && !missing.has(number) ? Uint8Array.of(1) : null),
+  };
+  player = new AudioPlayer(
+    device as unknown as AudioContext,
+    new EventTarget() as AudioNode,
+    {
+      store: store as AudioBlockStore,
+      timelines,
+      viewerTime: own,
+      isClockSettled: settled,
+    },
+    createToneDecoder(track).make,
+    () => now,
+  );
 }
 
 /** Milliseconds pass on the page and the device, which runs at `speed`. */
 function pass(ms: number, speed = 1): void {
   for (let left = ms; left > 0; left -= STEP) {
-    device.pass((STEP * speed) / 1000);
+    device.advance((STEP * speed) / 1000);
     now += STEP;
     vi.advanceTimersByTime(STEP);
   }
@@ -69,13 +88,14 @@ function error(pageMs: number): number {
   const there = ((lead.time - timelines.newest!.clock) / 1e6) % (track.durationUs / 1e6);
   // within a frame of the clock's own steps, whatever the tones do in it
   const at = there * 48_000;
-  return Math.min(...[-1, -0.5, 0, 0.5, 1].map((off) => Math.abs(device.out[frame].sample - tone(at + off))));
+  return Math.min(...[-1, -0.5, 0, 0.5, 1].map((off) => Math.abs(device.output[frame].sample - toneSample(at + off))));
 }
 
 /** The largest step from a frame to the next, over frames put out. */
 function step(from: number): number {
   let most = 0;
-  for (let frame = from + 1; frame < device.out.length; frame++) most = Math.max(most, Math.abs(device.out[frame].sample - device.out[frame - 1].sample));
+  for (let frame = from + 1; frame < device.output.length; frame++)
+    most = Math.max(most, Math.abs(device.output[frame].sample - device.output[frame - 1].sample));
   return most;
 }
 
@@ -84,9 +104,9 @@ describe("what is heard", () => {
     retime();
     start();
     pass(200);
-    const begun = device.out.length;
+    const begun = device.output.length;
     pass(9_000);
-    expect(device.out.slice(begun).every(({ sources }) => sources === 1)).toBe(true);
+    expect(device.output.slice(begun).every(({ sources }) => sources === 1)).toBe(true);
     expect(step(0)).toBeLessThan(STEEP);
     for (let back = 0; back < 2_000; back += 10) expect(error(now - back)).toBeLessThan(0.01);
     expect(Math.abs(player.leadAt(now)!.time - own(now))).toBeLessThan(3_000);
@@ -140,9 +160,11 @@ describe("an edit of the timeline", () => {
       const lead = player.leadAt(now - back)!;
       const at = (positionAt(timelines.newest!, lead.time) * 48_000) / 1e6;
       const frame = Math.round((now - back - device.offset - device.latency) * 48);
-      expect(Math.min(...[-1, -0.5, 0, 0.5, 1].map((off) => Math.abs(device.out[frame].sample - tone(at + off))))).toBeLessThan(0.01);
+      expect(
+        Math.min(...[-1, -0.5, 0, 0.5, 1].map((off) => Math.abs(device.output[frame].sample - toneSample(at + off)))),
+      ).toBeLessThan(0.01);
     }
-    expect(device.out.slice(48_000).every(({ sources }) => sources === 1)).toBe(true);
+    expect(device.output.slice(48_000).every(({ sources }) => sources === 1)).toBe(true);
     expect(step(48_000)).toBeLessThan(STEEP);
   });
 
@@ -150,21 +172,21 @@ describe("an edit of the timeline", () => {
     retime({ clock: own(now + 150), position: 2_150_000, playing: false });
     player.retime();
     pass(1_000);
-    expect(device.out.slice(-24_000).every(({ sample }) => sample === 0)).toBe(true);
+    expect(device.output.slice(-24_000).every(({ sample }) => sample === 0)).toBe(true);
     expect(player.leadAt(now)).not.toBeNull();
     retime({ clock: own(now + 150), position: 2_150_000 });
     player.retime();
     pass(1_000);
-    expect(device.out.slice(-4_800).some(({ sample }) => Math.abs(sample) > 0.3)).toBe(true);
+    expect(device.output.slice(-4_800).some(({ sample }) => Math.abs(sample) > 0.3)).toBe(true);
     expect(step(48_000)).toBeLessThan(STEEP);
   });
 
   test("that comes late cuts off what is heard, at once", () => {
-    const begun = device.out.length;
+    const begun = device.output.length;
     retime({ clock: own(now - 100), position: 0, playing: false });
     player.retime();
     pass(500);
-    const heard = device.out.slice(begun).findLastIndex(({ sample }) => sample !== 0);
+    const heard = device.output.slice(begun).findLastIndex(({ sample }) => sample !== 0);
     expect(heard).toBeLessThan(480);
   });
 
@@ -175,7 +197,7 @@ describe("an edit of the timeline", () => {
     player.retime();
     pass(1_000);
     expect(player.leadAt(now)!.run).toBe(run);
-    expect(device.out.slice(48_000).every(({ sources }) => sources === 1)).toBe(true);
+    expect(device.output.slice(48_000).every(({ sources }) => sources === 1)).toBe(true);
     expect(step(48_000)).toBeLessThan(STEEP);
   });
 });
@@ -185,7 +207,10 @@ test("packets that have not come are waited for, then silent, and heard from whe
   missing = new Set(gone);
   retime();
   start();
-  const heard = (number: number) => device.out[Math.round(track.firstSample(number) + PACKET / 2 + (device.offset - 5_000 - device.latency) * 48)]?.sample;
+  const heard = (number: number) =>
+    device.output[
+      Math.round(track.firstSample(number) + PACKET_SAMPLES / 2 + (device.offset - 5_000 - device.latency) * 48)
+    ]?.sample;
   pass(2_000);
   // those up to here were missed, the others come while there is time
   missing = new Set(gone.slice(0, 4));

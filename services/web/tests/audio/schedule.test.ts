@@ -1,20 +1,26 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { Schedule, SLOT, SLOT_US, stageEnd } from "../../src/audio/schedule";
+import { Schedule, SLOT_FRAMES, SLOT_US, stageTimeAtEnd } from "../../src/audio/schedule";
 
 /** Slots that are scheduled before they are heard. */
 const AHEAD = 24;
 
 /** Minutes of slots against an own clock that runs `drift` faster than the device and is `wobble(t)` off; the errors when heard. */
-function errors(schedule: Schedule, minutes: number, drift: number, wobble: (us: number) => number, silent = false): number[] {
+function errors(
+  schedule: Schedule,
+  minutes: number,
+  drift: number,
+  wobble: (us: number) => number,
+  silent = false,
+): number[] {
   const own = (us: number) => 7e9 + us * (1 + drift);
   const found: number[] = [];
   for (let index = 0; index < minutes * 60 * 16; index++) {
     const heard = index * SLOT_US;
     const told = own(heard) + wobble(heard - AHEAD * SLOT_US);
     schedule.add(index, told, silent);
-    found.push(schedule.stageAt(index * SLOT)!.time - own(heard));
-    schedule.forget(index - 40);
+    found.push(schedule.stageAt(index * SLOT_FRAMES)!.time - own(heard));
+    schedule.dropBefore(index - 40);
   }
   return found;
 }
@@ -58,11 +64,14 @@ test("slots of a run follow each other, at speeds that change gently and by half
         const slot = schedule.add(6 + nth, 1e9 + (nth + 1) * SLOT_US + off, false);
         expect(Math.abs(slot.speed - 1)).toBeLessThanOrEqual(0.005 + 1e-12);
         if (slot.run === before.run) {
-          expect(slot.stage).toBe(stageEnd(before));
+          expect(slot.stageTime).toBe(stageTimeAtEnd(before));
           expect(Math.abs(slot.speed - before.speed)).toBeLessThanOrEqual(0.0005 + 1e-12);
         }
-        expect(schedule.stageAt(slot.index * SLOT)).toEqual({ time: slot.stage, run: slot.run });
-        expect(schedule.stageAt((slot.index + 0.5) * SLOT)!.time).toBeCloseTo(slot.stage + (slot.speed * SLOT_US) / 2, 3);
+        expect(schedule.stageAt(slot.index * SLOT_FRAMES)).toEqual({ time: slot.stageTime, run: slot.run });
+        expect(schedule.stageAt((slot.index + 0.5) * SLOT_FRAMES)!.time).toBeCloseTo(
+          slot.stageTime + (slot.speed * SLOT_US) / 2,
+          3,
+        );
         before = slot;
       });
     }),
@@ -82,7 +91,7 @@ describe("a new run begins", () => {
     schedule.add(0, 0, false);
     expect(schedule.add(1, SLOT_US - 200e3, false)).toEqual({ index: 1, stage: SLOT_US - 200e3, speed: 1, run: 2 });
     expect(schedule.add(4, 3 * SLOT_US, false).run).toBe(3);
-    expect(schedule.stageAt(2.5 * SLOT)).toBeNull();
+    expect(schedule.stageAt(2.5 * SLOT_FRAMES)).toBeNull();
     schedule.clear();
     expect([schedule.last, schedule.stageAt(0)]).toEqual([null, null]);
     expect(schedule.add(5, 0, false).run).toBe(4);
@@ -92,6 +101,6 @@ describe("a new run begins", () => {
 test("what was heard is forgotten when told", () => {
   const schedule = new Schedule();
   for (let index = 0; index < 6; index++) schedule.add(index, index * SLOT_US, false);
-  schedule.forget(4);
+  schedule.dropBefore(4);
   expect([3, 4, 5, 6].map((index) => schedule.slot(index)?.index ?? null)).toEqual([null, 4, 5, null]);
 });

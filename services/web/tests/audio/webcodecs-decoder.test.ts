@@ -1,5 +1,5 @@
 import { afterEach, describe, expect, test, vi } from "vitest";
-import { webCodecsDecoder } from "../../src/audio/webcodecs-decoder";
+import { findWebCodecsDecoder } from "../../src/audio/webcodecs-decoder";
 
 /** A browser's decoder in a test's hands: what is given to it comes out when the test says. */
 class Decoder {
@@ -33,34 +33,45 @@ function install(able = true): void {
   Decoder.made = [];
   Decoder.able = able;
   vi.stubGlobal("AudioDecoder", Decoder);
-  vi.stubGlobal("EncodedAudioChunk", class {
-    constructor(chunk: object) {
-      Object.assign(this, chunk);
-    }
-  });
+  vi.stubGlobal(
+    "EncodedAudioChunk",
+    class {
+      constructor(chunk: object) {
+        Object.assign(this, chunk);
+      }
+    },
+  );
 }
 
 afterEach(() => void vi.unstubAllGlobals());
 
 test("a browser that has none, or that cannot Opus, has no such decoder", async () => {
-  expect(await webCodecsDecoder(2)).toBeNull();
+  expect(await findWebCodecsDecoder(2)).toBeNull();
   install(false);
-  expect(await webCodecsDecoder(2)).toBeNull();
+  expect(await findWebCodecsDecoder(2)).toBeNull();
 });
 
 describe("packets", () => {
   test("are told by their numbers, a plane for each channel, though fewer should come", async () => {
     install();
     const out: [number, number[]][] = [];
-    const decoder = (await webCodecsDecoder(2))!((number, planes) => out.push([number, planes!.map(([first]) => first)]));
+    const decoder = (await findWebCodecsDecoder(2))!((number, planes) =>
+      out.push([number, planes!.map(([first]) => first)]),
+    );
     decoder.decode(40, Uint8Array.of(1));
     decoder.decode(41, Uint8Array.of(2));
     const [inside] = Decoder.made;
-    expect(inside.given.map(({ timestamp, duration, type }) => [timestamp, duration, type])).toEqual([[2_400_000, 60_000, "key"], [2_460_000, 60_000, "key"]]);
+    expect(inside.given.map(({ timestamp, duration, type }) => [timestamp, duration, type])).toEqual([
+      [2_400_000, 60_000, "key"],
+      [2_460_000, 60_000, "key"],
+    ]);
     inside.put();
     inside.put(1);
-    expect(out).toEqual([[40, [1, 2]], [41, [1, 1]]]);
-    decoder.end();
+    expect(out).toEqual([
+      [40, [1, 2]],
+      [41, [1, 1]],
+    ]);
+    decoder.close();
     await expect.poll(() => inside.state).toBe("closed");
   });
 
@@ -68,15 +79,18 @@ describe("packets", () => {
     install();
     vi.spyOn(console, "warn").mockReturnValue();
     const out: [number, unknown][] = [];
-    const decoder = (await webCodecsDecoder(1))!((number, planes) => out.push([number, planes]));
+    const decoder = (await findWebCodecsDecoder(1))!((number, planes) => out.push([number, planes]));
     decoder.decode(0, Uint8Array.of(1));
     decoder.decode(1, Uint8Array.of(1));
     const [inside] = Decoder.made;
     inside.close();
     inside.init.error(new Error("no Opus"));
     decoder.decode(2, Uint8Array.of(1));
-    expect(out).toEqual([[0, null], [2, null]]);
-    expect(() => decoder.end()).not.toThrow();
+    expect(out).toEqual([
+      [0, null],
+      [2, null],
+    ]);
+    expect(() => decoder.close()).not.toThrow();
     vi.restoreAllMocks();
   });
 });

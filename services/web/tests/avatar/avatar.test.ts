@@ -1,26 +1,30 @@
-import { Group, Quaternion, Vector3, type Object3D } from "three";
+import { Group, type Object3D, Quaternion, Vector3 } from "three";
 import { beforeAll, describe, expect, test } from "vitest";
 import { Avatar } from "../../src/avatar/avatar";
 import { AvatarModel } from "../../src/avatar/model";
-import { JOINTS, restPose, type Figure, type Pose } from "../../src/motion/skeleton";
-import { handleOf } from "../../src/stage/performer";
-import { joint as standing, SOLE } from "../../src/stage/standard";
-import { otherFigure, standardFigure } from "../stage/standard-figure";
-import { figureFile, mixamo, type FigureOptions } from "./figures";
+import { type Figure, JOINTS, type Pose, restPose } from "../../src/motion/skeleton";
+import { handlePosition } from "../../src/stage/puppet/performer";
+import { SOLE_HEIGHT_M, jointPosition as standing } from "../../src/stage/puppet/standard-figure";
+import { createOtherFigure, createStandardFigure } from "../stage/puppet/figures";
+import { createFigureFile, type FigureOptions, mixamoName } from "./figure-files";
 
 /** What a limb's bone is, and the joints of the dancer that it lies between. */
 const LIMBS: readonly (readonly [bone: string, next: string, joint: string, after: string])[] = [
-  ["leftUpperArm", "leftLowerArm", "l_shoulder", "l_elbow"], ["leftLowerArm", "leftHand", "l_elbow", "l_wrist"],
-  ["rightUpperArm", "rightLowerArm", "r_shoulder", "r_elbow"], ["rightLowerArm", "rightHand", "r_elbow", "r_wrist"],
-  ["leftUpperLeg", "leftLowerLeg", "l_hip", "l_knee"], ["leftLowerLeg", "leftFoot", "l_knee", "l_ankle"],
-  ["rightUpperLeg", "rightLowerLeg", "r_hip", "r_knee"], ["rightLowerLeg", "rightFoot", "r_knee", "r_ankle"],
+  ["leftUpperArm", "leftLowerArm", "l_shoulder", "l_elbow"],
+  ["leftLowerArm", "leftHand", "l_elbow", "l_wrist"],
+  ["rightUpperArm", "rightLowerArm", "r_shoulder", "r_elbow"],
+  ["rightLowerArm", "rightHand", "r_elbow", "r_wrist"],
+  ["leftUpperLeg", "leftLowerLeg", "l_hip", "l_knee"],
+  ["leftLowerLeg", "leftFoot", "l_knee", "l_ankle"],
+  ["rightUpperLeg", "rightLowerLeg", "r_hip", "r_knee"],
+  ["rightLowerLeg", "rightFoot", "r_knee", "r_ankle"],
 ];
 
 const FILES: Readonly<Record<string, FigureOptions>> = {
   "VRM 1": { vrm: 1 },
   "VRM 0, facing away": { vrm: 0 },
   "VRM 1 in askew axes, with short legs": { vrm: 1, askew: true, legLength: 0.6 },
-  "a GLB in the T-pose, named as Mixamo does, in centimetres": { name: mixamo, unit: 0.01, askew: true },
+  "a GLB in the T-pose, named as Mixamo does, in centimetres": { name: mixamoName, unit: 0.01, askew: true },
   "a GLB in the A-pose, facing aside": { arms: 45, legs: 8, facing: 90, askew: true },
   "a GLB on its back": { lying: true, unit: 0.01 },
 };
@@ -30,13 +34,15 @@ const of = (avatar: Avatar, joint: string) => new Vector3().setFromMatrixPositio
 const degrees = (a: Vector3, b: Vector3) => (a.angleTo(b) * 180) / Math.PI;
 
 async function read(options: FigureOptions): Promise<AvatarModel> {
-  return AvatarModel.read(figureFile(options).buffer, "boxes");
+  return AvatarModel.parse(createFigureFile(options).buffer, "boxes");
 }
 
 /** A pose of a dance: turned, leaning, every joint somewhere. `time` in seconds. */
 function dancing(time: number): Pose {
   const pose = restPose();
-  standing("humanoid_root").add(new Vector3(0.8 * Math.sin(time), 0.03 * Math.sin(3 * time), 0.5 * Math.cos(time))).toArray(pose.root);
+  standing("humanoid_root")
+    .add(new Vector3(0.8 * Math.sin(time), 0.03 * Math.sin(3 * time), 0.5 * Math.cos(time)))
+    .toArray(pose.root);
   JOINTS.forEach((name, k) => {
     const reach = /shoulder|elbow/.test(name) ? 1.2 : /hip|knee|wrist/.test(name) ? 0.5 : 0.2;
     const axis = new Vector3(Math.sin(k), Math.cos(2 * k), Math.sin(3 * k + 1)).normalize();
@@ -57,16 +63,21 @@ function lowest(avatar: Avatar): number {
   let least = Infinity;
   avatar.group.updateMatrixWorld(true);
   avatar.group.traverse((mesh) => {
-    const skinned = mesh as Object3D & { isSkinnedMesh?: boolean; geometry: { attributes: { position: { count: number } } }; getVertexPosition(i: number, out: Vector3): Vector3 };
+    const skinned = mesh as Object3D & {
+      isSkinnedMesh?: boolean;
+      geometry: { attributes: { position: { count: number } } };
+      getVertexPosition(i: number, out: Vector3): Vector3;
+    };
     if (!skinned.isSkinnedMesh) return;
-    for (let i = 0; i < skinned.geometry.attributes.position.count; i++) least = Math.min(least, skinned.getVertexPosition(i, new Vector3()).applyMatrix4(mesh.matrixWorld).y);
+    for (let i = 0; i < skinned.geometry.attributes.position.count; i++)
+      least = Math.min(least, skinned.getVertexPosition(i, new Vector3()).applyMatrix4(mesh.matrixWorld).y);
   });
   return least;
 }
 
 describe.each(Object.entries(FILES))("%s", (_, options) => {
   let model: AvatarModel;
-  const figure = otherFigure();
+  const figure = createOtherFigure();
   beforeAll(async () => {
     model = await read(options);
   });
@@ -89,8 +100,12 @@ describe.each(Object.entries(FILES))("%s", (_, options) => {
     pose.rotations.set([yaw.w, yaw.x, yaw.y, yaw.z]);
     avatar.apply(pose, 0);
     const place = (bone: string) => at(model.nodes.get(bone) as Object3D);
-    expect(degrees(place("leftUpperLeg").sub(place("rightUpperLeg")), new Vector3(1, 0, 0).applyQuaternion(yaw))).toBeLessThan(0.5);
-    expect(degrees(place("leftToes").sub(place("leftFoot")).setY(0), new Vector3(0, 0, 1).applyQuaternion(yaw))).toBeLessThan(0.5);
+    expect(
+      degrees(place("leftUpperLeg").sub(place("rightUpperLeg")), new Vector3(1, 0, 0).applyQuaternion(yaw)),
+    ).toBeLessThan(0.5);
+    expect(
+      degrees(place("leftToes").sub(place("leftFoot")).setY(0), new Vector3(0, 0, 1).applyQuaternion(yaw)),
+    ).toBeLessThan(0.5);
     expect(place("head").y).toBeGreaterThan(place("hips").y + 0.3);
   });
 
@@ -108,7 +123,11 @@ describe.each(Object.entries(FILES))("%s", (_, options) => {
     let before: number | null = null;
     for (let time = 0; time < 4; time += 1 / 60) {
       avatar.apply(dancing(time), 0);
-      const sole = Math.min(...[...model.rest.soles].flatMap(([foot, soles]) => soles.map((place) => place.clone().applyMatrix4((model.nodes.get(foot) as Object3D).matrixWorld).y)));
+      const sole = Math.min(
+        ...[...model.rest.solePoints].flatMap(([foot, soles]) =>
+          soles.map((place) => place.clone().applyMatrix4((model.nodes.get(foot) as Object3D).matrixWorld).y),
+        ),
+      );
       expect(Math.abs(sole - avatar.ground)).toBeLessThan(0.015);
       const height = avatar.root.elements[13];
       if (before !== null) expect(Math.abs(height - before)).toBeLessThan(0.03);
@@ -122,23 +141,30 @@ describe.each(Object.entries(FILES))("%s", (_, options) => {
     avatar.apply(pose, 0);
     // A pull to where the hand comes to when the dancer's arm does what it then does.
     const raised = dancing(0.4);
-    const turn = new Quaternion(...([1, 2, 3, 0] as const).map((k) => raised.rotations[JOINTS.indexOf("l_shoulder") * 4 + k]) as [number, number, number, number]);
+    const turn = new Quaternion(
+      ...(([1, 2, 3, 0] as const).map((k) => raised.rotations[JOINTS.indexOf("l_shoulder") * 4 + k]) as [
+        number,
+        number,
+        number,
+        number,
+      ]),
+    );
     turn.premultiply(new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), 0.5));
     raised.rotations.set([turn.w, turn.x, turn.y, turn.z], JOINTS.indexOf("l_shoulder") * 4);
     avatar.apply(raised, 0);
     const to = avatar.handle(limb, new Vector3());
-    const wanted = handleOf(avatar, limb, new Vector3());
-    expect(avatar.told(limb, to, new Vector3()).distanceTo(wanted)).toBeLessThan(1e-9);
+    const wanted = handlePosition(avatar, limb, new Vector3());
+    expect(avatar.toStreamedHandle(limb, to, new Vector3()).distanceTo(wanted)).toBeLessThan(1e-9);
     avatar.apply(pose, 0);
     // from afar already nearly so: the rest is told as the hand comes nearer
-    expect(avatar.told(limb, to, new Vector3()).distanceTo(wanted)).toBeLessThan(0.12);
+    expect(avatar.toStreamedHandle(limb, to, new Vector3()).distanceTo(wanted)).toBeLessThan(0.12);
   });
 });
 
 describe("an avatar", () => {
   test("goes as far over the floor as its legs do", async () => {
     const model = await read({ vrm: 1, legLength: 0.6 });
-    const avatar = new Avatar(model, standardFigure());
+    const avatar = new Avatar(model, createStandardFigure());
     const way = (pose: Pose) => {
       avatar.apply(pose, 0);
       return at(model.nodes.get("leftToes") as Object3D);
@@ -146,27 +172,32 @@ describe("an avatar", () => {
     const from = way(stand());
     const moved = stand();
     moved.root[2] += 1;
-    const hips = standing("l_hip").y - standing("l_midtarsal").y + SOLE;
+    const hips = standing("l_hip").y - standing("l_midtarsal").y + SOLE_HEIGHT_M;
     const own = at(model.nodes.get("leftUpperLeg") as Object3D).y - avatar.ground;
     expect(way(moved).z - from.z).toBeCloseTo(own / hips, 1);
     expect(own / hips).toBeLessThan(0.85);
   });
 
   test("holds and knees are where they are seen, for hands in the palm", async () => {
-    const model = await read({ name: mixamo, unit: 0.01, askew: true });
-    const avatar = new Avatar(model, standardFigure());
+    const model = await read({ name: mixamoName, unit: 0.01, askew: true });
+    const avatar = new Avatar(model, createStandardFigure());
     avatar.apply(dancing(1), 0);
-    for (const [limb, bone, next] of [[0, "leftHand", "leftMiddleProximal"], [1, "rightHand", "rightMiddleProximal"]] as const) {
+    for (const [limb, bone, next] of [
+      [0, "leftHand", "leftMiddleProximal"],
+      [1, "rightHand", "rightMiddleProximal"],
+    ] as const) {
       const [hand, fingers] = [at(model.nodes.get(bone) as Object3D), at(model.nodes.get(next) as Object3D)];
       expect(avatar.handle(limb, new Vector3()).distanceTo(hand.lerp(fingers, 0.85))).toBeLessThan(0.02);
     }
-    expect(avatar.handle(2, new Vector3()).distanceTo(at(model.nodes.get("leftLowerLeg") as Object3D))).toBeLessThan(0.02);
+    expect(avatar.handle(2, new Vector3()).distanceTo(at(model.nodes.get("leftLowerLeg") as Object3D))).toBeLessThan(
+      0.02,
+    );
   });
 
   test("has a tail that swings while it dances, and is still where stillness is asked for", async () => {
     const model = await read({ vrm: 1, tail: true });
-    const avatar = new Avatar(model, standardFigure());
-    const tail = model.stand.getObjectByName("tail") as Object3D;
+    const avatar = new Avatar(model, createStandardFigure());
+    const tail = model.root.getObjectByName("tail") as Object3D;
     avatar.apply(stand(), 0);
     const still = tail.quaternion.clone();
     for (let time = 0; time < 1; time += 1 / 60) avatar.apply(dancing(3 * time), 1 / 60);
@@ -178,7 +209,7 @@ describe("an avatar", () => {
   test("danced for one dancer it can dance for another", async () => {
     const model = await read({ vrm: 1 });
     const heights = [1, 0.5].map((size) => {
-      const figure: Figure = standardFigure(size);
+      const figure: Figure = createStandardFigure(size);
       const avatar = new Avatar(model, figure);
       new Group().add(avatar.group);
       const pose = stand();

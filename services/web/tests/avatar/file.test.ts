@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
-import { judge } from "../../src/avatar/file";
-import { REQUIRED } from "../../src/avatar/naming";
-import { AvatarProblem, LARGEST, tooLarge } from "../../src/avatar/problem";
+import { REQUIRED_BONES } from "../../src/avatar/bone-names";
+import { AvatarError, fileTooLarge, MAX_FILE_BYTES } from "../../src/avatar/error";
+import { parseAvatarFile } from "../../src/avatar/file";
 import { SKELETONS } from "./skeletons";
 
 /** A GLB of a description alone; `magic` and `version` as they should be. */
@@ -20,35 +20,47 @@ function glb(json: unknown, { magic = "glTF", version = 2, text = JSON.stringify
 
 /** The description of a skeleton with something to see. */
 function described(nodes = SKELETONS["Unreal"]): Record<string, unknown> {
-  const json = nodes.map(({ name }, at) => ({ name, children: nodes.flatMap(({ parent }, child) => (parent === at ? [child] : [])) }));
+  const json = nodes.map(({ name }, at) => ({
+    name,
+    children: nodes.flatMap(({ parent }, child) => (parent === at ? [child] : [])),
+  }));
   return { asset: { version: "2.0" }, nodes: json, meshes: [{}] };
 }
 
 /** Why a file cannot be used. */
-function why(bytes: ArrayBuffer): AvatarProblem {
+function why(bytes: ArrayBuffer): AvatarError {
   try {
-    judge(bytes);
+    parseAvatarFile(bytes);
   } catch (error) {
-    if (error instanceof AvatarProblem) return error;
+    if (error instanceof AvatarError) return error;
     throw error;
   }
   throw new Error("it was taken");
 }
 
 const bones = (list: readonly string[]) => Object.fromEntries(list.map((bone, node) => [bone, { node }]));
-const vrm1 = (list: readonly string[]) => ({ ...described(), extensions: { VRMC_vrm: { meta: { name: " Sato " }, humanoid: { humanBones: bones(list) } } } });
-const vrm0 = (list: readonly string[]) => ({ ...described(), extensions: { VRM: { meta: { title: "Old" }, humanoid: { humanBones: list.map((bone, node) => ({ bone, node })) } } } });
+const vrm1 = (list: readonly string[]) => ({
+  ...described(),
+  extensions: { VRMC_vrm: { meta: { name: " Sato " }, humanoid: { humanBones: bones(list) } } },
+});
+const vrm0 = (list: readonly string[]) => ({
+  ...described(),
+  extensions: { VRM: { meta: { title: "Old" }, humanoid: { humanBones: list.map((bone, node) => ({ bone, node })) } } },
+});
 
 describe("what can dance", () => {
   test("a plain GLB by the names of its bones", () => {
-    const { vrm, name, bones } = judge(glb(described()));
+    const { vrm, name, bones } = parseAvatarFile(glb(described()));
     expect([vrm, name, SKELETONS["Unreal"][bones.get("leftHand") ?? -1].name]).toEqual([false, null, "hand_l"]);
   });
 
   test("a VRM by the bones it names itself, of either version", () => {
-    for (const [json, called] of [[vrm1(REQUIRED), "Sato"], [vrm0(REQUIRED), "Old"]] as const) {
-      const { vrm, name, bones } = judge(glb(json));
-      expect([vrm, name, bones.get("leftHand")]).toEqual([true, called, REQUIRED.indexOf("leftHand")]);
+    for (const [json, called] of [
+      [vrm1(REQUIRED_BONES), "Sato"],
+      [vrm0(REQUIRED_BONES), "Old"],
+    ] as const) {
+      const { vrm, name, bones } = parseAvatarFile(glb(json));
+      expect([vrm, name, bones.get("leftHand")]).toEqual([true, called, REQUIRED_BONES.indexOf("leftHand")]);
     }
   });
 });
@@ -62,7 +74,8 @@ describe("what cannot, and why", () => {
 
   test("what is cut off, or whose description is broken", () => {
     const whole = glb(described());
-    for (const length of [12, 19, whole.byteLength - 1]) expect(why(whole.slice(0, length)).detail).toContain("ends before");
+    for (const length of [12, 19, whole.byteLength - 1])
+      expect(why(whole.slice(0, length)).detail).toContain("ends before");
     expect(why(glb(null, { text: '{"nodes": [' })).detail).toContain("cannot be read");
     const elsewhere = glb(described());
     new DataView(elsewhere).setUint32(12, 1e6, true);
@@ -71,23 +84,28 @@ describe("what cannot, and why", () => {
 
   test("what has no bones, or not all, of which those are named that are missing", () => {
     expect(why(glb({ nodes: [{ name: "Cube", mesh: 0 }], meshes: [{}] })).detail).toContain("no humanoid bones");
-    expect(why(glb(vrm1(REQUIRED.filter((bone) => !bone.startsWith("leftLower"))))).detail).toContain("left lower arm, left lower leg");
-    expect(why(glb(vrm0(REQUIRED.slice(1)))).detail).toContain("hips");
-    const outside = vrm1(REQUIRED);
+    expect(why(glb(vrm1(REQUIRED_BONES.filter((bone) => !bone.startsWith("leftLower"))))).detail).toContain(
+      "left lower arm, left lower leg",
+    );
+    expect(why(glb(vrm0(REQUIRED_BONES.slice(1)))).detail).toContain("hips");
+    const outside = vrm1(REQUIRED_BONES);
     outside.extensions.VRMC_vrm.humanoid.humanBones["head"] = { node: 999 };
     expect(why(glb(outside)).detail).toContain("head");
-    for (const odd of [null, 7, [], { nodes: 3, extensions: { VRM: 1 } }]) expect(why(glb(odd)).detail).toContain("no humanoid bones");
+    for (const odd of [null, 7, [], { nodes: 3, extensions: { VRM: 1 } }])
+      expect(why(glb(odd)).detail).toContain("no humanoid bones");
   });
 
   test("what has nothing to see, what lies in other files, what is compressed", () => {
     expect(why(glb({ ...described(), meshes: [] })).title).toBe("There is nothing to see");
-    expect(why(glb({ ...described(), images: [{ uri: "https://example.org/skin.png" }] })).detail).toContain("skin.png");
-    expect(judge(glb({ ...described(), images: [{ uri: "data:image/png;base64,AA==" }] })).vrm).toBe(false);
+    expect(why(glb({ ...described(), images: [{ uri: "https://example.org/skin.png" }] })).detail).toContain(
+      "skin.png",
+    );
+    expect(parseAvatarFile(glb({ ...described(), images: [{ uri: "data:image/png;base64,AA==" }] })).vrm).toBe(false);
     expect(why(glb({ ...described(), extensionsRequired: ["KHR_draco_mesh_compression"] })).detail).toContain("Draco");
   });
 
   test("what is too large, with its size and the limit", () => {
-    expect(tooLarge(LARGEST + 1).detail).toBe("it has 101 MB, and 100 MB are the most");
-    expect(why(new ArrayBuffer(LARGEST + 1)).title).toBe("It is too large");
+    expect(fileTooLarge(MAX_FILE_BYTES + 1).detail).toBe("it has 101 MB, and 100 MB are the most");
+    expect(why(new ArrayBuffer(MAX_FILE_BYTES + 1)).title).toBe("It is too large");
   });
 });

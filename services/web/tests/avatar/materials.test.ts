@@ -1,25 +1,43 @@
 import { MToonMaterial } from "@pixiv/three-vrm";
-import { BoxGeometry, Color, Group, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshPhysicalMaterial, MeshStandardMaterial, Texture } from "three";
+import {
+  BoxGeometry,
+  Color,
+  Group,
+  Mesh,
+  MeshBasicMaterial,
+  type MeshLambertMaterial,
+  MeshPhysicalMaterial,
+  MeshStandardMaterial,
+  Texture,
+} from "three";
 import { expect, test } from "vitest";
-import { dimCartoons, PlainMaterials, simplify } from "../../src/avatar/materials";
+import { dimMToonMaterials, SimpleMaterials, simplifyMaterials } from "../../src/avatar/materials";
 
 test("physical materials are plain where they have to be, with their colours, and themselves again", () => {
-  const [glossy, flat] = [new MeshStandardMaterial({ color: "#336699", transparent: true, opacity: 0.5 }), new MeshBasicMaterial()];
+  const [glossy, flat] = [
+    new MeshStandardMaterial({ color: "#336699", transparent: true, opacity: 0.5 }),
+    new MeshBasicMaterial(),
+  ];
   const [one, several] = [new Mesh(new BoxGeometry(), glossy), new Mesh(new BoxGeometry(), [flat, glossy])];
-  const materials = new PlainMaterials(new Group().add(one, several));
-  materials.show(true);
+  const materials = new SimpleMaterials(new Group().add(one, several));
+  materials.useSimple(true);
   const plain = one.material as unknown as MeshLambertMaterial;
-  expect([plain.isMeshLambertMaterial, plain.color.getHexString(), plain.opacity, plain.transparent]).toEqual([true, "336699", 0.5, true]);
+  expect([plain.isMeshLambertMaterial, plain.color.getHexString(), plain.opacity, plain.transparent]).toEqual([
+    true,
+    "336699",
+    0.5,
+    true,
+  ]);
   expect(several.material).toEqual([flat, plain]);
-  materials.show(false);
+  materials.useSimple(false);
   expect([one.material, several.material]).toEqual([glossy, [flat, glossy]]);
 });
 
 test("they are the model's own again when nobody dances in it", () => {
   const mesh = new Mesh(new BoxGeometry(), new MeshStandardMaterial());
   const own = mesh.material;
-  const materials = new PlainMaterials(mesh);
-  materials.show(true);
+  const materials = new SimpleMaterials(mesh);
+  materials.useSimple(true);
   materials.dispose();
   expect(mesh.material).toBe(own);
 });
@@ -29,7 +47,7 @@ test("cartoons are dimmed, shades more than what is lit, and nothing else is", (
   cartoon.color = new Color(1, 1, 1);
   cartoon.shadeColorFactor = new Color(1, 1, 1);
   const other = new MeshStandardMaterial({ color: "#ffffff" });
-  dimCartoons([cartoon, other]);
+  dimMToonMaterials([cartoon, other]);
   expect(cartoon.color.r).toBeLessThan(1);
   expect(cartoon.shadeColorFactor.r).toBeLessThan(cartoon.color.r);
   expect(other.color.r).toBe(1);
@@ -39,7 +57,7 @@ test("what the stage's shaders have not is taken away: glass is thin, gloss and 
   const picture = new Texture();
   const glass = new MeshPhysicalMaterial({ transmission: 1, iridescence: 1, dispersion: 2, clearcoat: 0.5 });
   const rough = new MeshStandardMaterial({ bumpMap: picture, map: picture, normalMap: picture, opacity: 0.5 });
-  simplify([glass, rough, new MeshBasicMaterial()]);
+  simplifyMaterials([glass, rough, new MeshBasicMaterial()]);
   expect([glass.transmission, glass.iridescence, glass.dispersion, glass.clearcoat]).toEqual([0, 0, 0, 0.5]);
   expect(glass.transparent).toBe(true);
   expect(glass.opacity).toBeGreaterThan(0.1);

@@ -1,36 +1,47 @@
 import { Mesh, type Object3D } from "three";
 import { describe, expect, test } from "vitest";
+import { AvatarError } from "../../src/avatar/error";
 import { AvatarModel } from "../../src/avatar/model";
-import { AvatarProblem } from "../../src/avatar/problem";
-import { figureFile } from "./figures";
+import { createFigureFile } from "./figure-files";
 
 describe("a file that is read", () => {
   test("has its maker's name for it, or the file's, and a node for each bone", async () => {
-    const [vrm, old, plain] = await Promise.all([{ vrm: 1 }, { vrm: 0 }, {}].map((options) => AvatarModel.read(figureFile(options as { vrm?: 0 | 1 }).buffer, "mine")));
+    const [vrm, old, plain] = await Promise.all(
+      [{ vrm: 1 }, { vrm: 0 }, {}].map((options) =>
+        AvatarModel.parse(createFigureFile(options as { vrm?: 0 | 1 }).buffer, "mine"),
+      ),
+    );
     expect([vrm.name, old.name, plain.name]).toEqual(["Boxes", "Old boxes", "mine"]);
     expect([vrm.vrm !== null, old.vrm !== null, plain.vrm]).toEqual([true, true, null]);
     for (const model of [vrm, old, plain]) expect(model.nodes.get("leftHand")?.name).toBe("leftHand");
   });
 
   test("throws and takes shadows, and is drawn wherever it dances", async () => {
-    const { stand } = await AvatarModel.read(figureFile().buffer, "mine");
+    const { root: stand } = await AvatarModel.parse(createFigureFile().buffer, "mine");
     const meshes: Object3D[] = [];
     stand.traverse((object) => object instanceof Mesh && meshes.push(object));
-    expect(meshes.map(({ castShadow, receiveShadow, frustumCulled }) => [castShadow, receiveShadow, frustumCulled])).toEqual([[true, true, false]]);
+    expect(
+      meshes.map(({ castShadow, receiveShadow, frustumCulled }) => [castShadow, receiveShadow, frustumCulled]),
+    ).toEqual([[true, true, false]]);
   });
 
   test("whose meshes cannot be read is told to be broken", async () => {
-    const whole = figureFile();
+    const whole = createFigureFile();
     const view = new DataView(whole.buffer);
     // the description stands, and what it describes is gone
     const end = 20 + view.getUint32(12, true);
     const cut = whole.slice(0, end);
     new DataView(cut.buffer).setUint32(8, end, true);
-    await expect(AvatarModel.read(cut.buffer, "mine")).rejects.toMatchObject({ name: "AvatarProblem", title: "It is broken" });
-    await expect(AvatarModel.read(new ArrayBuffer(8), "mine")).rejects.toBeInstanceOf(AvatarProblem);
+    await expect(AvatarModel.parse(cut.buffer, "mine")).rejects.toMatchObject({
+      name: "AvatarProblem",
+      title: "It is broken",
+    });
+    await expect(AvatarModel.parse(new ArrayBuffer(8), "mine")).rejects.toBeInstanceOf(AvatarError);
   });
 
   test("whose limbs have no length cannot dance", async () => {
-    await expect(AvatarModel.read(figureFile({ forearm: 0 }).buffer, "mine")).rejects.toThrow(/leftLowerArm and leftHand are in one place/);
+    await expect(AvatarModel.parse(createFigureFile({ forearm: 0 }).buffer, "mine")).rejects.toThrow(
+      /leftLowerArm and leftHand are in one place/,
+    );
   });
 });

@@ -1,5 +1,5 @@
 /** Skeletons as the usual tools name them: each node's name, with its parent's; "" for a root. */
-import type { NamedNode } from "../../src/avatar/naming";
+import type { NamedNode } from "../../src/avatar/bone-names";
 
 type Chains = readonly string[];
 

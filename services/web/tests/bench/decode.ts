@@ -1,8 +1,8 @@
 /** Milliseconds to decode blocks: JSON on standard input, for `make bench-codec`. The last line printed is one JSON object. */
 import { readFileSync } from "node:fs";
-import { decodeBlock } from "../../src/codec/decode";
-import { unpackDancer } from "../../src/codec/dancer";
-import { MotionTrack } from "../../src/codec/track";
+import { decodeMotionBlock } from "../../src/codec/motion-decoder";
+import { MotionTrack } from "../../src/codec/motion-track";
+import { unpackSkeletonDescription } from "../../src/codec/skeleton-description";
 
 interface Coded {
   track: { fps: number; frames: number; blockFrames: number; firstFrames: number; dancer: string };
@@ -11,7 +11,13 @@ interface Coded {
 
 const bytes = (hex: string) => Uint8Array.from(Buffer.from(hex, "hex"));
 const work = (JSON.parse(readFileSync(0, "utf8")) as Coded[]).flatMap(({ track, blocks }) => {
-  const of = new MotionTrack(track.fps, track.frames, track.blockFrames, track.firstFrames, unpackDancer(bytes(track.dancer)));
+  const of = new MotionTrack(
+    track.fps,
+    track.frames,
+    track.blockFrames,
+    track.firstFrames,
+    unpackSkeletonDescription(bytes(track.dancer)),
+  );
   return blocks.map((block) => ({ of, block: bytes(block) }));
 });
 
@@ -20,9 +26,11 @@ const spent = new Array<number>(work.length).fill(Infinity);
 for (let round = 0; round < 5; round++) {
   work.forEach(({ of, block }, nth) => {
     const began = performance.now();
-    decodeBlock(of, block);
+    decodeMotionBlock(of, block);
     spent[nth] = Math.min(spent[nth], performance.now() - began);
   });
 }
 spent.sort((a, b) => a - b);
-console.log(JSON.stringify({ blocks: spent.length, median_ms: spent[spent.length >> 1], largest_ms: spent[spent.length - 1] }));
+console.log(
+  JSON.stringify({ blocks: spent.length, median_ms: spent[spent.length >> 1], largest_ms: spent[spent.length - 1] }),
+);

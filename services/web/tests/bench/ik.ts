@@ -6,8 +6,13 @@ import { readFileSync } from "node:fs";
 import { Goal, Joint, Link, Solver } from "closed-chain-ik/src/core/index.js";
 import { Bone, BufferGeometry, MeshBasicMaterial, Skeleton, SkinnedMesh, Vector3 } from "three";
 import { CCDIKSolver } from "three/examples/jsm/animation/CCDIKSolver.js";
-import { Arm, SOLVED, readTable } from "../../src/marionette/arm";
-import { ELBOW_LIMIT, WRIST_LIMIT, parseProportions, type Proportions } from "../../src/marionette/proportions";
+import { Arm, NUMBERS_PER_ARM, parseBendTable } from "../../src/marionette/arm";
+import {
+  MAX_ELBOW_BEND_RAD,
+  MAX_WRIST_BEND_RAD,
+  type Proportions,
+  parseProportions,
+} from "../../src/marionette/proportions";
 
 interface Asked {
   /** Arms, and hand tips (x y z each) for which the other language solves too. */
@@ -28,8 +33,12 @@ interface Contender {
 }
 
 function ours(proportions: Proportions, table: Float64Array): Contender {
-  const arm = new Arm(proportions, table), out = new Float64Array(BATCH * SOLVED);
-  return { solve: (targets, from, count) => arm.solve(out, 0, targets, from, count), tip: () => out.subarray(8, 11) };
+  const arm = new Arm(proportions, table),
+    out = new Float64Array(BATCH * NUMBERS_PER_ARM);
+  return {
+    solve: (targets, from, count) => arm.solveArms(out, 0, targets, from, count),
+    tip: () => out.subarray(8, 11),
+  };
 }
 
 /** One that solves for a target at a time. */
@@ -43,7 +52,7 @@ function oneByOne(solve: (x: number, y: number, z: number) => void, tip: () => A
 }
 
 /** A skinned mesh of three links hanging from the shoulder, and a bone for the target; it goes on from the pose before. */
-function ccdik({ upper, fore, hand }: Proportions, limited: boolean): Contender {
+function ccdik({ upper, forearm: fore, hand }: Proportions, limited: boolean): Contender {
   const [root, shoulder, elbow, wrist, tip, target] = Array.from({ length: 6 }, () => new Bone());
   root.add(shoulder, target);
   shoulder.add(elbow);
@@ -58,7 +67,7 @@ function ccdik({ upper, fore, hand }: Proportions, limited: boolean): Contender 
   mesh.updateMatrixWorld(true);
   const hinge = (limit: number) =>
     limited ? { rotationMin: new Vector3(-limit, 0, 0), rotationMax: new Vector3(0, 0, 0) } : {};
-  const links = [{ index: 3, ...hinge(WRIST_LIMIT) }, { index: 2, ...hinge(ELBOW_LIMIT) }, { index: 1 }];
+  const links = [{ index: 3, ...hinge(MAX_WRIST_BEND_RAD) }, { index: 2, ...hinge(MAX_ELBOW_BEND_RAD) }, { index: 1 }];
   const solver = new CCDIKSolver(mesh, [{ target: 5, effector: 4, links, iteration: 10 }]);
   return oneByOne(
     (x, y, z) => {
@@ -77,11 +86,18 @@ const [X, Y, Z, EX, EY, EZ] = [0, 1, 2, 3, 4, 5];
  * A shoulder that turns freely, elbow and wrist that bend without limits, as it hardly ever gets past those. As it comes it stops
  * after five iterations, and wherever the way is not straight; here it may go on until it is within its thousandth.
  */
-function closedChain({ upper, fore, hand }: Proportions): Contender {
-  const base = new Link(), end = new Link(), goal = new Goal();
+function closedChain({ upper, forearm: fore, hand }: Proportions): Contender {
+  const base = new Link(),
+    end = new Link(),
+    goal = new Goal();
   let last = base;
-  [[0, EX, EY, EZ], [upper, EX], [fore, EX]].forEach(([at, ...freedoms], nth) => {
-    const joint = new Joint(), link = nth === 2 ? end : new Link();
+  [
+    [0, EX, EY, EZ],
+    [upper, EX],
+    [fore, EX],
+  ].forEach(([at, ...freedoms], nth) => {
+    const joint = new Joint(),
+      link = nth === 2 ? end : new Link();
     joint.setDoF(...freedoms);
     joint.setPosition(0, -at, 0);
     if (nth > 0) joint.setDoFValues(-0.5);
@@ -92,7 +108,8 @@ function closedChain({ upper, fore, hand }: Proportions): Contender {
   end.setPosition(0, -hand, 0);
   goal.setGoalDoF(X, Y, Z);
   goal.makeClosure(end);
-  const solver = new Solver(base), place: number[] = [0, 0, 0];
+  const solver = new Solver(base),
+    place: number[] = [0, 0, 0];
   solver.maxIterations = 50;
   solver.stallThreshold = 1e-6;
   solver.divergeThreshold = 1;
@@ -133,7 +150,8 @@ function tipError(contender: Contender, targets: Float64Array, count: number): n
 }
 
 const body = asked.bodies[asked.bodies.length - 1];
-const shape = parseProportions(body.proportions), table = readTable(Buffer.from(body.table, "base64"));
+const shape = parseProportions(body.proportions),
+  table = parseBendTable(Buffer.from(body.table, "base64"));
 // how many solves a turn has: a few hundredths of a second of each
 const contenders: Record<string, { contender: Contender; count: number }> = {
   ours: { contender: ours(shape, table), count: 500_000 },
@@ -143,7 +161,8 @@ const contenders: Record<string, { contender: Contender; count: number }> = {
 };
 const measured = Object.entries(asked.orders).map(([order, list]) => {
   const targets = Float64Array.from(list);
-  const errors: Record<string, number> = {}, rates: Record<string, number[]> = {};
+  const errors: Record<string, number> = {},
+    rates: Record<string, number[]> = {};
   for (const [name, { contender, count }] of Object.entries(contenders)) {
     errors[name] = tipError(contender, targets, 1_000);
     run(contender, targets, 2 * count);
@@ -159,12 +178,14 @@ const measured = Object.entries(asked.orders).map(([order, list]) => {
 
 // what we make of the targets that the other language solves too
 const solved = asked.bodies.map(({ proportions, table, checked }) => {
-  const arm = new Arm(parseProportions(proportions), readTable(Buffer.from(table, "base64")));
-  const out = new Float64Array(SOLVED), angles = new Float64Array(3), targets = Float64Array.from(checked);
+  const arm = new Arm(parseProportions(proportions), parseBendTable(Buffer.from(table, "base64")));
+  const out = new Float64Array(NUMBERS_PER_ARM),
+    angles = new Float64Array(3),
+    targets = Float64Array.from(checked);
   return Array.from({ length: checked.length / 3 }, (_, nth) => {
-    arm.solve(out, 0, targets, 3 * nth);
+    arm.solveArms(out, 0, targets, 3 * nth);
     const level = Math.hypot(out[8], out[10]);
-    arm.angles(angles, 0, arm.clamp(Math.hypot(level, out[9])), Math.atan2(out[9], level));
+    arm.solveAngles(angles, 0, arm.clampDistance(Math.hypot(level, out[9])), Math.atan2(out[9], level));
     return [...out, ...angles];
   });
 });

@@ -21,37 +21,55 @@
  * Where there is no graphics processor the picture is drawn in software, which takes most of a first paint.
  */
 import { parseArgs } from "node:util";
-import { chromium } from "../browser/chromium";
+import { chromiumPath } from "../browser/chromium";
 import { startServer } from "../browser/server";
-import { arrival, line } from "./page/arrival";
-import type { Bench, Figures } from "./page/bench";
-import { drawing, frames } from "./page/frames";
-import { hearing } from "./page/hearing";
-import { memory } from "./page/memory";
-import { reading } from "./page/reading";
+import { benchAccessibility } from "./page/accessibility";
+import { benchAudioSync } from "./page/audio-sync";
+import type { BenchContext, BenchFigures } from "./page/bench";
+import { benchConstrainedFirstPaint, benchFirstPaint } from "./page/first-paint";
+import { benchDrawCalls, benchFrameTime } from "./page/frame-cost";
+import { benchMemory } from "./page/memory";
 
-const CASES: Readonly<Record<string, (bench: Bench) => Promise<Figures>>> = { arrival, line, frames, drawing, memory, audio: hearing, axe: reading };
+const CASES: Readonly<Record<string, (bench: BenchContext) => Promise<BenchFigures>>> = {
+  arrival: benchFirstPaint,
+  line: benchConstrainedFirstPaint,
+  frames: benchFrameTime,
+  drawing: benchDrawCalls,
+  memory: benchMemory,
+  audio: benchAudioSync,
+  axe: benchAccessibility,
+};
 
 /** What each figure may be at most. */
 const BOUNDS: Readonly<Record<string, number>> = {
-  first_paint_s: 1, js_gzip_kb: 220, fonts_kb: 60, first_paint_1mbit_s: 3.5, frame_ms_p95: 6, draw_calls: 12, triangles: 80_000,
-  heap_growth_mb: 5, audio_ms_p95: 20, axe_violations: 0,
+  first_paint_s: 1,
+  js_gzip_kb: 220,
+  fonts_kb: 60,
+  first_paint_1mbit_s: 3.5,
+  frame_ms_p95: 6,
+  draw_calls: 12,
+  triangles: 80_000,
+  heap_growth_mb: 5,
+  audio_ms_p95: 20,
+  axe_violations: 0,
 };
 
-const { values } = parseArgs({ options: { only: { type: "string", default: Object.keys(CASES).join() }, minutes: { type: "string", default: "30" } } });
+const { values } = parseArgs({
+  options: { only: { type: "string", default: Object.keys(CASES).join() }, minutes: { type: "string", default: "30" } },
+});
 const only = values.only.split(",");
 const unknown = only.filter((name) => !(name in CASES));
 if (unknown.length > 0) throw new Error(`there is no case ${unknown.join()}; there are ${Object.keys(CASES).join()}`);
 const minutes = Number(values.minutes);
 if (!(minutes > 0)) throw new Error(`--minutes ${values.minutes} is no time to play`);
-const place = chromium();
+const place = chromiumPath();
 if (!place) throw new Error("Chromium is not installed; its place may be given in CHROMIUM");
 
-const figures: Figures = {};
+const figures: BenchFigures = {};
 const notes: string[] = [];
 const server = await startServer({ demo: true });
 try {
-  const bench: Bench = { url: server.url, chromium: place, minutes, note: (text) => void notes.push(text) };
+  const bench: BenchContext = { url: server.url, chromium: place, minutes, note: (text) => void notes.push(text) };
   for (const name of only) Object.assign(figures, await CASES[name](bench));
 } finally {
   await server.stop();

@@ -1,7 +1,7 @@
 /** Links in a real browser, at a real server with a secret: who may watch watches and no more, and is told when that is over. */
 import { beforeAll, expect, test } from "vitest";
-import { describeInBrowser } from "./in-browser";
-import { danced, welcomed } from "./inside";
+import { describeInBrowser } from "./browser-suite";
+import { waitForFirstPose, waitForWelcome } from "./page-probe";
 import { makeToken } from "./server";
 
 const SECRET = "the secret of a server that a browser test started";
@@ -18,13 +18,16 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
 
   async function share(): Promise<{ id: string; link: string }> {
     const { items } = (await (await asAdmin("GET", "/v1/sessions")).json()) as { items: { id: string }[] };
-    return (await (await asAdmin("POST", "/v1/shares", { session: items[0]?.id })).json()) as { id: string; link: string };
+    return (await (await asAdmin("POST", "/v1/shares", { session: items[0]?.id })).json()) as {
+      id: string;
+      link: string;
+    };
   }
 
   test("one for viewers shows the dance without controls, and says when it is revoked", async () => {
     const { id, link } = await share();
     const page = await own.open(link);
-    await danced(page);
+    await waitForFirstPose(page);
     expect(page.url()).not.toContain("#");
     expect(page.url()).not.toContain("share");
     expect(await page.evaluate(() => history.length)).toBeLessThan(3);
@@ -44,7 +47,7 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
     expect(told).toEqual({ id: null, playing: true });
     // the tab keeps it
     await page.reload();
-    await danced(page);
+    await waitForFirstPose(page);
     expect((await asAdmin("DELETE", `/v1/shares/${id}`)).status).toBe(204);
     const notice = page.locator(".notice");
     await notice.getByText("Link revoked").waitFor();
@@ -57,31 +60,33 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
     const { items } = (await (await asAdmin("GET", "/v1/motions")).json()) as { items: { id: string }[] };
     const { link } = (await (await asAdmin("POST", "/v1/shares", { motion: items[0]?.id })).json()) as { link: string };
     const page = await own.open(link);
-    await danced(page);
+    await waitForFirstPose(page);
     expect(page.url()).not.toContain("#");
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     expect(await page.getByRole("button", { name: "Strings", exact: true }).isVisible()).toBe(false);
     await page.reload();
-    await danced(page);
+    await waitForFirstPose(page);
   });
 
   test("the operator's has everything, and its page makes one for viewers", async () => {
     const page = await own.open(`/#token=${admin}`);
-    await danced(page);
+    await waitForFirstPose(page);
     expect(page.url()).not.toContain("token");
-    await welcomed(page);
+    await waitForWelcome(page);
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await page.getByRole("button", { name: "Play", exact: true }).click();
     await page.getByRole("button", { name: "Share link" }).click();
     // looked at as soon as it is there, as it does not stay
-    const [copied] = /http\S+/.exec(await page.locator(".toast").innerText()) ?? [await page.evaluate(() => navigator.clipboard.readText().catch(() => ""))];
+    const [copied] = /http\S+/.exec(await page.locator(".toast").innerText()) ?? [
+      await page.evaluate(() => navigator.clipboard.readText().catch(() => "")),
+    ];
     const shares = (await (await asAdmin("GET", "/v1/shares")).json()) as { items: { by: string }[] };
     expect(shares.items[0]?.by).toBe("operator");
     if (copied) {
       const guest = await own.open(copied);
-      await danced(guest);
+      await waitForFirstPose(guest);
       expect(await guest.getByRole("button", { name: "Pause" }).isVisible()).toBe(false);
     }
   });

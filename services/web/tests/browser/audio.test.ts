@@ -1,11 +1,11 @@
 /** Sound and stage in a real browser: when clicks at known motion times are heard, and what the stage shows then. */
 import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
-import { bowing } from "./bowing";
-import { loaded } from "./elements";
-import { describeInBrowser, PATIENCE } from "./in-browser";
-import { danced } from "./inside";
-import { wave } from "./wave";
+import { describeInBrowser, PAGE_TIMEOUT_MS } from "./browser-suite";
+import { createBowingBvh } from "./bvh-file";
+import { countLoadedScripts } from "./embedding-page";
+import { waitForFirstPose } from "./page-probe";
+import { encodeWav } from "./wav-file";
 
 declare global {
   interface Window {
@@ -40,14 +40,17 @@ const CLICKS = BENCH ? 80 : 30;
 
 const FLAGS = ["--autoplay-policy=no-user-gesture-required"];
 
-describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) => {
+describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PAGE_TIMEOUT_MS }, (own) => {
   let silent: { id: string; duration: number };
   let motion: { id: string; duration: number };
 
   beforeAll(async () => {
-    silent = await json("/v1/motions?filename=bows.bvh", { method: "POST", body: bowing(SECONDS * 30) });
-    motion = await json(`/v1/motions/${silent.id}/audio?filename=clicks.wav`, { method: "POST", body: clicks(silent.duration) });
-  }, PATIENCE);
+    silent = await json("/v1/motions?filename=bows.bvh", { method: "POST", body: createBowingBvh(SECONDS * 30) });
+    motion = await json(`/v1/motions/${silent.id}/audio?filename=clicks.wav`, {
+      method: "POST",
+      body: clicks(silent.duration),
+    });
+  }, PAGE_TIMEOUT_MS);
 
   async function json<T>(path: string, init: RequestInit = {}): Promise<T> {
     const answer = await fetch(own.url + path, init);
@@ -58,23 +61,27 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
   /** A page over a session of a motion. */
   async function open(id: string, { jitter = 0, decodes = true, tapped = false }: Surroundings = {}): Promise<Page> {
     const session = await json<{ id: string }>("/v1/sessions", {
-      method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify({ motion: id, loop: true, playing: true }),
+      method: "POST",
+      headers: { "content-type": "application/json" },
+      body: JSON.stringify({ motion: id, loop: true, playing: true }),
     });
     const page = await own.open(`/?session=${session.id}`, {
-      viewport: { width: 420, height: 320 }, colorScheme: "dark", bypassCSP: tapped,
+      viewport: { width: 420, height: 320 },
+      colorScheme: "dark",
+      bypassCSP: tapped,
       before: async (page) => {
         if (jitter > 0) await delay(page, jitter);
         if (!decodes) await page.addInitScript(() => void Reflect.deleteProperty(window, "AudioDecoder"));
       },
     });
-    await danced(page);
+    await waitForFirstPose(page);
     return page;
   }
 
   test("of a motion without any is not fetched, and has no button", async () => {
     const page = await open(silent.id);
     expect(await page.locator(".sound").isHidden()).toBe(true);
-    expect(await loaded(page, /sound|decoder/)).toBe(0);
+    expect(await countLoadedScripts(page, /sound|decoder/)).toBe(0);
   });
 
   test.each<[string, Surroundings]>([
@@ -85,11 +92,20 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
     const page = await open(motion.id, { ...surroundings, tapped: true });
     await heard(page, true);
     const errors = await errorsOf(page);
-    expect(await loaded(page, /wasm-decoder/)).toBe(surroundings.decodes === false ? 1 : 0);
+    expect(await countLoadedScripts(page, /wasm-decoder/)).toBe(surroundings.decodes === false ? 1 : 0);
     expect(errors.length).toBeGreaterThanOrEqual(CLICKS);
     const sizes = errors.map(Math.abs).sort((a, b) => a - b);
     const share = (part: number) => Math.round(sizes[Math.ceil(part * sizes.length) - 1] * 10) / 10;
-    console.log(JSON.stringify({ bench: "audio", line, clicks: errors.length, audio_median_ms: share(0.5), audio_p95_ms: share(0.95), audio_max_ms: share(1) }));
+    console.log(
+      JSON.stringify({
+        bench: "audio",
+        line,
+        clicks: errors.length,
+        audio_median_ms: share(0.5),
+        audio_p95_ms: share(0.95),
+        audio_max_ms: share(1),
+      }),
+    );
     expect(share(BENCH ? 0.95 : 0.5)).toBeLessThanOrEqual(GOAL);
   });
 
@@ -97,8 +113,8 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
     const page = await open(motion.id, { decodes: false });
     await heard(page, true);
     // there is a player, and by it the stage goes
-    await page.waitForFunction(() => window.bunraku.viewer.lead !== null);
-    expect(await loaded(page, /wasm-decoder/)).toBe(1);
+    await page.waitForFunction(() => window.bunraku.viewer.leader !== null);
+    expect(await countLoadedScripts(page, /wasm-decoder/)).toBe(1);
   });
 
   test("is switched by its button and by key, and how loud it is remembered", async () => {
@@ -109,7 +125,7 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
     await heard(page, false);
     expect(await button.getAttribute("aria-pressed")).toBe("false");
     // the stage goes on by its own clock
-    expect(await page.evaluate(() => window.bunraku.viewer.lead?.(performance.now()))).toBeNull();
+    expect(await page.evaluate(() => window.bunraku.viewer.leader?.(performance.now()))).toBeNull();
     await page.keyboard.press("KeyM");
     await heard(page, true);
     expect(await button.getAttribute("aria-pressed")).toBe("true");
@@ -123,10 +139,10 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
     await button.click();
     await heard(page, false);
     await page.reload();
-    await danced(page);
+    await waitForFirstPose(page);
     await button.waitFor();
     // what is not wanted is not even fetched
-    expect(await loaded(page, /sound|decoder/)).toBe(0);
+    expect(await countLoadedScripts(page, /sound|decoder/)).toBe(0);
     expect(await page.evaluate(() => window.bunraku.listening.speaker)).toBeNull();
     expect(await page.getByRole("slider", { name: "Volume" }).inputValue()).toBe("5");
     await button.click();
@@ -138,7 +154,10 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
     await page.evaluate(listen);
     await page.waitForFunction((many) => {
       const { heard, drawn } = window.clicks;
-      return heard.filter(({ pageMs }) => pageMs > drawn[0]?.pageMs).length >= many && (drawn.at(-1)?.pageMs ?? 0) > heard[heard.length - 1].pageMs;
+      return (
+        heard.filter(({ pageMs }) => pageMs > drawn[0]?.pageMs).length >= many &&
+        (drawn.at(-1)?.pageMs ?? 0) > heard[heard.length - 1].pageMs
+      );
     }, CLICKS);
     const { heard, drawn } = await page.evaluate(() => window.clicks);
     return heard.flatMap(({ pageMs }) => {
@@ -148,7 +167,8 @@ describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PATIENCE }, (own) 
       const share = (pageMs - one.pageMs) / (other.pageMs - one.pageMs);
       const moved = other.position - one.position;
       // a loop that began anew between two frames
-      const position = (one.position + share * (moved < -motion.duration / 2 ? moved + motion.duration : moved)) % motion.duration;
+      const position =
+        (one.position + share * (moved < -motion.duration / 2 ? moved + motion.duration : moved)) % motion.duration;
       return [1000 * (position - EVERY * Math.round(position / EVERY))];
     });
   }
@@ -165,7 +185,7 @@ function clicks(seconds: number): Uint8Array<ArrayBuffer> {
     const since = (frame / RATE) % EVERY;
     return since < 0.001 ? 0.9 : 0.03 * Math.sin((2 * Math.PI * 330 * frame) / RATE);
   });
-  return wave([sound, sound], RATE);
+  return encodeWav([sound, sound], RATE);
 }
 
 /** In the page: notes what is put out, and what is drawn. */

@@ -1,46 +1,59 @@
 /** The page in Japanese in a real browser: its names for screen readers, what the server's problems become, and the way back. */
 import { expect, test } from "vitest";
-import { describeInBrowser } from "./in-browser";
-import { danced, holds, LEFT_HAND, welcomed } from "./inside";
+import { describeInBrowser } from "./browser-suite";
+import { LEFT_HAND, waitForFirstPose, waitForHold, waitForWelcome } from "./page-probe";
 
 const KANA = /[\p{Script=Hiragana}\p{Script=Katakana}\p{Script=Han}]/u;
 
 describeInBrowser("Japanese", { demo: true }, ({ open }) => {
   test("is what a Japanese browser is shown: panels, tags and what screen readers say", async () => {
     const page = await open("", { locale: "ja-JP", viewport: { width: 1280, height: 800 } });
-    await danced(page);
-    await welcomed(page);
-    expect(await page.evaluate(() => [document.documentElement.lang, document.title.endsWith(" - Bunraku")])).toEqual(["ja", true]);
+    await waitForFirstPose(page);
+    await waitForWelcome(page);
+    expect(await page.evaluate(() => [document.documentElement.lang, document.title.endsWith(" - Bunraku")])).toEqual([
+      "ja",
+      true,
+    ]);
     await page.getByRole("img", { name: "舞台で踊る木の人形" }).waitFor();
     for (const name of ["演目", "糸", "回線"]) {
       await page.getByRole("button", { name, exact: true }).click();
-      await page.getByRole("complementary", { name, exact: true }).getByRole("heading", { name, exact: true }).waitFor();
+      await page
+        .getByRole("complementary", { name, exact: true })
+        .getByRole("heading", { name, exact: true })
+        .waitFor();
     }
     await page.getByRole("slider", { name: "再生位置" }).waitFor();
     await page.getByRole("button", { name: "左手を持つ" }).click();
     await page.locator(".tag", { hasText: "左手" }).waitFor();
     expect(await page.locator(".tag", { hasText: "左手" }).innerText()).toContain("あなた");
     await page.getByRole("button", { name: "左手を放す" }).waitFor();
-    await holds(page, LEFT_HAND);
+    await waitForHold(page, LEFT_HAND);
     await page.getByRole("button", { name: "キーとゲームパッド" }).click();
     await page.getByRole("dialog", { name: "キーとゲームパッド" }).getByText("1ブロック戻る").waitFor();
     // no name for screen readers was left in English
-    const names = await page.evaluate(() => [...document.querySelectorAll("[aria-label]")].map((element) => element.getAttribute("aria-label") ?? ""));
+    const names = await page.evaluate(() =>
+      [...document.querySelectorAll("[aria-label]")].map((element) => element.getAttribute("aria-label") ?? ""),
+    );
     expect(names.length).toBeGreaterThan(80);
     expect(names.filter((name) => !KANA.test(name))).toEqual(["English"]);
   });
 
   test("tells what is wrong with a file, and gives way to English for good", async () => {
     const page = await open("?lang=ja", { locale: "en-GB" });
-    await danced(page);
-    await page.locator('input[type=file][accept*=".bvh"]').setInputFiles({ name: "letter.bvh", mimeType: "text/plain", buffer: Buffer.from("Dear all,\n") });
+    await waitForFirstPose(page);
+    await page
+      .locator('input[type=file][accept*=".bvh"]')
+      .setInputFiles({ name: "letter.bvh", mimeType: "text/plain", buffer: Buffer.from("Dear all,\n") });
     await page.getByRole("alert").getByText("BVHファイルではありません").waitFor();
     const session = new URL(page.url()).searchParams.get("session");
     await page.getByRole("button", { name: "English" }).click();
     await page.getByRole("button", { name: "日本語" }).waitFor();
-    await danced(page);
+    await waitForFirstPose(page);
     expect(await page.evaluate(() => document.documentElement.lang)).toBe("en");
-    expect([new URL(page.url()).searchParams.get("session"), new URL(page.url()).searchParams.get("lang")]).toEqual([session, null]);
+    expect([new URL(page.url()).searchParams.get("session"), new URL(page.url()).searchParams.get("lang")]).toEqual([
+      session,
+      null,
+    ]);
     await page.reload();
     await page.getByRole("button", { name: "Library", exact: true }).waitFor();
     // by the keyboard, and kept
@@ -49,9 +62,11 @@ describeInBrowser("Japanese", { demo: true }, ({ open }) => {
   });
 
   test("is English where the words cannot be fetched", async () => {
-    const page = await open("?lang=ja", { before: (page) => page.route(/\/japanese-[^/]*\.js$/, (route) => route.abort()) });
+    const page = await open("?lang=ja", {
+      before: (page) => page.route(/\/japanese-[^/]*\.js$/, (route) => route.abort()),
+    });
     await page.getByRole("button", { name: "Library", exact: true }).waitFor();
     expect(await page.evaluate(() => document.documentElement.lang)).toBe("en");
-    await danced(page);
+    await waitForFirstPose(page);
   });
 });

@@ -1,9 +1,9 @@
 /** What a page in a real browser holds of dancers that went. */
 import type { CDPSession, Page } from "playwright-core";
 import { expect, test } from "vitest";
-import { bowing } from "./bowing";
-import { describeInBrowser } from "./in-browser";
-import { danced, welcomed } from "./inside";
+import { describeInBrowser } from "./browser-suite";
+import { createBowingBvh } from "./bvh-file";
+import { waitForFirstPose, waitForWelcome } from "./page-probe";
 
 /** Times that another dances, after each has danced. */
 const CHANGES = 6;
@@ -19,12 +19,14 @@ describeInBrowser("a page on which dancers came and went", { demo: true }, (own)
   test("holds none of them, neither they nor their motion, and nothing more of the graphics", async () => {
     const page = await own.open("", { viewport: { width: 260, height: 220 } });
     const protocol = await page.context().newCDPSession(page);
-    await danced(page);
-    await welcomed(page);
+    await waitForFirstPose(page);
+    await waitForWelcome(page);
     const [piece, other] = ["Sanba", "bows"];
-    await page.locator('input[type=file][accept*=".bvh"]').setInputFiles({ name: "bows.bvh", mimeType: "text/plain", buffer: Buffer.from(bowing(60)) });
+    await page
+      .locator('input[type=file][accept*=".bvh"]')
+      .setInputFiles({ name: "bows.bvh", mimeType: "text/plain", buffer: Buffer.from(createBowingBvh(60)) });
     await page.locator(".brand-piece", { hasText: other }).waitFor({ state: "attached" });
-    await danced(page);
+    await waitForFirstPose(page);
     await choose(page, piece);
     const before = await graphics(page);
     await page.evaluate(() => (window.gone = []));
@@ -43,9 +45,13 @@ describeInBrowser("a page on which dancers came and went", { demo: true }, (own)
 
 /** Has a dance of the library danced, by a part of its name, and waits for its first pose. */
 async function choose(page: Page, name: string): Promise<void> {
-  await page.evaluate((name) => [...document.querySelectorAll<HTMLElement>(".motion")].find((one) => one.textContent?.includes(name))?.click(), name);
+  await page.evaluate(
+    (name) =>
+      [...document.querySelectorAll<HTMLElement>(".motion")].find((one) => one.textContent?.includes(name))?.click(),
+    name,
+  );
   await page.locator(".brand-piece", { hasText: name }).waitFor({ state: "attached" });
-  await danced(page);
+  await waitForFirstPose(page);
 }
 
 /** What three.js has in the graphics' memory once all that is there was drawn. */

@@ -24,23 +24,27 @@ export interface RunningServer {
 export async function startServer(options: ServerOptions = {}): Promise<RunningServer> {
   const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
   const folder = process.env["BUNRAKU_DEMO_DATA"];
-  if (options.demo && folder) cpSync(await demoData(folder), data, { recursive: true });
-  return serve(data, options, () => rmSync(data, { recursive: true, force: true }));
+  if (options.demo && folder) cpSync(await createDemoData(folder), data, { recursive: true });
+  return runServer(data, options, () => rmSync(data, { recursive: true, force: true }));
 }
 
 /** What a server keeps that has made our own dance: made once for all test files, within `folder`, as it takes as long as seven starts of a server. */
-async function demoData(folder: string): Promise<string> {
+async function createDemoData(folder: string): Promise<string> {
   const made = join(folder, "made");
   if (!existsSync(made)) {
     const data = mkdtempSync(join(folder, "making-"));
-    await (await serve(data, { demo: true })).stop();
+    await (await runServer(data, { demo: true })).stop();
     cpSync(data, made, { recursive: true });
   }
   return made;
 }
 
 /** A server that keeps its things in `data`; `after` is done once it has ended. */
-async function serve(data: string, { demo = false, secret = "", origins = "" }: ServerOptions, after: () => void = () => undefined): Promise<RunningServer> {
+async function runServer(
+  data: string,
+  { demo = false, secret = "", origins = "" }: ServerOptions,
+  after: () => void = () => undefined,
+): Promise<RunningServer> {
   const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
   const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
     stdio: ["ignore", "pipe", "inherit"],
@@ -68,13 +72,16 @@ async function serve(data: string, { demo = false, secret = "", origins = "" }: 
 
 /** A token of a server with this secret, as its operator makes them. */
 export function makeToken(secret: string, role: string): string {
-  const made = spawnSync(join(REPOSITORY, ".venv/bin/bunraku"), ["token", "--role", role], { env: { ...process.env, BUNRAKU_SECRET: secret }, encoding: "utf8" });
+  const made = spawnSync(join(REPOSITORY, ".venv/bin/bunraku"), ["token", "--role", role], {
+    env: { ...process.env, BUNRAKU_SECRET: secret },
+    encoding: "utf8",
+  });
   if (made.status !== 0) throw new Error(`no token: ${made.stderr}`);
   return made.stdout.trim();
 }
 
 /** The folder of real clips beside the project, if it is there. */
-export function sharedFolder(): string | null {
+export function sharedClipFolder(): string | null {
   const folder = process.env["BUNRAKU_SHARED"] ?? resolve(REPOSITORY, "../shared");
   return existsSync(join(folder, "mocap/bvh")) ? folder : null;
 }

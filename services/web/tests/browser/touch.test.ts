@@ -1,19 +1,27 @@
 /** A ring dragged by touch in a real browser. */
 import { test } from "vitest";
-import { describeInBrowser } from "./in-browser";
-import { danced, LEFT_HAND, letGo, ringOf, settled, standAtBeginning, welcomed } from "./inside";
+import { describeInBrowser } from "./browser-suite";
+import {
+  LEFT_HAND,
+  pauseAtStart,
+  ringPosition,
+  waitForFirstPose,
+  waitForRelease,
+  waitForWelcome,
+  waitUntilSettled,
+} from "./page-probe";
 
 describeInBrowser("a finger on the page", { demo: true }, ({ open }) => {
   test("a finger on a ring pulls the hand, and lifted gives it back", async () => {
     // A small phone: there the limbs' buttons stand below the hands.
     const page = await open("", { viewport: { width: 360, height: 640 }, hasTouch: true, reducedMotion: "reduce" });
-    await danced(page);
+    await waitForFirstPose(page);
     // Paused on entering, as less motion is asked for: only the finger moves the hand.
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
-    await welcomed(page);
-    await standAtBeginning(page);
+    await waitForWelcome(page);
+    await pauseAtStart(page);
     // once nothing moves any more
-    const ring = await settled(page, () => ringOf(page, LEFT_HAND), 0.5);
+    const ring = await waitUntilSettled(page, () => ringPosition(page, LEFT_HAND), 0.5);
     const touch = await page.context().newCDPSession(page);
     const finger = (type: "touchStart" | "touchMove", x: number, y: number) =>
       touch.send("Input.dispatchTouchEvent", { type, touchPoints: [{ x: ring.x + x, y: ring.y + y }] });
@@ -31,6 +39,6 @@ describeInBrowser("a finger on the page", { demo: true }, ({ open }) => {
     );
     await touch.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
     await page.getByRole("button", { name: "Take the left hand" }).waitFor({ state: "attached" });
-    await letGo(page, LEFT_HAND);
+    await waitForRelease(page, LEFT_HAND);
   });
 });

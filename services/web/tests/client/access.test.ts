@@ -1,9 +1,9 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as access from "../../src/client/access";
-import { Connection } from "../../src/client/connection";
 import { ProblemError } from "../../src/client/problem";
-import { forbidStorage, stubStorage } from "../storage/stubs";
-import { Line } from "./line";
+import { ReconnectingConnection } from "../../src/client/reconnecting-connection";
+import { forbidStorage, stubStorage } from "../storage/storage-stub";
+import { FakeWebSocket } from "./fake-websocket";
 
 /** A token as the server makes them, but for its signature. */
 function token(claims: Record<string, unknown>): string {
@@ -30,18 +30,18 @@ afterEach(() => {
 
 test.each(["token", "share"])("a %s leaves the address at once and stays with the tab", (name) => {
   arrive(`#${name}=${VIEWER}`);
-  expect(access.comeIn()).toBe(true);
+  expect(access.consumeUrlToken()).toBe(true);
   expect(shown).toEqual(["/?session=s1"]);
   expect(access.authorization()).toEqual({ Authorization: `Bearer ${VIEWER}` });
   access.hold(null);
   arrive("");
-  expect(access.comeIn()).toBe(false);
+  expect(access.consumeUrlToken()).toBe(false);
   expect(access.guarded()).toBe(true);
 });
 
 test("without one everything is offered and nothing is sent", () => {
   arrive("#elsewhere");
-  expect(access.comeIn()).toBe(false);
+  expect(access.consumeUrlToken()).toBe(false);
   expect(shown).toEqual([]);
   expect([access.guarded(), access.bound(), access.may("admin")]).toEqual([false, false, true]);
   expect(access.authorization()).toEqual({});
@@ -51,7 +51,7 @@ test("without one everything is offered and nothing is sent", () => {
 test("storage may be forbidden", () => {
   forbidStorage("sessionStorage");
   arrive(`#token=${VIEWER}`);
-  access.comeIn();
+  access.consumeUrlToken();
   expect(access.guarded()).toBe(true);
 });
 
@@ -69,7 +69,7 @@ test.each([
 
 test("what cannot be read lets see: the server says what is wrong with it", () => {
   access.hold("no.token");
-  expect(access.ownRole()).toBe("view");
+  expect(access.currentRole()).toBe("view");
 });
 
 test("a socket's address gets a ticket for each attempt", async () => {
@@ -80,16 +80,26 @@ test("a socket's address gets a ticket for each attempt", async () => {
     asked.push([path, options]);
     return Promise.resolve(new Response(JSON.stringify({ ticket: `t${++tickets}` }), { status: 201 }));
   });
-  expect(await access.ticketed("wss://stage/v1/sessions/s1/stream?rate=1")).toBe("wss://stage/v1/sessions/s1/stream?rate=1&ticket=t1");
-  expect(await access.ticketed("wss://stage/v1/sessions/s1/stream?ticket=old")).toBe("wss://stage/v1/sessions/s1/stream?ticket=t2");
-  expect(asked[0]).toMatchObject(["https://stage/v1/tickets", { method: "POST", headers: { Authorization: `Bearer ${VIEWER}` } }]);
+  expect(await access.ticketed("wss://stage/v1/sessions/s1/stream?rate=1")).toBe(
+    "wss://stage/v1/sessions/s1/stream?rate=1&ticket=t1",
+  );
+  expect(await access.ticketed("wss://stage/v1/sessions/s1/stream?ticket=old")).toBe(
+    "wss://stage/v1/sessions/s1/stream?ticket=t2",
+  );
+  expect(asked[0]).toMatchObject([
+    "https://stage/v1/tickets",
+    { method: "POST", headers: { Authorization: `Bearer ${VIEWER}` } },
+  ]);
 });
 
 test("one who is not let in is told once more than the request is refused", async () => {
   access.hold(VIEWER);
   const denied: string[] = [];
   access.whenDenied(({ title }) => denied.push(title));
-  const answers = [[401, "Link revoked"], [503, "Not now"]] as const;
+  const answers = [
+    [401, "Link revoked"],
+    [503, "Not now"],
+  ] as const;
   for (const [status, title] of answers) {
     vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify({ title, detail: "so" }), { status })));
     await expect(access.ticketed("ws://stage/stream")).rejects.toMatchObject({ status, title });
@@ -99,73 +109,81 @@ test("one who is not let in is told once more than the request is refused", asyn
 
 function connect(url: () => string | Promise<string>) {
   const closed: [string, boolean][] = [];
-  const connection = new Connection({ url, onOpen: () => undefined, onMessage: () => undefined, onMalformed: () => undefined, onClosed: (reason, final) => closed.push([reason, final]) });
+  const connection = new ReconnectingConnection({
+    url,
+    onOpen: () => undefined,
+    onMessage: () => undefined,
+    onMalformed: () => undefined,
+    onClosed: (reason, final) => closed.push([reason, final]),
+  });
   return { connection, closed };
 }
 
 test("a connection waits for its address, asks anew each time, and after a ticket that was used up", async () => {
-  Line.install();
+  FakeWebSocket.install();
   let asked = 0;
   const { closed } = connect(() => Promise.resolve(`ws://stage/stream?ticket=${++asked}`));
-  expect(Line.opened).toHaveLength(0);
+  expect(FakeWebSocket.opened).toHaveLength(0);
   await vi.advanceTimersByTimeAsync(0);
-  expect(Line.last.url).toBe("ws://stage/stream?ticket=1");
-  Line.last.end(4401);
+  expect(FakeWebSocket.last.url).toBe("ws://stage/stream?ticket=1");
+  FakeWebSocket.last.endWith(4401);
   await vi.advanceTimersByTimeAsync(250);
-  expect(Line.last.url).toBe("ws://stage/stream?ticket=2");
+  expect(FakeWebSocket.last.url).toBe("ws://stage/stream?ticket=2");
   expect(closed).toEqual([["a link is needed", false]]);
-  Line.remove();
+  FakeWebSocket.remove();
 });
 
 test("a connection that gets no address is over where it never will, and tries again where nobody answers", async () => {
-  Line.install();
+  FakeWebSocket.install();
   const refused = connect(() => Promise.reject(new ProblemError(401, "Link revoked", "who made it has ended it")));
   let tries = 0;
-  const away = connect(() => (++tries < 3 ? Promise.reject(ProblemError.unreachable()) : Promise.resolve("ws://stage/stream")));
+  const away = connect(() =>
+    ++tries < 3 ? Promise.reject(ProblemError.unreachable()) : Promise.resolve("ws://stage/stream"),
+  );
   await vi.advanceTimersByTimeAsync(0);
   expect(refused.closed).toEqual([["Link revoked: who made it has ended it", true]]);
   expect(away.closed).toEqual([["the server cannot be reached", false]]);
   await vi.advanceTimersByTimeAsync(750);
-  expect(Line.opened).toHaveLength(1);
-  Line.remove();
+  expect(FakeWebSocket.opened).toHaveLength(1);
+  FakeWebSocket.remove();
 });
 
 test("another line is tried with a ticket of its own, unless the silent one speaks meanwhile", async () => {
-  Line.install();
+  FakeWebSocket.install();
   let asked = 0;
   const { connection } = connect(() => Promise.resolve(`ws://stage/stream?ticket=${++asked}`));
   await vi.advanceTimersByTimeAsync(0);
-  const [first] = Line.opened as [Line];
+  const [first] = FakeWebSocket.opened as [FakeWebSocket];
   first.accept();
-  connection.renew();
-  first.say({ name: "Grant", limb: 0, epoch: 1 });
+  connection.tryReplacement();
+  first.receive({ name: "Grant", limb: 0, epoch: 1 });
   await vi.advanceTimersByTimeAsync(0);
-  expect(Line.opened).toHaveLength(1);
-  connection.renew();
+  expect(FakeWebSocket.opened).toHaveLength(1);
+  connection.tryReplacement();
   await vi.advanceTimersByTimeAsync(0);
-  expect(Line.last.url).toBe("ws://stage/stream?ticket=3");
+  expect(FakeWebSocket.last.url).toBe("ws://stage/stream?ticket=3");
   connection.close();
-  Line.remove();
+  FakeWebSocket.remove();
 });
 
 test("closed here while it waits for its address it never connects", async () => {
-  Line.install();
+  FakeWebSocket.install();
   const { connection, closed } = connect(() => Promise.resolve("ws://stage/stream"));
   connection.close();
   await vi.advanceTimersByTimeAsync(5_000);
-  expect(Line.opened).toHaveLength(0);
+  expect(FakeWebSocket.opened).toHaveLength(0);
   expect(closed).toEqual([["closed here", true]]);
-  Line.remove();
+  FakeWebSocket.remove();
 });
 
 test("without a ticket, not being let in is final", () => {
-  Line.install();
+  FakeWebSocket.install();
   const { closed } = connect(() => "ws://stage/stream");
-  Line.last.end(4401);
+  FakeWebSocket.last.endWith(4401);
   vi.advanceTimersByTime(60_000);
-  expect(Line.opened).toHaveLength(1);
+  expect(FakeWebSocket.opened).toHaveLength(1);
   expect(closed).toEqual([["a link is needed", true]]);
-  Line.remove();
+  FakeWebSocket.remove();
 });
 
 test("a page comes in at several servers, each by its own", async () => {
@@ -179,11 +197,20 @@ test("a page comes in at several servers, each by its own", async () => {
   const [one, other] = [new access.Access("https://one.example", control), new access.Access("https://other.example")];
   const denied: string[] = [];
   access.whenDenied(() => denied.push("page"));
-  one.whenDenied(({ title }) => denied.push(title));
-  expect([one.may("control"), one.may("ingest"), other.may("admin"), other.guarded, access.may("control")]).toEqual([true, false, true, false, false]);
+  one.onUnauthorized(({ title }) => denied.push(title));
+  expect([
+    one.allows("control"),
+    one.allows("ingest"),
+    other.allows("admin"),
+    other.hasToken,
+    access.may("control"),
+  ]).toEqual([true, false, true, false, false]);
   await expect(one.request(`${one.server}/v1/sessions`)).rejects.toThrow("Link revoked");
   await expect(other.request(`${other.server}/v1/sessions`)).rejects.toThrow(ProblemError);
-  expect(sent).toEqual([["https://one.example/v1/sessions", `Bearer ${control}`], ["https://other.example/v1/sessions", undefined]]);
+  expect(sent).toEqual([
+    ["https://one.example/v1/sessions", `Bearer ${control}`],
+    ["https://other.example/v1/sessions", undefined],
+  ]);
   expect(denied).toEqual(["Link revoked"]);
-  expect(other.ticketed("wss://other.example/stream")).toBe("wss://other.example/stream");
+  expect(other.authorizeSocketUrl("wss://other.example/stream")).toBe("wss://other.example/stream");
 });

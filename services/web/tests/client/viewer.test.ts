@@ -1,19 +1,19 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
-import { type LineFigures, Viewer } from "../../src/client/viewer";
-import { decodeBlock } from "../../src/codec/decode";
+import { Viewer, type ViewerStatistics } from "../../src/client/viewer";
+import { decodeMotionBlock } from "../../src/codec/motion-decoder";
 import { restPose } from "../../src/motion/skeleton";
 import type { Message, TimelineState } from "../../src/wire/messages";
 import type { Overlay } from "../../src/wire/overlay";
-import { type BlockVectors, goldenDescription, goldenTrack } from "../golden";
-import { cameraBlocks, cameraNumbers, goldenScene } from "../scenes";
-import { bytes, vectors } from "../vectors";
-import { Line } from "./line";
+import { type BlockVectors, goldenDescription, goldenTrack } from "../golden-motion";
+import { goldenCameraBlocks, goldenCameraNumbers, goldenScene } from "../golden-scenes";
+import { decodeBase64, loadVectors } from "../golden-vectors";
+import { FakeWebSocket } from "./fake-websocket";
 
 const UNIX = 1_774_000_000_000_000;
 const SESSION = "ws://stage/v1/sessions/s1/stream";
 const MOTION = "ws://stage/v1/motions/dance/stream?rate=1";
-const golden = vectors<BlockVectors>("blocks").valid;
-const [best, lowest, , last] = golden.map((vector) => bytes(vector.block));
+const golden = loadVectors<BlockVectors>("blocks").valid;
+const [best, lowest, , last] = golden.map((vector) => decodeBase64(vector.block));
 
 let now = 0;
 /** Questions for the time that were answered. */
@@ -21,22 +21,30 @@ let answered = 0;
 let viewer: Viewer;
 
 beforeEach(() => {
-  Line.install();
+  FakeWebSocket.install();
   now = answered = 0;
 });
 afterEach(() => {
   viewer.close();
-  Line.remove();
+  FakeWebSocket.remove();
 });
 
 /** `ms` pass on both clocks of this end. */
-function pass(ms: number): void {
+function advanceTime(ms: number): void {
   now += ms;
   vi.advanceTimersByTime(ms);
 }
 
 function header(motion = "dance"): Message {
-  return { name: "ChannelHeader", motion, now: UNIX + now * 1000, channels: 19, software: "0", version: 1, clock: "unix" };
+  return {
+    name: "ChannelHeader",
+    motion,
+    now: UNIX + now * 1000,
+    channels: 19,
+    software: "0",
+    version: 1,
+    clock: "unix",
+  };
 }
 
 function description(motion = "dance"): Message {
@@ -45,8 +53,15 @@ function description(motion = "dance"): Message {
 
 function timeline(change: Partial<TimelineState> = {}): Message {
   return {
-    name: "TimelineState", epoch: 1, motion: "dance", clock: UNIX, position: 0, playing: true, loop: true,
-    duration: 2_600_000, ...change,
+    name: "TimelineState",
+    epoch: 1,
+    motion: "dance",
+    clock: UNIX,
+    position: 0,
+    playing: true,
+    loop: true,
+    duration: 2_600_000,
+    ...change,
   };
 }
 
@@ -55,22 +70,28 @@ function data(index: number, rate: number, block: Uint8Array): Message {
 }
 
 /** `ms` pass, and the server answers each question after 40 ms at the latest. */
-function passAnswered(ms: number): void {
+function advanceTimeAnswered(ms: number): void {
   for (const end = now + ms; now < end; ) {
-    pass(Math.min(20, end - now));
-    for (const { sequence, sent } of Line.last.of("Ping")) {
+    advanceTime(Math.min(20, end - now));
+    for (const { sequence, sent } of FakeWebSocket.last.messagesOf("Ping")) {
       if (sequence < answered || now * 1000 - sent < 40_000) continue;
       answered = sequence + 1;
-      Line.last.say({ name: "Pong", sequence, sent, received: UNIX + sent + 20_000, answered: UNIX + sent + 20_000 });
+      FakeWebSocket.last.receive({
+        name: "Pong",
+        sequence,
+        sent,
+        received: UNIX + sent + 20_000,
+        answered: UNIX + sent + 20_000,
+      });
     }
   }
 }
 
 /** A viewer whose server has greeted it, described the dance, and started it now. */
-function watching(url = SESSION): Viewer {
+function openViewer(url = SESSION): Viewer {
   viewer = new Viewer({ url, now: () => now, solver: null });
-  Line.last.accept();
-  Line.last.say(header(), description(), timeline());
+  FakeWebSocket.last.accept();
+  FakeWebSocket.last.receive(header(), description(), timeline());
   return viewer;
 }
 
@@ -83,8 +104,8 @@ describe("the start", () => {
     viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
     expect(viewer.poseAt(0)).toBeNull();
     expect([viewer.figure, viewer.timeline, viewer.presence, viewer.motion]).toEqual([null, null, null, null]);
-    expect([viewer.duration, viewer.blocks.length, viewer.rates.length]).toEqual([0, 0, 0]);
-    expect(viewer.line().reason).toBe("waiting for the first block");
+    expect([viewer.duration, viewer.blocks.length, viewer.ladder.length]).toEqual([0, 0, 0]);
+    expect(viewer.statistics().reason).toBe("waiting for the first block");
   });
 
   test("each thing is told as it comes, and the first block is drawn without waiting for a clock answer", () => {
@@ -93,302 +114,342 @@ describe("the start", () => {
     for (const event of ["open", "figure", "timeline", "blocks", "presence"]) {
       viewer.addEventListener(event, () => told.push(event));
     }
-    pass(80);
-    Line.last.accept();
-    Line.last.say(header(), description(), timeline({ clock: UNIX + 80_000 }));
-    Line.last.say({ name: "Presence", viewers: 1, puppeteers: [], limbs: [null, null, null, null], asks: [[], [], [], []] });
+    advanceTime(80);
+    FakeWebSocket.last.accept();
+    FakeWebSocket.last.receive(header(), description(), timeline({ clock: UNIX + 80_000 }));
+    FakeWebSocket.last.receive({
+      name: "Presence",
+      viewers: 1,
+      puppeteers: [],
+      limbs: [null, null, null, null],
+      asks: [[], [], [], []],
+    });
     expect(viewer.poseAt(now)).toBeNull();
-    Line.last.say(data(0, 0, lowest));
+    FakeWebSocket.last.receive(data(0, 0, lowest));
     expect(told).toEqual(["open", "figure", "blocks", "timeline", "presence", "blocks"]);
     const wanted = restPose();
-    decodeBlock(goldenTrack(), lowest).at(0, wanted);
+    decodeMotionBlock(goldenTrack(), lowest).poseAt(0, wanted);
     const pose = viewer.poseAt(now)!;
     expectNear(pose.root, wanted.root);
     expectNear(pose.rotations, wanted.rotations);
-    expect(viewer.line().firstPoseMs).toBe(80);
+    expect(viewer.statistics().firstPoseMs).toBe(80);
     expect(viewer.duration).toBe(2.6);
     expect([...viewer.blocks]).toEqual([0, -1, -1]);
-    expect(viewer.rates[1]).toEqual({ kbps: 5, mean: 1, max: 4 });
+    expect(viewer.ladder[1]).toEqual({ kbps: 5, mean: 1, max: 4 });
   });
 });
 
 test("the pose goes on with time, and a better block takes over", () => {
-  watching();
-  Line.last.say(data(0, 0, lowest));
-  pass(500);
+  openViewer();
+  FakeWebSocket.last.receive(data(0, 0, lowest));
+  advanceTime(500);
   const wanted = restPose();
-  decodeBlock(goldenTrack(), lowest).at(15, wanted);
+  decodeMotionBlock(goldenTrack(), lowest).poseAt(15, wanted);
   expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);
   expect(viewer.positionAt(now)).toBeCloseTo(0.5, 9);
-  expect(viewer.line().rate).toBe(0);
+  expect(viewer.statistics().rate).toBe(0);
   // what is told of is what was chosen, whatever the block on show still is
-  Line.last.say({ name: "Choice", rate: 1, reason: "best", line: null });
-  expect(viewer.line().rate).toBe(1);
-  Line.last.say(data(0, 1, best));
-  decodeBlock(goldenTrack(), best).at(15, wanted);
+  FakeWebSocket.last.receive({ name: "Choice", rate: 1, reason: "best", line: null });
+  expect(viewer.statistics().rate).toBe(1);
+  FakeWebSocket.last.receive(data(0, 1, best));
+  decodeMotionBlock(goldenTrack(), best).poseAt(15, wanted);
   expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);
-  expect(viewer.line().rate).toBe(1);
+  expect(viewer.statistics().rate).toBe(1);
 });
 
 test("where the block needed is missing the pose holds still, and that is one gap", () => {
-  watching();
-  Line.last.say(data(0, 1, best));
-  pass(990);
+  openViewer();
+  FakeWebSocket.last.receive(data(0, 1, best));
+  advanceTime(990);
   const held = structuredClone(viewer.poseAt(now)!);
-  pass(50);
+  advanceTime(50);
   expect(viewer.poseAt(now)).toEqual(held);
-  pass(50);
+  advanceTime(50);
   viewer.poseAt(now);
-  let line: LineFigures = viewer.line();
+  let line: ViewerStatistics = viewer.statistics();
   expect([line.gaps, line.bufferSeconds, line.reason]).toEqual([1, 0, "waiting for a block"]);
-  Line.last.say(data(1, 0, lowest));
+  FakeWebSocket.last.receive(data(1, 0, lowest));
   expect(viewer.poseAt(now)).not.toEqual(held);
-  line = viewer.line();
+  line = viewer.statistics();
   expect([line.gaps, line.reason]).toEqual([1, "chosen by the server"]);
   expect(line.bufferSeconds).toBeCloseTo(0.91, 9);
 });
 
 test("overlays lie over the dance on clock time, and their lateness is measured", () => {
-  watching();
-  Line.last.say(data(0, 1, best));
+  openViewer();
+  FakeWebSocket.last.receive(data(0, 1, best));
   const overlay = (due: number, x: number): Overlay => ({
-    name: "Overlay", sequence: 0, due: UNIX + due, limbs: new Map([[0, Int16Array.of(x, 0, 0, 0, 0, 0, 0, 0, 0)]]), earlier: [],
+    name: "Overlay",
+    sequence: 0,
+    due: UNIX + due,
+    limbs: new Map([[0, Int16Array.of(x, 0, 0, 0, 0, 0, 0, 0, 0)]]),
+    earlier: [],
   });
-  Line.last.say(overlay(100_000, 0), overlay(200_000, 16384));
-  expect(viewer.line().latencyMs).toBeLessThan(-100);
-  pass(150);
+  FakeWebSocket.last.receive(overlay(100_000, 0), overlay(200_000, 16384));
+  expect(viewer.statistics().latencyMs).toBeLessThan(-100);
+  advanceTime(150);
   const pose = viewer.poseAt(now)!;
   expect(2 * Math.atan2(pose.rotations[49], pose.rotations[48])).toBeCloseTo(Math.PI / 4, 4);
   const wanted = restPose();
-  decodeBlock(goldenTrack(), best).at(4.5, wanted);
+  decodeMotionBlock(goldenTrack(), best).poseAt(4.5, wanted);
   expectNear(pose.rotations.subarray(60), wanted.rotations.subarray(60));
-  pass(400);
-  decodeBlock(goldenTrack(), best).at(16.5, wanted);
+  advanceTime(400);
+  decodeMotionBlock(goldenTrack(), best).poseAt(16.5, wanted);
   expectNear(viewer.poseAt(now)!.rotations, wanted.rotations);
 });
 
 test("overlays that come late are shown as much later, and the dance with them", () => {
-  watching();
-  Line.last.say(data(0, 1, best));
-  Line.last.say({ name: "Pong", sequence: 0, sent: 0, received: UNIX, answered: UNIX });
+  openViewer();
+  FakeWebSocket.last.receive(data(0, 1, best));
+  FakeWebSocket.last.receive({ name: "Pong", sequence: 0, sent: 0, received: UNIX, answered: UNIX });
   const limbs = new Map([[0, new Int16Array(9)]]);
   for (let nth = 0; nth < 150; nth++) {
     // the first of two frames is needed 33 ms before the last is due: both come 50 ms too late
     const due = UNIX + now * 1000 - 50_000 + 2 * 16_667;
-    Line.last.say({ name: "Overlay", sequence: nth, due, limbs, earlier: [limbs] });
-    pass(100 / 3);
-    expect((viewer.shownTime(now) - UNIX) / 1e6 + viewer.line().playoutDelayMs / 1000).toBeCloseTo(now / 1000, 6);
-    expect(viewer.positionAt(now)).toBeCloseTo(((viewer.shownTime(now) - UNIX) / 1e6) % 2.6, 6);
+    FakeWebSocket.last.receive({ name: "Overlay", sequence: nth, due, limbs, earlier: [limbs] });
+    advanceTime(100 / 3);
+    expect((viewer.presentationTime(now) - UNIX) / 1e6 + viewer.statistics().playoutDelayMs / 1000).toBeCloseTo(
+      now / 1000,
+      6,
+    );
+    expect(viewer.positionAt(now)).toBeCloseTo(((viewer.presentationTime(now) - UNIX) / 1e6) % 2.6, 6);
   }
-  expect(viewer.line().playoutDelayMs).toBeCloseTo(60, 2);
-  expect(viewer.shownTime(now)).toBeCloseTo(viewer.clockTime(now)! - 60_000, -1);
+  expect(viewer.statistics().playoutDelayMs).toBeCloseTo(60, 2);
+  expect(viewer.presentationTime(now)).toBeCloseTo(viewer.clockTime(now)! - 60_000, -1);
 });
 
 test("pings in a burst, then every two seconds, and takes the smallest round trip", () => {
-  watching();
-  passAnswered(60 * 7);
-  expect(Line.last.of("Ping")).toHaveLength(8);
-  passAnswered(1_999);
-  expect(Line.last.of("Ping")).toHaveLength(8);
-  passAnswered(1);
-  const pings = Line.last.of("Ping");
+  openViewer();
+  advanceTimeAnswered(60 * 7);
+  expect(FakeWebSocket.last.messagesOf("Ping")).toHaveLength(8);
+  advanceTimeAnswered(1_999);
+  expect(FakeWebSocket.last.messagesOf("Ping")).toHaveLength(8);
+  advanceTimeAnswered(1);
+  const pings = FakeWebSocket.last.messagesOf("Ping");
   expect(pings).toHaveLength(9);
   expect(new Set(pings.map((ping) => ping.sequence)).size).toBe(9);
-  passAnswered(40);
-  expect(viewer.line().clockErrorMs).toBe(20);
+  advanceTimeAnswered(40);
+  expect(viewer.statistics().clockErrorMs).toBe(20);
   expect(viewer.clockTime(now)).toBeCloseTo(UNIX + now * 1000, -1);
 });
 
 test("reports once a second what is ready and how long drawing takes", () => {
-  watching();
-  Line.last.say(data(0, 1, best), data(1, 0, lowest));
-  for (let frame = 0; frame < 200; frame++) viewer.drawn(8);
-  passAnswered(1_000);
-  const [report] = Line.last.of("Report");
+  openViewer();
+  FakeWebSocket.last.receive(data(0, 1, best), data(1, 0, lowest));
+  for (let frame = 0; frame < 200; frame++) viewer.recordFrame(8);
+  advanceTimeAnswered(1_000);
+  const [report] = FakeWebSocket.last.messagesOf("Report");
   expect(report.buffer).toBe(1_000_000);
   expect(report.frame).toBeCloseTo(8_000, -1);
   expect(report.hidden).toBe(false);
-  passAnswered(2_000);
-  expect(Line.last.of("Report")).toHaveLength(3);
+  advanceTimeAnswered(2_000);
+  expect(FakeWebSocket.last.messagesOf("Report")).toHaveLength(3);
 });
 
 describe("camera and light", () => {
   const filmed = (): Message => ({
-    name: "Description", motion: "filmed", first: null, tracks: [goldenScene(1), goldenDescription(), goldenScene(0)],
+    name: "Description",
+    motion: "filmed",
+    first: null,
+    tracks: [goldenScene(1), goldenDescription(), goldenScene(0)],
   });
   const cameraData = (index: number, rate: number): Message => ({
-    name: "Data", track: 2, rate, index, block: cameraBlocks[rate][index],
+    name: "Data",
+    track: 2,
+    rate,
+    index,
+    block: goldenCameraBlocks[rate][index],
   });
 
   test("are shown beside the dance at the same instant", () => {
-    watching();
-    Line.last.say(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }));
+    openViewer();
+    FakeWebSocket.last.receive(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }));
     expect(viewer.scenes.map(({ kind }) => kind)).toEqual(["light", "camera"]);
     expect(viewer.cameraAt(now)).toBeNull();
-    Line.last.say(cameraData(0, 0), cameraData(0, 1), cameraData(1, 1), data(0, 1, best));
-    expect([viewer.damaged, ...viewer.blocks]).toEqual([0, 1, -1, -1]);
-    expectNear(viewer.cameraAt(now)!, Float64Array.from(cameraNumbers(0)[0]));
+    FakeWebSocket.last.receive(cameraData(0, 0), cameraData(0, 1), cameraData(1, 1), data(0, 1, best));
+    expect([viewer.damagedCount, ...viewer.blocks]).toEqual([0, 1, -1, -1]);
+    expectNear(viewer.cameraAt(now)!, Float64Array.from(goldenCameraNumbers(0)[0]));
     expect(viewer.sceneAt(now, 1)).toEqual(viewer.cameraAt(now));
     expect([viewer.sceneAt(now, 0), viewer.sceneAt(now, 2)]).toEqual([null, null]);
     expect(viewer.poseAt(now)).not.toBeNull();
     now = (26 / 30) * 1000;
-    viewer.cameraAt(now)!.forEach((value, i) => expect(value).toBeCloseTo(cameraNumbers(1)[0][i], 6));
+    viewer.cameraAt(now)!.forEach((value, i) => expect(value).toBeCloseTo(goldenCameraNumbers(1)[0][i], 6));
   });
 
   test("may be told of after the dance, and are shown from then on", () => {
-    watching();
+    openViewer();
     const told: string[] = [];
     for (const event of ["figure", "tracks"]) viewer.addEventListener(event, () => told.push(event));
-    const rest = (first: number, motion = "filmed"): Message => ({ name: "Description", motion, first, tracks: [goldenScene(1), goldenScene(0)] });
-    Line.last.say(header("filmed"), rest(1), { ...filmed(), tracks: [goldenDescription()] } as Message);
-    Line.last.say(timeline({ epoch: 2, motion: "filmed" }), cameraData(0, 1));
+    const rest = (first: number, motion = "filmed"): Message => ({
+      name: "Description",
+      motion,
+      first,
+      tracks: [goldenScene(1), goldenScene(0)],
+    });
+    FakeWebSocket.last.receive(header("filmed"), rest(1), { ...filmed(), tracks: [goldenDescription()] } as Message);
+    FakeWebSocket.last.receive(timeline({ epoch: 2, motion: "filmed" }), cameraData(0, 1));
     expect([viewer.cameraAt(now), viewer.scenes.length]).toEqual([null, 0]);
-    Line.last.say(rest(1, "another"), rest(1), rest(1), cameraData(0, 1));
+    FakeWebSocket.last.receive(rest(1, "another"), rest(1), rest(1), cameraData(0, 1));
     expect(viewer.scenes.map(({ kind }) => kind)).toEqual(["light", "camera"]);
-    expectNear(viewer.cameraAt(now)!, Float64Array.from(cameraNumbers(0)[0]));
+    expectNear(viewer.cameraAt(now)!, Float64Array.from(goldenCameraNumbers(0)[0]));
     expect(told).toEqual(["figure", "tracks"]);
   });
 
   test("belong to their motion", () => {
-    watching();
-    Line.last.say(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }), cameraData(0, 1));
+    openViewer();
+    FakeWebSocket.last.receive(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }), cameraData(0, 1));
     expect(viewer.cameraAt(now)).not.toBeNull();
-    Line.last.say(header(), description());
+    FakeWebSocket.last.receive(header(), description());
     expect([viewer.cameraAt(now), viewer.scenes.length]).toEqual([null, 0]);
-    Line.last.say(timeline({ epoch: 3 }));
+    FakeWebSocket.last.receive(timeline({ epoch: 3 }));
     expect(viewer.cameraAt(now)).toBeNull();
   });
 
   test("that are damaged are counted as such", () => {
-    watching();
-    Line.last.say(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }));
-    Line.last.say({ name: "Data", track: 2, rate: 0, index: 0, block: best.subarray(0, 0) });
-    Line.last.say({ name: "Data", track: 2, rate: 0, index: 9, block: cameraBlocks[0][0] });
-    expect(viewer.damaged).toBe(2);
+    openViewer();
+    FakeWebSocket.last.receive(header("filmed"), filmed(), timeline({ epoch: 2, motion: "filmed" }));
+    FakeWebSocket.last.receive({ name: "Data", track: 2, rate: 0, index: 0, block: best.subarray(0, 0) });
+    FakeWebSocket.last.receive({ name: "Data", track: 2, rate: 0, index: 9, block: goldenCameraBlocks[0][0] });
+    expect(viewer.damagedCount).toBe(2);
   });
 });
 
 describe("when the line is lost", () => {
   test("it comes back, keeps its blocks and the dance goes on meanwhile", () => {
-    watching();
+    openViewer();
     const reasons: string[] = [];
     viewer.addEventListener("closed", (event) => reasons.push((event as CustomEvent<string>).detail));
-    Line.last.say(data(0, 1, best));
-    Line.last.end(1006);
-    expect(viewer.line().reason).toBe("the line was lost");
-    pass(250);
+    FakeWebSocket.last.receive(data(0, 1, best));
+    FakeWebSocket.last.endWith(1006);
+    expect(viewer.statistics().reason).toBe("the line was lost");
+    advanceTime(250);
     expect(viewer.positionAt(now)).toBeCloseTo(0.25, 9);
     expect(viewer.poseAt(now)).not.toBeNull();
-    Line.last.accept();
-    Line.last.say(header(), description(), timeline({ epoch: 1, position: 100_000 }));
+    FakeWebSocket.last.accept();
+    FakeWebSocket.last.receive(header(), description(), timeline({ epoch: 1, position: 100_000 }));
     expect([...viewer.blocks]).toEqual([1, -1, -1]);
     expect(viewer.positionAt(now)).toBeCloseTo(0.35, 9);
     expect(reasons).toEqual(["the line was lost"]);
-    expect(viewer.ended).toBe(false);
+    expect(viewer.isClosed).toBe(false);
   });
 
   test("another motion drops the blocks", () => {
-    watching();
-    Line.last.say(data(0, 1, best));
-    Line.last.say(header("other"), description("other"));
+    openViewer();
+    FakeWebSocket.last.receive(data(0, 1, best));
+    FakeWebSocket.last.receive(header("other"), description("other"));
     expect(viewer.poseAt(now)).toBeNull();
     expect([...viewer.blocks]).toEqual([-1, -1, -1]);
-    Line.last.say(timeline({ epoch: 2, motion: "other" }), data(0, 0, lowest));
+    FakeWebSocket.last.receive(timeline({ epoch: 2, motion: "other" }), data(0, 0, lowest));
     expect(viewer.poseAt(now)).not.toBeNull();
     expect(viewer.motion).toBe("other");
   });
 
   test("a private timeline goes on from where it stood", () => {
-    watching(MOTION);
-    Line.last.say(data(0, 1, best));
-    pass(400);
-    Line.last.say(timeline({ epoch: 2, clock: UNIX, position: 700_000, playing: false, loop: false }));
-    Line.last.end(1006);
-    pass(250);
+    openViewer(MOTION);
+    FakeWebSocket.last.receive(data(0, 1, best));
+    advanceTime(400);
+    FakeWebSocket.last.receive(timeline({ epoch: 2, clock: UNIX, position: 700_000, playing: false, loop: false }));
+    FakeWebSocket.last.endWith(1006);
+    advanceTime(250);
     const clock = UNIX + 650_000;
-    expect(Line.last.url).toBe(`ws://stage/v1/motions/dance/stream?rate=1&have=dance.0.1--.2&at=0.700000&clock=${clock}`);
-    Line.last.accept();
-    Line.last.say(header(), description(), timeline({ position: 700_000 }));
-    expect(Line.last.of("Edit")).toEqual([{ name: "Edit", playing: false, position: null, loop: false }]);
+    expect(FakeWebSocket.last.url).toBe(
+      `ws://stage/v1/motions/dance/stream?rate=1&have=dance.0.1--.2&at=0.700000&clock=${clock}`,
+    );
+    FakeWebSocket.last.accept();
+    FakeWebSocket.last.receive(header(), description(), timeline({ position: 700_000 }));
+    expect(FakeWebSocket.last.messagesOf("Edit")).toEqual([
+      { name: "Edit", playing: false, position: null, loop: false },
+    ]);
   });
 
   test("what is held is not asked for again, in a session either", () => {
-    watching();
-    Line.last.say(data(0, 1, best));
-    Line.last.end(1006);
-    pass(250);
-    expect(new URL(Line.last.url).searchParams.get("have")).toBe("dance.0.1--.2");
-    expect(new URL(Line.last.url).searchParams.has("at")).toBe(false);
+    openViewer();
+    FakeWebSocket.last.receive(data(0, 1, best));
+    FakeWebSocket.last.endWith(1006);
+    advanceTime(250);
+    expect(new URL(FakeWebSocket.last.url).searchParams.get("have")).toBe("dance.0.1--.2");
+    expect(new URL(FakeWebSocket.last.url).searchParams.has("at")).toBe(false);
   });
 
   test("a line that falls silent is replaced by another, where the dance goes on as it was", () => {
-    watching(MOTION);
-    Line.last.say(data(0, 1, best), timeline({ epoch: 2, clock: UNIX, position: 700_000, playing: false, loop: false }));
+    openViewer(MOTION);
+    FakeWebSocket.last.receive(
+      data(0, 1, best),
+      timeline({ epoch: 2, clock: UNIX, position: 700_000, playing: false, loop: false }),
+    );
     const told: string[] = [];
     for (const event of ["open", "replaced", "closed"]) viewer.addEventListener(event, () => told.push(event));
-    const silent = Line.last;
+    const silent = FakeWebSocket.last;
     // it is asked for the time now and then, and does not answer
-    pass(6_500);
-    expect(Line.opened.length).toBeGreaterThan(1);
-    expect(Line.last.url).toContain("have=dance.0.1--.2&at=0.700000");
-    Line.last.accept();
+    advanceTime(6_500);
+    expect(FakeWebSocket.opened.length).toBeGreaterThan(1);
+    expect(FakeWebSocket.last.url).toContain("have=dance.0.1--.2&at=0.700000");
+    FakeWebSocket.last.accept();
     expect([told, silent.readyState]).toEqual([[], 1]);
-    Line.last.say(header(), description(), timeline({ position: 700_000 }));
+    FakeWebSocket.last.receive(header(), description(), timeline({ position: 700_000 }));
     expect([told, silent.readyState]).toEqual([["open", "replaced"], 3]);
-    expect(Line.last.of("Edit")).toEqual([{ name: "Edit", playing: false, position: null, loop: false }]);
-    expect(Line.last.of("Ping")).toHaveLength(1);
+    expect(FakeWebSocket.last.messagesOf("Edit")).toEqual([
+      { name: "Edit", playing: false, position: null, loop: false },
+    ]);
+    expect(FakeWebSocket.last.messagesOf("Ping")).toHaveLength(1);
     expect([...viewer.blocks]).toEqual([1, -1, -1]);
   });
 
   test("a missing session is the end", () => {
-    watching();
-    Line.last.end(4404);
-    pass(60_000);
-    expect(Line.opened).toHaveLength(1);
-    expect(viewer.ended).toBe(true);
-    expect(viewer.line().reason).toBe("there is no such motion or session");
+    openViewer();
+    FakeWebSocket.last.endWith(4404);
+    advanceTime(60_000);
+    expect(FakeWebSocket.opened).toHaveLength(1);
+    expect(viewer.isClosed).toBe(true);
+    expect(viewer.statistics().reason).toBe("there is no such motion or session");
   });
 });
 
 describe("what cannot be played", () => {
   test("a damaged block is passed over and counted", () => {
-    watching();
-    Line.last.say(data(0, 1, best.subarray(0, 0)), data(0, 1, last), data(3, 0, best));
-    Line.last.raw(Uint8Array.of(4, 0xc1));
-    expect(viewer.damaged).toBe(4);
+    openViewer();
+    FakeWebSocket.last.receive(data(0, 1, best.subarray(0, 0)), data(0, 1, last), data(3, 0, best));
+    FakeWebSocket.last.receiveRaw(Uint8Array.of(4, 0xc1));
+    expect(viewer.damagedCount).toBe(4);
     expect([...viewer.blocks]).toEqual([-1, -1, -1]);
-    Line.last.say(data(0, 0, lowest));
+    FakeWebSocket.last.receive(data(0, 0, lowest));
     expect(viewer.poseAt(now)).not.toBeNull();
   });
 
   test("other tracks' data is skipped", () => {
-    watching();
-    Line.last.say({ name: "Data", track: 0, rate: 1, index: 0, block: best });
-    expect([viewer.damaged, ...viewer.blocks]).toEqual([0, -1, -1, -1]);
+    openViewer();
+    FakeWebSocket.last.receive({ name: "Data", track: 0, rate: 1, index: 0, block: best });
+    expect([viewer.damagedCount, ...viewer.blocks]).toEqual([0, -1, -1, -1]);
   });
 
   test.each([
     ["no motion", [{ type: "audio" }], "the stream has no motion in it"],
     ["another codec", [{ ...goldenDescription(), codec: "bunraku.motion/9" }], "motion is of codec bunraku.motion/9"],
     ["no frames", [{ ...goldenDescription(), frames: 0 }], "motion needs frames"],
-    ["a dancer cut short", [{ ...goldenDescription(), dancer: new Uint8Array(0) }], "a dancer has 1..1024 bytes, not 0"],
+    [
+      "a dancer cut short",
+      [{ ...goldenDescription(), dancer: new Uint8Array(0) }],
+      "a dancer has 1..1024 bytes, not 0",
+    ],
     ["no rates", [{ ...goldenDescription(), rates: [] }], "motion needs rates"],
     ["a rate of nothing", [{ ...goldenDescription(), rates: [null] }], "rate 0 needs kbps"],
   ])("%s ends it and says why", (_, tracks, why) => {
     viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
-    Line.last.accept();
-    Line.last.say(header(), { name: "Description", motion: "dance", first: null, tracks });
-    expect(viewer.ended).toBe(true);
-    expect(viewer.line().reason).toContain(why);
+    FakeWebSocket.last.accept();
+    FakeWebSocket.last.receive(header(), { name: "Description", motion: "dance", first: null, tracks });
+    expect(viewer.isClosed).toBe(true);
+    expect(viewer.statistics().reason).toContain(why);
   });
 });
 
 test("a private timeline is edited in seconds", () => {
-  watching(MOTION);
+  openViewer(MOTION);
   expect(viewer.edit({ position: 1.25, playing: false })).toBe(true);
-  expect(Line.last.of("Edit")).toEqual([{ name: "Edit", playing: false, position: 1_250_000, loop: null }]);
-  expect(viewer.line().reason).toBe("waiting for the first block");
-  Line.last.say(data(0, 1, best));
+  expect(FakeWebSocket.last.messagesOf("Edit")).toEqual([
+    { name: "Edit", playing: false, position: 1_250_000, loop: null },
+  ]);
+  expect(viewer.statistics().reason).toBe("waiting for the first block");
+  FakeWebSocket.last.receive(data(0, 1, best));
   viewer.poseAt(now);
-  expect(viewer.line().reason).toBe("pinned by the address");
+  expect(viewer.statistics().reason).toBe("pinned by the address");
 });

@@ -1,9 +1,15 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { type AudioPacket, AudioTrack, milliseconds, PACKET, unpackAudio } from "../../src/codec/audio";
+import {
+  type AudioPacket,
+  AudioTrack,
+  PACKET_SAMPLES,
+  packetDurationMs,
+  unpackAudioBlock,
+} from "../../src/codec/audio";
 import { DamagedBlock } from "../../src/codec/errors";
-import { readTiming } from "../../src/codec/timing";
-import { bytes, vectors } from "../vectors";
+import { parseTiming } from "../../src/codec/timing";
+import { decodeBase64, loadVectors } from "../golden-vectors";
 
 interface AudioVectors {
   /** The timing of the motion that each track is beside. */
@@ -13,61 +19,64 @@ interface AudioVectors {
   invalid: { why: string; block: string }[];
 }
 
-const golden = vectors<AudioVectors>("audio");
-const motions = golden.motions.map((map) => readTiming(map, "motion"));
+const golden = loadVectors<AudioVectors>("audio");
+const motions = golden.motions.map((map) => parseTiming(map, "motion"));
 const tracks = golden.tracks.map((map, nth) => AudioTrack.fromDescription(map, motions[nth]));
 
 describe("golden blocks", () => {
   test.each(golden.valid)("block $index of track $track", (vector) => {
     const track = tracks[vector.track];
-    const packets = unpackAudio(bytes(vector.block));
+    const packets = unpackAudioBlock(decodeBase64(vector.block));
     expect(packets.map(({ number, data }) => [number, track.firstSample(number), [...data]])).toEqual(
-      vector.packets.map(({ number, sample, data }) => [number, sample, [...bytes(data)]]),
+      vector.packets.map(({ number, sample, data }) => [number, sample, [...decodeBase64(data)]]),
     );
     for (const { number } of packets) {
-      expect(track.blockAt(track.packetUs(number))).toBe(vector.index);
-      expect(track.packetAt(track.packetUs(number) + 1)).toBe(number);
-      expect(track.packetAt(track.packetUs(number + 1) - 1)).toBe(number);
+      expect(track.blockAt(track.packetStartUs(number))).toBe(vector.index);
+      expect(track.packetAt(track.packetStartUs(number) + 1)).toBe(number);
+      expect(track.packetAt(track.packetStartUs(number + 1) - 1)).toBe(number);
     }
   });
 
   test.each(golden.invalid)("refuses: $why", ({ block }) => {
-    expect(() => unpackAudio(bytes(block))).toThrow(DamagedBlock);
+    expect(() => unpackAudioBlock(decodeBase64(block))).toThrow(DamagedBlock);
   });
 
   test("hold all packets of a track, one after the other", () => {
     tracks.forEach((track, nth) => {
       const blocks = golden.valid.filter((vector) => vector.track === nth);
-      expect(blocks.map(({ index }) => index)).toEqual([...Array(track.blocks).keys()]);
-      const numbers = blocks.flatMap(({ block }) => unpackAudio(bytes(block))).map(({ number }) => number);
-      expect(numbers).toEqual([...Array(track.packets).keys()]);
-      expect(track.firstSample(track.packets - 1)).toBeLessThan(track.samples);
-      expect(track.firstSample(track.packets)).toBeGreaterThanOrEqual(track.samples);
+      expect(blocks.map(({ index }) => index)).toEqual([...Array(track.blockCount).keys()]);
+      const numbers = blocks.flatMap(({ block }) => unpackAudioBlock(decodeBase64(block))).map(({ number }) => number);
+      expect(numbers).toEqual([...Array(track.packetCount).keys()]);
+      expect(track.firstSample(track.packetCount - 1)).toBeLessThan(track.samples);
+      expect(track.firstSample(track.packetCount)).toBeGreaterThanOrEqual(track.samples);
     });
     expect(golden.valid.some(({ packets }) => packets.length === 0)).toBe(true);
   });
 });
 
 test("what is no block is refused, and what is one is 60 ms packets", () => {
-  const blocks = golden.valid.map(({ block }) => bytes(block)).filter(({ length }) => length > 0);
+  const blocks = golden.valid.map(({ block }) => decodeBase64(block)).filter(({ length }) => length > 0);
   const change = fc.tuple(fc.nat(), fc.nat(255));
-  let read = 0, refused = 0;
+  let read = 0,
+    refused = 0;
   const survives = (data: Uint8Array): void => {
     let packets: AudioPacket[];
     try {
-      packets = unpackAudio(data);
+      packets = unpackAudioBlock(data);
     } catch (error) {
       if (!(error instanceof DamagedBlock)) throw error;
       refused++;
       return;
     }
     read++;
-    for (const packet of packets) expect(milliseconds(packet.data)).toBe(60);
+    for (const packet of packets) expect(packetDurationMs(packet.data)).toBe(60);
     expect(packets.reduce((sum, packet) => sum + packet.data.length, 0)).toBeLessThanOrEqual(data.length);
   };
   fc.assert(
     fc.property(
-      fc.constantFrom(...blocks), fc.array(change, { minLength: 1, maxLength: 3 }), fc.double({ min: 0, max: 1, noNaN: true }),
+      fc.constantFrom(...blocks),
+      fc.array(change, { minLength: 1, maxLength: 3 }),
+      fc.double({ min: 0, max: 1, noNaN: true }),
       fc.uint8Array({ maxLength: 40 }),
       (whole, changes, part, any) => {
         const damaged = whole.slice();
@@ -89,7 +98,7 @@ describe("a description that cannot be played is refused with what it lacks", ()
     [{ channels: 3 }, "channels"],
     [{ channels: 1.5 }, "channels"],
     [{ pre_skip: -1 }, "pre_skip"],
-    [{ pre_skip: 2 * PACKET + 1 }, "pre_skip"],
+    [{ pre_skip: 2 * PACKET_SAMPLES + 1 }, "pre_skip"],
     [{ samples: 0 }, "samples"],
     [{ samples: 2 ** 60 }, "samples"],
     [{ samples: "9" }, "samples"],

@@ -1,10 +1,10 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { decodeCoefficients, SCENE_CHANNELS } from "../../src/codec/coefficients";
+import { decodeCoefficients, SCENE_CHANNEL_COUNT } from "../../src/codec/coefficients";
 import { DamagedBlock } from "../../src/codec/errors";
-import { shippedPrior } from "../../src/codec/prior";
-import { decodeScene, NUMBERS, SceneTrack } from "../../src/codec/scene";
-import { bytes, vectors } from "../vectors";
+import { loadShippedPrior } from "../../src/codec/prior";
+import { decodeSceneBlock, SCENE_VALUE_COUNT, SceneTrack } from "../../src/codec/scene";
+import { decodeBase64, loadVectors } from "../golden-vectors";
 
 interface SceneVectors {
   tracks: Record<string, unknown>[];
@@ -20,45 +20,54 @@ interface SceneVectors {
   invalid: { why: string; block: string }[];
 }
 
-const golden = vectors<SceneVectors>("scene");
+const golden = loadVectors<SceneVectors>("scene");
 const tracks = golden.tracks.map((track) => SceneTrack.fromDescription(track));
 
 describe("golden blocks", () => {
   test.each(golden.valid)("of track $track, $frames frames at step $step", (vector) => {
     const track = tracks[vector.track];
     const { frames, step, heading, q } = decodeCoefficients(
-      shippedPrior(), bytes(vector.block), track.blockFrames, track.fps, SCENE_CHANNELS,
+      loadShippedPrior(),
+      decodeBase64(vector.block),
+      track.blockFrames,
+      track.fps,
+      SCENE_CHANNEL_COUNT,
     );
     expect([frames, step, heading]).toEqual([vector.frames, vector.step, 0]);
     expect([...q]).toEqual(vector.q);
-    const block = decodeScene(track, bytes(vector.block));
+    const block = decodeSceneBlock(track, decodeBase64(vector.block));
     expect(block.frames).toBe(vector.frames);
-    const out = new Float64Array(NUMBERS);
+    const out = new Float64Array(SCENE_VALUE_COUNT);
     for (const { instant, numbers } of vector.values) {
-      block.at(instant, out);
+      block.valuesAt(instant, out);
       numbers.forEach((value, i) => expect(Math.abs(out[i] - value)).toBeLessThan(1e-9 * Math.max(1, Math.abs(value))));
     }
   });
 
   test.each(golden.invalid)("refuses: $why", ({ block }) => {
-    expect(() => decodeScene(tracks[0], bytes(block))).toThrow(DamagedBlock);
+    expect(() => decodeSceneBlock(tracks[0], decodeBase64(block))).toThrow(DamagedBlock);
   });
 
   test("are of cameras and lights, moving and still", () => {
-    expect(tracks.map(({ kind, blocks }) => [kind, blocks])).toEqual([["camera", 3], ["light", 6], ["camera", 1]]);
+    expect(tracks.map(({ kind, blockCount: blocks }) => [kind, blocks])).toEqual([
+      ["camera", 3],
+      ["light", 6],
+      ["camera", 1],
+    ]);
     expect(golden.valid.map(({ q }) => q.length)).toContain(0);
   });
 });
 
 test("what is no block decodes to finite numbers or is refused", () => {
-  const blocks = golden.valid.map((vector) => ({ track: tracks[vector.track], whole: bytes(vector.block) }));
+  const blocks = golden.valid.map((vector) => ({ track: tracks[vector.track], whole: decodeBase64(vector.block) }));
   const change = fc.tuple(fc.nat(), fc.nat(255));
-  const out = new Float64Array(NUMBERS);
-  let decoded = 0, refused = 0;
+  const out = new Float64Array(SCENE_VALUE_COUNT);
+  let decoded = 0,
+    refused = 0;
   const survives = (track: SceneTrack, data: Uint8Array): void => {
     try {
-      const block = decodeScene(track, data);
-      block.at(block.frames / 2, out);
+      const block = decodeSceneBlock(track, data);
+      block.valuesAt(block.frames / 2, out);
       expect(out.every(Number.isFinite)).toBe(true);
       expect(out[6]).toBeGreaterThanOrEqual(0);
       decoded++;
@@ -69,7 +78,9 @@ test("what is no block decodes to finite numbers or is refused", () => {
   };
   fc.assert(
     fc.property(
-      fc.constantFrom(...blocks), fc.array(change, { minLength: 1, maxLength: 8 }), fc.double({ min: 0, max: 1, noNaN: true }),
+      fc.constantFrom(...blocks),
+      fc.array(change, { minLength: 1, maxLength: 8 }),
+      fc.double({ min: 0, max: 1, noNaN: true }),
       fc.uint8Array({ maxLength: 400 }),
       ({ track, whole }, changes, part, any) => {
         const damaged = whole.slice();

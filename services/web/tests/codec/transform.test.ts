@@ -1,6 +1,6 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
-import { basis } from "../../src/codec/transform";
+import { cosineBasis } from "../../src/codec/transform";
 
 test("the cosines are orthonormal over the frames", () => {
   fc.assert(
@@ -9,7 +9,7 @@ test("the cosines are orthonormal over the frames", () => {
       const row = new Float64Array(frames);
       let product = 0;
       for (let t = 0; t < frames; t++) {
-        basis(row, frames, frames, t);
+        cosineBasis(row, frames, frames, t);
         product += row[a] * row[b];
       }
       expect(product).toBeCloseTo(a === b ? 1 : 0, 10);
@@ -20,7 +20,7 @@ test("the cosines are orthonormal over the frames", () => {
 test("is the definition's at any instant, to the longest block", () => {
   const row = new Float64Array(1000);
   for (const t of [-0.5, 0, 17.3, 999.5]) {
-    basis(row, 1000, 1000, t);
+    cosineBasis(row, 1000, 1000, t);
     for (const k of [1, 7, 500, 999]) {
       expect(row[k]).toBeCloseTo(Math.sqrt(2 / 1000) * Math.cos((Math.PI * (t + 0.5) * k) / 1000), 12);
     }

@@ -5,7 +5,7 @@ test.each([
   ["Sanbasō, First Steps", "Sanbasō, First Steps.bvh"],
   ["三番叟", "三番叟.bvh"],
   ["../../etc/passwd", "etc passwd.bvh"],
-  ["a\\b:c*d?e\"f<g>h|i", "a b c d e f g h i.bvh"],
+  ['a\\b:c*d?e"f<g>h|i', "a b c d e f g h i.bvh"],
   ["  .hidden. ", "hidden.bvh"],
   ["line\nbreak\u0000and \u202eturned", "line break and turned.bvh"],
   ["", "dance.bvh"],

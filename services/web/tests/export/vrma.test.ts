@@ -1,25 +1,25 @@
-import { VRMCore, type VRM1Meta, type VRMHumanBones, VRMHumanoid } from "@pixiv/three-vrm";
+import { type VRM1Meta, VRMCore, type VRMHumanBones, VRMHumanoid } from "@pixiv/three-vrm";
 import { createVRMAnimationClip, type VRMAnimation, VRMAnimationLoaderPlugin } from "@pixiv/three-vrm-animation";
 import { AnimationMixer, Group, Object3D, Quaternion, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { describe, expect, test } from "vitest";
-import { type Dance, poseOf } from "../../src/export/dance";
+import { poseAt, type SampledMotion } from "../../src/export/sampled-motion";
 import { writeVrma } from "../../src/export/vrma";
-import { BONE_PARENTS, BONES, tPose } from "../../src/motion/humanoid";
-import { emptyWorld, restPose, world } from "../../src/motion/skeleton";
-import { finished, goldenDance, turning, whole } from "./dances";
+import { BONE_PARENTS, BONES, tPoseFigure } from "../../src/motion/humanoid";
+import { createWorldTransforms, restPose, worldTransforms } from "../../src/motion/skeleton";
+import { goldenMotion, joinParts, runToCompletion, turningMotion } from "./motions";
 
-async function read(dance: Dance): Promise<VRMAnimation> {
+async function read(dance: SampledMotion): Promise<VRMAnimation> {
   const loader = new GLTFLoader();
   loader.register((parser) => new VRMAnimationLoaderPlugin(parser));
-  const { userData } = await loader.parseAsync(await whole(finished(writeVrma(dance, "a dance"))), "");
+  const { userData } = await loader.parseAsync(await joinParts(runToCompletion(writeVrma(dance, "a dance"))), "");
   const [animation] = userData.vrmAnimations as VRMAnimation[];
   return animation;
 }
 
 /** An avatar of the dancer's own build, in the T-pose, its bones under names of their own. */
-function avatar({ figure }: Dance): VRMCore {
-  const { offsets } = tPose(figure);
+function avatar({ figure }: SampledMotion): VRMCore {
+  const { offsets } = tPoseFigure(figure);
   const scene = new Group();
   const nodes = BONES.map((name) => Object.assign(new Object3D(), { name: `my_${name}` }));
   nodes.forEach((node, bone) => {
@@ -27,14 +27,21 @@ function avatar({ figure }: Dance): VRMCore {
     (BONE_PARENTS[bone] < 0 ? scene : nodes[BONE_PARENTS[bone]]).add(node);
   });
   scene.updateMatrixWorld(true);
-  const humanoid = new VRMHumanoid(Object.fromEntries(BONES.map((name, bone) => [name, { node: nodes[bone] }])) as unknown as VRMHumanBones);
+  const humanoid = new VRMHumanoid(
+    Object.fromEntries(BONES.map((name, bone) => [name, { node: nodes[bone] }])) as unknown as VRMHumanBones,
+  );
   scene.add(humanoid.normalizedHumanBonesRoot);
   return new VRMCore({ scene, humanoid, meta: { metaVersion: "1" } as VRM1Meta });
 }
 
 const FROM_SPINE = BONES.indexOf("spine");
 
-describe.each([["turning", turning()], ["with a straight sacroiliac", turning({ straight: true })], ["golden", goldenDance()], ["of a second dancer", goldenDance(1, { x: 1.3, z: -0.4, turn: 2.2 })]])("a dance %s", (_, dance) => {
+describe.each([
+  ["turning", turningMotion()],
+  ["with a straight sacroiliac", turningMotion({ straight: true })],
+  ["golden", goldenMotion()],
+  ["of a second dancer", goldenMotion(1, { x: 1.3, z: -0.4, turn: 2.2 })],
+])("a dance %s", (_, dance) => {
   test("moves an avatar of the dancer's build through three-vrm as the dancer moves", async () => {
     const animation = await read(dance);
     expect(animation.humanoidTracks.rotation.size).toBe(BONES.length);
@@ -43,14 +50,18 @@ describe.each([["turning", turning()], ["with a straight sacroiliac", turning({ 
     const clip = createVRMAnimationClip(animation, vrm);
     const mixer = new AnimationMixer(vrm.scene);
     mixer.clipAction(clip).play();
-    const ours = emptyWorld(), pose = restPose();
-    const at = new Vector3(), expected = new Vector3(), shift = new Vector3(), turn = new Quaternion();
+    const ours = createWorldTransforms(),
+      pose = restPose();
+    const at = new Vector3(),
+      expected = new Vector3(),
+      shift = new Vector3(),
+      turn = new Quaternion();
     const laid = new Quaternion();
     for (let frame = 0; frame < dance.frames; frame++) {
       mixer.setTime(Math.min(frame / dance.fps, clip.duration - 1e-6));
       vrm.update(0);
       vrm.scene.updateMatrixWorld(true);
-      world(dance.figure, poseOf(dance, frame, pose), ours);
+      worldTransforms(dance.figure, poseAt(dance, frame, pose), ours);
       shift.set(0, 0, 0);
       BONES.forEach((name, bone) => {
         const node = vrm.humanoid.getRawBoneNode(name as "hips") as Object3D;
@@ -61,7 +72,8 @@ describe.each([["turning", turning()], ["with a straight sacroiliac", turning({ 
         expect(at.distanceTo(expected.add(shift))).toBeLessThan(1e-4);
         const [w, x, y, z] = ours.orientations.subarray((bone + 1) * 4);
         laid.identity();
-        if (/Arm|Hand/.test(name)) laid.setFromAxisAngle(new Vector3(0, 0, 1), (name.startsWith("left") ? -1 : 1) * (Math.PI / 2));
+        if (/Arm|Hand/.test(name))
+          laid.setFromAxisAngle(new Vector3(0, 0, 1), (name.startsWith("left") ? -1 : 1) * (Math.PI / 2));
         expect(node.getWorldQuaternion(turn).angleTo(new Quaternion(x, y, z, w).multiply(laid))).toBeLessThan(1e-3);
       });
     }
@@ -69,12 +81,13 @@ describe.each([["turning", turning()], ["with a straight sacroiliac", turning({ 
 });
 
 test("a second dancer's is told about where its avatar stands, wherever that is on the stage", async () => {
-  const bytes = async (dance: Dance) => new Uint8Array(await whole(finished(writeVrma(dance, "a dance"))));
-  expect(await bytes(goldenDance(1, { x: 1.3, z: -0.4, turn: 2.2 }))).toEqual(await bytes(goldenDance(1)));
+  const bytes = async (dance: SampledMotion) =>
+    new Uint8Array(await joinParts(runToCompletion(writeVrma(dance, "a dance"))));
+  expect(await bytes(goldenMotion(1, { x: 1.3, z: -0.4, turn: 2.2 }))).toEqual(await bytes(goldenMotion(1)));
 });
 
 test("with a straight sacroiliac nothing is shifted", async () => {
-  const dance = turning({ straight: true });
+  const dance = turningMotion({ straight: true });
   const vrm = avatar(dance);
   const clip = createVRMAnimationClip(await read(dance), vrm);
   const mixer = new AnimationMixer(vrm.scene);
@@ -82,7 +95,7 @@ test("with a straight sacroiliac nothing is shifted", async () => {
   mixer.setTime(20 / dance.fps);
   vrm.update(0);
   vrm.scene.updateMatrixWorld(true);
-  const ours = world(dance.figure, poseOf(dance, 20, restPose()), emptyWorld());
+  const ours = worldTransforms(dance.figure, poseAt(dance, 20, restPose()), createWorldTransforms());
   const hand = new Vector3().setFromMatrixPosition((vrm.humanoid.getRawBoneNode("leftHand") as Object3D).matrixWorld);
   expect(hand.distanceTo(new Vector3().fromArray(ours.positions, 14 * 3))).toBeLessThan(1e-4);
 });

@@ -1,19 +1,19 @@
 import { beforeEach, expect, test } from "vitest";
-import { Commands } from "../../src/input/commands";
-import { createGamepad, type GamepadInput } from "../../src/input/gamepad";
-import type { Hands } from "../../src/input/hands";
+import { CommandDispatcher } from "../../src/input/command-dispatcher";
+import { createGamepadInput, type GamepadInput } from "../../src/input/gamepad";
+import type { LimbController } from "../../src/input/limb-controller";
 import { bind, DEFAULT_MAPPING, type Mapping } from "../../src/input/mapping";
-import { VelocityInputs } from "../../src/input/velocity";
-import { standingPuppet } from "../stage/standard-figure";
-import { deeds } from "./deeds";
-import { pad } from "./pads";
-import { handsBefore, Session } from "./session";
+import { VelocityInputs } from "../../src/input/velocity-input";
+import { createStandingPuppet } from "../stage/puppet/figures";
+import { createLimbController, FakePuppeteer } from "./fake-puppeteer";
+import { createGamepad } from "./gamepads";
+import { recordPageActions } from "./page-actions";
 
 const LEFT_HAND = 0;
 const [A, LEFT, RIGHT] = [0, 14, 15];
 
-let session: Session;
-let hands: Hands;
+let session: FakePuppeteer;
+let hands: LimbController;
 let velocity: VelocityInputs;
 let pads: (Gamepad | null)[];
 let input: GamepadInput;
@@ -21,13 +21,20 @@ let told: string[];
 let mapping: Mapping;
 
 beforeEach(() => {
-  session = new Session();
-  hands = handsBefore(standingPuppet(), session);
+  session = new FakePuppeteer();
+  hands = createLimbController(createStandingPuppet(), session);
   pads = [];
   told = [];
   mapping = DEFAULT_MAPPING;
-  velocity = new VelocityInputs(hands, { take: (limb) => hands.take(limb, "velocity"), free: (limb) => hands.source(limb) === null });
-  input = createGamepad(new Commands(hands, velocity, deeds(told)), () => mapping, () => pads);
+  velocity = new VelocityInputs(hands, {
+    claim: (limb) => hands.claim(limb, "velocity"),
+    isFree: (limb) => hands.source(limb) === null,
+  });
+  input = createGamepadInput(
+    new CommandDispatcher(hands, velocity, recordPageActions(told)),
+    () => mapping,
+    () => pads,
+  );
 });
 
 function frame(now: number, acting = true): void {
@@ -36,13 +43,16 @@ function frame(now: number, acting = true): void {
 }
 
 test("a stick that is moved takes its hand and moves it, and at rest it stops at once", () => {
-  pads = [pad([1, 0, 0, 0])];
+  pads = [createGamepad([1, 0, 0, 0])];
   frame(0);
-  expect(session.take()).toEqual([["claim", LEFT_HAND], ["velocity", LEFT_HAND, 1, 0, 0]]);
+  expect(session.takeCalls()).toEqual([
+    ["claim", LEFT_HAND],
+    ["velocity", LEFT_HAND, 1, 0, 0],
+  ]);
   frame(16);
-  pads = [pad([0.05, 0, 0, 0])];
+  pads = [createGamepad([0.05, 0, 0, 0])];
   frame(32);
-  expect(session.said.at(-1)).toEqual(["velocity", LEFT_HAND, 0, 0, 0]);
+  expect(session.calls.at(-1)).toEqual(["velocity", LEFT_HAND, 0, 0, 0]);
 });
 
 test("a trembling stick is steadied, the more the more that is wished", () => {
@@ -50,11 +60,11 @@ test("a trembling stick is steadied, the more the more that is wished", () => {
     mapping = { ...DEFAULT_MAPPING, stickSmoothing };
     const said: number[] = [];
     for (let i = 0; i < 200; i++) {
-      pads = [pad([0.6 + 0.1 * (i % 2), 0, 0, 0])];
+      pads = [createGamepad([0.6 + 0.1 * (i % 2), 0, 0, 0])];
       frame(i * 16);
-      said.push(session.take().at(-1)?.[2] as number);
+      said.push(session.takeCalls().at(-1)?.[2] as number);
     }
-    pads = [pad()];
+    pads = [createGamepad()];
     frame(200 * 16);
     const steady = said.slice(100);
     return Math.max(...steady) - Math.min(...steady);
@@ -64,51 +74,61 @@ test("a trembling stick is steadied, the more the more that is wished", () => {
 });
 
 test("pulled out, its limbs come to rest and are given back", () => {
-  pads = [pad([1, 0, -1, 0])];
+  pads = [createGamepad([1, 0, -1, 0])];
   frame(0);
   expect([hands.source(0), hands.source(1)]).toEqual(["velocity", "velocity"]);
   pads = [null];
   frame(16);
-  expect(session.said.slice(-2)).toEqual([["velocity", 0, 0, 0, 0], ["velocity", 1, 0, 0, 0]]);
+  expect(session.calls.slice(-2)).toEqual([
+    ["velocity", 0, 0, 0, 0],
+    ["velocity", 1, 0, 0, 0],
+  ]);
   frame(1000);
   expect([hands.source(0), hands.source(1), input.pad]).toEqual([null, null, null]);
 });
 
 test("the first pad of the standard mapping that is connected is read", () => {
-  const gone = { ...pad([1, 0, 0, 0]), connected: false } as Gamepad;
-  const standard = pad();
-  pads = [null, gone, pad([1, 0, 0, 0], { [A]: 1 }, ""), standard, pad([1, 0, 0, 0])];
+  const gone = { ...createGamepad([1, 0, 0, 0]), connected: false } as Gamepad;
+  const standard = createGamepad();
+  pads = [null, gone, createGamepad([1, 0, 0, 0], { [A]: 1 }, ""), standard, createGamepad([1, 0, 0, 0])];
   frame(0);
   expect(input.pad).toBe(standard);
-  expect([told, session.said]).toEqual([[], []]);
+  expect([told, session.calls]).toEqual([[], []]);
 });
 
 test("a button held down plays and seeks once", () => {
-  pads = [pad([0, 0, 0, 0], { [A]: 1, [LEFT]: 1 })];
+  pads = [createGamepad([0, 0, 0, 0], { [A]: 1, [LEFT]: 1 })];
   frame(0);
   frame(16);
   expect(told).toEqual(["play", "back"]);
-  pads = [pad()];
+  pads = [createGamepad()];
   frame(32);
-  pads = [pad([0, 0, 0, 0], { [RIGHT]: 1 })];
+  pads = [createGamepad([0, 0, 0, 0], { [RIGHT]: 1 })];
   frame(48);
   expect(told).toEqual(["play", "back", "forward"]);
 });
 
 test("what a button does is the mapping's to say, and nothing while one is being bound", () => {
   mapping = bind(DEFAULT_MAPPING, "button:1", "right_leg+");
-  pads = [pad([0, 0, 0, 0], { 1: 1 })];
+  pads = [createGamepad([0, 0, 0, 0], { 1: 1 })];
   frame(0, false);
-  expect([session.said, input.pad]).toEqual([[], pads[0]]);
+  expect([session.calls, input.pad]).toEqual([[], pads[0]]);
   frame(16);
-  expect(session.take()).toEqual([["claim", 3], ["velocity", 3, 1, 0, 0]]);
+  expect(session.takeCalls()).toEqual([
+    ["claim", 3],
+    ["velocity", 3, 1, 0, 0],
+  ]);
 });
 
 test("pressing the shoulder button gives a pushed stick from the hand to the leg", () => {
-  pads = [pad([0, -1, 0, 0])];
+  pads = [createGamepad([0, -1, 0, 0])];
   frame(0);
-  session.take();
-  pads = [pad([0, -1, 0, 0], { 4: 1 })];
+  session.takeCalls();
+  pads = [createGamepad([0, -1, 0, 0], { 4: 1 })];
   frame(16);
-  expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 0, 0], ["claim", 2], ["velocity", 2, 1, 0, 0]]);
+  expect(session.takeCalls()).toEqual([
+    ["velocity", LEFT_HAND, 0, 0, 0],
+    ["claim", 2],
+    ["velocity", 2, 1, 0, 0],
+  ]);
 });

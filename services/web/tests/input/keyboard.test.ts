@@ -1,12 +1,12 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
-import { Commands } from "../../src/input/commands";
-import type { Hands } from "../../src/input/hands";
+import { CommandDispatcher } from "../../src/input/command-dispatcher";
 import { listenToKeyboard } from "../../src/input/keyboard";
+import type { LimbController } from "../../src/input/limb-controller";
 import { bind, DEFAULT_MAPPING, type Mapping } from "../../src/input/mapping";
-import { VelocityInputs } from "../../src/input/velocity";
-import { standingPuppet } from "../stage/standard-figure";
-import { deeds } from "./deeds";
-import { handsBefore, Session } from "./session";
+import { VelocityInputs } from "../../src/input/velocity-input";
+import { createStandingPuppet } from "../stage/puppet/figures";
+import { createLimbController, FakePuppeteer } from "./fake-puppeteer";
+import { recordPageActions } from "./page-actions";
 
 const LEFT_HAND = 0;
 
@@ -25,16 +25,20 @@ class Focused extends EventTarget {
 }
 
 let target: EventTarget;
-let hands: Hands;
+let hands: LimbController;
 let velocity: VelocityInputs;
-let session: Session;
+let session: FakePuppeteer;
 let told: string[];
 let dialog: boolean;
 let mapping: Mapping;
 
 /** A key goes down; whether it was taken from the browser. */
 function down(code: string, more: Record<string, unknown> = {}): boolean {
-  const event = Object.assign(new Event("keydown", { cancelable: true }), { code, key: code, repeat: false, ctrlKey: false, metaKey: false, altKey: false }, more);
+  const event = Object.assign(
+    new Event("keydown", { cancelable: true }),
+    { code, key: code, repeat: false, ctrlKey: false, metaKey: false, altKey: false },
+    more,
+  );
   if ("focus" in more) Object.defineProperty(event, "target", { value: more.focus });
   target.dispatchEvent(event);
   return event.defaultPrevented;
@@ -55,20 +59,36 @@ beforeEach(() => {
   vi.stubGlobal("Element", Focused);
   vi.stubGlobal("document", { querySelector: () => (dialog ? {} : null) });
   target = new EventTarget();
-  session = new Session();
-  hands = handsBefore(standingPuppet(), session);
+  session = new FakePuppeteer();
+  hands = createLimbController(createStandingPuppet(), session);
   told = [];
   dialog = false;
   mapping = DEFAULT_MAPPING;
-  velocity = new VelocityInputs(hands, { take: (limb) => hands.take(limb, "velocity"), free: (limb) => hands.source(limb) === null });
-  const actions = { keys: () => told.push("keys"), escape: () => told.push("escape") };
-  listenToKeyboard(target as unknown as Window, new Commands(hands, velocity, deeds(told)), velocity, () => mapping, actions);
+  velocity = new VelocityInputs(hands, {
+    claim: (limb) => hands.claim(limb, "velocity"),
+    isFree: (limb) => hands.source(limb) === null,
+  });
+  const actions = { showKeys: () => told.push("keys"), onEscape: () => told.push("escape") };
+  listenToKeyboard(
+    target as unknown as Window,
+    new CommandDispatcher(hands, velocity, recordPageActions(told)),
+    velocity,
+    () => mapping,
+    actions,
+  );
 });
 afterEach(() => vi.unstubAllGlobals());
 
 describe("with no string held", () => {
   test("arrows seek, letters open panels, other keys are the browser's", () => {
-    expect(["ArrowRight", "KeyS", "KeyK", "Space", "KeyZ", "KeyW"].map(tap)).toEqual([true, true, true, true, false, false]);
+    expect(["ArrowRight", "KeyS", "KeyK", "Space", "KeyZ", "KeyW"].map(tap)).toEqual([
+      true,
+      true,
+      true,
+      true,
+      false,
+      false,
+    ]);
     expect(told).toEqual(["forward", "strings", "keep", "play"]);
   });
 
@@ -90,33 +110,40 @@ describe("with no string held", () => {
 describe("with a string held", () => {
   beforeEach(() => {
     tap("Digit2");
-    session.take();
+    session.takeCalls();
   });
 
   test("the same keys pull it, at once and several together, until they come up", () => {
     expect([down("KeyS"), down("ArrowRight")]).toEqual([true, true]);
     velocity.update(0);
-    const [[, limb, right, upwards]] = session.take();
-    expect([limb, right, upwards]).toEqual([LEFT_HAND, Math.round(32 * Math.SQRT1_2) / 32, -Math.round(32 * Math.SQRT1_2) / 32]);
+    const [[, limb, right, upwards]] = session.takeCalls();
+    expect([limb, right, upwards]).toEqual([
+      LEFT_HAND,
+      Math.round(32 * Math.SQRT1_2) / 32,
+      -Math.round(32 * Math.SQRT1_2) / 32,
+    ]);
     up("KeyS");
     velocity.update(16);
-    expect(session.take()).toEqual([["velocity", LEFT_HAND, 1, 0, 0]]);
+    expect(session.takeCalls()).toEqual([["velocity", LEFT_HAND, 1, 0, 0]]);
     target.dispatchEvent(new Event("blur"));
     velocity.update(32);
-    expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 0, 0]]);
+    expect(session.takeCalls()).toEqual([["velocity", LEFT_HAND, 0, 0, 0]]);
     expect(told).toEqual([]);
   });
 
   test("of an element they are up when the focus leaves it", () => {
-    const commands = new Commands(hands, velocity, deeds(told));
+    const commands = new CommandDispatcher(hands, velocity, recordPageActions(told));
     target = Object.assign(new EventTarget(), { tagName: "DIV" });
-    listenToKeyboard(target as unknown as HTMLElement, commands, velocity, () => mapping, { keys: () => undefined, escape: () => undefined });
+    listenToKeyboard(target as unknown as HTMLElement, commands, velocity, () => mapping, {
+      showKeys: () => undefined,
+      onEscape: () => undefined,
+    });
     down("ArrowUp");
     velocity.update(0);
-    expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 1, 0]]);
+    expect(session.takeCalls()).toEqual([["velocity", LEFT_HAND, 0, 1, 0]]);
     target.dispatchEvent(new Event("focusout"));
     velocity.update(16);
-    expect(session.take()).toEqual([["velocity", LEFT_HAND, 0, 0, 0]]);
+    expect(session.takeCalls()).toEqual([["velocity", LEFT_HAND, 0, 0, 0]]);
   });
 
   test("Escape lets go and shuts nothing; a key still down does nothing else then", () => {
@@ -145,5 +172,8 @@ test("a key bound anew takes its limb by a push", () => {
   mapping = bind(DEFAULT_MAPPING, "KeyU", "right_leg+");
   down("KeyU");
   velocity.update(0);
-  expect(session.take()).toEqual([["claim", 3], ["velocity", 3, 1, 0, 0]]);
+  expect(session.takeCalls()).toEqual([
+    ["claim", 3],
+    ["velocity", 3, 1, 0, 0],
+  ]);
 });

@@ -1,7 +1,7 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { bind, DEFAULT_MAPPING } from "../../src/input/mapping";
 import { loadMapping, saveMapping } from "../../src/input/mapping-store";
-import { forbidStorage, stubStorage } from "../storage/stubs";
+import { forbidStorage, stubStorage } from "../storage/storage-stub";
 
 let kept: Map<string, string>;
 
@@ -18,8 +18,17 @@ test("what is kept comes back; the default is kept by keeping nothing", () => {
 });
 
 test.each([
-  "", "{", "null", "7", "[]", '"text"', "{}", '{"version":1}', '{"version":1,"mapping":{"bindings":{"KeyW":["fly"]}}}',
-  JSON.stringify({ version: 2, mapping: DEFAULT_MAPPING }), JSON.stringify(DEFAULT_MAPPING),
+  "",
+  "{",
+  "null",
+  "7",
+  "[]",
+  '"text"',
+  "{}",
+  '{"version":1}',
+  '{"version":1,"mapping":{"bindings":{"KeyW":["fly"]}}}',
+  JSON.stringify({ version: 2, mapping: DEFAULT_MAPPING }),
+  JSON.stringify(DEFAULT_MAPPING),
 ])("what cannot be read is the default: %s", (content) => {
   saveMapping(bind(DEFAULT_MAPPING, "KeyZ", "keep"));
   for (const key of kept.keys()) kept.set(key, content);

@@ -1,17 +1,27 @@
 import fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { DIGITAL_INPUTS, HELD_INPUTS } from "../../src/input/inputs";
+import { DIGITAL_INPUTS, SELECTED_LIMB_INPUTS } from "../../src/input/digital-input";
 import {
-  ACTIONS, bind, conflictsOf, controlsOf, DEFAULT_MAPPING, isPadControl, limbTaken, readMapping, unbind, type Command, type Mapping,
+  ACTIONS,
+  bind,
+  type Command,
+  conflictsOf,
+  controlsOf,
+  DEFAULT_MAPPING,
+  isPadControl,
+  limbOfCommand,
+  type Mapping,
+  parseMapping,
+  unbind,
 } from "../../src/input/mapping";
 
-const ALL: readonly Command[] = [...DIGITAL_INPUTS, ...HELD_INPUTS, ...ACTIONS];
+const ALL: readonly Command[] = [...DIGITAL_INPUTS, ...SELECTED_LIMB_INPUTS, ...ACTIONS];
 const command = fc.constantFrom(...ALL);
 const control = fc.constantFrom("KeyZ", "KeyW", "Digit1", "button:1", "axis:0+", "button:4 button:1", "F2");
 
 describe("the default", () => {
   test("survives being written and read", () => {
-    expect(readMapping(JSON.parse(JSON.stringify(DEFAULT_MAPPING)))).toEqual(DEFAULT_MAPPING);
+    expect(parseMapping(JSON.parse(JSON.stringify(DEFAULT_MAPPING)))).toEqual(DEFAULT_MAPPING);
   });
 
   test("has no conflicts: keys of the held string give way to what they do without one", () => {
@@ -22,7 +32,11 @@ describe("the default", () => {
 
   test("reaches every hand and leg from the gamepad, and all limbs and actions from the keyboard", () => {
     for (const input of DIGITAL_INPUTS) expect(controlsOf(DEFAULT_MAPPING, input).some(isPadControl), input).toBe(true);
-    for (const one of [...HELD_INPUTS, ...ACTIONS]) expect(controlsOf(DEFAULT_MAPPING, one).some((key) => !isPadControl(key)), one).toBe(true);
+    for (const one of [...SELECTED_LIMB_INPUTS, ...ACTIONS])
+      expect(
+        controlsOf(DEFAULT_MAPPING, one).some((key) => !isPadControl(key)),
+        one,
+      ).toBe(true);
   });
 });
 
@@ -33,10 +47,11 @@ describe("editing", () => {
         const mapping = before.reduce((sum, [one, other]) => bind(sum, one, other), DEFAULT_MAPPING);
         const bound = bind(mapping, at, does);
         expect(controlsOf(bound, does)).toContain(at);
-        expect(readMapping(JSON.parse(JSON.stringify(bound)))).toEqual(bound);
+        expect(parseMapping(JSON.parse(JSON.stringify(bound)))).toEqual(bound);
         const back = unbind(bound, at, does);
         expect(controlsOf(back, does)).not.toContain(at);
-        for (const other of ALL) if (other !== does) expect(new Set(controlsOf(back, other))).toEqual(new Set(controlsOf(mapping, other)));
+        for (const other of ALL)
+          if (other !== does) expect(new Set(controlsOf(back, other))).toEqual(new Set(controlsOf(mapping, other)));
       }),
     );
   });
@@ -57,25 +72,33 @@ describe("editing", () => {
 
 describe("a mapping from elsewhere", () => {
   const broken: [string, unknown][] = [
-    ["nothing", null], ["a number", 7], ["a list", []], ["no bindings", { ...DEFAULT_MAPPING, bindings: undefined }],
+    ["nothing", null],
+    ["a number", 7],
+    ["a list", []],
+    ["no bindings", { ...DEFAULT_MAPPING, bindings: undefined }],
     ["a list of bindings", { ...DEFAULT_MAPPING, bindings: [] }],
     ["an unknown command", { ...DEFAULT_MAPPING, bindings: { KeyW: ["fly"] } }],
     ["commands that are no list", { ...DEFAULT_MAPPING, bindings: { KeyW: "play" } }],
     ["an unknown control", { ...DEFAULT_MAPPING, bindings: { "wheel:1": ["play"] } }],
-    ["too many controls", { ...DEFAULT_MAPPING, bindings: Object.fromEntries(Array.from({ length: 401 }, (_, i) => [`K${i}`, []])) }],
-    ["a dead zone of all", { ...DEFAULT_MAPPING, deadZone: 1 }], ["no dead zone", { ...DEFAULT_MAPPING, deadZone: undefined }],
-    ["smoothing below none", { ...DEFAULT_MAPPING, stickSmoothing: -0.1 }], ["smoothing in words", { ...DEFAULT_MAPPING, pointerSmoothing: "much" }],
+    [
+      "too many controls",
+      { ...DEFAULT_MAPPING, bindings: Object.fromEntries(Array.from({ length: 401 }, (_, i) => [`K${i}`, []])) },
+    ],
+    ["a dead zone of all", { ...DEFAULT_MAPPING, deadZone: 1 }],
+    ["no dead zone", { ...DEFAULT_MAPPING, deadZone: undefined }],
+    ["smoothing below none", { ...DEFAULT_MAPPING, stickSmoothing: -0.1 }],
+    ["smoothing in words", { ...DEFAULT_MAPPING, pointerSmoothing: "much" }],
   ];
   test.each(broken)("is none: %s", (_, value) => {
-    expect(readMapping(value)).toBeNull();
+    expect(parseMapping(value)).toBeNull();
   });
 
   test("is a mapping or null, never an error, whatever it is", () => {
     fc.assert(
       fc.property(fc.anything(), fc.anything(), (value, bindings) => {
         for (const one of [value, { ...DEFAULT_MAPPING, bindings }]) {
-          const read: Mapping | null = readMapping(one);
-          if (read) expect(readMapping(read)).toEqual(read);
+          const read: Mapping | null = parseMapping(one);
+          if (read) expect(parseMapping(read)).toEqual(read);
         }
       }),
     );
@@ -83,6 +106,6 @@ describe("a mapping from elsewhere", () => {
 });
 
 test("four actions take a limb each", () => {
-  expect(ACTIONS.map(limbTaken).filter((limb) => limb !== null)).toEqual([1, 0, 3, 2]);
-  expect(limbTaken("held_x+")).toBeNull();
+  expect(ACTIONS.map(limbOfCommand).filter((limb) => limb !== null)).toEqual([1, 0, 3, 2]);
+  expect(limbOfCommand("held_x+")).toBeNull();
 });

@@ -1,7 +1,7 @@
 import fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { OneEuro, smoothness } from "../../src/input/one-euro";
-import { vectors } from "../vectors";
+import { OneEuro, smoothingSettings } from "../../src/input/one-euro";
+import { loadVectors } from "../golden-vectors";
 
 interface Golden {
   settings: { min_cutoff: number; beta: number; derivative_cutoff: number };
@@ -17,14 +17,21 @@ const step = fc.double({ min: 0, max: 0.5, noNaN: true });
 function noise(count: number): number[] {
   let seed = 12345;
   const uniform = () => (seed = (seed * 1103515245 + 12345) % 2147483648) / 2147483648;
-  return Array.from({ length: count }, () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform()));
+  return Array.from(
+    { length: count },
+    () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform()),
+  );
 }
 
 const variance = (values: number[]) => values.reduce((sum, one) => sum + one * one, 0) / values.length;
 
-test.each(vectors<Golden[]>("one_euro"))("golden numbers with %o", ({ settings, samples }) => {
+test.each(loadVectors<Golden[]>("one_euro"))("golden numbers with %o", ({ settings, samples }) => {
   const { min_cutoff, beta, derivative_cutoff } = settings;
-  const filter = new OneEuro(samples[0].values.length, { minCutoff: min_cutoff, beta, derivativeCutoff: derivative_cutoff });
+  const filter = new OneEuro(samples[0].values.length, {
+    minCutoff: min_cutoff,
+    beta,
+    derivativeCutoff: derivative_cutoff,
+  });
   for (const { seconds, values, filtered } of samples) {
     filter.filter(values, seconds).forEach((one, axis) => expect(one).toBeCloseTo(filtered[axis], 12));
   }
@@ -55,19 +62,25 @@ describe("the One-Euro filter", () => {
 
   test("follows a step without passing it, and has it within a thousandth after seven time constants", () => {
     fc.assert(
-      fc.property(value, value, fc.double({ min: 0.2, max: 5, noNaN: true }), fc.array(fc.double({ min: 1e-3, max: 0.1, noNaN: true }), { minLength: 5, maxLength: 60 }), (from, to, minCutoff, steps) => {
-        const filter = new OneEuro(1, { minCutoff, beta: 0.5, derivativeCutoff: 1 });
-        filter.filter([from], 0);
-        let [seconds, last] = [0, from];
-        const settled = 7 / (2 * Math.PI * minCutoff);
-        for (const passed of [...steps, ...Array.from({ length: 200 }, () => settled / 200)]) {
-          const [now] = filter.filter([to], (seconds += passed));
-          expect(Math.abs(to - now)).toBeLessThanOrEqual(Math.abs(to - last) + 1e-12);
-          expect((to - now) * (to - from)).toBeGreaterThanOrEqual(-1e-9);
-          last = now;
-        }
-        expect(Math.abs(to - last)).toBeLessThan(1.1e-3 * Math.abs(to - from) + 1e-9);
-      }),
+      fc.property(
+        value,
+        value,
+        fc.double({ min: 0.2, max: 5, noNaN: true }),
+        fc.array(fc.double({ min: 1e-3, max: 0.1, noNaN: true }), { minLength: 5, maxLength: 60 }),
+        (from, to, minCutoff, steps) => {
+          const filter = new OneEuro(1, { minCutoff, beta: 0.5, derivativeCutoff: 1 });
+          filter.filter([from], 0);
+          let [seconds, last] = [0, from];
+          const settled = 7 / (2 * Math.PI * minCutoff);
+          for (const passed of [...steps, ...Array.from({ length: 200 }, () => settled / 200)]) {
+            const [now] = filter.filter([to], (seconds += passed));
+            expect(Math.abs(to - now)).toBeLessThanOrEqual(Math.abs(to - last) + 1e-12);
+            expect((to - now) * (to - from)).toBeGreaterThanOrEqual(-1e-9);
+            last = now;
+          }
+          expect(Math.abs(to - last)).toBeLessThan(1.1e-3 * Math.abs(to - from) + 1e-9);
+        },
+      ),
     );
   });
 
@@ -89,15 +102,21 @@ describe("the One-Euro filter", () => {
 
   test("of samples of one time, or an earlier one, the last counts as if it were the only one", () => {
     fc.assert(
-      fc.property(fc.array(fc.tuple(value, value, fc.double({ min: 1e-3, max: 0.2, noNaN: true })), { minLength: 1, maxLength: 20 }), (samples) => {
-        const [twice, once] = [new OneEuro(1, SETTINGS), new OneEuro(1, SETTINGS)];
-        let seconds = 0;
-        for (const [stale, fresh, passed] of samples) {
-          seconds += passed;
-          twice.filter([stale], seconds);
-          expect(twice.filter([fresh], seconds - passed / 2)).toEqual(once.filter([fresh], seconds));
-        }
-      }),
+      fc.property(
+        fc.array(fc.tuple(value, value, fc.double({ min: 1e-3, max: 0.2, noNaN: true })), {
+          minLength: 1,
+          maxLength: 20,
+        }),
+        (samples) => {
+          const [twice, once] = [new OneEuro(1, SETTINGS), new OneEuro(1, SETTINGS)];
+          let seconds = 0;
+          for (const [stale, fresh, passed] of samples) {
+            seconds += passed;
+            twice.filter([stale], seconds);
+            expect(twice.filter([fresh], seconds - passed / 2)).toEqual(once.filter([fresh], seconds));
+          }
+        },
+      ),
     );
   });
 
@@ -114,9 +133,9 @@ describe("the One-Euro filter", () => {
 });
 
 test("a wish for smoothness is none at 0, and steadier the more of it", () => {
-  expect(smoothness(0, 1)).toBeNull();
-  expect(smoothness(NaN, 1)).toBeNull();
-  const cutoffs = [0.01, 0.5, 1, 2].map((wish) => smoothness(wish, 1)?.minCutoff ?? 0);
+  expect(smoothingSettings(0, 1)).toBeNull();
+  expect(smoothingSettings(NaN, 1)).toBeNull();
+  const cutoffs = [0.01, 0.5, 1, 2].map((wish) => smoothingSettings(wish, 1)?.minCutoff ?? 0);
   expect(cutoffs[0]).toBeCloseTo(7.8, 1);
   expect(cutoffs[1]).toBeLessThan(cutoffs[0]);
   expect(cutoffs[2]).toBeCloseTo(0.6, 9);

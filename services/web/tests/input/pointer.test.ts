@@ -1,11 +1,11 @@
-import { beforeEach, expect, test } from "vitest";
 import { Vector3 } from "three";
-import type { Hands } from "../../src/input/hands";
-import { createPointer, type PointerInput } from "../../src/input/pointer";
-import type { Puppet } from "../../src/stage/puppet";
+import { beforeEach, expect, test } from "vitest";
+import type { LimbController } from "../../src/input/limb-controller";
+import { createPointerInput, type PointerInput } from "../../src/input/pointer";
+import type { Puppet } from "../../src/stage/puppet/puppet";
 import type { Stage } from "../../src/stage/stage";
-import { standingPuppet } from "../stage/standard-figure";
-import { handsBefore, Session } from "./session";
+import { createStandingPuppet } from "../stage/puppet/figures";
+import { createLimbController, FakePuppeteer } from "./fake-puppeteer";
 
 const LEFT_HAND = 0;
 /** Pixels of a metre: the stage is seen from far away along z. */
@@ -23,8 +23,8 @@ class Canvas extends EventTarget {
 }
 
 let canvas: Canvas;
-let hands: Hands;
-let session: Session;
+let hands: LimbController;
+let session: FakePuppeteer;
 let pointer: PointerInput;
 let puppet: Puppet;
 let free: boolean;
@@ -35,7 +35,16 @@ let smoothing: number;
 let nearer: number;
 
 beforeEach(() => {
-  [canvas, session, puppet, free, refused, taken, smoothing, nearer] = [new Canvas(), new Session(), standingPuppet(), true, [], [], 0, 0];
+  [canvas, session, puppet, free, refused, taken, smoothing, nearer] = [
+    new Canvas(),
+    new FakePuppeteer(),
+    createStandingPuppet(),
+    true,
+    [],
+    [],
+    0,
+    0,
+  ];
   performers = [puppet];
   const stage = {
     performers,
@@ -44,20 +53,30 @@ beforeEach(() => {
     back: () => new Vector3(0, 0, 1),
     audience: { orbit: () => undefined },
   };
-  hands = handsBefore(performers, session);
-  pointer = createPointer(canvas as unknown as HTMLCanvasElement, stage as unknown as Stage, hands, {
-    may: () => free, refused: (limb) => refused.push(limb), taken: (limb) => taken.push(limb), smoothing: () => smoothing, nearer: () => nearer,
+  hands = createLimbController(performers, session);
+  pointer = createPointerInput(canvas as unknown as HTMLCanvasElement, stage as unknown as Stage, hands, {
+    canClaim: () => free,
+    onRefused: (limb) => refused.push(limb),
+    onClaimed: (limb) => taken.push(limb),
+    smoothing: () => smoothing,
+    depthInput: () => nearer,
   });
 });
 
 function send(type: string, x: number, y: number, timeStamp: number): void {
-  const event = Object.assign(new Event(type), { pointerId: 1, pointerType: "mouse", button: 0, clientX: x, clientY: y });
+  const event = Object.assign(new Event(type), {
+    pointerId: 1,
+    pointerType: "mouse",
+    button: 0,
+    clientX: x,
+    clientY: y,
+  });
   Object.defineProperty(event, "timeStamp", { value: timeStamp });
   canvas.dispatchEvent(event);
 }
 
 const ring = () => puppet.handle(LEFT_HAND, new Vector3());
-const pulled = () => hands.pull(LEFT_HAND) as Vector3;
+const pulled = () => hands.pullTarget(LEFT_HAND) as Vector3;
 
 function grab(): { x: number; y: number } {
   const at = { x: ring().x * SCALE + 3, y: -ring().y * SCALE - 2 };
@@ -73,14 +92,14 @@ test("a ring follows the pointer that took it, from where it was taken, and is l
   expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
   pointer.update(32);
   expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
-  expect(pointer.pulling).toBe(true);
+  expect(pointer.isDragging).toBe(true);
   send("pointerup", at.x + 20, at.y - 40, 48);
   expect(hands.source(LEFT_HAND)).toBe(null);
-  expect(pointer.pulling).toBe(false);
+  expect(pointer.isDragging).toBe(false);
 });
 
 test("of several performers the nearest ring is taken, whosever it is, but of none who is not seen", () => {
-  const second = standingPuppet();
+  const second = createStandingPuppet();
   second.group.position.x = 1;
   second.handle = (limb, out) => puppet.handle(limb, out).add(second.group.position);
   performers.push(second);
@@ -91,10 +110,10 @@ test("of several performers the nearest ring is taken, whosever it is, but of no
   send("pointerup", at.x, at.y, 0);
   second.group.visible = true;
   send("pointerdown", at.x, at.y, 0);
-  expect([taken, session.said[0]]).toEqual([[4 + LEFT_HAND], ["claim", 4 + LEFT_HAND]]);
+  expect([taken, session.calls[0]]).toEqual([[4 + LEFT_HAND], ["claim", 4 + LEFT_HAND]]);
   send("pointermove", at.x + 20, at.y, 16);
-  expect(hands.pull(4 + LEFT_HAND)?.x).toBeCloseTo(ring().x + 1.1, 9);
-  expect(hands.pull(LEFT_HAND)).toBe(null);
+  expect(hands.pullTarget(4 + LEFT_HAND)?.x).toBeCloseTo(ring().x + 1.1, 9);
+  expect(hands.pullTarget(LEFT_HAND)).toBe(null);
 });
 
 test("a ring that another holds is refused, and so is nothing far from any ring", () => {
@@ -109,7 +128,7 @@ test("the picture may stand anywhere in a page", () => {
   canvas.corner = { left: 300, top: 1200 };
   const [x, y] = [ring().x * SCALE + 300, -ring().y * SCALE + 1200];
   send("pointermove", x, y, 0);
-  expect(pointer.near).toBe(LEFT_HAND);
+  expect(pointer.hoveredLimb).toBe(LEFT_HAND);
   send("pointerdown", x, y, 0);
   send("pointermove", x + 50, y - 30, 16);
   expect(pulled().x).toBeCloseTo(ring().x + 50 / SCALE, 9);

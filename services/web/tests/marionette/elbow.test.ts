@@ -1,34 +1,41 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { angleBetween, Elbow, liftBetween, SPEED, verticalNormal } from "../../src/marionette/elbow";
-import { ArmRig } from "../../src/marionette/limbs";
-import { PulledHand } from "../../src/marionette/pulled";
+import { ControlledHand } from "../../src/marionette/controlled-limb";
+import { angleBetween, Elbow, liftAngle, MAX_ELBOW_SPEED, verticalNormal } from "../../src/marionette/elbow";
+import { ArmRig } from "../../src/marionette/limb-rig";
 import { restPose } from "../../src/motion/skeleton";
-import { apart, combine, cross, dot, length, unit } from "../../src/motion/vector";
+import { combine, cross, distanceBetween, dot, length, unit } from "../../src/motion/vector";
 import { figure, table } from "./figure";
 
 const UP = Float64Array.of(0, 1, 0);
 const part = fc.double({ min: -0.6, max: 0.6, noNaN: true });
-const place = fc.tuple(part, part, part).map((parts) => Float64Array.from(parts)).filter((v) => length(v, 0) > 0.4);
+const place = fc
+  .tuple(part, part, part)
+  .map((parts) => Float64Array.from(parts))
+  .filter((v) => length(v, 0) > 0.4);
 const rest = restPose().rotations;
 
 describe("a pulled hand, wherever it is asked to be", () => {
   test.each([0, 1] as const)("%i: no upper arm goes where its shoulder does not, and the tip follows", (limb) => {
-    let exact = 0, frames = 0;
+    let exact = 0,
+      frames = 0;
     fc.assert(
       fc.property(fc.array(place, { minLength: 1, maxLength: 5 }), fc.constantFrom(20, 60, 144), (targets, fps) => {
-        const hand = new PulledHand(figure, limb, table), { rig } = hand;
-        const joints = new Float64Array(12), places = new Float64Array(9), tip = new Float64Array(3);
+        const hand = new ControlledHand(figure, limb, table),
+          { rig } = hand;
+        const joints = new Float64Array(12),
+          places = new Float64Array(9),
+          tip = new Float64Array(3);
         for (const target of targets) {
           for (let frame = 0; frame < fps / 2; frame++) {
-            hand.see(rest, 1 / fps);
-            hand.pull(joints, 0, rest, target, 1, 1 / fps);
-            rig.places(places, 0, joints, 0);
+            hand.observePose(rest, 1 / fps);
+            hand.solveJoints(joints, 0, rest, target, 1, 1 / fps);
+            rig.jointPositions(places, 0, joints, 0);
             unit(places, 0, places, 0);
-            expect(rig.shoulder.depth(places)).toBeLessThan(1e-6);
-            rig.target(tip, 0, joints, 0);
+            expect(rig.shoulder.depthInCaps(places)).toBeLessThan(1e-6);
+            rig.tipTarget(tip, 0, joints, 0);
             frames++;
-            if (apart(tip, 0, hand.place, 0) < 1e-9) exact++;
+            if (distanceBetween(tip, 0, hand.position, 0) < 1e-9) exact++;
           }
         }
       }),
@@ -39,18 +46,24 @@ describe("a pulled hand, wherever it is asked to be", () => {
   });
 
   test("in front, the tip is exactly where the follower has it", () => {
-    const front = fc.tuple(fc.double({ min: 0, max: 0.5, noNaN: true }), part, fc.double({ min: 0.25, max: 0.6, noNaN: true }));
+    const front = fc.tuple(
+      fc.double({ min: 0, max: 0.5, noNaN: true }),
+      part,
+      fc.double({ min: 0.25, max: 0.6, noNaN: true }),
+    );
     fc.assert(
       fc.property(fc.array(front, { minLength: 1, maxLength: 5 }), (targets) => {
-        const hand = new PulledHand(figure, 0, table), joints = new Float64Array(12), tip = new Float64Array(3);
-        hand.see(rest, 0);
+        const hand = new ControlledHand(figure, 0, table),
+          joints = new Float64Array(12),
+          tip = new Float64Array(3);
+        hand.observePose(rest, 0);
         for (const target of targets) {
           for (let frame = 0; frame < 40; frame++) {
-            hand.see(rest, 1 / 60);
-            hand.pull(joints, 0, rest, Float64Array.from(target), 1, 1 / 60);
+            hand.observePose(rest, 1 / 60);
+            hand.solveJoints(joints, 0, rest, Float64Array.from(target), 1, 1 / 60);
           }
-          hand.rig.target(tip, 0, joints, 0);
-          expect(apart(tip, 0, Float64Array.from(target), 0)).toBeLessThan(1e-6);
+          hand.rig.tipTarget(tip, 0, joints, 0);
+          expect(distanceBetween(tip, 0, Float64Array.from(target), 0)).toBeLessThan(1e-6);
         }
       }),
       { numRuns: 25 },
@@ -59,17 +72,21 @@ describe("a pulled hand, wherever it is asked to be", () => {
 });
 
 test("once the hand stands, the elbow's speed is bounded, however far the hand has jumped", () => {
-  const { arm, shoulder } = new ArmRig(figure, 0, table), { upper, fore, hand } = arm.proportions;
+  const { arm, shoulder } = new ArmRig(figure, 0, table),
+    { upper, forearm: fore, hand } = arm.proportions;
   fc.assert(
     fc.property(place, place, fc.constantFrom(1 / 144, 1 / 60, 1 / 20), (from, to, dt) => {
-      const elbow = new Elbow(arm, shoulder), before = new Float64Array(3), now = new Float64Array(3);
-      const direction = new Float64Array(3), side = new Float64Array(3);
+      const elbow = new Elbow(arm, shoulder),
+        before = new Float64Array(3),
+        now = new Float64Array(3);
+      const direction = new Float64Array(3),
+        side = new Float64Array(3);
       unit(direction, 0, from, 0);
       elbow.begin(direction, Float64Array.of(-1, 0, 0), 0.6);
-      elbow.follow(direction, length(from, 0), UP, dt);
+      elbow.step(direction, length(from, 0), UP, dt);
       unit(direction, 0, to, 0);
       for (let frame = 0; frame < 80; frame++) {
-        const { tip, normal, bend } = elbow.follow(direction, length(to, 0), UP, dt);
+        const { tip, normal, bend } = elbow.step(direction, length(to, 0), UP, dt);
         const r = length(tip, 0);
         expect(dot(normal, 0, tip, 0)).toBeCloseTo(0, 9);
         // the upper arm again, from tip, normal and bend
@@ -77,7 +94,7 @@ test("once the hand stands, the elbow's speed is bounded, however far the hand h
         const along = Math.min(Math.max((upper * upper + r * r - square) / (2 * upper * r), -1), 1);
         cross(side, 0, tip, 0, normal, 0);
         combine(now, 0, tip, 0, along / r, side, 0, Math.sqrt(1 - along * along) / r);
-        if (frame > 0) expect(angleBetween(now, before) * upper).toBeLessThanOrEqual(1.01 * SPEED * dt);
+        if (frame > 0) expect(angleBetween(now, before) * upper).toBeLessThanOrEqual(1.01 * MAX_ELBOW_SPEED * dt);
         before.set(now);
       }
     }),
@@ -93,6 +110,6 @@ test("on the axis there is no vertical plane to go to", () => {
 
 test("how far an elbow is off the chord", () => {
   const direction = Float64Array.of(0, 0, 1);
-  expect(liftBetween(Float64Array.of(0, -2, 2), direction)).toBeCloseTo(Math.PI / 4, 12);
-  expect(liftBetween(Float64Array.of(0, 0, 3), direction)).toBe(0);
+  expect(liftAngle(Float64Array.of(0, -2, 2), direction)).toBeCloseTo(Math.PI / 4, 12);
+  expect(liftAngle(Float64Array.of(0, 0, 3), direction)).toBe(0);
 });

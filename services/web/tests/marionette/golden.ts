@@ -1,6 +1,6 @@
 /** The shape of `proto/vectors/arm.json`. */
 
-import { vectors } from "../vectors";
+import { loadVectors } from "../golden-vectors";
 
 export interface GoldenArm {
   proportions: string;
@@ -25,4 +25,4 @@ export interface Golden {
   limbs: { offsets: number[][]; tips: number[][]; cases: GoldenLimb[] };
 }
 
-export const golden = vectors<Golden>("arm");
+export const golden = loadVectors<Golden>("arm");

@@ -1,7 +1,7 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
-import { THIGH_GREATEST, THIGH_LEAST, clampThigh, kneeBend } from "../../src/marionette/leg";
-import { LegRig } from "../../src/marionette/limbs";
+import { clampThigh, kneeBend, MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD } from "../../src/marionette/leg";
+import { LegRig } from "../../src/marionette/limb-rig";
 import { conjugate, multiply, rotate } from "../../src/motion/rotation";
 import { golden } from "./golden";
 
@@ -19,8 +19,8 @@ test("the knee bends one way and lets the shank hang", () => {
   fc.assert(
     fc.property(angle, (theta) => {
       const thigh = clampThigh(theta);
-      expect(thigh).toBeGreaterThanOrEqual(THIGH_LEAST);
-      expect(thigh).toBeLessThanOrEqual(THIGH_GREATEST);
+      expect(thigh).toBeGreaterThanOrEqual(MIN_THIGH_ANGLE_RAD);
+      expect(thigh).toBeLessThanOrEqual(MAX_THIGH_ANGLE_RAD);
       expect(kneeBend(thigh)).toBeGreaterThanOrEqual(0);
       // the shank's own angle from straight down
       expect(thigh - kneeBend(thigh)).toBe(Math.min(thigh, 0));
@@ -44,19 +44,23 @@ test("a figure's shank hangs plumb, its knee never bends backwards, its ankle ke
   const plain = new Float64Array(12);
   fc.assert(
     fc.property(limb, pose, angle, (which, rotations, theta) => {
-      const rig = new LegRig(figure, which), joints = new Float64Array(12), q = new Float64Array(4), link = new Float64Array(3);
-      rig.hang(joints, 0, theta, rotations);
+      const rig = new LegRig(figure, which),
+        joints = new Float64Array(12),
+        q = new Float64Array(4),
+        link = new Float64Array(3);
+      rig.solve(joints, 0, theta, rotations);
       multiply(q, 0, rotations, 0, rotations, 4);
       multiply(q, 0, q, 0, joints, 0);
-      rotate(link, 0, q, 0, figure.offsets, 3 * rig.first + 3);
+      rotate(link, 0, q, 0, figure.offsets, 3 * rig.firstJointIndex + 3);
       const thigh = Array.from(link, (part) => part / Math.hypot(...link));
       multiply(q, 0, q, 0, joints, 4);
-      rotate(link, 0, q, 0, figure.offsets, 3 * rig.first + 6);
-      const shank = Array.from(link, (part) => part / Math.hypot(...link)), lifted = clampThigh(theta);
+      rotate(link, 0, q, 0, figure.offsets, 3 * rig.firstJointIndex + 6);
+      const shank = Array.from(link, (part) => part / Math.hypot(...link)),
+        lifted = clampThigh(theta);
       expect(Math.abs(Math.cos(lifted) + thigh[1])).toBeLessThan(1e-9);
       const plumb = lifted >= 0 ? [0, -1, 0] : thigh;
       plumb.forEach((part, axis) => expect(Math.abs(part - shank[axis])).toBeLessThan(1e-9));
-      rig.hang(plain, 0, 0, poses[0]);
+      rig.solve(plain, 0, 0, poses[0]);
       expect(joints.subarray(8)).toEqual(plain.subarray(8));
     }),
   );
@@ -65,13 +69,18 @@ test("a figure's shank hangs plumb, its knee never bends backwards, its ankle ke
 test("a figure's joints turn no more than the input", () => {
   fc.assert(
     fc.property(limb, pose, angle, step, (which, rotations, theta, more) => {
-      const rig = new LegRig(figure, which), before = new Float64Array(12), after = new Float64Array(12), turn = new Float64Array(4);
-      rig.hang(before, 0, theta, rotations);
-      rig.hang(after, 0, theta + more, rotations);
+      const rig = new LegRig(figure, which),
+        before = new Float64Array(12),
+        after = new Float64Array(12),
+        turn = new Float64Array(4);
+      rig.solve(before, 0, theta, rotations);
+      rig.solve(after, 0, theta + more, rotations);
       for (let joint = 0; joint < 12; joint += 4) {
         conjugate(turn, 0, before.slice(joint, joint + 4), 0);
         multiply(turn, 0, turn, 0, after, joint);
-        expect(2 * Math.atan2(Math.hypot(turn[1], turn[2], turn[3]), Math.abs(turn[0]))).toBeLessThanOrEqual(more + 1e-7);
+        expect(2 * Math.atan2(Math.hypot(turn[1], turn[2], turn[3]), Math.abs(turn[0]))).toBeLessThanOrEqual(
+          more + 1e-7,
+        );
       }
     }),
   );

@@ -1,23 +1,23 @@
 import { expect, test } from "vitest";
-import { armProportions } from "../../src/marionette/limbs";
-import { parseProportions, proportionsOf } from "../../src/marionette/proportions";
+import { armProportions } from "../../src/marionette/limb-rig";
+import { parseProportions, proportionsFromLinks } from "../../src/marionette/proportions";
 import { golden } from "./golden";
 
 test("identities are as the golden vectors say", () => {
   for (const { lengths, masses, identity } of golden.identities) {
-    expect(proportionsOf(...lengths, masses ?? undefined).identity).toBe(identity);
+    expect(proportionsFromLinks(...lengths, masses ?? undefined).identity).toBe(identity);
   }
 });
 
 test("an identity is the shape, whatever the size, its masses those of its own links", () => {
-  expect(proportionsOf(0.396, 0.352, 0.252).identity).toBe("3960-3520-2520-5314-3438-1248");
-  expect(proportionsOf(39.6, 35.2, 25.2).identity).toBe("3960-3520-2520-5314-3438-1248");
+  expect(proportionsFromLinks(0.396, 0.352, 0.252).identity).toBe("3960-3520-2520-5314-3438-1248");
+  expect(proportionsFromLinks(39.6, 35.2, 25.2).identity).toBe("3960-3520-2520-5314-3438-1248");
   // the body whose masses they are has them
-  expect(proportionsOf(0.186, 0.146, 0.108).identity).toBe("4227-3318-2455-5600-3200-1200");
-  expect(proportionsOf(1, 1, 1).identity).toBe("3334-3333-3333-4769-3471-1760");
-  expect(proportionsOf(1, 1, 1, [2, 1, 1]).identity).toBe("3334-3333-3333-5000-2500-2500");
+  expect(proportionsFromLinks(0.186, 0.146, 0.108).identity).toBe("4227-3318-2455-5600-3200-1200");
+  expect(proportionsFromLinks(1, 1, 1).identity).toBe("3334-3333-3333-4769-3471-1760");
+  expect(proportionsFromLinks(1, 1, 1, [2, 1, 1]).identity).toBe("3334-3333-3333-5000-2500-2500");
   for (let i = 1; i < 400; i++) {
-    const { identity } = proportionsOf(0.3 + ((i * 0.618034) % 0.2), 0.3 + ((i * 0.754878) % 0.2), 0.15);
+    const { identity } = proportionsFromLinks(0.3 + ((i * 0.618034) % 0.2), 0.3 + ((i * 0.754878) % 0.2), 0.15);
     const parts = identity.split("-").map(Number);
     expect([1_000, 10_000]).toContain(parts[0] + parts[1] + parts[2]);
     expect(parseProportions(identity).identity).toBe(identity);
@@ -25,8 +25,8 @@ test("an identity is the shape, whatever the size, its masses those of its own l
 });
 
 test("a name is in thousandths where they say the same", () => {
-  expect(proportionsOf(0.4, 0.35, 0.25, [0.5, 0.3, 0.2]).identity).toBe("400-350-250-500-300-200");
-  const { upper, fore, hand } = parseProportions("4001-3500-2499-5000-3000-2000");
+  expect(proportionsFromLinks(0.4, 0.35, 0.25, [0.5, 0.3, 0.2]).identity).toBe("400-350-250-500-300-200");
+  const { upper, forearm: fore, hand } = parseProportions("4001-3500-2499-5000-3000-2000");
   expect([upper, fore, hand]).toEqual([0.4001, 0.35, 0.2499]);
 });
 
@@ -40,8 +40,8 @@ test("the standard figure's arms have one identity", () => {
 });
 
 test("what is no arm is refused", () => {
-  expect(() => proportionsOf(0.3, 0.3, 0)).toThrow("lengths");
-  expect(() => proportionsOf(0.3, 0.3, 0.2, [0, 0, 0])).toThrow("masses");
+  expect(() => proportionsFromLinks(0.3, 0.3, 0)).toThrow("lengths");
+  expect(() => proportionsFromLinks(0.3, 0.3, 0.2, [0, 0, 0])).toThrow("masses");
   expect(() => parseProportions("1-2-3")).toThrow(RangeError);
   expect(() => parseProportions("396-352-253-560-320-120")).toThrow(RangeError);
 });

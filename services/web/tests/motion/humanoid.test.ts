@@ -1,24 +1,39 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
 import {
-  BONE_COUNT, BONE_PARENTS, BONES, emptyHumanoidPose, type HumanoidPose, tPose, toHumanoid,
+  BONE_COUNT,
+  BONE_PARENTS,
+  BONES,
+  createHumanoidPose,
+  type HumanoidPose,
+  toHumanoid,
+  tPoseFigure,
 } from "../../src/motion/humanoid";
 import { fromRotationVector, multiply, rotate } from "../../src/motion/rotation";
-import { emptyWorld, JOINT_COUNT, JOINTS, type Pose, restPose, TIPS, world } from "../../src/motion/skeleton";
-import { standardFigure } from "../stage/standard-figure";
+import {
+  createWorldTransforms,
+  JOINT_COUNT,
+  JOINTS,
+  type Pose,
+  restPose,
+  TIP_JOINTS,
+  worldTransforms,
+} from "../../src/motion/skeleton";
+import { createStandardFigure } from "../stage/puppet/figures";
 
-const figure = standardFigure();
-const tall = tPose(figure);
-const bone = (name: string) => BONES.indexOf(name);
-const ofJoint = (name: string) => BONES[JOINTS.indexOf(name) - 1];
+const figure = createStandardFigure();
+const humanoid = tPoseFigure(figure);
+const boneIndex = (name: string) => BONES.indexOf(name);
+const boneOfJoint = (name: string) => BONES[JOINTS.indexOf(name) - 1];
 
 /** World positions (51) and orientations (68) of a humanoid with our T-pose, by the rules of glTF nodes. */
 function humanoidWorld(pose: HumanoidPose): { positions: Float64Array; orientations: Float64Array } {
-  const positions = new Float64Array(BONE_COUNT * 3), orientations = pose.rotations.slice();
+  const positions = new Float64Array(BONE_COUNT * 3),
+    orientations = pose.rotations.slice();
   positions.set(pose.hips);
   for (let b = 1; b < BONE_COUNT; b++) {
     const parent = BONE_PARENTS[b];
-    rotate(positions, b * 3, orientations, parent * 4, tall.offsets, b * 3);
+    rotate(positions, b * 3, orientations, parent * 4, humanoid.offsets, b * 3);
     for (let i = 0; i < 3; i++) positions[b * 3 + i] += positions[parent * 3 + i];
     multiply(orientations, b * 4, orientations, parent * 4, pose.rotations, b * 4);
   }
@@ -27,7 +42,10 @@ function humanoidWorld(pose: HumanoidPose): { positions: Float64Array; orientati
 
 const turn = fc.tuple(...[0, 1, 2].map(() => fc.double({ min: -1.8, max: 1.8, noNaN: true })));
 const anyPose: fc.Arbitrary<Pose> = fc
-  .record({ root: fc.tuple(...[0, 1, 2].map(() => fc.double({ min: -9, max: 9, noNaN: true }))), turns: fc.array(turn, { minLength: JOINT_COUNT, maxLength: JOINT_COUNT }) })
+  .record({
+    root: fc.tuple(...[0, 1, 2].map(() => fc.double({ min: -9, max: 9, noNaN: true }))),
+    turns: fc.array(turn, { minLength: JOINT_COUNT, maxLength: JOINT_COUNT }),
+  })
   .map(({ root, turns }) => {
     const pose = restPose();
     pose.root.set(root);
@@ -42,49 +60,81 @@ function expectNear(some: ArrayLike<number>, others: ArrayLike<number>): void {
 
 test("bones are the contract's joints under VRM's names, and hang from each other as VRM has it", () => {
   expect(BONES).toHaveLength(BONE_COUNT);
-  expect(["sacroiliac", "vl5", "skullbase", "l_shoulder", "l_elbow", "l_wrist", "r_hip", "r_knee", "r_ankle", "r_midtarsal"].map(ofJoint)).toEqual([
-    "hips", "spine", "head", "leftUpperArm", "leftLowerArm", "leftHand", "rightUpperLeg", "rightLowerLeg", "rightFoot", "rightToes",
+  expect(
+    [
+      "sacroiliac",
+      "vl5",
+      "skullbase",
+      "l_shoulder",
+      "l_elbow",
+      "l_wrist",
+      "r_hip",
+      "r_knee",
+      "r_ankle",
+      "r_midtarsal",
+    ].map(boneOfJoint),
+  ).toEqual([
+    "hips",
+    "spine",
+    "head",
+    "leftUpperArm",
+    "leftLowerArm",
+    "leftHand",
+    "rightUpperLeg",
+    "rightLowerLeg",
+    "rightFoot",
+    "rightToes",
   ]);
-  const parent = (name: string) => BONES[BONE_PARENTS[bone(name)]];
+  const parent = (name: string) => BONES[BONE_PARENTS[boneIndex(name)]];
   expect(["leftUpperLeg", "spine", "head", "rightUpperArm", "rightHand", "leftToes"].map(parent)).toEqual([
-    "hips", "hips", "spine", "spine", "rightLowerArm", "leftFoot",
+    "hips",
+    "hips",
+    "spine",
+    "spine",
+    "rightLowerArm",
+    "leftFoot",
   ]);
   expect(BONE_PARENTS[0]).toBe(-1);
 });
 
 test("in the T-pose the arms point to the sides as they hang at our rest", () => {
-  const [left, right] = ["leftLowerArm", "rightLowerArm"].map((name) => tall.offsets.subarray(bone(name) * 3, bone(name) * 3 + 3));
+  const [left, right] = ["leftLowerArm", "rightLowerArm"].map((name) =>
+    humanoid.offsets.subarray(boneIndex(name) * 3, boneIndex(name) * 3 + 3),
+  );
   const ours = figure.offsets.subarray(JOINTS.indexOf("l_elbow") * 3);
   expectNear(left, [-ours[1], ours[0], ours[2]]);
   expectNear(right, [ours[1], ours[0], ours[2]]);
   expect(left[0]).toBeGreaterThan(0.25);
-  expect(tall.tips[bone("rightHand") * 3]).toBeLessThan(-0.15);
+  expect(humanoid.tips[boneIndex("rightHand") * 3]).toBeLessThan(-0.15);
 });
 
 test("arms that we lift to the sides are a humanoid at its rest", () => {
   const pose = restPose();
-  for (const [name, sign] of [["l_shoulder", 1], ["r_shoulder", -1]] as const) {
+  for (const [name, sign] of [
+    ["l_shoulder", 1],
+    ["r_shoulder", -1],
+  ] as const) {
     fromRotationVector(pose.rotations, JOINTS.indexOf(name) * 4, 0, 0, (sign * Math.PI) / 2);
   }
-  const { rotations } = toHumanoid(figure, pose, emptyHumanoidPose());
+  const { rotations } = toHumanoid(figure, pose, createHumanoidPose());
   for (let b = 0; b < BONE_COUNT; b++) expectNear(rotations.subarray(b * 4, b * 4 + 4), [1, 0, 0, 0]);
 });
 
 test("any pose: hips and legs stand where ours do; above the spine's foot all is ours from there, tips too", () => {
   fc.assert(
     fc.property(anyPose, (pose) => {
-      const ours = world(figure, pose, emptyWorld());
-      const theirs = humanoidWorld(toHumanoid(figure, pose, emptyHumanoidPose()));
-      const spine = bone("spine");
+      const ours = worldTransforms(figure, pose, createWorldTransforms());
+      const theirs = humanoidWorld(toHumanoid(figure, pose, createHumanoidPose()));
+      const spine = boneIndex("spine");
       const [shift, tip, theirTip] = [new Float64Array(3), new Float64Array(3), new Float64Array(3)];
       for (let i = 0; i < 3; i++) shift[i] = theirs.positions[spine * 3 + i] - ours.positions[(spine + 1) * 3 + i];
       for (let b = 0; b < BONE_COUNT; b++) {
         const moved = b < spine ? [0, 0, 0] : shift;
         const at = [0, 1, 2].map((i) => ours.positions[(b + 1) * 3 + i] + moved[i]);
         expectNear(theirs.positions.subarray(b * 3, b * 3 + 3), at);
-        if (!TIPS.includes(b + 1)) continue;
+        if (!TIP_JOINTS.includes(b + 1)) continue;
         rotate(tip, 0, ours.orientations, (b + 1) * 4, figure.tips, (b + 1) * 3);
-        rotate(theirTip, 0, theirs.orientations, b * 4, tall.tips, b * 3);
+        rotate(theirTip, 0, theirs.orientations, b * 4, humanoid.tips, b * 3);
         expectNear(theirTip, tip);
       }
     }),
@@ -96,8 +146,8 @@ test("where the sacroiliac is straight every joint stands where ours does", () =
   fc.assert(
     fc.property(anyPose, (pose) => {
       pose.rotations.set([1, 0, 0, 0], JOINTS.indexOf("sacroiliac") * 4);
-      const ours = world(figure, pose, emptyWorld());
-      expectNear(humanoidWorld(toHumanoid(figure, pose, emptyHumanoidPose())).positions, ours.positions.subarray(3));
+      const ours = worldTransforms(figure, pose, createWorldTransforms());
+      expectNear(humanoidWorld(toHumanoid(figure, pose, createHumanoidPose())).positions, ours.positions.subarray(3));
     }),
     { numRuns: 50 },
   );
@@ -105,6 +155,6 @@ test("where the sacroiliac is straight every joint stands where ours does", () =
 
 test("the figure given stays as it was", () => {
   const before = figure.offsets.slice();
-  tPose(figure);
+  tPoseFigure(figure);
   expect(figure.offsets).toEqual(before);
 });

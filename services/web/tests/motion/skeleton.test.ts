@@ -1,8 +1,17 @@
 import { expect, test } from "vitest";
 import { fromRotationVector } from "../../src/motion/rotation";
 import {
-  lengthsOf,
-  copyPose, emptyWorld, JOINT_COUNT, JOINTS, LIMB_JOINTS, LIMBS, PARENTS, restPose, TIPS, world,
+  copyPose,
+  createWorldTransforms,
+  figureKey,
+  JOINT_COUNT,
+  JOINTS,
+  LIMB_FIRST_JOINTS,
+  LIMBS,
+  PARENTS,
+  restPose,
+  TIP_JOINTS,
+  worldTransforms,
 } from "../../src/motion/skeleton";
 
 /** Every joint one metre below its parent. */
@@ -12,17 +21,25 @@ for (let joint = 0; joint < JOINT_COUNT; joint++) figure.offsets[joint * 3 + 1] 
 test("parents come before their children, and limbs and tips are the contract's", () => {
   expect(JOINTS).toHaveLength(18);
   PARENTS.forEach((parent, joint) => expect(parent).toBeLessThan(joint));
-  expect(LIMBS.map((_, limb) => [0, 1, 2].map((nth) => JOINTS[LIMB_JOINTS[limb] + nth]))).toEqual([
-    ["l_shoulder", "l_elbow", "l_wrist"], ["r_shoulder", "r_elbow", "r_wrist"],
-    ["l_hip", "l_knee", "l_ankle"], ["r_hip", "r_knee", "r_ankle"],
+  expect(LIMBS.map((_, limb) => [0, 1, 2].map((nth) => JOINTS[LIMB_FIRST_JOINTS[limb] + nth]))).toEqual([
+    ["l_shoulder", "l_elbow", "l_wrist"],
+    ["r_shoulder", "r_elbow", "r_wrist"],
+    ["l_hip", "l_knee", "l_ankle"],
+    ["r_hip", "r_knee", "r_ankle"],
   ]);
-  expect(TIPS.map((joint) => JOINTS[joint])).toEqual(["skullbase", "l_wrist", "r_wrist", "l_midtarsal", "r_midtarsal"]);
+  expect(TIP_JOINTS.map((joint) => JOINTS[joint])).toEqual([
+    "skullbase",
+    "l_wrist",
+    "r_wrist",
+    "l_midtarsal",
+    "r_midtarsal",
+  ]);
 });
 
 test("at rest all hangs below the root", () => {
   const pose = restPose();
   pose.root.set([1, 10, 2]);
-  const { positions, orientations } = world(figure, pose, emptyWorld());
+  const { positions, orientations } = worldTransforms(figure, pose, createWorldTransforms());
   expect([...positions.subarray(42, 45)]).toEqual([1, 6, 2]);
   expect([...orientations.subarray(56, 60)]).toEqual([1, 0, 0, 0]);
 });
@@ -32,14 +49,19 @@ test("a joint turns what hangs from it, and nothing else", () => {
   const elbow = JOINTS.indexOf("l_elbow");
   // lifts the forearm forwards
   fromRotationVector(pose.rotations, elbow * 4, -Math.PI / 2, 0, 0);
-  const at = (joint: string) => [...world(figure, pose, emptyWorld()).positions.subarray(JOINTS.indexOf(joint) * 3)].slice(0, 3);
+  const at = (joint: string) =>
+    [...worldTransforms(figure, pose, createWorldTransforms()).positions.subarray(JOINTS.indexOf(joint) * 3)].slice(
+      0,
+      3,
+    );
   [0, -3, 1].forEach((value, axis) => expect(at("l_wrist")[axis]).toBeCloseTo(value, 12));
   expect(at("l_elbow")).toEqual([0, -3, 0]);
   expect(at("r_wrist")).toEqual([0, -4, 0]);
 });
 
 test("a pose is copied whole", () => {
-  const from = restPose(), to = restPose();
+  const from = restPose(),
+    to = restPose();
   from.root[1] = 3;
   from.rotations[7] = 0.5;
   copyPose(from, to);
@@ -49,9 +71,9 @@ test("a pose is copied whole", () => {
 
 test("dancers of equal lengths are told apart from all others", () => {
   const dancer = () => ({ offsets: Float64Array.from({ length: 54 }, (_, k) => k / 3), tips: new Float64Array(54) });
-  expect(lengthsOf(dancer())).toBe(lengthsOf(dancer()));
+  expect(figureKey(dancer())).toBe(figureKey(dancer()));
   const [taller, longer] = [dancer(), dancer()];
   taller.offsets[53] += 1e-12;
   longer.tips[0] = 0.2;
-  expect(new Set([dancer(), taller, longer].map(lengthsOf)).size).toBe(3);
+  expect(new Set([dancer(), taller, longer].map(figureKey)).size).toBe(3);
 });

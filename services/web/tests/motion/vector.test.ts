@@ -2,7 +2,16 @@ import fc from "fast-check";
 import { expect, test } from "vitest";
 import { conjugate, multiply, rotate } from "../../src/motion/rotation";
 import {
-  aboutAxis, across, between, cross, dot, fromColumns, length, normalise, squareTo, unit,
+  anyPerpendicular,
+  cross,
+  dot,
+  fromColumns,
+  fromCoordinateAxis,
+  length,
+  normalise,
+  rejectFrom,
+  rotationBetween,
+  unit,
 } from "../../src/motion/vector";
 
 const part = fc.double({ min: -1, max: 1, noNaN: true });
@@ -16,23 +25,37 @@ const quaternion = fc
   .map((q) => Float64Array.from(q, (x) => x / Math.hypot(...q)));
 
 test("between brings one direction to the other, opposite ones too", () => {
-  const q = new Float64Array(4), out = new Float64Array(3);
+  const q = new Float64Array(4),
+    out = new Float64Array(3);
   fc.assert(
     fc.property(direction, direction, (a, b) => {
-      between(q, 0, a, 0, b, 0);
+      rotationBetween(q, 0, a, 0, b, 0);
       rotate(out, 0, q, 0, a, 0);
       for (let i = 0; i < 3; i++) expect(Math.abs(out[i] - b[i])).toBeLessThan(1e-6);
-      between(q, 0, a, 0, a.map((x) => -x), 0);
+      rotationBetween(
+        q,
+        0,
+        a,
+        0,
+        a.map((x) => -x),
+        0,
+      );
       rotate(out, 0, q, 0, a, 0);
       for (let i = 0; i < 3; i++) expect(Math.abs(out[i] + a[i])).toBeLessThan(1e-6);
     }),
     // all but opposite
-    { examples: [1.3e-6, 1.5e-7, 1.3e-7].map((angle) => [Float64Array.of(0, 1, 0), Float64Array.of(Math.sin(angle), -Math.cos(angle), 0)]) },
+    {
+      examples: [1.3e-6, 1.5e-7, 1.3e-7].map((angle) => [
+        Float64Array.of(0, 1, 0),
+        Float64Array.of(Math.sin(angle), -Math.cos(angle), 0),
+      ]),
+    },
   );
 });
 
 test("columns give the rotation back", () => {
-  const columns = new Float64Array(9), again = new Float64Array(4);
+  const columns = new Float64Array(9),
+    again = new Float64Array(4);
   fc.assert(
     fc.property(quaternion, (q) => {
       for (let axis = 0; axis < 3; axis++) {
@@ -52,9 +75,9 @@ test("square and across are square, unit is unit", () => {
   const out = new Float64Array(3);
   fc.assert(
     fc.property(direction, direction, (a, b) => {
-      squareTo(out, 0, a, 0, b, 0);
+      rejectFrom(out, 0, a, 0, b, 0);
       expect(Math.abs(dot(out, 0, b, 0))).toBeLessThan(1e-12);
-      across(out, 0, a, 0);
+      anyPerpendicular(out, 0, a, 0);
       expect(Math.abs(dot(out, 0, a, 0))).toBeLessThan(1e-12);
       expect(Math.abs(length(out, 0) - 1)).toBeLessThan(1e-12);
       cross(out, 0, a, 0, b, 0);
@@ -65,8 +88,9 @@ test("square and across are square, unit is unit", () => {
 });
 
 test("a turn about an axis", () => {
-  const q = new Float64Array(4), out = new Float64Array(3);
-  aboutAxis(q, 0, 2, Math.PI / 2);
+  const q = new Float64Array(4),
+    out = new Float64Array(3);
+  fromCoordinateAxis(q, 0, 2, Math.PI / 2);
   normalise(q, 0);
   rotate(out, 0, q, 0, Float64Array.of(1, 0, 0), 0);
   expect(out[1]).toBeCloseTo(1, 12);

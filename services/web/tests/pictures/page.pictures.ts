@@ -3,15 +3,22 @@ import { mkdirSync } from "node:fs";
 import { resolve } from "node:path";
 import type { Page } from "playwright-core";
 import { test } from "vitest";
-import { describeInBrowser, type Own } from "../browser/in-browser";
-import { danced, drawn, holds, placeOf, ringOf, settled } from "../browser/inside";
+import { type BrowserFixture, describeInBrowser } from "../browser/browser-suite";
+import {
+  jointPosition,
+  ringPosition,
+  waitForDraw,
+  waitForFirstPose,
+  waitForHold,
+  waitUntilSettled,
+} from "../browser/page-probe";
 
-const FOLDER = resolve(import.meta.dirname, "../../../../docs/pictures");
+const PICTURE_FOLDER = resolve(import.meta.dirname, "../../../../docs/pictures");
 const DESKTOP = { width: 1440, height: 900 };
 const PHONE = { width: 390, height: 844 };
 
 /** Seconds into our own dance: a held pose. */
-const POSE = 11.4;
+const POSE_TIME_S = 11.4;
 
 type Theme = "dark" | "light";
 
@@ -24,71 +31,87 @@ const PULLS: Readonly<Record<string, readonly [limb: number, x: number, y: numbe
 
 describeInBrowser("pictures", { demo: true, timeout: 400_000 }, (own) => {
   test("desktop, by night and by day", async () => {
-    mkdirSync(FOLDER, { recursive: true });
-    const page = await stage(own, "dark", DESKTOP);
-    await take(page, "night");
-    for (const panel of ["Library", "Strings", "Line"]) await page.getByRole("button", { name: panel, exact: true }).click();
-    await settledLine(page);
-    await take(page, "panels");
+    mkdirSync(PICTURE_FOLDER, { recursive: true });
+    const page = await openStage(own, "dark", DESKTOP);
+    await takeScreenshot(page, "night");
+    for (const panel of ["Library", "Strings", "Line"])
+      await page.getByRole("button", { name: panel, exact: true }).click();
+    await waitForPlots(page);
+    await takeScreenshot(page, "panels");
     await page.keyboard.press("Shift+Slash");
-    await take(page, "keys");
-    await take(await stage(own, "light", DESKTOP), "day");
+    await takeScreenshot(page, "keys");
+    await takeScreenshot(await openStage(own, "light", DESKTOP), "day");
   });
 
   test("several at the strings", async () => {
-    const page = await stage(own, "dark", DESKTOP, "You");
-    for (const name of ["Aiko", "Mateo"]) await pull(await stage(own, "dark", { width: 760, height: 480 }, name, false), name);
-    await pull(page, "You");
-    await settled(page, () => placeOf(page, "r_wrist"), 0.002);
-    await take(page, "strings");
+    const page = await openStage(own, "dark", DESKTOP, "You");
+    for (const name of ["Aiko", "Mateo"])
+      await dragLimb(await openStage(own, "dark", { width: 760, height: 480 }, name, false), name);
+    await dragLimb(page, "You");
+    await waitUntilSettled(page, () => jointPosition(page, "r_wrist"), 0.002);
+    await takeScreenshot(page, "strings");
   });
 
   test("a phone", async () => {
-    const page = await stage(own, "dark", PHONE);
-    await take(page, "phone");
+    const page = await openStage(own, "dark", PHONE);
+    await takeScreenshot(page, "phone");
     await page.getByRole("button", { name: "Strings", exact: true }).click();
-    await take(page, "phone-strings");
-    const day = await stage(own, "light", PHONE);
+    await takeScreenshot(page, "phone-strings");
+    const day = await openStage(own, "light", PHONE);
     await day.getByRole("button", { name: "Line", exact: true }).click();
-    await settledLine(day);
-    await take(day, "phone-day");
+    await waitForPlots(day);
+    await takeScreenshot(day, "phone-day");
   });
 });
 
 /** The page at the held pose, for one of this name. */
-async function stage(own: Own, colorScheme: Theme, viewport: { width: number; height: number }, name = "You", best = true): Promise<Page> {
-  const page = await own.open(`?name=${name}${best ? "&quality=best" : ""}`, { colorScheme, viewport, reducedMotion: "reduce" });
-  await danced(page);
+async function openStage(
+  own: BrowserFixture,
+  colorScheme: Theme,
+  viewport: { width: number; height: number },
+  name = "You",
+  best = true,
+): Promise<Page> {
+  const page = await own.open(`?name=${name}${best ? "&quality=best" : ""}`, {
+    colorScheme,
+    viewport,
+    reducedMotion: "reduce",
+  });
+  await waitForFirstPose(page);
   const pause = page.getByRole("button", { name: "Pause" });
   if (await pause.isVisible()) await pause.click();
   const bar = await page.getByRole("slider", { name: "Seek" }).boundingBox();
   if (!bar) throw new Error("no seek bar on the page");
   const seconds = await page.evaluate(() => window.bunraku.viewer.duration);
-  await page.mouse.click(bar.x + (bar.width * POSE) / seconds, bar.y + bar.height / 2);
+  await page.mouse.click(bar.x + (bar.width * POSE_TIME_S) / seconds, bar.y + bar.height / 2);
   await page.mouse.move(viewport.width / 2, 4);
-  await page.waitForFunction((at) => Math.abs(window.bunraku.viewer.positionAt(performance.now()) - at) < 0.5, POSE);
-  await settled(page, () => placeOf(page, "r_wrist"), 0.002);
+  await page.waitForFunction(
+    (at) => Math.abs(window.bunraku.viewer.positionAt(performance.now()) - at) < 0.5,
+    POSE_TIME_S,
+  );
+  await waitUntilSettled(page, () => jointPosition(page, "r_wrist"), 0.002);
   return page;
 }
 
 /** Drags the limb of this puppeteer, and holds it there. */
-async function pull(page: Page, name: string): Promise<void> {
+async function dragLimb(page: Page, name: string): Promise<void> {
   const [limb, x, y] = PULLS[name] as readonly [number, number, number];
-  const ring = await ringOf(page, limb);
+  const ring = await ringPosition(page, limb);
   const scale = (page.viewportSize()?.height ?? 900) / 900;
   await page.mouse.move(ring.x, ring.y);
   await page.mouse.down();
   await page.mouse.move(ring.x + x * scale, ring.y + y * scale, { steps: 4 });
-  await holds(page, limb);
+  await waitForHold(page, limb);
 }
 
 /** Half a minute of the line's plots. */
-async function settledLine(page: Page): Promise<void> {
+async function waitForPlots(page: Page): Promise<void> {
   await page.waitForTimeout(20_000);
 }
 
-async function take(page: Page, name: string): Promise<void> {
-  await drawn(page);
-  await page.screenshot({ path: resolve(FOLDER, `${name}.jpg`), type: "jpeg", quality: 82 });
-  if (process.env["BUNRAKU_PICTURES_PNG"]) await page.screenshot({ path: resolve(process.env["BUNRAKU_PICTURES_PNG"], `${name}.png`) });
+async function takeScreenshot(page: Page, name: string): Promise<void> {
+  await waitForDraw(page);
+  await page.screenshot({ path: resolve(PICTURE_FOLDER, `${name}.jpg`), type: "jpeg", quality: 82 });
+  if (process.env["BUNRAKU_PICTURES_PNG"])
+    await page.screenshot({ path: resolve(process.env["BUNRAKU_PICTURES_PNG"], `${name}.png`) });
 }

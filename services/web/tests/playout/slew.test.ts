@@ -18,7 +18,8 @@ test("a new goal is gone to from where it is, and time that it is added to never
     fc.property(numbers, fc.array(change, { minLength: 1, maxLength: 12 }), (from, changes) => {
       const slew = new Slew();
       slew.start(from, from, 0);
-      let local = 0, shown = from;
+      let local = 0,
+        shown = from;
       for (const { goal, after } of changes) {
         for (let step = 1; step <= 20; step++) {
           const at = local + (after * step) / 20;
@@ -28,7 +29,7 @@ test("a new goal is gone to from where it is, and time that it is added to never
         }
         local += after;
         const before = slew.at(local);
-        slew.aim(goal, local);
+        slew.slewTo(goal, local);
         expect(slew.at(local)).toBeCloseTo(before, 3);
       }
     }),

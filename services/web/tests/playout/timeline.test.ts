@@ -1,11 +1,18 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
-import { positionAt, Timelines } from "../../src/playout/timeline";
+import { positionAt, TimelineHistory } from "../../src/playout/timeline";
 import type { TimelineState } from "../../src/wire/messages";
 
 function state(change: Partial<TimelineState> = {}): TimelineState {
   return {
-    name: "TimelineState", epoch: 1, motion: "a", clock: 1_000, position: 500, playing: true, loop: true, duration: 4_000,
+    name: "TimelineState",
+    epoch: 1,
+    motion: "a",
+    clock: 1_000,
+    position: 500,
+    playing: true,
+    loop: true,
+    duration: 4_000,
     ...change,
   };
 }
@@ -32,9 +39,10 @@ test("is always within the motion", () => {
 });
 
 test("a higher epoch replaces a lower one, once its clock has come", () => {
-  const timelines = new Timelines();
+  const timelines = new TimelineHistory();
   expect(timelines.at(0)).toBeNull();
-  const first = state(), second = state({ epoch: 2, clock: 5_000 });
+  const first = state(),
+    second = state({ epoch: 2, clock: 5_000 });
   expect(timelines.put(first)).toBe(true);
   expect(timelines.put(second)).toBe(true);
   expect(timelines.put(state({ epoch: 2, clock: 1 }))).toBe(false);
@@ -44,7 +52,7 @@ test("a higher epoch replaces a lower one, once its clock has come", () => {
 });
 
 test("a timeline of another motion holds at once: the blocks of the one before are gone", () => {
-  const timelines = new Timelines();
+  const timelines = new TimelineHistory();
   timelines.put(state());
   const other = state({ epoch: 2, motion: "b", clock: 9_000 });
   timelines.put(other);
@@ -52,7 +60,7 @@ test("a timeline of another motion holds at once: the blocks of the one before a
 });
 
 test("a new connection counts its epochs anew", () => {
-  const timelines = new Timelines();
+  const timelines = new TimelineHistory();
   timelines.put(state({ epoch: 9 }));
   timelines.restart();
   expect(timelines.at(2_000)?.position).toBe(500);

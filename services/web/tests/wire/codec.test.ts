@@ -3,28 +3,28 @@ import { describe, expect, test } from "vitest";
 import { pack, unpack } from "../../src/wire/codec";
 import { MalformedMessage } from "../../src/wire/errors";
 import type { Message, Presence } from "../../src/wire/messages";
-import { Outcome } from "../outcome";
-import { bytes, vectors } from "../vectors";
+import { decodeBase64, loadVectors } from "../golden-vectors";
+import { HostileInputCounts } from "../hostile-input";
 
-interface Vectors {
+interface MessageVectors {
   valid: { name: string; type: number; fields: Record<string, unknown>; bytes: string }[];
-  older: (Vectors["valid"][number] & { why: string })[];
+  older: (MessageVectors["valid"][number] & { why: string })[];
   skipped: string[];
   invalid: { why: string; bytes: string }[];
 }
 
-const golden = vectors<Vectors>("messages");
+const golden = loadVectors<MessageVectors>("messages");
 
 /** A golden field as the client holds it. */
-function held(value: unknown): unknown {
-  if (Array.isArray(value)) return value.map(held);
+function decodeField(value: unknown): unknown {
+  if (Array.isArray(value)) return value.map(decodeField);
   if (typeof value !== "object" || value === null) return value;
-  if ("base64" in value) return bytes(value.base64 as string);
-  return Object.fromEntries(Object.entries(value).map(([key, inner]) => [key, held(inner)]));
+  if ("base64" in value) return decodeBase64(value.base64 as string);
+  return Object.fromEntries(Object.entries(value).map(([key, inner]) => [key, decodeField(inner)]));
 }
 
-function message({ name, fields }: Vectors["valid"][number]): Message {
-  const read = held(fields) as Record<string, unknown>;
+function toMessage({ name, fields }: MessageVectors["valid"][number]): Message {
+  const read = decodeField(fields) as Record<string, unknown>;
   if (name === "Overlay") {
     const frame = (limbs: Record<string, number[]>) =>
       new Map(Object.entries(limbs).map(([limb, v]) => [Number(limb), Int16Array.from(v)]));
@@ -36,26 +36,27 @@ function message({ name, fields }: Vectors["valid"][number]): Message {
 
 describe("golden messages", () => {
   test.each(golden.valid)("$name $bytes", (vector) => {
-    const data = bytes(vector.bytes);
+    const data = decodeBase64(vector.bytes);
     // an Overlay of other performers too is message 14, read as the same
-    const several = vector.name === "Overlay" && Object.keys(vector.fields.limbs as object).some((limb) => Number(limb) > 3);
+    const several =
+      vector.name === "Overlay" && Object.keys(vector.fields.limbs as object).some((limb) => Number(limb) > 3);
     expect(data[0]).toBe(several ? 14 : vector.type);
-    expect(unpack(data)).toEqual(message(vector));
-    expect(unpack(pack(message(vector)))).toEqual(message(vector));
+    expect(unpack(data)).toEqual(toMessage(vector));
+    expect(unpack(pack(toMessage(vector)))).toEqual(toMessage(vector));
     // JavaScript cannot tell 60.0 from 60, so only the Description may differ in how its numbers are packed
-    if (vector.name !== "Description") expect(pack(message(vector))).toEqual(data);
+    if (vector.name !== "Description") expect(pack(toMessage(vector))).toEqual(data);
   });
 
   test.each(golden.older)("reads of those who say less: $why", (vector) => {
-    expect(unpack(bytes(vector.bytes))).toEqual(message(vector));
+    expect(unpack(decodeBase64(vector.bytes))).toEqual(toMessage(vector));
   });
 
   test.each(golden.skipped)("skips %s", (data) => {
-    expect(unpack(bytes(data))).toBeNull();
+    expect(unpack(decodeBase64(data))).toBeNull();
   });
 
   test.each(golden.invalid)("refuses: $why", (vector) => {
-    expect(() => unpack(bytes(vector.bytes))).toThrow(MalformedMessage);
+    expect(() => unpack(decodeBase64(vector.bytes))).toThrow(MalformedMessage);
   });
 });
 
@@ -66,11 +67,16 @@ test("what is wrong is said with its field", () => {
 
 test("askers are told for each of the limbs there are, of one performer or more", () => {
   const presence = (limbs: number, asks: number): Message => ({
-    name: "Presence", viewers: 1, puppeteers: [], limbs: Array.from({ length: limbs }, () => null), asks: Array.from({ length: asks }, () => ["a"]),
+    name: "Presence",
+    viewers: 1,
+    puppeteers: [],
+    limbs: Array.from({ length: limbs }, () => null),
+    asks: Array.from({ length: asks }, () => ["a"]),
   });
   for (const limbs of [4, 8, 12, 16]) {
     expect(unpack(pack(presence(limbs, limbs)))).toEqual(presence(limbs, limbs));
-    for (const asks of [0, limbs - 1, limbs + 1, limbs + 4]) expect(() => unpack(pack(presence(limbs, asks)))).toThrow("Presence, asks: must be a list for each limb");
+    for (const asks of [0, limbs - 1, limbs + 1, limbs + 4])
+      expect(() => unpack(pack(presence(limbs, asks)))).toThrow("Presence, asks: must be a list for each limb");
     const { asks: _, ...older } = presence(limbs, 0) as Presence;
     expect(unpack(pack(older as Message))).toEqual({ ...older, asks: Array.from({ length: limbs }, () => []) });
   }
@@ -82,28 +88,41 @@ test("unknown keys are skipped", () => {
 });
 
 test("any bytes are a message, skipped, or malformed", () => {
-  const outcome = new Outcome(MalformedMessage);
-  const types = fc.constantFrom(...Array.from({ length: 15 }, (_, i) => i), 63, 64, 65, 66, 67, 68, 69, 70, 71, 72, 255);
+  const outcome = new HostileInputCounts(MalformedMessage);
+  const types = fc.constantFrom(
+    ...Array.from({ length: 15 }, (_, i) => i),
+    63,
+    64,
+    65,
+    66,
+    67,
+    68,
+    69,
+    70,
+    71,
+    72,
+    255,
+  );
   fc.assert(
     fc.property(types, fc.uint8Array({ maxLength: 80 }), (type, rest) => {
-      outcome.of(() => unpack(Uint8Array.of(type, ...rest)));
+      outcome.run(() => unpack(Uint8Array.of(type, ...rest)));
     }),
     { numRuns: 3000 },
   );
-  outcome.tell("messages");
+  outcome.print("messages");
 });
 
 test("golden messages with any byte changed never throw anything else", () => {
-  const outcome = new Outcome(MalformedMessage);
+  const outcome = new HostileInputCounts(MalformedMessage);
   fc.assert(
     fc.property(fc.constantFrom(...golden.valid), fc.nat(), fc.nat(255), (vector, where, value) => {
-      const data = bytes(vector.bytes);
+      const data = decodeBase64(vector.bytes);
       data[1 + (where % (data.length - 1))] = value;
-      outcome.of(() => unpack(data));
+      outcome.run(() => unpack(data));
     }),
     { numRuns: 3000 },
   );
-  outcome.tell("golden messages, a byte changed");
+  outcome.print("golden messages, a byte changed");
 });
 
 test("inputs and times come back as they were", () => {
@@ -111,12 +130,20 @@ test("inputs and times come back as they were", () => {
   const u32 = fc.nat(0xffffffff);
   const real = fc.float({ noNaN: true, noDefaultInfinity: true });
   fc.assert(
-    fc.property(fc.nat(15), fc.nat(1), u32, u32, whole, fc.tuple(real, real, real), (limb, kind, epoch, sequence, sampled, values) => {
-      const input: Message = { name: "Input", limb, kind, epoch, sequence, sampled, values };
-      expect(unpack(pack(input))).toEqual(input);
-      const ping: Message = { name: "Ping", sequence, sent: sampled };
-      expect(pack(ping)).toHaveLength(32);
-      expect(unpack(pack(ping))).toEqual(ping);
-    }),
+    fc.property(
+      fc.nat(15),
+      fc.nat(1),
+      u32,
+      u32,
+      whole,
+      fc.tuple(real, real, real),
+      (limb, kind, epoch, sequence, sampled, values) => {
+        const input: Message = { name: "Input", limb, kind, epoch, sequence, sampled, values };
+        expect(unpack(pack(input))).toEqual(input);
+        const ping: Message = { name: "Ping", sequence, sent: sampled };
+        expect(pack(ping)).toHaveLength(32);
+        expect(unpack(pack(ping))).toEqual(ping);
+      },
+    ),
   );
 });

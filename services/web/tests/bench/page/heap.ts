@@ -1,7 +1,7 @@
 /** What a page's heap is made of, out of a snapshot of it. */
 import type { CDPSession } from "playwright-core";
 
-export interface Heap {
+export interface HeapUsage {
   /** What the page's script made and holds: objects, arrays, closures, strings and numbers. Bytes. */
   objects: number;
   /** What V8 made of the script, and goes on making better for long: byte code, machine code and what it noted for them. Bytes. */
@@ -15,25 +15,25 @@ interface Snapshot {
 }
 
 /** Types of V8's that are code; the browser's own, outside of the heap, are counted nowhere. */
-const CODE = new Set(["code", "object shape"]);
-const OUTSIDE = new Set(["native", "synthetic", "hidden"]);
+const CODE_TYPES = new Set(["code", "object shape"]);
+const EXTERNAL_TYPES = new Set(["native", "synthetic", "hidden"]);
 
-export async function heapOf(protocol: CDPSession): Promise<Heap> {
+export async function measureHeap(protocol: CDPSession): Promise<HeapUsage> {
   const chunks: string[] = [];
   const take = ({ chunk }: { chunk: string }) => void chunks.push(chunk);
   protocol.on("HeapProfiler.addHeapSnapshotChunk", take);
   await protocol.send("HeapProfiler.takeHeapSnapshot");
   protocol.off("HeapProfiler.addHeapSnapshotChunk", take);
-  return measured(JSON.parse(chunks.join("")) as Snapshot);
+  return sumHeap(JSON.parse(chunks.join("")) as Snapshot);
 }
 
-function measured({ snapshot: { meta }, nodes }: Snapshot): Heap {
+function sumHeap({ snapshot: { meta }, nodes }: Snapshot): HeapUsage {
   const [types] = meta.node_types;
   const [type, size] = ["type", "self_size"].map((field) => meta.node_fields.indexOf(field));
-  const heap: Heap = { objects: 0, code: 0 };
+  const heap: HeapUsage = { objects: 0, code: 0 };
   for (let at = 0; at < nodes.length; at += meta.node_fields.length) {
     const name = types[nodes[at + type]];
-    if (!OUTSIDE.has(name)) heap[CODE.has(name) ? "code" : "objects"] += nodes[at + size];
+    if (!EXTERNAL_TYPES.has(name)) heap[CODE_TYPES.has(name) ? "code" : "objects"] += nodes[at + size];
   }
   return heap;
 }

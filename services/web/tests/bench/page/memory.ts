@@ -4,49 +4,59 @@ import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import type { CDPSession, Page } from "playwright-core";
-import { danced, holds, LEFT_HAND, letGo, ringOf, settled, welcomed } from "../../browser/inside";
-import { sharedFolder } from "../../browser/server";
-import { rounded, visit, type Bench, type Figures } from "./bench";
-import { heapOf, type Heap } from "./heap";
+import {
+  LEFT_HAND,
+  ringPosition,
+  waitForFirstPose,
+  waitForHold,
+  waitForRelease,
+  waitForWelcome,
+  waitUntilSettled,
+} from "../../browser/page-probe";
+import { sharedClipFolder } from "../../browser/server";
+import { type BenchContext, type BenchFigures, roundTo, withPage } from "./bench";
+import { type HeapUsage, measureHeap } from "./heap";
 
 const REPOSITORY = resolve(import.meta.dirname, "../../../../..");
 /** Rounds before anything is compared: what is made once is made in them. */
-const WARM_UP = 3;
+const WARM_UP_ROUNDS = 3;
 /** Rounds between notes of how large the heap is: whether it goes on growing. */
-const NOTED = 5;
+const NOTE_EVERY_ROUNDS = 5;
 
-interface Left extends Heap {
+interface MemoryUsage extends HeapUsage {
   bytes: number;
   nodes: number;
   listeners: number;
 }
 
 /** After a warm-up of the same. */
-export async function memory(bench: Bench): Promise<Figures> {
+export async function benchMemory(bench: BenchContext): Promise<BenchFigures> {
   const folder = mkdtempSync(join(tmpdir(), "bunraku-bench-"));
   try {
-    const clip = clipFor(folder);
-    return await visit(bench, {}, async ({ page, protocol }) => {
+    const clip = findClip(folder);
+    return await withPage(bench, {}, async ({ page, protocol }) => {
       page.on("dialog", (dialog) => void dialog.accept());
       await page.goto(bench.url);
-      await danced(page);
-      await welcomed(page);
-      for (let nth = 0; nth < WARM_UP; nth++) await round(page, clip);
-      const before = await left(protocol);
+      await waitForFirstPose(page);
+      await waitForWelcome(page);
+      for (let nth = 0; nth < WARM_UP_ROUNDS; nth++) await playRound(page, clip);
+      const before = await measureMemory(protocol);
       const end = performance.now() + bench.minutes * 60_000;
       let rounds = 0;
       const heaps: number[] = [];
       for (; performance.now() < end; rounds++) {
-        await round(page, clip);
-        if (rounds % NOTED === 0) heaps.push(rounded((await used(protocol)) / 1e6, 2));
+        await playRound(page, clip);
+        if (rounds % NOTE_EVERY_ROUNDS === 0) heaps.push(roundTo((await usedHeapBytes(protocol)) / 1e6, 2));
       }
-      const after = await left(protocol);
-      bench.note(`memory: ${rounds} rounds in ${bench.minutes} minutes, heap ${rounded(before.bytes / 1e6, 2)} to ${rounded(after.bytes / 1e6, 2)} MB, nodes ${before.nodes} to ${after.nodes}, listeners ${before.listeners} to ${after.listeners}`);
-      bench.note(`memory: heap after every ${NOTED} rounds, MB: ${heaps.join(", ")}`);
+      const after = await measureMemory(protocol);
+      bench.note(
+        `memory: ${rounds} rounds in ${bench.minutes} minutes, heap ${roundTo(before.bytes / 1e6, 2)} to ${roundTo(after.bytes / 1e6, 2)} MB, nodes ${before.nodes} to ${after.nodes}, listeners ${before.listeners} to ${after.listeners}`,
+      );
+      bench.note(`memory: heap after every ${NOTE_EVERY_ROUNDS} rounds, MB: ${heaps.join(", ")}`);
       return {
-        heap_growth_mb: rounded((after.bytes - before.bytes) / 1e6, 2),
-        heap_growth_objects_mb: rounded((after.objects - before.objects) / 1e6, 2),
-        heap_growth_code_mb: rounded((after.code - before.code) / 1e6, 2),
+        heap_growth_mb: roundTo((after.bytes - before.bytes) / 1e6, 2),
+        heap_growth_objects_mb: roundTo((after.objects - before.objects) / 1e6, 2),
+        heap_growth_code_mb: roundTo((after.code - before.code) / 1e6, 2),
         node_growth: after.nodes - before.nodes,
         listener_growth: after.listeners - before.listeners,
         memory_rounds: rounds,
@@ -58,47 +68,48 @@ export async function memory(bench: Bench): Promise<Figures> {
 }
 
 /** A real clip where there is one, else our own dance as our own writer writes it. */
-function clipFor(folder: string): string {
-  const shared = join(sharedFolder() ?? folder, "mocap/bvh/mass_walk.bvh");
+function findClip(folder: string): string {
+  const shared = join(sharedClipFolder() ?? folder, "mocap/bvh/mass_walk.bvh");
   if (existsSync(shared)) return shared;
   const own = join(folder, "own.bvh");
-  const script = "import sys; from bunraku.motion import choreography, writers; sys.stdout.buffer.write(writers.write_bvh(choreography.dance()))";
+  const script =
+    "import sys; from bunraku.motion import choreography, writers; sys.stdout.buffer.write(writers.write_bvh(choreography.dance()))";
   writeFileSync(own, execFileSync(join(REPOSITORY, ".venv/bin/python"), ["-c", script], { maxBuffer: 1 << 26 }));
   return own;
 }
 
 /** Bytes of the heap once all that can be freed is. */
-async function used(protocol: CDPSession): Promise<number> {
+async function usedHeapBytes(protocol: CDPSession): Promise<number> {
   await protocol.send("HeapProfiler.enable");
   for (let nth = 0; nth < 3; nth++) await protocol.send("HeapProfiler.collectGarbage");
   return (await protocol.send("Runtime.getHeapUsage")).usedSize;
 }
 
 /** What is left then. */
-async function left(protocol: CDPSession): Promise<Left> {
-  const bytes = await used(protocol);
+async function measureMemory(protocol: CDPSession): Promise<MemoryUsage> {
+  const bytes = await usedHeapBytes(protocol);
   const { nodes, jsEventListeners: listeners } = await protocol.send("Memory.getDOMCounters");
-  return { bytes, nodes, listeners, ...(await heapOf(protocol)) };
+  return { bytes, nodes, listeners, ...(await measureHeap(protocol)) };
 }
 
 /** Everything that people do on a page, once; it is left as it was. */
-async function round(page: Page, clip: string): Promise<void> {
+async function playRound(page: Page, clip: string): Promise<void> {
   const press = (name: string) => page.getByRole("button", { name, exact: true }).click();
   await press("Pause");
   await page.getByRole("button", { name: "Play", exact: true }).waitFor();
-  const ring = await settled(page, () => ringOf(page, LEFT_HAND), 0.5);
+  const ring = await waitUntilSettled(page, () => ringPosition(page, LEFT_HAND), 0.5);
   await page.mouse.move(ring.x, ring.y);
   await page.mouse.down();
   await page.mouse.move(ring.x + 40, ring.y + 40, { steps: 8 });
-  await holds(page, LEFT_HAND);
+  await waitForHold(page, LEFT_HAND);
   await page.mouse.up();
-  await letGo(page, LEFT_HAND);
+  await waitForRelease(page, LEFT_HAND);
   await press("Play");
   await page.keyboard.press("Digit2");
-  await holds(page, LEFT_HAND);
+  await waitForHold(page, LEFT_HAND);
   await page.keyboard.press("KeyW", { delay: 300 });
   await page.keyboard.press("Escape");
-  await letGo(page, LEFT_HAND);
+  await waitForRelease(page, LEFT_HAND);
   for (const panel of ["Strings", "Line"]) {
     await press(panel);
     await page.getByRole("complementary", { name: panel }).waitFor();
@@ -113,11 +124,11 @@ async function round(page: Page, clip: string): Promise<void> {
   const before = await page.locator(".brand-piece").innerText();
   await page.locator('input[type=file][accept*=".bvh"]').setInputFiles(clip);
   await page.waitForFunction((before) => document.querySelector(".brand-piece")?.textContent !== before, before);
-  await danced(page);
+  await waitForFirstPose(page);
   const name = await page.locator(".brand-piece").innerText();
   await page.locator(".motion", { hasText: before }).click();
   await page.waitForFunction((before) => document.querySelector(".brand-piece")?.textContent === before, before);
-  await danced(page);
+  await waitForFirstPose(page);
   await page.getByRole("button", { name: `Remove ${name}` }).focus();
   await page.keyboard.press("Enter");
   await page.locator(".motion", { hasText: name }).waitFor({ state: "detached" });

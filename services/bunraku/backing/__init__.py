@@ -1,1 +1,0 @@
-"""I/O: what the services stand on."""

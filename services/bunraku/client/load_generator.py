@@ -1,0 +1,222 @@
+"""Many viewers of one stream in one process, to see how a server bears them.
+
+Each is a socket of its own that takes in what a viewer is sent and says once a second what a viewer says (a ping, and a
+report of what is ready ahead); nothing is decoded and nothing drawn, so that thousands fit. They keep one clock
+together, as they are at one place. Latenesses are of the messages as they come: an overlay is late when it comes after
+it was due, a block when it comes after its first frame should have been shown; what is in time has less than zero.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from array import array
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from bunraku.client.api import authorization
+from bunraku.client.load_viewer import LoadState, LoadViewer
+
+SEND_SLOTS = 50
+"""Parts of a second in which viewers say what they say, so that they do not say it all at once."""
+RESERVED_FILE_DESCRIPTORS = 64
+"""File descriptors of the process beside the viewers'."""
+
+
+class FileLimitExceeded(ValueError):
+    """The system lets this process open fewer sockets than are asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoadStatistics:
+    """How a crowd fared. `refused` could not join, `dropped` were closed by the server; times in milliseconds, None
+    where nothing of the kind came; `stalls` are blocks that came after their first frame should have been shown."""
+
+    viewers: int
+    joined: int
+    refused: int
+    dropped: int
+    seconds: float
+    join_ms_p50: float | None
+    join_ms_p99: float | None
+    overlays: int
+    overlay_late_ms_p50: float | None
+    overlay_late_ms_p95: float | None
+    overlay_late_ms_p99: float | None
+    overlay_gap_ms_p99: float | None
+    blocks: int
+    block_late_ms_p50: float | None
+    block_late_ms_p95: float | None
+    block_late_ms_p99: float | None
+    stalls: int
+    bytes_per_second: float
+    why: str | None
+
+    def as_json(self) -> dict[str, Any]:
+        """The figures as plain values."""
+        return asdict(self)
+
+
+class LoadGenerator:
+    """A crowd of viewers of the stream at `url` (a WebSocket's, `.../stream`), let in by a `token` if there is one."""
+
+    def __init__(self, url: str, *, single_reporter: bool = False, token: str | None = None) -> None:
+        """Of a `quiet` crowd one alone speaks; the others answer what WebSockets ask of them."""
+        self.url = url
+        self.state = LoadState()
+        self.viewers: list[LoadViewer] = []
+        self.join_times = array("d")
+        self.refused = 0
+        self._single_reporter = single_reporter
+        self._headers = authorization(token)
+        self._requested = 0
+        self._began = self._measured_from = 0.0
+        self._initial_bytes = 0
+        self._report_task: asyncio.Task[None] | None = None
+
+    async def join(
+        self, viewers: int, joins_per_second: float = 200.0, on_progress: Callable[[int], None] | None = None
+    ) -> None:
+        """That many more, so many a second; returns when all have joined or been refused. `told` hears how many have.
+
+        Raises `TooMany`.
+        """
+        _raise_file_limit(self._requested + viewers + RESERVED_FILE_DESCRIPTORS)
+        self._requested += viewers
+        if self._report_task is None:
+            self._report_task = asyncio.create_task(self._send_reports(), name="what a crowd says")
+        begun = time.monotonic()
+        async with asyncio.TaskGroup() as group:
+            for number in range(viewers):
+                await asyncio.sleep(max(begun + number / joins_per_second - time.monotonic(), 0.0))
+                group.create_task(self._join_viewer(on_progress))
+
+    async def leave(self, viewers: int) -> None:
+        """That many go, the last first, all at once."""
+        going, self.viewers[-viewers:] = self.viewers[-viewers:], []
+        self._requested -= len(going)
+        for viewer in going:
+            viewer.close()
+        await asyncio.sleep(0)
+
+    def reset_statistics(self) -> None:
+        """Count from here on."""
+        self._measured_from, self._initial_bytes = time.monotonic(), self.state.received_bytes
+        for counted in (self.state.overlay_lateness, self.state.overlay_gaps, self.state.block_lateness):
+            del counted[:]
+        self.state.stalls = 0
+
+    async def close(self) -> None:
+        """Everybody goes."""
+        if self._report_task is not None:
+            self._report_task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._report_task
+        await self.leave(len(self.viewers))
+
+    def statistics(self) -> LoadStatistics:
+        """How it went since `count`."""
+        shared, seconds = self.state, time.monotonic() - self._measured_from
+        joins = _percentiles(self.join_times, 1e3)
+        overlays, blocks = _percentiles(shared.overlay_lateness, 1e-3), _percentiles(shared.block_lateness, 1e-3)
+        return LoadStatistics(
+            viewers=self._requested,
+            joined=len(self.viewers),
+            refused=self.refused,
+            dropped=sum(viewer.closed for viewer in self.viewers),
+            seconds=round(seconds, 2),
+            join_ms_p50=joins[0],
+            join_ms_p99=joins[2],
+            overlays=len(shared.overlay_lateness),
+            overlay_late_ms_p50=overlays[0],
+            overlay_late_ms_p95=overlays[1],
+            overlay_late_ms_p99=overlays[2],
+            overlay_gap_ms_p99=_percentiles(shared.overlay_gaps, 1e-3)[2],
+            blocks=len(shared.block_lateness),
+            block_late_ms_p50=blocks[0],
+            block_late_ms_p95=blocks[1],
+            block_late_ms_p99=blocks[2],
+            stalls=shared.stalls,
+            bytes_per_second=round(
+                (shared.received_bytes - self._initial_bytes) / seconds / max(len(self.viewers), 1), 1
+            ),
+            why=shared.error,
+        )
+
+    async def _join_viewer(self, on_progress: Callable[[int], None] | None) -> None:
+        begun, viewer = time.monotonic(), LoadViewer(self.url, self.state, self._headers)
+        try:
+            async with asyncio.timeout(20):
+                await viewer.open()
+        except (OSError, TimeoutError) as error:
+            self.refused += 1
+            self.state.error = self.state.error or str(error) or type(error).__name__
+            return
+        self.viewers.append(viewer)
+        self.join_times.append(time.monotonic() - begun)
+        if on_progress is not None:
+            on_progress(len(self.viewers))
+
+    async def _send_reports(self) -> None:
+        """Let everyone speak once a second, for ever; of a quiet crowd one, who asks for the time."""
+        beat, due = 0, time.monotonic()
+        while True:
+            for viewer in self.viewers[beat % SEND_SLOTS : 1 if self._single_reporter else None : SEND_SLOTS]:
+                viewer.send_report(beat // SEND_SLOTS)
+            beat, due = beat + 1, due + 1 / SEND_SLOTS
+            await asyncio.sleep(max(due - time.monotonic(), 0.0))
+
+
+async def run_load(
+    url: str,
+    viewers: int,
+    seconds: float,
+    *,
+    joins_per_second: float = 200.0,
+    token: str | None = None,
+    on_progress: Callable[[str, float], None] | None = None,
+) -> LoadStatistics:
+    """Have `viewers` join the stream at `url`, `joins` a second, and watch for `seconds`; `told` hears what is done
+    (`joining`, `watching`) and the share done, 0..1. A `token` lets them in.
+
+    Raises `TooMany`.
+    """
+    crowd = LoadGenerator(url, token=token)
+    try:
+        await crowd.join(
+            viewers, joins_per_second, lambda joined: on_progress("joining", joined / viewers) if on_progress else None
+        )
+        crowd.reset_statistics()
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            if on_progress is not None:
+                on_progress("watching", 1 - left / seconds)
+            await asyncio.sleep(min(left, 0.2))
+        return crowd.statistics()
+    finally:
+        await crowd.close()
+
+
+def _raise_file_limit(sockets: int) -> None:
+    """Raise this process's limit of open files as far as is needed and allowed; raises `TooMany`."""
+    try:
+        import resource
+    except ImportError:
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft >= sockets or soft == resource.RLIM_INFINITY:
+        return
+    if hard != resource.RLIM_INFINITY and hard < sockets:
+        raise FileLimitExceeded(f"this process may open {hard} files (ulimit -Hn), {sockets} are needed")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (sockets, hard))
+
+
+def _percentiles(values: array[Any], scale: float) -> list[float | None]:
+    """The 50th, 95th and 99th, in other units."""
+    if not values:
+        return [None] * 3
+    return [round(float(value) * scale, 2) for value in np.percentile(np.array(values), (50, 95, 99))]

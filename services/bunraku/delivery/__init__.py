@@ -1,0 +1,1 @@
+"""Sender of a stream: scheduler, congestion window, adaptive bitrate, prefetch, resume."""

@@ -1,0 +1,1 @@
+"""Motion, music and staging of the demo, and their installation."""

@@ -1,0 +1,52 @@
+"""Where the body's weight is: its centre of mass from the positions of joints and tips.
+
+Segment masses and the places of their centres are the usual fractions (Winter, "Biomechanics and Motor Control of Human
+Movement", table 4.1), the trunk cut in pelvis and chest at vl5.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX
+
+CROWN, LEFT_HAND, RIGHT_HAND, LEFT_TOES, RIGHT_TOES = range(JOINT_COUNT, JOINT_COUNT + 5)
+"""Indices of the tips in `skeleton.points`."""
+
+_LIMB_SEGMENTS: tuple[tuple[str, str, float, float], ...] = (
+    ("shoulder", "elbow", 0.028, 0.436),
+    ("elbow", "wrist", 0.016, 0.430),
+    ("hip", "knee", 0.100, 0.433),
+    ("knee", "ankle", 0.0465, 0.433),
+)
+"""Segments from joint to joint of either side: their share of the body's mass, and where on the way its centre is."""
+
+
+def _point_weights() -> Array:
+    """Share of each point (23,) in the centre of mass; the sum is 1."""
+    share = np.zeros(JOINT_COUNT + 5)
+
+    def segment(near: int, far: int, mass: float, centre: float) -> None:
+        share[near] += mass * (1.0 - centre)
+        share[far] += mass * centre
+
+    for side, hand, toes in (("l", LEFT_HAND, LEFT_TOES), ("r", RIGHT_HAND, RIGHT_TOES)):
+        for near, far, mass, centre in _LIMB_SEGMENTS:
+            segment(JOINT_INDEX[f"{side}_{near}"], JOINT_INDEX[f"{side}_{far}"], mass, centre)
+        segment(JOINT_INDEX[f"{side}_wrist"], hand, 0.006, 0.5)
+        segment(JOINT_INDEX[f"{side}_ankle"], toes, 0.0145, 0.5)
+        # half the chest, from vl5 towards each shoulder
+        segment(JOINT_INDEX["vl5"], JOINT_INDEX[f"{side}_shoulder"], 0.1775, 0.55)
+    segment(JOINT_INDEX["skullbase"], CROWN, 0.081, 0.5)
+    segment(JOINT_INDEX["humanoid_root"], JOINT_INDEX["sacroiliac"], 0.142, 0.5)
+    return share
+
+
+POINT_WEIGHTS: Array = _point_weights()
+
+
+def centre_of_mass(points: Array) -> Array:
+    """Centre of mass (..., 3) in metres of a body whose `skeleton.points` are at `points` (..., 23, 3)."""
+    centre: Array = np.einsum("k,...kj->...j", POINT_WEIGHTS, points)
+    return centre

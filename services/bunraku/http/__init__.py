@@ -1,0 +1,1 @@
+"""Authentication, authorization, CORS, limits, problem documents and the access log."""

@@ -1,0 +1,1 @@
+"""Message bus, key-value store and leases, in process or over NATS."""

@@ -1,0 +1,106 @@
+"""A figure in the making: the source in its axes, and the joints placed so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bunraku.motion import procrustes, rotation
+from bunraku.motion.bvh import Bvh
+from bunraku.motion.bvh_kinematics import ancestor_chain, forward_kinematics
+from bunraku.motion.rest_pose import RestPose
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, PARENTS
+
+
+@dataclass(slots=True)
+class FigureFit:
+    """The source in the figure's axes and metres, n frames, and the figure so far.
+
+    `joints` H-Anim index -> source index; `position` (n, J, 3) the source's joints and `turn` (n, J, 4) each one's
+    rotation from its rest; `rested` (J, 3) the source at rest, `axes` (J, 4) its joints' orientations there. Of the
+    figure: `offsets` and `tips` (18, 3), `placed` (n, 18, 3) and `oriented` (n, 18, 4) in the world.
+    """
+
+    bvh: Bvh
+    joints: dict[int, int]
+    scale: float
+    position: Array
+    turn: Array
+    rest_positions: Array
+    rest_orientations: Array
+    offsets: Array = field(init=False)
+    tips: Array = field(init=False)
+    joint_positions: Array = field(init=False)
+    joint_orientations: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.position)
+        self.offsets, self.tips = np.zeros((JOINT_COUNT, 3)), np.zeros((JOINT_COUNT, 3))
+        self.joint_positions, self.joint_orientations = np.zeros((n, JOINT_COUNT, 3)), np.zeros((n, JOINT_COUNT, 4))
+
+    @classmethod
+    def from_bvh(cls, bvh: Bvh, joints: dict[str, int], rest: RestPose) -> FigureFit:
+        """The whole clip of `bvh` in the figure's axes, nothing placed yet."""
+        index = {JOINT_INDEX[name]: source for name, source in joints.items()}
+        used = sorted({ancestor for source in index.values() for ancestor in ancestor_chain(bvh, source)})
+        position, orientation = forward_kinematics(bvh, used)
+        axes = rotation.multiply(rest.rest_to_figure, rest.orientations)
+        turn = np.zeros_like(orientation)
+        turned = rotation.multiply(rest.motion_to_figure, orientation[:, used])
+        turn[:, used] = rotation.multiply(turned, rotation.conjugate(axes[used]))
+        return cls(
+            bvh=bvh,
+            joints=index,
+            scale=rest.scale,
+            position=rest.scale * rotation.rotate(rest.motion_to_figure, position),
+            turn=turn,
+            rest_positions=rest.scale * rotation.rotate(rest.rest_to_figure, rest.positions),
+            rest_orientations=axes,
+        )
+
+    def without_first_frame(self) -> FigureFit:
+        """The same without its first frame."""
+        return replace(self, position=self.position[1:], turn=self.turn[1:])
+
+    def place_joint(self, joint: int, offset: Array, orientation: Array) -> None:
+        """Place a joint of the figure: its `offset` (3,) in its parent, its world `orientation` (n, 4)."""
+        parent = PARENTS[joint]
+        self.offsets[joint] = offset
+        self.joint_positions[:, joint] = self.joint_positions[:, parent] + rotation.rotate(
+            self.joint_orientations[:, parent], offset
+        )
+        self.joint_orientations[:, joint] = orientation
+
+    def relative_positions(self, joint: int, sources: list[int]) -> Array:
+        """Positions (n, m, 3) of `sources` from where the figure's `joint` is."""
+        found: Array = self.position[:, sources] - self.joint_positions[:, [joint]]
+        return found
+
+    def mean_offset(self, parent: int, source: int) -> Array:
+        """Where a source joint lies in the figure's joint `parent` on average (3,)."""
+        place: Array = procrustes.mean_local_positions(
+            self.joint_orientations[:, parent], self.relative_positions(parent, [source])
+        )[0]
+        return place
+
+    def measure_bone(self, joint: int) -> tuple[Array, float]:
+        """The source's bone from `joint` to the next, at rest (3,), and its mean length."""
+        start, end = self.joints[joint], self.joints[joint + 1]
+        length = np.linalg.norm(self.position[:, end] - self.position[:, start], axis=-1).mean()
+        return self.rest_positions[end] - self.rest_positions[start], float(length)
+
+    def farthest_descendant(self, source: int) -> Array | None:
+        """From a source joint to the farthest point that hangs from it at rest (3,); None where nothing does."""
+        below = [joint for joint in range(source, len(self.bvh.parents)) if source in ancestor_chain(self.bvh, joint)]
+        found = [self.rest_positions[joint] - self.rest_positions[source] for joint in below[1:]]
+        found += [
+            self.rest_positions[end.parent]
+            - self.rest_positions[source]
+            + self.scale * rotation.rotate(self.rest_orientations[end.parent], end.offset)
+            for end in self.bvh.ends
+            if end.parent in below
+        ]
+        far = max(found, key=lambda v: float(np.linalg.norm(v)), default=None)
+        return far if far is not None and np.linalg.norm(far) > 1e-3 else None

@@ -1,0 +1,166 @@
+"""Which joint of a source is which joint of the figure, by the skeleton's shape alone.
+
+A body has two pairs of limbs, left and right alike; each limb has two long bones in a row. The longer pair is the
+legs. The head is at the end of the longest branch above the arms. Only the tree and the lengths of bones are used, so
+the rest pose does not matter; which side is left is for `rest.sides` to say, from the motion.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from bunraku.motion.bvh import Bvh
+from bunraku.motion.bvh_kinematics import ancestor_chain
+from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.name_mapping import JointMapping, common_ancestor, is_descendant
+from bunraku.motion.rotation import Array
+
+MAX_LENGTH_DIFFERENCE = 0.15
+"""Bones of left and right may differ by this part of the longer."""
+MIN_LIMB_RATIO = 0.15
+"""A limb is at least this part of the longest way from the root to a joint."""
+MAX_FOREARM_RATIO = 0.8
+"""Collar bone and upper arm are taken for an arm only where upper arm and forearm are under this part of them."""
+MIN_HEAD_RATIO = 0.12
+"""The head reaches at least this part of a leg's length above its joint."""
+
+
+@dataclass(frozen=True, slots=True)
+class _LimbCandidate:
+    joints: tuple[int, int, int]
+    bone_lengths: tuple[float, float]
+
+    @property
+    def length(self) -> float:
+        return sum(self.bone_lengths)
+
+
+def map_by_shape(bvh: Bvh) -> JointMapping:
+    """The mapping of joints that the skeleton's shape gives, sides not yet told apart.
+
+    Raises `UnreadableMotion` where the skeleton has no two pairs of limbs.
+    """
+    parents = bvh.parents
+    lengths = np.linalg.norm(bvh.offsets, axis=1)
+    lengths[0] = 0.0
+    pairs = _find_limb_pairs(bvh, lengths)
+    legs = pairs[0] if pairs else None
+    arms = next(
+        (pair for pair in pairs if legs and all(_are_disjoint(a, b, parents) for a in pair for b in legs)), None
+    )
+    if legs is None or arms is None:
+        raise UnreadableMotion(
+            "Not a humanoid",
+            "neither the joints' names nor the skeleton's shape show two arms and two legs",
+            line=bvh.joint_lines[0],
+            field=bvh.names[0],
+            hint="name the joints as Mixamo, MotionBuilder, VRM or H-Anim do, and send the whole body",
+        )
+    arms = _skip_collar_bones(arms, pairs)
+    joints: dict[str, int] = {}
+    for side, leg, arm in zip("lr", legs, arms, strict=True):
+        joints |= dict(zip((f"{side}_hip", f"{side}_knee", f"{side}_ankle"), leg.joints, strict=True))
+        joints |= dict(zip((f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist"), arm.joints, strict=True))
+        toes = _longest_branch(bvh, lengths, leg.joints[2], set())
+        if toes and lengths[toes[0]] > 0.05 * leg.length:
+            joints[f"{side}_midtarsal"] = toes[0]
+    head = find_head(bvh, joints)
+    if head is not None:
+        joints["skullbase"] = head
+    names = ", ".join(f"{joint} = {bvh.names[source]}" for joint, source in sorted(joints.items()))
+    return JointMapping("shape", joints, [f"The names are none we know; the skeleton's shape gave {names}."])
+
+
+def find_head(bvh: Bvh, joints: dict[str, int]) -> int | None:
+    """The head's joint, from where the arms are: the end of the longest branch that leaves the spine above the hips."""
+    lengths = np.linalg.norm(bvh.offsets, axis=1)
+    arms = [joints["l_shoulder"], joints["r_shoulder"]]
+    legs = [joints["l_hip"], joints["r_hip"]]
+    leg = lengths[joints["l_knee"]] + lengths[joints.get("l_ankle", joints["l_knee"])]
+    chest = common_ancestor(bvh.parents, arms)
+    barred = {joint for limb in arms + legs for joint in ancestor_chain(bvh, limb)}
+    barred.discard(chest)
+    way = _longest_branch(bvh, lengths, chest, barred)
+    above = 0.0
+    ends = {end.parent: float(np.linalg.norm(end.offset)) for end in bvh.ends}
+    for joint in reversed(way):
+        above = max(above, ends.get(joint, 0.0))
+        if above >= MIN_HEAD_RATIO * leg:
+            return joint
+        above += lengths[joint]
+    return way[-1] if way else None
+
+
+def _find_limb_pairs(bvh: Bvh, lengths: Array) -> list[tuple[_LimbCandidate, _LimbCandidate]]:
+    """Pairs of limbs that are alike and apart, the longest first."""
+    depth = np.zeros(len(lengths))
+    for joint, parent in enumerate(bvh.parents):
+        if parent >= 0:
+            depth[joint] = depth[parent] + lengths[joint]
+    limbs = [limb for limb in _find_limbs(bvh, lengths) if limb.length > MIN_LIMB_RATIO * depth.max()]
+    found = [
+        (a, b)
+        for a, b in itertools.combinations(sorted(limbs, key=lambda limb: -limb.length)[:60], 2)
+        if all(
+            abs(x - y) <= MAX_LENGTH_DIFFERENCE * max(x, y) for x, y in zip(a.bone_lengths, b.bone_lengths, strict=True)
+        )
+        and _are_disjoint(a, b, bvh.parents)
+    ]
+    return sorted(found, key=lambda pair: -min(pair[0].length, pair[1].length))
+
+
+def _skip_collar_bones(
+    arms: tuple[_LimbCandidate, _LimbCandidate], pairs: list[tuple[_LimbCandidate, _LimbCandidate]]
+) -> tuple[_LimbCandidate, _LimbCandidate]:
+    """The arms one bone further down where they began with the collar bone; a hand is too short to follow as one."""
+    for pair in pairs:
+        further = {arm.joints[:2] for arm in pair} == {arm.joints[1:] for arm in arms}
+        if further and sum(arm.length for arm in pair) >= MAX_FOREARM_RATIO * sum(arm.length for arm in arms):
+            return pair
+    return arms
+
+
+def _find_limbs(bvh: Bvh, lengths: Array) -> list[_LimbCandidate]:
+    """All pairs of bones in a row, neither over twice the other; joints of no length between them are passed over."""
+    short = 1e-3 * max(float(lengths.max()), 1e-12)
+    found = []
+    for end, middle in enumerate(bvh.parents):
+        if middle < 0 or lengths[end] <= short:
+            continue
+        while lengths[middle] <= short and bvh.parents[middle] >= 0:
+            middle = bvh.parents[middle]
+        start = bvh.parents[middle]
+        bones = (float(lengths[middle]), float(lengths[end]))
+        if start >= 0 and max(bones) <= 2.0 * min(bones):
+            found.append(_LimbCandidate((start, middle, end), bones))
+    return found
+
+
+def _are_disjoint(a: _LimbCandidate, b: _LimbCandidate, parents: tuple[int, ...]) -> bool:
+    """Whether two limbs share no joint and neither hangs from the other."""
+    if set(a.joints) & set(b.joints):
+        return False
+    return not is_descendant(parents, a.joints[0], b.joints[0]) and not is_descendant(parents, b.joints[0], a.joints[0])
+
+
+def _longest_branch(bvh: Bvh, lengths: Array, start: int, excluded: set[int]) -> list[int]:
+    """The joints below `start` along its longest branch, without those `barred`."""
+    reach = np.zeros(len(lengths))
+    longest: dict[int, int] = {}
+    for end in bvh.ends:
+        reach[end.parent] = max(reach[end.parent], float(np.linalg.norm(end.offset)))
+    for joint in range(len(lengths) - 1, 0, -1):
+        parent = bvh.parents[joint]
+        way = lengths[joint] + reach[joint]
+        if joint not in excluded and (parent not in longest or way > reach[parent]):
+            longest[parent] = joint
+            reach[parent] = max(reach[parent], way)
+    way_down = []
+    joint = start
+    while joint in longest:
+        joint = longest[joint]
+        way_down.append(joint)
+    return way_down

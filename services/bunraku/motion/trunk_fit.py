@@ -1,0 +1,130 @@
+"""The figure's trunk: root, sacroiliac, vl5 and skullbase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bunraku.motion import procrustes, rotation
+from bunraku.motion.bvh_kinematics import ancestor_chain
+from bunraku.motion.fit import FigureFit
+from bunraku.motion.limb_fit import aim_at
+from bunraku.motion.name_mapping import common_ancestor
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import JOINT_INDEX
+
+CROWN_OFFSET_M = 0.20
+"""Metres from skullbase to the crown: where error is measured."""
+NECK_LENGTH_M = 0.12
+"""Metres from between the shoulders to the skullbase of a source that has no head."""
+CHEST_POINT_WEIGHTS: Array = np.array([1.0, 2.0, 2.0])
+"""Skullbase and shoulders: a shoulder carries an arm."""
+MIN_IMPROVEMENT_M = 1e-4
+"""Metres by which a way that is less plain must be better to be taken."""
+MAX_SAMPLED_FRAMES = 200
+
+HIPS = ("l_hip", "r_hip")
+SHOULDERS = ("l_shoulder", "r_shoulder")
+
+
+def fit_trunk(fit: FigureFit) -> None:
+    """Place root, sacroiliac, vl5 and skullbase, and say where hips and shoulders hang from them."""
+    root = fit.joints[0]
+    fit.joint_positions[:, 0], fit.joint_orientations[:, 0] = fit.position[:, root], fit.turn[:, root]
+    _fit_pelvis(fit)
+    _fit_chest(fit)
+    _fit_head(fit)
+
+
+def _fit_pelvis(fit: FigureFit) -> None:
+    """sacroiliac: the source's, else at the root; where the hips move in it, turned as their line turns."""
+    pelvis = JOINT_INDEX["sacroiliac"]
+    source = fit.joints.get(pelvis)
+    if source is None:
+        fit.place_joint(pelvis, np.zeros(3), fit.joint_orientations[:, 0])
+    else:
+        fit.place_joint(pelvis, fit.mean_offset(0, source), fit.turn[:, source])
+    hips = fit.relative_positions(pelvis, [fit.joints[JOINT_INDEX[name]] for name in HIPS])
+    places = procrustes.mean_local_positions(fit.joint_orientations[:, pelvis], hips)
+    if procrustes.rms_error(fit.joint_orientations[:, pelvis], places, hips, np.ones(2)) > MIN_IMPROVEMENT_M:
+        fit.joint_orientations[:, pelvis] = aim_at(
+            fit.joint_orientations[:, pelvis], places[0] - places[1], hips[:, 1], hips[:, 0]
+        )
+        places = procrustes.mean_local_positions(fit.joint_orientations[:, pelvis], hips)
+    for name, place in zip(HIPS, places, strict=True):
+        fit.offsets[JOINT_INDEX[name]] = place
+
+
+@dataclass(frozen=True, slots=True)
+class _ChestCandidate:
+    """vl5 at the source joint `source`, turned as `turned` (None: solved), with its points at `places` (m, 3)."""
+
+    error: float
+    position_joint: int
+    orientation_joint: int | None
+    local_positions: Array
+
+
+def _fit_chest(fit: FigureFit) -> None:
+    """vl5: the place in the source's spine, and the turn (one of its joints' or the solved one), that fit best."""
+    vl5 = JOINT_INDEX["vl5"]
+    carried = [JOINT_INDEX[name] for name in ("skullbase", *SHOULDERS) if JOINT_INDEX[name] in fit.joints]
+    sources = [fit.joints[joint] for joint in carried]
+    weights = CHEST_POINT_WEIGHTS[-len(carried) :]
+    root = fit.joints[0]
+    above = ancestor_chain(fit.bvh, root)
+    way = ancestor_chain(
+        fit.bvh, common_ancestor(fit.bvh.parents, [fit.joints[JOINT_INDEX[name]] for name in SHOULDERS])
+    )
+    spine = [joint for joint in reversed(way) if joint not in above] or [root]
+    chosen = _select_chest(fit, spine, sources, weights)
+    if chosen.position_joint != root:
+        fit.joints[vl5] = chosen.position_joint
+    fit.place_joint(
+        vl5,
+        fit.mean_offset(0, chosen.position_joint),
+        fit.turn[:, spine[-1] if chosen.orientation_joint is None else chosen.orientation_joint],
+    )
+    targets = fit.relative_positions(vl5, sources)
+    if chosen.orientation_joint is None:
+        fit.joint_orientations[:, vl5] = procrustes.solve_kabsch(chosen.local_positions, targets, weights)
+    for joint, place in zip(
+        carried, procrustes.mean_local_positions(fit.joint_orientations[:, vl5], targets), strict=True
+    ):
+        fit.offsets[joint] = place
+
+
+def _select_chest(fit: FigureFit, spine: list[int], sources: list[int], weights: Array) -> _ChestCandidate:
+    """Try every place and turn on a sample of frames; the first of equals is kept."""
+    few = np.unique(np.linspace(0, len(fit.position) - 1, MAX_SAMPLED_FRAMES).astype(np.int64))
+    choices: list[_ChestCandidate] = []
+    for source in spine:
+        placed = fit.joint_positions[few, 0] + rotation.rotate(
+            fit.joint_orientations[few, 0], fit.mean_offset(0, source)
+        )
+        own = float(np.sqrt(np.mean(np.sum((placed - fit.position[few, source]) ** 2, axis=-1))))
+        targets = fit.position[few][:, sources] - placed[:, None]
+        for turned in (*spine, None):
+            if turned is None:
+                rested = fit.rest_positions[sources] - fit.rest_positions[source]
+                places = procrustes.fit_local_positions(fit.turn[few, spine[-1]], targets, weights, rested)
+                orientation = procrustes.solve_kabsch(places, targets, weights)
+            else:
+                orientation = fit.turn[few, turned]
+                places = procrustes.mean_local_positions(orientation, targets)
+            error = procrustes.rms_error(orientation, places, targets, weights) + own / weights.sum()
+            choices.append(_ChestCandidate(error, source, turned, places))
+    least = min(choice.error for choice in choices)
+    return next(choice for choice in choices if choice.error <= least + MIN_IMPROVEMENT_M)
+
+
+def _fit_head(fit: FigureFit) -> None:
+    head, vl5 = JOINT_INDEX["skullbase"], JOINT_INDEX["vl5"]
+    source = fit.joints.get(head)
+    if source is None:
+        middle = fit.offsets[[JOINT_INDEX[name] for name in SHOULDERS]].mean(axis=0)
+        fit.place_joint(head, middle + np.array([0.0, NECK_LENGTH_M, 0.0]), fit.joint_orientations[:, vl5])
+    else:
+        fit.place_joint(head, fit.offsets[head], fit.turn[:, source])
+    fit.tips[head] = (0.0, CROWN_OFFSET_M, 0.0)

@@ -1,1 +1,0 @@
-"""Pure: music of our own for the dance, from notes to samples."""

@@ -1,0 +1,1 @@
+"""Settings, clock, logging, metrics, readiness and the service context."""

@@ -1,0 +1,1 @@
+"""Catalogue (SQL), jobs, share links and the object store of motions."""

@@ -1,0 +1,58 @@
+"""Links for viewers in SQL."""
+
+from __future__ import annotations
+
+import builtins
+from typing import Any
+
+from sqlalchemy import Row, delete, select
+from sqlalchemy.ext.asyncio import AsyncEngine
+
+from bunraku.storage.catalogue import Share
+from bunraku.storage.table import SHARES, QueryRunner
+
+
+class SqlShareTable:
+    """The table of links; each method as that of `Catalogue`."""
+
+    def __init__(self, engine: AsyncEngine, run_query: QueryRunner) -> None:
+        self._engine = engine
+        self._run_query = run_query
+
+    async def add(self, share: Share) -> None:
+        """Add one."""
+        await self._run_query(self._add(share))
+
+    async def get(self, share_id: str) -> Share | None:
+        """The one of this id."""
+        found = await self._run_query(self._select(select(SHARES).where(SHARES.c.id == share_id)))
+        return found[0] if found else None
+
+    async def list(self, subject: str | None, limit: int) -> builtins.list[Share]:
+        """The newest, of one subject or of all."""
+        statement = select(SHARES).order_by(SHARES.c.created.desc(), SHARES.c.id.desc()).limit(limit)
+        if subject is not None:
+            statement = statement.where(SHARES.c.subject == subject)
+        return await self._run_query(self._select(statement))
+
+    async def remove(self, share_id: str) -> bool:
+        """Revoke one; whether it was there."""
+        return await self._run_query(self._remove(share_id))
+
+    async def _add(self, share: Share) -> None:
+        row = {column.name: getattr(share, column.name) for column in SHARES.columns}
+        async with self._engine.begin() as connection:
+            await connection.execute(delete(SHARES).where(SHARES.c.expires < share.created))
+            await connection.execute(SHARES.insert().values(row))
+
+    async def _select(self, statement: Any) -> builtins.list[Share]:
+        async with self._engine.connect() as connection:
+            return [_share_from_row(row) for row in (await connection.execute(statement)).all()]
+
+    async def _remove(self, share_id: str) -> bool:
+        async with self._engine.begin() as connection:
+            return (await connection.execute(delete(SHARES).where(SHARES.c.id == share_id))).rowcount > 0
+
+
+def _share_from_row(row: Row[Any]) -> Share:
+    return Share(row.id, row.created, row.expires, row.subject, row.session, row.motion)

@@ -1,0 +1,156 @@
+/** How a model stands before it dances: which way it faces, where its bones are, and what of it touches the floor. */
+import { type BufferAttribute, type Group, Mesh, type Object3D, Quaternion, SkinnedMesh, Vector3 } from "three";
+import { BONE_PARENTS, BONES } from "../motion/humanoid";
+
+const UP = new Vector3(0, 1, 0);
+/** Beside the driven bones, the one that says where a hand points. */
+const FINGER_BONES = ["leftMiddleProximal", "rightMiddleProximal"];
+/** Of the ankle's way to the front of the foot, where the ball is in a foot without toes. */
+const BALL_SHARE = 0.7;
+
+/** A bone at rest, in the frame of the model turned to face z with y up; lengths are the file's. */
+export interface RestBone {
+  position: Vector3;
+  /** Of its node. */
+  rotation: Quaternion;
+  /** Of the node it hangs from in the file, whatever that is. */
+  parentRotation: Quaternion;
+}
+
+export interface RestMeasurements {
+  /** Turns the file's frame to facing z, y up. */
+  facing: Quaternion;
+  bones: ReadonlyMap<string, RestBone>;
+  /** Height of the soles. */
+  soleHeight: number;
+  /** For each foot's bone the places under heel and ball, in its node's frame. */
+  solePoints: ReadonlyMap<string, readonly Vector3[]>;
+  /** From each hand's bone to the tips of its fingers, as far as its mesh goes. */
+  handLengths: ReadonlyMap<string, number>;
+}
+
+/** Measures the model in `stand`, which stands at the origin and is turned by this; `nodes` are those of the humanoid's bones. */
+export function measureRest(stand: Group, nodes: ReadonlyMap<string, Object3D>): RestMeasurements {
+  stand.quaternion.identity();
+  stand.updateMatrixWorld(true);
+  const facing = facingOf(nodes);
+  stand.quaternion.copy(facing);
+  stand.updateMatrixWorld(true);
+  const bones = new Map<string, RestBone>();
+  for (const bone of [...BONES, ...FINGER_BONES]) {
+    const node = nodes.get(bone);
+    if (node)
+      bones.set(bone, {
+        position: positionOf(node),
+        rotation: node.getWorldQuaternion(new Quaternion()),
+        parentRotation: (node.parent ?? stand).getWorldQuaternion(new Quaternion()),
+      });
+  }
+  const clouds = collectVertices(stand, nodes);
+  const feet = SIDES.map((side) => [...(clouds.get(`${side}Foot`) ?? []), ...(clouds.get(`${side}Toes`) ?? [])]);
+  const all = feet.flat();
+  const lowest =
+    all.length > 0
+      ? Math.min(...all.map(({ y }) => y))
+      : Math.min(
+          ...SIDES.map((side) => positionOf(nodes.get(`${side}Toes`) ?? (nodes.get(`${side}Foot`) as Object3D)).y),
+        );
+  return {
+    facing,
+    bones,
+    soleHeight: lowest,
+    solePoints: new Map(SIDES.map((side, at) => [`${side}Foot`, solePointsOf(side, nodes, feet[at], lowest)])),
+    handLengths: new Map(
+      SIDES.map((side) => [`${side}Hand`, handLength(side, nodes, clouds.get(`${side}Hand`) ?? [])]),
+    ),
+  };
+}
+
+/** Which of our bones each driven bone hangs from; null for the hips. */
+export function drivenParent(bone: string): string | null {
+  const parent = BONE_PARENTS[BONES.indexOf(bone)];
+  return parent < 0 ? null : BONES[parent];
+}
+
+const SIDES = ["left", "right"] as const;
+type Side = (typeof SIDES)[number];
+
+/** From the left of the hips and the way up to the head: some files face away, lie on their back or look aside. */
+function facingOf(nodes: ReadonlyMap<string, Object3D>): Quaternion {
+  const at = (bone: string) => positionOf(nodes.get(bone) as Object3D);
+  const rise = at("head").sub(at("hips"));
+  const up = nearestAxis(rise);
+  const upright = new Quaternion().setFromUnitVectors(up, UP);
+  const left = at("leftUpperLeg")
+    .sub(at("rightUpperLeg"))
+    .add(at("leftUpperArm").sub(at("rightUpperArm")))
+    .applyQuaternion(upright)
+    .setY(0);
+  return new Quaternion().setFromAxisAngle(UP, Math.atan2(left.z, left.x)).multiply(upright);
+}
+
+function nearestAxis({ x, y, z }: Vector3): Vector3 {
+  const size = [x, y, z].map(Math.abs);
+  const most = size.indexOf(Math.max(...size));
+  return new Vector3().setComponent(most, Math.sign([x, y, z][most]) || 1);
+}
+
+function solePointsOf(
+  side: Side,
+  nodes: ReadonlyMap<string, Object3D>,
+  cloud: readonly Vector3[],
+  floor: number,
+): Vector3[] {
+  const foot = nodes.get(`${side}Foot`) as Object3D;
+  const toes = nodes.get(`${side}Toes`);
+  const ankle = positionOf(foot);
+  const front = cloud.length > 0 ? Math.max(...cloud.map(({ z }) => z)) : ankle.z;
+  const back = cloud.length > 0 ? Math.min(...cloud.map(({ z }) => z)) : ankle.z;
+  const ball = toes ? positionOf(toes) : ankle.clone().setZ(ankle.z + BALL_SHARE * (front - ankle.z));
+  return [ankle.clone().setZ(back), ball].map((place) => foot.worldToLocal(place.setY(floor)));
+}
+
+function handLength(side: Side, nodes: ReadonlyMap<string, Object3D>, cloud: readonly Vector3[]): number {
+  const hand = positionOf(nodes.get(`${side}Hand`) as Object3D);
+  return Math.max(0, ...cloud.map((place) => place.distanceTo(hand)));
+}
+
+/** The vertices of hands and feet as they stand, by the humanoid's bone that carries most of each. */
+function collectVertices(stand: Group, nodes: ReadonlyMap<string, Object3D>): Map<string, Vector3[]> {
+  const bones = new Map(
+    [...nodes].filter(([bone]) => (BONES as readonly string[]).includes(bone)).map(([bone, node]) => [node, bone]),
+  );
+  const carriers = new Map<Object3D, string | null>();
+  const carrierOf = (node: Object3D | null): string | null => {
+    if (!node) return null;
+    let carrier = carriers.get(node);
+    if (carrier === undefined) carriers.set(node, (carrier = bones.get(node) ?? carrierOf(node.parent)));
+    return carrier;
+  };
+  const clouds = new Map<string, Vector3[]>();
+  stand.traverse((mesh) => {
+    if (!(mesh instanceof Mesh)) return;
+    const { position, skinIndex, skinWeight } = mesh.geometry.attributes as Record<string, BufferAttribute | undefined>;
+    for (let i = 0; i < (position?.count ?? 0); i++) {
+      const skinned = mesh instanceof SkinnedMesh && skinIndex && skinWeight;
+      const carrier = carrierOf(skinned ? mesh.skeleton.bones[dominantBone(skinIndex, skinWeight, i)] : mesh);
+      if (!carrier || !/Hand|Foot|Toes/.test(carrier)) continue;
+      const place = mesh.getVertexPosition(i, new Vector3()).applyMatrix4(mesh.matrixWorld);
+      const cloud = clouds.get(carrier);
+      if (cloud) cloud.push(place);
+      else clouds.set(carrier, [place]);
+    }
+  });
+  return clouds;
+}
+
+/** Index of the bone that carries most of a vertex. */
+function dominantBone(indices: BufferAttribute, weights: BufferAttribute, vertex: number): number {
+  let most = 0;
+  for (let k = 1; k < 4; k++) if (weights.getComponent(vertex, k) > weights.getComponent(vertex, most)) most = k;
+  return indices.getComponent(vertex, most);
+}
+
+function positionOf(node: Object3D): Vector3 {
+  return new Vector3().setFromMatrixPosition(node.matrixWorld);
+}

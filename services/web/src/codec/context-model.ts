@@ -1,0 +1,247 @@
+/**
+ * From what is decoded already to the scale of the next coefficient (`proto/SPEC.md`, Levels, Features, Prior). Everything is
+ * in integers, to the same bits as the Python room `codec/contexts.py`; all sums fit in 32 bits.
+ */
+
+import { CHANNEL_COUNT, JOINTS, PARENTS } from "../motion/skeleton";
+import { magnitudeLevels } from "./magnitude-level";
+import { CHANNEL_AXES, FEATURE_COUNT, HIDDEN_UNITS, type Prior, SHARED_FEATURES, SUM_COUNT } from "./prior";
+
+/** Scales are kept within these, in 1/256 octave. */
+export const MIN_SCALE = -7 * 256;
+export const MAX_SCALE = 14 * 256;
+
+/** Class of each frequency: 0, 1, 2, 3-4, 5-8, 9-15, 16 and above. */
+export const FREQUENCY_CLASS_OF = Uint8Array.from(
+  { length: 513 },
+  (_, k) => [1, 2, 3, 5, 9, 16].filter((first) => k >= first).length,
+);
+
+// a channel that is missing reads zeros here
+const NO_CHANNEL = CHANNEL_COUNT;
+
+const PARENT = [NO_CHANNEL, 0, ...PARENTS.slice(1).map((joint) => joint + 1)];
+const MIRROR = [
+  NO_CHANNEL,
+  NO_CHANNEL,
+  ...JOINTS.slice(1).map((name, before) =>
+    name.startsWith("r_") ? JOINTS.indexOf(`l${name.slice(1)}`) + 1 : before + 1,
+  ),
+];
+
+/** Of each channel its parent's channel, its mirror's and its grandparent's, 19 for none: only channels before it count. */
+export const RELATIVE_CHANNELS = {
+  parent: Uint8Array.from(PARENT),
+  mirror: Uint8Array.from(MIRROR),
+  grandparent: Uint8Array.from(PARENT, (parent) => (parent === NO_CHANNEL ? NO_CHANNEL : PARENT[parent])),
+} as const;
+const { parent: PARENT_OF, mirror: MIRROR_OF, grandparent: GRANDPARENT_OF } = RELATIVE_CHANNELS;
+
+const ZERO_SUMS = new Float64Array(SUM_COUNT);
+
+// zeros on both sides of the frequencies
+const PADDING_BEFORE = 3;
+const PADDING_TOTAL = 8;
+
+/**
+ * Levels of what is decoded of one block. For each channel, `share` each frequency, take the `scale` of each axis and say what
+ * came of it to `see`; then `seeFrequency`, and after the last `seeChannel`.
+ */
+export class ContextModel {
+  private readonly width: number;
+  /** Of each coefficient: [channel, and one for none][axis 3][`width`]. */
+  private readonly axisLevels: Int32Array;
+  /** Means of the three axes: [channel, and one for none][`width`]. */
+  private readonly meanLevels: Int32Array;
+  /** Sums of the means over the channels that are done. */
+  private readonly levelTotals: Int32Array;
+  /** Sum of the means of this channel up to the frequency. */
+  private runningSum = 0;
+  private readonly features = new Float64Array(FEATURE_COUNT);
+  private readonly sharedSums = new Float64Array(SUM_COUNT);
+  private readonly sums = new Float64Array(SUM_COUNT);
+  private readonly magnitudeLevels = magnitudeLevels();
+
+  /**
+   * @param count frequencies of the block
+   * @param step its step index
+   * @param durationLevel the level of its duration
+   */
+  constructor(
+    private readonly prior: Prior,
+    private readonly count: number,
+    private readonly step: number,
+    private readonly durationLevel: number,
+  ) {
+    this.width = count + PADDING_TOTAL;
+    this.axisLevels = new Int32Array((CHANNEL_COUNT + 1) * 3 * this.width);
+    this.meanLevels = new Int32Array((CHANNEL_COUNT + 1) * this.width);
+    this.levelTotals = new Int32Array(this.width);
+  }
+
+  /** Sums up what the three axes of frequency `k` share. */
+  computeSharedSums(channel: number, k: number): void {
+    const { features: f, meanLevels: means, levelTotals: totals, width, sharedSums: shared } = this;
+    const at = k + PADDING_BEFORE;
+    const own = channel * width + at;
+    const parent = PARENT_OF[channel] * width + at;
+    const mirror = MIRROR_OF[channel] * width + at;
+    const grandparent = GRANDPARENT_OF[channel] * width + at;
+    const done = channel > 1 ? channel : 1;
+    if (k === 0) this.runningSum = 0;
+    f[0] = means[own - 1];
+    f[1] = means[own - 2];
+    f[2] = means[own - 3];
+    f[3] = means[parent];
+    f[4] = means[parent - 1];
+    f[5] = means[parent + 1];
+    f[6] = ((means[parent + 2] + means[parent + 3] + means[parent + 4]) / 3) | 0;
+    f[7] = means[mirror];
+    f[8] = means[mirror - 1];
+    f[9] = means[mirror + 1];
+    f[10] = ((means[mirror + 2] + means[mirror + 3] + means[mirror + 4]) / 3) | 0;
+    f[11] = means[grandparent];
+    f[12] = (means[grandparent + 1] + means[grandparent + 2]) >> 1;
+    f[13] = (totals[at] / done) | 0;
+    f[14] = (totals[at - 1] / done) | 0;
+    f[15] = (totals[at + 1] / done) | 0;
+    f[16] = ((totals[at + 2] + totals[at + 3] + totals[at + 4]) / (3 * done)) | 0;
+    f[17] = (this.runningSum / (k + 1)) | 0;
+    f[18] = channel > 0 ? means[own - width] : 0;
+    f[19] = channel > 1 ? means[own - 2 * width] : 0;
+    f[20] = this.count - k < 63 ? this.count - k : 63;
+    f[21] = this.magnitudeLevels[k];
+    f[22] = this.step;
+    f[23] = this.durationLevel;
+    accumulateSums(
+      shared,
+      ZERO_SUMS,
+      ZERO_SUMS,
+      0,
+      f,
+      0,
+      SHARED_FEATURES,
+      this.prior.weights,
+      FREQUENCY_CLASS_OF[k] * FEATURE_COUNT * SUM_COUNT,
+    );
+  }
+
+  /** The expected size of one coefficient, log2 in 1/256, after `share` of its frequency. */
+  predictScale(channel: number, axis: number, k: number): number {
+    const { features: f, axisLevels: axes, width, sharedSums: shared, sums } = this;
+    const { weights, biases, out } = this.prior;
+    const at = k + PADDING_BEFORE;
+    const first = channel * 3 * width + at;
+    const own = first + axis * width;
+    const parent = (PARENT_OF[channel] * 3 + axis) * width + at;
+    const mirror = (MIRROR_OF[channel] * 3 + axis) * width + at;
+    f[24] = axes[own - 1];
+    f[25] = axes[own - 2];
+    f[26] = axes[own - 3];
+    // axes that are not yet decoded are still zero
+    f[27] = axes[first];
+    f[28] = axes[first + width];
+    f[29] = axes[parent];
+    f[30] = axes[mirror];
+    f[31] = axes[mirror + 1];
+    const z = FREQUENCY_CLASS_OF[k];
+    const bias = (z * CHANNEL_AXES + channel * 3 + axis) * SUM_COUNT;
+    accumulateSums(
+      sums,
+      shared,
+      biases,
+      bias,
+      f,
+      SHARED_FEATURES,
+      FEATURE_COUNT,
+      weights,
+      z * FEATURE_COUNT * SUM_COUNT,
+    );
+    let result = sums[0] >> 8;
+    for (let unit = 0; unit < HIDDEN_UNITS; unit++) {
+      const x = sums[1 + unit] >> 8;
+      if (x > 0) result += Math.imul(x < 32767 ? x : 32767, out[z * HIDDEN_UNITS + unit]) >> 12;
+    }
+    return result < MIN_SCALE ? MIN_SCALE : result > MAX_SCALE ? MAX_SCALE : result;
+  }
+
+  /** Notes the size of a coefficient. */
+  updateMagnitude(channel: number, axis: number, k: number, magnitude: number): void {
+    this.axisLevels[(channel * 3 + axis) * this.width + k + PADDING_BEFORE] =
+      this.magnitudeLevels[magnitude < 4095 ? magnitude : 4095];
+  }
+
+  /** Notes that the three axes of a frequency are decoded. */
+  finishFrequency(channel: number, k: number): void {
+    const { axisLevels: axes, width } = this;
+    const at = channel * 3 * width + k + PADDING_BEFORE;
+    const mean = ((axes[at] + axes[at + width] + axes[at + 2 * width]) / 3) | 0;
+    this.meanLevels[channel * width + k + PADDING_BEFORE] = mean;
+    this.runningSum += mean;
+  }
+
+  /** Notes that a channel is decoded. */
+  finishChannel(channel: number): void {
+    const { meanLevels: means, levelTotals: totals, width } = this;
+    for (let at = 0; at < width; at++) totals[at] += means[channel * width + at];
+  }
+}
+
+/**
+ * The nine sums, into `out`: `start`, the biases from `bias` on, and features `from` .. `to` - 1 weighted with [feature][sum] from
+ * `base` on. They are named one by one because they are to stay in registers: most of a decoder's time is spent here. They
+ * are whole numbers in doubles, which multiply and add at least as fast, and there are more registers for them.
+ */
+function accumulateSums(
+  out: Float64Array,
+  start: Float64Array,
+  biases: Float64Array,
+  bias: number,
+  features: Float64Array,
+  from: number,
+  to: number,
+  weights: Float64Array,
+  base: number,
+): void {
+  let a = start[0] + biases[bias];
+  let b = start[1] + biases[bias + 1];
+  let c = start[2] + biases[bias + 2];
+  let d = start[3] + biases[bias + 3];
+  let e = start[4] + biases[bias + 4];
+  let f = start[5] + biases[bias + 5];
+  let g = start[6] + biases[bias + 6];
+  let h = start[7] + biases[bias + 7];
+  let i = start[8] + biases[bias + 8];
+  for (let feature = from; feature < to; feature++) {
+    const value = features[feature],
+      at = base + feature * SUM_COUNT;
+    a += value * weights[at];
+    b += value * weights[at + 1];
+    c += value * weights[at + 2];
+    d += value * weights[at + 3];
+    e += value * weights[at + 4];
+    f += value * weights[at + 5];
+    g += value * weights[at + 6];
+    h += value * weights[at + 7];
+    i += value * weights[at + 8];
+  }
+  out[0] = a;
+  out[1] = b;
+  out[2] = c;
+  out[3] = d;
+  out[4] = e;
+  out[5] = f;
+  out[6] = g;
+  out[7] = h;
+  out[8] = i;
+}
+
+/**
+ * Context of the sign of the coefficient at `at` of `q`, whose frequency is `k`: a movement that a block cuts off leaves every
+ * second frequency with one sign.
+ */
+export function signContext(q: Float64Array, offset: number, k: number): number {
+  const near = k > 2 ? q[offset - 2] : 0;
+  const far = k > 4 ? q[offset - 4] : 0;
+  return 3 * ((near < -2 ? -2 : near > 2 ? 2 : near) + 2) + (far < 0 ? 0 : far > 0 ? 2 : 1);
+}

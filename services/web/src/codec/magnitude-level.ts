@@ -1,0 +1,36 @@
+/** Sizes on a logarithmic scale, in integers so that every decoder reaches the same (`proto/SPEC.md`, Levels). */
+
+const LEVEL_COUNT = 4096;
+const table = new Uint8Array(LEVEL_COUNT);
+let isFilled = false;
+
+/** Half the bits of (size + 1)^32, rounded down. */
+function computeLevel(magnitude: number): number {
+  const digits = (BigInt(magnitude + 1) ** 32n).toString(16);
+  return (4 * digits.length - Math.clz32(Number.parseInt(digits[0], 16)) + 28) >> 1;
+}
+
+/** Fills the table from `first` to `last`, whose levels are known: few sizes need the definition, as it never falls. */
+function fillTable(first: number, last: number, lowest: number, highest: number): void {
+  if (lowest === highest || last - first < 2) {
+    table.fill(lowest, first, last);
+    table[last] = highest;
+    return;
+  }
+  const middle = (first + last) >> 1,
+    between = computeLevel(middle);
+  fillTable(first, middle, lowest, between);
+  fillTable(middle, last, between, highest);
+}
+
+/** Levels of 0..4095; larger sizes have that of 4095. */
+export function magnitudeLevels(): Uint8Array {
+  if (!isFilled) fillTable(0, LEVEL_COUNT - 1, computeLevel(0), computeLevel(LEVEL_COUNT - 1));
+  isFilled = true;
+  return table;
+}
+
+/** 16 log2(1 + size), rounded. */
+export function magnitudeLevel(magnitude: number): number {
+  return magnitudeLevels()[Math.min(magnitude, LEVEL_COUNT - 1)];
+}

@@ -1,0 +1,233 @@
+/**
+ * One limb between the dance and a hand: taken, pulled, let go. Each frame the limb is first shown the dance (`see`), then,
+ * while it is not wholly the dance's, pulled (`pull`). It remembers where it is and how fast it goes, and is moved on by the time
+ * between frames, in seconds. Places (3) are hand tips in the shoulder's frame in arm lengths; of a leg the thigh's angle, first
+ * of three. Poses are 18 rotations, joints 12 numbers. As `marionette/pulled.py`.
+ */
+
+import type { Numbers } from "../motion/rotation";
+import type { Figure } from "../motion/skeleton";
+import { addScaled, distanceBetween, length } from "../motion/vector";
+import { ArmBlend } from "./blend";
+import { Elbow, liftAngle } from "./elbow";
+import { Follower } from "./follower";
+import { DirectionAlignment, HAND_ACCELERATION, JointBlend, returnAcceleration, THIGH_ACCELERATION } from "./handover";
+import { ArmRig, LegRig } from "./limb-rig";
+import { MAX_TIP_DISTANCE } from "./proportions";
+
+/** Arm lengths: a pulled arm is never quite locked, so that its elbow leaves the line at a bounded speed. */
+export const MAX_REACH = 0.9995;
+/** Arm lengths from the shoulder that a hand is pulled to at least: nearer in, the elbow would have to whirl. */
+export const MIN_REACH = 0.15;
+/** Arm lengths per second squared, against the dance, that a hand let go comes back with at most. */
+const MAX_HAND_RETURN_ACCELERATION = 79;
+/** Arm lengths, or radians, within which a limb is the dance's again. */
+const ARRIVAL_TOLERANCE = 1e-6;
+/** A limb on its last way home is still solved for. */
+const MIN_WEIGHT = 1e-9;
+
+const ZERO_VELOCITY = new Float64Array(3);
+
+/** What hands and legs have in common: how the dance has the limb, and how it moves. */
+export abstract class ControlledLimb {
+  protected readonly motionPosition = new Float64Array(3);
+  protected readonly velocity = new Float64Array(3);
+  protected follower: Follower | null = null;
+  protected returnAcceleration: number | null = null;
+  private hasPose = false;
+  private readonly currentPosition = new Float64Array(3);
+  private readonly previousPosition = new Float64Array(3);
+  private readonly previousVelocity = new Float64Array(3);
+
+  /** Where the limb is (3); live storage. */
+  get position(): Float64Array {
+    return this.follower ? this.follower.position : this.motionPosition;
+  }
+
+  /** The dance's pose, `seconds` after the last. */
+  observePose(rotations: Numbers, seconds: number): void {
+    const { motionPosition: own, previousPosition: before, currentPosition: now, velocity } = this;
+    this.positionInPose(now, rotations);
+    before.set(this.hasPose ? own : now);
+    this.previousVelocity.set(velocity);
+    own.set(now);
+    for (let i = 0; i < 3; i++) velocity[i] = seconds > 0 ? (own[i] - before[i]) / seconds : 0;
+    this.hasPose = true;
+  }
+
+  /** The limb is wholly the dance's. */
+  reset(): void {
+    this.follower = null;
+    this.returnAcceleration = null;
+  }
+
+  /** The limb is taken where another pose than the dance has it, standing. */
+  startFrom(rotations: Numbers): void {
+    this.positionInPose(this.currentPosition, rotations);
+    this.follower = new Follower(this.currentPosition, ZERO_VELOCITY);
+  }
+
+  /**
+   * Writes the limb's joints, `seconds` after the last, in the pose that was seen just now; false, nothing written, once it is
+   * back. It is on its way to `wanted` (3), or, where that is null, back to the dance; `weight` (0..1) says how far it has gone
+   * over from the dance's way of reaching a place to the marionette's.
+   */
+  abstract solveJoints(
+    out: Numbers,
+    outAt: number,
+    rotations: Numbers,
+    goal: Numbers | null,
+    weight: number,
+    seconds: number,
+  ): boolean;
+
+  /** Where a pose has the limb (3). */
+  protected abstract positionInPose(out: Numbers, rotations: Numbers): void;
+
+  /** What moves the limb; it starts from where the dance had it a frame ago, at the speed it had. */
+  protected ensureFollower(): Follower {
+    return (this.follower ??= new Follower(this.previousPosition, this.previousVelocity));
+  }
+
+  /** The acceleration on the way back to the dance, settled when the limb is let go. */
+  protected chooseReturnAcceleration(maxAcceleration: number): number {
+    if (this.returnAcceleration !== null) return this.returnAcceleration;
+    const { position: place, velocity } = this.ensureFollower();
+    const away = distanceBetween(place, 0, this.previousPosition, 0);
+    return (this.returnAcceleration = returnAcceleration(
+      away,
+      distanceBetween(velocity, 0, this.velocity, 0),
+      maxAcceleration,
+    ));
+  }
+}
+
+/** One hand of a figure. */
+export class ControlledHand extends ControlledLimb {
+  readonly rig: ArmRig;
+  private readonly elbow: Elbow;
+  private readonly alignment = new DirectionAlignment();
+  private readonly blend: ArmBlend;
+  private readonly clampedGoal = new Float64Array(3);
+  private readonly direction = new Float64Array(3);
+  private readonly axis = new Float64Array(3);
+  private readonly up = new Float64Array(3);
+  private readonly target = new Float64Array(3);
+  private readonly around = new Float64Array(4);
+  private readonly places = new Float64Array(9);
+  private readonly bent = new Float64Array(12);
+
+  /** `limb` is 0 (left hand) or 1 (right hand), `table` what `readTable` gave for the arm's proportions. */
+  constructor(figure: Figure, limb: 0 | 1, table: Float64Array) {
+    super();
+    this.rig = new ArmRig(figure, limb, table);
+    this.elbow = new Elbow(this.rig.arm, this.rig.shoulder);
+    this.blend = new ArmBlend(this.rig);
+  }
+
+  override reset(): void {
+    super.reset();
+    this.elbow.reset();
+    this.alignment.reset();
+    this.blend.reset();
+  }
+
+  override solveJoints(
+    out: Numbers,
+    outAt: number,
+    rotations: Numbers,
+    goal: Numbers | null,
+    weight: number,
+    seconds: number,
+  ): boolean {
+    const { rig, elbow, motionPosition: own, direction, up, target, bent, around } = this;
+    const { minTipDistance: inner } = rig.arm,
+      at = 4 * rig.firstJointIndex,
+      follower = this.ensureFollower(),
+      hand = follower.position;
+    if (goal) {
+      this.returnAcceleration = null;
+      const reach = Math.min(Math.max(length(goal, 0), MIN_REACH), MAX_REACH);
+      rig.targetDirection(this.clampedGoal, 0, goal, 0);
+      for (let i = 0; i < 3; i++) this.clampedGoal[i] *= reach;
+      follower.step(this.clampedGoal, seconds, HAND_ACCELERATION, inner, MAX_TIP_DISTANCE);
+    } else {
+      // the dance may have its hand nearer to the shoulder than one is pulled
+      follower.step(
+        own,
+        seconds,
+        this.chooseReturnAcceleration(MAX_HAND_RETURN_ACCELERATION),
+        Math.min(inner, length(own, 0)),
+        1,
+        this.velocity,
+      );
+      if (weight <= 0 && distanceBetween(hand, 0, own, 0) < ARRIVAL_TOLERANCE) return false;
+    }
+    if (!elbow.hasBegun) {
+      rig.jointPositions(this.places, 0, rotations, at);
+      rig.targetDirection(direction, 0, own, 0);
+      rig.planeNormal(this.axis, 0, rotations, at);
+      elbow.begin(direction, this.axis, liftAngle(this.places, direction));
+    }
+    rig.targetDirection(direction, 0, hand, 0);
+    rig.localUp(up, 0, rotations);
+    const { tip, normal, bend } = elbow.step(direction, length(hand, 0), up, seconds);
+    rig.bendJoints(bent, 0, length(tip, 0), bend);
+    // the dance may hold its arms where the marionette's shoulders do not go: what they allow comes in with the weight
+    addScaled(target, 0, tip, 0, hand, 0, -1);
+    addScaled(target, 0, hand, 0, target, 0, weight);
+    this.alignment.update(around, 0, own, target, weight);
+    this.blend.blend(out, outAt, rotations, at, bent, target, around, normal, Math.max(weight, MIN_WEIGHT), seconds);
+    return true;
+  }
+
+  protected override positionInPose(out: Numbers, rotations: Numbers): void {
+    this.rig.tipTarget(out, 0, rotations, 4 * this.rig.firstJointIndex);
+  }
+}
+
+/** One leg of a figure. */
+export class ControlledLeg extends ControlledLimb {
+  readonly rig: LegRig;
+  private readonly hung = new Float64Array(12);
+  private readonly blend = new JointBlend();
+
+  /** `limb` is 2 (left leg) or 3 (right leg). */
+  constructor(figure: Figure, limb: 2 | 3) {
+    super();
+    this.rig = new LegRig(figure, limb);
+  }
+
+  override reset(): void {
+    super.reset();
+    this.blend.reset();
+  }
+
+  override solveJoints(
+    out: Numbers,
+    outAt: number,
+    rotations: Numbers,
+    goal: Numbers | null,
+    weight: number,
+    seconds: number,
+  ): boolean {
+    const { rig, motionPosition: own, hung } = this;
+    const follower = this.ensureFollower(),
+      thigh = follower.position;
+    if (goal) {
+      this.returnAcceleration = null;
+      follower.step(goal, seconds, THIGH_ACCELERATION);
+    } else {
+      follower.step(own, seconds, this.chooseReturnAcceleration(THIGH_ACCELERATION), 0, Infinity, this.velocity);
+      if (weight <= 0 && Math.abs(thigh[0] - own[0]) < ARRIVAL_TOLERANCE) return false;
+    }
+    rig.solve(hung, 0, thigh[0], rotations);
+    this.blend.blend(out, outAt, rotations, 4 * rig.firstJointIndex, hung, 0, Math.max(weight, MIN_WEIGHT));
+    return true;
+  }
+
+  protected override positionInPose(out: Numbers, rotations: Numbers): void {
+    out[0] = this.rig.thighAngle(rotations, this.motionPosition[0]);
+    out[1] = out[2] = 0;
+  }
+}

@@ -1,0 +1,144 @@
+/**
+ * A limb on its way to where it is wanted, at a bounded acceleration: it speeds up, brakes in time and arrives without running
+ * past (the time-optimal way of a mass with a bounded force, in discrete time; Han, From PID to Active Disturbance Rejection
+ * Control, 2009). A target that moves evenly is kept up with and not run after. As `marionette/follow.py`.
+ */
+
+import type { Numbers } from "../motion/rotation";
+import {
+  addScaled,
+  anyPerpendicular,
+  distanceBetween,
+  dot,
+  length,
+  rejectFrom,
+  setVector,
+  unit,
+} from "../motion/vector";
+
+/** Arm lengths (radians, of a thigh) per second: a target that moved faster has jumped, and has no speed of its own. */
+const MAX_TARGET_SPEED = 4;
+/** Arm lengths (radians) per second: no hand or thigh is sent farther in a second than that. */
+const MAX_LIMB_SPEED = 5;
+/** Arm lengths from the shoulder within which a hand on its way elsewhere does not come: it goes round. */
+const SHOULDER_CLEARANCE = 0.35;
+
+const FORWARDS = Float64Array.of(0, 0, 1);
+
+/** One hand (arm lengths) or thigh (radians in the first of three), where it is and how fast it goes. */
+export class Follower {
+  readonly position: Float64Array;
+  readonly velocity: Float64Array;
+  private readonly previousTarget = new Float64Array(3);
+  private readonly previousFrameVelocity = new Float64Array(3);
+  /** Whether there was a step before, and whether its ground moved. */
+  private hasPreviousTarget = false;
+  private hadFrameVelocity = false;
+  private readonly ahead = new Float64Array(3);
+  private readonly goal = new Float64Array(3);
+  private readonly direction = new Float64Array(3);
+  private readonly change = new Float64Array(3);
+  private readonly before = new Float64Array(3);
+  private readonly aside = new Float64Array(3);
+
+  /** Starts at `place` (3) with `velocity` (3), which are copied. */
+  constructor(place: Numbers, velocity: Numbers) {
+    this.position = place.slice();
+    this.velocity = velocity.slice();
+  }
+
+  /**
+   * Moves `place` on by `seconds`, on the way to `wanted`.
+   *
+   * `acceleration` (a second squared) bounds the change of velocity. With `carried`, the velocity of a moving ground (the
+   * dance's own limb), the bound is on the change against it: so the limb is back in the dance in a time that does not depend
+   * on what the dance does. A place nearer to the origin than `inner` or farther than `outer` is not taken, and the way round
+   * the origin keeps `CLEARANCE` where it can.
+   */
+  step(
+    target: Numbers,
+    seconds: number,
+    acceleration: number,
+    minDistance = 0,
+    maxDistance = Infinity,
+    frameVelocity: Numbers | null = null,
+  ): void {
+    if (seconds <= 0) return;
+    const { position: place, velocity, ahead, goal, direction, change, before } = this;
+    for (let i = 0; i < 3; i++) {
+      ahead[i] = frameVelocity
+        ? frameVelocity[i]
+        : this.hasPreviousTarget
+          ? (target[i] - this.previousTarget[i]) / seconds
+          : 0;
+      before[i] = frameVelocity ? (this.hadFrameVelocity ? this.previousFrameVelocity[i] : frameVelocity[i]) : 0;
+    }
+    if (!frameVelocity && length(ahead, 0) > MAX_TARGET_SPEED) ahead.fill(0);
+    this.hasPreviousTarget = true;
+    this.previousTarget.set(target);
+    this.hadFrameVelocity = frameVelocity !== null;
+    if (frameVelocity) this.previousFrameVelocity.set(frameVelocity);
+    // what is left of the way when the target's own is taken off
+    addScaled(goal, 0, target, 0, ahead, 0, -seconds);
+    const distance = this.findPath(goal, minDistance);
+    const most = acceleration * seconds;
+    // the speed from which whole steps of the bounded acceleration come to rest after `distance`
+    let speed = most * (Math.sqrt(0.25 + (2 * distance) / (most * seconds)) - 0.5);
+    speed = Math.min(speed, distance / seconds, MAX_LIMB_SPEED);
+    // with a moving ground all velocities are against it
+    for (let i = 0; i < 3; i++) {
+      const had = velocity[i] - before[i];
+      const aim = frameVelocity ? direction[i] * speed : ahead[i] + direction[i] * speed;
+      change[i] = aim - had;
+      velocity[i] = frameVelocity ? had + ahead[i] : had;
+    }
+    const size = length(change, 0);
+    addScaled(velocity, 0, velocity, 0, change, 0, size > most ? most / size : 1);
+    before.set(place);
+    addScaled(place, 0, place, 0, velocity, 0, seconds);
+    clampDistance(place, minDistance, maxDistance);
+    for (let i = 0; i < 3; i++) velocity[i] = (place[i] - before[i]) / seconds;
+  }
+
+  /** How far it is to `wanted`, straight or past a point beside the origin; the unit vector to set out on into `direction`. */
+  private findPath(target: Numbers, minDistance: number): number {
+    const { position: place, direction, aside } = this;
+    addScaled(direction, 0, target, 0, place, 0, -1);
+    const distance = length(direction, 0);
+    if (distance < 1e-12) {
+      direction.fill(0);
+      return 0;
+    }
+    for (let i = 0; i < 3; i++) direction[i] /= distance;
+    if (minDistance <= 0) return distance;
+    const along = -dot(place, 0, direction, 0);
+    const near = Math.min(SHOULDER_CLEARANCE, length(place, 0), length(target, 0));
+    if (!(along > 0 && along < distance)) return distance;
+    // the nearest that the straight way comes to the origin
+    addScaled(aside, 0, place, 0, direction, 0, along);
+    const off = length(aside, 0);
+    if (off >= near) return distance;
+    if (off > 1e-3) unit(aside, 0, aside, 0);
+    else {
+      // in front of the chest, where a hand that comes straight across has the room
+      rejectFrom(aside, 0, FORWARDS, 0, direction, 0);
+      if (length(aside, 0) > 0.1) unit(aside, 0, aside, 0);
+      else anyPerpendicular(aside, 0, direction, 0);
+    }
+    for (let i = 0; i < 3; i++) aside[i] *= near;
+    const leg = distanceBetween(aside, 0, place, 0);
+    if (leg < 1e-9) return distance;
+    for (let i = 0; i < 3; i++) direction[i] = (aside[i] - place[i]) / leg;
+    return leg + distanceBetween(target, 0, aside, 0);
+  }
+}
+
+function clampDistance(position: Numbers, minDistance: number, maxDistance: number): void {
+  const size = length(position, 0);
+  if (size < minDistance) {
+    if (!unit(position, 0, position, 0)) setVector(position, 0, 0, -1, 0);
+    for (let i = 0; i < 3; i++) position[i] *= minDistance;
+  } else if (size > maxDistance) {
+    for (let i = 0; i < 3; i++) position[i] *= maxDistance / size;
+  }
+}

@@ -1,0 +1,86 @@
+/**
+ * The links of an arm turn about themselves at a bounded speed. Where a link lies says nothing about how far it is turned about
+ * itself: an arm that is all but straight may have any plane, and a wrist that bends a little more may turn the palm over. So
+ * each link remembers how it was turned, and what is asked of it beyond `FASTEST` it makes up for later: shoulder, elbow and
+ * wrist trade that turn, and no place changes. As `marionette/spin.py`.
+ */
+
+import { conjugate, multiply, type Numbers, rotate } from "../motion/rotation";
+import { dot, fromAxisAngle, normalise, rotationBetween, setVector, unit } from "../motion/vector";
+
+/** Radians per second that a link turns about itself at most. */
+export const MAX_TWIST_SPEED_RAD_S = 5 * Math.PI;
+/** Radians that a link is behind at most; beyond, it takes the other way round. */
+export const MAX_TWIST_LAG_RAD = 1.5 * Math.PI;
+/** Radians of a whole turn. */
+export const FULL_TURN_RAD = 2 * Math.PI;
+
+/** The three links of one arm. */
+export class TwistLimiter {
+  /** Radians (3), link by link, from what was wanted last to what was shown, within `FARTHEST` either way. */
+  readonly lagRad = new Float64Array(3);
+  private hasOrientations = false;
+  private readonly directions = new Float64Array(9);
+  private readonly orientations = new Float64Array(12);
+  private readonly wanted = new Float64Array(4);
+  private readonly carried = new Float64Array(4);
+  private readonly turn = new Float64Array(4);
+  private readonly along = new Float64Array(3);
+  private readonly before = new Float64Array(3);
+
+  /** `links` (9) are where their orientations are the identity, of any length. */
+  constructor(links: Numbers) {
+    for (let at = 0; at < 9; at += 3)
+      if (!unit(this.directions, at, links, at)) setVector(this.directions, at, 0, -1, 0);
+  }
+
+  /** The next call of `follow` starts anew. */
+  reset(): void {
+    this.hasOrientations = false;
+    this.lagRad.fill(0);
+  }
+
+  /**
+   * Makes of joints (12) the nearest that the arm is shown with, `seconds` after the last. All places stay, and no link is turned
+   * about itself by more than `share` (0..1) of `FARTHEST` from what was given. The first time, and where all links keep up, the
+   * joints stay as they are.
+   */
+  limit(joints: Numbers, at: number, share: number, seconds: number): void {
+    const { wanted, orientations: shown, lagRad: behind, turn } = this;
+    wanted[0] = 1;
+    setVector(wanted, 1, 0, 0, 0);
+    for (let link = 0; link < 3; link++) {
+      multiply(wanted, 0, wanted, 0, joints, at + 4 * link);
+      if (this.hasOrientations) this.limitBoneTwist(link, MAX_TWIST_LAG_RAD * share, MAX_TWIST_SPEED_RAD_S * seconds);
+      else for (let i = 0; i < 4; i++) shown[4 * link + i] = wanted[i];
+    }
+    this.hasOrientations = true;
+    if (behind[0] === 0 && behind[1] === 0 && behind[2] === 0) return;
+    for (let i = 0; i < 4; i++) joints[at + i] = shown[i];
+    for (let i = 4; i < 12; i += 4) {
+      conjugate(turn, 0, shown, i - 4);
+      multiply(joints, at + i, turn, 0, shown, i);
+      normalise(joints, at + i);
+    }
+  }
+
+  /** Shows a link as it is wanted, turned about itself by `most` radians at most, `step` less than if it stayed as it was. */
+  private limitBoneTwist(link: number, maxLag: number, maxStep: number): void {
+    const { directions, wanted, orientations: shown, lagRad: behind, carried, turn, along, before } = this;
+    rotate(along, 0, wanted, 0, directions, 3 * link);
+    rotate(before, 0, shown, 4 * link, directions, 3 * link);
+    rotationBetween(carried, 0, before, 0, along, 0);
+    multiply(carried, 0, carried, 0, shown, 4 * link);
+    conjugate(turn, 0, wanted, 0);
+    multiply(turn, 0, carried, 0, turn, 0);
+    let angle = 2 * Math.atan2(dot(turn, 1, along, 0), turn[0]);
+    // the way round that it took, unless that is much the longer by now
+    angle += FULL_TURN_RAD * Math.round((behind[link] - angle) / FULL_TURN_RAD);
+    if (Math.abs(angle) > MAX_TWIST_LAG_RAD) angle -= FULL_TURN_RAD * Math.round(angle / FULL_TURN_RAD);
+    const left = Math.min(Math.max(Math.abs(angle) - maxStep, 0), maxLag);
+    behind[link] = left > 0 ? Math.sign(angle) * left : 0;
+    fromAxisAngle(turn, 0, along, 0, behind[link]);
+    multiply(shown, 4 * link, turn, 0, wanted, 0);
+    normalise(shown, 4 * link);
+  }
+}

@@ -1,0 +1,140 @@
+/** The puppet's one material: three's physical shading with finish, pattern and wood taken from vertex attributes. */
+import { BackSide, type IUniform, MeshLambertMaterial, MeshPhysicalMaterial, type Texture } from "three";
+import { NOISE_GLSL } from "../scenery/noise";
+
+const VERTEX_HEADER_GLSL = /* glsl */ `
+attribute vec4 finish; attribute vec3 pattern;
+varying vec4 vFinish; varying vec3 vPattern; varying vec3 vRest; varying float vSeed, vFront;
+`;
+const FRAGMENT_HEADER_GLSL = /* glsl */ `
+varying vec4 vFinish; varying vec3 vPattern; varying vec3 vRest; varying float vSeed, vFront;
+uniform sampler2D facePaint; uniform sampler2D hempLeaf;
+${NOISE_GLSL}
+`;
+
+/** Year rings, fibres and pores from the place in the rest pose; `vSeed` makes each bone a timber of its own. */
+const WOOD_GLSL = /* glsl */ `
+#ifndef PLAIN
+if (vFinish.w > 0.) {
+  vec3 q = vRest + vSeed * vec3(.37, 1.3, .71);
+  float warp = 1.6 * noise3(q * vec3(7., 1.6, 7.)) + .35 * noise3(q * vec3(22., 3., 22.));
+  float ring = fract(.5 * (85. * length(q.xz - floor(q.xz * 2.) * .5 - vec2(.33, .18)) + 5. * warp));
+  ring = smoothstep(0., .75, ring) * smoothstep(1., .86, ring);
+  float fibre = noise3(q * vec3(520., 14., 520.));
+  float pore = smoothstep(.74, .9, noise3(q * vec3(300., 9., 300.)));
+  diffuseColor.rgb = mix(diffuseColor.rgb, diffuseColor.rgb * vec3(.62, .50, .40), vFinish.w * (.46 * ring + .25 * pore));
+  diffuseColor.rgb *= 1. + vFinish.w * .14 * (fibre - .5);
+  roughen = vFinish.w * (.10 * ring + .15 * pore);
+}
+#endif
+`;
+
+/** Kinds of PATTERN in finish.ts: 1 face, 2 asanoha, 3 weave, 4 stripe. */
+const COLOUR_GLSL = /* glsl */ `
+#include <color_fragment>
+float roughen = 0.;
+#ifdef PLAIN
+float thread = 1.;
+#else
+float thread = .93 + .14 * noise2(vPattern.xy * vec2(900., 220.));
+#endif
+if (vPattern.z > 3.5) {
+  float at = vPattern.x * 62., blur = 1.5 * fwidth(at);
+  float stripe = smoothstep(.8 - blur, .8 + blur, 2. * abs(fract(at) - .5)) * (1. - clamp(.7 * blur, 0., .8));
+  diffuseColor.rgb = mix(diffuseColor.rgb, 1.7 * diffuseColor.rgb + vec3(.016, .014, .011), .45 * stripe);
+  diffuseColor.rgb *= thread;
+} else if (vPattern.z > 2.5) {
+  diffuseColor.rgb *= .86 + .22 * smoothstep(.5, .62, 2. * abs(fract(vPattern.y * 46.) - .5));
+} else if (vPattern.z > 1.5) {
+  float line = texture2D(hempLeaf, vPattern.xy * 11.).r;
+  diffuseColor.rgb = mix(diffuseColor.rgb, 2.2 * diffuseColor.rgb + vec3(.045, .055, .075), .62 * line);
+  diffuseColor.rgb *= thread;
+} else if (vPattern.z > .5) {
+  float front = smoothstep(.2, .5, vFront);
+  diffuseColor.rgb *= mix(vec3(1.), texture2D(facePaint, vPattern.xy).rgb, front);
+}
+${WOOD_GLSL}
+`;
+
+/** The figure for machines that draw in software: colours, patterns and light, without lacquer, grain or reflections. */
+export function createSimpleFigureMaterial(paint: PuppetTextures): MeshLambertMaterial {
+  const material = new MeshLambertMaterial({ vertexColors: true });
+  material.defines = { PLAIN: "" };
+  material.customProgramCacheKey = () => "figure-plain";
+  material.onBeforeCompile = (shader) => {
+    Object.assign(shader.uniforms, { facePaint: { value: paint.face }, hempLeaf: { value: paint.asanoha } });
+    patchVertexShader(shader);
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", `#include <common>\n${FRAGMENT_HEADER_GLSL}`)
+      .replace("#include <color_fragment>", COLOUR_GLSL)
+      // What the studio's panes would have given is put in as a little light of its own.
+      .replace("#include <emissivemap_fragment>", "totalEmissiveRadiance = diffuseColor.rgb * .16;");
+  };
+  return material;
+}
+
+function patchVertexShader(shader: { vertexShader: string }): void {
+  shader.vertexShader = shader.vertexShader
+    .replace("#include <common>", `#include <common>\n${VERTEX_HEADER_GLSL}`)
+    .replace(
+      "#include <begin_vertex>",
+      "#include <begin_vertex>\nvFinish = finish; vPattern = pattern; vRest = position; vSeed = skinIndex.x; vFront = normal.z;",
+    );
+}
+
+export interface PuppetTextures {
+  face: Texture;
+  asanoha: Texture;
+}
+
+/**
+ * The figure's material; with `mirrorAt` the one that draws the same mesh upside down below a floor at that height (an
+ * object holding it, shared with the floor) and fades it with the distance to the floor.
+ */
+export function createFigureMaterial(paint: PuppetTextures, mirrorHeight?: IUniform<number>): MeshPhysicalMaterial {
+  const material = new MeshPhysicalMaterial({
+    vertexColors: true,
+    roughness: 1,
+    metalness: 1,
+    clearcoat: 1,
+    clearcoatRoughness: 0.16,
+  });
+  if (mirrorHeight) {
+    material.side = BackSide;
+    material.clearcoat = 0.001;
+  }
+  material.customProgramCacheKey = () => (mirrorHeight ? "figure-mirrored" : "figure");
+  material.onBeforeCompile = (shader) => {
+    Object.assign(shader.uniforms, { facePaint: { value: paint.face }, hempLeaf: { value: paint.asanoha } });
+    if (mirrorHeight) shader.uniforms.floorAt = mirrorHeight;
+    patchVertexShader(shader);
+    shader.fragmentShader = shader.fragmentShader
+      .replace(
+        "#include <common>",
+        `#include <common>\n${FRAGMENT_HEADER_GLSL}${mirrorHeight ? "varying float vHeight;\n" : ""}`,
+      )
+      .replace("#include <color_fragment>", COLOUR_GLSL)
+      .replace("#include <roughnessmap_fragment>", "float roughnessFactor = clamp(vFinish.x + roughen, .05, 1.);")
+      .replace("#include <metalnessmap_fragment>", "float metalnessFactor = vFinish.y;")
+      .replace(
+        "#include <lights_physical_fragment>",
+        "#include <lights_physical_fragment>\nmaterial.clearcoat *= vFinish.z;",
+      );
+    if (!mirrorHeight) return;
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", "#include <common>\nvarying float vHeight; uniform float floorAt;")
+      .replace(
+        "#include <fog_vertex>",
+        `#include <fog_vertex>
+      vec4 above = modelMatrix * vec4(transformed, 1.);
+      vHeight = above.y - floorAt;
+      above.y = floorAt - vHeight;
+      gl_Position = projectionMatrix * viewMatrix * above;`,
+      );
+    shader.fragmentShader = shader.fragmentShader.replace(
+      "#include <opaque_fragment>",
+      "#include <opaque_fragment>\ngl_FragColor.rgb *= exp(-2.1 * max(vHeight, 0.));",
+    );
+  };
+  return material;
+}

@@ -1,0 +1,97 @@
+/** The puppet as a mesh for files: what it looks like at rest, and how its sleeves hang in a dance. */
+import { Matrix4, Quaternion, type SkinnedMesh, Texture, Vector3 } from "three";
+import type { PuppetModel } from "../../export/glb";
+import { type Figure, JOINTS } from "../../motion/skeleton";
+import { PATTERN } from "./finish";
+import { Puppet } from "./puppet";
+import { PuppetAssets } from "./puppet-assets";
+import { SIDES } from "./standard-figure";
+import { createFaceTexture } from "./texture";
+
+/** Triangles whose normals look less forward than this have no face painted on them. */
+const MIN_FACE_NORMAL_Z = 0.2;
+
+/** The puppet of this `figure`. Takes no graphics context. */
+export function createPuppetModel(figure: Figure): PuppetModel {
+  // a file has no use for the paint of the stage
+  const unpainted = { face: new Texture(), asanoha: new Texture() };
+  const puppet = new Puppet(figure, new PuppetAssets(unpainted, { value: 0 }));
+  const { geometry } = puppet.group.getObjectByName("figure") as SkinnedMesh;
+  const values = (name: string) => geometry.getAttribute(name).array;
+  const normals = Float32Array.from(values("normal")),
+    pattern = values("pattern");
+  const vertices = normals.length / 3;
+  const painted = (vertex: number) =>
+    pattern[vertex * 3 + 2] === PATTERN.face && normals[vertex * 3 + 2] > MIN_FACE_NORMAL_Z;
+  const face: number[] = [],
+    body: number[] = [];
+  const triangles = geometry.index?.array ?? [];
+  for (let at = 0; at < triangles.length; at += 3) {
+    const corners = [triangles[at], triangles[at + 1], triangles[at + 2]];
+    (corners.every(painted) ? face : body).push(...corners);
+  }
+  const sleeves = SIDES.map(({ side }) => new SleeveRotation(puppet, side));
+  return {
+    positions: Float32Array.from(values("position")),
+    normals,
+    colours: Float32Array.from(values("color")),
+    bones: Uint8Array.from(values("skinIndex")),
+    weights: Float32Array.from(values("skinWeight")),
+    faceUvs: Float32Array.from({ length: vertices * 2 }, (_, i) =>
+      i % 2 === 0 ? pattern[(i / 2) * 3] : 1 - pattern[((i - 1) / 2) * 3 + 1],
+    ),
+    face: Uint32Array.from(face),
+    body: Uint32Array.from(body),
+    poseSleeves(pose, seconds, out) {
+      puppet.apply(pose, seconds);
+      sleeves.forEach((sleeve, at) => sleeve.write(out, at * 4));
+    },
+  };
+}
+
+/** The face as a picture, PNG. */
+export async function renderFacePng(): Promise<Uint8Array<ArrayBuffer>> {
+  const texture = createFaceTexture();
+  const canvas = texture.image as HTMLCanvasElement;
+  const picture = await new Promise<Blob | null>((done) => canvas.toBlob(done, "image/png"));
+  texture.dispose();
+  if (!picture) throw new Error("this browser makes no picture of the face");
+  return new Uint8Array(await picture.arrayBuffer());
+}
+
+/**
+ * How a sleeve hangs, as a turn. On the stage the bag leans against the arm as no turn does: the turn keeps it along the arm,
+ * and falling to the same side of it.
+ */
+class SleeveRotation {
+  readonly #shoulder: Matrix4;
+  readonly #sleeve: Matrix4;
+  readonly #along: Vector3;
+  readonly #rest: Quaternion;
+
+  constructor(puppet: Puppet, side: string) {
+    this.#shoulder = puppet.joint(`${side}_shoulder`);
+    this.#sleeve = puppet.joint(`${side}_sleeve`);
+    this.#along = new Vector3().fromArray(puppet.figure.offsets, JOINTS.indexOf(`${side}_elbow`) * 3).normalize();
+    this.#rest = armFrame(this.#along.clone(), BAG_DIRECTION.clone()).invert();
+  }
+
+  /** Its turn in the shoulder's frame as the puppet stands now, w x y z. */
+  write(out: Float64Array, at: number): void {
+    const hanging = armFrame(
+      this.#along.clone().transformDirection(this.#sleeve),
+      BAG_DIRECTION.clone().transformDirection(this.#sleeve),
+    );
+    const turn = new Quaternion().setFromRotationMatrix(this.#shoulder).invert().multiply(hanging).multiply(this.#rest);
+    out.set([turn.w, turn.x, turn.y, turn.z], at);
+  }
+}
+
+/** Where the bag is drawn to hang at rest. */
+const BAG_DIRECTION = new Vector3(0, 0, -1);
+
+/** The turn to axes along `arm`, and across it towards `fall`. */
+function armFrame(arm: Vector3, fall: Vector3): Quaternion {
+  fall.addScaledVector(arm, -fall.dot(arm)).normalize();
+  return new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(arm, fall, arm.clone().cross(fall)));
+}

@@ -1,0 +1,276 @@
+/** What the audience sees of the strings: rings, threads and bars, from who holds what (section 5). */
+import { Group, Vector3 } from "three";
+import { LIMBS } from "../../motion/skeleton";
+import { limbNumber, MAX_LIMBS } from "../../wire/limbs";
+import type { Performer } from "../puppet/performer";
+import type { Look } from "../scenery/look";
+import { type ControlBar, ControlBars, HOOK_OFFSET_M } from "./control-bar";
+import { HandleRings } from "./handle-ring";
+import { separate } from "./separation";
+import { Threads } from "./thread";
+
+export interface StringState {
+  /** Index of the holder's colour, or null when the limb is free. */
+  puppeteer: number | null;
+  /** The pointer is near, or the control has the focus. */
+  isHighlighted: boolean;
+  /** Where the holder pulls to, world metres; null when unknown (another's hand, keys, a stick). */
+  pullTarget: Vector3 | null;
+  /** Of a performer that this page's keys do not act on just now: it keeps to the background. */
+  isDimmed?: boolean;
+}
+
+/** How the strings are looked at. */
+export interface StringsView {
+  /** Height of the floor, and what bars stay under, world metres. */
+  ground: number;
+  ceiling: number;
+  /** The camera's right, world. */
+  right: Vector3;
+  /** How many times further away than from one dancer. */
+  distanceScale: number;
+}
+
+const FREE_STRING: StringState = { puppeteer: null, isHighlighted: false, pullTarget: null };
+/** What is left of the rings and silk of those behind. */
+const DIMMED_SHARE = 0.42;
+const HIDDEN_POSITION = new Vector3();
+
+/** Pull error that draws a thread fully taut, metres. */
+const TAUT_ERROR_M = 0.25;
+/** Heights over the floor that bars keep at least: of hands, of legs. Metres for the standard figure. */
+const MIN_BAR_HEIGHT_M = [2.14, 1.98];
+/** Bars at heights nearer than this hang as far apart as this, so that none covers another. Metres for the standard figure. */
+const SAME_HEIGHT_M = 0.2;
+const MIN_BAR_DISTANCE_M = 0.36;
+const MAX_LEAN_RAD = (12 * Math.PI) / 180;
+
+interface StringAnimation {
+  held: number;
+  highlight: number;
+  bar: Vector3;
+  roll: number;
+  puppeteer: number;
+  shake: number;
+}
+
+/** One string just now: its handle, and where its bar is to hang, null where it is free. */
+interface StringLayout {
+  state: StringState;
+  /** Which limb of its performer it is, 0..3. */
+  limb: number;
+  handle: Vector3;
+  barTarget: Vector3 | null;
+  /** Of its performer, and of what is to be seen from where one looks. */
+  scale: number;
+  size: number;
+}
+
+export class Strings {
+  readonly group = new Group();
+  /** No easing, no shake. */
+  reducedMotion = false;
+  readonly #threads = new Threads();
+  readonly #rings = new HandleRings();
+  readonly #bars = new ControlBars();
+  readonly #animations: StringAnimation[];
+
+  constructor() {
+    this.group.name = "strings";
+    this.group.add(this.#threads.mesh, this.#rings.mesh, this.#bars.mesh);
+    this.group.visible = false;
+    this.#animations = Array.from({ length: MAX_LIMBS }, () => ({
+      held: 0,
+      highlight: 0,
+      bar: new Vector3(),
+      roll: 0,
+      puppeteer: 0,
+      shake: 0,
+    }));
+  }
+
+  /** The ring of a limb that another holds shakes its head. */
+  shakeRing(limb: number): void {
+    if (!this.reducedMotion) this.#animations[limb].shake = 1;
+  }
+
+  /** Where a limb's bar is, for its name tag; null while there is none. */
+  barPosition(limb: number): Vector3 | null {
+    return this.#animations[limb].held > 0.5 ? this.#animations[limb].bar : null;
+  }
+
+  /** Draws four strings for each performer, none where that is null; `states` by number of the limb, free where there is none. */
+  update(
+    performers: readonly (Pick<Performer, "handle" | "scale"> | null)[],
+    states: readonly StringState[],
+    look: Look,
+    seconds: number,
+    view: StringsView,
+  ): void {
+    this.group.visible = true;
+    this.#threads.dark = look.dark;
+    this.#threads.count = this.#rings.count = performers.length * LIMBS.length;
+    const strings = performers.flatMap((performer, k) =>
+      LIMBS.map(
+        (_, part) => performer && layOutString(performer, part, states[limbNumber(k, part)] ?? FREE_STRING, view),
+      ),
+    );
+    const there = strings.filter((string) => string !== null);
+    separateBars(
+      there.flatMap(({ barTarget: goal }) => goal ?? []),
+      view.right,
+      Math.max(...there.map(({ size }) => size)),
+    );
+    const bars = strings.map((string, limb) =>
+      string ? this.#drawString(limb, string, look, seconds, view.right) : this.#hideString(limb),
+    );
+    this.#bars.set(bars.filter((bar) => bar !== null));
+  }
+
+  /** Draws a string, but for its bar, which it returns. */
+  #drawString(
+    limb: number,
+    { state, limb: part, handle, barTarget: goal, scale, size }: StringLayout,
+    look: Look,
+    seconds: number,
+    right: Vector3,
+  ): ControlBar | null {
+    const motion = this.#animations[limb];
+    const held = state.puppeteer !== null;
+    if (state.puppeteer !== null) {
+      if (motion.held < 0.02) motion.bar.copy(handle).y += 0.2;
+      motion.puppeteer = state.puppeteer;
+    }
+    motion.held = this.#approach(motion.held, held ? 1 : 0, seconds, held ? 0.16 : 0.5);
+    motion.highlight = this.#approach(motion.highlight, state.isHighlighted ? 1 : 0, seconds, 0.16);
+    motion.shake = this.#approach(motion.shake, 0, seconds, 0.4);
+    const shake = motion.shake > 0 ? Math.sin(motion.shake * 4 * Math.PI) * 0.01 * size : 0;
+    const shown = handle.clone().addScaledVector(right, shake);
+    const tension = state.pullTarget
+      ? Math.min(1, 0.35 + state.pullTarget.distanceTo(handle) / TAUT_ERROR_M)
+      : held
+        ? 0.75
+        : 0;
+    const bar = motion.held > 0.01 ? this.#animateBar(motion, goal, part, seconds, size) : null;
+    this.#drawRing(limb, shown, motion, state, look, size);
+    if (held) {
+      const hook = motion.bar.clone().setY(motion.bar.y - HOOK_OFFSET_M * (size / scale));
+      this.#threads.set(limb, shown, hook, {
+        colour: look.puppeteerColours[motion.puppeteer],
+        alpha: 1,
+        tension,
+        sag: (1 - motion.held) * 0.05,
+        fadesOut: false,
+      });
+    } else {
+      const top = shown.clone().setY(shown.y + (part < 2 ? 0.62 : 0.26) * scale);
+      const alpha = look.threadOpacity * (state.isDimmed ? DIMMED_SHARE : 1);
+      this.#threads.set(limb, shown, top, {
+        colour: look.threadColour,
+        alpha,
+        tension: 0,
+        sag: motion.held * 0.03,
+        fadesOut: true,
+      });
+    }
+    return bar;
+  }
+
+  #hideString(limb: number): null {
+    this.#animations[limb].held = 0;
+    this.#rings.set(limb, HIDDEN_POSITION, { colour: "#fff", alpha: 0, radius: 0, lineShare: 0, glow: 0 });
+    this.#threads.set(limb, HIDDEN_POSITION, HIDDEN_POSITION, {
+      colour: "#fff",
+      alpha: 0,
+      tension: 0,
+      sag: 0,
+      fadesOut: false,
+    });
+    return null;
+  }
+
+  /** `goal` is where the bar is to hang; null where it was let go, and rises. */
+  #animateBar(motion: StringAnimation, goal: Vector3 | null, part: number, seconds: number, size: number): ControlBar {
+    const held = goal !== null;
+    const before = motion.bar.x;
+    motion.bar.lerp(
+      goal ?? motion.bar.clone().setY(motion.bar.y + 0.3),
+      this.reducedMotion ? 1 : 1 - Math.exp(-(held ? 9 : 2) * seconds),
+    );
+    const lean =
+      seconds > 0 && !this.reducedMotion
+        ? Math.max(-MAX_LEAN_RAD, Math.min(MAX_LEAN_RAD, -0.16 * ((motion.bar.x - before) / seconds)))
+        : 0;
+    motion.roll += ((part % 2 === 0 ? -0.1 : 0.1) + lean - motion.roll) * Math.min(1, 8 * seconds || 1);
+    return { position: motion.bar.clone(), roll: motion.roll, size: (held ? 1.1 : motion.held * 1.1) * size };
+  }
+
+  #drawRing(limb: number, at: Vector3, motion: StringAnimation, state: StringState, look: Look, size: number): void {
+    const held = state.puppeteer !== null;
+    const radius = (held ? 0.062 : 0.046 + 0.01 * motion.highlight) * size;
+    const strength = look.ringOpacity * (state.isDimmed ? DIMMED_SHARE : 1);
+    this.#rings.set(limb, at, {
+      colour: held ? look.puppeteerColours[motion.puppeteer] : look.ringColour,
+      alpha: held ? 1 : strength + (1 - strength) * motion.highlight,
+      radius,
+      lineShare: held ? 0.035 : 0.026,
+      glow: held && look.dark ? 1 : 0,
+    });
+  }
+
+  #approach(value: number, goal: number, seconds: number, over: number): number {
+    if (this.reducedMotion) return goal;
+    const step = seconds / over;
+    return value < goal ? Math.min(goal, value + step) : Math.max(goal, value - step);
+  }
+}
+
+function layOutString(
+  performer: Pick<Performer, "handle" | "scale">,
+  part: number,
+  state: StringState,
+  view: StringsView,
+): StringLayout {
+  const { scale } = performer;
+  const handle = performer.handle(part, new Vector3());
+  const goal = state.puppeteer === null ? null : barTarget(state, handle, part, view, scale);
+  // from far away small things are drawn larger, though not as large as from near
+  return { state, limb: part, handle, barTarget: goal, scale, size: scale * Math.sqrt(view.distanceScale) };
+}
+
+/** Where a held limb's bar hangs by itself. */
+function barTarget(
+  { pullTarget: pull }: StringState,
+  handle: Vector3,
+  part: number,
+  { ground, ceiling }: StringsView,
+  scale: number,
+): Vector3 {
+  const goal = handle.clone();
+  goal.x += (part % 2 === 0 ? 1 : -1) * (part < 2 ? 0.08 : 0.16) * scale;
+  // Above the head, so that neither bar nor name stands before the face.
+  const clear = Math.max(
+    handle.y + (part < 2 ? 0.32 : 0.5) * scale,
+    ground + MIN_BAR_HEIGHT_M[part < 2 ? 0 : 1] * scale,
+  );
+  goal.y = Math.min(Math.max(clear, pull ? pull.y : -Infinity), ceiling);
+  // A bar never meets the hand; where the picture ends too soon it slips above the edge instead.
+  goal.y = Math.max(goal.y, handle.y + 0.12 * scale);
+  return goal;
+}
+
+/** Moves bars of about one height aside along the camera's `right`. */
+function separateBars(goals: readonly Vector3[], right: Vector3, scale: number): void {
+  const level: Vector3[][] = [];
+  for (const goal of [...goals].sort((a, b) => a.y - b.y)) {
+    const last = level.at(-1);
+    if (last && goal.y - last[last.length - 1].y < SAME_HEIGHT_M * scale) last.push(goal);
+    else level.push([goal]);
+  }
+  for (const bars of level) {
+    const places = bars.map((bar) => bar.dot(right));
+    separate(places, MIN_BAR_DISTANCE_M * scale).forEach((place, nth) =>
+      bars[nth].addScaledVector(right, place - places[nth]),
+    );
+  }
+}

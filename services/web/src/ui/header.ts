@@ -1,0 +1,111 @@
+/** Seal, wordmark and piece; who is here, the link to share, keys, theme. */
+
+import { formatDecimal } from "../i18n/number-format";
+import { joinList, pageLanguage, translate } from "../i18n/translator";
+import type { Theme } from "../stage/scenery/look";
+import { element, setText } from "./dom";
+import { initialOf, isolateBidi } from "./format";
+import { icon } from "./icon";
+import type { Presence } from "./limb-state";
+
+/** The other language's own name, and as few letters of it as can be known by. */
+const OTHER_LANGUAGE = {
+  en: { lang: "ja", name: "日本語", letter: "あ" },
+  ja: { lang: "en", name: "English", letter: "EN" },
+} as const;
+
+export interface Header {
+  setMotionName(name: string): void;
+  renderPeople(presence: Presence | null, self: string | null): void;
+  setTheme(theme: Theme): void;
+  /** What of it stands before the picture. */
+  readonly parts: readonly HTMLElement[];
+}
+
+export function createHeader(
+  root: HTMLElement,
+  actions: { share(): void; keys(): void; language(): void; theme(): void },
+): Header {
+  const piece = element("span", { class: "brand-piece" });
+  const brand = element(
+    "a",
+    { class: "brand", href: location.pathname, title: translate("Home") },
+    element("span", { class: "seal" }),
+  );
+  brand.append(
+    element("span", {}, element("b", { class: "brand-name" }, element("span", { class: "sr-only" }, "Bunraku")), piece),
+  );
+  const count = element("span", { class: "people-count" });
+  const avatars = element("span", { class: "avatars" });
+  const people = element("div", { class: "people", role: "group", hidden: true }, count, avatars);
+  const share = element(
+    "button",
+    { class: "share", type: "button", "aria-label": translate("Share link"), onClick: actions.share },
+    icon("link"),
+    element("span", {}, translate("Share link")),
+  );
+  const keys = element(
+    "button",
+    {
+      class: "round-button keys-button",
+      type: "button",
+      "aria-label": translate("Keys and gamepad"),
+      onClick: actions.keys,
+    },
+    icon("pad"),
+  );
+  const own = OTHER_LANGUAGE[pageLanguage()];
+  const other = element(
+    "button",
+    {
+      class: "round-button language",
+      type: "button",
+      lang: own.lang,
+      "aria-label": own.name,
+      title: own.name,
+      onClick: actions.language,
+    },
+    own.letter,
+  );
+  const theme = element("button", { class: "round-button", type: "button", onClick: actions.theme }, icon("theme"));
+  const right = element("div", { class: "header-right" }, people, share, keys, other, theme);
+  root.append(element("header", { class: "header" }, brand, right));
+  return {
+    parts: [brand, right],
+    setMotionName(name) {
+      setText(piece, name);
+      document.title = name ? `${isolateBidi(name)} - Bunraku` : "Bunraku";
+    },
+    renderPeople(presence, self) {
+      people.hidden = !presence || (presence.viewers < 1 && presence.puppeteers.length === 0);
+      if (!presence) return;
+      const here = Math.max(presence.viewers, presence.puppeteers.length);
+      setText(count, translate("{count} here", { count: formatDecimal(here, 0) }));
+      const names = presence.puppeteers.map((one) => (one.id === self ? translate("you") : one.name));
+      people.setAttribute(
+        "aria-label",
+        names.length
+          ? translate("{count} watching; at the strings: {names}", {
+              count: formatDecimal(here, 0),
+              names: joinList(names),
+            })
+          : translate("{count} watching", { count: formatDecimal(here, 0) }),
+      );
+      avatars.replaceChildren(
+        ...presence.puppeteers.slice(0, 5).map((one) =>
+          element(
+            "span",
+            {
+              style: `--colour: var(--holder-${one.colour})`,
+              title: one.id === self ? translate("{name} (you)", { name: one.name }) : one.name,
+            },
+            initialOf(one.name),
+          ),
+        ),
+      );
+    },
+    setTheme(now) {
+      theme.setAttribute("aria-label", translate(now === "night" ? "Light theme" : "Dark theme"));
+    },
+  };
+}

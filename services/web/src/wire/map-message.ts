@@ -1,0 +1,141 @@
+/** Messages of one MessagePack map (`proto/SPEC.md`, MessagePack messages): their fields, checked, to bytes and back. */
+
+import { decode, encode } from "@msgpack/msgpack";
+import { MalformedMessage } from "./errors";
+import { MAX_LIMBS } from "./limbs";
+import { MESSAGE_TYPES, type Message, type PuppeteerPresence, type Track } from "./messages";
+
+/** Reads a field's value, or throws what it should have been. */
+type FieldParser = (value: unknown) => unknown;
+
+/** The messages of fixed layout are read elsewhere (`fixed.ts`). */
+type MapMessageName = Exclude<Message["name"], "Data" | "Overlay" | "Ping" | "Pong" | "Input">;
+
+/** More than any real message has, and little enough to read at once. */
+const MAX_ENTRIES = 100_000;
+
+function requireValid(isValid: boolean, expected: string): void {
+  if (!isValid) throw new MalformedMessage(`must be ${expected}`);
+}
+
+const text: FieldParser = (value) => (requireValid(typeof value === "string", "text"), value);
+const flag: FieldParser = (value) => (requireValid(typeof value === "boolean", "true or false"), value);
+const count: FieldParser = (value) => (
+  requireValid(Number.isSafeInteger(value) && (value as number) >= 0, "a whole number of 0..2^53"), value
+);
+const limb: FieldParser = (value) => (
+  count(value), requireValid((value as number) < MAX_LIMBS, `a limb, 0..${MAX_LIMBS - 1}`), value
+);
+const list =
+  (item: FieldParser): FieldParser =>
+  (value) => {
+    requireValid(Array.isArray(value), "a list");
+    return (value as unknown[]).map(item);
+  };
+const isMap = (value: unknown): value is Record<string, unknown> =>
+  typeof value === "object" && value !== null && !Array.isArray(value) && !ArrayBuffer.isView(value);
+const mapOf =
+  <T>(read: (map: Record<string, unknown>) => T) =>
+  (value: unknown): T => {
+    requireValid(isMap(value), "a map");
+    return read(value as Record<string, unknown>);
+  };
+/** A field that may be nil or left out; it reads as null. */
+const optional =
+  (field: FieldParser): FieldParser =>
+  (value) =>
+    value === undefined || value === null ? null : field(value);
+
+const track = mapOf((value): Track => ({ ...value, type: text(value.type) as string }));
+const puppeteer = mapOf(
+  (value): PuppeteerPresence => ({
+    id: text(value.id) as string,
+    name: text(value.name) as string,
+    colour: count(value.colour) as number,
+  }),
+);
+
+/** Who asks for each of the `limbs` that were read before; left out by those who know of no asking. */
+const asksPerLimb = (value: unknown, { limbs }: Readonly<Record<string, unknown>>): unknown => {
+  const each = limbs as unknown[];
+  if (value === undefined || value === null) return each.map(() => []);
+  const asks = list(list(text))(value) as unknown[];
+  return (requireValid(asks.length === each.length, "a list for each limb"), asks);
+};
+
+/** The fields of each message in the order in which they are read; one may look at those `before` it. */
+const MESSAGE_FIELDS: {
+  [name in MapMessageName]: Readonly<
+    Record<string, (value: unknown, before: Readonly<Record<string, unknown>>) => unknown>
+  >;
+} = {
+  ChannelHeader: { motion: text, now: count, channels: count, software: text, version: count, clock: text },
+  Description: { motion: text, first: optional(count), tracks: list(track) },
+  TimelineState: {
+    epoch: count,
+    motion: text,
+    clock: count,
+    position: count,
+    playing: flag,
+    loop: flag,
+    duration: count,
+  },
+  Presence: { viewers: count, puppeteers: list(puppeteer), limbs: list(optional(text)), asks: asksPerLimb },
+  Problem: { title: text, detail: text },
+  Welcome: { id: text, colour: count, lead: count },
+  Grant: { limb, epoch: count },
+  Refusal: { limb, reason: text, holder: optional(text) },
+  Edit: { playing: optional(flag), position: optional(count), loop: optional(flag) },
+  Report: { buffer: count, decode: count, frame: count, hidden: flag },
+  Claim: { limb },
+  Release: { limb, epoch: count },
+  Alive: { limbs: list(limb) },
+  Notice: { limb, reason: text, detail: text },
+  Choice: { rate: count, reason: text, line: optional(count) },
+  Ask: { limb, wanted: flag },
+};
+
+const NAME_BY_TYPE = new Map(
+  Object.keys(MESSAGE_FIELDS).map((name) => [MESSAGE_TYPES[name as MapMessageName], name as MapMessageName]),
+);
+
+/** Whether messages of type byte `type` are one map. */
+export function isMapType(type: number): boolean {
+  return NAME_BY_TYPE.has(type);
+}
+
+/** The message as bytes: the type, and the map of the fields that are not null. */
+export function packMap(message: Extract<Message, { name: MapMessageName }>): Uint8Array<ArrayBuffer> {
+  const fields = Object.entries(message).filter(([key, value]) => key !== "name" && value !== null);
+  const packed = encode(Object.fromEntries(fields));
+  const bytes = new Uint8Array(1 + packed.length);
+  bytes[0] = MESSAGE_TYPES[message.name];
+  bytes.set(packed, 1);
+  return bytes;
+}
+
+/** The message in `bytes`, of a type for which `isMapType` holds. */
+export function unpackMap(bytes: Uint8Array): Message {
+  const name = NAME_BY_TYPE.get(bytes[0])!;
+  let values: unknown;
+  try {
+    values = decode(bytes.subarray(1), {
+      maxStrLength: bytes.length,
+      maxBinLength: bytes.length,
+      maxArrayLength: MAX_ENTRIES,
+      maxMapLength: MAX_ENTRIES,
+    });
+  } catch (error) {
+    throw new MalformedMessage(`${name} is not MessagePack: ${(error as Error).message}`);
+  }
+  if (!isMap(values)) throw new MalformedMessage(`${name} is not a MessagePack map`);
+  const message: Record<string, unknown> = { name };
+  for (const [key, field] of Object.entries(MESSAGE_FIELDS[name])) {
+    try {
+      message[key] = field(values[key], message);
+    } catch (error) {
+      throw new MalformedMessage(`${name}, ${key}: ${(error as Error).message}`);
+    }
+  }
+  return message as unknown as Message;
+}

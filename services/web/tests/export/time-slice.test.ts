@@ -1,0 +1,45 @@
+import { expect, test } from "vitest";
+import type { IncrementalTask } from "../../src/export/sampled-motion";
+import { runInSlices } from "../../src/export/time-slice";
+
+/** Ten steps of three milliseconds on a clock of their own. */
+function steps(): { work: IncrementalTask<string>; now: () => number; taken: () => number } {
+  let time = 0;
+  let taken = 0;
+  function* work(): IncrementalTask<string> {
+    for (; taken < 10; taken++) {
+      time += 3;
+      yield taken / 10;
+    }
+    return "done";
+  }
+  return { work: work(), now: () => time, taken: () => taken };
+}
+
+test("pauses after every few milliseconds of work, and tells how far it is", async () => {
+  const { work, now } = steps();
+  const shares: number[] = [];
+  let pauses = 0;
+  const made = await runInSlices(work, {
+    now,
+    onProgress: (share) => shares.push(share),
+    yieldToEventLoop: async () => void pauses++,
+  });
+  expect(made).toBe("done");
+  expect(shares).toEqual([0.2, 0.5, 0.8]);
+  expect(pauses).toBe(3);
+});
+
+test("does nothing more once it is given up", async () => {
+  const { work, now, taken } = steps();
+  const abort = new AbortController();
+  const reason = new Error("given up");
+  await expect(
+    runInSlices(work, { now, signal: abort.signal, yieldToEventLoop: async () => abort.abort(reason) }),
+  ).rejects.toBe(reason);
+  expect(taken()).toBe(2);
+});
+
+test("takes the browser's own clock and pauses where none are given", async () => {
+  expect(await runInSlices(steps().work)).toBe("done");
+});

@@ -1,7 +1,0 @@
-/** What the page would do, written down. */
-import type { PageActions } from "../../src/input/commands";
-
-export function deeds(told: string[]): PageActions {
-  const names = ["next_dancer", "ask", "give", "play", "back", "forward", "keep", "picture", "library", "strings", "line"] as const;
-  return Object.fromEntries(names.map((name) => [name, () => told.push(name)])) as unknown as PageActions;
-}

@@ -1,5 +1,0 @@
-/** Gamepads as the browser tells of them. */
-export function pad(axes = [0, 0, 0, 0], pressed: Readonly<Record<number, number>> = {}, mapping = "standard"): Gamepad {
-  const buttons = Array.from({ length: 17 }, (_, i) => ({ pressed: (pressed[i] ?? 0) > 0.5, touched: false, value: pressed[i] ?? 0 }));
-  return { id: "Pad (test)", connected: true, mapping, axes, buttons } as unknown as Gamepad;
-}

@@ -1,0 +1,19 @@
+/** What the page would do, written down. */
+import type { PageActions } from "../../src/input/command-dispatcher";
+
+export function recordPageActions(calls: string[]): PageActions {
+  const names = [
+    "next_dancer",
+    "ask",
+    "give",
+    "play",
+    "back",
+    "forward",
+    "keep",
+    "picture",
+    "library",
+    "strings",
+    "line",
+  ] as const;
+  return Object.fromEntries(names.map((name) => [name, () => calls.push(name)])) as unknown as PageActions;
+}

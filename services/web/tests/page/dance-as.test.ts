@@ -1,8 +1,0 @@
-import { expect, test } from "vitest";
-import { isAvatar } from "../../src/page/dance-as";
-
-test("figures are told from dances by their endings, however these are written", () => {
-  const named = (name: string) => isAvatar(new File([], name));
-  expect(["sato.vrm", "Sato.GLB", "scene.gltf"].map(named)).toEqual([true, true, true]);
-  expect(["dance.bvh", "glb", "my.vrm.zip", "take.fbx"].map(named)).toEqual([false, false, false, false]);
-});

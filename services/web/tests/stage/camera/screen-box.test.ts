@@ -1,0 +1,23 @@
+import { PerspectiveCamera, Vector3 } from "three";
+import { expect, test } from "vitest";
+import { overlaps, projectBox } from "../../../src/stage/camera/screen-box";
+
+test("a box is as large on the screen as it is in the world at its depth", () => {
+  const camera = new PerspectiveCamera(90, 2, 0.1, 100);
+  camera.position.set(0, 1, 5);
+  camera.updateMatrixWorld();
+  // five metres away a right angle sees ten metres of height: 100 pixels a metre
+  const box = projectBox(new Vector3(1, 2, 0), { across: 0.5, up: 0.2, down: 0.1 }, camera, 2000, 1000);
+  const wanted = { left: 1050, top: 380, right: 1150, bottom: 410 };
+  for (const side of ["left", "top", "right", "bottom"] as const) expect(box[side]).toBeCloseTo(wanted[side], 6);
+});
+
+test("boxes overlap that share area, or would with room between them", () => {
+  const box = { left: 10, top: 10, right: 20, bottom: 20 };
+  const beside = { left: 20, top: 12, right: 30, bottom: 18 };
+  const below = { left: 10, top: 23, right: 20, bottom: 30 };
+  expect(overlaps(box, { left: 12, top: 12, right: 14, bottom: 14 })).toBe(true);
+  expect([overlaps(box, beside), overlaps(beside, box)]).toEqual([false, false]);
+  expect([overlaps(box, beside, 1), overlaps(beside, box, 1)]).toEqual([true, true]);
+  expect([overlaps(box, below, 3), overlaps(box, below, 4)]).toEqual([false, true]);
+});

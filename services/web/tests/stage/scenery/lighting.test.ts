@@ -1,0 +1,116 @@
+import { DirectionalLight, type Object3D, SpotLight, Vector3 } from "three";
+import { beforeEach, describe, expect, test } from "vitest";
+import type { LightState } from "../../../src/playout/light-state";
+import { createLights, type Lights } from "../../../src/stage/scenery/lighting";
+import { LOOKS } from "../../../src/stage/scenery/look";
+
+let lights: Lights;
+let key: SpotLight, warm: SpotLight, cool: SpotLight;
+let fill: DirectionalLight;
+
+beforeEach(() => {
+  lights = createLights();
+  lights.applyLook(LOOKS.night);
+  const is =
+    <T extends Object3D>(kind: new () => T) =>
+    (one: Object3D): one is T =>
+      one instanceof kind;
+  [key, warm, cool] = lights.group.children.filter(is(SpotLight));
+  [fill] = lights.group.children.filter(is(DirectionalLight));
+});
+
+const light = (
+  share: number,
+  place: [number, number, number] = [1, 4, 4],
+  colour: [number, number, number] = [1, 0.2, 0.1],
+): LightState => ({
+  full: 200,
+  numbers: [...place, ...colour, 200 * share],
+});
+
+/** What a spot throws on its target, and how wide its cone is there. */
+const thrown = (one: SpotLight) => {
+  const distance = one.position.distanceTo(one.target.position);
+  return [one.intensity / distance ** 2, Math.tan(one.angle) * distance];
+};
+
+test("without a show's the look's own lights stand", () => {
+  const before = [key, warm, cool].map((one) => [one.intensity, ...one.position.toArray(), one.angle]);
+  lights.update([], 0.5);
+  expect([key, warm, cool].map((one) => [one.intensity, ...one.position.toArray(), one.angle])).toEqual(before);
+  expect(before[0]).toEqual([118, -1.9, 3.9, 4.1, expect.closeTo(0.36)]);
+  expect([key.shadow.camera.near, key.shadow.camera.far].map((one) => Math.round(one * 10) / 10)).toEqual([2, 9]);
+  expect([lights.ambientLevel, fill.intensity]).toEqual([1, 1.04]);
+});
+
+describe("a show's", () => {
+  test("first light is the key, the second and the third are the rims", () => {
+    lights.update(
+      [light(1, [1, 4, 4]), light(1, [2, 4, -2], [0, 1, 0]), light(1, [-2, 4, -2]), light(1, [9, 9, 9])],
+      5,
+    );
+    expect([key, warm, cool].map((one) => one.position.toArray())).toEqual([
+      [1, 4, 4],
+      [2, 4, -2],
+      [-2, 4, -2],
+    ]);
+    expect(warm.color.toArray()).toEqual([0, 1, 0]);
+    expect([key, warm, cool].map((one) => one.castShadow)).toEqual([true, false, false]);
+  });
+
+  test("full, throws what the look's own does from wherever it stands, by night and by day", () => {
+    for (const look of [LOOKS.night, LOOKS.day]) {
+      lights.applyLook(look);
+      lights.update([], 5);
+      const own = thrown(key);
+      for (const place of [
+        [1, 4, 4],
+        [0, 3, 2],
+        [-6, 8, 6],
+      ] as const) {
+        lights.update([light(1, [...place])], 5);
+        thrown(key).forEach((one, at) => expect(one).toBeCloseTo(own[at], 6));
+      }
+      lights.update([light(0.25)], 5);
+      expect(thrown(key)[0]).toBeCloseTo(own[0] / 4, 6);
+    }
+  });
+
+  test("place is in the world's frame, though the stage travels with the dancer", () => {
+    lights.group.position.set(2, 0, -1);
+    lights.group.rotation.y = 1;
+    lights.group.updateMatrixWorld(true);
+    lights.update([light(1, [3, 4, 2])], 5);
+    lights.group.updateMatrixWorld(true);
+    expect(key.getWorldPosition(new Vector3()).distanceTo(new Vector3(3, 4, 2))).toBeLessThan(1e-9);
+  });
+
+  test("darkness leaves a little light to see by", () => {
+    lights.update([light(0), light(0), light(0)], 5);
+    expect([key, warm, cool].map((one) => one.intensity)).toEqual([0, 0, 0]);
+    expect(lights.ambientLevel).toBeCloseTo(0.2);
+    expect(fill.intensity).toBeCloseTo(0.2 * 1.04);
+  });
+
+  test("lights come on and go evenly", () => {
+    const steps: number[] = [];
+    let before = key.position.clone();
+    const on = () => {
+      steps.push(key.position.distanceTo(before));
+      before = key.position.clone();
+    };
+    for (let frame = 0; frame < 60; frame++, on()) lights.update([light(0.5)], 1 / 60);
+    expect(key.position.toArray()).toEqual([1, 4, 4]);
+    for (let frame = 0; frame < 60; frame++, on()) lights.update([], 1 / 60);
+    expect(key.position.toArray()).toEqual([-1.9, 3.9, 4.1]);
+    expect(key.intensity).toBeCloseTo(118);
+    expect(Math.max(...steps)).toBeLessThan(0.1);
+    expect(lights.ambientLevel).toBe(1);
+  });
+
+  test("light on the dancer's very place stays off it", () => {
+    lights.update([light(1, [0, 0.9, 0])], 5);
+    expect(key.position.distanceTo(key.target.position)).toBeCloseTo(0.8);
+    expect(Number.isFinite(key.intensity)).toBe(true);
+  });
+});

@@ -1,0 +1,66 @@
+import * as fc from "fast-check";
+import { Group } from "three";
+import { describe, expect, test } from "vitest";
+import { type CameraView, createView, viewFromNumbers } from "../../../src/stage/camera/view";
+import { MAX_SIDE_ANGLE_RAD, Scenery } from "../../../src/stage/scenery/scenery";
+
+/** A view from `azimuth` radians round the stage, in the frame of a stage turned by `front`. */
+function from(azimuth: number, front = 0): CameraView {
+  const view = createView();
+  viewFromNumbers([3 * Math.sin(azimuth + front), 1.5, 3 * Math.cos(azimuth + front), 0, 1, 0, 0.5], view);
+  return view;
+}
+
+/** How far to the side a view sees the scenery, radians. */
+function aside(scenery: Scenery, azimuth: number): number {
+  const away = azimuth - scenery.group.rotation.y;
+  return Math.atan2(Math.sin(away), Math.cos(away));
+}
+
+describe("the scenery", () => {
+  test("stands still for the audience", () => {
+    const scenery = new Scenery();
+    for (const degrees of [0, 25, -25, 10]) {
+      scenery.update(from((degrees * Math.PI) / 180), true, 1 / 60);
+      expect(scenery.group.rotation.y).toBeCloseTo(0, 12);
+    }
+  });
+
+  test("is behind the dancer wherever the camera goes, and never jumps with one that does not", () => {
+    const path = fc.array(fc.double({ min: -0.2, max: 0.2, noNaN: true }), { minLength: 1, maxLength: 200 });
+    fc.assert(
+      fc.property(path, (steps) => {
+        const scenery = new Scenery();
+        let azimuth = 0;
+        for (const step of steps) {
+          const before = scenery.group.rotation.y;
+          azimuth += step;
+          scenery.update(from(azimuth), false, 1 / 60);
+          expect(Math.abs(aside(scenery, azimuth))).toBeLessThan(MAX_SIDE_ANGLE_RAD + 1e-9);
+          const turned = scenery.group.rotation.y - before;
+          expect(Math.abs(Math.atan2(Math.sin(turned), Math.cos(turned)))).toBeLessThan(Math.abs(step) + 1e-9);
+        }
+      }),
+    );
+  });
+
+  test("goes back when one's own seat is taken again", () => {
+    const scenery = new Scenery();
+    scenery.update(from(2), false, 1 / 60);
+    expect(scenery.group.rotation.y).toBeCloseTo(2 - MAX_SIDE_ANGLE_RAD, 9);
+    for (let i = 0; i < 240; i++) scenery.update(from(0), true, 1 / 60);
+    expect(Math.abs(scenery.group.rotation.y)).toBeLessThan(1e-3);
+  });
+
+  test("is of the stage, which turns by where the dance faces", () => {
+    const stage = new Group();
+    stage.rotation.y = 1.2;
+    stage.updateMatrixWorld(true);
+    const scenery = new Scenery();
+    stage.add(scenery.group);
+    scenery.update(from(0.2, 1.2), false, 1 / 60);
+    expect(scenery.group.rotation.y).toBeCloseTo(0, 9);
+    scenery.update(from(1.5, 1.2), false, 1 / 60);
+    expect(scenery.group.rotation.y).toBeCloseTo(1.5 - MAX_SIDE_ANGLE_RAD, 9);
+  });
+});

@@ -1,0 +1,159 @@
+"""The viewers at the far ends of `narrow.py`'s lines, and the session they watch."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import numpy as np
+from websockets.asyncio.client import connect
+
+from bunraku.client import StreamEnded, Viewer
+from bunraku.client.api import Client
+from bunraku.client.puppeteer import Puppeteer
+from bunraku.playout.clock import ClockSample
+from bunraku.wire.limbs import LIMBS
+from bunraku.wire.messages import MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL, Ping, Pong, unpack
+from bunraku.wire.overlay import Overlay
+from tests.bench.network import EmulatedLink, EmulatedNetwork, FarEnd
+
+SERVER_PORT = 18352
+OVERLAY_LEAD_US = 60_000
+"""How far ahead of its making an overlay is due, microseconds; a session's Welcome says it."""
+LINKS = {"9k6": EmulatedLink(9_600, 150), "28k8": EmulatedLink(28_800, 75), "56k": EmulatedLink(56_000, 75)}
+"""The lines of old telephones, by their kbit/s."""
+Figures = dict[str, Any]
+
+
+class MeasuringViewer(Viewer):
+    """A viewer that remembers when what came."""
+
+    def __init__(self, url: str, far: FarEnd | None = None, truth: float = 0.0, **options: Any) -> None:
+        """`truth` is the server's clock minus this machine's monotonic one, microseconds."""
+        super().__init__(url, open_socket=far.open_socket if far else None, **options)
+        self.true_clock_offset_us = truth
+        self.overlay_arrivals: list[tuple[int, float, int]] = []
+        """When each overlay came, how late after its newest frame was made (ms), and how many frames it had."""
+        self.started_us = 0
+        self.clock_errors: list[float] = []
+        self.shown: list[tuple[int, int, int]] = []
+        """Of each picture: local time, reference time, rate of the block shown or -1."""
+        self.audio_available: list[bool] = []
+        """Of each picture: whether the sound that goes with it was there."""
+
+    def _take(self, data: bytes) -> None:
+        if data and data[0] == Overlay.TYPE:
+            overlay, now = Overlay.unpack(data), time.monotonic_ns() // 1000
+            self.overlay_arrivals.append(
+                (
+                    now,
+                    (now + self.true_clock_offset_us - (overlay.due - OVERLAY_LEAD_US)) / 1e3,
+                    len(overlay.earlier) + 1,
+                )
+            )
+        super()._on_message(data)
+
+    async def watch_and_measure(self, seconds: float, **options: Any) -> None:
+        """Watch, and note how far the clock is off at each picture once it was told the time well."""
+
+        def picture(reference: int, _: Any) -> None:
+            now = time.monotonic_ns() // 1000
+            shown = self.clock.at(self._local_clock()) - (now + self.true_clock_offset_us)
+            self.clock_errors.append(shown / 1e3)
+            self.shown.append((now, reference, round(self._bitrate_at(reference) * 1e3)))
+            self.audio_available.append(self.audio_buffered_us(reference) > 0)
+
+        self.started_us = time.monotonic_ns() // 1000
+        while (left := seconds - (time.monotonic_ns() // 1000 - self.started_us) / 1e6) > 0.5:
+            try:
+                await self.watch(left, picture, **options)
+            except StreamEnded as ended:
+                print(f"a stream ended: {ended}")
+                self.statistics.gaps += 1
+            except (OSError, TimeoutError):
+                # the line does not carry a connection yet
+                continue
+
+
+class NonReconnectingViewer(MeasuringViewer):
+    """One that waits for what comes late, however late."""
+
+    def __init__(self, url: str, far: FarEnd | None = None, truth: float = 0.0) -> None:
+        super().__init__(url, far, truth, silent=float("inf"))
+
+
+class BenchContext:
+    """The server at the near end, a motion in it, and what every case needs."""
+
+    def __init__(self, net: EmulatedNetwork, url: str, motion: str, truth: float) -> None:
+        self.network, self.url, self.motion, self.true_clock_offset_us = net, url, motion, truth
+
+    def create_viewer(self, far: FarEnd, path: str, **options: Any) -> MeasuringViewer:
+        """A viewer at a far end."""
+        return MeasuringViewer(f"ws://{far.host}:{SERVER_PORT}{path}", far, self.true_clock_offset_us, **options)
+
+    def create_motion_viewer(self, far: FarEnd, query: str = "", **options: Any) -> MeasuringViewer:
+        """A viewer of the motion."""
+        return self.create_viewer(far, f"/v1/motions/{self.motion}/stream{query}", **options)
+
+    async def run_controlled(self, work: Callable[[str], Awaitable[None]], angular_speed: float = 2.0) -> None:
+        """`work`, told the id of a session whose dancer is pulled about by all four limbs meanwhile, at `pace` radians
+        of their swing a second."""
+        async with Client(self.url) as client:
+            session = (await client.open_session(self.motion))["id"]
+            async with Puppeteer(client, session, "bench") as puppeteer:
+                for limb in LIMBS:
+                    await puppeteer.claim(limb)
+                pulling = asyncio.create_task(_move_limbs(puppeteer, angular_speed))
+                try:
+                    await work(session)
+                finally:
+                    pulling.cancel()
+                    await asyncio.gather(pulling, return_exceptions=True)
+
+
+async def _move_limbs(puppeteer: Puppeteer, angular_speed: float) -> None:
+    loop = asyncio.get_running_loop()
+    while True:
+        phase = angular_speed * loop.time()
+        swing, rise = float(np.sin(phase)), float(np.cos(1.3 * phase))
+        for limb, side in zip(LIMBS[:2], (1.0, -1.0), strict=True):
+            await puppeteer.target(limb, side * (0.4 + 0.2 * swing), -0.1 + 0.3 * rise, 0.5)
+        for limb, side in zip(LIMBS[2:], (1.0, -1.0), strict=True):
+            await puppeteer.target(limb, 0.4 + 0.3 * side * swing)
+        await asyncio.sleep(1 / 60)
+
+
+def round_finite(value: float) -> int | None:
+    """To the nearest one; None for what did not come."""
+    return round(value) if np.isfinite(value) else None
+
+
+def percentile(values: Any, share: float) -> float:
+    """NaN of nothing."""
+    return float(np.percentile(values, share)) if len(values) else float("nan")
+
+
+async def measure_clock_offset() -> float:
+    """The server's clock minus this machine's monotonic one, microseconds, over the loopback."""
+    url = f"ws://127.0.0.1:{SERVER_PORT}"
+    async with Client(url.replace("ws", "http")) as client:
+        motion = (await client.motions())[0]["id"]
+    best = ClockSample(0.0, 1 << 60)
+    async with connect(
+        f"{url}/v1/motions/{motion}/stream",
+        subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
+        max_size=MAX_SERVER_MESSAGE_BYTES,
+    ) as connection:
+        for sequence in range(100):
+            sent = time.monotonic_ns() // 1000
+            await connection.send(Ping(sequence, sent).pack())
+            while not isinstance(pong := unpack(bytes(await connection.recv(decode=False))), Pong):
+                continue
+            arrived = time.monotonic_ns() // 1000
+            trip = (arrived - sent) - (pong.answered - pong.received)
+            if trip < best.round_trip_us:
+                best = ClockSample(((pong.received - sent) + (pong.answered - arrived)) / 2, trip)
+    return best.offset

@@ -1,0 +1,125 @@
+"""A session is pulled at, kept, and danced again, over real sockets."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from bunraku.cli import app
+from bunraku.client import Client, Puppeteer, ServerProblem, Viewer
+from bunraku.motion.skeleton import joint_and_tip_positions
+from bunraku.playout.block_store import Pose
+from bunraku.runtime.context import clock
+from tests.servers import make_bvh_clip, run_server
+
+LIMB = "left_hand"
+
+
+async def watch_controlled_session(client: Client, session: str, seconds: float) -> tuple[Viewer, dict[int, Pose]]:
+    """What a viewer sees of a session while a hand of it is pulled: poses by clock time."""
+    seen: dict[int, Pose] = {}
+    viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
+    async with Puppeteer(client, session) as puppeteer:
+        watching = asyncio.create_task(viewer.watch(seconds + 1.0, seen.__setitem__))
+        await puppeteer.claim(LIMB)
+        loop = asyncio.get_running_loop()
+        end = loop.time() + seconds
+        while (now := loop.time()) < end:
+            await puppeteer.target(LIMB, 0.7, 0.5 + 0.3 * math.sin(4 * now), 0.4)
+            await asyncio.sleep(1 / 60)
+        await puppeteer.release(LIMB)
+        await watching
+    return viewer, seen
+
+
+def hand_tip(viewer: Viewer, pose: Pose) -> np.ndarray:
+    """World place of the left hand's tip."""
+    assert viewer.track is not None
+    place: np.ndarray = joint_and_tip_positions(viewer.track.figure, *pose)[19]
+    return place
+
+
+async def test_what_was_pulled_is_kept_and_danced_again(tmp_path: Path) -> None:
+    source = tmp_path / "Swan.bvh"
+    source.write_bytes(make_bvh_clip(3.0, 91))
+    with run_server(tmp_path / "data") as url:
+        async with Client(url) as client:
+            dance = await client.upload(source)
+            session = (await client.open_session(dance["id"]))["id"]
+            viewer, seen = await watch_controlled_session(client, session, 2.0)
+            camera = [
+                {"time": clock() - 3_000_000, "position": [0, 1.2, 4], "gaze": [0, 1, 0], "fov": 0.5},
+                {"time": clock(), "position": [2, 1.2, 3], "gaze": [0, 1, 0], "fov": 0.7},
+            ]
+            before = clock()
+            kept = await client.record(session, "A swan's arm", 2.5, camera)
+            assert kept["name"] == "A swan's arm"
+            assert kept["kept_from"] == dance["id"]
+            assert kept["duration"] == pytest.approx(2.5, abs=0.02)
+            assert (await client.motions())[0] == kept
+            assert kept["tracks"] == ["motion", "camera"]
+            again = Viewer(client.socket_url(f"/v1/motions/{kept['id']}/stream"))
+            danced: dict[int, Pose] = {}
+            figures = await again.watch(3.2, danced.__setitem__)
+            # it is a motion like any other: it is played in a session and pulled at
+            second = (await client.open_session(kept["id"]))["id"]
+            over, _ = await watch_controlled_session(client, second, 0.5)
+            await client.delete_motion(dance["id"])
+            assert (await client.motion(kept["id"]))["id"] == kept["id"]
+    assert figures.gaps == 0
+    assert figures.camera_blocks == kept["blocks"]
+    assert figures.camera is not None
+    assert over.statistics.overlays > 20
+    state = again.timeline_history.newest
+    assert state is not None
+    assert again.track is not None
+    # frame k of what was kept was seen at the instant when it was asked for, less its length, and a little for the way
+    frames = [again._blocks.pose_at(round(k * 1e6 / 60)) for k in range(150)]  # type: ignore[union-attr]
+    kept_hands = np.array([hand_tip(again, pose) for pose in frames if pose is not None])
+    assert len(kept_hands) == 150
+    seen_at = np.array(sorted(seen))
+    seen_hands = np.array([hand_tip(viewer, seen[t]) for t in sorted(seen)])
+
+    def off(late: int) -> float:
+        at = before + late - 2_500_000 + np.arange(150) * 1e6 / 60
+        inside = (at > seen_at[0]) & (at < seen_at[-1])
+        wanted = np.stack([np.interp(at[inside], seen_at, seen_hands[:, axis]) for axis in range(3)], axis=1)
+        assert inside.sum() > 100
+        return float(np.median(np.linalg.norm(kept_hands[inside] - wanted, axis=1)))
+
+    assert min(off(late) for late in range(0, 200_000, 2_000)) < 0.01
+
+
+async def test_what_cannot_be_kept_is_said(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        with pytest.raises(ServerProblem, match="No such session"):
+            await client.record("none")
+        session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+        for seconds in (-1.0, 601.0):
+            with pytest.raises(ServerProblem, match="seconds"):
+                await client.record(session, seconds=seconds)
+        with pytest.raises(ServerProblem, match="camera"):
+            await client.record(session, camera=[{"time": 5, "position": [0, 1], "gaze": [0, 1, 0], "fov": 0.5}])
+
+
+def test_the_command_line_keeps_a_session_by_id_and_by_its_page(server: str, clip_file: Path) -> None:
+    async def open_session() -> str:
+        async with Client(server) as client:
+            session: str = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+            await Viewer(client.socket_url(f"/v1/sessions/{session}/stream")).watch(0.5)
+        return session
+
+    session = asyncio.run(open_session())
+    run = CliRunner()
+    by_id = run.invoke(app, ["keep", session, "--server", server, "--name", "Mine", "--json"])
+    assert by_id.exit_code == 0, by_id.output
+    assert json.loads(by_id.stdout)["name"] == "Mine"
+    by_page = run.invoke(app, ["keep", f"{server}/?session={session}", "--seconds", "0.3"])
+    assert by_page.exit_code == 0, by_page.output
+    assert f"{clip_file.stem}, kept" in by_page.stdout

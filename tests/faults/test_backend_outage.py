@@ -1,0 +1,108 @@
+"""The whole house upon PostgreSQL, S3 and NATS, and what still goes on while they are away."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import Awaitable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import asyncpg
+import httpx2
+import pytest
+
+from bunraku.client import Client, Puppeteer, ServerProblem, Viewer
+from tests.processes import ServerProcess, nats_url_of, run_jetstream, run_postgres, run_s3_server
+from tests.servers import make_bvh_clip, run_server
+
+
+class Deployment:
+    """A running server and what it stands on."""
+
+    def __init__(self, url: str, database: ServerProcess, bus: ServerProcess) -> None:
+        self.url, self.database, self.bus = url, database, bus
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Deployment]:
+    with ExitStack() as stack:
+        patch = stack.enter_context(pytest.MonkeyPatch.context())
+        folders = [tmp_path_factory.mktemp(name) for name in ("nats", "s3", "data")]
+        database = stack.enter_context(run_postgres())
+        bus = stack.enter_context(run_jetstream(folders[0]))
+        store = stack.enter_context(run_s3_server(folders[1]))
+        endpoint = f"http://127.0.0.1:{store.port}"
+        patch.setenv("AWS_ENDPOINT_URL", endpoint)
+        patch.setenv("AWS_REGION", "us-east-1")
+        patch.setenv("AWS_ACCESS_KEY_ID", "key")
+        patch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
+        httpx2.put(f"{endpoint}/bunraku").raise_for_status()
+        url = stack.enter_context(
+            run_server(
+                folders[2],
+                catalogue=f"postgresql://postgres@127.0.0.1:{database.port}/postgres",
+                library="s3://bunraku/motions",
+                bus=nats_url_of(bus),
+            )
+        )
+        yield Deployment(url, database, bus)
+
+
+def write_clip(folder: Path, seconds: float = 2.0) -> Path:
+    source = folder / "dance.bvh"
+    source.write_bytes(make_bvh_clip(seconds, secrets.randbelow(10_000)))
+    return source
+
+
+async def response_status(asked: Awaitable[object]) -> int:
+    """What the server says of a request."""
+    try:
+        await asked
+    except ServerProblem as problem:
+        return problem.status
+    return 200
+
+
+async def test_a_dance_is_taken_in_pulled_at_and_kept(house: Deployment, tmp_path: Path) -> None:
+    async with Client(house.url) as client:
+        motion = await client.upload(write_clip(tmp_path))
+        session = (await client.open_session(motion["id"]))["id"]
+        viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
+        watching = asyncio.create_task(viewer.watch(2.0))
+        async with Puppeteer(client, session) as puppeteer:
+            await puppeteer.claim("left_hand")
+            for number in range(60):
+                await puppeteer.target("left_hand", 0.7, 0.2 + 0.01 * number, 0.4)
+                await asyncio.sleep(1 / 60)
+        figures = await watching
+        assert figures.overlays > 10
+        assert figures.gaps == 0
+        kept = await client.record(session, "kept", 1.0)
+        assert (await client.motion(kept["id"]))["kept_from"] == motion["id"]
+    connection = await asyncpg.connect(f"postgresql://postgres@127.0.0.1:{house.database.port}/postgres")
+    assert await connection.fetchval("SELECT count(*) FROM motions") >= 2
+    await connection.close()
+
+
+async def test_the_dance_plays_on_while_catalogue_and_bus_are_away(house: Deployment, tmp_path: Path) -> None:
+    async with Client(house.url) as client:
+        motion = await client.upload(write_clip(tmp_path, 5.0))
+        session = (await client.open_session(motion["id"]))["id"]
+        viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
+        shown = asyncio.Event()
+        watching = asyncio.create_task(viewer.watch(6.0, lambda _, __: shown.set()))
+        async with asyncio.timeout(60):
+            await shown.wait()
+        house.database.kill()
+        house.bus.kill()
+        for asked in (client.motions(), client.motion(motion["id"]), client.upload(write_clip(tmp_path))):
+            assert await response_status(asked) == 503
+        house.database.start()
+        house.bus.start()
+        async with asyncio.timeout(60):
+            while (said := await response_status(client.upload(write_clip(tmp_path)))) != 200:
+                assert said == 503
+        figures = await watching
+        assert figures.gaps == 0
+        assert figures.frames > 100

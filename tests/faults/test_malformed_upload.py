@@ -1,0 +1,90 @@
+"""Uploads that mean harm: each is refused with a reason, soon, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from tests.servers import make_bvh_clip
+
+VALID_BVH = make_bvh_clip(0.3)
+HEAD, FRAMES = VALID_BVH.split(b"MOTION", 1)
+
+
+def nested_joints(count: int) -> bytes:
+    deep = b"".join(b"JOINT j%d\n{\nOFFSET 0 1 0\nCHANNELS 0\n" % i for i in range(count))
+    return b"HIERARCHY\nROOT r\n{\nOFFSET 0 0 0\nCHANNELS 0\n" + deep + b"}\n" * (count + 1) + b"MOTION\nFrames: 0\n"
+
+
+MALFORMED_FILES: dict[str, Callable[[], bytes]] = {
+    "nothing": lambda: b"",
+    "zeros": lambda: bytes(1_000_000),
+    "a million joints": lambda: nested_joints(1_000_000),
+    "a million frames": lambda: (
+        b"HIERARCHY\nROOT r\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
+        b"End Site\n{\nOFFSET 0 1 0\n}\n}\nMOTION\nFrames: 1000000\nFrame Time: 0.01\n" + b"0 1 0\n" * 1_000_000
+    ),
+    "a line of 60 MB": lambda: HEAD + b"MOTION\nFrames: 1\nFrame Time: 0.03\n" + b"0" * 60_000_000,
+    "numbers without end": lambda: HEAD + b"MOTION\nFrames: 2\nFrame Time: 0.03\n" + b"1e999 " * 1_000_000,
+    "not a number": lambda: VALID_BVH.replace(b"MOTION", b"MOTION\n", 1)[:-6] + b"NaN\n",
+    "two roots": lambda: HEAD + HEAD.removeprefix(b"HIERARCHY\n") + b"MOTION" + FRAMES,
+    "open braces": lambda: HEAD.replace(b"}", b"") + b"MOTION" + FRAMES,
+    "a joint within itself": lambda: HEAD.replace(b"JOINT l_hip", b"JOINT humanoid_root", 1) + b"MOTION" + FRAMES[:40],
+    "another file": lambda: b"\x89PNG\r\n\x1a\n" + bytes(1000),
+}
+
+
+def leftover_sources() -> list[Path]:
+    return list(Path(tempfile.gettempdir()).glob("bunraku-upload-*/source"))
+
+
+@pytest.mark.parametrize("harm", MALFORMED_FILES)
+async def test_harm_is_refused_in_words_and_leaves_nothing(server: str, harm: str) -> None:
+    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+        before = (await http.get("/v1/motions?limit=200")).json()
+        answer = await http.post("/v1/motions", params={"filename": f"{harm}.bvh"}, content=MALFORMED_FILES[harm]())
+        assert answer.status_code in (413, 422), answer.text
+        problem = answer.json()
+        assert problem["title"]
+        assert problem["detail"]
+        assert problem["hint"]
+        assert (await http.get("/v1/motions?limit=200")).json() == before
+        assert (await http.get("/v1/health")).status_code == 200
+    assert not leftover_sources()
+
+
+async def test_a_line_of_a_gigabyte_is_cut_off(server: str) -> None:
+    sent = 0
+
+    async def line() -> AsyncIterator[bytes]:
+        nonlocal sent
+        yield HEAD + b"MOTION\nFrames: 1\nFrame Time: 0.03\n"
+        for _ in range(1_000):
+            sent += 1 << 20
+            yield b"0" * (1 << 20)
+
+    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+        try:
+            assert (await http.post("/v1/motions", params={"filename": "x.bvh"}, content=line())).status_code == 413
+        except httpx2.TransportError:
+            assert sent < 500 << 20
+        assert (await http.get("/v1/health")).status_code == 200
+
+
+async def test_one_who_goes_away_while_sending_leaves_nothing(server: str) -> None:
+    class Gone(Exception):
+        pass
+
+    async def half() -> AsyncIterator[bytes]:
+        yield VALID_BVH[:1000]
+        raise Gone
+
+    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+        before = (await http.get("/v1/motions?limit=200")).json()
+        with pytest.raises(Gone):
+            await http.post("/v1/motions", params={"filename": "x.bvh"}, content=half())
+        assert (await http.get("/v1/motions?limit=200")).json() == before

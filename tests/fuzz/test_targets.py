@@ -1,0 +1,112 @@
+"""Damaged, truncated and hostile bytes: one error type a room, nothing unbounded, nothing else."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bunraku.wire.messages import Description
+from tests.fuzz.targets import TARGETS, TRACK_DESCRIPTIONS, load_seeds
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+EXAMPLES = 1_000
+RUNS = 3_000
+MAX_SHOWN_BYTES = 4_096
+"""Bytes of a seed for Hypothesis, which prints what fails."""
+
+SEEDS = load_seeds()
+EDITS = st.lists(st.tuples(st.integers(0, 1 << 16), st.integers(0, 255)), max_size=8)
+
+
+def corrupt(data: bytes, edits: list[tuple[int, int]], kept_share: float, tail: bytes) -> bytes:
+    """`data` with some bytes changed, cut to a part of its length, and something behind it."""
+    octets = bytearray(data)
+    for place, value in edits:
+        if octets:
+            octets[place % len(octets)] = value
+    return bytes(octets[: round(kept_share * len(octets))]) + tail
+
+
+def hostile_inputs(number: int) -> st.SearchStrategy[bytes]:
+    """Bytes for a target: any at all, and damaged golden ones."""
+    whole = st.sampled_from([data for target, data in SEEDS if target == number and len(data) <= MAX_SHOWN_BYTES])
+    kept = st.just(1.0) | st.floats(0, 1)
+    return st.binary(max_size=600) | st.builds(corrupt, whole, EDITS, kept, st.binary(max_size=40))
+
+
+VALUES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(1 << 63), (1 << 64) - 1),
+    st.integers(0, 2000),
+    st.floats(),
+    st.floats(0, 1e-300),
+    st.text(max_size=9),
+    st.binary(max_size=9),
+    st.lists(st.floats(), max_size=3),
+)
+HOSTILE_DESCRIPTIONS = st.builds(
+    lambda track, changes: Description("motion", [track | changes]).pack(),
+    st.sampled_from(TRACK_DESCRIPTIONS),
+    st.dictionaries(st.sampled_from(sorted(TRACK_DESCRIPTIONS[0])), VALUES, max_size=3),
+)
+
+
+@pytest.mark.parametrize(
+    ("number", "inputs"),
+    [
+        (0, hostile_inputs(0)),
+        (1, hostile_inputs(1)),
+        (2, hostile_inputs(2)),
+        (2, HOSTILE_DESCRIPTIONS),
+        (3, hostile_inputs(3)),
+    ],
+    ids=["blocks", "dancers", "messages", "descriptions", "audio"],
+)
+def test_hypothesis(
+    number: int, inputs: st.SearchStrategy[bytes], tally: Callable[[str], None], request: pytest.FixtureRequest
+) -> None:
+    counts = [0, 0]
+
+    @settings(max_examples=EXAMPLES)
+    @given(inputs)
+    def check(data: bytes) -> None:
+        counts[TARGETS[number](data)] += 1
+
+    check()
+    assert min(counts) > 0
+    tally(f"Hypothesis, {request.node.callspec.id}: {sum(counts)} inputs, {counts[1]} read, {counts[0]} refused")
+
+
+@pytest.mark.timeout(600)
+def test_atheris(tmp_path: Path, tally: Callable[[str], None]) -> None:
+    if find_spec("atheris") is None:
+        why = "atheris is not installed: it has wheels for CPython 3.11 to 3.14 on Linux, x86-64"
+        pytest.fail(why) if os.environ.get("CI") else pytest.skip(why)
+    corpus, file = tmp_path / "corpus", tmp_path / "counts"
+    corpus.mkdir()
+    # a hang is what one input's guard of 60 s is for; what a block may cost is bounded by its numbers, in the targets
+    options = [f"-runs={RUNS}", "-timeout=60", "-rss_limit_mb=2048", f"-artifact_prefix={tmp_path}/"]
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.fuzz", corpus, file, *options],
+        cwd=REPOSITORY,
+        env=os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path / "numba")},
+        capture_output=True,
+        text=True,
+        timeout=580,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    counts = np.fromfile(file, np.int64).reshape(len(TARGETS), 2)
+    assert counts.min() > 0
+    for target, (refused, read) in zip(TARGETS, counts, strict=True):
+        tally(f"atheris, {target.__name__}s: {refused + read} inputs, {read} read, {refused} refused")

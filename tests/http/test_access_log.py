@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import logging
+from collections.abc import AsyncIterator
+from typing import Any
+
+import httpx2
+import pytest
+from prometheus_client import generate_latest
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
+from starlette.types import Receive, Scope, Send
+
+from bunraku.http import request_id
+from bunraku.http.access_log import ROUTE_SCOPE_KEY, AccessLogMiddleware
+from bunraku.runtime.metrics import Metrics
+from tests.metrics import MetricSamples
+
+
+async def answer(request: Request) -> Response:
+    request.scope[ROUTE_SCOPE_KEY] = "/v1/things/{thing}"
+    return PlainTextResponse(request_id.current(), 418 if request.method == "POST" else 200)
+
+
+async def fail(_: Request) -> Response:
+    raise LookupError("a fault of ours")
+
+
+@pytest.fixture
+async def stand() -> AsyncIterator[tuple[httpx2.AsyncClient, Metrics]]:
+    metrics = Metrics()
+    routes = [Route("/v1/things/{thing}", answer, methods=["GET", "POST"]), Route("/v1/fail", fail)]
+    app = AccessLogMiddleware(Starlette(routes=[*routes, Route("/livez", answer)]), metrics)
+    transport = httpx2.ASGITransport(app, raise_app_exceptions=False)
+    async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
+        yield http, metrics
+
+
+def request_count(metrics: Metrics, **labels: str) -> float:
+    return MetricSamples(generate_latest(metrics.registry).decode()).sum("request_duration_seconds_count", **labels)
+
+
+async def test_a_request_keeps_the_name_it_came_with_and_gets_one_without(
+    stand: tuple[httpx2.AsyncClient, Metrics],
+) -> None:
+    http, _ = stand
+    kept = await http.get("/v1/things/1", headers={"X-Request-Id": "from-a-proxy_1"})
+    assert kept.headers["x-request-id"] == kept.text == "from-a-proxy_1"
+    for forged in ("x" * 65, "a;b c\td", "<script>"):
+        made = await http.get("/v1/things/1", headers={"X-Request-Id": forged})
+        assert made.headers["x-request-id"] == made.text != forged
+        assert len(made.text) == 16
+    assert request_id.current() == ""
+
+
+async def test_it_is_counted_by_its_route_and_logged_without_its_query(
+    stand: tuple[httpx2.AsyncClient, Metrics], caplog: pytest.LogCaptureFixture
+) -> None:
+    http, metrics = stand
+    with caplog.at_level(logging.INFO, "bunraku"):
+        await http.get("/v1/things/1?ticket=very-secret")
+        await http.post("/v1/things/2")
+        await http.get("/v1/nowhere?ticket=very-secret")
+        await http.get("/index.html")
+        await http.get("/v1/fail")
+    assert request_count(metrics, route="/v1/things/{thing}", method="GET", status="200") == 1
+    assert request_count(metrics, route="/v1/things/{thing}", method="POST", status="418") == 1
+    assert request_count(metrics, route="elsewhere", method="GET", status="404") == 1
+    assert request_count(metrics, route="page", method="GET", status="404") == 1
+    assert request_count(metrics, route="elsewhere", method="GET", status="500") == 1
+    first: Any = next(record for record in caplog.records if record.getMessage() == "request")
+    assert (first.method, first.route, first.path, first.status) == ("GET", "/v1/things/{thing}", "/v1/things/1", 200)
+    assert 0 < first.seconds < 20
+    assert "very-secret" not in "".join(str(record.__dict__) for record in caplog.records)
+
+
+async def test_who_looks_whether_somebody_answers_is_not_told_of(
+    stand: tuple[httpx2.AsyncClient, Metrics], caplog: pytest.LogCaptureFixture
+) -> None:
+    http, metrics = stand
+    with caplog.at_level(logging.INFO, "bunraku"):
+        await http.get("/livez")
+    assert not [record for record in caplog.records if record.name.startswith("bunraku")]
+    with caplog.at_level(logging.DEBUG, "bunraku"):
+        await http.get("/livez")
+    assert [record for record in caplog.records if record.name == "bunraku.http.access_log"]
+    assert request_count(metrics, method="GET") == 2
+
+
+@pytest.mark.parametrize(
+    ("sent", "status"),
+    [
+        (["websocket.accept"], "101"),
+        (["websocket.accept", "websocket.send", "websocket.close"], "101"),
+        (["websocket.close"], "403"),
+        (["websocket.http.response.start", "websocket.http.response.body"], "429"),
+        ([], "499"),
+    ],
+)
+async def test_a_socket_counts_once_as_its_handshake_ends(sent: list[str], status: str) -> None:
+    metrics, told = Metrics(), []
+
+    async def app(scope: Scope, _: Receive, send: Send) -> None:
+        assert request_id.current() == "from-a-proxy"
+        for kind in sent:
+            await send({"type": kind, "status": 429, "headers": []})
+            scope[ROUTE_SCOPE_KEY] = "/v1/things/{thing}/stream"
+
+    async def send(message: Any) -> None:
+        told.append(message)
+
+    async def receive() -> Any:
+        raise AssertionError("nobody listens")
+
+    scope = {"type": "websocket", "path": "/v1/things/1/stream", "headers": [(b"x-request-id", b"from-a-proxy")]}
+    await AccessLogMiddleware(app, metrics)(scope, receive, send)
+    assert [message["type"] for message in told] == sent
+    assert request_count(metrics) == request_count(metrics, method="WEBSOCKET", status=status) == 1
+    named = [message for message in told if (b"x-request-id", b"from-a-proxy") in message["headers"]]
+    assert len(named) == (status == "429")

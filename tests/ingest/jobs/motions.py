@@ -1,0 +1,45 @@
+"""Two dances and logs of sessions over them."""
+
+from __future__ import annotations
+
+from bunraku.codec.motion_encoder import encode_motion
+from bunraku.marionette.input_log import InputLog
+from bunraku.motion.placement import Placement
+from bunraku.motion.skeleton import Motion
+from bunraku.storage import motion_store
+from bunraku.storage.motion_store import StoredMotion
+from bunraku.wire.messages import TimelineState
+from tests.vectors.blocks import random_motion
+
+START_CLOCK_US = 1_700_000_000_000_000
+SECOND_US = 1_000_000
+
+
+def make_stored_motion(name: str, seconds: float, seed: int) -> StoredMotion:
+    """A dance as the library has it."""
+    motion = random_motion(seconds, 30.0, seed)
+    calm = Motion(motion.figure, 30.0, motion.root * 0.1 + [0, 0.85, 0], motion.rotations)
+    encoded = encode_motion(calm, error_bounds_mm=(30.0, 3.0), grade="live")
+    return motion_store.unpack(name, motion_store.pack(name, encoded))
+
+
+PLACEMENTS = Placement(-0.8, 0.1, 0.5), Placement(0.8, -0.1, -2.0)
+_FIRST_MOTION, _SECOND_MOTION = make_stored_motion("one", 3.0, 21), make_stored_motion("two", 2.0, 22)
+MOTIONS = {
+    "one": _FIRST_MOTION,
+    "two": _SECOND_MOTION,
+    "both": motion_store.unpack(
+        "both", motion_store.with_performers("both", _FIRST_MOTION, [_SECOND_MOTION], PLACEMENTS)[0]
+    ),
+    "longer": motion_store.unpack(
+        "longer", motion_store.with_performers("longer", _SECOND_MOTION, [_FIRST_MOTION], PLACEMENTS)[0]
+    ),
+}
+
+
+def make_log(*states: TimelineState) -> bytes:
+    """The log of a session that had these timelines, and nobody pulled."""
+    log = InputLog()
+    for state in states:
+        log.add_timeline(state)
+    return log.pack()

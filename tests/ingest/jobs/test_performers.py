@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from bunraku.codec.motion_decoder import decode_motion_block
+from bunraku.codec.motion_encoder import encode_motion
+from bunraku.ingest.jobs.performers import (
+    MAX_EXTRA_SPACING_M,
+    PERFORMER_SPACING_M,
+    combine_performers,
+    place_side_by_side,
+)
+from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.motion import rotation
+from bunraku.motion.placement import Placement
+from bunraku.motion.skeleton import Motion
+from bunraku.storage import motion_store
+from bunraku.storage.motion_store import StoredMotion
+from bunraku.wire.messages import Data
+from tests.ingest.jobs.motions import MOTIONS
+from tests.vectors.blocks import random_motion
+
+
+def make_walk(name: str, metres: float, facing: float) -> StoredMotion:
+    """A dance that goes `metres` to its left and back, about (3, -2), and faces `facing`."""
+    motion = random_motion(2.0, 30.0, 31)
+    turn = rotation.from_coordinate_axis(1, np.full(60, facing))
+    along = rotation.rotate(
+        turn, np.stack([np.interp(range(60), (0, 30, 59), (0, metres, 0)), np.zeros(60), np.zeros(60)], 1)
+    )
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = turn
+    walked = Motion(motion.figure, 30.0, along + np.array([3.0, 0.9, -2.0]), rotations)
+    return motion_store.unpack(
+        name, motion_store.pack(name, encode_motion(walked, error_bounds_mm=(30.0, 5.0), grade="live"))
+    )
+
+
+def stage_positions(motion: StoredMotion) -> list[np.ndarray]:
+    """Of each performer the root's places, (frames, 3)."""
+    found = []
+    for dance in motion.performers:
+        packets = enumerate(dance.packets[-1])
+        blocks = [
+            decode_motion_block(dance.track, Data.unpack(packet).block).pose_at(
+                np.arange(float(dance.track.frames_in(index)))
+            )
+            for index, packet in packets
+        ]
+        root, rotations = (np.concatenate(part) for part in zip(*blocks, strict=True))
+        root, rotations = dance.placement.apply(root, rotations)
+        forward = rotation.rotate(rotations[:, 0], np.array([0.0, 0.0, 1.0])).mean(axis=0)
+        assert np.arctan2(forward[0], forward[2]) == pytest.approx(0.0, abs=0.05)
+        found.append(root)
+    return found
+
+
+def test_they_stand_in_a_row_as_near_as_their_dances_let_them_and_face_one_way() -> None:
+    still, wide = make_walk("still", 0.0, 2.0), make_walk("wide", 1.5, -1.0)
+    made = combine_performers("three", still, [wide, still], None)
+    assert isinstance(made, JobResult)
+    assert made.description == {"tracks": ["motion"] * 3, "performers": 3, "made_from": "still"}
+    roots = stage_positions(motion_store.unpack("three", made.packed))
+    for left, right in pairwise(roots):
+        assert (right[:, 0] - left[:, 0]).min() == pytest.approx(PERFORMER_SPACING_M, abs=0.15)
+    middles = [(root[:, 0].min() + root[:, 0].max()) / 2 for root in roots]
+    assert middles[0] + middles[2] == pytest.approx(0.0, abs=0.1)
+    for root in roots:
+        assert abs(root[:, 2]).max() < 0.1
+
+
+def test_who_dance_the_same_keep_step_side_by_side() -> None:
+    wide = make_walk("wide", 3.0, 1.0)
+    made = combine_performers("two", wide, [wide], None)
+    assert isinstance(made, JobResult)
+    left, right = stage_positions(motion_store.unpack("two", made.packed))
+    assert right[:, 0] - left[:, 0] == pytest.approx(PERFORMER_SPACING_M, abs=1e-6)
+
+
+def test_who_walks_across_the_floor_is_not_given_all_of_it() -> None:
+    far, still = make_walk("far", 30.0, 0.0), make_walk("still", 0.0, 0.0)
+    left, right = place_side_by_side([far.performers[0], still.performers[0]])
+    middles = [place.x + 3.0 + half for place, half in ((left, 15.0), (right, 0.0))]
+    assert middles[1] - middles[0] == pytest.approx(PERFORMER_SPACING_M + MAX_EXTRA_SPACING_M, abs=0.6)
+
+
+def test_places_may_be_given_and_there_are_as_many_as_performers() -> None:
+    places = [Placement(0.0, 1.0, 0.0), Placement(0.5, -1.0, 3.0)]
+    made = combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], places)
+    assert isinstance(made, JobResult)
+    assert [dance.placement for dance in motion_store.unpack("m", made.packed).performers] == places
+    refused = combine_performers("m", MOTIONS["one"], [MOTIONS["both"]], places)
+    assert isinstance(refused, JobRejection)
+    assert refused.field == "places"
+
+
+def test_more_than_four_are_refused() -> None:
+    refused = combine_performers("m", MOTIONS["both"], [MOTIONS["both"], MOTIONS["one"]], None)
+    assert isinstance(refused, JobRejection)
+    assert (refused.title, refused.field) == ("Too many performers", "motions")
+    assert "this would have 5" in refused.detail
+
+
+def test_it_says_how_far_it_is() -> None:
+    told: list[float] = []
+    combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], None, told.append)
+    assert told == [0.5, 1.0]

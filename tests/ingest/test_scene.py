@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import httpx2
+
+from bunraku.client.api import Client
+from bunraku.wire.messages import Description, unpack
+from tests.servers import make_bvh_clip
+
+CAMERA = [
+    {"time": 0, "position": [0, 1, 4], "gaze": [0, 1, 0], "fov": 0.5},
+    {"time": 1_500_000, "position": [1, 1, 4], "gaze": [0, 1, 0], "fov": 0.4, "ease": "smooth"},
+]
+LIGHT = [{"time": 0, "position": [-2, 4, 4], "colour": [1, 0.8, 0.5], "intensity": 118}]
+
+
+async def post_motion(http: httpx2.AsyncClient, seed: int) -> str:
+    answer = await http.post("/v1/motions", params={"filename": "dance.bvh"}, content=make_bvh_clip(2.0, seed))
+    assert answer.status_code in (200, 201), answer.text
+    return str(answer.json()["id"])
+
+
+async def test_keyframes_make_another_motion_and_leave_the_first_as_it_is(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+        motion = await post_motion(http, 71)
+        before = (await http.get(f"/v1/motions/{motion}")).json()
+        answer = await http.post(f"/v1/motions/{motion}/scene", json={"camera": CAMERA, "lights": [LIGHT, LIGHT]})
+        assert answer.status_code == 201, answer.text
+        new = answer.json()
+        assert answer.headers["location"] == f"/v1/motions/{new['id']}"
+        assert (new["tracks"], new["made_from"]) == (["motion", "camera", "light", "light"], motion)
+        assert (await http.get(f"/v1/motions/{motion}")).json() == before
+        again = await http.post(f"/v1/motions/{motion}/scene", json={"camera": CAMERA, "lights": [LIGHT, LIGHT]})
+        assert (again.status_code, again.json()) == (200, new)
+        description = unpack((await http.get(f"/v1/motions/{new['id']}/description")).content)
+        assert isinstance(description, Description)
+        assert description.motion == new["id"]
+        assert [track["type"] for track in description.tracks] == new["tracks"]
+        block = await http.get(f"/v1/motions/{new['id']}/blocks/0/0?track=3")
+        assert block.status_code == 200
+
+
+async def test_what_is_wrong_is_said_with_its_field(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+        motion = await post_motion(http, 72)
+        for asked, field in (
+            ({"camera": [CAMERA[1], CAMERA[0]]}, "camera[1].time"),
+            ({"lights": [[{**LIGHT[0], "intensity": -1}]]}, "lights[0][0].intensity"),
+            ({}, "camera"),
+        ):
+            answer = await http.post(f"/v1/motions/{motion}/scene", json=asked)
+            assert answer.status_code == 422, answer.text
+            assert answer.headers["content-type"] == "application/problem+json"
+            assert answer.json()["field"] == field
+        assert (await http.post("/v1/motions/nothing/scene", json={"camera": CAMERA})).status_code == 404
+
+
+async def test_the_sdk_adds_a_scene(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server, timeout=60) as http, Client(server) as client:
+        new = await client.add_scene(await post_motion(http, 73), {"lights": [LIGHT]})
+        assert new["tracks"] == ["motion", "light"]

@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bunraku.marionette import leg, vector
+from bunraku.marionette.limb_rig import ArmRig, LegRig, Limb
+from bunraku.marionette.proportions import ProportionsError
+from bunraku.marionette.vector import Vector
+from bunraku.motion import rotation, skeleton
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, Figure, standard_figure
+from tests.marionette.fixtures import random_motion
+
+FIGURE = standard_figure()
+HANDS = {limb: ArmRig(FIGURE, limb) for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND)}
+LEGS = {limb: LegRig(FIGURE, limb) for limb in (Limb.LEFT_LEG, Limb.RIGHT_LEG)}
+POSES = random_motion(120, seed=5)
+
+hands = st.sampled_from(sorted(HANDS))
+legs = st.sampled_from(sorted(LEGS))
+poses = st.integers(0, len(POSES) - 1).map(lambda i: POSES[i])
+parts = st.floats(-1.0, 1.0)
+directions = st.tuples(parts, parts, parts).filter(lambda v: vector.length(v) > 0.05)
+
+
+def posed(pose: Array, limb: Limb, joints: tuple[tuple[float, ...], ...]) -> tuple[Array, Array]:
+    """World positions and orientations of the pose with one limb's joints replaced, root at the origin."""
+    merged = pose.copy()
+    merged[list(limb.joint_indices)] = joints
+    return skeleton.world_transforms(FIGURE, np.zeros(3), merged)
+
+
+def test_the_limbs_joints_are_the_contracts() -> None:
+    assert [[JOINTS[k] for k in limb.joint_indices] for limb in Limb] == [
+        ["l_shoulder", "l_elbow", "l_wrist"],
+        ["r_shoulder", "r_elbow", "r_wrist"],
+        ["l_hip", "l_knee", "l_ankle"],
+        ["r_hip", "r_knee", "r_ankle"],
+    ]
+
+
+@given(hands, poses, directions, st.floats(0.12, 0.999))
+def test_the_worlds_hand_tip_is_at_the_target_and_the_arm_hangs(
+    limb: Limb, pose: Array, towards: Vector, reach: float
+) -> None:
+    rig = HANDS[limb]
+    target = vector.scale(vector.unit(towards, (0.0, -1.0, 0.0)), reach)
+    position, orientation = posed(pose, limb, rig.solve(target, rig.local_up(pose.tolist())))
+    shoulder, elbow, wrist = limb.joint_indices
+    tip = position[wrist] + rotation.rotate(orientation[wrist], FIGURE.tips[wrist])
+    place = rotation.rotate(orientation[JOINT_INDEX["vl5"]], np.array(target)) * rig.arm_length_m
+    np.testing.assert_allclose(tip - position[shoulder], place, atol=1e-9)
+    # one vertical plane: level distances are all along one line
+    level = np.stack([position[elbow], position[wrist], tip])[:, [0, 2]] - position[shoulder][[0, 2]]
+    along = place[[0, 2]]
+    if np.hypot(*along) > 1e-3:
+        square = (level[:, 0] * along[1] - level[:, 1] * along[0]) / np.hypot(*along)
+        assert float(np.abs(square).max()) < 1e-9
+    # and the elbow below the line to the tip
+    chord = place / np.linalg.norm(place)
+    below = (position[elbow] - position[shoulder]) - chord * float(chord @ (position[elbow] - position[shoulder]))
+    assert below[1] < 1e-9
+
+
+@given(hands, poses)
+def test_the_dances_own_hand_is_found(limb: Limb, pose: Array) -> None:
+    rig = HANDS[limb]
+    position, orientation = skeleton.world_transforms(FIGURE, np.zeros(3), pose)
+    shoulder, _, wrist = limb.joint_indices
+    tip = position[wrist] + rotation.rotate(orientation[wrist], FIGURE.tips[wrist]) - position[shoulder]
+    chest = rotation.conjugate(orientation[JOINT_INDEX["vl5"]])
+    found = rig.tip_target(rig.pose_joints(pose.tolist()))
+    np.testing.assert_allclose(found, rotation.rotate(chest, tip) / rig.arm_length_m, atol=1e-12)
+
+
+@given(directions, st.floats(0.12, 0.99))
+def test_the_two_arms_mirror_each_other(towards: Vector, reach: float) -> None:
+    x, y, z = vector.scale(vector.unit(towards, (0.0, -1.0, 0.0)), reach)
+    left = HANDS[Limb.LEFT_HAND].solve((x, y, z), (0.0, 1.0, 0.0))
+    right = HANDS[Limb.RIGHT_HAND].solve((-x, y, z), (0.0, 1.0, 0.0))
+    if np.hypot(x, z) < 1e-6:
+        return
+    for a, b in zip(left, right, strict=True):
+        mirrored = (b[0], b[1], -b[2], -b[3])
+        assert abs(abs(sum(p * q for p, q in zip(a, mirrored, strict=True))) - 1.0) < 1e-9
+
+
+def test_a_hand_held_out_ahead_has_its_palm_down_and_its_elbow_bent_forwards() -> None:
+    joints = HANDS[Limb.LEFT_HAND].solve((0.0, -0.5, 0.5), (0.0, 1.0, 0.0))
+    bend = vector.rotate(joints[1], (0.0, -1.0, 0.0))
+    assert bend[2] > 0.2
+    assert abs(bend[0]) < 0.1
+    whole = vector.multiply(vector.multiply(joints[0], joints[1]), joints[2])
+    palm = vector.rotate(whole, (-1.0, 0.0, 0.0))
+    assert palm[1] < 0.0
+
+
+@given(legs, poses, st.floats(leg.MIN_THIGH_ANGLE_RAD, leg.MAX_THIGH_ANGLE_RAD))
+def test_the_thigh_lifts_in_the_plane_the_hips_face_and_the_shank_hangs(limb: Limb, pose: Array, theta: float) -> None:
+    rig = LEGS[limb]
+    position, orientation = posed(pose, limb, rig.solve(theta, pose.tolist()))
+    hip, knee, ankle = limb.joint_indices
+    thigh, shank = position[knee] - position[hip], position[ankle] - position[knee]
+    _, level = rig.hip_facing(pose.tolist())
+    thigh = thigh / np.linalg.norm(thigh)
+    np.testing.assert_allclose(
+        thigh, np.sin(theta) * np.array(level) - np.cos(theta) * np.array([0, 1.0, 0]), atol=1e-9
+    )
+    if theta >= 0.0:
+        np.testing.assert_allclose(shank / np.linalg.norm(shank), [0.0, -1.0, 0.0], atol=1e-9)
+        sole = rotation.rotate(orientation[ankle], np.array([0.0, 1.0, 0.0]))
+        np.testing.assert_allclose(sole, [0.0, 1.0, 0.0], atol=1e-9)
+    else:
+        np.testing.assert_allclose(shank / np.linalg.norm(shank), thigh, atol=1e-9)
+    merged = pose.copy()
+    merged[list(limb.joint_indices)] = rig.solve(theta, pose.tolist())
+    assert abs(rig.thigh_angle(merged.tolist()) - theta) < 1e-9
+
+
+def test_hips_on_their_side_still_face_somewhere() -> None:
+    pose = np.tile(rotation.IDENTITY, (18, 1))
+    pose[0] = rotation.from_coordinate_axis(2, np.array(np.pi / 2.0))
+    _, level = LEGS[Limb.LEFT_LEG].hip_facing(pose.tolist())
+    assert abs(vector.length(level) - 1.0) < 1e-12
+    assert level[1] == 0.0
+    assert level[2] > 0.9
+
+
+def test_an_arm_too_short_to_hang_is_refused() -> None:
+    tips = FIGURE.tips.copy()
+    tips[JOINT_INDEX["l_wrist"]] = 0.0
+    with pytest.raises(ProportionsError, match="L2"):
+        ArmRig(Figure(FIGURE.offsets, tips), Limb.LEFT_HAND)
+
+
+def test_a_thigh_lifted_over_the_top_stays_at_its_limit_and_is_not_thrown_back() -> None:
+    rig = LegRig(FIGURE, Limb.LEFT_LEG)
+    pose = np.tile(rotation.IDENTITY, (18, 1))
+    own, seen = 0.0, []
+    for lifted in np.linspace(0.0, 4.0, 100):
+        pose[rig.joint_indices[0]] = rotation.from_coordinate_axis(0, np.array(-lifted))
+        own = rig.thigh_angle(pose.tolist(), own)
+        seen.append(own)
+    assert max(seen) == leg.MAX_THIGH_ANGLE_RAD == seen[-1]
+    assert np.abs(np.diff(seen)).max() < 0.05

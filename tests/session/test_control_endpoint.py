@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+from bunraku.client import Client, ControlRefused, Puppeteer
+from bunraku.wire.messages import SUBPROTOCOL, Claim, Grant, Input, Ping, Pong, Problem, Refusal, Welcome, unpack
+
+
+@pytest.fixture
+async def session(server: str, clip_file: Path) -> str:
+    async with Client(server) as client:
+        return str((await client.open_session((await client.upload(clip_file))["id"]))["id"])
+
+
+async def test_a_limb_has_one_holder_and_the_first_one_gets_it(server: str, session: str) -> None:
+    async with Client(server) as client, Puppeteer(client, session, "Aiko") as aiko:
+        async with Puppeteer(client, session, "Yuki") as yuki:
+            await aiko.claim("left_hand")
+            with pytest.raises(ControlRefused, match="held"):
+                await yuki.claim("left_hand")
+            await yuki.claim("right_leg")
+            state = await client.session(session)
+            assert state["limbs"] == [aiko.id, None, None, yuki.id]
+            assert [(p["name"], p["colour"]) for p in state["puppeteers"]] == [("Aiko", 0), ("Yuki", 1)]
+            await aiko.release("left_hand")
+            await yuki.claim("left_hand")
+        # who leaves lets go
+        async with asyncio.timeout(5):
+            while any((await client.session(session))["limbs"]):  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        await aiko.claim("left_hand")
+
+
+async def test_a_silent_holder_loses_the_limb(server: str, session: str) -> None:
+    url = server.replace("http", "ws") + f"/v1/sessions/{session}/control"
+    async with connect(url, subprotocols=[SUBPROTOCOL], compression=None) as silent:  # type: ignore[list-item]
+        await silent.send(Claim(1).pack())
+        kinds = []
+        async with asyncio.timeout(5):
+            while not isinstance(message := unpack(await silent.recv(decode=False)), Refusal):
+                kinds.append(type(message))
+    assert kinds[0] is Welcome
+    assert Grant in kinds
+    assert (message.limb, message.reason) == (1, "lost")
+
+
+async def test_inputs_without_the_limb_are_ignored_and_pings_answered(server: str, session: str) -> None:
+    url = server.replace("http", "ws") + f"/v1/sessions/{session}/control?name=%00%20"
+    async with connect(url, subprotocols=[SUBPROTOCOL], compression=None) as socket:  # type: ignore[list-item]
+        await socket.send(Input(0, Input.TARGET, 99, 1, 0, (1, 1, 1)).pack())
+        await socket.send(Ping(3, 4).pack())
+        async with asyncio.timeout(5):
+            while not isinstance(message := unpack(await socket.recv(decode=False)), Pong):
+                continue
+    assert (message.sequence, message.sent) == (3, 4)
+    async with Client(server) as client:
+        assert (await client.session(session))["limbs"] == [None] * 4
+
+
+@pytest.mark.parametrize("sends", [bytes([67]), Input(0, 1, 1, 1, 1, (float("nan"), 0, 0)).pack(), bytes(2000)])
+async def test_broken_messages_end_only_the_one_who_sends_them(server: str, session: str, sends: bytes) -> None:
+    url = server.replace("http", "ws") + f"/v1/sessions/{session}/control"
+    async with Client(server) as client, Puppeteer(client, session, "Aiko") as aiko:
+        with pytest.raises(ConnectionClosed) as closed:  # noqa: PT012
+            async with connect(url, subprotocols=[SUBPROTOCOL], compression=None) as socket:  # type: ignore[list-item]
+                await socket.send(sends)
+                while True:
+                    message = unpack(await socket.recv(decode=False))
+                    assert not isinstance(message, Problem) or message.detail
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code in (1008, 1009)
+        await aiko.claim("left_hand")
+
+
+async def test_a_stage_that_is_not_there_is_said_so(server: str) -> None:
+    async with Client(server) as client:
+        with pytest.raises(ControlRefused, match="No such session"):
+            async with Puppeteer(client, "nothing"):
+                pass

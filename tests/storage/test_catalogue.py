@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from bunraku.runtime.availability import BackendUnavailable
+from bunraku.storage.catalogue import Catalogue, CatalogueEntry
+
+
+async def test_it_opens_once_at_its_first_use(url: str) -> None:
+    catalogue = Catalogue(url)
+    first, second = await asyncio.gather(catalogue.open(), catalogue.open())
+    assert first is second
+    assert await catalogue.add_motion(CatalogueEntry("m1", 1, {"a": 1}))
+    assert await catalogue.get_motion("m1") == CatalogueEntry("m1", 1, {"a": 1})
+    assert await catalogue.list_motions(5) == ([CatalogueEntry("m1", 1, {"a": 1})], None)
+    assert await catalogue.remove_motion("m1")
+    await catalogue.close()
+
+
+async def test_one_that_was_never_used_closes_too(tmp_path: Path) -> None:
+    await Catalogue(f"sqlite:///{tmp_path}/c.sqlite").close()
+    assert not (tmp_path / "c.sqlite").exists()
+
+
+async def test_after_a_failure_it_tries_again(tmp_path: Path) -> None:
+    catalogue = Catalogue(f"sqlite:///{tmp_path}/missing/c.sqlite")
+    with pytest.raises(BackendUnavailable, match="unable to open"):
+        await catalogue.get_motion("m1")
+    await asyncio.to_thread((tmp_path / "missing").mkdir)
+    assert await catalogue.get_motion("m1") is None
+    await catalogue.close()
+
+
+def test_a_strange_address_is_refused() -> None:
+    with pytest.raises(ValueError, match="sqlite"):
+        Catalogue("mysql://somewhere")

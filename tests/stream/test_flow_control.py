@@ -1,0 +1,244 @@
+from __future__ import annotations
+
+from bunraku.delivery.congestion import bytes_on_wire
+from bunraku.stream.flow_control import UNCONSTRAINED_CHECKS, FlowControl
+from bunraku.websocket.link import AckedLink
+from tests.delivery.virtual_link import VirtualLink
+from tests.stream.fake_transport import parse_frames
+from tests.stream.simulated_sender import SimulatedSender
+
+SECOND = 1_000_000
+
+
+def count_overlays(sender: SimulatedSender, seconds: int) -> int:
+    """Thirty overlays a second, each written if it may, and told of if need be; how many were."""
+    written = 0
+    for _ in range(30 * seconds):
+        sender.at += 33_333
+        steady = sender.flow.is_unconstrained
+        if sender.flow.can_write_overlay():
+            (sender.write_untracked if steady else sender.write)(90)
+            written += 1
+    return written
+
+
+def test_on_a_quick_line_all_is_written_and_the_system_is_not_asked() -> None:
+    for delay in (500, 40_000):
+        sender = SimulatedSender(1e7, delay)
+        assert count_overlays(sender, 10) == 300
+        assert sender.flow.is_unconstrained
+        sender.reads = 0
+        assert count_overlays(sender, 60) == 1800
+        assert sender.reads == 0
+        sender.flow.reassess()
+        assert sender.flow.is_unconstrained
+        assert 1 <= sender.reads <= 2
+
+
+def test_a_quick_line_that_becomes_narrow_is_found_out_by_a_look_and_a_narrow_one_that_becomes_quick_by_use() -> None:
+    for delay in (500, 40_000):
+        sender = SimulatedSender(1e7, delay)
+        count_overlays(sender, 10)
+        sender.reduced_throughput = 1_200.0
+        for _ in range(20):
+            count_overlays(sender, 1)
+            sender.flow.reassess()
+        found = [(sender.flow.is_unconstrained, sender.flow.is_unlimited)]
+        sender.reduced_throughput = None
+        count_overlays(sender, 30)
+        found.append((sender.flow.is_unconstrained, sender.flow.is_unlimited))
+        assert found == [(False, False), (True, delay == 500)]
+
+
+def test_blocks_over_a_line_that_is_far_go_on_beside_overlays_that_are_not_told_of() -> None:
+    sender = SimulatedSender(1e6, 40_000)
+    count_overlays(sender, 10)
+    for _ in range(200):
+        sender.at += 33_333
+        sender.write_untracked(90)
+        if sender.flow.has_capacity():
+            sender.write(1_500)
+    assert sender.flow.window.written > 0.9 * (200 * 1_500 + 10 * 30 * 90)
+    sender.at += 250_000
+    sender.flow.reassess()
+    assert sender.flow.is_unconstrained
+
+
+def test_a_narrow_line_is_noticed_and_not_written_to_unasked() -> None:
+    sender = SimulatedSender(1_200.0, 150_000)
+    assert count_overlays(sender, 4) < 60
+    assert not sender.flow.can_write_overlay()
+
+
+def test_of_lines_far_away_the_system_is_asked_to_hold_nothing_back_but_for_loss() -> None:
+    assert [SimulatedSender(1e7, delay).is_loss_based for delay in (500, 40_000)] == [False, True]
+
+
+def test_a_line_of_which_nothing_is_known_always_has_room() -> None:
+    flow = FlowControl(None, lambda: 0)
+    for _ in range(2 * UNCONSTRAINED_CHECKS):
+        assert flow.can_write_overlay()
+        assert flow.has_capacity()
+        flow.record_write(10_000)
+    assert not flow.is_constrained
+    assert not flow.is_unmeasured
+
+
+def test_a_line_that_is_far_away_is_unknown_until_it_answers() -> None:
+    assert not SimulatedSender(1e7, 500).flow.is_unmeasured
+    sender = SimulatedSender(3_600.0, 75_000)
+    states = [(sender.flow.is_unmeasured, sender.flow.is_awaiting_ack)]
+    sender.write(500)
+    for _ in range(60):
+        states.append((sender.flow.is_unmeasured, sender.flow.is_awaiting_ack))
+        sender.at += 10_000
+        sender.flow.has_capacity()
+    assert states[:2] == [(True, False), (True, True)]
+    assert states[-1] == (False, False)
+
+
+def test_blocks_have_a_share_of_a_narrow_line_and_no_more() -> None:
+    sender = SimulatedSender(3_600.0, 75_000)
+    sent = taken = 0
+    for _ in range(60 * 100):
+        sender.at += 10_000
+        if not sender.flow.has_capacity():
+            continue
+        if sender.flow.may_send_block():
+            sender.write(600)
+            sender.flow.charge_block(600)
+            taken += bytes_on_wire(600)
+        else:
+            sender.write(88)
+        sent += 1
+    share = taken / sender.link.sent_bytes
+    assert 0.2 < share < 0.4
+    assert sent > 100
+
+
+def test_no_block_that_can_wait_makes_worse_what_waits_as_a_line_becomes_slower() -> None:
+    sender = SimulatedSender(7_000.0, 75_000)
+    slowed = 10 * 1_000_000
+    blocks = []
+    while sender.at < slowed + 4_000_000:
+        sender.at += 10_000
+        if sender.at >= slowed:
+            sender.reduced_throughput = 1_800.0
+        if not sender.flow.has_capacity():
+            continue
+        if sender.flow.may_send_block():
+            sender.write(300)
+            sender.flow.charge_block(300)
+            blocks.append(sender.at - slowed)
+        else:
+            sender.write(88)
+    # until it is noticed, and once its queue is as long as it should be
+    after = [at / 1e6 for at in blocks if at >= 0]
+    assert not [at for at in after if 0.5 <= at < 1.2]
+    assert len([at for at in after if at >= 1.2]) >= 2
+
+
+def test_a_net_has_come_once_all_that_was_written_till_then_is_acknowledged() -> None:
+    sender = SimulatedSender(3_000.0, 75_000)
+    sender.write(300)
+    states = [(sender.flow.is_prefetch_delivered, sender.flow.is_awaiting_ack)]
+    sender.flow.mark_prefetch_sent()
+    sender.write(300)
+    # what is written later does not count
+    sender.flow.mark_prefetch_sent()
+    while sender.flow.window.in_flight_bytes:
+        sender.at += 1_000
+        sender.flow.has_capacity()
+        now = sender.flow.is_prefetch_delivered, sender.flow.is_awaiting_ack
+        if now != states[-1]:
+            states.append(now)
+            assert sender.flow.window.in_flight_bytes == bytes_on_wire(300) * now[0]
+    assert states == [(False, True), (True, False)]
+    assert FlowControl(None, lambda: 0).is_prefetch_delivered
+
+
+def test_a_closed_line_has_room_so_that_who_writes_is_told() -> None:
+    sender = SimulatedSender(1_200.0, 150_000)
+    sender.write(5_000)
+    assert not sender.flow.has_capacity()
+    sender.closed = True
+    assert sender.flow.has_capacity()
+
+
+def test_what_was_held_at_the_beginning_goes_once() -> None:
+    sender = SimulatedSender(1e6, 1_000)
+    assert sender.flow.is_corked
+    sender.flow.uncork()
+    assert not sender.flow.is_corked
+
+
+class ProxiedSender:
+    """A line behind a proxy: nothing is known of it but what is echoed."""
+
+    def __init__(self, rate: float, delay: int) -> None:
+        self.at = 10**9
+        self.virtual_link = VirtualLink(lambda _: rate, delay)
+        self.link = AckedLink(lambda: self.at)
+        self.flow = FlowControl(self.link, lambda: self.at)
+        self.delay = delay
+        self.pending_echoes: list[tuple[float, bytes]] = []
+
+    def write(self, size: int) -> None:
+        asking = self.flow.probe(size)
+        arrives = self.virtual_link.write(self.at, size + len(asking))
+        self.pending_echoes += [(arrives + self.delay, payload) for _, payload in parse_frames(asking)]
+        self.flow.record_write(size)
+
+    def advance_time(self, microseconds: int) -> None:
+        for _ in range(microseconds // 5_000):
+            self.at += 5_000
+            while self.pending_echoes and self.pending_echoes[0][0] <= self.at:
+                self.flow.on_probe_echo(self.pending_echoes.pop(0)[1])
+            self.flow.has_capacity()
+
+
+def test_behind_a_proxy_a_line_is_far_until_it_answers_soon() -> None:
+    near = ProxiedSender(1e7, 1_000)
+    assert (near.flow.is_high_rtt, near.flow.is_unmeasured, near.flow.is_unlimited) == (True, True, False)
+    near.write(1_000)
+    assert near.flow.is_awaiting_ack
+    near.advance_time(5_000)
+    assert (near.flow.is_high_rtt, near.flow.is_unconstrained, near.flow.is_unlimited) == (False, True, True)
+    # nothing is asked of what is written unasked
+    assert near.flow.probe(90) == b""
+    far = ProxiedSender(1e6, 40_000)
+    far.write(1_000)
+    far.advance_time(100_000)
+    assert (far.flow.is_high_rtt, far.flow.is_unmeasured, far.flow.is_unlimited) == (True, False, False)
+
+
+def test_behind_a_proxy_a_narrow_line_is_not_filled() -> None:
+    echoes = ProxiedSender(3_600.0, 75_000)
+    most, sent = 0.0, 0
+    for step in range(40 * 100):
+        echoes.advance_time(10_000)
+        if step % 3 == 0 and echoes.flow.has_capacity():
+            echoes.write(84)
+            sent += 1
+        if step > 1_000:
+            most = max(most, max((arrives - echoes.at for arrives, _ in echoes.pending_echoes), default=0.0))
+    # one way there and back, and what waits before it
+    assert most < 600_000
+    assert echoes.virtual_link.sent_bytes > 0.8 * 3_600 * 40
+    assert sent > 500
+    assert echoes.flow.is_constrained
+
+
+def test_behind_a_proxy_a_near_line_whose_answers_stay_out_is_quick_no_more() -> None:
+    near = ProxiedSender(1e7, 1_000)
+    near.write(1_000)
+    near.advance_time(5_000)
+    assert near.flow.is_unlimited
+    # a look asks, and this answer stays out
+    assert near.flow.probe(0)
+    near.at += 50_000
+    near.flow.reassess()
+    assert near.flow.is_unconstrained
+    near.at += 400_000
+    near.flow.reassess()
+    assert not near.flow.is_unconstrained
