@@ -28,10 +28,11 @@ import uvicorn
 import uvloop
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 
+from bunraku.codec.container import pack_motion
 from bunraku.playout import timeline
-from bunraku.runtime.context import clock, open_context
+from bunraku.runtime.clock import clock
+from bunraku.runtime.context import open_context
 from bunraku.runtime.settings import Settings
-from bunraku.storage.motion_store import pack
 from bunraku.websocket import multicast
 from bunraku.websocket.connection import WebSocketConnection
 from bunraku.wire.messages import Presence
@@ -108,7 +109,7 @@ async def run_bunraku(listening: socket.socket, size: int, hertz: int, *, playin
             encoded = encode_motion(
                 random_motion(MOTION_DURATION_US / 1e6, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live"
             )
-            await backing.motion_store.put(SESSION, pack(SESSION, encoded))
+            await backing.motion_store.put(SESSION, pack_motion(SESSION, encoded))
             state = timeline.start(SESSION, MOTION_DURATION_US, clock())
             # on a stage that stands what is measured is the overlay
             state = timeline.edit(state, clock(), playing=playing)

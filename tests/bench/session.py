@@ -39,7 +39,7 @@ from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.vector import Quaternion, Vector
 from bunraku.motion.skeleton import Figure
 from bunraku.playout.overlay_buffer import RADIANS_PER_UNIT
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from bunraku.serve import WARM_UP_DELAY_S
 from bunraku.wire.messages import Description, unpack
 from bunraku.wire.overlay import Overlay

@@ -13,6 +13,8 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.typing import Subprotocol
 
 from bunraku.client import Client, StreamEnded, Viewer
+from bunraku.codec.container import add_audio_track, pack_motion
+from bunraku.codec.container import unpack_motion as unpack_motion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
@@ -20,8 +22,7 @@ from bunraku.delivery.resume import ResumeState
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout.block_store import MotionBlockStore, Pose
-from bunraku.storage.motion_store import MotionStore, pack, with_audio
-from bunraku.storage.motion_store import unpack as unpack_motion
+from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
 from tests.audio import decode_opus, find_onset, make_click
 from tests.servers import run_server
@@ -85,7 +86,7 @@ async def test_it_shows_camera_and_light_beside_the_dance(tmp_path: Path) -> Non
     encoded = encode_motion(random_motion(2.0, 30.0, 5), error_bounds_mm=(30.0, 5.0), grade="live")
     filmed, lit = sample_camera(2.0, 30.0), sample_light(2.0, 30.0)
     scenes = [encode_scene(filmed, error_bounds_mm=(20.0, 1.0)), encode_scene(lit, error_bounds_mm=(20.0, 1.0))]
-    await MotionStore.open(f"file://{tmp_path}/library").put("filmed", pack("filmed", encoded, scenes))
+    await MotionStore.open(f"file://{tmp_path}/library").put("filmed", pack_motion("filmed", encoded, scenes))
     with run_server(tmp_path) as url:
         viewer = Viewer(Client(url).socket_url("/v1/motions/filmed/stream?rate=1"))
         seen: dict[int, list[np.ndarray | None]] = {}
@@ -116,9 +117,9 @@ async def test_it_shows_camera_and_light_beside_the_dance(tmp_path: Path) -> Non
 async def test_it_holds_the_sound_beside_the_dance(tmp_path: Path) -> None:
     shelf = MotionStore.open(f"file://{tmp_path}/library")
     encoded = encode_motion(random_motion(2.0, 30.0, 5), error_bounds_mm=(30.0, 5.0), grade="live")
-    stored = unpack_motion("dance", pack("dance", encoded))
+    stored = unpack_motion("dance", pack_motion("dance", encoded))
     sound = make_click(2.0, 48_000, 1.5).astype(np.float32)
-    await shelf.put("sung", with_audio("sung", stored, encode_audio([sound], stored.first_track, 1))[0])
+    await shelf.put("sung", add_audio_track("sung", stored, encode_audio([sound], stored.first_track, 1))[0])
     with run_server(tmp_path) as url:
         viewer = Viewer(Client(url).socket_url("/v1/motions/sung/stream?rate=1"))
         ahead: dict[int, int] = {}
@@ -239,7 +240,7 @@ async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what
         encode_motion(random_motion(seconds, fps, seed), error_bounds_mm=(30.0, 5.0), grade="live")
         for seconds, fps, seed in ((8.0, 30.0, 5), (9.0, 24.0, 6))
     )
-    await MotionStore.open(f"file://{tmp_path}/library").put("pair", pack("pair", first, others=[second]))
+    await MotionStore.open(f"file://{tmp_path}/library").put("pair", pack_motion("pair", first, others=[second]))
     with run_server(tmp_path) as url:
         door = CuttingProxy(Client(url).socket_url("/v1/motions/pair/stream"))
         async with door.open("?rate=1") as viewer:
@@ -277,7 +278,7 @@ async def test_of_a_paused_dance_the_best_of_every_performer_is_shown_soon(tmp_p
     dances = [
         encode_motion(random_motion(8.0, 30.0, seed), error_bounds_mm=(60.0, 5.0), grade="live") for seed in (5, 6)
     ]
-    await MotionStore.open(f"file://{tmp_path}/library").put("pair", pack("pair", dances[0], others=dances[1:]))
+    await MotionStore.open(f"file://{tmp_path}/library").put("pair", pack_motion("pair", dances[0], others=dances[1:]))
     with run_server(tmp_path) as url:
         async with Client(url) as client:
             session = (await client.open_session("pair", playing=False))["id"]

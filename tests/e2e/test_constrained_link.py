@@ -10,8 +10,9 @@ import pytest
 
 from bunraku.client import Viewer, ViewerStatistics
 from bunraku.codec import motion_decoder
+from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
-from bunraku.storage.motion_store import MotionStore, pack
+from bunraku.storage.motion_store import MotionStore
 from tests.bench.network import EmulatedLink, FarEnd, missing_requirement, open_network
 from tests.reverse_proxy import run_reverse_proxy
 from tests.servers import run_server
@@ -27,7 +28,7 @@ def dance(tmp_path: Path) -> Path:
         pytest.skip(reason)
     motion_decoder.warm_up()
     encoded = encode_motion(random_motion(20.0, 30.0, 5), error_bounds_mm=(30.0, 5.0), grade="live")
-    asyncio.run(MotionStore.open(f"file://{tmp_path}/library").put("dance", pack("dance", encoded)))
+    asyncio.run(MotionStore.open(f"file://{tmp_path}/library").put("dance", pack_motion("dance", encoded)))
     return tmp_path
 
 

@@ -15,7 +15,7 @@ from bunraku.cli import app
 from bunraku.client import Client, Puppeteer, ServerProblem, Viewer
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout.block_store import Pose
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from tests.servers import make_bvh_clip, run_server
 
 LIMB = "left_hand"

@@ -206,9 +206,9 @@ async def test_a_page_of_another_site_opens_no_socket(tmp_path: Path, origin: st
     with run_server(tmp_path) as url:
         address = url.replace("http", "ws") + "/v1/sessions/none/control"
         with pytest.raises(InvalidStatus) as refused:
-            await connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=origin)  # type: ignore[list-item, arg-type]
+            await connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=origin)  # type: ignore[arg-type]
         assert refused.value.response.status_code == 403
-        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=url) as socket:  # type: ignore[list-item, arg-type]
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=url) as socket:  # type: ignore[arg-type]
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
         assert closed.value.rcvd is not None

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.http.problem_details import ProblemError
 from bunraku.ingest.derived_motion import DerivedMotionFactory
@@ -13,14 +14,13 @@ from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.settings import Settings
 from bunraku.storage.catalogue import CatalogueEntry
-from bunraku.storage.motion_store import StoredMotion, pack
 from tests.vectors.blocks import random_motion
 
 ENCODED = encode_motion(random_motion(1.2, 30.0, 3), error_bounds_mm=(30.0,), grade="live")
 
 
 async def make_factory(backing: ServiceContext) -> DerivedMotionFactory:
-    await backing.motion_store.put("one", pack("one", ENCODED))
+    await backing.motion_store.put("one", pack_motion("one", ENCODED))
     await backing.catalogue.add_motion(CatalogueEntry("one", 5, {"name": "One"}))
     return DerivedMotionFactory(backing, UploadOperation(backing))
 
@@ -35,7 +35,7 @@ async def test_the_same_is_made_once_and_again_where_its_object_is_gone(tmp_path
     async def copy(new: str, stored: StoredMotion) -> JobResult:
         assert stored.id == "one"
         made.append(new)
-        return JobResult(pack(new, ENCODED), {"made_from": stored.id})
+        return JobResult(pack_motion(new, ENCODED), {"made_from": stored.id})
 
     async with open_context(Settings(data=tmp_path)) as backing:
         derived = await make_factory(backing)

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from bunraku.runtime.context import clock, open_context
+from bunraku.runtime.clock import clock
+from bunraku.runtime.context import open_context
 from bunraku.runtime.settings import Settings
 from tests.messaging.test_bus import MessageRecorder, flush_buses
 from tests.processes import nats_url_of, run_nats_server

@@ -6,6 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_decoder import MotionBlock, decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.motion_track import MotionTrack
@@ -15,7 +16,7 @@ from bunraku.playout.block_store import MotionBlockStore
 from bunraku.playout.timeline import TimelineHistory
 from bunraku.session import pose_cache as poses_module
 from bunraku.session.pose_cache import BATCH_FRAMES, PoseCache, shared_block_store
-from bunraku.storage.motion_store import MotionStore, StoredMotion, pack
+from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import Data
 from tests.ingest.jobs.motions import MOTIONS
 from tests.vectors.blocks import random_motion
@@ -26,7 +27,7 @@ STEP_US = 16_667
 async def stored_motion() -> StoredMotion:
     library = MotionStore.open("memory:///")
     await library.put(
-        "one", pack("one", encode_motion(random_motion(2.3, 30.0, 5), error_bounds_mm=(5.0,), grade="live"))
+        "one", pack_motion("one", encode_motion(random_motion(2.3, 30.0, 5), error_bounds_mm=(5.0,), grade="live"))
     )
     motion = await library.get("one")
     assert motion is not None

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.context import ServiceContext, open_context
@@ -16,7 +17,6 @@ from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.stage_proxy import StageProxy
-from bunraku.storage.motion_store import pack
 from bunraku.wire.messages import Claim, Grant, Presence, TimelineState, Welcome, unpack
 from bunraku.wire.overlay import Overlay
 from tests.vectors.blocks import random_motion
@@ -29,7 +29,7 @@ async def backing(tmp_path: Path) -> AsyncIterator[ServiceContext]:
     async with open_context(Settings(data=tmp_path)) as opened:
         for seed, name in enumerate(MOTIONS):
             encoded = encode_motion(random_motion(2.0 + seed, 30.0, seed), error_bounds_mm=(30.0,), grade="live")
-            await opened.motion_store.put(name, pack(name, encoded))
+            await opened.motion_store.put(name, pack_motion(name, encoded))
         yield opened
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from bunraku.codec import motion_decoder
+from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.ownership import INPUT_TIMEOUT_US
@@ -20,11 +21,11 @@ from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore
 from bunraku.playout.overlay_buffer import pack_joints
 from bunraku.playout.timeline import position_at
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from bunraku.session import puppeteer_roster
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
 from bunraku.session.stage import EDIT_LEAD_US, FRAME_INTERVAL_US, FRAMES_PER_MESSAGE, Stage, make_marionettes
-from bunraku.storage.motion_store import MotionStore, StoredMotion, pack
+from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import (
     Alive,
     Ask,
@@ -74,7 +75,8 @@ class StageMessages:
 async def stored_motion(name: str, seed: int) -> StoredMotion:
     library = MotionStore.open("memory:///")
     await library.put(
-        name, pack(name, encode_motion(random_motion(2.3, 30.0, seed), error_bounds_mm=(30.0, 5.0), grade="live"))
+        name,
+        pack_motion(name, encode_motion(random_motion(2.3, 30.0, seed), error_bounds_mm=(30.0, 5.0), grade="live")),
     )
     motion = await library.get(name)
     assert motion is not None

@@ -7,10 +7,12 @@ from pathlib import Path
 import msgpack
 import pytest
 
+from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.http.problem_details import ProblemError
 from bunraku.playout import timeline
-from bunraku.runtime.context import ServiceContext, clock, open_context
+from bunraku.runtime.clock import clock
+from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
 from bunraku.session.puppeteer_connection import PuppeteerConnection
@@ -18,7 +20,6 @@ from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import Stage, make_marionettes
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
-from bunraku.storage.motion_store import StoredMotion, pack
 from bunraku.wire.messages import Claim
 from tests.vectors.blocks import random_motion
 
@@ -44,7 +45,7 @@ class FakeStageOwner:
 async def backing(tmp_path: Path) -> AsyncIterator[ServiceContext]:
     async with open_context(Settings(data=tmp_path)) as opened:
         encoded = encode_motion(random_motion(2.0, 30.0, 1), error_bounds_mm=(30.0,), grade="live")
-        await opened.motion_store.put("one", pack("one", encoded))
+        await opened.motion_store.put("one", pack_motion("one", encoded))
         yield opened
 
 

@@ -6,7 +6,9 @@ from pathlib import Path
 import msgpack
 import pytest
 
+from bunraku.codec import container
 from bunraku.codec.audio import AudioTrack, EncodedAudio, create_audio_track, pack_audio_level, unpack_audio_block
+from bunraku.codec.container import StoredMotion, add_audio_track, add_performers, pack_motion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneTrack
@@ -14,7 +16,7 @@ from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.motion.placement import Placement
 from bunraku.storage import motion_store
-from bunraku.storage.motion_store import MotionStore, StoredMotion, pack, with_audio, with_performers
+from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import Data, Description, unpack
 from tests.vectors import audio as sounds
 from tests.vectors import scene as scenes
@@ -25,7 +27,7 @@ ENCODED = encode_motion(random_motion(2.5, 30.0, 8), error_bounds_mm=(30.0, 5.0)
 
 async def test_a_motion_comes_back_ready_to_be_sent(tmp_path: Path) -> None:
     shelf = MotionStore.open(f"file://{tmp_path}/library")
-    await shelf.put("m1", pack("m1", ENCODED))
+    await shelf.put("m1", pack_motion("m1", ENCODED))
     stored = await shelf.get("m1")
     assert stored is not None
     description = unpack(stored.description)
@@ -45,7 +47,7 @@ async def test_cameras_and_lights_are_tracks_of_their_own(tmp_path: Path) -> Non
         encode_scene(scenes.sample_camera(2.5, 30.0), error_bounds_mm=(10.0,)),
         encode_scene(scenes.sample_light(2.0, 24.0)),
     ]
-    await shelf.put("m1", pack("m1", ENCODED, beside))
+    await shelf.put("m1", pack_motion("m1", ENCODED, beside))
     stored = await shelf.get("m1")
     assert stored is not None
     assert [len(track) for track in stored.packets] == [2, 1, 5]
@@ -68,9 +70,9 @@ async def test_cameras_and_lights_are_tracks_of_their_own(tmp_path: Path) -> Non
 
 def test_more_tracks_than_can_be_numbered_are_refused() -> None:
     still = encode_scene(scenes.sample_camera(0.1, 30.0), error_bounds_mm=(10.0,))
-    assert len(motion_store.unpack("m", pack("m", ENCODED, [still] * 15)).tracks) == 16
+    assert len(container.unpack_motion("m", pack_motion("m", ENCODED, [still] * 15)).tracks) == 16
     with pytest.raises(ValueError, match="at most 16 tracks, not 17"):
-        pack("m", ENCODED, [still] * 16)
+        pack_motion("m", ENCODED, [still] * 16)
 
 
 def encoded_audio(stored: StoredMotion, seconds: float) -> EncodedAudio:
@@ -81,19 +83,19 @@ def encoded_audio(stored: StoredMotion, seconds: float) -> EncodedAudio:
 
 
 def test_audio_stands_last_and_another_takes_its_place() -> None:
-    before = motion_store.unpack(
-        "m1", pack("m1", ENCODED, [encode_scene(scenes.sample_camera(2.5, 30.0), error_bounds_mm=(10.0,))])
+    before = container.unpack_motion(
+        "m1", pack_motion("m1", ENCODED, [encode_scene(scenes.sample_camera(2.5, 30.0), error_bounds_mm=(10.0,))])
     )
-    first, kinds = with_audio("m2", before, encoded_audio(before, 2.0))
+    first, kinds = add_audio_track("m2", before, encoded_audio(before, 2.0))
     assert kinds == ["motion", "camera", "audio"]
-    sung = motion_store.unpack("m2", first)
+    sung = container.unpack_motion("m2", first)
     assert sung.packets[:2] == before.packets
     assert sung.bitrates_kbps[:2] == before.bitrates_kbps
     assert [len(rates) for rates in sung.bitrates_kbps] == [2, 1, 2]
     assert sung.performers[0].front == before.performers[0].front
-    again, kinds = with_audio("m3", sung, encoded_audio(sung, 1.0))
+    again, kinds = add_audio_track("m3", sung, encoded_audio(sung, 1.0))
     assert kinds == ["motion", "camera", "audio"]
-    other = motion_store.unpack("m3", again)
+    other = container.unpack_motion("m3", again)
     audio = other.tracks[2]
     assert isinstance(audio, AudioTrack)
     assert audio.samples == 48_000
@@ -108,14 +110,14 @@ def test_audio_stands_last_and_another_takes_its_place() -> None:
 
 def test_audio_beside_as_many_tracks_as_can_be_numbered_is_refused() -> None:
     still = encode_scene(scenes.sample_camera(0.1, 30.0), error_bounds_mm=(10.0,))
-    full = motion_store.unpack("m", pack("m", ENCODED, [still] * 15))
+    full = container.unpack_motion("m", pack_motion("m", ENCODED, [still] * 15))
     with pytest.raises(ValueError, match="at most 16 tracks"):
-        with_audio("n", full, encoded_audio(full, 1.0))
+        add_audio_track("n", full, encoded_audio(full, 1.0))
 
 
 async def test_an_object_from_when_a_motion_was_one_track_still_opens(tmp_path: Path) -> None:
     shelf = MotionStore.open(f"file://{tmp_path}")
-    now = msgpack.unpackb(pack("m1", ENCODED))
+    now = msgpack.unpackb(pack_motion("m1", ENCODED))
     await shelf.put("m1", msgpack.packb({"description": now["description"], "packets": now["tracks"][0]}))
     stored = await shelf.get("m1")
     assert stored is not None
@@ -144,7 +146,7 @@ async def test_what_could_not_be_a_logs_name_is_never_a_path(tmp_path: Path, nam
 
 async def test_what_was_removed_is_gone_and_removing_it_again_is_nothing(tmp_path: Path) -> None:
     shelf = MotionStore.open(f"file://{tmp_path}")
-    await shelf.put("m1", pack("m1", ENCODED))
+    await shelf.put("m1", pack_motion("m1", ENCODED))
     await shelf.get("m1")
     await shelf.remove("m1")
     await shelf.remove("m1")
@@ -154,7 +156,7 @@ async def test_what_was_removed_is_gone_and_removing_it_again_is_nothing(tmp_pat
 
 async def test_memory_is_bounded_and_what_fell_out_is_read_again(monkeypatch: pytest.MonkeyPatch) -> None:
     shelf = MotionStore.open("memory:///")
-    packed = pack("m", ENCODED)
+    packed = pack_motion("m", ENCODED)
     monkeypatch.setattr(motion_store, "MAX_CACHE_BYTES", 2 * len(packed))
     for number in range(5):
         await shelf.put(f"m{number}", packed)
@@ -167,32 +169,33 @@ async def test_memory_is_bounded_and_what_fell_out_is_read_again(monkeypatch: py
 
 async def test_a_motion_of_another_codec_is_none_until_it_is_sent_again(tmp_path: Path) -> None:
     shelf = MotionStore.open(f"file://{tmp_path}")
-    await shelf.put("m1", pack("m1", ENCODED).replace(b"bunraku.motion/2", b"bunraku.motion/1"))
+    await shelf.put("m1", pack_motion("m1", ENCODED).replace(b"bunraku.motion/2", b"bunraku.motion/1"))
     assert await shelf.get("m1") is None
-    await shelf.put("m1", pack("m1", ENCODED))
+    await shelf.put("m1", pack_motion("m1", ENCODED))
     assert await shelf.get("m1") is not None
 
 
 def test_an_object_is_one_map() -> None:
-    assert set(msgpack.unpackb(pack("m", ENCODED))) == {"description", "tracks"}
+    assert set(msgpack.unpackb(pack_motion("m", ENCODED))) == {"description", "tracks"}
 
 
 @pytest.mark.parametrize("motion", ["", "../m1", "a/b", "a//b", "m1\0", "é", ".", "motions/m1"])
 async def test_what_could_not_be_an_id_is_no_motion(tmp_path: Path, motion: str) -> None:
     shelf = MotionStore.open(f"file://{tmp_path}")
-    await shelf.put("m1", pack("m1", ENCODED))
+    await shelf.put("m1", pack_motion("m1", ENCODED))
     assert await shelf.get(motion) is None
 
 
 def test_performers_come_together_with_blocks_that_are_the_same() -> None:
     camera = encode_scene(scenes.sample_camera(2.5, 30.0), error_bounds_mm=(10.0,))
-    one = motion_store.unpack("one", pack("one", ENCODED, [camera]))
-    two = motion_store.unpack(
-        "two", pack("two", encode_motion(random_motion(1.5, 60.0, 9), error_bounds_mm=(30.0,), grade="live"), [camera])
+    one = container.unpack_motion("one", pack_motion("one", ENCODED, [camera]))
+    two = container.unpack_motion(
+        "two",
+        pack_motion("two", encode_motion(random_motion(1.5, 60.0, 9), error_bounds_mm=(30.0,), grade="live"), [camera]),
     )
     places = [Placement(-1.0, 0.0, 0.5), Placement(1.0, 0.0, 0.0), Placement(0.0, -2.0, 0.0)]
-    packed, kinds = with_performers("three", one, [two, one], places)
-    three = motion_store.unpack("three", packed)
+    packed, kinds = add_performers("three", one, [two, one], places)
+    three = container.unpack_motion("three", packed)
     # the others' cameras stay out
     assert kinds == ["motion", "motion", "motion", "camera"]
     assert [dance.placement for dance in three.performers] == places
@@ -203,14 +206,16 @@ def test_performers_come_together_with_blocks_that_are_the_same() -> None:
             for packet, was in zip(packets, before, strict=True):
                 assert Data.unpack(packet) == replace(Data.unpack(was), track=number)
     with pytest.raises(ValueError, match="at most 4 performers"):
-        with_performers("many", three, [three], places * 2)
-    again = motion_store.unpack("lit", motion_store.with_scenes("lit", three, [camera, camera], {"camera"})[0])
+        add_performers("many", three, [three], places * 2)
+    again = container.unpack_motion(
+        "lit", container.replace_scene_tracks("lit", three, [camera, camera], {"camera"})[0]
+    )
     assert [type(track).__name__ for track in again.tracks] == ["MotionTrack"] * 3 + ["SceneTrack"] * 2
     assert [dance.placement for dance in again.performers] == places
 
 
 def test_more_tracks_than_can_be_numbered_are_refused_with_performers_too() -> None:
     still = encode_scene(scenes.sample_light(0.5, 24.0), error_bounds_mm=(30.0,))
-    full = motion_store.unpack("m", pack("m", ENCODED, [still] * 15))
+    full = container.unpack_motion("m", pack_motion("m", ENCODED, [still] * 15))
     with pytest.raises(ValueError, match="at most 16 tracks"):
-        with_performers("n", full, [full], [Placement(), Placement()])
+        add_performers("n", full, [full], [Placement(), Placement()])

@@ -9,9 +9,10 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.storage.motion_store import MotionStore, pack
+from bunraku.storage.motion_store import MotionStore
 from bunraku.storage.object_storage import ObjectStorage
 from tests.processes import ServerProcess, run_s3_server
 from tests.vectors.blocks import random_motion
@@ -60,7 +61,7 @@ async def test_what_was_put_is_there_until_it_is_removed(url: str, size: int) ->
 
 async def test_a_library_keeps_motions_and_logs(url: str) -> None:
     encoded = encode_motion(random_motion(1.5, 30.0, 8), error_bounds_mm=(30.0,), grade="live")
-    await MotionStore.open(url).put("m1", pack("m1", encoded))
+    await MotionStore.open(url).put("m1", pack_motion("m1", encoded))
     library = MotionStore.open(url)
     stored = await library.get("m1")
     assert stored is not None
@@ -103,7 +104,7 @@ async def test_a_server_that_is_gone_is_unavailable_and_what_is_in_memory_is_the
         httpx2.put(f"{endpoint}/bucket").raise_for_status()
         objects, library = ObjectStorage("s3://bucket"), MotionStore.open("s3://bucket")
         encoded = encode_motion(random_motion(1.5, 30.0, 8), error_bounds_mm=(30.0,), grade="live")
-        await library.put("m1", pack("m1", encoded))
+        await library.put("m1", pack_motion("m1", encoded))
         assert await library.get("m1") is not None
         other.kill()
         await assert_unavailable(objects)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from bunraku.codec.container import StoredMotion, add_audio_track, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.opus import encode_audio
-from bunraku.storage.motion_store import StoredMotion, pack, unpack, with_audio
 from bunraku.stream.block_batch import BlockBatchCache
 from bunraku.stream.sync_group import SyncGroups
 from bunraku.stream.tick_scheduler import TickScheduler
@@ -22,9 +22,9 @@ def motion_with_camera_and_audio(seconds: float, filmed_seconds: float, heard_se
     """A dance of two rates, with a camera and a sound that are shorter."""
     encoded = encode_motion(random_motion(seconds, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
     scene = encode_scene(sample_camera(filmed_seconds, 25.0), error_bounds_mm=(20.0, 4.0))
-    motion = unpack("m", pack("m", encoded, [scene]))
+    motion = unpack_motion("m", pack_motion("m", encoded, [scene]))
     noise = np.random.default_rng(2).normal(0, 0.2, (round(heard_seconds * 48_000), 1)).astype(np.float32)
-    return unpack("m", with_audio("m", motion, encode_audio([noise], motion.first_track, 1))[0])
+    return unpack_motion("m", add_audio_track("m", motion, encode_audio([noise], motion.first_track, 1))[0])
 
 
 class FakeViewerGroup:

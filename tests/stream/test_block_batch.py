@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from bunraku.codec.container import StoredMotion
 from bunraku.playout import timeline
-from bunraku.runtime.context import clock
-from bunraku.storage.motion_store import StoredMotion
+from bunraku.runtime.clock import clock
 from bunraku.stream import viewer_connection
 from bunraku.wire.messages import Report
 from tests.stream.sync_viewer import FakeViewerGroup, SyncedViewer, motion_with_camera_and_audio

@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from bunraku.codec.container import StoredMotion, add_audio_track, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.delivery.block_scheduler import MIN_PREFETCH_US
@@ -13,7 +14,6 @@ from bunraku.delivery.congestion import HEADER_BYTES
 from bunraku.delivery.resume import ResumeState
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.playout import timeline
-from bunraku.storage.motion_store import StoredMotion, pack, unpack, with_audio
 from bunraku.stream.flow_control import FlowControl
 from bunraku.stream.motion_delivery import MAX_IDLE_BLOCK_S, MotionDelivery
 from bunraku.stream.track_selection import TRACK_TYPES
@@ -30,7 +30,7 @@ UNLIMITED_FLOW = FlowControl(None, lambda: 0)
 @pytest.fixture(scope="module")
 def motion() -> StoredMotion:
     encoded = encode_motion(random_motion(9.2, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
-    return unpack("m", pack("m", encoded))
+    return unpack_motion("m", pack_motion("m", encoded))
 
 
 def all_packets(playing: MotionDelivery, motion: StoredMotion) -> list[tuple[int, int]]:
@@ -71,8 +71,8 @@ def pair() -> StoredMotion:
         encode_motion(random_motion(seconds, fps, seed), error_bounds_mm=(30.0, 5.0), grade="live")
         for seconds, fps, seed in ((9.2, 30.0, 9), (8.5, 24.0, 8))
     )
-    return unpack(
-        "m", pack("m", first, [encode_scene(sample_camera(9.2, 30.0), error_bounds_mm=(20.0, 4.0))], [second])
+    return unpack_motion(
+        "m", pack_motion("m", first, [encode_scene(sample_camera(9.2, 30.0), error_bounds_mm=(20.0, 4.0))], [second])
     )
 
 
@@ -148,7 +148,9 @@ def test_who_wants_no_motion_is_told_of_no_choice(motion: StoredMotion) -> None:
 
 def test_over_a_line_that_is_far_the_rest_is_told_of_once_the_motion_goes_on_for_a_while() -> None:
     encoded = encode_motion(random_motion(9.2, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
-    motion = unpack("m", pack("m", encoded, [encode_scene(sample_camera(9.2, 30.0), error_bounds_mm=(20.0, 4.0))]))
+    motion = unpack_motion(
+        "m", pack_motion("m", encoded, [encode_scene(sample_camera(9.2, 30.0), error_bounds_mm=(20.0, 4.0))])
+    )
     state = timeline.start("m", motion.first_track.duration_us, 0, playing=False)
     whole = MotionDelivery(motion, TRACK_TYPES, None)
     assert whole.initial_description(is_high_rtt=False) == motion.description
@@ -169,7 +171,9 @@ def test_over_a_line_that_is_far_the_rest_is_told_of_once_the_motion_goes_on_for
 
 def test_who_comes_back_is_told_of_the_tracks_that_it_was_not_told_of() -> None:
     encoded = encode_motion(random_motion(2.0, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
-    motion = unpack("m", pack("m", encoded, [encode_scene(sample_camera(2.0, 30.0), error_bounds_mm=(20.0, 4.0))]))
+    motion = unpack_motion(
+        "m", pack_motion("m", encoded, [encode_scene(sample_camera(2.0, 30.0), error_bounds_mm=(20.0, 4.0))])
+    )
     state = timeline.start("m", motion.first_track.duration_us, 0, playing=False)
     for tracks, firsts in ((1, [1]), (2, []), (None, [])):
         playing = MotionDelivery(motion, TRACK_TYPES, None)
@@ -181,8 +185,8 @@ def test_who_comes_back_is_told_of_the_tracks_that_it_was_not_told_of() -> None:
 
 
 def test_over_a_far_line_nothing_is_bettered_before_the_net_has_come() -> None:
-    motion = unpack(
-        "m", pack("m", encode_motion(random_motion(40.0, 10.0, 9), error_bounds_mm=(30.0, 5.0), grade="live"))
+    motion = unpack_motion(
+        "m", pack_motion("m", encode_motion(random_motion(40.0, 10.0, 9), error_bounds_mm=(30.0, 5.0), grade="live"))
     )
     state = timeline.start("m", motion.first_track.duration_us, 0)
     sender = SimulatedSender(7_000.0, 75_000)
@@ -205,9 +209,9 @@ def test_over_a_far_line_nothing_is_bettered_before_the_net_has_come() -> None:
 
 def test_a_line_too_narrow_for_sound_gets_a_better_motion() -> None:
     encoded = encode_motion(random_motion(4.0, 30.0, 9), error_bounds_mm=(60.0, 20.0, 8.0), grade="live")
-    dance = unpack("m", pack("m", encoded))
+    dance = unpack_motion("m", pack_motion("m", encoded))
     noise = np.random.default_rng(2).normal(0, 0.2, (192_000, 1)).astype(np.float32)
-    motion = unpack("m", with_audio("m", dance, encode_audio([noise], dance.first_track, 1))[0])
+    motion = unpack_motion("m", add_audio_track("m", dance, encode_audio([noise], dance.first_track, 1))[0])
     state = timeline.start("m", motion.first_track.duration_us, 0, playing=False)
 
     def chosen(bps: float) -> tuple[int, int]:
@@ -258,7 +262,7 @@ def idle_upgrade_levels(
 def test_of_a_stage_that_stands_all_performers_are_bettered_as_far_as_a_block_takes_the_line_not_long() -> None:
     ladder = (60.0, 20.0, 8.0, 3.0)
     first, second = (encode_motion(random_motion(4.0, 30.0, n), error_bounds_mm=ladder, grade="live") for n in (9, 8))
-    motion = unpack("m", pack("m", first, others=[second]))
+    motion = unpack_motion("m", pack_motion("m", first, others=[second]))
     assert idle_upgrade_levels(motion, flow_with_throughput(None)) == [3, 3]
     # a second of one at the best rate, with its heads
     bits = 1_000 * sum(kbps[-1] for kbps in motion.bitrates_kbps) / 2 + 8 * HEADER_BYTES

@@ -6,9 +6,9 @@ import random
 
 import pytest
 
+from bunraku.codec.container import StoredMotion
 from bunraku.playout import timeline
-from bunraku.runtime.context import clock
-from bunraku.storage.motion_store import StoredMotion
+from bunraku.runtime.clock import clock
 from bunraku.stream import viewer_connection
 from bunraku.websocket.frame import encode_frame
 from bunraku.wire.messages import Presence, Report

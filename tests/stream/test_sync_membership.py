@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from bunraku.codec.container import StoredMotion
 from bunraku.delivery.block_scheduler import SCHEDULING_MARGIN_US
 from bunraku.playout import timeline
-from bunraku.runtime.context import clock
-from bunraku.storage.motion_store import StoredMotion
+from bunraku.runtime.clock import clock
 from bunraku.stream.block_batch import BlockBatchCache
 from bunraku.stream.motion_delivery import MotionDelivery
 from bunraku.stream.sync_group import SyncGroups

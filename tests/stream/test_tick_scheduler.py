@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import asyncio
 
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from bunraku.stream.tick_scheduler import MAX_BATCH, TickScheduler
 
 

@@ -3,11 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bunraku.codec.container import StoredMotion, add_audio_track, add_performers, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.motion.placement import STAGE_CENTRE
-from bunraku.storage.motion_store import StoredMotion, pack, unpack, with_audio, with_performers
 from bunraku.stream.track_selection import (
     TRACK_TYPES,
     build_allocations,
@@ -27,9 +27,11 @@ from tests.vectors.scene import sample_camera
 def motion() -> StoredMotion:
     """A motion with a camera, then noise."""
     encoded = encode_motion(random_motion(2.0, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
-    filmed = unpack("m", pack("m", encoded, [encode_scene(sample_camera(2.0, 30.0), error_bounds_mm=(20.0, 4.0))]))
+    filmed = unpack_motion(
+        "m", pack_motion("m", encoded, [encode_scene(sample_camera(2.0, 30.0), error_bounds_mm=(20.0, 4.0))])
+    )
     noise = np.random.default_rng(2).normal(0, 0.2, (96_000, 1)).astype(np.float32)
-    return unpack("m", with_audio("m", filmed, encode_audio([noise], filmed.first_track, 1))[0])
+    return unpack_motion("m", add_audio_track("m", filmed, encode_audio([noise], filmed.first_track, 1))[0])
 
 
 def test_all_channels_are_counted(motion: StoredMotion) -> None:
@@ -80,8 +82,10 @@ def test_motion_and_sound_share_the_line_where_both_are_wanted(motion: StoredMot
 
 
 def test_rates_of_several_performers_are_chosen_and_paid_for_together(motion: StoredMotion) -> None:
-    single = unpack("s", pack("s", encode_motion(random_motion(1.0, 30.0, 4), error_bounds_mm=(20.0,), grade="live")))
-    both = unpack("b", with_performers("b", motion, [single, motion], [STAGE_CENTRE] * 3)[0])
+    single = unpack_motion(
+        "s", pack_motion("s", encode_motion(random_motion(1.0, 30.0, 4), error_bounds_mm=(20.0,), grade="live"))
+    )
+    both = unpack_motion("b", add_performers("b", motion, [single, motion], [STAGE_CENTRE] * 3)[0])
     low, high = motion.bitrates_kbps[0]
     assert motion_bitrates(both) == pytest.approx(
         [2 * low + single.bitrates_kbps[0][0], 2 * high + single.bitrates_kbps[0][0]]

@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bunraku.codec.container import StoredMotion, add_audio_track, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.delivery.block_scheduler import SCHEDULING_MARGIN_US
 from bunraku.delivery.resume import ResumeState
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.playout import timeline
-from bunraku.runtime.context import clock
-from bunraku.storage.motion_store import StoredMotion, pack, unpack, with_audio
+from bunraku.runtime.clock import clock
 from bunraku.stream import viewer_connection
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, MAX_PENDING_PINGS
 from bunraku.stream.tick_scheduler import TickScheduler
@@ -44,11 +44,11 @@ def motions() -> dict[str, StoredMotion]:
     for name, seconds in (("one", 9.2), ("two", 2.0), ("filmed", 2.0)):
         encoded = encode_motion(random_motion(seconds, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
         scenes = [encode_scene(make(2.0, 30.0), error_bounds_mm=(20.0, 4.0)) for make in (sample_camera, sample_light)]
-        shelf[name] = unpack(name, pack(name, encoded, scenes if name == "filmed" else ()))
+        shelf[name] = unpack_motion(name, pack_motion(name, encoded, scenes if name == "filmed" else ()))
     # "sung", with noise beside it
     noise = np.random.default_rng(2).normal(0, 0.2, (441_600, 1)).astype(np.float32)
-    packed, _ = with_audio("sung", shelf["one"], encode_audio([noise], shelf["one"].first_track, 1))
-    return {**shelf, "sung": unpack("sung", packed)}
+    packed, _ = add_audio_track("sung", shelf["one"], encode_audio([noise], shelf["one"].first_track, 1))
+    return {**shelf, "sung": unpack_motion("sung", packed)}
 
 
 def open_viewer(

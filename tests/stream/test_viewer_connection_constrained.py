@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
+from bunraku.codec.container import StoredMotion, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.playout import timeline
-from bunraku.runtime.context import clock
-from bunraku.storage.motion_store import StoredMotion, pack, unpack
+from bunraku.runtime.clock import clock
 from bunraku.stream import viewer_connection
 from bunraku.stream.tick_scheduler import TickScheduler
 from bunraku.stream.viewer_connection import ViewerConnection
@@ -28,7 +28,7 @@ LIMBS: dict[int, tuple[int, ...]] = dict.fromkeys(range(4), (7,) * 9)
 @pytest.fixture(scope="module")
 def motion() -> StoredMotion:
     encoded = encode_motion(random_motion(40.0, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
-    return unpack("one", pack("one", encoded))
+    return unpack_motion("one", pack_motion("one", encoded))
 
 
 class ConstrainedTransport(FakeTransport):
@@ -193,7 +193,7 @@ def pair() -> StoredMotion:
         encode_motion(random_motion(40.0, 30.0, seed), error_bounds_mm=(60.0, 20.0, 8.0, 3.0), grade="live")
         for seed in (9, 8)
     )
-    return unpack("pair", pack("pair", first, others=[second]))
+    return unpack_motion("pair", pack_motion("pair", first, others=[second]))
 
 
 async def test_while_the_stage_stands_what_is_on_show_is_bettered_first_and_once_and_then_the_line_falls_still(
@@ -232,7 +232,7 @@ async def test_a_loop_that_is_there_whole_comes_better_than_the_line_carries_as_
         encode_motion(random_motion(8.0, 30.0, seed), error_bounds_mm=(60.0, 20.0, 8.0, 3.0), grade="live")
         for seed in (9, 8)
     ]
-    loop = unpack("loop", pack("loop", dances[0], others=dances[1:]))
+    loop = unpack_motion("loop", pack_motion("loop", dances[0], others=dances[1:]))
     watching = ConstrainedViewer(loop, monkeypatch, 1_200.0)
     watching.advance_time(60_000_000)
     assert watching.viewer.choice is not None

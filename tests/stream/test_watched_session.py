@@ -6,10 +6,11 @@ from collections.abc import Callable
 import msgpack
 import pytest
 
+from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.messaging.bus import MemoryBus, NoResponse
 from bunraku.playout import timeline
-from bunraku.storage.motion_store import MotionStore, pack
+from bunraku.storage.motion_store import MotionStore
 from bunraku.stream import watched_session
 from bunraku.stream.tick_scheduler import TickScheduler
 from bunraku.stream.viewer_connection import ViewerConnection
@@ -30,7 +31,7 @@ async def library() -> MotionStore:
     shelf = MotionStore.open("memory:///")
     encoded = encode_motion(random_motion(2.0, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
     for name in ("m", "n"):
-        await shelf.put(name, pack(name, encoded))
+        await shelf.put(name, pack_motion(name, encoded))
     return shelf
 
 

@@ -15,7 +15,7 @@ from bunraku.client.puppeteer import ControlRefused, Puppeteer
 from bunraku.client.reconnecting_connection import ReconnectingConnection
 from bunraku.client.viewer import Viewer
 from bunraku.playout.timeline import position_at
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from bunraku.wire.overlay import Overlay
 
 FRAME_S = 1 / 20

@@ -86,10 +86,10 @@ class LoadViewer(MessageSocket):
     __slots__ = (
         "_block_count",
         "_buffered_until",
-        "_received_blocks",
         "_is_controlled",
         "_last_overlay_at",
         "_received_at",
+        "_received_blocks",
         "_state",
     )
 

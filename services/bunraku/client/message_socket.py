@@ -37,7 +37,7 @@ def upgrade_request(url: str, headers: Mapping[str, str] | None = None) -> bytes
 class MessageSocket(asyncio.Protocol, ABC):
     """One socket, from its connection on; what comes goes to `take`, which is there to be given in a subclass."""
 
-    __slots__ = ("_buffer", "_headers", "_handshake", "_transport", "closed", "url")
+    __slots__ = ("_buffer", "_handshake", "_headers", "_transport", "closed", "url")
 
     def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
         """At a `ws:` or `wss:` URL, with what `headers` its request has beside its own."""

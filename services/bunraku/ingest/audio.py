@@ -9,6 +9,7 @@ from typing import Any
 
 from starlette.requests import Request
 
+from bunraku.codec.container import StoredMotion
 from bunraku.http.access_control import access_of
 from bunraku.ingest.derived_motion import DerivedMotionFactory
 from bunraku.ingest.motion import UploadOperation, derive_motion_id
@@ -16,7 +17,6 @@ from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.runtime.context import ServiceContext
 from bunraku.storage.catalogue import CatalogueEntry
-from bunraku.storage.motion_store import StoredMotion
 
 
 class AudioOperation:

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+from bunraku.codec.container import StoredMotion
 from bunraku.http.not_found import motion_not_found
 from bunraku.http.problem_details import ProblemError
 from bunraku.ingest.motion import UploadOperation, derive_motion_id
@@ -13,7 +14,6 @@ from bunraku.ingest.persistence import check_quota, store_motion
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.runtime.context import ServiceContext
 from bunraku.storage.catalogue import CatalogueEntry
-from bunraku.storage.motion_store import StoredMotion
 
 DerivationJob = Callable[[str, StoredMotion], Awaitable[JobResult | JobRejection]]
 """Makes the motion of this new id from the stored one."""

@@ -19,7 +19,8 @@ from typing import Any
 from bunraku.http import request_id
 from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.runtime.context import ServiceContext, clock
+from bunraku.runtime.clock import clock
+from bunraku.runtime.context import ServiceContext
 from bunraku.storage.catalogue import Job
 
 POLL_INTERVAL_S = 2.0

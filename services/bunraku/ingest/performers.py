@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from bunraku.codec.container import StoredMotion
 from bunraku.http.not_found import motion_not_found
 from bunraku.http.problem_details import ProblemError, invalid_field_problem
 from bunraku.ingest.derived_motion import DerivedMotionFactory
@@ -16,7 +17,6 @@ from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.motion.placement import Placement
 from bunraku.runtime.context import ServiceContext
 from bunraku.storage.catalogue import CatalogueEntry
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.wire.limbs import MAX_PERFORMERS
 
 MAX_NAME_LENGTH = 200

@@ -6,7 +6,8 @@ from typing import Any
 
 from bunraku.http.problem_details import ProblemError
 from bunraku.ingest.result import JobResult
-from bunraku.runtime.context import ServiceContext, clock
+from bunraku.runtime.clock import clock
+from bunraku.runtime.context import ServiceContext
 from bunraku.storage.catalogue import CatalogueEntry, QuotaExceeded
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import msgpack
 from pydantic import ValidationError
 
+from bunraku.codec.container import StoredMotion
 from bunraku.http.problem_details import ProblemError, invalid_field_problem
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.motion import derive_motion_id
@@ -18,7 +19,6 @@ from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.recording_request import MAX_RECORDING_S, RECORDING_FPS, RecordingRequest
 from bunraku.runtime.context import ServiceContext
 from bunraku.storage.catalogue import CatalogueEntry
-from bunraku.storage.motion_store import StoredMotion
 
 RECORDING_SUBJECT = "ingest.keep"
 MAX_ACTIVE_RECORDINGS = 8

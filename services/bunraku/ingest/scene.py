@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from bunraku.codec.container import StoredMotion
 from bunraku.http.problem_details import ProblemError
 from bunraku.ingest.derived_motion import DerivedMotionFactory
 from bunraku.ingest.keyframe import KeyframeOrderError, Staging, check_keyframe_order
@@ -11,7 +12,6 @@ from bunraku.ingest.motion import MAX_ACTIVE_UPLOADS, UploadOperation
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.runtime.context import ServiceContext
 from bunraku.storage.catalogue import CatalogueEntry
-from bunraku.storage.motion_store import StoredMotion
 
 
 class SceneOperation:

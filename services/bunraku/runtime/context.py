@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 
 from bunraku.http.authentication import Authenticator
 from bunraku.messaging.bus import Bus, MemoryBus
 from bunraku.messaging.key_value import KeyValueStore, MemoryKeyValueStore
+from bunraku.runtime.clock import clock
 from bunraku.runtime.metrics import Metrics
 from bunraku.runtime.settings import Settings
 from bunraku.storage.catalogue import Catalogue
 from bunraku.storage.motion_store import MotionStore
-
-_MONOTONIC_OFFSET_US = time.time_ns() // 1000 - time.monotonic_ns() // 1000
-
-
-def clock() -> int:
-    """The reference clock: microseconds since 1970, carried on by the monotonic clock so that it never steps."""
-    return _MONOTONIC_OFFSET_US + time.monotonic_ns() // 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +27,8 @@ class ServiceContext:
     key_values: KeyValueStore
     authenticator: Authenticator
     metrics: Metrics = field(default_factory=Metrics)
+    clock: Callable[[], int] = clock
+    """Reference clock, microseconds since 1970."""
 
 
 @asynccontextmanager

@@ -13,7 +13,8 @@ from starlette.websockets import WebSocket
 from bunraku.http.access_control import access_of
 from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.runtime.context import ServiceContext, clock
+from bunraku.runtime.clock import clock
+from bunraku.runtime.context import ServiceContext
 from bunraku.session.counters import RATE_LIMITED, SessionCounters
 from bunraku.session.puppeteer_connection import MAX_QUEUED_MESSAGES, PuppeteerConnection
 from bunraku.session.stage_endpoint import PUPPETEER_HEARTBEAT_S

@@ -6,13 +6,13 @@ import asyncio
 import secrets
 from weakref import WeakValueDictionary
 
+from bunraku.codec.container import StoredMotion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore
 from bunraku.playout.timeline import TimelineHistory
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.wire.messages import Data
 
 BATCH_FRAMES = 60

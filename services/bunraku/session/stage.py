@@ -16,6 +16,7 @@ from collections.abc import Callable
 
 import msgpack
 
+from bunraku.codec.container import StoredMotion
 from bunraku.marionette.input_log import InputLog, LoggedMarionettes
 from bunraku.marionette.marionettes import Marionettes, OverlayJoints
 from bunraku.marionette.ownership import InputOutcome
@@ -25,13 +26,12 @@ from bunraku.messaging.bus import Bus, Subscription
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.overlay_buffer import pack_joints
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.pose_cache import PoseCache
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster
 from bunraku.session.stall import EventLoopStallCompensation
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.wire import messages
 from bunraku.wire.messages import Alive, Ask, Claim, Grant, Input, Presence, Refusal, Release, TimelineState, Welcome
 from bunraku.wire.overlay import Overlay

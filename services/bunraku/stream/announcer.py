@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bunraku import __version__
+from bunraku.codec.container import StoredMotion
 from bunraku.delivery.resume import ResumeState
-from bunraku.runtime.context import clock
-from bunraku.storage.motion_store import StoredMotion
+from bunraku.runtime.clock import clock
 from bunraku.stream.motion_delivery import MotionDelivery
 from bunraku.stream.track_selection import count_channels
 from bunraku.websocket.frame import encode_frame
@@ -15,7 +15,7 @@ from bunraku.wire.messages import ChannelHeader, TimelineState
 class MotionAnnouncer:
     """To one viewer, who has `held` from before, if anything."""
 
-    __slots__ = ("_resume_state", "_announced")
+    __slots__ = ("_announced", "_resume_state")
 
     def __init__(self, resume_state: ResumeState | None) -> None:
         self._resume_state = resume_state

@@ -9,6 +9,7 @@ from typing import Annotated
 from fastapi import FastAPI, Query, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
+from bunraku.codec.container import StoredMotion
 from bunraku.delivery.resume import ResumeState
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
@@ -18,8 +19,8 @@ from bunraku.messaging.bus import NoResponse, is_subject_token
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
 from bunraku.playout import timeline
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.runtime.context import ServiceContext, clock
-from bunraku.storage.motion_store import StoredMotion
+from bunraku.runtime.clock import clock
+from bunraku.runtime.context import ServiceContext
 from bunraku.stream import metrics
 from bunraku.stream.counters import StreamCounters
 from bunraku.stream.flow_control import Link

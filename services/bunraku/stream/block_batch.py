@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from bunraku.codec.container import StoredMotion
 from bunraku.delivery.allocation import BitrateAllocation
 from bunraku.delivery.block_scheduler import BlockScheduler, ScheduledBlock, ScheduledTrack, newly_due_blocks
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.websocket.frame import encode_frame
 from bunraku.wire.messages import TimelineState
 

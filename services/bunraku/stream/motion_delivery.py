@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from bunraku.codec.container import StoredMotion
 from bunraku.delivery import allocation
 from bunraku.delivery.allocation import BitrateAllocation
 from bunraku.delivery.bitrate import BitrateSelector
 from bunraku.delivery.block_scheduler import BlockScheduler
 from bunraku.delivery.congestion import HEADER_BYTES
 from bunraku.delivery.resume import ResumeState
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.stream.flow_control import FlowControl
 from bunraku.stream.track_selection import (
     build_allocations,
@@ -31,13 +31,13 @@ class MotionDelivery:
     microseconds."""
 
     __slots__ = (
+        "_announced_choice",
         "_announces_level",
         "_described_count",
         "_is_constrained",
         "_is_pinned",
         "_motion_only_allocations",
         "_motion_only_selector",
-        "_announced_choice",
         "_track_count",
         "allocations",
         "has_unsent_choice",

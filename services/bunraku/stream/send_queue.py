@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from bunraku.websocket.frame import encode_frame
 from bunraku.wire.messages import Ping, Pong
 

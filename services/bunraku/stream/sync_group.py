@@ -12,10 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from bunraku.codec.container import StoredMotion
 from bunraku.delivery.allocation import BitrateAllocation
 from bunraku.delivery.block_scheduler import ScheduledTrack
 from bunraku.delivery.timing_wheel import SLOT_US
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.stream.block_batch import BlockBatchCache
 from bunraku.stream.counters import StreamCounters
 from bunraku.stream.tick_scheduler import TickScheduler
@@ -52,10 +52,10 @@ class SyncGroup:
     __slots__ = (
         "_groups",
         "_members",
+        "_multicast",
         "_plans",
         "_scheduler",
         "_sent",
-        "_multicast",
         "_tracks",
         "next_due",
         "parameters",

@@ -19,7 +19,7 @@ MIN_SYNC_US = 4_000_000
 class SyncMembership:
     """Nobody at first. Times are clock times in microseconds."""
 
-    __slots__ = ("_member", "group", "expires_at")
+    __slots__ = ("_member", "expires_at", "group")
 
     def __init__(self, member: SyncMember) -> None:
         self._member = member

@@ -8,7 +8,7 @@ from contextvars import copy_context
 from typing import Protocol
 
 from bunraku.delivery.timing_wheel import SLOT_US, TimingWheel
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 
 MAX_BATCH = 32
 """Viewers that have their turn one after the other; a millisecond or two."""

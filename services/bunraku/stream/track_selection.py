@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from bunraku.codec.audio import AudioTrack
 from bunraku.codec.coefficients import SCENE_CHANNEL_COUNT
+from bunraku.codec.container import StoredMotion, Track
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SceneTrack
 from bunraku.delivery import allocation
 from bunraku.delivery.block_scheduler import ScheduledTrack
 from bunraku.motion.skeleton import CHANNEL_COUNT
-from bunraku.storage.motion_store import StoredMotion, Track
 from bunraku.wire.messages import Description, unpack
 
 TRACK_TYPES = ("motion", "audio", "camera", "light")

@@ -16,10 +16,10 @@ import asyncio
 import logging
 import random
 
+from bunraku.codec.container import StoredMotion
 from bunraku.delivery.resume import ResumeState
 from bunraku.playout import timeline
-from bunraku.runtime.context import clock
-from bunraku.storage.motion_store import StoredMotion
+from bunraku.runtime.clock import clock
 from bunraku.stream.announcer import MotionAnnouncer
 from bunraku.stream.counters import TIMEOUT_REASON, StreamCounters
 from bunraku.stream.flow_control import FlowControl, Link
@@ -60,15 +60,15 @@ class ViewerConnection:
     __slots__ = (
         "_announcer",
         "_counters",
+        "_delivery",
         "_flow",
-        "_next_block_at",
         "_has_own_timeline",
         "_heartbeat",
+        "_next_block_at",
         "_next_flow_check_at",
         "_overlay_waited_at",
         "_phase",
         "_pinned_level",
-        "_delivery",
         "_queue",
         "_quiet_period",
         "_scheduler",
@@ -76,8 +76,8 @@ class ViewerConnection:
         "_timeline_history",
         "_timer",
         "_track_types",
-        "group",
         "connection",
+        "group",
     )  # fmt: skip
 
     def __init__(

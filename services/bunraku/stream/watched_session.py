@@ -10,11 +10,12 @@ from collections.abc import Callable
 
 import msgpack
 
+from bunraku.codec.container import StoredMotion
 from bunraku.http import request_id
 from bunraku.messaging.bus import Bus, NoResponse, Subscription, is_subject_token
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.runtime.context import clock
-from bunraku.storage.motion_store import MotionStore, StoredMotion
+from bunraku.runtime.clock import clock
+from bunraku.storage.motion_store import MotionStore
 from bunraku.stream.block_batch import BlockBatchCache
 from bunraku.stream.counters import StreamCounters
 from bunraku.stream.sync_group import SyncGroups

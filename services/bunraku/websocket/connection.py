@@ -13,7 +13,7 @@ import socket
 from collections.abc import Callable
 from typing import Protocol, cast
 
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from bunraku.websocket.frame import (
     ClientFrameParser,
     FrameError,
@@ -61,10 +61,10 @@ class WebSocketConnection(asyncio.Protocol):
         "_listener",
         "_parser",
         "_transport",
-        "on_ended",
+        "file_descriptor",
         "is_writable",
         "last_received_at",
-        "file_descriptor",
+        "on_ended",
         "write",
     )
 

@@ -73,7 +73,7 @@ def parse_close_code(payload: bytes) -> int:
 class ClientFrameParser:
     """What a client sends, put together again."""
 
-    __slots__ = ("_buffer", "_max_message_bytes", "_message_opcode", "_fragments")
+    __slots__ = ("_buffer", "_fragments", "_max_message_bytes", "_message_opcode")
 
     def __init__(self, max_message_bytes: int) -> None:
         """`largest`: the most bytes that a message may have."""

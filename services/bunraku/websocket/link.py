@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from starlette.websockets import WebSocket
 
-from bunraku.runtime.context import clock
+from bunraku.runtime.clock import clock
 from bunraku.websocket.frame import Opcode, encode_frame
 
 if sys.platform == "linux":
@@ -104,7 +104,7 @@ class AckedLink:
     """The line of a viewer behind a proxy: what was echoed has come. Nobody but the viewer itself suffers from echoes
     of what has not."""
 
-    __slots__ = ("_acked_bytes", "_pending_pings", "_clock", "_min_rtt_us", "_rtt_us", "_written_bytes")
+    __slots__ = ("_acked_bytes", "_clock", "_min_rtt_us", "_pending_pings", "_rtt_us", "_written_bytes")
 
     def __init__(self, clock: Callable[[], int]) -> None:
         """`clock` tells microseconds."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from bunraku.codec import container
+from bunraku.codec.container import StoredMotion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.marionette.input_log import InputLog
 from bunraku.motion.placement import Placement
 from bunraku.motion.skeleton import Motion
-from bunraku.storage import motion_store
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import random_motion
 
@@ -20,7 +20,7 @@ def make_stored_motion(name: str, seconds: float, seed: int) -> StoredMotion:
     motion = random_motion(seconds, 30.0, seed)
     calm = Motion(motion.figure, 30.0, motion.root * 0.1 + [0, 0.85, 0], motion.rotations)
     encoded = encode_motion(calm, error_bounds_mm=(30.0, 3.0), grade="live")
-    return motion_store.unpack(name, motion_store.pack(name, encoded))
+    return container.unpack_motion(name, container.pack_motion(name, encoded))
 
 
 PLACEMENTS = Placement(-0.8, 0.1, 0.5), Placement(0.8, -0.1, -2.0)
@@ -28,11 +28,11 @@ _FIRST_MOTION, _SECOND_MOTION = make_stored_motion("one", 3.0, 21), make_stored_
 MOTIONS = {
     "one": _FIRST_MOTION,
     "two": _SECOND_MOTION,
-    "both": motion_store.unpack(
-        "both", motion_store.with_performers("both", _FIRST_MOTION, [_SECOND_MOTION], PLACEMENTS)[0]
+    "both": container.unpack_motion(
+        "both", container.add_performers("both", _FIRST_MOTION, [_SECOND_MOTION], PLACEMENTS)[0]
     ),
-    "longer": motion_store.unpack(
-        "longer", motion_store.with_performers("longer", _SECOND_MOTION, [_FIRST_MOTION], PLACEMENTS)[0]
+    "longer": container.unpack_motion(
+        "longer", container.add_performers("longer", _SECOND_MOTION, [_FIRST_MOTION], PLACEMENTS)[0]
     ),
 }
 

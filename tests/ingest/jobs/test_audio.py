@@ -5,13 +5,13 @@ from pathlib import Path
 import msgpack
 import pytest
 
+from bunraku.codec import container
 from bunraku.codec.audio import AudioTrack, unpack_audio_block
+from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.audio import add_audio
 from bunraku.ingest.result import JobRejection, JobResult
-from bunraku.storage import motion_store
-from bunraku.storage.motion_store import StoredMotion, pack
 from bunraku.wire.messages import Data
 from tests.audio import decode_opus, find_onset, make_click, make_tone, write_audio
 from tests.vectors.blocks import random_motion
@@ -21,15 +21,15 @@ from tests.vectors.scene import sample_camera
 @pytest.fixture(scope="module")
 def stored() -> StoredMotion:
     encoded = encode_motion(random_motion(2.0, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live", first_seconds=0.5)
-    return motion_store.unpack(
-        "one", pack("one", encoded, [encode_scene(sample_camera(2.0, 30.0), error_bounds_mm=(20.0,))])
+    return container.unpack_motion(
+        "one", pack_motion("one", encoded, [encode_scene(sample_camera(2.0, 30.0), error_bounds_mm=(20.0,))])
     )
 
 
 def add_sound(stored: StoredMotion, path: Path, motion: str = "two") -> tuple[StoredMotion, JobResult]:
     made = add_audio(motion, stored, path)
     assert isinstance(made, JobResult), made
-    return motion_store.unpack(motion, made.packed), made
+    return container.unpack_motion(motion, made.packed), made
 
 
 def test_all_else_stays_the_same_bytes(stored: StoredMotion, tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_a_shorter_sound_ends_in_silence_and_a_longer_one_with_the_motion(
     path = write_audio(tmp_path / "a.mp3", make_tone(seconds, 48_000), 48_000)
     made = add_audio("two", stored, path, shares.append)
     assert isinstance(made, JobResult)
-    new = motion_store.unpack("two", made.packed)
+    new = container.unpack_motion("two", made.packed)
     track = new.tracks[2]
     assert isinstance(track, AudioTrack)
     assert track.samples == kept

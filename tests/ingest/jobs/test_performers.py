@@ -5,6 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from bunraku.codec import container
+from bunraku.codec.container import StoredMotion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.ingest.jobs.performers import (
@@ -17,8 +19,6 @@ from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.motion import rotation
 from bunraku.motion.placement import Placement
 from bunraku.motion.skeleton import Motion
-from bunraku.storage import motion_store
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.wire.messages import Data
 from tests.ingest.jobs.motions import MOTIONS
 from tests.vectors.blocks import random_motion
@@ -34,8 +34,8 @@ def make_walk(name: str, metres: float, facing: float) -> StoredMotion:
     rotations = motion.rotations.copy()
     rotations[:, 0] = turn
     walked = Motion(motion.figure, 30.0, along + np.array([3.0, 0.9, -2.0]), rotations)
-    return motion_store.unpack(
-        name, motion_store.pack(name, encode_motion(walked, error_bounds_mm=(30.0, 5.0), grade="live"))
+    return container.unpack_motion(
+        name, container.pack_motion(name, encode_motion(walked, error_bounds_mm=(30.0, 5.0), grade="live"))
     )
 
 
@@ -63,7 +63,7 @@ def test_they_stand_in_a_row_as_near_as_their_dances_let_them_and_face_one_way()
     made = combine_performers("three", still, [wide, still], None)
     assert isinstance(made, JobResult)
     assert made.description == {"tracks": ["motion"] * 3, "performers": 3, "made_from": "still"}
-    roots = stage_positions(motion_store.unpack("three", made.packed))
+    roots = stage_positions(container.unpack_motion("three", made.packed))
     for left, right in pairwise(roots):
         assert (right[:, 0] - left[:, 0]).min() == pytest.approx(PERFORMER_SPACING_M, abs=0.15)
     middles = [(root[:, 0].min() + root[:, 0].max()) / 2 for root in roots]
@@ -76,7 +76,7 @@ def test_who_dance_the_same_keep_step_side_by_side() -> None:
     wide = make_walk("wide", 3.0, 1.0)
     made = combine_performers("two", wide, [wide], None)
     assert isinstance(made, JobResult)
-    left, right = stage_positions(motion_store.unpack("two", made.packed))
+    left, right = stage_positions(container.unpack_motion("two", made.packed))
     assert right[:, 0] - left[:, 0] == pytest.approx(PERFORMER_SPACING_M, abs=1e-6)
 
 
@@ -91,7 +91,7 @@ def test_places_may_be_given_and_there_are_as_many_as_performers() -> None:
     places = [Placement(0.0, 1.0, 0.0), Placement(0.5, -1.0, 3.0)]
     made = combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], places)
     assert isinstance(made, JobResult)
-    assert [dance.placement for dance in motion_store.unpack("m", made.packed).performers] == places
+    assert [dance.placement for dance in container.unpack_motion("m", made.packed).performers] == places
     refused = combine_performers("m", MOTIONS["one"], [MOTIONS["both"]], places)
     assert isinstance(refused, JobRejection)
     assert refused.field == "places"

@@ -3,6 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bunraku.codec import container
+from bunraku.codec.container import StoredMotion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
@@ -16,8 +18,6 @@ from bunraku.messaging.recording_request import RecordingRequest
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore, SceneBlockStore
-from bunraku.storage import motion_store
-from bunraku.storage.motion_store import StoredMotion
 from bunraku.wire.messages import Data
 from tests.ingest.jobs.motions import MOTIONS, PLACEMENTS, SECOND_US, START_CLOCK_US, make_log
 
@@ -31,7 +31,7 @@ def load_blocks(name: str) -> MotionBlockStore:
 
 def unpack_recording(made: JobResult | JobRejection) -> tuple[StoredMotion, MotionBlockStore]:
     assert isinstance(made, JobResult), made
-    motion = motion_store.unpack("kept", made.packed)
+    motion = container.unpack_motion("kept", made.packed)
     store = MotionBlockStore(motion.first_track)
     for index, packet in enumerate(motion.first_packets[-1]):
         store.put(index, 1, decode_motion_block(store.track, Data.unpack(packet).block))
@@ -97,7 +97,7 @@ def test_of_several_performers_all_are_kept_where_they_stood_with_what_was_pulle
     )
     assert isinstance(made, JobResult)
     assert (made.description["tracks"], made.description["performers"]) == (["motion", "motion"], 2)
-    kept = motion_store.unpack("kept", made.packed)
+    kept = container.unpack_motion("kept", made.packed)
     assert [dance.placement for dance in kept.performers] == list(PLACEMENTS)
     assert [dance.front for dance in kept.performers] == [dance.front for dance in both.performers]
     alone = showing.motion_poses_at(START_CLOCK_US + SECOND_US)

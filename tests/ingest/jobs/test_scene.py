@@ -5,21 +5,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bunraku.codec.container import StoredMotion, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.ingest.jobs.scene import SCENE_FPS, add_scene, sample_keyframes
 from bunraku.ingest.keyframe import CameraKeyframe, LightKeyframe, Staging
 from bunraku.ingest.result import JobRejection, JobResult
-from bunraku.storage.motion_store import StoredMotion, pack, unpack
 from bunraku.wire.messages import Data
 from tests.vectors.blocks import random_motion
 
 
 @pytest.fixture(scope="module")
 def bare() -> StoredMotion:
-    return unpack(
-        "bare", pack("bare", encode_motion(random_motion(2.3, 30.0, 3), error_bounds_mm=(30.0,), grade="live"))
+    return unpack_motion(
+        "bare", pack_motion("bare", encode_motion(random_motion(2.3, 30.0, 3), error_bounds_mm=(30.0,), grade="live"))
     )
 
 
@@ -64,7 +64,7 @@ def test_camera_and_lights_lie_beside_the_dance_and_are_replaced_by_others(bare:
     made = add_scene("one", bare, asked)
     assert isinstance(made, JobResult)
     assert made.description == {"tracks": ["motion", "camera", "light", "light"], "made_from": "bare"}
-    stored = unpack("one", made.packed)
+    stored = unpack_motion("one", made.packed)
     assert stored.first_packets == bare.first_packets
     track = stored.tracks[1]
     assert isinstance(track, SceneTrack)
@@ -81,14 +81,14 @@ def test_camera_and_lights_lie_beside_the_dance_and_are_replaced_by_others(bare:
     dark = add_scene("two", stored, Staging(lights=[]))
     assert isinstance(dark, JobResult)
     assert dark.description["tracks"] == ["motion", "camera"]
-    again = add_scene("three", unpack("two", dark.packed), Staging(camera=[camera_keyframe(0, 2.0)]))
+    again = add_scene("three", unpack_motion("two", dark.packed), Staging(camera=[camera_keyframe(0, 2.0)]))
     assert isinstance(again, JobResult)
     assert again.description["tracks"] == ["motion", "camera"]
-    assert unpack("three", again.packed).packets[1] != stored.packets[1]
+    assert unpack_motion("three", again.packed).packets[1] != stored.packets[1]
 
 
 def test_more_tracks_than_can_be_numbered_are_refused(bare: StoredMotion, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bunraku.storage.motion_store.MAX_TRACKS", 2)
+    monkeypatch.setattr("bunraku.codec.container.MAX_TRACKS", 2)
     refused = add_scene("one", bare, Staging(lights=[[light_keyframe(0, 1.0)]] * 2))
     assert isinstance(refused, JobRejection)
     assert (refused.title, refused.field) == ("Too many tracks", "lights")

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bunraku.codec.audio import SAMPLE_RATE, max_samples
+from bunraku.codec.container import StoredMotion, add_audio_track
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.ingest.jobs.sound_file import Samples, SoundFile, UnreadableSound
 from bunraku.ingest.result import JobRejection, JobResult
-from bunraku.storage.motion_store import StoredMotion, with_audio
 
 
 def add_audio(
@@ -26,7 +26,7 @@ def add_audio(
     except UnreadableSound as error:
         return JobRejection(error.title, error.detail, hint=error.hint)
     try:
-        packed, kinds = with_audio(motion_id, stored, encoded)
+        packed, kinds = add_audio_track(motion_id, stored, encoded)
     except ValueError as error:
         return JobRejection("Too many tracks", str(error))
     described = encoded.describe()

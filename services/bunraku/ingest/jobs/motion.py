@@ -9,6 +9,7 @@ from pathlib import Path
 from threading import Lock
 
 from bunraku.codec import motion_encoder
+from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import EncodingGrade, encode_motion
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.marionette.limb_rig import ArmRig, Limb
@@ -16,7 +17,6 @@ from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.analysis import analyse
 from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.errors import UnreadableMotion
-from bunraku.storage.motion_store import pack
 
 FIRST_BLOCK_S = 0.5
 """Of the first block, so that a dance starts soon on a narrow line."""
@@ -58,7 +58,7 @@ def encode_file(
         )
     track = encoded.track
     return JobResult(
-        pack(motion_id, encoded),
+        pack_motion(motion_id, encoded),
         {
             "duration": analysis.motion.duration,
             "fps": analysis.motion.fps,

@@ -7,12 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from bunraku.codec.container import PerformerTracks, StoredMotion, add_performers
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.motion import rotation
 from bunraku.motion.placement import Placement, place_in_row
 from bunraku.motion.rotation import Array
-from bunraku.storage.motion_store import PerformerTracks, StoredMotion, with_performers
 from bunraku.wire.messages import Data
 
 PERFORMER_SPACING_M = 1.6
@@ -44,7 +44,7 @@ def combine_performers(
             field="places",
         )
     try:
-        packed, kinds = with_performers(motion_id, stored, others, placements)
+        packed, kinds = add_performers(motion_id, stored, others, placements)
     except ValueError as error:
         return JobRejection("Too many performers", str(error), field="motions")
     return JobResult(packed, {"tracks": kinds, "performers": len(dances), "made_from": stored.id})

@@ -10,6 +10,7 @@ from threading import Lock
 
 import numpy as np
 
+from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import EncodedMotion, EncodingGrade, encode_motion
 from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
@@ -19,7 +20,6 @@ from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.marionette.input_log import CorruptInputLog, InputLog
 from bunraku.messaging.recording_request import RECORDING_FPS, KeyframeValues, RecordingRequest
 from bunraku.motion.skeleton import Motion
-from bunraku.storage.motion_store import StoredMotion, pack
 
 
 def encode_recording(
@@ -86,7 +86,7 @@ def encode_recording(
             each.append(replace(encoded, front=one.front, placement=one.placement))
     encoded, *others = each
     return JobResult(
-        pack(motion_id, encoded, scenes, others),
+        pack_motion(motion_id, encoded, scenes, others),
         {
             "duration": kept.duration,
             "fps": kept.fps,

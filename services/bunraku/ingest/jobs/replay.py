@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping
 
+from bunraku.codec.container import PerformerTracks, StoredMotion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.marionette.input_log import InputLog
 from bunraku.motion.rotation import Array
@@ -12,7 +13,6 @@ from bunraku.motion.skeleton import Figure
 from bunraku.playout.block_store import MotionBlockStore, Pose
 from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US, OverlayBuffer, pack_joints
 from bunraku.playout.timeline import position_at
-from bunraku.storage.motion_store import PerformerTracks, StoredMotion
 from bunraku.wire.messages import Data, TimelineState
 from bunraku.wire.overlay import Overlay
 

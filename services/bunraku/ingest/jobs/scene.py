@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from bunraku.codec.container import StoredMotion, replace_scene_tracks
 from bunraku.codec.scene import SceneKind, SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.motion import FIRST_BLOCK_S
@@ -13,7 +14,6 @@ from bunraku.ingest.keyframe import CameraKeyframe, LightKeyframe, Staging
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.motion.easing import minimum_jerk
 from bunraku.motion.rotation import Array
-from bunraku.storage.motion_store import StoredMotion, with_scenes
 
 SCENE_FPS = 30.0
 """Frames a second that keyframes are made into; between them a client shows any instant."""
@@ -59,7 +59,7 @@ def add_scene(
     replaced: set[str] = {"camera"} if staging.camera is not None else set()
     replaced |= {"light"} if staging.lights is not None else set()
     try:
-        packed, kinds = with_scenes(motion_id, stored, scenes, replaced)
+        packed, kinds = replace_scene_tracks(motion_id, stored, scenes, replaced)
     except ValueError as error:
         return JobRejection("Too many tracks", str(error), field="lights")
     return JobResult(packed, {"tracks": kinds, "made_from": stored.id})
