@@ -39,9 +39,9 @@ export default defineConfig({
     // three.js is one chunk, loaded while the page is already there
     chunkSizeWarningLimit: 700,
   },
-  // the prior lies beside the Python codec
+  // the prior and the constants are part of the contract
   server: {
-    fs: { allow: [".", "../bunraku/codec/prior.json"] },
+    fs: { allow: [".", "../../proto"] },
     proxy: { "/v1": { target: "http://127.0.0.1:8000", ws: true } },
   },
   test: {

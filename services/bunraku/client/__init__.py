@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Client": "api",
-    "ServerProblem": "api",
+    "ControlRefused": "puppeteer",
     "OneEuro": "one_euro",
     "Puppeteer": "puppeteer",
-    "Refused": "puppeteer",
-    "Figures": "figures",
-    "StreamEnded": "line",
+    "ServerProblem": "api",
+    "StreamEnded": "reconnecting_connection",
     "Viewer": "viewer",
+    "ViewerStatistics": "viewer_statistics",
 }
 __all__ = [
     "Client",

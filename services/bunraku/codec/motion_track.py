@@ -38,9 +38,9 @@ class MotionTrack(Timing):
 
     def __post_init__(self) -> None:
         """`weights` (19, 3, 3) is what a channel's values are multiplied with before they are quantised (SPEC.md,
-        Weights), `unweights` what undoes it."""
+        Weights), `inverse_weights` what undoes it."""
         object.__setattr__(self, "weights", channel_weights(self.figure, self.skeleton.reference_rotations()))
-        object.__setattr__(self, "unweights", np.ascontiguousarray(np.linalg.inv(self.weights)))
+        object.__setattr__(self, "inverse_weights", np.ascontiguousarray(np.linalg.inv(self.weights)))
 
     @property
     def figure(self) -> Figure:

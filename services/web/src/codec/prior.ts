@@ -3,7 +3,7 @@
  * room's, from the same file, laid out in the order in which they are read.
  */
 
-import shippedValues from "../../../bunraku/codec/prior.json";
+import shippedValues from "../../../../proto/prior.json";
 import { CHANNEL_COUNT } from "../motion/skeleton";
 
 /** Features of a frequency that its three axes share; `FEATURES` - `SHARED` more are each axis's own. */

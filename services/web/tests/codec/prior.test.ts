@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import values from "../../../bunraku/codec/prior.json";
+import values from "../../../../proto/prior.json";
 import {
   CHANNEL_AXES,
   FEATURE_COUNT,
