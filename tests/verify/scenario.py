@@ -19,7 +19,7 @@ from tests.servers import make_bvh_clip
 from tests.verify.participant import MonitoredPuppeteer, MonitoredViewer
 from tests.verify.stack import Stack
 
-PROBE_SOURCE = (Path(__file__).parent / "inside.py").read_bytes()
+PROBE_SOURCE = (Path(__file__).parent / "container_probe.py").read_bytes()
 MAX_SILENCE_S = 5.0
 """Seconds within which viewers go on."""
 MAX_CLOCK_ERROR_S = 0.1
