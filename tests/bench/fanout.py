@@ -35,10 +35,10 @@ from shutil import which
 from typing import Any
 
 from bunraku.client.api import Client
-from bunraku.client.message_socket import upgrade_request
 from bunraku.client.puppeteer import ControlRefused, Puppeteer
 from tests.bench.arguments import parse_parts
 from tests.bench.fanout_processes import LineProcess, start_c_sender
+from tests.raw_client import upgrade_request
 
 OVERLAY_LEAD_MS = 60.0
 """How far ahead of their publishing overlays are due."""

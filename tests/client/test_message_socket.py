@@ -1,3 +1,5 @@
+"""The minimal client against the server side of `websockets`, in memory and over real sockets."""
+
 from __future__ import annotations
 
 import asyncio
@@ -6,24 +8,32 @@ from itertools import pairwise
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.frames import CloseCode, Frame, Opcode
+from websockets.http11 import Request
+from websockets.server import ServerProtocol
+from websockets.typing import Subprotocol
 
-from bunraku.client.message_socket import MessageSocket, upgrade_request
+from bunraku.client.message_socket import MessageSocket
+from bunraku.wire.messages import SUBPROTOCOL
 
-UPGRADE_RESPONSE = b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n\r\n"
 URL = "ws://stage/v1/sessions/s1/stream?rate=0"
 
 
 class RecordingSocket(MessageSocket):
-    def __init__(self, url: str) -> None:
-        super().__init__(url)
+    def __init__(self, url: str, headers: dict[str, str] | None = None) -> None:
+        super().__init__(url, headers)
         self.messages: list[bytes] = []
+        self.received_two = asyncio.Event()
 
     def on_message(self, message: bytes) -> None:
         self.messages.append(message)
+        if len(self.messages) == 2:
+            self.received_two.set()
 
 
 class RecordingTransport(asyncio.Transport):
-    """The system's side of a connection: what was written, and whether it was closed."""
+    """Transport in memory: the bytes written, and whether it was closed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -33,6 +43,10 @@ class RecordingTransport(asyncio.Transport):
     def write(self, data: bytes | bytearray | memoryview) -> None:
         self.written += data
 
+    def take(self) -> bytes:
+        data, self.written = self.written, b""
+        return data
+
     def is_closing(self) -> bool:
         return self._closing
 
@@ -40,13 +54,25 @@ class RecordingTransport(asyncio.Transport):
         self._closing = True
 
 
-def frame(opcode: int, payload: bytes) -> bytes:
-    """A server's (RFC 6455, section 5.2)."""
-    size = len(payload)
-    if size < 126:
-        return bytes((0x80 | opcode, size)) + payload
-    wide, mark = (2, 126) if size < 1 << 16 else (8, 127)
-    return bytes((0x80 | opcode, mark)) + size.to_bytes(wide, "big") + payload
+class MemoryServer:
+    """Server side of one connection in memory."""
+
+    def __init__(self, client: MessageSocket) -> None:
+        self.protocol = ServerProtocol(subprotocols=[Subprotocol(SUBPROTOCOL)], max_size=None)
+        self.transport = RecordingTransport()
+        client.connection_made(self.transport)
+        self.protocol.receive_data(self.transport.take())
+        (request,) = self.protocol.events_received()
+        assert isinstance(request, Request)
+        self.request = request
+        self.protocol.send_response(self.protocol.accept(request))
+
+    def take(self) -> bytes:
+        return b"".join(self.protocol.data_to_send())
+
+    def received_frames(self) -> list[Frame]:
+        self.protocol.receive_data(self.transport.take())
+        return [event for event in self.protocol.events_received() if isinstance(event, Frame)]
 
 
 MESSAGES = st.lists(
@@ -56,64 +82,78 @@ MESSAGES = st.lists(
 
 
 @given(messages=MESSAGES, cuts=st.lists(st.floats(0, 1), max_size=8))
-def test_messages_come_whole_and_in_order_in_whatever_pieces_they_arrive(
-    messages: list[bytes], cuts: list[float]
-) -> None:
-    data = UPGRADE_RESPONSE + b"".join(frame(2, message) for message in messages)
-    places = sorted({0, len(data), *(round(cut * len(data)) for cut in cuts)})
-
+def test_messages_arrive_whole_and_in_order_in_any_fragmentation(messages: list[bytes], cuts: list[float]) -> None:
     async def run() -> None:
-        kept = RecordingSocket(URL)
-        kept.connection_made(RecordingTransport())
-        for begin, end in pairwise(places):
-            kept.data_received(data[begin:end])
-        assert kept.messages == messages
+        client = RecordingSocket(URL)
+        server = MemoryServer(client)
+        for message in messages:
+            server.protocol.send_binary(message)
+        data = server.take()
+        for begin, end in pairwise(sorted({0, len(data), *(round(cut * len(data)) for cut in cuts)})):
+            client.data_received(data[begin:end])
+        assert client.messages == messages
 
     asyncio.run(run())
 
 
-async def test_what_sockets_ask_of_each_other_is_answered_and_is_no_message() -> None:
-    kept, wire = RecordingSocket(URL), RecordingTransport()
-    kept.connection_made(wire)
-    wire.written = b""
-    kept.data_received(UPGRADE_RESPONSE + frame(9, b"there?"))
-    assert wire.written == bytes((0x8A, 0x86, 0, 0, 0, 0)) + b"there?"
-    wire.written = b""
-    kept.send(b"one", b"two")
-    assert wire.written == b"".join(bytes((0x82, 0x83, 0, 0, 0, 0)) + message for message in (b"one", b"two"))
-    kept.data_received(frame(8, (1001).to_bytes(2, "big")))
-    assert kept.closed
-    assert wire.is_closing()
-    wire.written = b""
-    kept.send(b"three")
-    kept.close()
-    assert (wire.written, kept.messages) == (b"", [])
+async def test_control_frames_are_answered_and_are_no_messages() -> None:
+    client = RecordingSocket(URL)
+    server = MemoryServer(client)
+    server.protocol.send_ping(b"there?")
+    client.data_received(server.take())
+    (pong,) = server.received_frames()
+    assert (pong.opcode, bytes(pong.data)) == (Opcode.PONG, b"there?")
+    client.send(b"one", b"two")
+    assert [bytes(frame.data) for frame in server.received_frames()] == [b"one", b"two"]
+    server.protocol.send_close(CloseCode.GOING_AWAY)
+    client.data_received(server.take())
+    assert client.closed
+    (close,) = server.received_frames()
+    assert close.opcode is Opcode.CLOSE
+    client.send(b"three")
+    client.close()
+    assert (server.transport.take(), client.messages) == (b"", [])
 
 
-def test_its_request_names_the_target_the_host_and_what_else_it_is_given() -> None:
-    lines = upgrade_request(URL, {"Authorization": "Bearer t"}).decode().split("\r\n")
-    assert lines[:2] == ["GET /v1/sessions/s1/stream?rate=0 HTTP/1.1", "Host: stage"]
-    assert lines[-3:] == ["Authorization: Bearer t", "", ""]
-    assert "Sec-WebSocket-Protocol: bunraku.v1" in lines
-    assert upgrade_request(URL) != upgrade_request(URL), "a key is used once (RFC 6455, section 4.1)"
+async def test_request_names_target_host_subprotocol_and_headers() -> None:
+    request = MemoryServer(RecordingSocket(URL, {"Authorization": "Bearer t"})).request
+    assert request.path == "/v1/sessions/s1/stream?rate=0"
+    assert request.headers["Host"] == "stage"
+    assert request.headers["Authorization"] == "Bearer t"
+    assert request.headers["Sec-WebSocket-Protocol"] == SUBPROTOCOL
+
+
+async def test_real_server_and_client_exchange_messages() -> None:
+    async def echo(connection: ServerConnection) -> None:
+        async for message in connection:
+            await connection.send(message)
+
+    async with serve(echo, "127.0.0.1", 0, subprotocols=[Subprotocol(SUBPROTOCOL)]) as server, asyncio.timeout(20):
+        port = next(iter(server.sockets)).getsockname()[1]
+        client = RecordingSocket(f"ws://127.0.0.1:{port}/stream")
+        await client.open()
+        client.send(b"one", b"two")
+        await client.received_two.wait()
+        client.close()
+    assert client.messages == [b"one", b"two"]
 
 
 @pytest.mark.parametrize(
-    ("answer", "says"),
+    ("response", "error"),
     [
-        (b"HTTP/1.1 403 Forbidden\r\n\r\n", "403 Forbidden"),
-        (b"HTTP/1.1 101", "closed the connection"),
-        (b"", "closed the connection"),
+        (b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\n\r\n", "403"),
+        (b"HTTP/1.1 101", "connection"),
+        (b"", "connection"),
     ],
 )
-async def test_a_server_that_will_not_talk_is_an_error_that_says_why(answer: bytes, says: str) -> None:
-    async def refuse(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+async def test_rejected_handshake_is_an_error_with_its_reason(response: bytes, error: str) -> None:
+    async def reject(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await reader.readuntil(b"\r\n\r\n")
-        writer.write(answer)
+        writer.write(response)
         writer.close()
 
-    async with await asyncio.start_server(refuse, "127.0.0.1", 0) as server:
+    async with await asyncio.start_server(reject, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
         async with asyncio.timeout(20):
-            with pytest.raises(ConnectionError, match=says):
+            with pytest.raises(ConnectionError, match=error):
                 await RecordingSocket(f"ws://127.0.0.1:{port}/stream").open()

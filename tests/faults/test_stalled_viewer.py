@@ -14,10 +14,10 @@ import pytest
 
 from bunraku.client import Client, Puppeteer
 from bunraku.client.load_generator import LoadGenerator
-from bunraku.client.message_socket import upgrade_request
 from bunraku.messaging.bus import MemoryBus
 from bunraku.stream import heartbeat
 from bunraku.wire.overlay import Overlay
+from tests.raw_client import upgrade_request
 
 
 async def open_session(server: str, clip_file: Path) -> tuple[str, str]:

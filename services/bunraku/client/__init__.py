@@ -1,7 +1,6 @@
-"""The Python SDK: `api.Client` uploads and lists, `viewer.Viewer` watches, `puppeteer.Puppeteer` pulls,
-`one_euro.OneEuro` steadies what pulls.
+"""Python SDK: `Client` (HTTP), `Viewer` (watch), `Puppeteer` (control limbs) and `OneEuro` (smooth noisy input).
 
-Names are imported where they are first used: listing motions need not load a decoder.
+Names are imported at their first use, so that listing motions does not load a decoder.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -37,7 +36,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The class of this name, from the module it lives in."""
+    """Import a class of the SDK from its module."""
     from importlib import import_module
 
     if name not in _HOMES:

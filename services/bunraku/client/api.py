@@ -1,4 +1,4 @@
-"""Bunraku's HTTP interface from Python."""
+"""HTTP client of the Python SDK."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from urllib.parse import quote, urlsplit, urlunsplit
 import httpx2
 
 REQUEST_TIMEOUT = httpx2.Timeout(10.0, read=130.0)
-"""Seconds; an answer to an upload comes when it is encoded, and a session is kept within 120 s."""
+"""Seconds. The answer to an upload comes after encoding; a recording is made within 120 s."""
 CHUNK_BYTES = 1 << 16
 PROGRESS_INTERVAL_S = 0.25
-"""Seconds between two questions how far an upload is."""
+"""Interval between queries of an upload's progress."""
 
 
 def authorization(token: str | None) -> dict[str, str]:
-    """The header that says by what one comes in, none without a token."""
+    """Return the `Authorization` header of a token, or no header without one."""
     return {} if token is None else {"Authorization": f"Bearer {token}"}
 
 
 class ServerProblem(Exception):
-    """What the server answered in place of what was asked: an RFC 9457 problem, `body`, with its `status`."""
+    """Error answer of the server: an RFC 9457 problem document, `body`, with its HTTP `status`."""
 
     def __init__(self, status: int, body: dict[str, Any]) -> None:
         line = f"line {body['line']}: " if body.get("line") else ""
@@ -37,10 +37,9 @@ class ServerProblem(Exception):
 
 
 class Client:
-    """A server of Bunraku at `url` (http or https), which a `token` lets in if it asks for one. Use as an async context
-    manager.
+    """Client of a server at `url` (http or https), with an optional access `token`. Use as an async context manager.
 
-    Methods raise `ServerProblem` where the server refuses, and `httpx2.TransportError` where there is none.
+    Methods raise `ServerProblem` if the server rejects the request, and `httpx2.TransportError` if it is unreachable.
     """
 
     def __init__(self, url: str = "http://127.0.0.1:8000", token: str | None = None) -> None:
@@ -60,8 +59,11 @@ class Client:
         progress: Callable[[int, int], None] | None = None,
         on_stage: Callable[[str, float], None] | None = None,
     ) -> dict[str, Any]:
-        """Upload a motion file and wait until it can be watched; `progress` is told bytes sent and in all, and `made`
-        again and again what the server does with it (`waiting`, `reading`, `encoding`) and the share done, 0..1."""
+        """Upload a motion file and wait until it can be watched.
+
+        `progress` receives bytes sent and total; `on_stage` repeatedly receives the server's stage (`waiting`,
+        `reading`, `encoding`) and the share done, 0..1.
+        """
         return await self._upload_file(path, "/v1/motions", progress, on_stage)
 
     async def add_audio(
@@ -71,27 +73,31 @@ class Client:
         progress: Callable[[int, int], None] | None = None,
         on_stage: Callable[[str, float], None] | None = None,
     ) -> dict[str, Any]:
-        """Make a new motion that is `motion` with the sound of a WAV, FLAC, MP3 or Ogg file, and wait until it can be
-        watched; the rest as of `upload`."""
+        """Create a motion from `motion` and a WAV, FLAC, MP3 or Ogg file, and wait until it can be watched.
+
+        The callbacks are those of `upload`.
+        """
         return await self._upload_file(path, f"/v1/motions/{quote(motion, safe='')}/audio", progress, on_stage)
 
     async def add_scene(self, motion: str, staging: dict[str, Any]) -> dict[str, Any]:
-        """Make a new motion that is `motion` with a camera and lights: keyframes as `POST /v1/motions/{id}/scene` takes
-        them."""
+        """Create a motion from `motion` with a camera and lights: keyframes as for `POST /v1/motions/{id}/scene`."""
         path = f"/v1/motions/{quote(motion, safe='')}/scene"
         return await self._request("POST", path, json=staging)
 
     async def add_performers(
         self, motion: str, motions: list[str], places: list[list[float]] | None = None
     ) -> dict[str, Any]:
-        """Make a new motion in which the performers of `motions` dance beside those of `motion`: `places` are `[x, z,
-        turn]` of each, metres and radians, its own first; in a row if not said."""
+        """Create a motion with the performers of `motions` beside those of `motion`.
+
+        `places` are `[x, z, turn]` of each performer in metres and radians, those of `motion` first; by default they
+        stand in a row.
+        """
         path = f"/v1/motions/{quote(motion, safe='')}/performers"
-        asked = {"motions": motions} | ({"places": places} if places is not None else {})
-        return await self._request("POST", path, json=asked)
+        body = {"motions": motions} | ({"places": places} if places is not None else {})
+        return await self._request("POST", path, json=body)
 
     async def motions(self) -> list[dict[str, Any]]:
-        """All motions, newest first."""
+        """Return all motions, newest first."""
         items: list[dict[str, Any]] = []
         params: dict[str, Any] = {"limit": 200}
         while True:
@@ -102,23 +108,23 @@ class Client:
             params["cursor"] = page["next"]
 
     async def motion(self, motion: str) -> dict[str, Any]:
-        """One motion."""
+        """Return one motion."""
         return await self._request("GET", f"/v1/motions/{quote(motion, safe='')}")
 
     async def delete_motion(self, motion: str) -> None:
-        """Remove one motion."""
+        """Delete one motion."""
         await self._request("DELETE", f"/v1/motions/{quote(motion, safe='')}")
 
     async def open_session(self, motion: str, *, playing: bool = True, loop: bool = True) -> dict[str, Any]:
-        """A new session over a motion."""
+        """Open a session over a motion."""
         return await self._request("POST", "/v1/sessions", json={"motion": motion, "playing": playing, "loop": loop})
 
     async def session(self, session: str) -> dict[str, Any]:
-        """One session."""
+        """Return one session."""
         return await self._request("GET", f"/v1/sessions/{quote(session, safe='')}")
 
     async def first_session(self) -> str | None:
-        """The id of the session that is open longest, None where none is."""
+        """Return the id of the oldest open session, or None."""
         items = (await self._request("GET", "/v1/sessions", params={"limit": 1}))["items"]
         return items[0]["id"] if items else None
 
@@ -133,33 +139,38 @@ class Client:
         seconds: float | None = None,
         camera: Sequence[Mapping[str, Any]] = (),
     ) -> dict[str, Any]:
-        """Keep what a session has shown, the last `seconds` of it or all that can be kept, as a new motion, and wait
-        until it can be watched. `camera`, if any, are keyframes in order of time: `time` on the reference clock in
-        microseconds, `position` and `gaze` in metres in the dance's frame, `fov` in radians."""
-        given = {"name": name, "seconds": seconds, "camera": [dict(key) for key in camera] or None}
-        asked = {key: value for key, value in given.items() if value is not None}
-        return await self._request("POST", f"/v1/sessions/{quote(session, safe='')}/recordings", json=asked)
+        """Record what a session has shown as a new motion, and wait until it can be watched.
+
+        `seconds` limits the recording to the last part (default: all that is available). `camera` are keyframes in
+        order of time: `time` on the reference clock in microseconds, `position` and `gaze` in metres in the motion's
+        frame, `fov` in radians.
+        """
+        fields = {"name": name, "seconds": seconds, "camera": [dict(key) for key in camera] or None}
+        body = {key: value for key, value in fields.items() if value is not None}
+        return await self._request("POST", f"/v1/sessions/{quote(session, safe='')}/recordings", json=body)
 
     async def share(
         self, *, session: str | None = None, motion: str | None = None, seconds: int | None = None
     ) -> dict[str, Any]:
-        """A link for viewers of a session or a motion, good for `seconds` or a week: `link` goes behind the server's
-        address, `id` is what it is revoked by."""
-        given = {"session": session, "motion": motion, "seconds": seconds}
-        asked = {key: value for key, value in given.items() if value is not None}
-        return await self._request("POST", "/v1/shares", json=asked)
+        """Create a share link for viewers of a session or a motion, valid for `seconds` (default: a week).
+
+        The result's `link` is appended to the server's address; `id` revokes it.
+        """
+        fields = {"session": session, "motion": motion, "seconds": seconds}
+        body = {key: value for key, value in fields.items() if value is not None}
+        return await self._request("POST", "/v1/shares", json=body)
 
     async def shares(self) -> list[dict[str, Any]]:
-        """The newest links for viewers that one has made, or, as admin, all."""
+        """Return the newest share links of this subject, or of all subjects for an admin."""
         items: list[dict[str, Any]] = (await self._request("GET", "/v1/shares", params={"limit": 200}))["items"]
         return items
 
     async def revoke_share(self, share: str) -> None:
-        """Revoke a link: who watches by it is ended."""
+        """Revoke a share link; connections that use it are closed."""
         await self._request("DELETE", f"/v1/shares/{quote(share, safe='')}")
 
     def socket_url(self, path: str) -> str:
-        """The WebSocket address of a path of this server."""
+        """Return the WebSocket URL of a path of this server."""
         parts = urlsplit(self.url)
         scheme = {"http": "ws", "https": "wss"}.get(parts.scheme, parts.scheme)
         return urlunsplit((scheme, parts.netloc, parts.path.rstrip("/") + path, "", ""))
@@ -171,7 +182,7 @@ class Client:
         progress: Callable[[int, int], None] | None,
         on_stage: Callable[[str, float], None] | None,
     ) -> dict[str, Any]:
-        """Send a file to an address that takes one, as `upload` says."""
+        """Send a file to an endpoint, with the callbacks of `upload`."""
         size = await asyncio.to_thread(os.path.getsize, path)
         name = secrets.token_urlsafe(16)
 
@@ -184,7 +195,7 @@ class Client:
                     if progress is not None:
                         progress(sent, size)
 
-        following = asyncio.create_task(self._poll_progress(name, on_stage)) if on_stage is not None else None
+        polling = asyncio.create_task(self._poll_progress(name, on_stage)) if on_stage is not None else None
         try:
             return await self._request(
                 "POST",
@@ -194,18 +205,18 @@ class Client:
                 headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
             )
         finally:
-            if following is not None:
-                following.cancel()
-                await asyncio.wait((following,))
+            if polling is not None:
+                polling.cancel()
+                await asyncio.wait((polling,))
 
     async def _poll_progress(self, upload: str, on_stage: Callable[[str, float], None]) -> None:
-        """Tell how far an upload is until cancelled. What fails in this is no matter: the upload's own answer tells."""
+        """Report the progress of an upload until cancelled. Failures are ignored: the upload's own answer counts."""
         while True:
             await asyncio.sleep(PROGRESS_INTERVAL_S)
             with contextlib.suppress(ServerProblem, httpx2.TransportError):
-                said = await self._request("GET", f"/v1/uploads/{upload}")
-                if said["stage"] != "receiving":
-                    on_stage(said["stage"], said["share"])
+                progress = await self._request("GET", f"/v1/uploads/{upload}")
+                if progress["stage"] != "receiving":
+                    on_stage(progress["stage"], progress["share"])
 
     async def _request(self, method: str, path: str, **options: Any) -> dict[str, Any]:
         response = await self._http.request(method, path, **options)
@@ -214,7 +225,10 @@ class Client:
         try:
             body = response.json()
         except ValueError:
-            body = {"title": "Not Bunraku", "detail": f"{self.url} answered {response.status_code} without JSON"}
+            body = {
+                "title": "Not a Bunraku server",
+                "detail": f"{self.url} answered {response.status_code} without JSON",
+            }
         if not response.is_success or not isinstance(body, dict):
             raise ServerProblem(response.status_code, body if isinstance(body, dict) else {})
         return body

@@ -1,9 +1,9 @@
-"""Many viewers of one stream in one process, to see how a server bears them.
+"""Load generator: many viewers of one stream in one process, to measure a server under load.
 
-Each is a socket of its own that takes in what a viewer is sent and says once a second what a viewer says (a ping, and a
-report of what is ready ahead); nothing is decoded and nothing drawn, so that thousands fit. They keep one clock
-together, as they are at one place. Latenesses are of the messages as they come: an overlay is late when it comes after
-it was due, a block when it comes after its first frame should have been shown; what is in time has less than zero.
+Each viewer has its own connection, receives messages and sends what a viewer sends once per second (a ping, and a
+report of its buffer); nothing is decoded or drawn, so that thousands fit. All share one clock. Lateness refers to
+arrival: an overlay is late if it arrives after its due time, a block if it arrives after its first frame is due;
+messages in time have negative lateness.
 """
 
 from __future__ import annotations
@@ -22,19 +22,22 @@ from bunraku.client.api import authorization
 from bunraku.client.load_viewer import LoadState, LoadViewer
 
 SEND_SLOTS = 50
-"""Parts of a second in which viewers say what they say, so that they do not say it all at once."""
+"""Slots per second over which the viewers' reports are spread."""
 RESERVED_FILE_DESCRIPTORS = 64
-"""File descriptors of the process beside the viewers'."""
+"""File descriptors of the process besides the viewers'."""
 
 
 class FileLimitExceeded(ValueError):
-    """The system lets this process open fewer sockets than are asked for."""
+    """Open-file limit of this process is too low for the requested number of connections."""
 
 
 @dataclass(frozen=True, slots=True)
 class LoadStatistics:
-    """How a crowd fared. `refused` could not join, `dropped` were closed by the server; times in milliseconds, None
-    where nothing of the kind came; `stalls` are blocks that came after their first frame should have been shown."""
+    """Result of a load test.
+
+    `refused` viewers could not join, `dropped` ones were closed by the server. Times are milliseconds, None without
+    samples; `stalls` counts blocks that arrived after their first frame was due.
+    """
 
     viewers: int
     joined: int
@@ -57,15 +60,15 @@ class LoadStatistics:
     why: str | None
 
     def as_json(self) -> dict[str, Any]:
-        """The figures as plain values."""
+        """Return the statistics as plain values."""
         return asdict(self)
 
 
 class LoadGenerator:
-    """A crowd of viewers of the stream at `url` (a WebSocket's, `.../stream`), let in by a `token` if there is one."""
+    """Group of viewers of the stream at `url` (`ws://.../stream`), with an optional access `token`."""
 
     def __init__(self, url: str, *, single_reporter: bool = False, token: str | None = None) -> None:
-        """Of a `quiet` crowd one alone speaks; the others answer what WebSockets ask of them."""
+        """Prepare a load test; with `single_reporter`, only one viewer sends reports."""
         self.url = url
         self.state = LoadState()
         self.viewers: list[LoadViewer] = []
@@ -81,14 +84,14 @@ class LoadGenerator:
     async def join(
         self, viewers: int, joins_per_second: float = 200.0, on_progress: Callable[[int], None] | None = None
     ) -> None:
-        """That many more, so many a second; returns when all have joined or been refused. `told` hears how many have.
+        """Add viewers at a rate; return when all have joined or been rejected.
 
-        Raises `TooMany`.
+        `on_progress` receives the number of joined viewers. Raises `FileLimitExceeded`.
         """
         _raise_file_limit(self._requested + viewers + RESERVED_FILE_DESCRIPTORS)
         self._requested += viewers
         if self._report_task is None:
-            self._report_task = asyncio.create_task(self._send_reports(), name="what a crowd says")
+            self._report_task = asyncio.create_task(self._send_reports(), name="load test reports")
         begun = time.monotonic()
         async with asyncio.TaskGroup() as group:
             for number in range(viewers):
@@ -96,22 +99,22 @@ class LoadGenerator:
                 group.create_task(self._join_viewer(on_progress))
 
     async def leave(self, viewers: int) -> None:
-        """That many go, the last first, all at once."""
-        going, self.viewers[-viewers:] = self.viewers[-viewers:], []
-        self._requested -= len(going)
-        for viewer in going:
+        """Disconnect the viewers that joined last, all at once."""
+        leaving, self.viewers[-viewers:] = self.viewers[-viewers:], []
+        self._requested -= len(leaving)
+        for viewer in leaving:
             viewer.close()
         await asyncio.sleep(0)
 
     def reset_statistics(self) -> None:
-        """Count from here on."""
+        """Start counting anew."""
         self._measured_from, self._initial_bytes = time.monotonic(), self.state.received_bytes
-        for counted in (self.state.overlay_lateness, self.state.overlay_gaps, self.state.block_lateness):
-            del counted[:]
+        for samples in (self.state.overlay_lateness, self.state.overlay_gaps, self.state.block_lateness):
+            del samples[:]
         self.state.stalls = 0
 
     async def close(self) -> None:
-        """Everybody goes."""
+        """Disconnect all viewers."""
         if self._report_task is not None:
             self._report_task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -119,7 +122,7 @@ class LoadGenerator:
         await self.leave(len(self.viewers))
 
     def statistics(self) -> LoadStatistics:
-        """How it went since `count`."""
+        """Return the statistics since `reset_statistics`."""
         shared, seconds = self.state, time.monotonic() - self._measured_from
         joins = _percentiles(self.join_times, 1e3)
         overlays, blocks = _percentiles(shared.overlay_lateness, 1e-3), _percentiles(shared.block_lateness, 1e-3)
@@ -162,12 +165,12 @@ class LoadGenerator:
             on_progress(len(self.viewers))
 
     async def _send_reports(self) -> None:
-        """Let everyone speak once a second, for ever; of a quiet crowd one, who asks for the time."""
-        beat, due = 0, time.monotonic()
+        """Send the report of every viewer once per second, or of only one with `single_reporter`."""
+        tick, due = 0, time.monotonic()
         while True:
-            for viewer in self.viewers[beat % SEND_SLOTS : 1 if self._single_reporter else None : SEND_SLOTS]:
-                viewer.send_report(beat // SEND_SLOTS)
-            beat, due = beat + 1, due + 1 / SEND_SLOTS
+            for viewer in self.viewers[tick % SEND_SLOTS : 1 if self._single_reporter else None : SEND_SLOTS]:
+                viewer.send_report(tick // SEND_SLOTS)
+            tick, due = tick + 1, due + 1 / SEND_SLOTS
             await asyncio.sleep(max(due - time.monotonic(), 0.0))
 
 
@@ -180,29 +183,28 @@ async def run_load(
     token: str | None = None,
     on_progress: Callable[[str, float], None] | None = None,
 ) -> LoadStatistics:
-    """Have `viewers` join the stream at `url`, `joins` a second, and watch for `seconds`; `told` hears what is done
-    (`joining`, `watching`) and the share done, 0..1. A `token` lets them in.
+    """Run a load test of `viewers` on the stream at `url` for `seconds`.
 
-    Raises `TooMany`.
+    `on_progress` receives the stage (`joining`, `watching`) and the share done, 0..1. Raises `FileLimitExceeded`.
     """
-    crowd = LoadGenerator(url, token=token)
+    generator = LoadGenerator(url, token=token)
     try:
-        await crowd.join(
+        await generator.join(
             viewers, joins_per_second, lambda joined: on_progress("joining", joined / viewers) if on_progress else None
         )
-        crowd.reset_statistics()
+        generator.reset_statistics()
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             if on_progress is not None:
                 on_progress("watching", 1 - left / seconds)
             await asyncio.sleep(min(left, 0.2))
-        return crowd.statistics()
+        return generator.statistics()
     finally:
-        await crowd.close()
+        await generator.close()
 
 
 def _raise_file_limit(sockets: int) -> None:
-    """Raise this process's limit of open files as far as is needed and allowed; raises `TooMany`."""
+    """Raise this process's open-file limit as far as needed and allowed; raise `FileLimitExceeded`."""
     try:
         import resource
     except ImportError:
@@ -211,12 +213,14 @@ def _raise_file_limit(sockets: int) -> None:
     if soft >= sockets or soft == resource.RLIM_INFINITY:
         return
     if hard != resource.RLIM_INFINITY and hard < sockets:
-        raise FileLimitExceeded(f"this process may open {hard} files (ulimit -Hn), {sockets} are needed")
+        raise FileLimitExceeded(
+            f"the load test needs {sockets} open files, the limit is {hard}: raise it with ulimit -n"
+        )
     resource.setrlimit(resource.RLIMIT_NOFILE, (sockets, hard))
 
 
 def _percentiles(values: array[Any], scale: float) -> list[float | None]:
-    """The 50th, 95th and 99th, in other units."""
+    """Return p50, p95 and p99, scaled."""
     if not values:
         return [None] * 3
     return [round(float(value) * scale, 2) for value in np.percentile(np.array(values), (50, 95, 99))]

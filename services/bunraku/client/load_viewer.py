@@ -1,4 +1,4 @@
-"""One of a crowd: a socket that takes in what a viewer is sent, and keeps only when it came."""
+"""Viewer of the load generator: receives messages and records only their times."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ from bunraku.wire.messages import ChannelHeader, Data, Description, Ping, Pong, 
 from bunraku.wire.overlay import Overlay
 
 MAX_SEND_AHEAD_US = 6_000_000
-"""No server sends blocks further ahead than this, microseconds."""
+"""Upper bound of how far ahead servers send blocks."""
 CLOCK_CACHE_S = 0.2
-"""Seconds in which the common clock moves too little to be asked again."""
+"""Time for which the shared clock's offset is cached."""
 
 
 class LoadState:
-    """What a crowd has in common: its clock, the stage's timeline, and what is counted, in microseconds: how late
-    overlays and blocks came, and the time between two overlays at one viewer while a limb is pulled."""
+    """State shared by all viewers of a load test: clock, timeline, and counts.
+
+    Lateness of overlays and blocks, and gaps between overlays of a controlled limb at one viewer, in microseconds.
+    """
 
     def __init__(self) -> None:
         self.clock = ReferenceClock()
@@ -41,20 +43,20 @@ class LoadState:
         self._seen: dict[bytes, None] = {}
 
     def now(self) -> int:
-        """The reference clock."""
+        """Return the time on the reference clock, microseconds."""
         local = time.monotonic_ns() // 1000
         if local - self._cached_at > CLOCK_CACHE_S * 1e6:
             self._cached_at, self._cached_offset = local, self.clock.at(local) - local
         return local + self._cached_offset
 
     def on_pong(self, pong: Pong) -> None:
-        """Take in an answer that tells the time."""
+        """Add a clock sample."""
         if not self.clock.is_synchronised:
             self._cached_at = 0
         self.clock.add_sample(pong.sent, pong.received, pong.answered, time.monotonic_ns() // 1000)
 
     def process_shared(self, data: bytes) -> None:
-        """Take in what is the same for everyone, once."""
+        """Process a message that is the same for every viewer, once."""
         if data in self._seen:
             return
         if len(self._seen) > 64:
@@ -81,7 +83,7 @@ class LoadState:
 
 
 class LoadViewer(MessageSocket):
-    """One viewer, from its connection on."""
+    """Connection of one viewer."""
 
     __slots__ = (
         "_block_count",
@@ -94,7 +96,7 @@ class LoadViewer(MessageSocket):
     )
 
     def __init__(self, url: str, state: LoadState, headers: Mapping[str, str] | None = None) -> None:
-        """Of the stream at `url`, with what `headers` its request has beside its own."""
+        """Prepare a viewer of the stream at `url`; `headers` are added to its request."""
         super().__init__(url, headers)
         self._state = state
         self._received_at = 0
@@ -105,18 +107,16 @@ class LoadViewer(MessageSocket):
         self._is_controlled = False
 
     def send_report(self, sequence: int) -> None:
-        """Say what a viewer says each second."""
+        """Send the ping and report that a viewer sends every second."""
         ping = Ping(sequence & 0xFFFFFFFF, time.monotonic_ns() // 1000)
         self.send(ping.pack(), Report(max(self._buffered_until - self._state.now(), 0)).pack())
 
     def data_received(self, data: bytes) -> None:
-        """As asyncio has it."""
         self._state.received_bytes += len(data)
         self._received_at = self._state.now()
         super().data_received(data)
 
     def on_message(self, message: bytes) -> None:
-        """Count what has come."""
         kind, shared, now = message[0], self._state, self._received_at
         if kind == Overlay.TYPE:
             shared.overlay_lateness.append(_clamp_int32(now - int.from_bytes(message[4:12], "little")))
@@ -129,30 +129,30 @@ class LoadViewer(MessageSocket):
             shared.on_pong(Pong.unpack(message))
         else:
             shared.process_shared(message)
-            # the first of these tells the time
+            # the first of these sets the clock
             self._received_at = shared.now()
 
     def _count_block(self, message: bytes, now: int) -> None:
         shared = self._state
         state, timing, data = shared.timelines.at(now), shared.timing, Data.unpack(message)
-        # of the motion alone, and of each block the version that comes first
+        # only blocks of the motion, and the first version of each
         if state is None or timing is None or data.track or data.index in self._received_blocks:
             return
         self._received_blocks.add(data.index)
         length = round(timing.frames_in(data.index) * 1e6 / timing.fps)
         ahead = timing.start_us(data.index) - position_at(state, now)
         if state.loop:
-            # what comes round again is ahead by less than is sent ahead, or has begun
+            # a block of the next loop is closer than the send-ahead limit; otherwise it has started already
             begun = min(state.duration // 2, max(length, state.duration - MAX_SEND_AHEAD_US))
             ahead = (ahead + begun) % state.duration - begun
         self._buffered_until = max(self._buffered_until, now + ahead + length)
         self._block_count += 1
-        # the block on show when one joins has always begun
+        # the first block has always started when a viewer joins
         if self._block_count > 1 and state.playing:
             shared.block_lateness.append(_clamp_int32(-ahead))
             shared.stalls += ahead < 0
 
 
 def _clamp_int32(microseconds: int) -> int:
-    """What fits into 32 bits: half an hour."""
+    """Clamp to 32 bits: about half an hour."""
     return min(max(microseconds, -(1 << 31)), (1 << 31) - 1)

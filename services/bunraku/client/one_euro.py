@@ -1,4 +1,4 @@
-"""The One-Euro filter for noisy sources: a tracker, a shaking hand.
+"""One-Euro filter for noisy input, such as a tracker or an unsteady hand.
 
 Casiez, Roussel, Vogel: "1€ Filter: A Simple Speed-based Low-pass Filter for Noisy Input in Interactive Systems", CHI
 2012. Slow movement is smoothed, fast movement is followed. The cutoff grows with the speed of the whole vector, so that
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 MIN_SAMPLE_INTERVAL_S = 1e-6
-"""Samples nearer in time than this are of one time, seconds."""
+"""Samples closer in time than this count as simultaneous."""
 
 
 class _State(NamedTuple):
@@ -22,10 +22,10 @@ class _State(NamedTuple):
 
 
 class OneEuro:
-    """The filter of one vector over time. It reads no clock: times come in.
+    """Filter of one vector over time; times are arguments.
 
-    `min_cutoff`, Hz, at rest: lower is steadier. `beta`, Hz for each unit a second of speed: higher lags less.
-    `derivative_cutoff`, Hz, of the speed's own smoothing. The defaults suit places in arm lengths.
+    `min_cutoff` in Hz applies at rest: lower is steadier. `beta` in Hz per unit per second of speed: higher lags less.
+    `derivative_cutoff` in Hz smooths the speed. The defaults suit positions in arm lengths.
     """
 
     def __init__(self, min_cutoff: float = 1.5, beta: float = 8.0, derivative_cutoff: float = 1.0) -> None:
@@ -38,16 +38,16 @@ class OneEuro:
         self._current: _State | None = None
 
     def filter(self, values: Sequence[float], seconds: float) -> tuple[float, ...]:
-        """The smoothed value of a sample at a time.
+        """Return the smoothed value of a sample at a time in seconds.
 
-        The first comes through as it is, and so does a constant. Times may be irregular; of several samples of one
-        time, or of an earlier one, the last counts as if it were the only one. Raises `ValueError` for a number that is
-        not finite, or another number of them than before.
+        The first sample and a constant pass unchanged. Times may be irregular; of several samples with the same or an
+        earlier time, the last one replaces the others. Raises ValueError for values that are not finite, or another
+        number of them.
         """
         if not (math.isfinite(seconds) and all(map(math.isfinite, values))):
-            raise ValueError(f"a sample is finite numbers and a time, not {list(values)} at {seconds}")
+            raise ValueError(f"a sample needs finite numbers and a time, not {list(values)} at {seconds}")
         if self._current is not None and len(values) != len(self._current.value):
-            raise ValueError(f"a sample had {len(self._current.value)} numbers before, and has {len(values)} now")
+            raise ValueError(f"a sample needs {len(self._current.value)} numbers as before, not {len(values)}")
         if self._current is not None:
             if seconds - self._current.seconds >= MIN_SAMPLE_INTERVAL_S:
                 self._previous = self._current
@@ -60,21 +60,21 @@ class OneEuro:
         return self._current.value
 
     def reset(self) -> None:
-        """Forget what came: the next sample is the first."""
+        """Forget all samples: the next one is the first."""
         self._previous = self._current = None
 
-    def _smooth(self, before: _State, values: Sequence[float], seconds: float) -> _State:
-        passed = seconds - before.seconds
-        slow = _smoothing_factor(self.derivative_cutoff, passed)
-        change = zip(before.value, before.speed, values, strict=True)
-        speed = tuple(speed + slow * ((new - old) / passed - speed) for old, speed, new in change)
-        much = _smoothing_factor(self.min_cutoff + self.beta * math.hypot(*speed), passed)
-        # written so that a constant comes through to the last bit
-        value = tuple(old + much * (new - old) for old, new in zip(before.value, values, strict=True))
+    def _smooth(self, previous: _State, values: Sequence[float], seconds: float) -> _State:
+        elapsed = seconds - previous.seconds
+        speed_factor = _smoothing_factor(self.derivative_cutoff, elapsed)
+        change = zip(previous.value, previous.speed, values, strict=True)
+        speed = tuple(speed + speed_factor * ((new - old) / elapsed - speed) for old, speed, new in change)
+        value_factor = _smoothing_factor(self.min_cutoff + self.beta * math.hypot(*speed), elapsed)
+        # exact for a constant, to the last bit
+        value = tuple(old + value_factor * (new - old) for old, new in zip(previous.value, values, strict=True))
         return _State(seconds, value, speed)
 
 
 def _smoothing_factor(cutoff: float, elapsed: float) -> float:
-    """What a new sample weighs in a low-pass of a cutoff in Hz, after some seconds."""
+    """Return the weight of a new sample in a low-pass filter with a cutoff in Hz, after `elapsed` seconds."""
     turned = 2 * math.pi * cutoff * elapsed
     return turned / (turned + 1)

@@ -1,4 +1,4 @@
-"""A puppeteer from Python: takes limbs of a session and moves them."""
+"""Puppeteer of the Python SDK: claims limbs of a session and moves them."""
 
 from __future__ import annotations
 
@@ -32,22 +32,23 @@ from bunraku.wire.messages import (
 )
 
 ALIVE_INTERVAL_S = 0.1
+"""Interval of keep-alive messages while limbs are held."""
 ASK_TIMEOUT_S = 20.0
-"""Seconds after which an ask is forgotten."""
+"""Default time to wait for a limb that was asked for."""
 ANSWER_TIMEOUT_S = 5.0
-"""Seconds to wait for the server's word."""
+"""Time to wait for an answer of the server."""
 
 
 class ControlRefused(Exception):
-    """A limb that is another's, or a stage that is closed; the text says which."""
+    """Limb held by another puppeteer, or closed session; the message has the reason."""
 
 
 class Puppeteer:
-    """One puppeteer of a session. Use as an async context manager; limbs are named as in `wire.limbs.LIMBS`, or
-    numbered: limb l of performer k is 4 k + l.
+    """Puppeteer of a session. Use as an async context manager.
 
-    While a limb is held the server is told 10 times a second that it still is. One that was lost, as this process stood
-    still for longer than a holder may be silent, is claimed again and told once more where it should be.
+    Limbs are named as in `wire.limbs.LIMBS`, or numbered: limb l of performer k is 4 k + l. While limbs are held, a
+    keep-alive message is sent 10 times per second. A limb that was lost because this process was suspended is claimed
+    again, and its last target is sent again.
     """
 
     def __init__(self, client: Client, session: str, name: str = "Someone") -> None:
@@ -56,18 +57,18 @@ class Puppeteer:
         self.id: str | None = None
         self.presence: Presence | None = None
         self.notice: Notice | None = None
-        """What became of an input that was not taken as it came, last."""
+        """Last notice about an input that was changed or refused."""
         self._epochs: dict[int, int] = {}
         self._last_inputs: dict[int, tuple[int, tuple[float, float, float]]] = {}
-        """What was last asked of each limb that is held: kind and values."""
+        """Last input of each held limb: kind and values."""
         self._lost_limbs: set[int] = set()
-        """Limbs that were lost and are claimed again."""
+        """Lost limbs with a pending claim."""
         self._sequence = 0
         self._answers: asyncio.Queue[Grant | Refusal] = asyncio.Queue(64)
         self._welcome = asyncio.Event()
         self._connection: ClientConnection | None = None
         self._tasks: list[asyncio.Task[None]] = []
-        self._close_reason = "the stage is not open"
+        self._close_reason = "the session is not open"
 
     async def __aenter__(self) -> Self:
         self._connection = await connect(
@@ -99,7 +100,7 @@ class Puppeteer:
             await self._connection.close()
 
     async def claim(self, limb: str | int) -> None:
-        """Take a limb; raises `Refused` where another holds it."""
+        """Claim a limb; raise `ControlRefused` if another puppeteer holds it."""
         number = limb_number(limb)
         self._last_inputs.pop(number, None)
         await self._send(Claim(number).pack())
@@ -115,8 +116,10 @@ class Puppeteer:
             )
 
     async def ask(self, limb: str | int, seconds: float = ASK_TIMEOUT_S) -> None:
-        """Ask the holder of a limb for it, and wait until it is one's own; raises `Refused` where it was not given in
-        `seconds`. A free limb is taken."""
+        """Ask the holder of a limb for it and wait; raise `ControlRefused` if it is not granted within `seconds`.
+
+        A free limb is claimed at once.
+        """
         number = limb_number(limb)
         try:
             await self.claim(limb)
@@ -133,7 +136,7 @@ class Puppeteer:
             raise ControlRefused(f"{limb} was asked for and not given") from None
 
     async def release(self, limb: str | int) -> None:
-        """Let a limb go."""
+        """Release a limb."""
         number = limb_number(limb)
         if number in self._epochs:
             await self._send(Release(number, self._epochs.pop(number)).pack())
@@ -141,22 +144,23 @@ class Puppeteer:
     async def target(
         self, limb: str | int, x: float, y: float = 0.0, z: float = 0.0, *, smooth: OneEuro | None = None
     ) -> None:
-        """Pull a held hand's tip to a place in the shoulder's frame, arm lengths; a leg's thigh to the angle `x`.
+        """Move the tip of a held hand to a position in the shoulder's frame, arm lengths; for a leg, set the thigh
+        angle `x`.
 
-        `smooth`, one for each limb and kept from call to call, steadies what a noisy source says.
+        `smooth`, one filter per limb that is kept between calls, smooths a noisy source.
         """
         if smooth is not None:
             x, y, z = smooth.filter((x, y, z), time.monotonic())
         await self._set_input(limb, Input.TARGET, (x, y, z))
 
     async def velocity(self, limb: str | int, x: float, y: float = 0.0, z: float = 0.0) -> None:
-        """Move a held limb at -1..1 of full speed along each axis until told otherwise."""
+        """Move a held limb at -1..1 of full speed along each axis until further notice."""
         await self._set_input(limb, Input.VELOCITY, (x, y, z))
 
     async def _set_input(self, limb: str | int, kind: int, values: tuple[float, float, float]) -> None:
         number = limb_number(limb)
         if number not in self._epochs:
-            raise ControlRefused(f"{limb} is not held")
+            raise ControlRefused(f"{limb} is not held: claim it first")
         self._last_inputs[number] = kind, values
         await self._send_input(number)
 
@@ -195,14 +199,14 @@ class Puppeteer:
         self._welcome.set()
 
     async def _on_grant(self, grant: Grant) -> None:
-        limb, again = grant.limb, grant.limb in self._lost_limbs
+        limb, reclaimed = grant.limb, grant.limb in self._lost_limbs
         self._lost_limbs.discard(limb)
-        if again and limb not in self._epochs:
-            # let go before the answer came
+        if reclaimed and limb not in self._epochs:
+            # released before the answer arrived
             await self._send(Release(limb, grant.epoch).pack())
             return
         self._epochs[limb] = grant.epoch
-        if not again:
+        if not reclaimed:
             self._answers.put_nowait(grant)
         elif limb in self._last_inputs:
             await self._send_input(limb)

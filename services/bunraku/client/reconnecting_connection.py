@@ -1,7 +1,7 @@
-"""A viewer's line: a WebSocket that comes back by itself once something was heard over it.
+"""WebSocket connection that re-establishes itself after its first message.
 
-One that falls silent may be lost, and the system finds that out after minutes only: so another is tried beside it, and
-whichever is heard first is the line from then on, as in the page.
+A silent connection may be lost, which the operating system detects only after minutes. A second connection is therefore
+attempted beside it, and whichever receives a message first becomes current, as in the page.
 """
 
 from __future__ import annotations
@@ -19,28 +19,30 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 from bunraku.wire.messages import MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
 
 SILENCE_TIMEOUT_S = 4.0
-"""Seconds without a word after which another line is tried: the time is asked every second."""
+"""Silence after which another connection is attempted; clock pings are sent every second."""
 CONNECT_TIMEOUT_S = 3.0
-"""Seconds that a try may take before it is given up for another."""
+"""Time after which an attempt is replaced by another."""
 RETRY_INTERVAL_S = 0.5
-"""Seconds from one try to the next."""
+"""Interval between attempts."""
 RETRYABLE_CLOSE_CODES = (None, 1001, 1006, 1011, 1012, 1013)
-"""Close codes after which to come again may help."""
+"""Close codes after which reconnecting may succeed."""
 
 
 class StreamEnded(Exception):
-    """The server closed the stream; the text says why."""
+    """Stream closed by the server; the message has the reason."""
 
 
 class ConnectionLost(StreamEnded):
-    """The line broke, or the server was too busy: it may be tried again."""
+    """Connection lost, or server overloaded: a retry may succeed."""
 
 
 class ReconnectingConnection:
-    """To the WebSocket at `address()`, which is asked before each try. `opened` is called when there is a line, or
-    another one, and `take` with each message; what they raise ends it. `silent` is after how many seconds without a
-    word another is tried; `open_socket` makes the unconnected, non-blocking socket of a connection where the machine's
-    own way is not the one meant; `headers` go with each handshake."""
+    """Connection to the WebSocket at `make_url()`, which is called before each attempt.
+
+    `on_open` is called for every new current connection, `on_message` for each message; their exceptions end `run`.
+    `open_socket` creates the unconnected, non-blocking socket of a connection if the default route is not wanted;
+    `headers` are sent with each handshake.
+    """
 
     def __init__(
         self,
@@ -58,33 +60,36 @@ class ReconnectingConnection:
         self._silence_timeout = silence_timeout
         self._open_socket = open_socket
         self._headers = headers
-        # the line, and its task; of the tasks that try there is one more at most
+        # current connection and its task; there is at most one more attempt
         self._connection: ClientConnection | None = None
         self._task: asyncio.Task[None] | None = None
         self._attempts: set[asyncio.Task[None]] = set()
         self._attempted_at = 0.0
         self._received_at: float | None = None
         self.reconnects = 0
-        """How often it was lost, or replaced as it was silent."""
+        """Connections lost, or replaced because of silence."""
         self.close_reason = ""
-        """Why the server will close it, where it has said so."""
+        """Reason for the close that the server announced."""
 
     async def send(self, message: bytes) -> None:
-        """Say something, where there is a line."""
+        """Send a message if connected."""
         if self._connection is not None:
             with contextlib.suppress(ConnectionClosed):
                 await self._connection.send(message)
 
     async def run(self) -> None:
-        """Keep it up, for ever. Raises `StreamEnded` where the server ends it; and OSError, TimeoutError and
-        `WebSocketException` as long as nothing was heard."""
+        """Keep the connection up until it ends.
+
+        Raises `StreamEnded` if the server ends the stream, and OSError, TimeoutError or `WebSocketException` as long as
+        no message was received.
+        """
         try:
             while True:
                 if self._time_until_attempt() <= 0.0:
-                    # what was tried beside a silent line was in vain
+                    # the attempt beside a silent connection failed
                     await self._cancel_attempts(excluded=self._task)
                     self._attempted_at = time.monotonic()
-                    self._attempts.add(asyncio.create_task(self._attempt(), name="a viewer's line"))
+                    self._attempts.add(asyncio.create_task(self._attempt(), name="viewer connection"))
                 wait = min(self._time_until_attempt(), self._silence_timeout, 3600.0)
                 done, _ = await asyncio.wait(self._attempts, timeout=wait, return_when=asyncio.FIRST_COMPLETED)
                 for task in done:
@@ -94,7 +99,7 @@ class ReconnectingConnection:
             await self._cancel_attempts()
 
     def _time_until_attempt(self) -> float:
-        """Seconds until another line is to be tried."""
+        """Return the seconds until the next attempt."""
         if not self._attempts:
             return 0.0
         if self._received_at is None:
@@ -102,7 +107,7 @@ class ReconnectingConnection:
         return max(self._received_at + self._silence_timeout, self._attempted_at + CONNECT_TIMEOUT_S) - time.monotonic()
 
     async def _on_attempt_ended(self, task: asyncio.Task[None]) -> None:
-        """A try has ended: raise what cannot be helped."""
+        """Handle the end of an attempt; raise errors that a retry cannot solve."""
         if task.cancelled():
             return
         if task is self._task:
@@ -125,7 +130,7 @@ class ReconnectingConnection:
         self._attempts.difference_update(ended)
 
     async def _attempt(self) -> None:
-        """One connection, until it ends or another has taken its place."""
+        """Run one connection until it ends or another replaces it."""
         address = self._make_url()
         async with connect(
             address,
@@ -141,7 +146,7 @@ class ReconnectingConnection:
             try:
                 await self._receive(connection)
             except asyncio.CancelledError:
-                # nobody is there to answer a Close
+                # the server does not answer a close frame on a lost connection
                 connection.transport.abort()
                 raise
 
@@ -159,12 +164,14 @@ class ReconnectingConnection:
                 if isinstance(data, bytes):
                     self._on_message(data)
         if connection.close_code in RETRYABLE_CLOSE_CODES:
-            raise ConnectionLost(self.close_reason or f"the line to the server was lost ({connection.close_code})")
-        why = self.close_reason or connection.close_reason
-        raise StreamEnded(why or f"the server closed the stream ({connection.close_code})")
+            raise ConnectionLost(
+                self.close_reason or f"the connection to the server was lost ({connection.close_code})"
+            )
+        reason = self.close_reason or connection.close_reason
+        raise StreamEnded(reason or f"the server closed the stream ({connection.close_code})")
 
     def _make_current(self, connection: ClientConnection) -> None:
-        """It is the line now: what it takes the place of ends."""
+        """Make this the current connection and cancel the others."""
         self._connection, self._task, self.close_reason = connection, asyncio.current_task(), ""
         for other in self._attempts - {self._task}:
             other.cancel()
@@ -173,10 +180,10 @@ class ReconnectingConnection:
     async def _connect_socket(self, url: str) -> socket.socket | None:
         if self._open_socket is None:
             return None
-        made, parts = self._open_socket(), urlsplit(url)
+        connecting, parts = self._open_socket(), urlsplit(url)
         try:
-            await asyncio.get_running_loop().sock_connect(made, (parts.hostname, parts.port or 80))
+            await asyncio.get_running_loop().sock_connect(connecting, (parts.hostname, parts.port or 80))
         except BaseException:
-            made.close()
+            connecting.close()
             raise
-        return made
+        return connecting

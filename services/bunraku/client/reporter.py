@@ -1,4 +1,4 @@
-"""What a viewer says by itself: it asks for the time, and tells how it fares (SPEC.md, Ping, Report)."""
+"""Periodic messages of a viewer: clock pings and reports (specification: Ping, Report)."""
 
 from __future__ import annotations
 
@@ -9,16 +9,20 @@ from collections.abc import Awaitable, Callable
 from bunraku.wire.messages import Ping, Report
 
 INITIAL_PINGS = 8
+"""Pings of a new connection that are sent at the shorter interval."""
 INITIAL_PING_INTERVAL_S = 0.06
 PING_INTERVAL_S = 1.0
-"""Seconds from one question for the time to the next, of the first few and then."""
+"""Interval between further pings."""
 MAX_UNANSWERED_PINGS = 2
-"""So many questions may be on their way: on a line that all but stands their answers would be all that it carries."""
+"""Pings in flight: on a stalled link their answers would use all of its bandwidth."""
 
 
 class ViewerReporter:
-    """Over one viewer's line, and any that comes after it: `send` says something where there is a line, `now` is the
-    local clock in microseconds, `fares` what there is to tell."""
+    """Sender of pings and reports over the current connection.
+
+    `send` sends a message if connected, `clock` is the local clock in microseconds, `make_report` returns the current
+    report.
+    """
 
     def __init__(
         self,
@@ -35,26 +39,26 @@ class ViewerReporter:
         self._ping_count = 0
 
     def restart(self) -> None:
-        """There is a new line."""
+        """Start anew on a new connection."""
         self._ping_count = self._answered_count = 0
         self._restarted.set()
         self._may_ping.set()
 
     def on_pong(self, sequence: int) -> None:
-        """The question of this number was answered, and so were those before it."""
+        """Record the answer to a ping and to all before it."""
         self._answered_count = max(self._answered_count, sequence + 1)
         if self._ping_count - self._answered_count < MAX_UNANSWERED_PINGS:
             self._may_ping.set()
 
     async def run(self) -> None:
-        """Ask and tell, for ever."""
+        """Send pings and reports until cancelled."""
         while True:
             self._restarted.clear()
             while not self._restarted.is_set():
                 await self._send(Ping(self._ping_count, self._clock()).pack())
                 self._ping_count += 1
-                if self._ping_count > INITIAL_PINGS and (fares := self._make_report()) is not None:
-                    await self._send(fares.pack())
+                if self._ping_count > INITIAL_PINGS and (report := self._make_report()) is not None:
+                    await self._send(report.pack())
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(
                         INITIAL_PING_INTERVAL_S if self._ping_count < INITIAL_PINGS else PING_INTERVAL_S

@@ -1,4 +1,4 @@
-"""A viewer without a screen: receives a stream, decodes it, keeps time, and says how it fared."""
+"""Headless viewer of the Python SDK: receives a stream, decodes it, keeps time, and collects statistics."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ FRAME_INTERVAL_S = 1 / 60
 
 
 class Viewer:
-    """One viewer of a stream at a WebSocket `url` (`.../stream`), which a `token` lets in if its server asks for one.
+    """Viewer of the stream at a WebSocket `url` (`.../stream`), with an optional access `token`.
 
-    `now` is the local clock in microseconds; `silent` and `open_socket` are as of `bunraku.client.reconnecting_connection.Line`.
+    `local_clock` returns microseconds; `silence_timeout` and `open_socket` are those of `ReconnectingConnection`.
     """
 
     def __init__(
@@ -93,16 +93,16 @@ class Viewer:
         *,
         frame_interval: float = FRAME_INTERVAL_S,
     ) -> ViewerStatistics:
-        """Watch for `seconds`, a picture every `frame` seconds; `on_frame` is told reference time (of what is shown:
-        the play-out delay behind the clock) and merged pose of each.
+        """Watch for `seconds`, one frame every `frame_interval` seconds, and return the statistics.
 
-        A line that is lost is taken up again where it was. Raises `StreamEnded` where the server closes the stream,
-        OSError where there is none.
+        `on_frame` receives the reference time of each frame (the clock minus the play-out delay) and its merged pose. A
+        lost connection is re-established and resumes where it was. Raises `StreamEnded` if the server closes the
+        stream, OSError if it is unreachable.
         """
         await asyncio.to_thread(motion_decoder.warm_up)
         self._started_at = time.monotonic()
         work = (self._render(seconds, on_frame, frame_interval), self._connection.run(), self._reporter.run())
-        tasks = [asyncio.create_task(way) for way in work]
+        tasks = [asyncio.create_task(coroutine) for coroutine in work]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -114,7 +114,7 @@ class Viewer:
         return self._finish_statistics()
 
     def _on_open(self) -> None:
-        """There is a line, or another one."""
+        """Reset what belongs to one connection."""
         self.clock.restart()
         self.timeline_history.restart()
         self._reporter.restart()
@@ -124,7 +124,8 @@ class Viewer:
         self._on_message(data)
 
     def _make_url(self) -> str:
-        """Where to connect: after the first time with what is here already, and where a private timeline goes on."""
+        """Return the URL to connect to: after the first connection with the blocks already received and the
+        position."""
         state = self.timeline_history.newest
         if state is None or self._tracks is None or self.motion is None:
             return self.url
@@ -140,12 +141,12 @@ class Viewer:
 
     @property
     def track(self) -> MotionTrack | None:
-        """The dance, None until it is told of."""
+        """Track of the first performer, None before its Description."""
         return self._blocks.track if self._blocks is not None else None
 
     @property
     def scenes(self) -> list[SceneTrack]:
-        """Cameras and lights that are told of."""
+        """Announced camera and light tracks."""
         return [store.track for store in self._tracks.scenes] if self._tracks is not None else []
 
     @property
@@ -158,13 +159,12 @@ class Viewer:
 
     @property
     def performers(self) -> list[MotionTrack | None]:
-        """The dances of those who perform, None of one that cannot be shown here."""
+        """Tracks of the performers, None for one that cannot be decoded."""
         stores = self._tracks.performers if self._tracks is not None else []
         return [store.track if store is not None else None for store in stores]
 
     def pose_at(self, reference: int, performer: int = 0) -> Pose | None:
-        """The merged pose of a performer on the stage at clock time `reference`, None where nothing is there to be
-        shown."""
+        """Return the merged pose of a performer at clock time `reference`, or None if its block is missing."""
         state, tracks = self.timeline_history.at(reference), self._tracks
         if state is None or tracks is None or state.motion != self.motion or performer >= len(tracks.performers):
             return None
@@ -177,8 +177,8 @@ class Viewer:
         return root, self._overlays.apply(rotations, reference, performer)
 
     def scene_at(self, reference: int, scene: int = 0) -> Array | None:
-        """The seven numbers (7,) of the camera or light `scenes[scene]` at clock time `reference` (SPEC.md, Scene
-        block), None where nothing is there to be shown."""
+        """Return the seven values (7,) of the camera or light `scenes[scene]` at `reference`, or None
+        (specification: Scene block)."""
         state = self.timeline_history.at(reference)
         if state is None or self._tracks is None or state.motion != self.motion or not 0 <= scene < len(self.scenes):
             return None
@@ -186,25 +186,27 @@ class Viewer:
         return store.scene_at(timeline.position_at(state, reference), state.loop, state.duration)
 
     def camera_at(self, reference: int) -> Array | None:
-        """As `scene_at`, of the show's camera: the first one there is."""
+        """Return `scene_at` of the motion's camera: the first one."""
         kinds = [track.kind for track in self.scenes]
         return self.scene_at(reference, kinds.index("camera")) if "camera" in kinds else None
 
     @property
     def audio(self) -> AudioTrack | None:
-        """The sound of the motion, None where there is none that can be heard here."""
+        """Audio track of the motion, None if there is none that can be decoded."""
         return self._audio.track if self._audio is not None else None
 
     def audio_buffered_us(self, reference: int) -> int:
-        """Microseconds of sound that are here from clock time `reference` on without a gap."""
+        """Return the gapless audio buffered from clock time `reference` on, microseconds."""
         state = self.timeline_history.at(reference)
         if state is None or self._audio is None or state.motion != self.motion:
             return 0
         return self._audio.buffered_us(timeline.position_at(state, reference), state.loop)
 
     def packets_from(self, reference: int) -> list[AudioPacket]:
-        """The Opus packets that are here without a gap, from the one heard at clock time `reference` to the motion's
-        end at most; `audio.first_sample` says when each begins."""
+        """Return the gapless Opus packets from clock time `reference` to the end of the motion at most.
+
+        `audio.first_sample` gives the start of each.
+        """
         state = self.timeline_history.at(reference)
         if state is None or self._audio is None or state.motion != self.motion:
             return []
@@ -220,7 +222,7 @@ class Viewer:
             late = self.clock.at(local) - message.due
             if self.clock.is_synchronised:
                 self._overlay_leads_ms.append(-late / 1e3)
-                # its first frame is gone to from the last one of the message before
+                # its first frame continues from the last one of the previous message
                 self._delay.add_lateness(late + (len(message.earlier) + 1) * Overlay.FRAME_INTERVAL_US, local)
             self._overlays.put(message)
         elif isinstance(message, Pong):
@@ -237,18 +239,18 @@ class Viewer:
         elif isinstance(message, Choice):
             self.statistics.reason = message.reason
         elif isinstance(message, Problem):
-            # the close that follows says whether to come again
+            # the close frame that follows decides about reconnecting
             self._connection.close_reason = f"{message.title}: {message.detail}"
 
     def _on_description(self, description: Description) -> None:
-        """Take in the tracks that can be read here: the motion must, and of others what is not known is skipped."""
+        """Add the announced tracks; the motion must be decodable, other unknown tracks are skipped."""
         first = description.first or 0
         if description.motion == self.motion and self._tracks is not None:
-            # what an id names never changes: the blocks that are here are good
+            # a motion never changes: the blocks received so far stay valid
             self._tracks.add(first, description.tracks)
             return
         if first:
-            # the rest of one that was not told of
+            # continuation of a Description that was not received
             return
         try:
             self._tracks = TrackSet(description.tracks)
@@ -257,8 +259,8 @@ class Viewer:
         self.motion = description.motion
 
     def _store_block(self, data: Data) -> None:
-        """Decode a block of a track that is known, and keep it."""
-        began = time.perf_counter()
+        """Decode a block of a known track and store it."""
+        started = time.perf_counter()
         store = self._tracks.store(data.track) if self._tracks is not None else None
         if isinstance(store, SceneBlockStore):
             store.put(data.index, data.rate, decode_scene_block(store.track, data.block))
@@ -272,7 +274,7 @@ class Viewer:
             self.statistics.audio_rate = data.rate
         elif isinstance(store, MotionBlockStore):
             store.put(data.index, data.rate, decode_motion_block(store.track, data.block))
-            self._decode_s = time.perf_counter() - began
+            self._decode_s = time.perf_counter() - started
             self.statistics.blocks += 1
             self.statistics.rate = data.rate
 
@@ -286,7 +288,7 @@ class Viewer:
     async def _render(self, seconds: float, on_frame: Callable[[int, Pose], None] | None, frame: float) -> None:
         loop = asyncio.get_running_loop()
         due, end, dark = loop.time(), loop.time() + seconds, False
-        before, weighed = loop.time(), 0.0
+        previous, weighted_kbps = loop.time(), 0.0
         while loop.time() < end:
             local = self._local_clock()
             reference = self.clock.at(local) - round(self._delay.at(local))
@@ -306,36 +308,36 @@ class Viewer:
             now = loop.time()
             if self.statistics.first_pose_ms is not None:
                 if dark:
-                    self.statistics.dark_ms += (now - before) * 1e3
-                weighed += (now - before) * self._bitrate_at(reference)
-                self._shown_s += now - before
-                self.statistics.shown_kbps = weighed / max(self._shown_s, 1e-9)
-            before = now
+                    self.statistics.dark_ms += (now - previous) * 1e3
+                weighted_kbps += (now - previous) * self._bitrate_at(reference)
+                self._shown_s += now - previous
+                self.statistics.shown_kbps = weighted_kbps / max(self._shown_s, 1e-9)
+            previous = now
             due = max(due + frame, loop.time())
             await asyncio.sleep(max(due - loop.time(), 0))
 
     def _bitrate_at(self, reference: int) -> float:
-        """What the rate shown at `reference` costs, nothing where the block is missing."""
+        """Return the bitrate of the level shown at `reference`, 0 if the block is missing."""
         state = self.timeline_history.at(reference)
         if state is None or self._tracks is None:
             return 0.0
-        dance, kbps = self._tracks.first_performer, self._tracks.kbps
-        rate = dance.level(dance.track.block_at(timeline.position_at(state, reference)))
-        return kbps[rate] if 0 <= rate < len(kbps) else 0.0
+        performer, kbps = self._tracks.first_performer, self._tracks.kbps
+        level = performer.level(performer.track.block_at(timeline.position_at(state, reference)))
+        return kbps[level] if 0 <= level < len(kbps) else 0.0
 
     def _finish_statistics(self) -> ViewerStatistics:
-        figures = self.statistics
-        figures.seconds = time.monotonic() - self._started_at
-        figures.reconnects = self._connection.reconnects
-        figures.kbps = figures.bytes * 8e-3 / figures.seconds
-        figures.clock_offset_ms = self.clock.offset / 1e3 - (time.time_ns() // 1000 - self._local_clock()) / 1e3
-        figures.clock_error_ms = self.clock.error_bound / 1e3 if self.clock.is_synchronised else None
-        figures.overlay_early_ms = float(np.median(self._overlay_leads_ms)) if self._overlay_leads_ms else None
-        return figures
+        statistics = self.statistics
+        statistics.seconds = time.monotonic() - self._started_at
+        statistics.reconnects = self._connection.reconnects
+        statistics.kbps = statistics.bytes * 8e-3 / statistics.seconds
+        statistics.clock_offset_ms = self.clock.offset / 1e3 - (time.time_ns() // 1000 - self._local_clock()) / 1e3
+        statistics.clock_error_ms = self.clock.error_bound / 1e3 if self.clock.is_synchronised else None
+        statistics.overlay_early_ms = float(np.median(self._overlay_leads_ms)) if self._overlay_leads_ms else None
+        return statistics
 
 
 def _held_blocks(store: MotionBlockStore | None, position: int) -> HeldBlocks:
-    """What is here of a performer from motion time `position` on; of one that cannot be played nothing."""
+    """Return the levels held of a performer from motion time `position` on."""
     if store is None:
         return 0, ()
     blocks = store.track.block_count

@@ -1,4 +1,4 @@
-"""How a headless viewer fared, in figures."""
+"""Statistics of a headless viewer."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from typing import Any
 
 @dataclass(slots=True)
 class ViewerStatistics:
-    """How a viewer fared. Times in milliseconds; `kbps` counts all payload received over the time watched; `blocks` are
-    the motion's, `gaps` how often one was missing and `dark_ms` for how long, `shown_kbps` the mean of the rates shown,
-    `reason` why the server chose the last one, `reconnects` how often the line was lost and tried again; `camera` where
-    the show's camera was last: `position` and `gaze` in metres, `fov` in radians."""
+    """Statistics of a viewer.
+
+    Times are milliseconds; `kbps` is all payload received over the time watched. `blocks` are the motion's; `gaps`
+    counts missing blocks and `dark_ms` their duration; `shown_kbps` is the mean bitrate of the levels shown, `reason`
+    the server's reason for the last level, `reconnects` the number of lost connections. `camera` is the last view:
+    `position` and `gaze` in metres, `fov` in radians.
+    """
 
     seconds: float = 0.0
     first_pose_ms: float | None = None
@@ -36,7 +39,7 @@ class ViewerStatistics:
     camera: dict[str, Any] | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """The figures as plain values."""
+        """Return the statistics as plain values."""
         return {key: _round_floats(value) for key, value in asdict(self).items()}
 
 
