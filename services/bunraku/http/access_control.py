@@ -41,9 +41,8 @@ class Role(IntEnum):
         try:
             return cls[text.upper()]
         except KeyError:
-            raise ValueError(
-                f"unknown role {text[:40]!r}; use one of {', '.join(role.label for role in cls)}"
-            ) from None
+            labels = ", ".join(role.label for role in cls)
+            raise ValueError(f"unknown role {text[:40]!r}; use one of {labels}") from None
 
 
 @dataclass(frozen=True, slots=True)

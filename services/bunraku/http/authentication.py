@@ -93,7 +93,10 @@ class Authenticator:
     async def create_share(
         self, issuer: Access, session: str | None, motion: str | None, lifetime_s: int
     ) -> tuple[Share, str]:
-        """Create a link for viewers. Return it with its token. Raises `ProblemError` 409 at a server without a secret."""
+        """Create a link for viewers and return it with its token.
+
+        Raises `ProblemError` 409 at a server without a secret.
+        """
         if self._tokens is None:
             raise ProblemError(
                 409,

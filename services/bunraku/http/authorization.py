@@ -103,7 +103,10 @@ def add_security_scheme(app: FastAPI) -> None:
 
 
 class AuthorizationMiddleware:
-    """Middleware that rejects requests and WebSockets that may not reach their route. Paths outside the API are public."""
+    """Middleware that rejects requests and WebSockets that do not meet the requirement of their route.
+
+    Paths outside the API are public.
+    """
 
     def __init__(self, app: ASGIApp, context: ServiceContext, rules: list[RouteRule]) -> None:
         self._app = app
@@ -286,7 +289,10 @@ class AuthorizationMiddleware:
         return await self._authenticator.authenticate_token("")
 
     async def _check_bound_resource(self, access: Access, path_params: dict[str, str]) -> None:
-        """Raise `ProblemError` if bound access does not include the resource. Hidden and missing resources look alike."""
+        """Raise `ProblemError` if bound access does not include the resource.
+
+        The response does not reveal whether a hidden resource exists.
+        """
         session, motion = path_params.get("session"), path_params.get("motion")
         if session is not None and not await self._authenticator.can_view(access, "session", session):
             raise session_not_found(session)

@@ -1,9 +1,9 @@
 """Server side of an open WebSocket connection, directly on the transport.
 
-Every viewer of a session receives the same bytes thirty times a second. A task and a queue per viewer would cost several
-times as much as the write itself. Therefore a connection is accepted like any other and then detached from ASGI
-(`bunraku.websocket.handoff`): only a `WebSocketConnection` remains; uvicorn's protocol, its task and the request scope
-are released.
+Every viewer of a session receives the same bytes thirty times a second. A task and a queue per viewer would cost
+several times as much as the write itself. Therefore a connection is accepted like any other and then detached from
+ASGI (`bunraku.websocket.handoff`): only a `WebSocketConnection` remains; uvicorn's protocol, its task and the request
+scope are released.
 """
 
 from __future__ import annotations
