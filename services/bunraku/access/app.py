@@ -99,8 +99,8 @@ def create_app(context: ServiceContext) -> FastAPI:
     @requires(Role.CONTROL, allow_bound=True)
     async def revoke(share: Annotated[str, Path(pattern=r"^[0-9a-f]{18}$")], request: Request) -> None:
         """Revoke a link. Connections that were opened with it are closed."""
-        access, found = access_of(request), await catalogue.get_share(share)
-        if found is None or (access.role is not Role.ADMIN and found.subject != access.subject):
+        access, existing = access_of(request), await catalogue.get_share(share)
+        if existing is None or (access.role is not Role.ADMIN and existing.subject != access.subject):
             raise ProblemError(404, "No such link", f"there is no link {share!r}")
         await authenticator.revoke_share(share)
 

@@ -62,7 +62,7 @@ class Access:
 
     @property
     def is_bound(self) -> bool:
-        """Whether the access is limited to one session or motion."""
+        """True if the access is limited to one session or motion."""
         return self.session is not None or self.motion is not None
 
 

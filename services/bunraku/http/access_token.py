@@ -80,7 +80,7 @@ class TokenSigner:
             raise InvalidToken("expired", "it has expired")
         subject = claims["sub"]
         if not isinstance(subject, str) or len(subject) > _MAX_SUBJECT_LENGTH:
-            raise InvalidToken("invalid", f"its subject is not a text of at most {_MAX_SUBJECT_LENGTH} characters")
+            raise InvalidToken("invalid", f"its subject is not a string of at most {_MAX_SUBJECT_LENGTH} characters")
         try:
             role = Role.parse(str(claims.get("role")))
             session, motion, share = (

@@ -60,7 +60,7 @@ class Authenticator:
 
     @property
     def requires_token(self) -> bool:
-        """Whether clients need a token, because the server has a secret."""
+        """True if the server has a secret, so that clients need a token."""
         return self._tokens is not None
 
     async def authenticate_token(self, token: str) -> Access:

@@ -117,7 +117,7 @@ class WebSocketConnection(asyncio.Protocol):
 
     @property
     def is_closing(self) -> bool:
-        """Whether this side has sent a Close frame first."""
+        """True if this side has sent a Close frame first."""
         return self._close_timer is not None
 
     def send_ping(self) -> None:

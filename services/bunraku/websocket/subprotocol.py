@@ -91,6 +91,6 @@ async def receive(socket: WebSocket) -> bytes:
         raise CloseConnection(POLICY_VIOLATION, "Text", "received a text message; messages are binary")
     if len(data) > MAX_CLIENT_MESSAGE_BYTES:
         raise CloseConnection(
-            MESSAGE_TOO_BIG, "Too large", f"a message has {len(data)} bytes, at most {MAX_CLIENT_MESSAGE_BYTES} allowed"
+            MESSAGE_TOO_BIG, "Too large", f"a message has {len(data)} bytes; the limit is {MAX_CLIENT_MESSAGE_BYTES}"
         )
     return bytes(data)
