@@ -28,10 +28,10 @@ async def open_test_context(tmp_path: Path, bus: str = "memory:", **options: str
 
 
 async def rejection_title(authenticator: Authenticator, token: str) -> str:
-    with pytest.raises(ProblemError) as refused:
+    with pytest.raises(ProblemError) as raised:
         await authenticator.authenticate_token(token)
-    assert refused.value.status == 401
-    return refused.value.title
+    assert raised.value.status == 401
+    return raised.value.title
 
 
 async def test_server_without_secret_grants_full_access(tmp_path: Path) -> None:

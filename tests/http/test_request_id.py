@@ -9,7 +9,7 @@ from bunraku.http.problem_details import ProblemError
 from bunraku.messaging.bus import MemoryBus
 
 
-@pytest.mark.parametrize("values", ["a1b2c3d4", "A" * 64, "3f2a4c1e-8b7d-4e6f-9a01-23456789abcd", "under_score"])
+@pytest.mark.parametrize("value", ["a1b2c3d4", "A" * 64, "3f2a4c1e-8b7d-4e6f-9a01-23456789abcd", "under_score"])
 def test_valid_request_id_is_kept(value: str) -> None:
     assert request_id.accept_or_generate([value]) == value
 

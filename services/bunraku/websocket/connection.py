@@ -24,7 +24,7 @@ from bunraku.websocket.frame import (
     encode_frame,
     parse_close_code,
 )
-from bunraku.websocket.subprotocol import POLICY_VIOLATION, CloseConnection
+from bunraku.websocket.subprotocol import POLICY_VIOLATION, SERVICE_RESTART, CloseConnection
 from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES, Problem
 
 CLOSE_TIMEOUT_S = 10.0
@@ -32,7 +32,6 @@ CLOSE_TIMEOUT_S = 10.0
 SEND_BUFFER_BYTES = 32 << 10
 """Kernel send buffer of a viewer, in payload of typical messages. Linux doubles the value that it is given and counts
 the overhead of its buffers. Data in this buffer cannot be replaced when newer data is to be sent."""
-SERVICE_RESTART = 1012
 
 
 class ConnectionListener(Protocol):
