@@ -5,7 +5,8 @@ import asyncio
 import pytest
 from starlette.websockets import WebSocketDisconnect
 
-from bunraku.websocket.subprotocol import CloseConnection, run_until_first_ends
+from bunraku.runtime.availability import BackendUnavailable
+from bunraku.websocket.subprotocol import TRY_AGAIN_LATER, CloseConnection, run_until_first_ends
 
 
 async def test_other_coroutines_are_cancelled_when_the_first_ends() -> None:
@@ -34,3 +35,10 @@ async def test_exception_of_the_first_coroutine_is_raised() -> None:
 
     with pytest.raises(CloseConnection, match="malformed"):
         await run_until_first_ends(close(), wait_for_ever())
+
+
+def test_unavailable_backend_asks_the_client_to_try_again_later() -> None:
+    reason = CloseConnection.unavailable(BackendUnavailable("the bus", "connection refused by 10.0.0.7"))
+    assert (reason.code, reason.title) == (TRY_AGAIN_LATER, "Not now")
+    assert "the bus" in reason.detail
+    assert "10.0.0.7" not in reason.detail
