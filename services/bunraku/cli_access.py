@@ -1,4 +1,4 @@
-"""Commands `bunraku token` and `bunraku share`, and the access settings of `bunraku up` (docs/safety.md)."""
+"""Commands `bunraku token` and `bunraku share`, and the access settings of `bunraku up` (docs/security.md)."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def ensure_secret(settings: Settings, host: str) -> bool:
     if settings.bus != "memory:":
         err.print(
             f"{reachable_host} is reachable from other machines: set BUNRAKU_SECRET to the same value for all "
-            "processes (docs/safety.md)."
+            "processes (docs/security.md)."
         )
         raise typer.Exit(1)
     try:

@@ -1,4 +1,4 @@
-"""Roles, the access that a token grants, and the access that a route requires (docs/safety.md)."""
+"""Roles, the access that a token grants, and the access that a route requires (docs/security.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Authorization of every request and WebSocket before it reaches its route (docs/safety.md).
+"""Authorization of every request and WebSocket before it reaches its route (docs/security.md).
 
 Each route declares its requirement with `bunraku.http.access_control.requires`. API paths without a route are answered
 with 404, and an app with a route without a declared requirement does not start.
