@@ -13,8 +13,7 @@ from starlette.requests import ClientDisconnect
 
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
-from bunraku.http.not_found import motion_not_found
-from bunraku.http.problem_details import ProblemError
+from bunraku.http.problem_details import ProblemError, motion_not_found
 from bunraku.ingest import metrics
 from bunraku.ingest.audio import AudioOperation
 from bunraku.ingest.entry import entry_json

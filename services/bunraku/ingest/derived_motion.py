@@ -7,8 +7,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http.not_found import motion_not_found
-from bunraku.http.problem_details import ProblemError
+from bunraku.http.problem_details import ProblemError, motion_not_found
 from bunraku.ingest.motion import UploadOperation, derive_motion_id
 from bunraku.ingest.persistence import check_quota, store_motion
 from bunraku.ingest.result import JobRejection, JobResult

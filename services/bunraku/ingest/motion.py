@@ -15,8 +15,7 @@ from typing import Any
 from starlette.requests import ClientDisconnect, Request
 
 from bunraku.http.access_control import access_of
-from bunraku.http.insufficient_storage import translate_disk_full
-from bunraku.http.problem_details import ProblemError
+from bunraku.http.problem_details import ProblemError, translate_disk_full
 from bunraku.ingest.job_queue import JobQueue
 from bunraku.ingest.persistence import check_quota, store_motion
 from bunraku.ingest.progress import UploadProgress

@@ -9,8 +9,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http.not_found import motion_not_found
-from bunraku.http.problem_details import ProblemError, invalid_field_problem
+from bunraku.http.problem_details import ProblemError, invalid_field_problem, motion_not_found
 from bunraku.ingest.derived_motion import DerivedMotionFactory
 from bunraku.ingest.motion import MAX_ACTIVE_UPLOADS, UploadOperation
 from bunraku.ingest.result import JobRejection, JobResult

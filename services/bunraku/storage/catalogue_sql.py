@@ -15,7 +15,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnection
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
 
-from bunraku.http.insufficient_storage import insufficient_storage
+from bunraku.http.problem_details import insufficient_storage
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendTimeout, BackendUnavailable
 from bunraku.storage.catalogue import CatalogueEntry, InvalidCursor, Quota, QuotaExceeded
 from bunraku.storage.job_sql import SqlJobTable

@@ -12,7 +12,7 @@ import obstore
 from obstore.exceptions import BaseError
 from obstore.store import LocalStore, ObjectStore, from_url
 
-from bunraku.http.insufficient_storage import insufficient_storage, is_disk_full
+from bunraku.http.problem_details import insufficient_storage, is_disk_full
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendTimeout, BackendUnavailable
 
 MIN_THROUGHPUT_BYTES_PER_S = 1 << 20

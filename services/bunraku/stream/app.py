@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Annotated
 
@@ -13,8 +13,7 @@ from bunraku.codec.container import StoredMotion
 from bunraku.delivery.resume import ResumeState
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
-from bunraku.http.not_found import motion_not_found
-from bunraku.http.problem_details import ProblemError
+from bunraku.http.problem_details import ProblemError, motion_not_found
 from bunraku.messaging.bus import NoResponse, is_subject_token
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
 from bunraku.playout import timeline
@@ -32,6 +31,7 @@ from bunraku.websocket import subprotocol
 from bunraku.websocket.connection import WebSocketConnection
 from bunraku.websocket.handoff import detach
 from bunraku.websocket.link import link_of
+from bunraku.websocket.multicast import LazySender
 from bunraku.websocket.subprotocol import CloseConnection
 
 IMMUTABLE_HEADERS = {"Cache-Control": "public, max-age=31536000, immutable"}
@@ -46,7 +46,8 @@ MAX_RESUME_AGE_US = 60_000_000
 def create_app(context: ServiceContext) -> FastAPI:
     """The service upon `backing`."""
     attendance = StreamCounters()
-    sessions = WatchedSessions(context.bus, context.motion_store, attendance)
+    sender = LazySender()
+    sessions = WatchedSessions(context.bus, context.motion_store, attendance, sender)
     turns = TickScheduler()
 
     @asynccontextmanager
@@ -55,6 +56,7 @@ def create_app(context: ServiceContext) -> FastAPI:
         yield
 
     app = FastAPI(title="Bunraku stream", lifespan=lifespan)
+    app.state.multicast_sender = sender
     problem_details.install_problem_handlers(app)
 
     async def stored(motion: str) -> StoredMotion:
@@ -109,7 +111,7 @@ def create_app(context: ServiceContext) -> FastAPI:
                 raise CloseConnection(subprotocol.NOT_FOUND, "No such motion", f"there is no motion {motion[:40]!r}")
             # NaN and infinities start at the beginning
             position = round(min(at, 1e6) * 1e6) if at > 0 else 0
-            outlet, line = await _accept_viewer(socket, viewer)
+            outlet, line = await _accept_viewer(socket, viewer, context.clock)
             attendance.count_writes(outlet)
             now = clock()
             # who comes back goes on where it was, however long the way here took
@@ -139,11 +141,9 @@ def create_app(context: ServiceContext) -> FastAPI:
             except NoResponse:
                 raise await _explain_unanswered_session(context.key_values, session) from None
             except BackendUnavailable as error:
-                raise CloseConnection(
-                    subprotocol.TRY_AGAIN_LATER, "Not now", f"{error.backend} does not answer; come again"
-                ) from None
+                raise CloseConnection.unavailable(error) from None
             try:
-                outlet, line = await _accept_viewer(socket, viewer)
+                outlet, line = await _accept_viewer(socket, viewer, context.clock)
                 attendance.count_writes(outlet)
                 watched.add_viewer(viewer)
                 viewer.open(outlet, line)
@@ -169,7 +169,7 @@ async def _explain_unanswered_session(key_values: KeyValueStore, session: str) -
     try:
         known = is_subject_token(session) and await key_values.get(f"{SESSION_KEY_PREFIX}.{session}") is not None
     except BackendUnavailable as error:
-        return CloseConnection(subprotocol.TRY_AGAIN_LATER, "Not now", f"{error.backend} does not answer; come again")
+        return CloseConnection.unavailable(error)
     if known:
         return CloseConnection(
             subprotocol.TRY_AGAIN_LATER, "Session not here yet", "its server does not answer now; come again"
@@ -177,15 +177,17 @@ async def _explain_unanswered_session(key_values: KeyValueStore, session: str) -
     return CloseConnection(subprotocol.NOT_FOUND, "No such session", f"there is no session {session[:40]!r}")
 
 
-async def _accept_viewer(socket: WebSocket, viewer: ViewerConnection) -> tuple[WebSocketConnection, Link | None]:
+async def _accept_viewer(
+    socket: WebSocket, viewer: ViewerConnection, clock: Callable[[], int]
+) -> tuple[WebSocketConnection, Link | None]:
     """Accept a viewer's socket and take it. What is written is held until `Viewer.open` lets it go: the answer to the
     handshake and the first block share a packet. Raises as `subprotocol.accept` and `take` do."""
-    line = link_of(socket)
+    line = link_of(socket, clock)
     if line is not None:
         line.set_corked(True)
     try:
         await subprotocol.accept(socket)
-        return detach(socket, viewer), line
+        return detach(socket, viewer, clock), line
     except BaseException:
         if line is not None:
             line.set_corked(False)

@@ -20,7 +20,7 @@ from bunraku.stream.block_batch import BlockBatchCache
 from bunraku.stream.counters import StreamCounters
 from bunraku.stream.tick_scheduler import TickScheduler
 from bunraku.websocket.connection import WebSocketConnection
-from bunraku.websocket.multicast import MulticastGroup
+from bunraku.websocket.multicast import PLAIN_SENDER, MulticastGroup, MulticastSender
 from bunraku.wire.messages import TimelineState
 
 
@@ -116,7 +116,7 @@ class SyncGroup:
             self._scheduler.schedule(self, self.next_due + self.phase)
         if self._multicast is None:
             now = [member.connection for member, begun in self._members.items() if begun <= at]
-            together = MulticastGroup(now)
+            together = MulticastGroup(now, self._groups.sender)
             if len(now) == len(self._members):
                 self._multicast = together
         else:
@@ -130,9 +130,15 @@ class SyncGroup:
 class SyncGroups:
     """The cohorts of one session."""
 
-    def __init__(self, batches: BlockBatchCache, counters: StreamCounters | None = None) -> None:
+    def __init__(
+        self,
+        batches: BlockBatchCache,
+        counters: StreamCounters | None = None,
+        sender: MulticastSender = PLAIN_SENDER,
+    ) -> None:
         """`attendance` counts what is sent."""
         self.batches = batches
+        self.sender = sender
         self.counters = counters or StreamCounters()
         self._groups: dict[tuple[object, ...], SyncGroup] = {}
 

@@ -21,7 +21,7 @@ from bunraku.stream.counters import StreamCounters
 from bunraku.stream.sync_group import SyncGroups
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.websocket.frame import encode_frame
-from bunraku.websocket.multicast import MulticastGroup
+from bunraku.websocket.multicast import PLAIN_SENDER, MulticastGroup, MulticastSender
 from bunraku.websocket.subprotocol import INTERNAL_ERROR, NOT_FOUND, CloseConnection
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Presence, TimelineState, unpack
@@ -46,6 +46,7 @@ class WatchedSession:
         state: bytes,
         on_empty: Callable[[], None],
         counters: StreamCounters,
+        sender: MulticastSender,
     ) -> None:
         """`state` is the session's answer; `left` is told when the last viewer has gone; `attendance` counts what is
         sent."""
@@ -56,9 +57,10 @@ class WatchedSession:
         self._replica = replica
         self.batches = BlockBatchCache()
         self._counters = counters
-        self.sync_groups = SyncGroups(self.batches, counters)
+        self.sync_groups = SyncGroups(self.batches, counters, sender)
         self._viewers: set[ViewerConnection] = set()
         # to those whose line has room the same bytes are written, with nothing asked in between
+        self._sender = sender
         self._writable: MulticastGroup | None = None
         self._unwritable: list[ViewerConnection] = []
         self._motion: StoredMotion | None = None
@@ -213,7 +215,7 @@ class WatchedSession:
         ready = self._writable
         if ready is None:
             ready = self._writable = MulticastGroup(
-                [viewer.connection for viewer in self._viewers if viewer.accepts_direct_writes]
+                [viewer.connection for viewer in self._viewers if viewer.accepts_direct_writes], self._sender
             )
             self._unwritable = [viewer for viewer in self._viewers if not viewer.accepts_direct_writes]
         for viewer in self._unwritable:
@@ -225,9 +227,16 @@ class WatchedSession:
 class WatchedSessions:
     """The sessions watched here, opened with their first viewer and closed with their last."""
 
-    def __init__(self, bus: Bus, motion_store: MotionStore, counters: StreamCounters | None = None) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        motion_store: MotionStore,
+        counters: StreamCounters | None = None,
+        sender: MulticastSender = PLAIN_SENDER,
+    ) -> None:
         """`attendance` counts what is sent."""
         self._counters = counters or StreamCounters()
+        self._sender = sender
         self._bus = bus
         self._motion_store = motion_store
         self._replica = secrets.token_hex(6)
@@ -270,6 +279,7 @@ class WatchedSessions:
             state,
             lambda: self.close_if_empty(session),
             self._counters,
+            self._sender,
         )
 
     def _resynchronise(self, *watched: WatchedSession) -> None:

@@ -1,7 +1,8 @@
-"""The same bytes to many sockets, in one compiled loop of send(2).
+"""Compiled loop of send(2) that writes one message to many sockets.
 
-Of a message to six hundred viewers Python's share, a call of each transport's `write`, is a third of the whole. It is a
-module of its own as it takes seconds to import (numba), and is done without until then.
+For a message to six hundred viewers, calling the `write` method of each transport takes a third of the total time in
+Python. This module is the only one of the package that imports numba; load it with `bunraku.kernels.load_kernels`.
+Importing it raises ImportError or AttributeError on systems without POSIX sockets.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 SEND_FLAGS = socket.MSG_DONTWAIT | getattr(socket, "MSG_NOSIGNAL", 0)
 
-# by its name, not its address: what is compiled is kept on disk
+# referenced by name rather than by address, because compiled code is cached on disk
 _libc_send: Any = types.ExternalFunction("send", types.intp(types.int32, types.voidptr, types.uintp, types.int32))
 
 
@@ -24,8 +25,11 @@ _libc_send: Any = types.ExternalFunction("send", types.intp(types.int32, types.v
 def multicast_send(
     file_descriptors: NDArray[np.int32], data: NDArray[np.uint8], flags: int, sent: NDArray[np.int64]
 ) -> int:
-    """Send `data` once to each of the connected `sockets`, file descriptors, with the flags of send(2); how many took
-    less than all. How many bytes each took, -1 where it could take none, is written to `sent`."""
+    """Send `data` once to each connected socket with the given flags of send(2).
+
+    Write to `sent` the number of bytes that each socket accepted, -1 where it accepted none. Return the number of
+    sockets that did not accept all bytes.
+    """
     short = 0
     for place in range(file_descriptors.size):
         sent[place] = _libc_send(file_descriptors[place], data.ctypes.data, data.size, flags)
