@@ -1,4 +1,4 @@
-/** Line icons on a 20 px grid, and the four limbs on a 24 px one. */
+/** Line icons on a 20 px grid, and icons of the four limbs on a 24 px grid. */
 import { shape } from "./dom";
 
 const PATHS = {
@@ -43,7 +43,7 @@ export function icon(name: IconName): SVGSVGElement {
   return svg;
 }
 
-/** Strokes of a small dancer seen from the audience: the figure's left is on the right. */
+/** Strokes of a small dancer, seen from the audience: the figure's left limbs are on the right. */
 const BODY = "M12 6.500v7.500";
 const RAISED_LIMBS = [
   "M12 8.500L17.500 5",
@@ -59,7 +59,7 @@ const RAISED_LIMB_TIPS = [
   [7.4, 16.6],
 ];
 
-/** The dancer with one limb picked out: 0 left hand, 1 right hand, 2 left leg, 3 right leg. */
+/** Draw the dancer with one limb highlighted: 0 left hand, 1 right hand, 2 left leg, 3 right leg. */
 export function limbIcon(limb: number): SVGSVGElement {
   const svg = shape("svg", { class: "icon", viewBox: "0 0 24 24", "aria-hidden": "true" });
   const rest = [BODY, ...RESTING_LIMBS.filter((_, other) => other !== limb)].join("");
@@ -78,7 +78,7 @@ export function limbIcon(limb: number): SVGSVGElement {
   return svg;
 }
 
-/** A small dancing figure of its own for a motion, its limbs from the motion's id. */
+/** Draw a small dancing figure for a motion. The pose is derived from the motion's id. */
 export function motionGlyph(id: string): SVGSVGElement {
   let seed = 7;
   for (const letter of id) seed = (seed * 31 + (letter.codePointAt(0) ?? 0)) % 65521;

@@ -270,7 +270,7 @@ describeInBrowser(
         before: errors,
       });
       await said(page, 0).getByText("A link is needed").waitFor();
-      await said(page, 1).getByText("No stage is here").waitFor();
+      await said(page, 1).getByText("No stage here").waitFor();
       await said(page, 2).getByText("The stage does not answer").waitFor();
       expect(await page.evaluate(() => (window as unknown as { errors: string[] }).errors.length)).toBe(3);
 
