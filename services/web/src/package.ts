@@ -1,4 +1,4 @@
-/** Public interface of the npm package `bunraku`: element, viewer, puppeteer, stage, and decoders of the wire format. */
+/** Public interface of the npm package `bunraku`: element, viewer, puppeteer, stage, and wire format decoders. */
 
 export { Access, type Role, tabToken } from "./client/access";
 export { ProblemError } from "./client/problem";

@@ -16,7 +16,8 @@ import type { StagedPerformer, ThemePreference } from "bunraku";
 import "bunraku/element";
 import { BunrakuStage } from "bunraku/element";
 
-const viewer = new Viewer({ url: "wss://stage.example/v1/sessions/one/stream", access: new Access("https://stage.example", null) });
+const access = new Access("https://stage.example", null);
+const viewer = new Viewer({ url: "wss://stage.example/v1/sessions/one/stream", access });
 const puppeteer = new Puppeteer({ url: null, viewer });
 puppeteer.target(0, 0.1, 0.2, 0.3);
 const pose: Pose | null = viewer.poseAt(0);
@@ -119,7 +120,8 @@ test.each([
 test("package can be loaded without a page, and decodes messages", () => {
   const program = `
     const { JOINTS, pack, unpack, BunrakuStage, MotionTrack } = await import("bunraku");
-    console.log(JSON.stringify([JOINTS.length, unpack(pack({ name: "Claim", limb: 3 })), typeof BunrakuStage, typeof MotionTrack.fromDescription]));`;
+    const message = unpack(pack({ name: "Claim", limb: 3 }));
+    console.log(JSON.stringify([JOINTS.length, message, typeof BunrakuStage, typeof MotionTrack.fromDescription]));`;
   expect(JSON.parse(run(process.execPath, ["--input-type=module", "-e", program], folder))).toEqual([
     18,
     { name: "Claim", limb: 3 },

@@ -36,7 +36,7 @@ export class App implements AppParts {
   constructor(canvas: HTMLCanvasElement, query: URLSearchParams, startup: StartupSequence) {
     const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
     canvas.ariaLabel = translate(
-      "A wooden puppet dancing on a stage before a disc of gold leaf. Take its hands and legs with the strings' buttons or the keys 1 to 4.",
+      "A wooden puppet dancing before a disc of gold leaf. Take its hands and legs by button or by the keys 1 to 4.",
     );
     this.displayName = resolveDisplayName(query, Math.random());
     this.page = createPage(document.body, createUserActions(this));

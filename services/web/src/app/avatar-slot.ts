@@ -82,7 +82,7 @@ export class AvatarSlot {
       isStored
         ? translate("{name} dances here; everyone else sees the puppet", { name })
         : translate(
-            "{name} dances here; everyone else sees the puppet. This browser cannot store it: it lasts for this visit only",
+            "{name} dances here, for this visit only: this browser cannot store it. Everyone else sees the puppet",
             {
               name,
             },

@@ -30,7 +30,7 @@ export interface LimbControllerView {
 export class ClaimController {
   stageInputs: StageInputs | null = null;
   connected = false;
-  /** Whether this page may not claim limbs. */
+  /** True if this page may not claim limbs. */
   viewOnly = false;
   /** Performer whose limbs keys, gamepad and page controls act on. */
   readonly selectedPerformer = new PerformerSelection(() => this.render());
@@ -202,7 +202,9 @@ export class ClaimController {
     this.render();
   }
 
-  /** Hand a limb over to the first requester, by default the selected limb if it is requested, else any requested one. */
+  /**
+   * Hand a limb over to the first requester, by default the selected limb if it is requested, else any requested one.
+   */
   handOver(limb = this.#nextRequestedLimb()): void {
     if (this.viewOnly) return;
     if (limb === null) this.view.toast(this.translator.translate("Nobody is asking for your strings"));

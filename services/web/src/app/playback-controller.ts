@@ -18,7 +18,7 @@ import type { StartupSequence } from "./startup";
 export interface PlaybackControllerOptions {
   page: Page;
   startup: StartupSequence;
-  /** Whether the person asks for less motion: a motion that only this page shows then starts paused. */
+  /** Matches if the user prefers less motion: a session without viewers then starts paused. */
   reducedMotion: MediaQueryList;
   /** Query of the page's address, which may name a session or a motion. */
   query: URLSearchParams;

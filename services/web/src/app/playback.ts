@@ -86,14 +86,14 @@ export class Playback {
     this.seek(Math.min(duration, Math.max(0, this.position(now) + (blocks * duration) / all.length)), now);
   }
 
-  /** Whether this page may edit the timeline. */
+  /** True if this page may edit the timeline. */
   get isEditable(): boolean {
     return this.kind === "motions" || this.access.allows("control");
   }
 
   /**
-   * Edit the timeline, for all viewers if it is a session's. One request is in flight at a time; edits made meanwhile are
-   * merged into the next one.
+   * Edit the timeline, for all viewers if it is a session's. One request is in flight at a time; edits made meanwhile
+   * are merged into the next one.
    */
   edit(change: SessionEdit): void {
     if (!this.isEditable) return;

@@ -1,4 +1,6 @@
-/** Position of a motion with a private timeline, saved while the page reloads. A session's timeline is on the server. */
+/**
+ * Position of a motion with a private timeline, saved while the page reloads. A session's timeline is on the server.
+ */
 import { tabStorage } from "../storage/web-storage";
 import type { Playback } from "./playback";
 

@@ -7,9 +7,9 @@ import type { AudioBlockStore } from "../playout/audio-store";
 
 /** State that the sound button shows. */
 export interface SoundState {
-  /** Whether the motion has sound. */
+  /** True if the motion has sound. */
   readonly available: boolean;
-  /** Whether it can be heard now. */
+  /** True if it can be heard now. */
   readonly audible: boolean;
   readonly volume: number;
 }

@@ -128,7 +128,9 @@ export class StageController {
     return { pose: poses[0] ?? null, limbs };
   }
 
-  /** Release all pressed keys and buttons. Called when the page goes into the background and receives no key-up events. */
+  /**
+   * Release all pressed keys and buttons. Called when the page goes into the background and receives no key-up events.
+   */
   releaseInputs(): void {
     this.commands.releaseAll();
     this.velocity.update(performance.now());

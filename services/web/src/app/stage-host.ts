@@ -160,7 +160,7 @@ export class StageHost {
     canvas.addEventListener("webglcontextrestored", () => page.notice("graphics", null));
   }
 
-  /** Report that there will be no stage, and run what waits for the first frame. */
+  /** Report that there will be no stage, and run the callbacks that wait for the first frame. */
   #showUnavailable(reason: string): void {
     this.options.startup.finish();
     this.options.page.notice("graphics", translate("This browser cannot draw the stage"), reason);

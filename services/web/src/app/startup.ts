@@ -1,6 +1,7 @@
 /**
- * Order of the page's start: the puppet first. Fonts, sound and other work wait for the first frame, since they share its
- * connection and, with software rendering, its processor. Timeouts bound the wait if no motion or no stage arrives.
+ * Order of the page's start: the puppet first. Fonts, sound and other work wait for the first frame, since they share
+ * its connection and, with software rendering, its processor. Timeouts bound the wait if no motion or no stage
+ * arrives.
  */
 
 /** Time after which the page is shown without its stage, which is still loading over a slow connection. */
@@ -14,8 +15,9 @@ export class StartupSequence {
   #stageReady = false;
 
   /**
-   * Start at once. The attribute `data-arriving` of `root` tells the style sheet the state: `veiled` (as in the page's
-   * markup) while only the seal is shown, empty while the page is shown without the stage, absent when finished.
+   * Start at once. The attribute `data-arriving` of `root` carries the state for the style sheet: `veiled` (as in the
+   * page's markup) while only the seal is shown, empty while the page is shown without the stage, absent when
+   * finished.
    */
   constructor(private readonly root: HTMLElement) {
     root.dataset["arriving"] = "veiled";

@@ -26,7 +26,7 @@ export class ElementController {
   readonly #view: ElementView;
   readonly #limbController: ClaimController;
   #controls = false;
-  /** Whether the motion has sound. */
+  /** True if the motion has sound. */
   #hasSound = false;
   #closed = false;
   #graphicsFailed = false;
@@ -128,7 +128,7 @@ export class ElementController {
     this.#view.remove();
   }
 
-  /** Whether this element may claim limbs. */
+  /** True if this element may claim limbs. */
   get #canClaimLimbs(): boolean {
     return this.#controls && this.playback?.kind === "sessions" && this.playback.access.allows("control");
   }

@@ -55,7 +55,7 @@ export class ElementRenderer {
     return this.#still;
   }
 
-  /** Whether the element has controls: the picture then leaves space for the bar, and keys are handled. */
+  /** True if the element has controls: the picture then leaves space for the bar, and keys are handled. */
   set controls(controls: boolean) {
     this.#controls = controls;
     this.#resize();

@@ -17,8 +17,8 @@ const STREAM_PATH = /^\/v1\/(sessions|motions)\/([^/]+)(?:\/(?:stream|control))?
 
 /**
  * Parse the address of a page, session or motion: `https://stage.example/`, `...?session=ID`, `...?motion=ID` or
- * `.../v1/sessions/ID`, each optionally with `#share=...` or `#token=...`. A relative address is resolved against `base`.
- * Returns null for any other address.
+ * `.../v1/sessions/ID`, each optionally with `#share=...` or `#token=...`. A relative address is resolved against
+ * `base`. Returns null for any other address.
  */
 export function parseStageAddress(src: string, base: string): StageAddress | null {
   if (!URL.canParse(src, base)) return null;

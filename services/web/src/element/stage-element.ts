@@ -92,8 +92,8 @@ export class BunrakuStage extends ElementBase {
   }
 
   /**
-   * Whether the sound is off, as it is at first. Browsers only allow sound after a gesture of the user: set this to false in a
-   * handler of one, or it takes effect at the next gesture anywhere in the page.
+   * Whether the sound is off, as it is at first. Browsers only allow sound after a gesture of the user: set this to
+   * false in a handler of one, or it takes effect at the next gesture anywhere in the page.
    */
   get muted(): boolean {
     return this.#muted;
@@ -175,7 +175,9 @@ export class BunrakuStage extends ElementBase {
     });
   }
 
-  /** Handle a move by `moveBefore`: its presence keeps the browser from calling disconnected and connected callbacks. */
+  /**
+   * Handle a move by `moveBefore`: its presence keeps the browser from calling disconnected and connected callbacks.
+   */
   connectedMoveCallback(): void {}
 
   attributeChangedCallback(

@@ -49,7 +49,10 @@ const LIGHT_THEME_SELECTOR = /:root\[data-theme=["']?day["']?\]/g;
 
 let styleSheet: CSSStyleSheet | null = null;
 
-/** Return the style sheet that all elements share. Constructed style sheets are allowed under any content security policy. */
+/**
+ * Return the style sheet that all elements share. Constructed style sheets are allowed under any content security
+ * policy.
+ */
 function sharedStyleSheet(): CSSStyleSheet {
   if (!styleSheet) {
     styleSheet = new CSSStyleSheet();

@@ -9,7 +9,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "{detail}. {hint}": "{detail}。{hint}",
   "{part} of {whole}": "{part} / {whole}",
   // the stage
-  "A wooden puppet dancing on a stage before a disc of gold leaf. Take its hands and legs with the strings' buttons or the keys 1 to 4.":
+  "A wooden puppet dancing before a disc of gold leaf. Take its hands and legs by button or by the keys 1 to 4.":
     "金箔の円を背に、舞台で踊る木の人形。糸のボタンか1〜4のキーで、手足を持って動かせます。",
   "This browser cannot draw the stage": "このブラウザでは舞台を表示できません",
   "It needs WebGL 2. Try another browser, or switch on hardware acceleration.":
@@ -35,14 +35,13 @@ export const JAPANESE_PAGE_MESSAGES = {
   "The server cannot show it now. Retrying automatically.": "いまサーバーが応答できません。自動で再接続します。",
   "The stage cannot be shown here": "ここでは舞台を表示できません",
   "The stage does not answer": "舞台が応答しません",
-  "This page came over https, and browsers let it speak with no server that has none.":
+  "This page uses https, so browsers do not let it connect to a server without https.":
     "このページはhttpsで開かれているため、httpsでないサーバーには接続できません。",
-  "This page was opened from a file. The stage's server lets such pages in only if BUNRAKU_ORIGINS has null in it.":
+  "This page was opened from a file. The stage's server allows such pages only if BUNRAKU_ORIGINS contains null.":
     "このページはファイルから開かれています。サーバーのBUNRAKU_ORIGINSにnullがある場合だけ接続できます。",
-  "The stage's server does not know this site. Its host can let it in: BUNRAKU_ORIGINS={origin}":
+  "The stage's server does not allow this site. Its operator can allow it: BUNRAKU_ORIGINS={origin}":
     "舞台のサーバーはこのサイトを許可していません。サーバーの管理者が許可できます：BUNRAKU_ORIGINS={origin}",
-  "Its server cannot be reached now. It is tried again and again.":
-    "いまサーバーに接続できません。自動で再接続します。",
+  "The server cannot be reached now. Retrying automatically.": "いまサーバーに接続できません。自動で再接続します。",
   // header
   Home: "ホーム",
   "Share link": "リンクを共有",
@@ -94,14 +93,14 @@ export const JAPANESE_PAGE_MESSAGES = {
   // avatar
   "Dance as": "踊り手",
   "The puppet": "人形",
-  "A VRM file, or a GLB with humanoid bones. It stays in this browser: nothing is uploaded, and everyone else still sees the puppet.":
+  "A VRM file, or a GLB with humanoid bones. It stays in this browser; everyone else still sees the puppet.":
     "VRM、または人型のボーンを持つGLB。このブラウザの中だけで使われ、アップロードされません。ほかの人には人形が見えます。",
   "Remove the avatar {name}": "アバター「{name}」を削除",
   "Choose your own avatar": "自分のアバターを選ぶ",
   "Choose another avatar": "別のアバターを選ぶ",
   "Reading {name}": "「{name}」を読み込み中",
   "{name} dances here; everyone else sees the puppet": "「{name}」が踊ります。ほかの人には人形が見えます",
-  "{name} dances here; everyone else sees the puppet. This browser cannot store it: it lasts for this visit only":
+  "{name} dances here, for this visit only: this browser cannot store it. Everyone else sees the puppet":
     "「{name}」が踊ります。ほかの人には人形が見えます。このブラウザには保存できないため、今回だけ使えます",
   "It could not be read": "読み込めませんでした",
   "the file or the program that reads it could not be loaded":
@@ -249,13 +248,13 @@ export const JAPANESE_PAGE_MESSAGES = {
   measuring: "計測中",
   "first pose {time}": "表示まで {time}",
   "{label} over the last minute, now {value}, scale to {top}": "直近1分の{label}、現在{value}、目盛りは{top}まで",
-  "the best there is": "最高の品質",
-  "as much as the line carries": "回線に合わせています",
-  "so that pulled limbs come in time": "操る手足を優先しています",
-  "as drawing takes this machine long": "端末の描画に合わせています",
-  "until more is ready ahead": "先読みを待っています",
-  "more is tried once this goes well": "安定したら品質を上げます",
-  "as nobody looks at this tab": "タブが表示されていません",
+  "the best available": "最高の品質",
+  "as much as the connection allows": "回線に合わせています",
+  "so that controlled limbs arrive in time": "操る手足を優先しています",
+  "since drawing is slow on this device": "端末の描画に合わせています",
+  "until more is buffered": "先読みを待っています",
+  "raised once this level is stable": "安定したら品質を上げます",
+  "since this tab is in the background": "タブが表示されていません",
   "pinned by the address": "アドレスで指定",
   "chosen by the server": "サーバーが選択",
   "{reason} ({rate} kbit/s)": "{reason}（{rate} kbit/s）",
@@ -267,8 +266,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   // reasons for the end of a connection
   "closed here": "こちらで閉じました",
   "closed with code {code}": "コード{code}で閉じられました",
-  "the server has ended it": "サーバーが終了しました",
-  "the line was lost": "回線が途切れました",
+  "ended by the server": "サーバーが終了しました",
+  "the connection was lost": "回線が途切れました",
   "the server failed": "サーバーで障害が起きました",
   "the server restarts": "サーバーを再起動しています",
   "the server is too busy": "サーバーが混み合っています",
@@ -280,7 +279,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "it answered {status}": "応答は{status}でした",
   "No answer": "サーバーから応答がありません",
   "the server cannot be reached": "サーバーに接続できません",
-  "look at the line, then try again": "回線を確かめて、もう一度お試しください",
+  "check your connection, then try again": "回線を確かめて、もう一度お試しください",
   // keys and gamepad
   Close: "閉じる",
   "The key settings could not be loaded. Check your connection, then try again":

@@ -5,7 +5,10 @@ import { type Language, type LocaleMessages, pageLanguage, setPageLanguage, Tran
 const STORAGE_KEY = "bunraku.language";
 const LANGUAGES: readonly Language[] = ["en", "ja"];
 
-/** Return the first supported language among the requested, the stored and the preferred ones; English if there is none. */
+/**
+ * Return the first supported language among the requested, the stored and the preferred ones; English if there is
+ * none.
+ */
 export function selectLanguage(
   requested: string | null,
   stored: string | null,
@@ -49,8 +52,8 @@ export function otherLanguage(): Language {
 }
 
 /**
- * Store the other language as the user's choice, and return the address to load. The address contains the language if the
- * browser cannot store it.
+ * Store the other language as the user's choice, and return the address to load. The address contains the language if
+ * the browser cannot store it.
  */
 export function switchLanguage(address: string): string {
   const url = new URL(address);

@@ -1,7 +1,7 @@
 /**
- * Translation of texts. The English text is the key and the default. Translations are loaded before the page is built, so
- * modules must not translate while they load: tables hold English texts, which are translated where they are shown. The page
- * has one translator, each embedded element has its own. Pure.
+ * Translation of texts. The English text is the key and the default. Translations are loaded before the page is built,
+ * so modules must not translate while they load: tables hold English texts, which are translated where they are shown.
+ * The page has one translator, each embedded element has its own. Pure.
  */
 import type { JAPANESE_PAGE_MESSAGES } from "./japanese";
 

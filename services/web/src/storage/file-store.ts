@@ -1,8 +1,8 @@
 const OBJECT_STORE = "files";
 
 /**
- * Files stored in the browser by key, in a dedicated IndexedDB database. If storage is forbidden or full, nothing is stored or
- * found and no method throws.
+ * Files stored in the browser by key, in a dedicated IndexedDB database. If storage is forbidden or full, nothing is
+ * stored or found and no method throws.
  */
 export class FileStore {
   #database: Promise<IDBDatabase | null> | null = null;

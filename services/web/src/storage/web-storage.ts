@@ -1,6 +1,6 @@
 /**
- * Texts and JSON values in the browser's storage. If storage is forbidden or full, or holds invalid JSON, nothing is stored or
- * found and no method throws.
+ * Texts and JSON values in the browser's storage. If storage is forbidden or full, or holds invalid JSON, nothing is
+ * stored or found and no method throws.
  */
 export class WebStorage {
   /** `open` is called at each access: if storage is forbidden, the mere access to the global throws. */
@@ -14,7 +14,7 @@ export class WebStorage {
     }
   }
 
-  /** Return the JSON value of a key, null if there is no valid one. Its type must be checked: other code may have written it. */
+  /** Return the JSON value of a key; null if there is none or it is invalid. The value's type is not checked. */
   getJson(key: string): unknown {
     try {
       return JSON.parse(this.get(key) ?? "null");

@@ -18,7 +18,10 @@ const DEFAULT_NAMES = [
 const STORAGE_KEY = "bunraku.name";
 const MAX_NAME_LENGTH = 40;
 
-/** Return the name in the address (`?name=`), else the stored one, else a default picked by `random` (0 to 1). Stores it. */
+/**
+ * Return the name in the address (`?name=`), else the stored one, else a default picked by `random` (0 to 1). Stores
+ * it.
+ */
 export function resolveDisplayName(query: URLSearchParams, random: number): string {
   const name =
     query.get("name")?.trim().slice(0, MAX_NAME_LENGTH) ||

@@ -4,8 +4,8 @@ type Listener = (event: never) => void;
 export type Attributes = Record<string, string | number | boolean | null | undefined | Listener>;
 
 /**
- * Create an HTML element. Attributes that are `false` or `null` are omitted, `true` sets an empty attribute, and functions
- * named `on...` become event listeners.
+ * Create an HTML element. Attributes that are `false` or `null` are omitted, `true` sets an empty attribute, and
+ * functions named `on...` become event listeners.
  */
 export function element<K extends keyof HTMLElementTagNameMap>(
   tag: K,
@@ -43,7 +43,9 @@ export function shape<K extends keyof SVGElementTagNameMap>(
   return created;
 }
 
-/** Set the text of a node. Unchanged text is not written again: that would cause a layout and a screen reader message. */
+/**
+ * Set the text of a node. Unchanged text is not written again: that would cause a layout and a screen reader message.
+ */
 export function setText(target: Node, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }

@@ -62,9 +62,9 @@ export interface LimbState {
   holder: LimbHolder | null;
   /** Other users who ask for it, in the order of their requests. */
   requesters: readonly LimbRequester[];
-  /** Whether this page asks for it. */
+  /** True if this page asks for it. */
   requestedByMe: boolean;
-  /** Whether the keys and buttons of "the held string" move it. */
+  /** True if the keys and buttons of "the held string" move it. */
   selected: boolean;
 }
 
@@ -86,8 +86,8 @@ export function limbRequesters(
 }
 
 /**
- * Return the holder of each limb of `performers` performers, null for a free limb. While the motion changes, `presence` may
- * contain fewer or more limbs than that.
+ * Return the holder of each limb of `performers` performers, null for a free limb. While the motion changes,
+ * `presence` may contain fewer or more limbs than that.
  */
 export function limbHolders(
   presence: Presence | null,

@@ -45,7 +45,7 @@ export interface Panels {
   close(name: PanelName): void;
   /** Close the panel that was opened last. Returns false if none is open. */
   closeLast(): boolean;
-  /** Whether a sheet covers the lower part of a phone, or its right side in landscape. */
+  /** True if a sheet covers the lower part of a phone, or its right side in landscape. */
   readonly isSheetOpen: boolean;
   /** Width in pixels that panels, or the dock, cover at the left and right of a desktop or a landscape phone. */
   readonly sideInsets: readonly [left: number, right: number];
@@ -53,16 +53,16 @@ export interface Panels {
   readonly bottomInset: number;
 }
 
-/** Widths of a panel with its margin, and of the dock with its margin and part of its names (art direction, section 6). */
+/** Widths of a panel and of the dock with their margins; the dock with part of its names (art direction, section 6). */
 const PANEL_WIDTH_PX = 356;
 const DOCK_WIDTH_PX = 96;
-/** The same on a landscape phone, where a sheet has a maximum share of the window's width (`style/sideways.css`). */
+/** Widths on a landscape phone, where a sheet has a maximum share of the window's width (`style/sideways.css`). */
 const [SHEET_MAX_WIDTH_PX, SHEET_MAX_WIDTH_SHARE] = [340, 0.56];
 const LANDSCAPE_DOCK_WIDTH_PX = 112;
 
 /**
- * Manage which panels are open. `onToggle` is called for every panel that opens or closes, `onResize` when one changes its
- * size. Closing a panel returns the focus to the element that opened it.
+ * Manage which panels are open. `onToggle` is called for every panel that opens or closes, `onResize` when one changes
+ * its size. Closing a panel returns the focus to the element that opened it.
  */
 export function createPanels(
   panels: ReadonlyMap<PanelName, HTMLElement>,

@@ -9,7 +9,7 @@ export interface ThemeChoice {
   toggle(): void;
 }
 
-/** Apply the theme to the document, now and whenever it changes. `onChange` is called each time, including the first. */
+/** Apply the theme to the document, now and whenever it changes. `onChange` is called each time, also at once. */
 export function createTheme(onChange: (theme: Theme) => void): ThemeChoice {
   const system = matchMedia("(prefers-color-scheme: light)");
   let chosen = storedTheme();

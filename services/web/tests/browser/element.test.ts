@@ -278,7 +278,7 @@ describeInBrowser(
       const late = await open(small(`${own.url}/#token=${token}`), site.origin, {
         before: (page) => page.route("**/v1/sessions", (request) => request.abort()),
       });
-      await said(late).getByText("It is tried again").waitFor();
+      await said(late).getByText("Retrying automatically").waitFor();
       await late.unroute("**/v1/sessions");
       await waitForStages(late);
       await said(late).waitFor({ state: "hidden" });

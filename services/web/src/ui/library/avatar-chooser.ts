@@ -22,7 +22,7 @@ export interface AvatarActions {
 export interface AvatarState {
   /** Name of the avatar; null if there is none. */
   readonly name: string | null;
-  /** Whether the avatar is shown instead of the puppet. */
+  /** True if the avatar is shown instead of the puppet. */
   readonly active: boolean;
   /** Name of the file that is being loaded. */
   readonly loadingFile: string | null;
@@ -70,7 +70,7 @@ export function createAvatarChooser(actions: AvatarActions): AvatarChooser {
     "p",
     { class: "muted" },
     translate(
-      "A VRM file, or a GLB with humanoid bones. It stays in this browser: nothing is uploaded, and everyone else still sees the puppet.",
+      "A VRM file, or a GLB with humanoid bones. It stays in this browser; everyone else still sees the puppet.",
     ),
   );
   const section = element(

@@ -19,7 +19,7 @@ export interface UploadRow {
 }
 
 export interface DownloadRow {
-  /** Show what is being done, and the fraction of the whole. */
+  /** Show the current step, and the fraction of the whole. */
   showProgress(text: string, fraction: number): void;
   remove(): void;
 }

@@ -20,7 +20,7 @@ export class SampleHistory {
 export const PLOT_WIDTH = 100;
 export const PLOT_HEIGHT = 34;
 
-/** Return the upper end of a plot's scale: the maximum rounded up to 1, 2 or 5 times a power of ten, at least `minTop`. */
+/** Return the upper end of a scale: the maximum rounded up to 1, 2 or 5 times a power of ten, at least `minTop`. */
 export function niceScaleMax(values: readonly number[], minTop: number): number {
   const max = values.reduce((high, value) => (value > high ? value : high), minTop);
   const power = 10 ** Math.floor(Math.log10(max));

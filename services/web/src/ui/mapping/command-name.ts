@@ -47,8 +47,8 @@ export function commandName(command: Command): string {
 }
 
 /**
- * Summarise the commands of one part of the gamepad drawing. A limb that several of them move is named once; for the limb
- * `ownLimb`, whose name stands beside the part, only directions are named.
+ * Summarise the commands of one part of the gamepad drawing. A limb that several of them move is named once; for the
+ * limb `ownLimb`, whose name stands beside the part, only directions are named.
  */
 export function summarizeCommands(commands: readonly Command[], ownLimb: number | null = null): string {
   const names = commands.map((command) => {

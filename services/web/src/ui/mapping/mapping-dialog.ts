@@ -11,7 +11,7 @@ import { createMappingEditor } from "./mapping-editor";
 export interface MappingDialog {
   show(): void;
   readonly isOpen: boolean;
-  /** Whether the next key or button is bound to a command, and must have no other effect. */
+  /** True if the next key or button is bound to a command, and must have no other effect. */
   readonly isCapturing: boolean;
   /** Highlight the pressed parts; null without a gamepad. Call this every frame while the dialog is open. */
   updateGamepad(

@@ -20,7 +20,7 @@ import { controlName } from "./control-name";
 
 export interface MappingEditor {
   readonly element: HTMLElement;
-  /** Whether the next press is bound to a command. */
+  /** True if the next press is bound to a command. */
   readonly isCapturing: boolean;
   render(mapping: Mapping): void;
   /** Handle the pressed controls of the gamepad, 0 to 1. Call this every frame. */

@@ -59,8 +59,8 @@ export function createMessageArea(root: HTMLElement, notice: HTMLElement, onMove
 }
 
 /**
- * Return whether messages belong at the bottom rather than the top. They stay where they are unless they cover a face there
- * and would not on the other side. New messages also keep a margin to faces, since faces move.
+ * Return whether messages belong at the bottom rather than the top. They stay where they are unless they cover a face
+ * there and would not on the other side. New messages also keep a margin to faces, since faces move.
  */
 export function belongsAtBottom(
   atBottom: boolean,

@@ -1,4 +1,4 @@
-/** Toasts: one short message at a time that disappears and may offer actions, and one for as long as the connection is lost. */
+/** Toasts: one short message at a time, which may offer actions, and one for as long as the connection is lost. */
 import { element } from "../dom";
 import { createLiveRegion } from "./live-region";
 

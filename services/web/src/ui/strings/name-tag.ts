@@ -16,8 +16,8 @@ export interface ScreenPoint {
 export interface NameTags {
   /**
    * Place each holder's tag beside the bar of its string, where it covers no other tag, bar or face. Boxes are in CSS
-   * pixels, a bar of null hides its tag, and `now` is in milliseconds. Tags of this page's user are placed first, then those
-   * of the `selected` performer.
+   * pixels, a bar of null hides its tag, and `now` is in milliseconds. Tags of this page's user are placed first, then
+   * those of the `selected` performer.
    */
   render(
     limbs: readonly LimbState[],
@@ -46,8 +46,8 @@ export interface NameTagOptions {
 }
 
 /**
- * Create the layer of tags over the whole picture. `onRequest` is called for a press on "Ask". Tags are hidden from assistive
- * technology: the strings panel offers the same.
+ * Create the layer of tags over the whole picture. `onRequest` is called for a press on "Ask". Tags are hidden from
+ * assistive technology: the strings panel offers the same.
  */
 export function createNameTags(
   root: ParentNode & Node,

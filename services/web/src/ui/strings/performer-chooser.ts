@@ -1,4 +1,6 @@
-/** Selection of the performer that rows and keys act on: one button each, with a dot per limb in its holder's colour. */
+/**
+ * Selection of the performer that rows and keys act on: one button each, with a dot per limb in its holder's colour.
+ */
 import { joinList, pageTranslator, translate } from "../../i18n/translator";
 import { limbNumber } from "../../wire/limbs";
 import { element, setAttribute } from "../dom";

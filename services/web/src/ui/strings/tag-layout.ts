@@ -1,6 +1,6 @@
 /**
- * Layout of name tags: each stands beside the bar of its string and covers no other tag, bar or obstacle. Tags get shorter
- * where space is scarce. Pure; CSS pixels, y down.
+ * Layout of name tags: each stands beside the bar of its string and covers no other tag, bar or obstacle. Tags get
+ * shorter where space is scarce. Pure; CSS pixels, y down.
  */
 import { overlaps, type ScreenBox } from "../../stage/camera/screen-box";
 
@@ -23,7 +23,10 @@ export interface LabelViewport extends Size {
   top: number;
 }
 
-/** Placement of a tag. Passed to the layout of the next frame, so that tags stay where they are for as long as possible. */
+/**
+ * Placement of a tag. Passed to the layout of the next frame, so that tags stay where they are for as long as
+ * possible.
+ */
 export interface LabelPlacement {
   /** Null if there is no space even for the shortest form. */
   box: ScreenBox | null;
@@ -54,10 +57,10 @@ interface CandidatePosition {
 }
 
 /**
- * Place `labels` at time `now` in milliseconds; the result is null where the label is null. Tags cover neither bars nor
- * `obstacles`. `previous` is the result of the last frame. A new tag gets the longest form that fits. Later it makes way for
- * tags of a lower rank at once, and gets longer again only after a delay. Every tag gets its shortest form before any gets a
- * longer one.
+ * Place `labels` at time `now` in milliseconds; the result is null where the label is null. Tags cover neither bars
+ * nor `obstacles`. `previous` is the result of the last frame. A new tag gets the longest form that fits. Later it
+ * makes way for tags of a lower rank at once, and gets longer again only after a delay. Every tag gets its shortest
+ * form before any gets a longer one.
  */
 export function layOutLabels(
   labels: readonly (TagLabel | null)[],
@@ -103,8 +106,8 @@ export function layOutLabels(
 }
 
 /**
- * Return a box of the given size at a `distance` from a point, clear of `obstacles`: on `previousSide` if possible, else
- * right, left, above or below the point (sides 0 to 3). Returns null if no side has space.
+ * Return a box of the given size at a `distance` from a point, clear of `obstacles`: on `previousSide` if possible,
+ * else right, left, above or below the point (sides 0 to 3). Returns null if no side has space.
  */
 export function placeBeside(
   { x, y }: { x: number; y: number },
@@ -129,8 +132,8 @@ export function placeBeside(
 }
 
 /**
- * Place a tag as in the previous frame, else in the same form elsewhere, else in a shorter form. A new tag gets its shortest
- * form. Boxes that are `reserved` for other tags are avoided if possible.
+ * Place a tag as in the previous frame, else in the same form elsewhere, else in a shorter form. A new tag gets its
+ * shortest form. Boxes that are `reserved` for other tags are avoided if possible.
  */
 function placeLabel(
   candidates: readonly CandidatePosition[],
@@ -157,8 +160,8 @@ function placeLabel(
 }
 
 /**
- * Move a tag to the first better candidate that is not longer than the form `largestSize`, once it has been possible since
- * `since` for UPGRADE_DELAY_MS. A new tag is upgraded at once.
+ * Move a tag to the first better candidate that is not longer than the form `largestSize`, once it has been possible
+ * since `since` for UPGRADE_DELAY_MS. A new tag is upgraded at once.
  */
 function upgradePlacement(
   current: LabelPlacement,

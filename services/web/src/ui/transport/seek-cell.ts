@@ -8,8 +8,8 @@ export interface SeekCell {
 }
 
 /**
- * Return at most `maxCells` cells for blocks of the given bitrate levels (-1 for a missing block). A merged cell has the
- * quality of its worst block, so that no gap is hidden.
+ * Return at most `maxCells` cells for blocks of the given bitrate levels (-1 for a missing block). A merged cell has
+ * the quality of its worst block, so that no gap is hidden.
  */
 export function seekCells(blocks: ArrayLike<number>, levelCount: number, maxCells: number): SeekCell[] {
   const count = Math.min(blocks.length, maxCells);

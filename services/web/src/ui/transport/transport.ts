@@ -47,7 +47,10 @@ export interface TransportActions extends SoundActions {
   camera(): void;
   /** Save a picture of the stage. */
   picture(): void;
-  /** Record the performance as a new motion; resolves on success and on a reported failure. Omitted if this page may not. */
+  /**
+   * Record the performance as a new motion; resolves on success and on a reported failure. Omitted if this page may
+   * not.
+   */
   keep?(): Promise<void>;
 }
 

@@ -97,7 +97,10 @@ describe("tags beside their bars", () => {
 });
 
 describe("many tags", () => {
-  /** Window, obstacles, and up to sixteen bars with tags of different lengths and ranks, which move from frame to frame. */
+  /**
+   * Window, obstacles, and up to sixteen bars with tags of different lengths and ranks, which move from frame to
+   * frame.
+   */
   const scenes = fc.record({
     width: fc.integer({ min: 320, max: 1600 }),
     height: fc.integer({ min: 320, max: 1000 }),
