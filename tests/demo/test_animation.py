@@ -23,14 +23,14 @@ def position_in_chest(motion: Motion, frame: int, joint: str) -> Array:
     return rotation.rotate(chest, position[JOINT_INDEX[joint]] - position[JOINT_INDEX[f"{joint[0]}_shoulder"]])
 
 
-def test_it_has_the_frames_of_the_score(motion: Motion) -> None:
+def test_motion_has_the_frames_of_the_score(motion: Motion) -> None:
     assert motion.frame_count == 300
     assert motion.duration == SCORE.duration
     assert np.allclose(np.linalg.norm(motion.rotations, axis=-1), 1.0)
 
 
 @pytest.mark.parametrize(("joint", "arm"), [("l_wrist", OUT), ("r_wrist", DOWN)])
-def test_at_a_key_both_wrists_are_where_the_pose_has_them(motion: Motion, joint: str, arm: Arm) -> None:
+def test_wrists_match_the_pose_at_a_key(motion: Motion, joint: str, arm: Arm) -> None:
     frame = round(2.2 * SCORE.seconds_per_beat * 60)
     straight = np.linalg.norm(FIGURE.offsets[JOINT_INDEX["l_elbow"]] + FIGURE.offsets[JOINT_INDEX["l_wrist"]])
     side = 1.0 if joint[0] == "l" else -1.0
@@ -40,7 +40,7 @@ def test_at_a_key_both_wrists_are_where_the_pose_has_them(motion: Motion, joint:
     assert position_in_chest(motion, frame, joint) == pytest.approx(wanted, abs=0.005)
 
 
-def test_at_a_key_the_trunk_and_head_are_as_written(motion: Motion) -> None:
+def test_trunk_and_head_match_the_pose_at_a_key(motion: Motion) -> None:
     frame = round(2.4 * SCORE.seconds_per_beat * 60)
     position, orientation = skeleton.world_transforms(motion.figure, motion.root[frame], motion.rotations[frame])
     left, right = position[JOINT_INDEX["l_shoulder"]], position[JOINT_INDEX["r_shoulder"]]
@@ -51,13 +51,13 @@ def test_at_a_key_the_trunk_and_head_are_as_written(motion: Motion) -> None:
     assert 12.0 < np.degrees(np.arctan2(gaze[0], gaze[2])) < 22.0
 
 
-def test_the_last_frame_leads_on_to_the_first(motion: Motion) -> None:
+def test_last_frame_leads_to_the_first(motion: Motion) -> None:
     points = skeleton.joint_and_tip_positions(motion.figure, motion.root, motion.rotations)
     step = np.linalg.norm(points[0] - points[-1], axis=-1).max()
     assert step < 0.001
 
 
-def test_the_same_moment_has_the_same_pose_at_any_frame_rate(motion: Motion) -> None:
+def test_pose_at_a_time_is_independent_of_frame_rate(motion: Motion) -> None:
     slow = animation.animate(SCORE, FIGURE, 20.0)
     assert np.allclose(slow.root, motion.root[::3], rtol=0, atol=1e-9)
     assert np.allclose(slow.rotations, motion.rotations[::3], rtol=0, atol=1e-9)

@@ -38,7 +38,7 @@ def danced(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return rates
 
 
-async def test_the_dance_is_taken_in_once_and_again_when_it_was_removed(tmp_path: Path, danced: list[float]) -> None:
+async def test_demo_is_created_once_and_again_after_removal(tmp_path: Path, danced: list[float]) -> None:
     async with open_context(Settings(data=tmp_path)) as backing:
         motion = await bootstrap.ensure_demo_motion(backing)
         entry = await backing.catalogue.get_motion(motion)
@@ -60,9 +60,7 @@ async def test_the_dance_is_taken_in_once_and_again_when_it_was_removed(tmp_path
 
 
 @pytest.mark.usefixtures("danced")
-async def test_a_dance_made_by_other_code_makes_room_for_the_new_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_demo_of_other_code_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async with open_context(Settings(data=tmp_path)) as backing:
         monkeypatch.setattr(choreography, "TITLE", "Older")
         await bootstrap.ensure_demo_motion(backing)
@@ -73,9 +71,7 @@ async def test_a_dance_made_by_other_code_makes_room_for_the_new_one(
         assert [entry.description["name"] for entry in entries] == ["Newer"]
 
 
-async def test_of_replicas_that_start_at_once_one_makes_the_dance_and_one_opens_its_stage(
-    tmp_path: Path, danced: list[float]
-) -> None:
+async def test_concurrent_replicas_create_one_motion_and_one_session(tmp_path: Path, danced: list[float]) -> None:
     (tmp_path / "nats").mkdir()
     async with AsyncExitStack() as stack:
         database, bus = stack.enter_context(run_postgres()), stack.enter_context(run_jetstream(tmp_path / "nats"))

@@ -73,13 +73,13 @@ def joint_flexion(motion: Motion, joint: str) -> Array:
     return np.degrees(vector[:, 0])
 
 
-def test_it_lasts_its_beats(motion: Motion) -> None:
+def test_motion_lasts_its_beats(motion: Motion) -> None:
     assert motion.duration == SCORE.duration == 30.0
     assert choreography.BEAT_COUNT % choreography.BEATS_PER_PHRASE == 0
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_a_planted_foot_does_not_slide(points: Array, beat: Array, side: Side) -> None:
+def test_planted_foot_does_not_slide(points: Array, beat: Array, side: Side) -> None:
     down = is_planted(beat, side)
     edges = np.flatnonzero(np.diff(down.astype(int))) + 1
     stands = [stand for stand in np.split(np.arange(len(down)), edges) if down[stand[0]]]
@@ -90,7 +90,7 @@ def test_a_planted_foot_does_not_slide(points: Array, beat: Array, side: Side) -
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_a_foot_that_touches_the_floor_is_planted(points: Array, beat: Array, side: Side) -> None:
+def test_foot_on_the_floor_is_planted(points: Array, beat: Array, side: Side) -> None:
     # seen from the motion alone: where ankle and toes are both at their height of standing, nothing moves
     ankle, midtarsal = JOINT_INDEX[f"{side[0]}_ankle"], JOINT_INDEX[f"{side[0]}_midtarsal"]
     low = np.all(np.abs(points[:, [ankle, midtarsal], 1] - [0.0656, 0.0001]) < 1e-4, axis=1)
@@ -111,7 +111,7 @@ def test_no_foot_goes_through_the_floor(points: Array, orientation: Array) -> No
         assert toes.min() - 0.0141 > footwork.FLOOR_HEIGHT_M - 0.005
 
 
-def test_one_foot_is_always_down_but_in_hops(points: Array, beat: Array) -> None:
+def test_one_foot_is_down_except_in_hops(points: Array, beat: Array) -> None:
     ankles = points[:, [JOINT_INDEX["l_ankle"], JOINT_INDEX["r_ankle"]], 1]
     floating = np.all(ankles > 0.0656 + 0.001, axis=1)
     assert np.all(is_airborne(beat)[floating])
@@ -119,7 +119,7 @@ def test_one_foot_is_always_down_but_in_hops(points: Array, beat: Array) -> None
     assert len(SCORE.hops) == 3
 
 
-def test_the_weight_is_over_the_feet_that_are_down(points: Array, orientation: Array, beat: Array) -> None:
+def test_weight_is_over_the_planted_feet(points: Array, orientation: Array, beat: Array) -> None:
     centre = mass.centre_of_mass(points)[:, [0, 2]]
     down = {side: is_planted(beat, side) for side in SIDES}
     angle = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
@@ -146,7 +146,7 @@ def test_knees_and_elbows_bend_the_right_way(motion: Motion) -> None:
         assert 60.0 < bend.max() < 150.0
 
 
-def test_joints_move_at_sane_speeds_without_jumps(motion: Motion) -> None:
+def test_joint_speeds_are_bounded(motion: Motion) -> None:
     speed = angular_speed(motion)
     fastest = np.linalg.norm(speed, axis=-1).max(axis=0)
     assert fastest.max() < 12.0, JOINTS[int(np.argmax(fastest))]
@@ -160,13 +160,13 @@ def test_the_hips_move_smoothly(motion: Motion) -> None:
     assert np.abs(np.diff(speed, axis=0)).max() * FPS < 25.0
 
 
-def test_its_end_leads_on_to_its_beginning(points: Array) -> None:
+def test_motion_loops(points: Array) -> None:
     assert np.linalg.norm(points[0] - points[-1], axis=-1).max() < 0.002
     seam, before = points[0] - points[-1], points[-1] - points[-2]
     assert np.linalg.norm(seam - before, axis=-1).max() < 0.0005
 
 
-def test_it_keeps_to_the_stage_and_to_its_audience(motion: Motion, points: Array, orientation: Array) -> None:
+def test_motion_stays_on_stage_and_faces_the_audience(motion: Motion, points: Array, orientation: Array) -> None:
     ankles = points[:, [JOINT_INDEX["l_ankle"], JOINT_INDEX["r_ankle"]]]
     assert np.linalg.norm(motion.root[:, [0, 2]], axis=-1).max() < 0.6
     assert np.linalg.norm(ankles[..., [0, 2]], axis=-1).max() < 0.6
@@ -174,7 +174,7 @@ def test_it_keeps_to_the_stage_and_to_its_audience(motion: Motion, points: Array
     assert np.mean(ahead[:, 2] > 0.5) > 0.75
 
 
-def test_it_turns_round_in_place_and_round_the_stage(orientation: Array, motion: Motion, beat: Array) -> None:
+def test_motion_turns_in_place_and_around_the_stage(orientation: Array, motion: Motion, beat: Array) -> None:
     ahead = rotation.rotate(orientation[:, 0], np.array([0.0, 0.0, 1.0]))
     facing = np.degrees(np.unwrap(np.arctan2(ahead[:, 0], ahead[:, 2])))
 
@@ -191,7 +191,7 @@ def test_it_turns_round_in_place_and_round_the_stage(orientation: Array, motion:
     assert facing[-1] == pytest.approx(facing[0], abs=1.0)
 
 
-def test_the_arms_go_wide_and_high_and_cross_before_the_chest(points: Array, orientation: Array) -> None:
+def test_arms_spread_rise_and_cross(points: Array, orientation: Array) -> None:
     left, right = points[:, mass.LEFT_HAND], points[:, mass.RIGHT_HAND]
     assert np.linalg.norm(left - right, axis=-1).max() > 1.6
     crown = points[:, mass.CROWN, 1]
@@ -201,7 +201,7 @@ def test_the_arms_go_wide_and_high_and_cross_before_the_chest(points: Array, ori
     assert way[:, 0].min() < -0.15
 
 
-def test_the_hands_go_neither_through_the_body_nor_through_each_other(points: Array, orientation: Array) -> None:
+def test_hands_pass_through_neither_body_nor_each_other(points: Array, orientation: Array) -> None:
     chest = JOINT_INDEX["vl5"]
     along = np.linspace(0.0, 1.0, 7)[:, None, None]
     lines = []
@@ -228,7 +228,7 @@ def test_the_feet_pass_without_touching(points: Array) -> None:
     assert between.min() > 2.0 * 0.035
 
 
-def test_steps_are_on_half_beats_at_least_and_stamps_on_whole_ones() -> None:
+def test_steps_are_on_half_beats_and_stamps_on_beats() -> None:
     halves = np.array(choreography.footfall_times()) * 2.0 * choreography.BEATS_PER_MINUTE / 60.0
     assert len(halves) == len(SCORE.steps) + 3
     assert np.allclose(halves, np.round(halves), rtol=0, atol=1e-9)
@@ -237,7 +237,7 @@ def test_steps_are_on_half_beats_at_least_and_stamps_on_whole_ones() -> None:
     assert len(beats) >= 8
 
 
-def test_a_foot_lands_when_its_step_says(points: Array) -> None:
+def test_foot_lands_on_its_beat(points: Array) -> None:
     for step in SCORE.steps:
         height = points[:, JOINT_INDEX[f"{step.side[0]}_ankle"], 1]
         landing = step.beat * SCORE.seconds_per_beat * FPS
@@ -245,7 +245,7 @@ def test_a_foot_lands_when_its_step_says(points: Array) -> None:
         assert height[int(landing - 0.06 * FPS)] > 0.0656 + 0.001
 
 
-def test_the_knees_of_the_mie_are_raised_and_its_pose_is_held(points: Array, beat: Array) -> None:
+def test_mie_raises_the_knee_and_holds_the_pose(points: Array, beat: Array) -> None:
     raised = [footfall for footfall in SCORE.list_footfalls() if isinstance(footfall, Step) and footfall.lift > 0.2]
     assert len(raised) == 2
     for step in raised:
@@ -259,7 +259,7 @@ def test_the_knees_of_the_mie_are_raised_and_its_pose_is_held(points: Array, bea
         assert np.ptp(hands, axis=0).max() < 0.04
 
 
-def test_it_bows_first_and_last(points: Array, beat: Array) -> None:
+def test_motion_starts_and_ends_with_a_bow(points: Array, beat: Array) -> None:
     for first, last, depth in ((0.0, 3.0, 0.06), (45.0, 48.0, 0.15)):
         part = (first <= beat) & (beat < last)
         assert points[0, mass.CROWN, 1] - points[part, mass.CROWN, 1].min() > depth
@@ -267,7 +267,7 @@ def test_it_bows_first_and_last(points: Array, beat: Array) -> None:
 
 
 @pytest.mark.parametrize("fps", [24.0, 120.0])
-def test_any_frame_rate_shows_the_same_dance(motion: Motion, fps: float) -> None:
+def test_motion_is_independent_of_frame_rate(motion: Motion, fps: float) -> None:
     other = choreography.animate_dance(fps)
     assert other.frame_count == 30 * fps
     common = int(np.gcd(int(fps), int(FPS)))

@@ -31,7 +31,7 @@ def test_a_planted_foot_is_flat_and_does_not_move(side: Side) -> None:
         assert np.allclose(foot.toe_bend[planted], 0.0)
 
 
-def test_the_middle_of_the_sole_stands_where_the_step_says() -> None:
+def test_sole_centre_is_at_the_steps_position() -> None:
     foot = animate_feet()["left"]
     for beat, place in ((0.5, SCORE.left_foot), (3.0, FootPlacement(0.2, 0.0, 0.0)), (7.0, SCORE.left_foot)):
         i = int(np.argmin(np.abs(BEAT - beat)))
@@ -43,7 +43,7 @@ def test_the_middle_of_the_sole_stands_where_the_step_says() -> None:
 
 
 @pytest.mark.parametrize("stamp", [False, True])
-def test_a_swinging_foot_rises_to_its_lift_and_no_point_of_the_sole_goes_through_the_floor(stamp: bool) -> None:
+def test_swinging_foot_reaches_its_lift_above_the_floor(stamp: bool) -> None:
     step = Step(2, "left", FootPlacement(0.2, 0.0), swing_beats=1.0, lift=0.08, is_stamp=stamp)
     score = replace(SCORE, steps=(step, *SCORE.steps[1:]))
     foot = footwork.animate_foot(score, FIGURE, "left", TIME)

@@ -18,7 +18,7 @@ STRUCK: tuple[Callable[[], Array], ...] = (
 
 
 @pytest.mark.parametrize("struck", STRUCK)
-def test_what_is_struck_is_loud_at_once_and_ends_in_silence(struck: Callable[[], Array]) -> None:
+def test_struck_tone_is_loud_at_once_and_ends_in_silence(struck: Callable[[], Array]) -> None:
     tone = struck()
     np.testing.assert_array_equal(tone, struck())
     assert 0.3 < np.abs(tone).max() < 2
@@ -29,7 +29,7 @@ def test_what_is_struck_is_loud_at_once_and_ends_in_silence(struck: Callable[[],
 
 @pytest.mark.parametrize("play", [instruments.pluck_string, instruments.blow_flute])
 @pytest.mark.parametrize("hertz", [146.83, 293.66, 440.0, 587.33])
-def test_a_tone_has_its_pitch(play: Callable[[float, float], Array], hertz: float) -> None:
+def test_tone_has_its_pitch(play: Callable[[float, float], Array], hertz: float) -> None:
     tone = play(hertz, 1.0)
     assert len(tone) == SAMPLE_RATE_HZ
     part = tone[SAMPLE_RATE_HZ // 10 : SAMPLE_RATE_HZ // 2]
@@ -41,7 +41,7 @@ def test_a_tone_has_its_pitch(play: Callable[[float, float], Array], hertz: floa
     assert abs(SAMPLE_RATE_HZ / best / hertz - 1) < 0.015
 
 
-def test_a_string_fades_and_a_flute_stays() -> None:
+def test_string_decays_and_flute_sustains() -> None:
     for play, least, most in ((instruments.pluck_string, 0.0, 0.35), (instruments.blow_flute, 0.5, 2.0)):
         tone = play(440.0, 1.0)
         early, late = (np.sqrt(np.mean(part**2)) for part in (tone[4_800:9_600], tone[38_400:43_200]))

@@ -16,12 +16,12 @@ def posed_centre_of_mass(rotations: Array) -> Array:
     return mass.centre_of_mass(skeleton.joint_and_tip_positions(FIGURE, FIGURE.offsets[0], rotations))
 
 
-def test_the_masses_are_one_whole_body() -> None:
+def test_masses_sum_to_one() -> None:
     assert np.isclose(mass.POINT_WEIGHTS.sum(), 1.0)
     assert np.all(mass.POINT_WEIGHTS >= 0.0)
 
 
-def test_a_standing_body_balances_in_its_hips_over_its_feet() -> None:
+def test_standing_body_balances_over_its_feet() -> None:
     x, y, z = posed_centre_of_mass(REST)
     # 55 to 58 per cent of the height is where bodies are measured to balance (Winter); the figure stands on -.014
     assert 0.55 < (y + 0.014) / 1.764 < 0.58
@@ -30,12 +30,12 @@ def test_a_standing_body_balances_in_its_hips_over_its_feet() -> None:
 
 
 @given(arrays(np.float64, 3, elements=st.floats(-5, 5)))
-def test_it_goes_where_the_body_goes(way: Array) -> None:
+def test_centre_of_mass_moves_with_the_body(way: Array) -> None:
     points = skeleton.joint_and_tip_positions(FIGURE, FIGURE.offsets[0], REST)
     assert np.allclose(mass.centre_of_mass(points + way), mass.centre_of_mass(points) + way)
 
 
-def test_a_raised_arm_lifts_it_by_the_weight_of_the_arm() -> None:
+def test_raised_arm_lifts_the_centre_of_mass() -> None:
     raised = REST.copy()
     raised[JOINT_INDEX["l_shoulder"]] = rotation.from_coordinate_axis(2, np.array(np.pi))
     rise = posed_centre_of_mass(raised)[1] - posed_centre_of_mass(REST)[1]

@@ -14,14 +14,14 @@ def music() -> Array:
     return render_music()
 
 
-def test_it_is_as_long_as_the_dance_and_never_too_loud(music: Array) -> None:
+def test_music_is_as_long_as_the_motion_and_limited(music: Array) -> None:
     assert music.shape == (round(animate_dance(12.0).duration * SAMPLE_RATE_HZ), 2)
     assert 0.4 < np.abs(music).max() <= 0.8
     assert np.isfinite(music).all()
     np.testing.assert_array_equal(music, render_music())
 
 
-def test_every_landing_is_struck_on_its_beat() -> None:
+def test_every_footfall_has_percussion_on_its_beat() -> None:
     struck = list(percussion_notes(SCORE))
     seconds = {note.beat * SCORE.seconds_per_beat for note in struck}
     assert set(footfall_times()) <= seconds
@@ -31,7 +31,7 @@ def test_every_landing_is_struck_on_its_beat() -> None:
     assert sum(note.instrument == "clappers" for note in struck) == 2 * 2, "two mie"
 
 
-def test_stamps_are_heard_where_they_are_danced(music: Array) -> None:
+def test_stamps_sound_at_their_time(music: Array) -> None:
     """Below 110 Hz there is the great drum alone: its power leaps up within a hundredth of a second of each stamp."""
     low = np.fft.rfft(music.mean(axis=1))
     low[np.fft.rfftfreq(len(music), 1 / SAMPLE_RATE_HZ) > 110] = 0
@@ -42,7 +42,7 @@ def test_stamps_are_heard_where_they_are_danced(music: Array) -> None:
         assert after > 4 * before, f"the stamp at {time:.2f} s"
 
 
-def test_string_and_flute_keep_to_the_scale_and_the_dance() -> None:
+def test_string_and_flute_stay_in_scale_and_length() -> None:
     pitches = {pitch % 12 for _, pitch in STRING_NOTES} | {pitch % 12 for _, _, pitch in FLUTE_NOTES}
     assert pitches == {0, 1, 5, 7, 8}
     ends = [beat + beats for beat, beats, _ in FLUTE_NOTES]

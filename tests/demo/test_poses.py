@@ -11,7 +11,7 @@ POSE_NAMES = sorted(name for name, value in vars(poses).items() if isinstance(va
 
 
 @pytest.mark.parametrize("name", POSE_NAMES)
-def test_a_held_pose_keeps_the_hands_out_of_the_body_and_apart(name: str) -> None:
+def test_held_pose_keeps_hands_out_of_the_body_and_apart(name: str) -> None:
     pose = getattr(poses, name)
     feet = FootPlacement(0.12, 0.0, 8), FootPlacement(-0.12, 0.0, -8)
     score = Score(60.0, 12, poses.STAND, *feet, (PoseKey(3, pose, 3), PoseKey(11, poses.STAND, 3)), ())
@@ -36,7 +36,7 @@ def test_a_held_pose_keeps_the_hands_out_of_the_body_and_apart(name: str) -> Non
     assert gap > 0.08
 
 
-def test_the_crossed_hands_are_past_each_other() -> None:
+def test_crossed_hands_are_past_each_other() -> None:
     feet = FootPlacement(0.08, 0.0), FootPlacement(-0.08, 0.0)
     score = Score(60.0, 12, poses.STAND, *feet, (PoseKey(3, poses.CROSSED, 3), PoseKey(11, poses.STAND, 3)), ())
     motion = animation.animate(score, FIGURE, 10.0)

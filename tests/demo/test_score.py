@@ -20,7 +20,7 @@ SCORE = Score(
 )
 
 
-def test_a_mirrored_pose_is_the_other_side_and_mirrored_twice_itself() -> None:
+def test_mirroring_twice_gives_the_same_pose() -> None:
     mirrored = POSE.mirror()
     assert (mirrored.left, mirrored.right) == (DOWN, OUT)
     assert (mirrored.lean, mirrored.twist, mirrored.look, mirrored.tilt) == (-3, 10, -20, 2)
@@ -28,7 +28,7 @@ def test_a_mirrored_pose_is_the_other_side_and_mirrored_twice_itself() -> None:
     assert mirrored.mirror() == POSE
 
 
-def test_a_score_knows_its_time_and_the_order_of_its_footfalls() -> None:
+def test_score_has_duration_and_ordered_footfalls() -> None:
     assert SCORE.seconds_per_beat == 0.625
     assert SCORE.duration == 5.0
     assert [footfall.beat for footfall in SCORE.list_footfalls()] == [2, 4, 6]
@@ -36,24 +36,24 @@ def test_a_score_knows_its_time_and_the_order_of_its_footfalls() -> None:
     assert [set(footfall.targets) for footfall in SCORE.list_footfalls()] == [{"left"}, {"left", "right"}, {"left"}]
 
 
-def test_a_score_whose_last_pose_is_not_its_first_is_refused() -> None:
+def test_score_that_does_not_end_in_rest_pose_is_rejected() -> None:
     with pytest.raises(ValueError, match="rest pose by beat 8"):
         replace(SCORE, keys=(PoseKey(2, POSE, 1.5),))
     with pytest.raises(ValueError, match="rest pose by beat 8"):
         replace(SCORE, keys=(PoseKey(2, POSE, 1.5), PoseKey(9, REST, 2)))
 
 
-def test_a_score_whose_feet_do_not_come_home_is_refused() -> None:
+def test_score_whose_feet_do_not_return_is_rejected() -> None:
     with pytest.raises(ValueError, match="at beat 4 the feet are at"):
         replace(SCORE, steps=SCORE.steps[:1])
 
 
-def test_a_step_while_a_foot_is_in_the_air_is_refused() -> None:
+def test_step_while_a_foot_is_in_the_air_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"step to beat 4 begins before beat 3\.7"):
         replace(SCORE, steps=(*SCORE.steps, Step(3.7, "right", RIGHT)))
 
 
-def test_keys_out_of_order_are_refused() -> None:
+def test_keys_out_of_order_are_rejected() -> None:
     with pytest.raises(ValueError, match="beat 1 must follow beat 2"):
         replace(SCORE, keys=(PoseKey(2, POSE, 1.5), PoseKey(1, POSE, 1), PoseKey(7, REST, 1)))
     with pytest.raises(ValueError, match="set out after beat 0"):

@@ -9,7 +9,7 @@ from bunraku.ingest.keyframe import Staging, check_keyframe_order
 from bunraku.motion import skeleton
 
 
-def test_the_camera_closes_and_moves_calmly() -> None:
+def test_camera_loops_and_moves_smoothly() -> None:
     keyframes = staging.camera_keyframes(SCORE)
     assert len(keyframes) == round(SCORE.duration * staging.KEYFRAME_RATE_FPS)
     places = np.array([key["position"] for key in keyframes])
@@ -18,7 +18,7 @@ def test_the_camera_closes_and_moves_calmly() -> None:
     assert np.linalg.norm(steps[-1]) < 0.01
 
 
-def test_the_dancer_is_in_the_picture_all_the_time() -> None:
+def test_performer_stays_in_the_picture() -> None:
     motion = animate_dance(30.0)
     places = skeleton.joint_and_tip_positions(motion.figure, motion.root, motion.rotations)
     for frame, (place, gaze, field) in enumerate(_camera_views()):
@@ -35,7 +35,7 @@ def test_the_dancer_is_in_the_picture_all_the_time() -> None:
         assert np.abs(aside).max() < 4 / 5, f"cut off at {frame / 30:.1f} s"
 
 
-def test_three_lights_close_and_none_goes_out() -> None:
+def test_three_lights_loop_and_none_goes_out() -> None:
     tracks = staging.light_keyframes(SCORE)
     assert len(tracks) == 3
     for keyframes in tracks:
@@ -45,7 +45,7 @@ def test_three_lights_close_and_none_goes_out() -> None:
         assert intensity[0] == pytest.approx(intensity[-1], abs=0.02)
 
 
-def test_they_are_keyframes_as_the_service_takes_them() -> None:
+def test_staging_is_accepted_by_the_service() -> None:
     asked = Staging.model_validate(
         {"camera": staging.camera_keyframes(SCORE), "lights": staging.light_keyframes(SCORE)}
     )

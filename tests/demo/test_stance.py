@@ -51,7 +51,7 @@ def test_both_feet_are_reached_under_the_weight(
     assert root[0, 1] <= height[0]
 
 
-def test_hips_that_are_low_enough_stay_at_the_height_asked_for() -> None:
+def test_low_hips_keep_the_given_height() -> None:
     rotations = np.tile(rotation.IDENTITY, (1, JOINT_COUNT, 1))
     height = np.array([0.7])
     root = stance.solve_stance(FIGURE, rotations, standing_feet(0.1, 0.0), np.zeros(1), height, np.zeros((1, 2)))

@@ -28,7 +28,7 @@ def end_positions(upper: Array, lower: Array, turned: Array, bend: Array, hinge:
 
 @pytest.mark.parametrize(("upper", "lower", "hinge"), LIMBS)
 @given(direction=DIRECTIONS, pole=DIRECTIONS, share=st.floats(0, 1))
-def test_the_end_reaches_its_target_and_the_hinge_points_to_the_pole(
+def test_end_reaches_target_and_hinge_points_to_pole(
     upper: Array, lower: Array, hinge: float, direction: Array, pole: Array, share: float
 ) -> None:
     assume(np.linalg.norm(direction) > 0.1)
@@ -47,7 +47,7 @@ def test_the_end_reaches_its_target_and_the_hinge_points_to_the_pole(
 
 
 @pytest.mark.parametrize(("upper", "lower", "hinge"), LIMBS)
-def test_at_rest_nothing_is_turned(upper: Array, lower: Array, hinge: float) -> None:
+def test_rest_pose_needs_no_rotation(upper: Array, lower: Array, hinge: float) -> None:
     # the hinge's own x is square to this pole, so that rest is the solution
     pole = np.cross(upper + lower, [1.0, 0.0, 0.0])[None] * hinge
     turned, bend = two_bone_ik.solve_two_bone(upper, lower, (upper + lower)[None], pole, hinge)
@@ -56,7 +56,7 @@ def test_at_rest_nothing_is_turned(upper: Array, lower: Array, hinge: float) -> 
 
 
 @pytest.mark.parametrize(("upper", "lower", "hinge"), LIMBS)
-def test_what_is_out_of_reach_is_met_in_direction(upper: Array, lower: Array, hinge: float) -> None:
+def test_target_out_of_reach_is_met_in_direction(upper: Array, lower: Array, hinge: float) -> None:
     target = np.array([[0.3, -2.0, 0.4], [0.003, -0.02, 0.004]])
     turned, bend = two_bone_ik.solve_two_bone(upper, lower, target, np.array([[0.0, 0.0, hinge]] * 2), hinge)
     end = end_positions(upper, lower, turned, bend, hinge)

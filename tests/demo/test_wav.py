@@ -8,7 +8,7 @@ import numpy as np
 from bunraku.demo.wav import write_wav
 
 
-def test_any_reader_reads_it_back() -> None:
+def test_wav_reads_back() -> None:
     samples = np.random.default_rng(1).uniform(-1.2, 1.2, (1000, 2))
     with wave.open(io.BytesIO(write_wav(samples))) as file:
         assert (file.getnchannels(), file.getframerate(), file.getsampwidth(), file.getnframes()) == (

@@ -184,7 +184,7 @@ def test_every_container_may_do_no_more_than_it_must(built: RenderedOverlay) -> 
 
 
 def test_every_probe_asks_what_is_answered(built: RenderedOverlay) -> None:
-    program = (REPOSITORY / "services" / "bunraku" / "backing" / "readiness.py").read_text()
+    program = (REPOSITORY / "services" / "bunraku" / "runtime" / "readiness.py").read_text()
     for name, container in built.containers():
         ports = {port["name"]: port["containerPort"] for port in container["ports"]}
         for kind in ("startupProbe", "livenessProbe", "readinessProbe"):

@@ -38,7 +38,7 @@ def assert_motions_equal(actual: Motion, expected: Motion, tolerance: float = 1e
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10_000), swing=st.floats(0.0, 0.8))
-def test_a_dance_written_read_and_analysed_is_the_same_dance(seed: int, swing: float) -> None:
+def test_written_motion_is_analysed_to_the_same_motion(seed: int, swing: float) -> None:
     motion = smooth_motion(seed=seed, swing=swing)
     analysis = analyse(bvh.parse_bvh(write_bvh(motion)))
     assert_motions_equal(analysis.motion, motion)
@@ -47,7 +47,7 @@ def test_a_dance_written_read_and_analysed_is_the_same_dance(seed: int, swing: f
 
 
 @pytest.mark.parametrize(("degrees", "name"), [(90.0, "T"), (70.0, "T"), (45.0, "A"), (10.0, "I"), (0.0, "I")])
-def test_rest_poses_are_told_and_turned_to_the_same_figure(degrees: float, name: str) -> None:
+def test_rest_poses_are_detected_and_give_the_same_figure(degrees: float, name: str) -> None:
     motion = smooth_motion()
     analysis = analyse(bvh.parse_bvh(export_bvh(motion, pose_with_arms(degrees))))
     assert analysis.rest_pose == name
@@ -64,7 +64,7 @@ def test_rest_poses_are_told_and_turned_to_the_same_figure(degrees: float, name:
         (rotation.from_coordinate_axis(1, np.array(0.7)), ""),
     ],
 )
-def test_any_axes_are_turned_to_y_up_facing_z(axes: Array, said: str) -> None:
+def test_any_axes_are_rotated_to_y_up_facing_z(axes: Array, said: str) -> None:
     motion = smooth_motion()
     analysis = analyse(bvh.parse_bvh(export_bvh(motion, pose_with_arms(90.0), axes)))
     assert_motions_equal(analysis.motion, motion)
@@ -74,14 +74,14 @@ def test_any_axes_are_turned_to_y_up_facing_z(axes: Array, said: str) -> None:
 @pytest.mark.parametrize(
     ("per_metre", "unit"), [(1.0, "m"), (100.0, "cm"), (1000.0, "mm"), (1 / 0.0254, "inch"), (0.45 / 0.0254, "CMU")]
 )
-def test_units_are_told_from_the_leg(per_metre: float, unit: str) -> None:
+def test_unit_is_detected_from_leg_length(per_metre: float, unit: str) -> None:
     motion = smooth_motion()
     analysis = analyse(bvh.parse_bvh(export_bvh(motion, units_per_metre=per_metre)))
     assert analysis.unit.startswith(unit)
     assert_motions_equal(analysis.motion, motion)
 
 
-def test_a_size_no_unit_explains_is_scaled_and_said() -> None:
+def test_unexplained_size_is_scaled_and_reported() -> None:
     analysis = analyse(bvh.parse_bvh(export_bvh(smooth_motion(), units_per_metre=5.0)))
     assert analysis.unit == "unknown"
     offsets = analysis.motion.figure.offsets
@@ -90,7 +90,7 @@ def test_a_size_no_unit_explains_is_scaled_and_said() -> None:
 
 
 @pytest.mark.parametrize("swing", [0.3, 0.6])
-def test_bones_along_one_axis_give_the_same_joints(swing: float) -> None:
+def test_bone_aligned_rest_pose_gives_the_same_joints(swing: float) -> None:
     motion = smooth_motion(swing=swing)
     analysis = analyse(bvh.parse_bvh(export_bvh(motion, bone_aligned(motion.figure))))
     assert analysis.rest_pose == "bone-aligned"
@@ -101,7 +101,7 @@ def test_bones_along_one_axis_give_the_same_joints(swing: float) -> None:
     assert np.abs(np.sum(made.rotations * motion.rotations, axis=-1)).min() > 1.0 - 1e-5
 
 
-def test_sides_named_wrongly_are_exchanged() -> None:
+def test_wrongly_named_sides_are_exchanged() -> None:
     motion = smooth_motion()
     swapped = tuple({"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:] for name in JOINTS)
     analysis = analyse(bvh.parse_bvh(export_bvh(motion, names=swapped)))
@@ -121,7 +121,7 @@ def test_elbows_bend_about_minus_x_and_knees_about_x() -> None:
     assert_motions_equal(made, motion)
 
 
-def test_a_dance_high_above_the_floor_is_moved_onto_it() -> None:
+def test_motion_above_the_floor_is_moved_onto_it() -> None:
     motion = smooth_motion()
     high = replace(motion, root=motion.root + np.array([0.0, 3.0, 0.0]))
     analysis = analyse(bvh.parse_bvh(export_bvh(high)))
@@ -130,7 +130,7 @@ def test_a_dance_high_above_the_floor_is_moved_onto_it() -> None:
     assert placed[..., 1].min() == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_first_frame_apart_from_the_dance_is_left_out() -> None:
+def test_calibration_pose_in_first_frame_is_dropped() -> None:
     motion = smooth_motion(swing=0.3)
     motion.rotations[0] = rotation.IDENTITY
     for name, angle in (("l_shoulder", 1.5), ("r_shoulder", -1.5)):
@@ -140,7 +140,7 @@ def test_a_first_frame_apart_from_the_dance_is_left_out() -> None:
     assert any("first frame" in sentence for sentence in analysis.assumptions)
 
 
-def test_names_of_nobody_are_mapped_by_shape() -> None:
+def test_unknown_names_are_mapped_by_shape() -> None:
     motion = smooth_motion()
     analysis = analyse(
         bvh.parse_bvh(export_bvh(motion, pose_with_arms(90.0), names=tuple(f"bone{k}" for k in range(18))))
@@ -149,7 +149,7 @@ def test_names_of_nobody_are_mapped_by_shape() -> None:
     assert_motions_equal(analysis.motion, motion)
 
 
-def test_what_is_no_body_is_refused() -> None:
+def test_non_humanoid_skeleton_is_rejected() -> None:
     chain = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation\n"
     chain += b"JOINT b { OFFSET 0 1 0 CHANNELS 0 } } MOTION Frames: 1 Frame Time: 0.1\n0 0 0\n"
     with pytest.raises(UnreadableMotion, match="two arms and two legs") as refusal:
@@ -206,7 +206,7 @@ def test_reported_fit_is_the_distance_from_the_source(clip: tuple[str, bvh.Bvh])
     assert np.max(apart) == pytest.approx(analysis.max_fit_error_mm, rel=1e-6)
 
 
-def test_real_clips_are_near_what_the_study_made_of_them(clip: tuple[str, bvh.Bvh], shared: Path) -> None:
+def test_real_clips_match_the_reference_study(clip: tuple[str, bvh.Bvh], shared: Path) -> None:
     name, source = clip
     analysis = analyse_clip(source)
     study = np.load(shared / "mocap" / "hanim19" / f"{name}.npz")
@@ -228,7 +228,7 @@ def _leg_length(offsets: Array) -> float:
     return float(np.linalg.norm(offsets[joints], axis=-1).sum() / 2.0)
 
 
-def test_straight_figure_is_what_tests_think() -> None:
+def test_straight_figure_has_straight_limbs() -> None:
     figure = straight_figure()
     assert joint_and_tip_positions(figure, figure.offsets[0], np.tile(rotation.IDENTITY, (18, 1)))[
         :, 1

@@ -37,7 +37,7 @@ from tests.motion.bvh_samples import HIERARCHY_TEXT, MINIMAL_BVH, ROWS, VALUES, 
         ),
     ],
 )
-def test_every_dialect_reads_as_the_plain_file(data: bytes) -> None:
+def test_every_dialect_parses_like_the_plain_file(data: bytes) -> None:
     bvh = parse_bvh(data)
     assert bvh.names == ("Hips", "Spine")
     assert bvh.parents == (-1, 0)
@@ -48,13 +48,13 @@ def test_every_dialect_reads_as_the_plain_file(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b" \r\n\t", b"\xef\xbb\xbf"])
-def test_an_empty_file_is_refused(data: bytes) -> None:
+def test_empty_file_is_rejected(data: bytes) -> None:
     with pytest.raises(UnreadableMotion, match="Empty file") as caught:
         parse_bvh(data)
     assert caught.value.hint
 
 
-def test_broken_utf16_and_no_channels_are_refused() -> None:
+def test_broken_utf16_and_missing_channels_are_rejected() -> None:
     with pytest.raises(UnreadableMotion, match="Broken text"):
         parse_bvh(b"\xff\xfeH\x00I")
     with pytest.raises(UnreadableMotion, match="No channels"):
@@ -65,11 +65,11 @@ def test_broken_utf16_and_no_channels_are_refused() -> None:
     ("time", "fps"),
     [(b".0083333", 120.0), (b"0.0333333", 30.0), (b"0.033367", pytest.approx(29.97, abs=1e-3)), (b"0.025000", 40.0)],
 )
-def test_a_rounded_frame_time_is_the_rate_it_was_rounded_from(time: bytes, fps: float) -> None:
+def test_rounded_frame_time_gives_the_original_rate(time: bytes, fps: float) -> None:
     assert parse_bvh(HIERARCHY_TEXT + motion_section(time=b"Frame Time: " + time)).fps == fps
 
 
-def test_all_real_clips_read(shared: Path) -> None:
+def test_all_real_clips_parse(shared: Path) -> None:
     clips = sorted((shared / "mocap" / "bvh").glob("*.bvh"))
     assert clips
     for clip in clips:
@@ -93,7 +93,7 @@ def motions(draw: st.DrawFn) -> Motion:
 
 @settings(max_examples=25)
 @given(motions())
-def test_what_is_written_reads_as_the_same_motion(motion: Motion) -> None:
+def test_written_motion_parses_to_the_same_motion(motion: Motion) -> None:
     bvh: Bvh = parse_bvh(write_bvh(motion))
     assert (bvh.names, bvh.notes, bvh.fps) == (JOINTS, (), motion.fps)
     position, orientation = forward_kinematics(bvh, list(range(JOINT_COUNT)))

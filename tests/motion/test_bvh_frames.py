@@ -24,7 +24,7 @@ INCOMPLETE_ROW = b"1 2 3 4 5 6 7 8"
         (motion_section(time=b"Frame Time: 0"), 2, "The frame time is not above zero; 30 frames/s assumed."),
     ],
 )
-def test_what_is_there_is_used_and_noted(data: bytes, frames: int, note: str) -> None:
+def test_irregular_header_is_tolerated_and_noted(data: bytes, frames: int, note: str) -> None:
     if b"Frame Time:\n" in data:
         data = data.replace(b"Frame Time:\n1", b"Frame Time:\n\n1")
     bvh = parse_bvh(HIERARCHY_TEXT + data)
@@ -55,7 +55,7 @@ def test_what_is_there_is_used_and_noted(data: bytes, frames: int, note: str) ->
         (motion_section(frames=b"Frames: 2\n" * 100_000), "Not a number", None),
     ],
 )
-def test_refusals_say_where_and_what_to_do(data: bytes, title: str, line: int | None) -> None:
+def test_errors_name_line_and_remedy(data: bytes, title: str, line: int | None) -> None:
     with pytest.raises(UnreadableMotion) as caught:
         parse_bvh(HIERARCHY_TEXT + data)
     assert caught.value.title == title
@@ -64,7 +64,7 @@ def test_refusals_say_where_and_what_to_do(data: bytes, title: str, line: int | 
         assert caught.value.line == FIRST_FRAME_LINE + line
 
 
-def test_a_long_line_of_one_word_is_refused_in_a_short_message() -> None:
+def test_long_word_is_rejected_with_a_short_message() -> None:
     with pytest.raises(UnreadableMotion, match="Not a number") as caught:
         parse_bvh(HIERARCHY_TEXT + motion_section(b"x" * 20_000_000))
     assert len(str(caught.value)) < 300

@@ -8,7 +8,7 @@ HIERARCHY_WITH_MOTION = HIERARCHY_TEXT + b"MOTION\n"
 
 
 @pytest.mark.parametrize("name", ["ns:Spine", "Bip01 L Thigh", "upper_arm.L", "Hüfte", "腰"])
-def test_names_may_hold_colons_dots_spaces_and_any_letter(name: str) -> None:
+def test_names_may_contain_colons_dots_spaces_and_any_letter(name: str) -> None:
     assert parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"Spine", name.encode())).names == ("Hips", name)
 
 
@@ -17,7 +17,7 @@ def test_latin_1_names() -> None:
 
 
 @pytest.mark.parametrize("end", [b"End Site Spine_end", b"END SITE", b"EndSite"])
-def test_end_sites_of_any_name(end: bytes) -> None:
+def test_end_sites_may_have_any_name(end: bytes) -> None:
     assert [site.parent for site in parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"End Site", end)).ends] == [1]
 
 
@@ -45,7 +45,7 @@ def test_channels_of_any_number_order_and_case(channels: bytes, read: str) -> No
     assert " ".join(channel[:2] for channel in found) == read
 
 
-def test_brothers_of_one_name_are_noted() -> None:
+def test_duplicate_sibling_names_are_noted() -> None:
     tree = HIERARCHY_WITH_MOTION.replace(b"  }\n}\n", b"  }\n  JOINT Spine { OFFSET 1 0 0 CHANNELS 0 }\n}\n")
     hierarchy = parse_hierarchy(tree)
     assert hierarchy.names == ("Hips", "Spine", "Spine")
@@ -80,7 +80,7 @@ def test_brothers_of_one_name_are_noted() -> None:
         (b"MOTION", b"", "No motion", 17, None),
     ],
 )
-def test_refusals_say_where_and_what_to_do(old: bytes, new: bytes, title: str, line: int, field: str | None) -> None:
+def test_errors_name_line_and_remedy(old: bytes, new: bytes, title: str, line: int, field: str | None) -> None:
     assert old in HIERARCHY_WITH_MOTION
     with pytest.raises(UnreadableMotion) as caught:
         parse_hierarchy(HIERARCHY_WITH_MOTION.replace(old, new, 1))
@@ -88,7 +88,7 @@ def test_refusals_say_where_and_what_to_do(old: bytes, new: bytes, title: str, l
     assert caught.value.hint
 
 
-def test_a_million_joints_side_by_side_and_deep_are_refused() -> None:
+def test_a_million_joints_wide_or_deep_are_rejected() -> None:
     with pytest.raises(UnreadableMotion, match="Too many joints") as caught:
         parse_hierarchy(b"HIERARCHY\nROOT a {\n" + b"JOINT b { }\n" * 1_000_000)
     assert caught.value.line == 2 + MAX_JOINTS
@@ -99,6 +99,6 @@ def test_a_million_joints_side_by_side_and_deep_are_refused() -> None:
         parse_hierarchy(b"HIERARCHY\nROOT a {\n" + b"End Site { }\n" * 1_000_000)
 
 
-def test_long_gaps_are_passed_over() -> None:
+def test_long_runs_of_comments_are_skipped() -> None:
     hierarchy = parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"MOTION", b"\n# x" * 1_000_000 + b"\nMOTION"))
     assert hierarchy.motion_line == MOTION_LINE + 1_000_001

@@ -6,7 +6,7 @@ from bunraku.motion.bvh_kinematics import ancestor_chain, channel_columns, forwa
 from tests.motion.bvh_samples import HIERARCHY_TEXT, motion_section
 
 
-def test_a_quarter_turn_about_z_lays_the_spine_to_the_side() -> None:
+def test_quarter_turn_about_z_rotates_the_spine() -> None:
     bvh = parse_bvh(HIERARCHY_TEXT + motion_section(b"1 2 3 90 0 0 0 0 0", b"1 2 3 90 90 0 0 0 0"))
     position, _ = forward_kinematics(bvh, [1])
     assert position[:, 0].tolist() == [[1.0, 2.0, 3.0]] * 2
@@ -17,7 +17,7 @@ def test_a_quarter_turn_about_z_lays_the_spine_to_the_side() -> None:
 
 
 @pytest.mark.parametrize("y", [10.5, 0.0])
-def test_positions_of_a_limb_stand_for_the_offset_or_are_added_to_it(y: float) -> None:
+def test_limb_position_channels_replace_or_extend_the_offset(y: float) -> None:
     channels = b"6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
     row = b"0 0 0 0 0 0 0.5 %f 0 0 0 0" % y
     bvh = parse_bvh(HIERARCHY_TEXT.replace(b"3 Zrotation Xrotation Yrotation", channels, 1) + motion_section(row, row))
@@ -25,7 +25,7 @@ def test_positions_of_a_limb_stand_for_the_offset_or_are_added_to_it(y: float) -
     assert position[0, 1].tolist() == [0.5, 10.5, 0.0]
 
 
-def test_a_root_without_positions_stands_at_its_offset() -> None:
+def test_root_without_position_channels_stays_at_its_offset() -> None:
     bvh = parse_bvh(
         HIERARCHY_TEXT.replace(b"6 Xposition Yposition Zposition", b"3", 1) + motion_section(b"0 0 0 0 0 0")
     )

@@ -20,14 +20,14 @@ def parse_text(text: bytes, comma: int = NO_COMMA) -> tuple[list[float], int]:
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=20))
-def test_any_double_reads_back_within_its_last_places(numbers: list[float]) -> None:
+def test_any_double_parses_within_its_last_digits(numbers: list[float]) -> None:
     values, bad = parse_text(b" ".join(repr(number).encode() for number in numbers))
     assert bad == -1
     assert values == pytest.approx(numbers, rel=1e-14, abs=1e-320)
 
 
 @given(st.integers(-(10**15) + 1, 10**15 - 1), st.integers(0, 15))
-def test_fifteen_digits_read_exactly(digits: int, places: int) -> None:
+def test_fifteen_digits_parse_exactly(digits: int, places: int) -> None:
     text = f"{digits}e-{places}"
     assert parse_text(text.encode())[0] == [float(text)]
 
@@ -35,7 +35,7 @@ def test_fifteen_digits_read_exactly(digits: int, places: int) -> None:
 @pytest.mark.parametrize(
     "word", ["", "-", ".", "1e", "1e+", "1.2.3", "1-2", "nan", "inf", "0x1", "1,5", "1e309", "1_0"]
 )
-def test_the_first_bad_word_is_found(word: str) -> None:
+def test_first_invalid_word_is_located(word: str) -> None:
     assert parse_text(b"1 2\n" + word.encode() + b" 3")[1] == (4 if word else -1)
 
 

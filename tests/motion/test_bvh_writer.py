@@ -10,7 +10,7 @@ ANGLE = st.floats(-180.0, 180.0)
 
 
 @given(ANGLE, ANGLE | st.sampled_from([-90.0, 90.0]), ANGLE)
-def test_euler_angles_turn_as_the_quaternion(z: float, x: float, y: float) -> None:
+def test_euler_angles_equal_the_quaternion(z: float, x: float, y: float) -> None:
     q = rotation_from_zxy(np.array([z, x, y]))
     angles = euler_zxy(q)
     assert abs(angles[1]) <= 90.0

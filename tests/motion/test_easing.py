@@ -10,7 +10,7 @@ EASES = [easing.minimum_jerk, easing.ease_out, easing.ease_in]
 
 
 @pytest.mark.parametrize("ease", EASES)
-def test_an_ease_rises_from_0_to_1_and_rests_at_both_ends(ease: EasingFunction) -> None:
+def test_easing_rises_from_0_to_1_at_rest_at_both_ends(ease: EasingFunction) -> None:
     u = np.linspace(-0.5, 1.5, 2001)
     eased = ease(u)
     assert np.all(eased[u <= 0.0] == 0.0)
@@ -19,30 +19,28 @@ def test_an_ease_rises_from_0_to_1_and_rests_at_both_ends(ease: EasingFunction) 
     assert np.max(np.abs(np.diff(eased, 2))) / 0.001**2 < 21.0
 
 
-def test_crisp_starts_sooner_and_ends_softer_than_minimum_jerk() -> None:
+def test_ease_out_starts_sooner_and_ends_softer_than_minimum_jerk() -> None:
     early, late = np.array([0.2]), np.array([0.8])
     assert easing.ease_out(early)[0] > easing.minimum_jerk(early)[0] + 0.1
     assert 1.0 - easing.ease_out(late)[0] < 0.2 * (1.0 - easing.minimum_jerk(late)[0])
 
 
 @given(st.lists(st.tuples(st.floats(0, 10), st.floats(0.1, 5), st.floats(-3, 3)), max_size=6), st.floats(-2, 2))
-def test_a_track_begins_at_its_start_and_ends_with_all_moves_made(
-    moves: list[tuple[float, float, float]], start: float
-) -> None:
+def test_track_starts_at_start_and_ends_after_all_moves(moves: list[tuple[float, float, float]], start: float) -> None:
     made = [EasedMove(begin, duration, np.array([delta, -delta])) for begin, duration, delta in moves]
     track = easing.superpose(np.array([0.0, 20.0]), np.array([start, 1.0]), made)
     total = sum(delta for _, _, delta in moves)
     assert np.allclose(track, [[start, 1.0], [start + total, 1.0 - total]], rtol=0, atol=1e-9)
 
 
-def test_overlapping_moves_flow_through_the_key_between_them() -> None:
+def test_overlapping_moves_do_not_stop_at_the_key() -> None:
     time = np.linspace(0.0, 2.0, 401)
     one, two = EasedMove(0.0, 1.0, np.array([1.0])), EasedMove(0.6, 1.0, np.array([1.0]))
     speed = np.gradient(easing.superpose(time, np.zeros(1), [one, two])[:, 0], time)
     assert speed[(time > 0.4) & (time < 1.2)].min() > 0.5
 
 
-def test_a_bump_swells_to_1_at_its_peak_and_is_nothing_outside() -> None:
+def test_bump_peaks_at_1_and_is_zero_outside() -> None:
     assert np.allclose(easing.bump(np.array([0.0, 1.0, 1.5, 3.0, 4.0]), 1.0, 1.5, 3.0), [0, 0, 1, 0, 0])
 
 
@@ -54,6 +52,6 @@ def test_hermite_follows_a_parabola_exactly(a: float, b: float, span: float) -> 
     assert np.allclose(spline, a * time + b * time**2, rtol=0, atol=1e-9)
 
 
-def test_hermite_keeps_its_ends_outside_its_knots() -> None:
+def test_hermite_is_constant_outside_its_knots() -> None:
     spline = easing.hermite(np.array([-1.0, 5.0]), np.array([0.0, 1.0, 2.0]), np.array([3.0, 0.0, 4.0]), np.ones(3))
     assert np.allclose(spline, [3.0, 4.0])

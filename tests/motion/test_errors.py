@@ -1,7 +1,7 @@
 from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 
 
-def test_the_message_says_what_where_and_what_to_do() -> None:
+def test_message_contains_title_line_detail_and_hint() -> None:
     error = UnreadableMotion("Two roots", "a second ROOT", line=7, field="b", hint="send one")
     assert str(error) == "Two roots: line 7: a second ROOT (send one)"
     assert (error.title, error.detail, error.line, error.field, error.hint) == (
@@ -14,6 +14,6 @@ def test_the_message_says_what_where_and_what_to_do() -> None:
     assert str(UnreadableMotion("Empty file", "nothing")) == "Empty file: nothing"
 
 
-def test_shown_text_is_short_and_printable() -> None:
+def test_quoted_excerpt_is_short_and_printable() -> None:
     assert quote_excerpt(b"a\x00b\xff") == "'a\\x00b�'"
     assert quote_excerpt("x" * 50) == "'" + "x" * 40 + "…'"

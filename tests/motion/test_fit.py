@@ -25,19 +25,19 @@ def fit() -> FigureFit:
     )
 
 
-def test_the_source_is_in_the_figures_axes_and_metres(fit: FigureFit) -> None:
+def test_source_is_in_the_figures_axes_and_metres(fit: FigureFit) -> None:
     placed, oriented = world_transforms(MOTION.figure, MOTION.root, MOTION.rotations)
     np.testing.assert_allclose(fit.position, placed, atol=1e-6)
     np.testing.assert_allclose(np.abs(np.sum(fit.turn[:, :12] * oriented[:, :12], axis=-1)), 1.0, atol=1e-9)
 
 
-def test_without_first_keeps_the_rest(fit: FigureFit) -> None:
+def test_without_first_frame_keeps_the_others(fit: FigureFit) -> None:
     shorter = fit.without_first_frame()
     np.testing.assert_array_equal(shorter.position, fit.position[1:])
     assert shorter.joint_positions.shape == (39, 18, 3)
 
 
-def test_bones_and_what_lies_beyond(fit: FigureFit) -> None:
+def test_bones_and_farthest_descendants_are_measured(fit: FigureFit) -> None:
     bone, length = fit.measure_bone(JOINT_INDEX["l_knee"])
     np.testing.assert_allclose(bone, MOTION.figure.offsets[JOINT_INDEX["l_ankle"]], atol=1e-6)
     assert length == pytest.approx(np.linalg.norm(bone), abs=1e-6)

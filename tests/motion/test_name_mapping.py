@@ -238,7 +238,7 @@ def mapped_limb_names(naming: JointMapping, names: list[str]) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_each_programs_names_are_known(name: str) -> None:
+def test_names_of_each_program_are_mapped(name: str) -> None:
     names, parents = BODIES[name][0]
     naming = map_by_name(names, parents)
     assert naming is not None
@@ -250,7 +250,7 @@ def test_each_programs_names_are_known(name: str) -> None:
 
 @pytest.mark.parametrize("prefix", ["rig:", "Character1_", "Armature|", "Actor 1:Skeleton:", "Bip001 "])
 @pytest.mark.parametrize("name", ["MotionBuilder", "LAFAN", "Xsens", "Rokoko"])
-def test_namespaces_and_prefixes_are_taken_off(name: str, prefix: str) -> None:
+def test_namespaces_and_prefixes_are_removed(name: str, prefix: str) -> None:
     names, parents = BODIES[name][0]
     naming = map_by_name([prefix + one for one in names], parents)
     assert naming is not None
@@ -270,7 +270,7 @@ def test_case_and_punctuation_do_not_matter(name: str, change: object) -> None:
     assert mapped_limb_names(naming, names) == expected_names(name)
 
 
-def test_rigify_deform_bones_are_blenders() -> None:
+def test_rigify_deform_bones_match_blender() -> None:
     names, parents = BODIES["Blender"][0]
     naming = map_by_name([f"DEF-{name}" for name in names], parents)
     assert naming is not None
@@ -278,25 +278,25 @@ def test_rigify_deform_bones_are_blenders() -> None:
     assert mapped_limb_names(naming, names) == expected_names("Blender")
 
 
-def test_names_that_hang_wrongly_are_not_believed() -> None:
+def test_names_in_a_wrong_hierarchy_are_ignored() -> None:
     names, parents = BODIES["MotionBuilder"][0]
     swapped = {"LeftUpLeg": "LeftLeg", "LeftLeg": "LeftUpLeg"}
     assert map_by_name([swapped.get(name, name) for name in names], parents) is None
 
 
-def test_half_a_body_fits_no_profile() -> None:
+def test_half_a_body_matches_no_profile() -> None:
     names, parents = build_tree(
         "Hips,LeftUpLeg,LeftLeg,LeftFoot", "Hips,Spine,Head", "Spine,LeftArm,LeftForeArm,LeftHand"
     )
     assert map_by_name(names, parents) is None
 
 
-def test_names_of_nobody_fit_no_profile() -> None:
+def test_unknown_names_match_no_profile() -> None:
     names, parents = BODIES["MotionBuilder"][0]
     assert map_by_name([f"joint{index}" for index in range(len(names))], parents) is None
 
 
-def test_the_first_of_two_joints_of_one_name_is_taken() -> None:
+def test_first_of_two_equal_names_is_used() -> None:
     names, parents = BODIES["MotionBuilder"][0]
     naming = map_by_name([*names, "LeftLeg"], [*parents, 0])
     assert naming is not None
@@ -307,12 +307,12 @@ def test_the_first_of_two_joints_of_one_name_is_taken() -> None:
     ("name", "plain"),
     [("rig:upper_arm.L", "upperarml"), ("Bip01 L Thigh", "bip01lthigh"), ("a|b|Hips", "hips"), ("Hips:", "hips")],
 )
-def test_bare_names(name: str, plain: str) -> None:
+def test_names_are_normalised(name: str, plain: str) -> None:
     assert normalise_name(name) == plain
 
 
 @given(name=st.text(max_size=30))
-def test_a_bare_name_is_bare(name: str) -> None:
+def test_normalised_name_is_stable(name: str) -> None:
     plain = normalise_name(name)
     assert plain == "" or plain.isalnum()
     assert normalise_name(plain) == plain
@@ -324,7 +324,7 @@ def parent_arrays(draw: st.DrawFn) -> list[int]:
 
 
 @given(parents=parent_arrays(), data=st.data())
-def test_the_common_ancestor_is_over_all_and_the_lowest(parents: list[int], data: st.DataObject) -> None:
+def test_common_ancestor_is_the_lowest_one(parents: list[int], data: st.DataObject) -> None:
     joints = data.draw(st.lists(st.integers(0, len(parents) - 1), min_size=1, max_size=4))
 
     def over(joint: int) -> bool:

@@ -29,17 +29,17 @@ def all_patterns(profile: NamingProfile) -> list[str]:
     return [name for pattern in [*profile.trunk_patterns.values(), *limbs] for name in pattern.split("|")]
 
 
-def test_every_profile_has_a_name_of_its_own() -> None:
+def test_profile_names_are_unique() -> None:
     assert len({profile.name for profile in PROFILES}) == len(PROFILES)
 
 
 @pytest.mark.parametrize("name", NAMED)
-def test_programs_that_must_be_known_are(name: str) -> None:
+def test_required_programs_have_a_profile(name: str) -> None:
     assert name in [profile.name for profile in PROFILES]
 
 
 @pytest.mark.parametrize("profile", PROFILES, ids=lambda profile: profile.name)
-def test_a_profile_names_joints_of_the_figure_and_each_but_once(profile: NamingProfile) -> None:
+def test_profile_maps_each_joint_once(profile: NamingProfile) -> None:
     assert set(profile.trunk_patterns) <= set(JOINTS)
     assert {f"{side}_{joint}" for side in "lr" for joint in profile.limb_patterns} <= set(JOINTS)
     assert set(profile.limb_patterns) == set(LIMB_JOINT_NAMES)
@@ -50,6 +50,6 @@ def test_a_profile_names_joints_of_the_figure_and_each_but_once(profile: NamingP
 
 
 @pytest.mark.parametrize("profile", [p for p in PROFILES if p.marker], ids=lambda profile: profile.name)
-def test_signs_are_regular_expressions_on_bare_names(profile: NamingProfile) -> None:
+def test_markers_match_normalised_names(profile: NamingProfile) -> None:
     assert not re.fullmatch(profile.marker, "")
     assert profile.marker == profile.marker.lower()

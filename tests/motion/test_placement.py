@@ -12,7 +12,7 @@ from tests.vectors.blocks import random_motion
 COORDINATES = st.floats(-6.0, 6.0)
 
 
-def test_in_the_middle_nothing_is_moved() -> None:
+def test_stage_centre_moves_nothing() -> None:
     motion = random_motion(0.3, 30.0, 3)
     root, rotations = STAGE_CENTRE.apply(motion.root, motion.rotations)
     assert root is motion.root
@@ -20,7 +20,7 @@ def test_in_the_middle_nothing_is_moved() -> None:
 
 
 @given(COORDINATES, COORDINATES, COORDINATES)
-def test_every_point_is_turned_from_z_towards_x_and_moved(x: float, z: float, turn: float) -> None:
+def test_placement_rotates_from_z_towards_x_then_translates(x: float, z: float, turn: float) -> None:
     motion = random_motion(0.2, 30.0, 3)
     before = joint_and_tip_positions(motion.figure, motion.root, motion.rotations)
     after = joint_and_tip_positions(motion.figure, *Placement(x, z, turn).apply(motion.root, motion.rotations))
@@ -30,7 +30,7 @@ def test_every_point_is_turned_from_z_towards_x_and_moved(x: float, z: float, tu
     np.testing.assert_allclose(after[..., 2], cosine * before[..., 2] - sine * before[..., 0] + z, atol=1e-9)
 
 
-def test_one_pose_is_put_as_many_are() -> None:
+def test_single_pose_is_placed_like_many() -> None:
     motion = random_motion(0.2, 30.0, 4)
     place = Placement(1.0, -2.0, 0.7)
     root, rotations = place.apply(motion.root, motion.rotations)
@@ -51,18 +51,18 @@ def test_one_pose_is_put_as_many_are() -> None:
         ([0.0, -100.5, 0.0], "100 metres"),
     ],
 )
-def test_what_is_no_place_is_refused(said: object, says: str) -> None:
+def test_invalid_placement_is_rejected(said: object, says: str) -> None:
     with pytest.raises(ValueError, match=says):
         Placement.parse(said)
 
 
-def test_a_place_is_read_as_it_was_told() -> None:
+def test_valid_placement_is_parsed() -> None:
     assert Placement.parse([1, -2.5, 0.25]) == Placement(1.0, -2.5, 0.25)
     assert Placement.parse(list(STAGE_CENTRE)) == STAGE_CENTRE
 
 
 @given(st.lists(st.tuples(COORDINATES, COORDINATES, st.floats(0.5, 2.0), COORDINATES), min_size=1, max_size=4))
-def test_in_a_row_each_is_as_far_from_the_next_as_is_asked_and_all_are_about_the_middle(
+def test_row_has_the_given_gaps_and_is_centred(
     dances: list[tuple[float, ...]],
 ) -> None:
     middles = [np.array([x, z]) for x, z, _, _ in dances]

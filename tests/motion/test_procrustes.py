@@ -21,7 +21,7 @@ def random_points(random: np.random.Generator) -> Array:
 
 
 @given(seed=st.integers(0, 10_000))
-def test_kabsch_finds_the_turn_that_was_made(seed: int) -> None:
+def test_kabsch_recovers_the_rotation(seed: int) -> None:
     random = np.random.default_rng(seed)
     points, turn = random_points(random), random_rotations(random, 20)
     found = procrustes.solve_kabsch(points, rotation.rotate(turn[:, None], points), np.array([1.0, 2.0, 2.0]))
@@ -29,7 +29,7 @@ def test_kabsch_finds_the_turn_that_was_made(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-def test_no_turn_nearby_is_better_than_kabschs(seed: int) -> None:
+def test_kabsch_is_a_local_optimum(seed: int) -> None:
     random = np.random.default_rng(seed)
     points, weights = random_points(random), random.uniform(0.5, 2.0, 3)
     targets = rotation.rotate(random_rotations(random, 5)[:, None], points) + random.normal(0.0, 0.05, (5, 3, 3))
@@ -48,7 +48,7 @@ def test_kabsch_never_mirrors(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-def test_two_points_are_brought_over_one_another(seed: int) -> None:
+def test_two_points_are_aligned(seed: int) -> None:
     random = np.random.default_rng(seed)
     points = np.array([[0.2, 0.4, 0.0], [-0.2, 0.4, 0.0]])
     targets = rotation.rotate(random_rotations(random, 6)[:, None], points)
@@ -57,14 +57,14 @@ def test_two_points_are_brought_over_one_another(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-def test_mean_places_are_where_rigid_points_lie(seed: int) -> None:
+def test_mean_local_positions_of_rigid_points_are_exact(seed: int) -> None:
     random = np.random.default_rng(seed)
     points, turn = random_points(random), random_rotations(random, 20)
     targets = rotation.rotate(turn[:, None], points)
     np.testing.assert_allclose(procrustes.mean_local_positions(turn, targets), points, atol=1e-12)
 
 
-def test_misfit_is_the_weighted_root_mean_square() -> None:
+def test_rms_error_is_weighted() -> None:
     still = np.tile(rotation.IDENTITY, (2, 1))
     targets = np.zeros((2, 2, 3))
     targets[0, 0, 0], targets[1, 1, 1] = 3.0, 4.0
@@ -74,7 +74,7 @@ def test_misfit_is_the_weighted_root_mean_square() -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-def test_fitted_places_of_rigid_points_are_their_rest_whatever_the_beginning(seed: int) -> None:
+def test_fitted_positions_of_rigid_points_equal_their_rest(seed: int) -> None:
     random = np.random.default_rng(seed)
     points, turn = random_points(random), random_rotations(random, 30, 0.6)
     targets = rotation.rotate(turn[:, None], points)
@@ -83,7 +83,7 @@ def test_fitted_places_of_rigid_points_are_their_rest_whatever_the_beginning(see
 
 
 @given(seed=st.integers(0, 10_000))
-def test_fitted_places_are_no_worse_than_the_means_they_begin_with(seed: int) -> None:
+def test_fitted_positions_are_no_worse_than_the_initial_means(seed: int) -> None:
     random = np.random.default_rng(seed)
     points, turn = random_points(random), random_rotations(random, 30, 0.6)
     targets = rotation.rotate(turn[:, None], points) + random.normal(0.0, 0.03, (30, 3, 3))

@@ -34,7 +34,7 @@ def test_units(unit: str, per_metre: float) -> None:
 
 
 @pytest.mark.parametrize(("per_metre", "unit"), [(0.7, "m"), (1.4, "m"), (70.0, "cm"), (140.0, "cm")])
-def test_a_child_and_a_giant_are_measured_in_the_same_unit(per_metre: float, unit: str) -> None:
+def test_child_and_giant_have_the_same_unit(per_metre: float, unit: str) -> None:
     rest, _ = rest_pose_of(export_bvh(smooth_motion(frames=5), units_per_metre=per_metre))
     assert rest.unit == unit
 
@@ -49,7 +49,7 @@ def test_rest_poses(degrees: int, name: str) -> None:
     np.testing.assert_allclose(np.abs(rest.rest_to_figure @ rotation.IDENTITY), 1.0)
 
 
-def test_arms_that_point_forwards_are_another_pose() -> None:
+def test_arms_pointing_forwards_are_an_other_pose() -> None:
     at_rest = pose_with_arms(0.0)
     for name in JOINTS[12:]:
         at_rest[JOINT_INDEX[name]] = rotation.from_coordinate_axis(0, np.array(-np.pi / 2))
@@ -58,7 +58,7 @@ def test_arms_that_point_forwards_are_another_pose() -> None:
 
 
 @pytest.mark.parametrize("swing", [0.0, 0.4])
-def test_a_bone_aligned_rest_takes_the_straightest_frame(swing: float) -> None:
+def test_bone_aligned_rest_uses_the_straightest_frame(swing: float) -> None:
     motion = smooth_motion(frames=40, swing=swing)
     rest, _ = rest_pose_of(export_bvh(motion, bone_aligned(motion.figure)))
     assert rest.pose == "bone-aligned"
@@ -72,7 +72,7 @@ def test_a_bone_aligned_rest_takes_the_straightest_frame(swing: float) -> None:
 
 
 @given(turn=st.floats(-3.1, 3.1), tilt=st.sampled_from([(0, 0.0), (0, np.pi / 2), (0, -np.pi / 2), (2, np.pi / 2)]))
-def test_the_body_is_turned_up_and_to_the_front_wherever_it_faces(turn: float, tilt: tuple[int, float]) -> None:
+def test_body_is_rotated_upright_and_to_the_front(turn: float, tilt: tuple[int, float]) -> None:
     lie = rotation.from_coordinate_axis(tilt[0], np.array(tilt[1]))
     axes = rotation.multiply(lie, rotation.from_coordinate_axis(1, np.array(turn)))
     rest, _ = rest_pose_of(export_bvh(smooth_motion(frames=3, swing=0.2), pose_with_arms(90.0), axes))
@@ -82,7 +82,7 @@ def test_the_body_is_turned_up_and_to_the_front_wherever_it_faces(turn: float, t
     np.testing.assert_allclose(rotation.rotate(apart, UP), UP, atol=1e-6)
 
 
-def test_a_motion_on_another_axis_than_its_rest_is_set_on_its_feet() -> None:
+def test_motion_on_another_axis_than_its_rest_is_rotated() -> None:
     motion = smooth_motion(frames=30, swing=0.2)
     source = bvh.parse_bvh(export_bvh(motion))
     lie = rotation.from_coordinate_axis(0, np.array(np.pi / 2))
@@ -102,7 +102,7 @@ def lying_motion() -> Motion:
     return Motion(motion.figure, motion.fps, motion.root * [1.0, 0.1, 1.0], rotations)
 
 
-def test_a_body_that_lies_is_left_lying() -> None:
+def test_lying_body_stays_lying() -> None:
     rest, _ = rest_pose_of(export_bvh(lying_motion()))
     np.testing.assert_allclose(rotation.rotate(rest.motion_to_figure, UP), UP, atol=1e-9)
     assert any("lies" in sentence for sentence in rest.assumptions)
@@ -114,7 +114,7 @@ def sampled_positions(motion: Motion) -> Array:
 
 
 @pytest.mark.parametrize("crossed", [("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "midtarsal")])
-def test_arms_and_legs_named_crosswise_are_put_on_one_side(crossed: tuple[str, ...]) -> None:
+def test_crossed_arms_and_legs_are_put_on_one_side(crossed: tuple[str, ...]) -> None:
     joints = dict(JOINTS_BY_NAME)
     for name in crossed:
         joints[f"l_{name}"], joints[f"r_{name}"] = joints[f"r_{name}"], joints[f"l_{name}"]
@@ -123,14 +123,14 @@ def test_arms_and_legs_named_crosswise_are_put_on_one_side(crossed: tuple[str, .
     assert said
 
 
-def test_sides_that_are_right_stay_and_the_mapping_given_is_not_changed() -> None:
+def test_correct_sides_stay_and_the_input_is_unchanged() -> None:
     given = dict(JOINTS_BY_NAME)
     found, said = resolve_sides(sampled_positions(smooth_motion(frames=20)), given)
     assert (found, said, given) == (JOINTS_BY_NAME, [], JOINTS_BY_NAME)
 
 
 @pytest.mark.parametrize(("frames", "sampled_frames"), [(1, 1), (2, 2), (256, 256), (1000, 256)])
-def test_sampled_frames_begin_and_end_with_the_clip(frames: int, sampled_frames: int) -> None:
+def test_sampled_frames_include_first_and_last(frames: int, sampled_frames: int) -> None:
     source = bvh.parse_bvh(export_bvh(smooth_motion(frames=frames)))
     chosen = sample_frames(source)
     assert len(chosen) == sampled_frames

@@ -13,21 +13,21 @@ ROTATIONS = VECTORS.map(lambda v: rotation.from_rotation_vector(v * 3))
 
 
 @given(ROTATIONS, ROTATIONS, VECTORS)
-def test_multiply_is_one_turn_after_the_other(a: rotation.Array, b: rotation.Array, v: rotation.Array) -> None:
+def test_multiply_composes_rotations(a: rotation.Array, b: rotation.Array, v: rotation.Array) -> None:
     np.testing.assert_allclose(
         rotation.rotate(rotation.multiply(a, b), v), rotation.rotate(a, rotation.rotate(b, v)), atol=1e-12
     )
 
 
 @given(ROTATIONS, VECTORS)
-def test_rotate_keeps_lengths_and_conjugate_undoes_it(q: rotation.Array, v: rotation.Array) -> None:
+def test_rotate_keeps_lengths_and_conjugate_inverts_it(q: rotation.Array, v: rotation.Array) -> None:
     turned = rotation.rotate(q, v)
     assert np.isclose(np.linalg.norm(turned), np.linalg.norm(v), atol=1e-12)
     np.testing.assert_allclose(rotation.rotate(rotation.conjugate(q), turned), v, atol=1e-12)
 
 
 @given(ROTATIONS)
-def test_every_form_of_a_rotation_leads_back(q: rotation.Array) -> None:
+def test_every_representation_round_trips(q: rotation.Array) -> None:
     for again in (
         rotation.from_rotation_vector(rotation.to_rotation_vector(q)),
         rotation.from_axis_angle(rotation.to_axis_angle(q)),
@@ -43,19 +43,19 @@ def test_half_turns_keep_their_axis_through_a_matrix() -> None:
 
 
 @given(VECTORS, VECTORS)
-def test_between_brings_one_direction_to_the_other(a: rotation.Array, b: rotation.Array) -> None:
+def test_rotation_between_aligns_directions(a: rotation.Array, b: rotation.Array) -> None:
     a, b = rotation.normalise(a), rotation.normalise(b)
     if np.linalg.norm(a) > 0 and np.linalg.norm(b) > 0:
         np.testing.assert_allclose(rotation.rotate(rotation.rotation_between(a, b), a), b, atol=1e-5)
 
 
-def test_between_opposite_directions_is_a_half_turn() -> None:
+def test_opposite_directions_give_a_half_turn() -> None:
     a = np.array([[1.0, 0, 0], [0, 0, -1.0]])
     np.testing.assert_allclose(rotation.rotate(rotation.rotation_between(a, -a), a), -a, atol=1e-12)
 
 
 @given(ROTATIONS, ROTATIONS, st.floats(0, 1))
-def test_slerp_turns_at_an_even_speed(a: rotation.Array, b: rotation.Array, t: float) -> None:
+def test_slerp_has_constant_speed(a: rotation.Array, b: rotation.Array, t: float) -> None:
     def angle(x: rotation.Array, y: rotation.Array) -> float:
         return float(np.linalg.norm(rotation.to_rotation_vector(rotation.multiply(rotation.conjugate(x), y))))
 
@@ -64,7 +64,7 @@ def test_slerp_turns_at_an_even_speed(a: rotation.Array, b: rotation.Array, t: f
     assert np.isclose(angle(middle, b), (1 - t) * angle(a, b), atol=1e-6)
 
 
-def test_continuous_follows_three_whole_turns() -> None:
+def test_unwrapped_vectors_follow_three_turns() -> None:
     angle = np.linspace(0, 6 * np.pi, 200)
     wrapped = rotation.to_rotation_vector(rotation.from_coordinate_axis(1, angle))
     followed = rotation.unwrap_rotation_vectors(wrapped)

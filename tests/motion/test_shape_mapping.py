@@ -42,7 +42,7 @@ def test_real_clips_with_scrambled_names_are_mapped_as_by_name(clip: str, shared
     assert any("shape" in sentence for sentence in shaped.assumptions)
 
 
-def test_a_dances_limbs_and_head_are_found_from_bones_alone() -> None:
+def test_limbs_and_head_are_found_from_bones_alone() -> None:
     source = bvh.parse_bvh(export_bvh(smooth_motion(frames=3), pose_with_arms(45.0)))
     joints = map_by_shape(source).joints
     left, right = (
@@ -60,7 +60,7 @@ def test_find_head_is_the_end_of_the_spine() -> None:
     assert find_head(source, {name: JOINT_INDEX[name] for name in JOINTS}) == JOINT_INDEX["skullbase"]
 
 
-def test_a_body_with_no_head_has_none() -> None:
+def test_headless_body_has_no_head() -> None:
     source = bvh.parse_bvh(export_bvh(smooth_motion(frames=2)))
     kept = [joint for joint, name in enumerate(source.names) if name != "skullbase"]
     index = {joint: new for new, joint in enumerate(kept)}
@@ -76,7 +76,7 @@ def test_a_body_with_no_head_has_none() -> None:
     assert find_head(headless, {name: index[JOINT_INDEX[name]] for name in JOINTS if name != "skullbase"}) is None
 
 
-def test_a_body_of_one_pair_of_limbs_is_refused_with_a_hint() -> None:
+def test_body_with_one_pair_of_limbs_is_rejected_with_a_hint() -> None:
     source = bvh.parse_bvh(export_bvh(smooth_motion(frames=2)))
     keep = [joint for joint in range(18) if joint < JOINT_INDEX["vl5"]]
     legs = replace(

@@ -27,7 +27,7 @@ def test_parents_come_before_their_children() -> None:
     assert all(parent < joint for joint, parent in enumerate(PARENTS))
 
 
-def test_standard_figure_stands_as_the_specification_says() -> None:
+def test_standard_figure_matches_the_specification() -> None:
     motion = rest_motion()
     position, _ = world_transforms(motion.figure, motion.figure.offsets[0], motion.rotations[0])
     np.testing.assert_allclose(position[JOINT_INDEX["l_wrist"]], [0.1984, 0.8663, -0.0583], atol=1e-9)
@@ -36,7 +36,7 @@ def test_standard_figure_stands_as_the_specification_says() -> None:
     np.testing.assert_allclose(crown, [0.0050, 1.7504, 0.0055], atol=1e-9)
 
 
-def test_a_turned_parent_carries_its_children() -> None:
+def test_rotated_parent_moves_its_children() -> None:
     motion = rest_motion()
     motion.rotations[0, JOINT_INDEX["l_shoulder"]] = rotation.from_coordinate_axis(2, np.array(np.pi / 2))
     position, orientation = world_transforms(motion.figure, motion.root, motion.rotations)
@@ -45,14 +45,14 @@ def test_a_turned_parent_carries_its_children() -> None:
     np.testing.assert_allclose(orientation[0, JOINT_INDEX["l_wrist"]], orientation[0, JOINT_INDEX["l_shoulder"]])
 
 
-def test_channels_are_the_papers_nineteen() -> None:
+def test_channels_are_the_nineteen_of_the_paper() -> None:
     made = to_channels(rest_motion(5))
     assert len(made) == CHANNEL_COUNT
     assert made[0].shape == (5, 3)
     assert all(channel.shape == (5, 4) for channel in made[1:])
 
 
-def test_wrong_shapes_are_refused() -> None:
+def test_wrong_shapes_are_rejected() -> None:
     with pytest.raises(ValueError, match="offsets and tips"):
         Figure(np.zeros((17, 3)), np.zeros((18, 3)))
     with pytest.raises(ValueError, match="frame rate"):
@@ -61,7 +61,7 @@ def test_wrong_shapes_are_refused() -> None:
         Motion(standard_figure(), 30.0, np.zeros((2, 3)), np.zeros((1, JOINT_COUNT, 4)))
 
 
-def test_the_front_is_the_mean_facing_and_none_for_one_who_turns() -> None:
+def test_facing_is_the_mean_and_zero_for_a_turning_motion() -> None:
     motion = rest_motion(60)
     assert mean_facing(motion) == 0
     motion.rotations[:, 0] = rotation.from_coordinate_axis(1, np.linspace(2.0, 2.6, 60))

@@ -27,7 +27,7 @@ def fit() -> FigureFit:
     )
 
 
-def test_the_trunk_lies_on_a_source_that_has_it(fit: FigureFit) -> None:
+def test_trunk_coincides_with_the_source(fit: FigureFit) -> None:
     fit_trunk(fit)
     placed, _ = world_transforms(MOTION.figure, MOTION.root, MOTION.rotations)
     trunk = [JOINT_INDEX[name] for name in ("humanoid_root", "sacroiliac", "vl5", "skullbase")]
@@ -36,7 +36,7 @@ def test_the_trunk_lies_on_a_source_that_has_it(fit: FigureFit) -> None:
     np.testing.assert_allclose(fit.offsets[carried], MOTION.figure.offsets[carried], atol=1e-5)
 
 
-def test_a_source_without_a_head_gets_one_over_the_shoulders(fit: FigureFit) -> None:
+def test_headless_source_gets_a_head_above_the_shoulders(fit: FigureFit) -> None:
     headless = replace(fit, joints={joint: of for joint, of in fit.joints.items() if joint != JOINT_INDEX["skullbase"]})
     fit_trunk(headless)
     head = headless.offsets[JOINT_INDEX["skullbase"]]
@@ -45,7 +45,7 @@ def test_a_source_without_a_head_gets_one_over_the_shoulders(fit: FigureFit) -> 
     assert headless.tips[JOINT_INDEX["skullbase"]].tolist() == [0.0, CROWN_OFFSET_M, 0.0]
 
 
-def test_hips_that_move_in_the_pelvis_turn_it(fit: FigureFit) -> None:
+def test_moving_hips_rotate_the_pelvis(fit: FigureFit) -> None:
     swung = replace(fit, position=fit.position.copy())
     hips = [JOINT_INDEX["l_hip"], JOINT_INDEX["r_hip"]]
     sway = 0.03 * np.sin(np.arange(40) / 5.0)
@@ -59,7 +59,7 @@ def test_hips_that_move_in_the_pelvis_turn_it(fit: FigureFit) -> None:
     assert np.abs(np.sum(swung.joint_orientations[:, pelvis] * fit.turn[:, pelvis], axis=-1)).min() < 1.0 - 1e-3
 
 
-def test_the_whole_analysis_finds_the_same_trunk() -> None:
+def test_analysis_finds_the_same_trunk() -> None:
     made = analyse(bvh.parse_bvh(export_bvh(MOTION))).motion
     np.testing.assert_allclose(
         made.figure.offsets[JOINT_INDEX["vl5"]], MOTION.figure.offsets[JOINT_INDEX["vl5"]], atol=1e-5

@@ -1,4 +1,4 @@
-"""The body that performs a score: trunk, head and arms from pose to pose, over legs that carry the weight."""
+"""Animation of a score: trunk, head and arms from pose to pose, over legs that carry the weight."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, Figure, Motion
 
 HEAD_LEAD_S, SHOULDER_LEAD_S, ELBOW_LAG_S, WRIST_LAG_S = 0.06, 0.03, 0.03, 0.09
-"""Seconds by which parts set out before or after their beat: the head leads, the hand is drawn along."""
+"""Offsets of body parts from their beat: the head leads, the hand follows."""
 TURN_ANTICIPATION_S = 0.3
-"""Seconds by which the head sees a turn of the hips coming."""
+"""Time by which the head anticipates a turn of the hips."""
 MAX_HEAD_LEAD_RAD = np.radians(40.0)
-"""The most by which it then turns ahead of them."""
+"""Largest angle by which the head then leads the hips."""
 BREATH_COUNT = 6
-"""Breaths in one dance, a whole number so that it closes."""
+"""Breaths per loop, a whole number so that the loop closes."""
 _SHOULDER_NEUTRAL: Array = np.array([-0.8, 0.0, 0.8])
-"""Rotation vector of a left arm held forward and out, the middle of its range. Arms are blended as rotation vectors
-from here, so that none comes near the half turn where such a vector jumps."""
+"""Rotation vector of a left arm held forward and out, the middle of its range.
+
+Arms are blended as rotation vectors relative to it, so that none comes near half a turn, where such a vector jumps.
+"""
 _MIRROR_SIGNS: dict[Side, Array] = {"left": np.array([1.0, 1.0, 1.0]), "right": np.array([1.0, -1.0, -1.0])}
 
 
 def animate(score: Score, figure: Figure, fps: float) -> Motion:
-    """The motion of `score` danced by `figure` at `fps` frames a second; its end leads on to its beginning."""
+    """Return the motion of `score` for `figure` at `fps` frames per second; its end leads to its start."""
     time = np.arange(round(score.duration * fps)) / fps
     rotations = np.tile(rotation.IDENTITY, (len(time), JOINT_COUNT, 1))
     _animate_trunk(score, time, rotations)
@@ -42,7 +44,7 @@ def animate(score: Score, figure: Figure, fps: float) -> Motion:
 
 
 def _interpolate_keys(score: Score, time: Array, extract: Callable[[Pose], Array]) -> Array:
-    """What `value` says of a pose (k,), from key to key over `time` (n,): (n, k)."""
+    """Interpolate the values (k,) that `extract` returns for each pose over `time` (n,): (n, k)."""
     beat = score.seconds_per_beat
     start = now = extract(score.rest_pose)
     moves = []
@@ -55,7 +57,7 @@ def _interpolate_keys(score: Score, time: Array, extract: Callable[[Pose], Array
 
 
 def _stamp_shock(score: Score, time: Array) -> Array:
-    """How the stamps shake the body (n,), 0 to 1 and back at each."""
+    """Return the shock of the stamps to the body (n,), 0 to 1 and back at each."""
     shock = np.zeros_like(time)
     for step in score.steps:
         if step.is_stamp:
@@ -65,13 +67,13 @@ def _stamp_shock(score: Score, time: Array) -> Array:
 
 
 def _hip_drop(score: Score, time: Array) -> Array:
-    """By how much the hips sink below standing (n,), metres."""
+    """Return the depth (n,) in metres of the hips below standing."""
     depth: Array = _interpolate_keys(score, time + SHOULDER_LEAD_S, lambda pose: np.array([pose.depth]))[:, 0]
     return depth + 0.012 * _stamp_shock(score, time)
 
 
 def _animate_trunk(score: Score, time: Array, rotations: Array) -> None:
-    """Sets root, sacroiliac, vl5 and skullbase in `rotations`."""
+    """Set root, sacroiliac, vl5 and skullbase in `rotations`."""
     facing = balance.hip_facing(score, time)
     trunk = _interpolate_keys(score, time + SHOULDER_LEAD_S, lambda pose: np.radians([pose.bow, pose.lean, pose.twist]))
     head = _interpolate_keys(score, time + HEAD_LEAD_S, lambda pose: np.radians([pose.look, pose.nod, pose.tilt]))
@@ -90,13 +92,13 @@ def _animate_trunk(score: Score, time: Array, rotations: Array) -> None:
 
 
 def _rotation_yxz(y: Array, x: Array, z: Array) -> Array:
-    """Turns (n, 4) about z, then x, then y, by angles (n,) in radians."""
+    """Return rotations (n, 4) about z, then x, then y, by angles (n,) in radians."""
     about = rotation.from_coordinate_axis
     return rotation.multiply(rotation.multiply(about(1, y), about(0, x)), about(2, z))
 
 
 def _animate_arm(score: Score, figure: Figure, time: Array, side: Side, rotations: Array) -> None:
-    """Sets shoulder, elbow and wrist of one side in `rotations`; each arm of a pose is solved once."""
+    """Set shoulder, elbow and wrist of one side in `rotations`; the arm of each pose is solved once."""
     arms = {pose: getattr(pose, side) for pose in (score.rest_pose, *(key.pose for key in score.keys))}
     solved = {pose: solve_arm(figure, arm) for pose, arm in arms.items()}
     shoulder = _interpolate_keys(score, time + SHOULDER_LEAD_S, lambda pose: solved[pose][:3])
@@ -111,7 +113,8 @@ def _animate_arm(score: Score, figure: Figure, time: Array, side: Side, rotation
 
 
 def solve_arm(figure: Figure, arm: Arm) -> Array:
-    """A left arm (7,), radians: shoulder, a rotation vector from the middle of its range, bend of the elbow, wrist."""
+    """Return a left arm (7,) in radians: shoulder (rotation vector from neutral), elbow bend, wrist (rotation
+    vector)."""
     upper, lower = figure.offsets[JOINT_INDEX["l_elbow"]], figure.offsets[JOINT_INDEX["l_wrist"]]
     target = np.array([arm.wrist_position]) * two_bone_ik.end_distance(upper, lower)
     turned, bend = two_bone_ik.solve_two_bone(

@@ -1,4 +1,4 @@
-"""What the body must do to stand on its feet: where the hips face, where the weight is, and how hops carry them."""
+"""Hips and weight of a score: facing, target of the centre of mass, and height of hops."""
 
 from __future__ import annotations
 
@@ -13,35 +13,36 @@ from bunraku.motion.easing import EasedMove
 from bunraku.motion.rotation import Array
 
 HOP_PUSH_OFF_S = 0.4
-"""Seconds in which the hips gather for a hop and recover from one."""
+"""Duration in which the hips prepare for a hop and recover from it."""
 MIN_LONG_STAND_S = 1.2
-"""Seconds on both feet from which on the weight comes to rest between them."""
+"""Duration on both feet from which the weight settles between them."""
 MAX_SETTLE_S = 0.4
-"""Seconds in which it does so, so that a held pose is held."""
+"""Longest duration of that movement, so that a held pose is still."""
 
 
 def hip_facing(score: Score, time: Array) -> Array:
-    """Where the hips face (n,) at `time` (n,) seconds, in radians to the left of the audience: between the two feet."""
+    """Return the facing of the hips (n,) at `time` (n,) seconds, in radians to the audience's left: between the
+    feet."""
     feet = dict(score.initial_feet)
     start = now = _mean_foot_turn(feet)
     moves = []
     for footfall in score.list_footfalls():
         feet |= footfall.targets
         begin, end = footfall.takeoff_beat * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
-        # the hips begin a turn before the foot does and end it after
+        # the hips start a turn before the foot does and end it later
         moves.append(EasedMove(begin - 0.12, end - begin + 0.3, np.array([_mean_foot_turn(feet) - now])))
         now = _mean_foot_turn(feet)
     return easing.superpose(time, np.array([start]), moves)[:, 0]
 
 
 def weight_target(score: Score, time: Array) -> Array:
-    """Where the centre of mass is to be (n, 2), x and z in metres, at `time` (n,) seconds.
+    """Return the target of the centre of mass (n, 2), x and z in metres, at `time` (n,) seconds.
 
     It is over the standing foot before the other is lifted and until it has landed, and between the feet in a long
     stand.
     """
     feet = dict(score.initial_feet)
-    # where the weight stands, from when to when, and how long before and after it may be on its way
+    # position of the weight, start and end, and time before and after that it may move
     stands: list[tuple[Array, float, float, float]] = [(_midpoint(feet), 0.0, 0.0, 0.0)]
     for footfall in score.list_footfalls():
         begin, end = footfall.takeoff_beat * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
@@ -63,10 +64,10 @@ def weight_target(score: Score, time: Array) -> Array:
 
 
 def hop_height(score: Score, time: Array) -> Array:
-    """Height in metres (n,) that hops add to the hips at `time` (n,) seconds.
+    """Return the height in metres (n,) that hops add to the hips at `time` (n,) seconds.
 
-    They sink and push off, fly freely under gravity, and give way on landing: a cubic through the floor's height with
-    the speed of the flight at either end of it, which in the air is the parabola itself.
+    The hips sink and push off, fly under gravity, and yield on landing: a cubic through the floor's height with the
+    speed of the flight at both ends, which is the parabola itself in the air.
     """
     knots: list[tuple[float, float]] = []
     for hop in score.hops:
@@ -97,7 +98,7 @@ def _midpoint(feet: FootPlacements) -> Array:
 
 
 def _standing_foot_point(feet: FootPlacements, landing: FootPlacements) -> Array:
-    """A point on the standing foot, 18 mm to the side where the other foot comes from and goes to."""
+    """Return a point on the standing foot, 18 mm towards the path of the other foot."""
     ((side, to),) = landing.items()
     here = _floor_point(feet["right" if side == "left" else "left"])
     away = 0.5 * (_floor_point(feet[side]) + _floor_point(to)) - here

@@ -1,7 +1,7 @@
-"""The demo: our own dance with its music, camera and lights, taken in like any upload the first time, and its stage.
+"""Installation of the demo: original motion, music, camera and lights, ingested like an upload, and its session.
 
-Several replicas may start at once. One of them makes the dance while the others wait; the stage has a name that follows
-from the dance, so that the register lets one of them open it.
+Several replicas may start at once. One creates the motion while the others wait; the session's id follows from the
+motion, so that the key-value store lets only one replica open it.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from bunraku.runtime.context import ServiceContext
 from bunraku.session.session_manager import SessionManager
 
 DEMO_NOTE_KEY = "demo"
-"""The library's note of what was made, and the register's word for who makes it."""
+"""Name of the note in the object store about the demo motion, and prefix of the lease for creating it."""
 RETRY_INTERVAL_S = 1.0
-"""Seconds after which what is away is asked again."""
+"""Interval between attempts while a backend is unavailable."""
 
 _PACKAGE_DIR = Path(__file__).parents[1]
 _log = logging.getLogger(__name__)
 
 
 async def open_demo_stage(context: ServiceContext, sessions: SessionManager) -> None:
-    """The demo's stage, there once this returns, by this replica or another; tried until what it takes is there."""
+    """Open the demo's session, on this replica or another; retry until the backends are available."""
     while True:
         try:
             motion = await ensure_demo_motion(context)
@@ -42,69 +42,71 @@ async def open_demo_stage(context: ServiceContext, sessions: SessionManager) -> 
         except RevisionConflict:
             return
         except BackendUnavailable as error:
-            _log.warning("the demo's stage: %s; trying again", error)
+            _log.warning("demo stage not ready: %s; retrying", error)
         except ProblemError as error:
             if error.status < 500:
                 raise
-            _log.warning("the demo's stage: %s; trying again", error.detail)
+            _log.warning("demo stage not ready: %s; retrying", error.detail)
         else:
             return
         await asyncio.sleep(RETRY_INTERVAL_S)
 
 
 async def ensure_demo_motion(context: ServiceContext) -> str:
-    """The id of the dance in the library.
+    """Return the id of the demo motion in the store.
 
-    It is danced, played and taken in anew only when the code that makes it has changed since, or it was removed: this
-    takes some seconds, which the next start should not. Raises `Unavailable`.
+    The motion is created only if the code that creates it has changed, or if it was removed: this takes some seconds,
+    which the next start should not. Raises `BackendUnavailable`.
     """
     made_by = await asyncio.to_thread(_code_fingerprint)
-    if (noted := await _find_current_motion(context, made_by)) is not None:
-        return noted
+    if (existing := await _find_current_motion(context, made_by)) is not None:
+        return existing
     async with hold_lease(context.key_values, f"{DEMO_NOTE_KEY}.making"):
-        # another replica may have made it meanwhile
+        # another replica may have created it meanwhile
         return await _find_current_motion(context, made_by) or await _create_motion(context, made_by)
 
 
 async def _find_current_motion(context: ServiceContext, fingerprint: str) -> str | None:
-    """The id of the dance that this code has made already, if it is there."""
-    noted, maker = await _read_note(context)
+    """Return the id of the motion that this code has created before, if it still exists."""
+    motion_id, maker = await _read_note(context)
     return (
-        noted
-        if noted is not None and maker == fingerprint and await context.motion_store.get(noted) is not None
+        motion_id
+        if motion_id is not None and maker == fingerprint and await context.motion_store.get(motion_id) is not None
         else None
     )
 
 
 async def _read_note(context: ServiceContext) -> tuple[str | None, str]:
-    """The dance that was made last, and of which code."""
+    """Return the id of the motion created last, and the fingerprint of its code."""
     try:
         note = json.loads(await context.motion_store.get_note(DEMO_NOTE_KEY) or b"")
         return str(note["motion"]), str(note["made_by"])
     except (ValueError, KeyError, TypeError):
-        # the first time, or not ours: it is written anew
+        # no note yet, or a foreign one: it is replaced
         return None, ""
 
 
 async def _create_motion(context: ServiceContext, fingerprint: str) -> str:
-    before, _ = await _read_note(context)
+    previous, _ = await _read_note(context)
     with tempfile.TemporaryDirectory(prefix="bunraku-demo-") as folder:
         source = Path(folder) / "source"
         song = Path(folder) / "song"
         (motion, title), digest = await asyncio.gather(
             asyncio.to_thread(_write_motion, source), asyncio.to_thread(_write_music, song)
         )
-        if before is not None:
-            # made by other code: its blocks are not what this code would send
-            await context.catalogue.remove_motion(before)
-            await context.motion_store.remove(before)
+        if previous is not None:
+            # made by other code: its blocks differ from those that this code would send
+            await context.catalogue.remove_motion(previous)
+            await context.motion_store.remove(previous)
         uploads = UploadOperation(context)
         await uploads.ingest_file(motion, source, f"{title}.bvh")
-        sung, _ = await AudioOperation(context, uploads).add_audio(motion, digest, song, f"{title}.wav")
-        staged, _ = await SceneOperation(context, uploads).add_scene(sung.id, await asyncio.to_thread(_build_staging))
-        for on_the_way in (motion, sung.id):
-            await context.catalogue.remove_motion(on_the_way)
-            await context.motion_store.remove(on_the_way)
+        with_music, _ = await AudioOperation(context, uploads).add_audio(motion, digest, song, f"{title}.wav")
+        staged, _ = await SceneOperation(context, uploads).add_scene(
+            with_music.id, await asyncio.to_thread(_build_staging)
+        )
+        for intermediate in (motion, with_music.id):
+            await context.catalogue.remove_motion(intermediate)
+            await context.motion_store.remove(intermediate)
     await context.motion_store.put_note(
         DEMO_NOTE_KEY, json.dumps({"motion": staged.id, "made_by": fingerprint}).encode()
     )
@@ -137,7 +139,7 @@ def _build_staging() -> Staging:
 
 
 def _code_fingerprint() -> str:
-    """Of all code on the dance's way into the library."""
+    """Return a digest of all code that contributes to the stored motion."""
     digest = hashlib.sha256()
     for package in ("motion", "demo", "codec", "ingest"):
         for source in sorted([*(_PACKAGE_DIR / package).rglob("*.py"), *(_PACKAGE_DIR / package).glob("*.json")]):

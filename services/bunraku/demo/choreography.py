@@ -1,7 +1,7 @@
-"""Sanbasō, First Steps: a dance of our own for the demo, in six phrases of eight beats.
+"""Sanbasō, First Steps: original choreography of the demo, six phrases of eight beats.
 
 Its manner is that of Sanbasō, the dance that opens a day of puppet theatre, and of Nihon-buyō: low hips, gliding steps,
-stamps that mark the beat, the hops of a crow, and held poses (mie). The steps, poses and their order are ours.
+stamps that mark the beat, the hops of a crow, and held poses (mie). The steps, poses and their order are original.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ BEATS_PER_PHRASE = 8
 BEAT_COUNT = 48
 
 QUICK_SWING_BEATS = 0.26
-"""Beats in the air of a step that takes half a beat."""
+"""Swing duration of a step that takes half a beat."""
 LEFT_FOOT_START, RIGHT_FOOT_START = FootPlacement(0.08, 0.0, 8), FootPlacement(-0.08, 0.0, -8)
 
 KEYS = (
@@ -67,24 +67,24 @@ KEYS = (
 
 
 def glide_step(beat: float, foot: Side, x: float, z: float, turn: float = 0.0) -> Step:
-    """A suriashi step: the sole skims the floor for half a beat."""
+    """Return a suriashi step: the sole skims the floor for half a beat."""
     return Step(beat, foot, FootPlacement(x, z, turn))
 
 
 def stamp_step(beat: float, foot: Side, x: float, z: float, turn: float = 0.0) -> Step:
-    """A hyōshi: the foot is lifted and comes down hard on the beat."""
+    """Return a hyōshi: the foot is lifted and stamps on the beat."""
     return Step(beat, foot, FootPlacement(x, z, turn), swing_beats=0.6, lift=0.10, fall_beats=0.25, is_stamp=True)
 
 
 def raised_knee_stamp(beat: float, foot: Side, x: float, z: float, turn: float = 0.0) -> Step:
-    """A knee raised high and held before the stamp that begins a mie."""
+    """Return a stamp with the knee raised high and held before it, which starts a mie."""
     return Step(beat, foot, FootPlacement(x, z, turn), swing_beats=1.25, lift=0.26, fall_beats=0.3, is_stamp=True)
 
 
 def feet_around(
     x: float, z: float, turn: float, half_width: float = 0.08, toe_out_deg: float = 8.0
 ) -> dict[Side, FootPlacement]:
-    """Both feet about a point (x, z), facing `turn`, each `apart` metres from it, its toes out by `open_by` degrees."""
+    """Return both feet around (x, z), facing `turn`, each `half_width` metres from it, toes out by `toe_out_deg`."""
     across, down = half_width * math.cos(math.radians(turn)), half_width * math.sin(math.radians(turn))
     return {
         "left": FootPlacement(x + across, z - down, turn + toe_out_deg),
@@ -93,7 +93,7 @@ def feet_around(
 
 
 def turning_steps() -> list[Step]:
-    """A whole turn to the left on the spot: the left foot opens, the right follows; slow, and quick at the end."""
+    """Return the steps of a full turn to the left on the spot, slow at first and quick at the end."""
     facings: tuple[tuple[float, Side, float], ...] = (
         (25.0, "left", 66.0),
         (26.0, "right", 88.0),
@@ -113,7 +113,7 @@ def turning_steps() -> list[Step]:
 
 
 def circling_steps() -> list[Step]:
-    """A whole turn to the right, walking round a small circle in two quick steps to the beat; the last one closes."""
+    """Return the steps of a full turn to the right around a small circle, two per beat; the last one closes."""
     radius = 0.2
     steps = []
     for index in range(11):
@@ -121,7 +121,7 @@ def circling_steps() -> list[Step]:
         out = math.radians(heading)
         side: Side = "right" if index % 2 == 0 else "left"
         x, z = radius * (math.cos(out) - 1.0), -radius * math.sin(out)
-        # narrow and straight while it turns, open again at home
+        # narrow and straight during the turn, open again at the end
         place = (
             feet_around(x, z, heading) if index > 8 else feet_around(x, z, heading, half_width=0.066, toe_out_deg=4.0)
         )
@@ -130,7 +130,7 @@ def circling_steps() -> list[Step]:
 
 
 def crow_hop(beat: float, x: float, z: float, turn: float) -> Hop:
-    """A hop of the crow (karasu-tobi) that lands with both feet about (x, z), facing `turn`."""
+    """Return a crow's hop (karasu-tobi) that lands with both feet around (x, z), facing `turn`."""
     feet = feet_around(x, z, turn)
     return Hop(beat, feet["left"], feet["right"])
 
@@ -163,15 +163,15 @@ SCORE = Score(BEATS_PER_MINUTE, BEAT_COUNT, poses.STAND, LEFT_FOOT_START, RIGHT_
 
 
 def footfall_times() -> list[float]:
-    """Seconds at which a foot lands, stamps and hops included, in order."""
+    """Return the times in seconds at which a foot lands, stamps and hops included, ascending."""
     return [footfall.beat * SCORE.seconds_per_beat for footfall in SCORE.list_footfalls()]
 
 
 def stamp_times() -> list[float]:
-    """Seconds of the stamps (hyōshi), which are heard, in order."""
+    """Return the times in seconds of the audible stamps (hyōshi), ascending."""
     return [step.beat * SCORE.seconds_per_beat for step in SCORE.steps if step.is_stamp]
 
 
 def animate_dance(fps: float = 60.0) -> Motion:
-    """The whole dance on the standard figure, 30 s, at `fps` frames a second; its end leads on to its beginning."""
+    """Return the motion on the standard figure, 30 s, at `fps` frames per second; its end leads to its start."""
     return animate(SCORE, standard_figure(), fps)

@@ -1,4 +1,4 @@
-"""Where the feet are over time, from the steps of a score: flat and still where planted, in an arc where they swing."""
+"""Trajectories of the feet from the steps of a score: flat and still when planted, an arc when they swing."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, Figure
 
 FLOOR_HEIGHT_M = -0.014
-"""Height of the floor and of a planted sole, metres (the standing figure's midtarsal is at .0001)."""
+"""Height of the floor and of a planted sole (the standing figure's midtarsal is at .0001)."""
 GRAVITY_M_S2 = 9.81
-"""Metres a second squared."""
 SOLE_CENTRE_OFFSET_M = 0.06
-"""The middle of the sole, the place of a step, lies this far before the ankle, metres."""
+"""Distance of the sole's centre, the position of a step, in front of the ankle."""
 HEEL_OFFSET_M = 0.056
-"""The heel lies this far behind the ankle, metres."""
+"""Distance of the heel behind the ankle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +26,7 @@ class FootTrack:
     """One foot over n frames.
 
     World position of the ankle (n, 3) in metres, world orientation of the foot (n, 4), upward bend of the toes (n,) and
-    facing of the foot (n,) to the left of the audience, both in radians.
+    facing of the foot (n,) to the audience's left, both in radians.
     """
 
     ankle_position: Array
@@ -37,7 +36,7 @@ class FootTrack:
 
 
 def animate_foot(score: Score, figure: Figure, side: Side, time: Array) -> FootTrack:
-    """The foot of `side` as `figure` dances `score`, over `time` (n,) seconds."""
+    """Return the foot of `side` while `figure` performs `score`, over `time` (n,) seconds."""
     place = score.initial_feet[side]
     start = _placement_vector(place)
     moves = []
@@ -47,7 +46,7 @@ def animate_foot(score: Score, figure: Figure, side: Side, time: Array) -> FootT
             continue
         begin, end = footfall.takeoff_beat * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
         to = footfall.targets[side]
-        # over its place a little before it is down, so that it comes down straight
+        # reaches its position shortly before landing, so that it comes down vertically
         moves.append(EasedMove(begin, 0.95 * (end - begin), _placement_vector(to) - _placement_vector(place)))
         place = to
         swing = _hop_swing if isinstance(footfall, Hop) else _stamp_swing if footfall.is_stamp else _glide_swing
@@ -68,7 +67,7 @@ def _placement_vector(place: FootPlacement) -> Array:
 
 
 def _sole_geometry(figure: Figure, side: Side, orientation: Array, toe_bend: Array) -> tuple[Array, Array]:
-    """Height above the ankle of the lowest of the sole (n,), and from it the way to the middle of the foot (n, 3)."""
+    """Return the height of the sole's lowest point above the ankle (n,), and the vector to the sole's centre (n, 3)."""
     chain = ("humanoid_root", "sacroiliac", *(f"{side[0]}_{joint}" for joint in ("hip", "knee", "ankle")))
     down = FLOOR_HEIGHT_M - sum(float(figure.offsets[JOINT_INDEX[joint]][1]) for joint in chain)
     midtarsal = JOINT_INDEX[f"{side[0]}_midtarsal"]
@@ -81,7 +80,7 @@ def _sole_geometry(figure: Figure, side: Side, orientation: Array, toe_bend: Arr
 
 
 def _swing_times(score: Score, footfall: Step | Hop) -> tuple[float, float, float]:
-    """Seconds of lifting, of beginning to come down (half way in a hop), and of landing."""
+    """Return the times of lifting, of starting to come down (half way in a hop), and of landing, in seconds."""
     begin, end = footfall.takeoff_beat * score.seconds_per_beat, footfall.beat * score.seconds_per_beat
     if isinstance(footfall, Hop):
         return begin, 0.5 * (begin + end), end
@@ -89,9 +88,9 @@ def _swing_times(score: Score, footfall: Step | Hop) -> tuple[float, float, floa
 
 
 def _glide_swing(score: Score, step: Step | Hop, time: Array) -> tuple[Array, Array, Array]:
-    """Clearance of the sole (n,) in metres, rise of the heel and of the toes (n,) in radians, in a gliding step.
+    """Return clearance of the sole (n,) in metres, rise of heel and of toes (n,) in radians, in a gliding step.
 
-    The heel is down before the toes rise: where the lowest point of the sole changes, the foot is at rest on it.
+    The heel is down before the toes rise: where the lowest point of the sole changes, the foot rests on it.
     """
     begin, peak, end = _swing_times(score, step)
     quarter = 0.25 * (end - begin)
@@ -105,7 +104,7 @@ def _glide_swing(score: Score, step: Step | Hop, time: Array) -> tuple[Array, Ar
 
 
 def _stamp_swing(score: Score, step: Step | Hop, time: Array) -> tuple[Array, Array, Array]:
-    """As `_glide`, in a stamp: the foot rises within 0.9 beats, waits with its toes up, and falls."""
+    """Return the same as `_glide_swing` for a stamp: the foot rises within 0.9 beats, waits with toes up, and falls."""
     begin, fall, end = _swing_times(score, step)
     rise = min(fall, begin + 0.9 * score.seconds_per_beat)
     up = easing.minimum_jerk((time - begin) / (rise - begin))
@@ -114,7 +113,7 @@ def _stamp_swing(score: Score, step: Step | Hop, time: Array) -> tuple[Array, Ar
 
 
 def _hop_swing(score: Score, hop: Step | Hop, time: Array) -> tuple[Array, Array, Array]:
-    """As `_glide`, in a hop: the legs stretch as they leave the floor and draw up under the body."""
+    """Return the same as `_glide_swing` for a hop: the legs stretch at take-off and draw up under the body."""
     begin, peak, end = _swing_times(score, hop)
     apex = GRAVITY_M_S2 * (end - begin) ** 2 / 8.0
     return (

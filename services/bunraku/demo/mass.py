@@ -1,7 +1,7 @@
-"""Where the body's weight is: its centre of mass from the positions of joints and tips.
+"""Centre of mass of the body from the positions of joints and tips.
 
-Segment masses and the places of their centres are the usual fractions (Winter, "Biomechanics and Motor Control of Human
-Movement", table 4.1), the trunk cut in pelvis and chest at vl5.
+Segment masses and centres are those of Winter, "Biomechanics and Motor Control of Human Movement", table 4.1, with the
+trunk divided into pelvis and chest at vl5.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX
 
 CROWN, LEFT_HAND, RIGHT_HAND, LEFT_TOES, RIGHT_TOES = range(JOINT_COUNT, JOINT_COUNT + 5)
-"""Indices of the tips in `skeleton.points`."""
+"""Indices of the tips in `skeleton.joint_and_tip_positions`."""
 
 _LIMB_SEGMENTS: tuple[tuple[str, str, float, float], ...] = (
     ("shoulder", "elbow", 0.028, 0.436),
@@ -20,11 +20,11 @@ _LIMB_SEGMENTS: tuple[tuple[str, str, float, float], ...] = (
     ("hip", "knee", 0.100, 0.433),
     ("knee", "ankle", 0.0465, 0.433),
 )
-"""Segments from joint to joint of either side: their share of the body's mass, and where on the way its centre is."""
+"""Segments of either side: joints, share of the body's mass, and relative position of the centre between the joints."""
 
 
 def _point_weights() -> Array:
-    """Share of each point (23,) in the centre of mass; the sum is 1."""
+    """Return the weight of each point (23,) in the centre of mass; the sum is 1."""
     share = np.zeros(JOINT_COUNT + 5)
 
     def segment(near: int, far: int, mass: float, centre: float) -> None:
@@ -47,6 +47,6 @@ POINT_WEIGHTS: Array = _point_weights()
 
 
 def centre_of_mass(points: Array) -> Array:
-    """Centre of mass (..., 3) in metres of a body whose `skeleton.points` are at `points` (..., 23, 3)."""
+    """Return the centre of mass (..., 3) in metres of a body with joints and tips at `points` (..., 23, 3)."""
     centre: Array = np.einsum("k,...kj->...j", POINT_WEIGHTS, points)
     return centre

@@ -1,4 +1,4 @@
-"""Tones put where their beats are, in a room: notes to stereo samples."""
+"""Mixer: notes to stereo samples, at their beats, in a room."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bunraku.motion.rotation import Array
 Instrument = Literal["string", "flute", "great drum", "hand drum", "clappers", "bell"]
 
 PEAK_LIMIT = 0.8
-"""Of any sample: what is encoded may come out a little louder."""
+"""Largest sample: encoding may increase it slightly."""
 _GAIN_AND_PAN: dict[Instrument, tuple[float, float]] = {
     "string": (0.30, -0.35),
     "flute": (0.20, 0.4),
@@ -24,15 +24,17 @@ _GAIN_AND_PAN: dict[Instrument, tuple[float, float]] = {
     "clappers": (0.40, -0.6),
     "bell": (0.16, 0.6),
 }
-"""How loud a player is, and where: -1 is left, 1 right."""
+"""Gain and pan of each instrument: -1 is left, 1 right."""
 _EARLY_REFLECTIONS = ((0.023, 0.16, -0.8), (0.037, 0.13, 0.8), (0.059, 0.09, -0.5), (0.083, 0.07, 0.6))
-"""What a wooden hall sends back: seconds, share and side."""
+"""Reflections of a wooden hall: delay in seconds, share and pan."""
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Who plays at which beat, how loudly (1: as ever), for how many beats, and which pitch where it has one: semitones
-    above the D below the middle of the keyboard's treble (293.66 Hz)."""
+    """One note: instrument, beat, gain (1: normal), length in beats, and pitch.
+
+    `semitones` count from the D above middle C (293.66 Hz).
+    """
 
     beat: float
     instrument: Instrument
@@ -42,13 +44,15 @@ class Note:
 
     @property
     def frequency_hz(self) -> float:
-        """Frequency of its pitch."""
+        """Frequency of the pitch."""
         return float(293.66 * 2 ** (self.semitones / 12))
 
 
 def render_notes(notes: Iterable[Note], seconds_per_beat: float, duration_s: float) -> Array:
-    """The notes as samples (n, 2) of `seconds`, each attack at its beat to the sample; what would sound on past the end
-    is faded. Raises ValueError for a note that begins outside."""
+    """Return the notes as samples (n, 2) of `duration_s` seconds, each attack on its beat to the sample.
+
+    Tones that would last beyond the end are faded out. Raises ValueError for a note that starts outside.
+    """
     count = round(duration_s * SAMPLE_RATE_HZ)
     sides = np.zeros((count, 2))
     tones: dict[tuple[Instrument, int, float], Array] = {}
@@ -56,13 +60,13 @@ def render_notes(notes: Iterable[Note], seconds_per_beat: float, duration_s: flo
         start = round(note.beat * seconds_per_beat * SAMPLE_RATE_HZ)
         if not 0 <= start < count:
             raise ValueError(f"the {note.instrument} at beat {note.beat} is outside the {duration_s:g} s of the music")
-        loud, side = _GAIN_AND_PAN[note.instrument]
+        gain, pan = _GAIN_AND_PAN[note.instrument]
         key = note.instrument, note.semitones, note.length_beats
         if key not in tones:
             tones[key] = _synthesise_note(note, seconds_per_beat)
-        tone = tones[key][: count - start] * (loud * note.gain)
-        # of equal power wherever it comes from
-        angle = (side + 1) * np.pi / 4
+        tone = tones[key][: count - start] * (gain * note.gain)
+        # equal-power panning
+        angle = (pan + 1) * np.pi / 4
         sides[start : start + len(tone)] += tone[:, None] * [np.cos(angle), np.sin(angle)]
     mixed = sides.copy()
     for delay, share, side in _EARLY_REFLECTIONS:
@@ -70,7 +74,7 @@ def render_notes(notes: Iterable[Note], seconds_per_beat: float, duration_s: flo
         mixed[later:] += share * sides.mean(axis=1)[: count - later, None] * [np.cos(angle), np.sin(angle)]
     fade = round(min(0.25, duration_s / 2) * SAMPLE_RATE_HZ)
     mixed[-fade:] *= np.linspace(1, 0, fade)[:, None]
-    # the loudest places are rounded off, not the whole turned down for them
+    # soft clipping of peaks instead of a lower overall gain
     rounded: Array = PEAK_LIMIT * np.tanh(mixed / PEAK_LIMIT)
     return rounded
 

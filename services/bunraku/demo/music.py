@@ -1,8 +1,8 @@
-"""The music of Sanbasō, First Steps: ours, in the manner of the theatre's, on the beat of the steps.
+"""Music of Sanbasō, First Steps: original, in the manner of the theatre's, on the beat of the steps.
 
-The drums are not written down: every stamp is the great drum, every other step the hand drum, every hop the bell, and
-each mie has its clappers, so that what is heard is what is seen even where the dance is changed. String and flute are
-written for it, in the scale in which such songs are often sung (miyako-bushi: D, E flat, G, A, B flat).
+Percussion follows from the score: every stamp is the great drum, every other step the hand drum, every hop the bell,
+and each mie has clappers, so that sound matches motion even if the choreography changes. String and flute are written
+for it, in the miyako-bushi scale (D, E flat, G, A, B flat).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from bunraku.motion.rotation import Array
 _D, _E_FLAT, _G, _A, _B_FLAT = 0, 1, 5, 7, 8
 _OCTAVE = 12
 _MIN_MIE_SWING_BEATS = 1.0
-"""A knee is held so many beats in the air, at least, before the stamp of a mie."""
+"""Shortest swing of a raised knee before the stamp of a mie."""
 
 STRING_NOTES: tuple[tuple[float, int], ...] = (
     # 1 greeting: few tones, far apart
@@ -54,7 +54,7 @@ FLUTE_NOTES: tuple[tuple[float, float, int], ...] = (
 
 
 def percussion_notes(score: Score) -> Iterator[Note]:
-    """What is struck where a foot lands."""
+    """Yield the percussion of each footfall."""
     for footfall in score.list_footfalls():
         if isinstance(footfall, Hop):
             yield Note(footfall.beat, "bell")
@@ -62,7 +62,7 @@ def percussion_notes(score: Score) -> Iterator[Note]:
         elif footfall.is_stamp:
             yield Note(footfall.beat, "great drum")
             if footfall.swing_beats >= _MIN_MIE_SWING_BEATS:
-                # the clappers call the eye to it: as it lands, and in the stillness after
+                # clappers at the landing, and in the silence after it
                 yield Note(footfall.beat, "clappers", 1.2)
                 yield Note(footfall.beat + 0.5, "clappers", 0.8)
         else:
@@ -70,12 +70,12 @@ def percussion_notes(score: Score) -> Iterator[Note]:
 
 
 def all_notes() -> list[Note]:
-    """The whole piece."""
+    """Return all notes of the music."""
     strings = [Note(beat, "string", 1.15 if beat % 1 == 0 else 0.9, 1.5, pitch) for beat, pitch in STRING_NOTES]
     flutes = [Note(beat, "flute", 1.0, beats, pitch) for beat, beats, pitch in FLUTE_NOTES]
     return [*strings, *flutes, *percussion_notes(SCORE)]
 
 
 def render_music() -> Array:
-    """The piece as samples (n, 2), 48,000 a second, as long as the dance."""
+    """Return the music as samples (n, 2) at 48 kHz, as long as the motion."""
     return render_notes(all_notes(), SCORE.seconds_per_beat, SCORE.duration)

@@ -1,7 +1,7 @@
-"""The poses of the demo's dance, by name: arms first, then whole bodies made of them.
+"""Poses of the demo's choreography, by name: arms first, then whole bodies made of them.
 
-The numbers of an `Arm`: the wrist (out, up, forward) from the shoulder in arm lengths, where the elbow points (out, up,
-forward), the turn of the palm and the bend of the hand in degrees.
+The numbers of an `Arm`: position of the wrist (out, up, forward) from the shoulder in arm lengths, direction of the
+elbow (out, up, forward), turn of the palm and bend of the hand in degrees.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""How a dance is written down: poses at beats, steps that land on beats, hops. A score holds no numbers per frame.
+"""Score of a choreography: poses at beats, steps that land on beats, hops. It holds no values per frame.
 
-Places on the stage are metres from its centre, x to the puppet's left when it faces the audience, z towards the
-audience. Angles are degrees. A beat is counted from 0 at the start of the dance.
+Positions on the stage are metres from its centre, x to the performer's left when it faces the audience, z towards the
+audience. Angles are degrees. Beats count from 0 at the start.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ SIDES: tuple[Side, Side] = ("left", "right")
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """Where one arm is, the same numbers for either side.
+    """Position of one arm, with the same numbers for either side.
 
-    `wrist` is the wrist from the shoulder as (out, up, forward) of the chest, in lengths of the hanging arm; `elbow`
-    the direction (out, up, forward) in which the elbow points; `turn` degrees by which the palm, inwards at rest, is
-    turned to the front; `bend` degrees by which the hand is bent to its palm.
+    `wrist_position` is the wrist from the shoulder as (out, up, forward) of the chest, in lengths of the hanging arm;
+    `elbow_direction` (out, up, forward) is the direction of the elbow; `palm_turn` degrees by which the palm, inwards
+    at rest, is turned to the front; `hand_bend` degrees by which the hand is bent towards its palm.
     """
 
     wrist_position: tuple[float, float, float]
@@ -31,11 +31,11 @@ class Arm:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A shape of the body above the feet.
+    """Pose of the body above the feet.
 
-    `left` and `right` are its arms; `depth` metres by which the hips sink below standing; `bow` forward, `lean` and
-    `twist` to the left, of the trunk over the hips; `look`, `nod` and `tilt` of the head: to the left of the hips'
-    facing, down, and over the left shoulder.
+    `left` and `right` are the arms; `depth` metres by which the hips sink below standing; `bow` forward, `lean` and
+    `twist` to the left, of the trunk relative to the hips; `look`, `nod` and `tilt` of the head: to the left of the
+    hips' facing, down, and over the left shoulder.
     """
 
     left: Arm
@@ -49,7 +49,7 @@ class Pose:
     tilt: float = 0.0
 
     def mirror(self) -> Pose:
-        """The same pose with left and right exchanged."""
+        """Return the pose with left and right exchanged."""
         return replace(
             self,
             left=self.right,
@@ -63,10 +63,10 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class PoseKey:
-    """The body comes into `pose` at `beat`, having set out `over` beats earlier.
+    """Key at which the body reaches `pose`: at `beat`, after a transition of `transition_beats`.
 
-    If it sets out before the key before is reached, it flows through that one. It starts crisply, as a puppet does,
-    or, where it is `even`, as a slow sweep does.
+    If the transition starts before the previous key is reached, it flows through that key. It starts sharply, as a
+    puppet moves, or slowly if `is_smooth`.
     """
 
     beat: float
@@ -77,7 +77,7 @@ class PoseKey:
 
 @dataclass(frozen=True, slots=True)
 class FootPlacement:
-    """Where a foot stands: the middle of its sole (x, z), metres, and its turn to the left of the audience, degrees."""
+    """Position of a foot: the centre of its sole (x, z) in metres, and its turn to the audience's left in degrees."""
 
     x: float
     z: float
@@ -85,15 +85,15 @@ class FootPlacement:
 
 
 FootPlacements = Mapping[Side, FootPlacement]
-"""Where both feet stand, or where one or both go."""
+"""Positions of both feet, or targets of one or both."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A foot goes to a place and lands at `beat`.
+    """Step of one foot that lands at `beat`.
 
-    It is `swing` beats in the air, its sole `lift` metres high at most, and comes down in the last `fall` beats. A
-    `stamp` comes down hard and is heard.
+    The foot swings for `swing_beats`, its sole at most `lift` metres high, and comes down in the last `fall_beats`. A
+    stamp comes down hard and is audible.
     """
 
     beat: float
@@ -106,18 +106,18 @@ class Step:
 
     @property
     def takeoff_beat(self) -> float:
-        """The beat at which the foot leaves the floor."""
+        """Beat at which the foot leaves the floor."""
         return self.beat - self.swing_beats
 
     @property
     def targets(self) -> FootPlacements:
-        """Where the foot goes, by its side."""
+        """Target of the foot, by its side."""
         return {self.side: self.placement}
 
 
 @dataclass(frozen=True, slots=True)
 class Hop:
-    """Both feet leave the floor together and land at `beat` in their places, after `flight` beats.
+    """Hop of both feet that lands at `beat` after `flight_beats`.
 
     The soles rise `lift` times as high as the body flies: above 1, the legs are drawn up.
     """
@@ -130,21 +130,22 @@ class Hop:
 
     @property
     def takeoff_beat(self) -> float:
-        """The beat at which the feet leave the floor."""
+        """Beat at which the feet leave the floor."""
         return self.beat - self.flight_beats
 
     @property
     def targets(self) -> FootPlacements:
-        """Where the feet go, by their sides."""
+        """Targets of the feet, by side."""
         return {"left": self.left, "right": self.right}
 
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """A dance of `beats` beats that begins and ends in the pose `rest`, its feet at `left` and `right`.
+    """Choreography of `beat_count` beats that starts and ends in `rest_pose`, with the feet at `left_foot` and
+    `right_foot`.
 
-    Keys and hops are in order of time. ValueError says at which beat a score does not close or lifts a foot when it
-    cannot.
+    Keys and hops are in order of time. Raises ValueError with the beat if the score does not close or lifts a foot that
+    cannot be lifted.
     """
 
     beats_per_minute: float
@@ -177,19 +178,19 @@ class Score:
 
     @property
     def initial_feet(self) -> FootPlacements:
-        """Where the feet stand at the beginning."""
+        """Positions of the feet at the start."""
         return {"left": self.left_foot, "right": self.right_foot}
 
     def list_footfalls(self) -> list[Step | Hop]:
-        """Steps and hops in order of landing."""
+        """Return steps and hops in order of landing."""
         return sorted([*self.steps, *self.hops], key=lambda footfall: footfall.beat)
 
     @property
     def seconds_per_beat(self) -> float:
-        """Seconds from beat to beat."""
+        """Seconds per beat."""
         return 60.0 / self.beats_per_minute
 
     @property
     def duration(self) -> float:
-        """Seconds of the whole dance."""
+        """Duration in seconds."""
         return self.beat_count * self.seconds_per_beat

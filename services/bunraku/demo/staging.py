@@ -1,6 +1,6 @@
-"""Camera and lights for the demo's dance, from key to key on the beats of its score.
+"""Camera and lights of the demo, from key to key on the beats of its score.
 
-World frame, metres, the dancer facing z at the origin; the end leads on to the beginning.
+World frame, metres, the performer facing z at the origin; the end leads to the start.
 """
 
 from __future__ import annotations
@@ -19,8 +19,11 @@ KEYFRAME_RATE_FPS = 30.0
 
 
 class CameraKey(NamedTuple):
-    """The camera comes to a view at `beat`, having set out `over` beats earlier: `aside` and `above`, degrees round
-    what it looks at, to its left (x) and up; metres `away` from there; and there, `x` and `y`, metres."""
+    """Camera view reached at `beat` after a transition of `transition_beats`.
+
+    `azimuth_deg` and `elevation_deg` are angles around the target, towards its left (x) and up; `distance_m` is the
+    distance from the target, which is at `target_x`, `target_y` in metres.
+    """
 
     beat: float
     transition_beats: float
@@ -32,7 +35,7 @@ class CameraKey(NamedTuple):
 
 
 FIELD_OF_VIEW_RAD = radians(26.0)
-"""Vertical field of view, the same as the audience's own."""
+"""Vertical field of view, the same as the audience's."""
 FIRST_CAMERA_KEY = CameraKey(0.0, 0.0, 0.0, 3.0, 7.0, 0.0, 0.92)
 CAMERA_KEYS = (
     # the greeting, nearer as the sleeves open
@@ -52,12 +55,11 @@ CAMERA_KEYS = (
     CameraKey(43.1, 3.0, 22.0, -3.0, 6.6, 0.2, 0.92),
     CameraKey(47.75, 3.5, 0.0, 3.0, 7.0, 0.0, 0.92),
 )
-"""They look a little low: below, a page has its controls."""
+"""Targets are slightly low: the page has its controls at the bottom."""
 
 
 class LightKey(NamedTuple):
-    """The lights come to these intensities at `beat`, having set out `over` beats earlier; 1 is full, as bright as the
-    stage has them without a show."""
+    """Intensities reached at `beat` after a transition of `transition_beats`; 1 is the stage's default brightness."""
 
     beat: float
     transition_beats: float
@@ -67,7 +69,7 @@ class LightKey(NamedTuple):
 
 
 LIGHT_POSITIONS = {"key": (-1.9, 3.9, 4.1), "warm": (2.6, 3.0, -2.3), "cool": (-2.9, 1.6, -2.0)}
-"""Where the lights hang: before the dancer, and two behind that draw the outline."""
+"""Positions of the lights: in front of the performer, and two behind that outline the figure."""
 LIGHT_COLOURS = {"key": (1.0, 0.775, 0.539), "warm": (1.0, 0.694, 0.352), "cool": (0.275, 0.434, 1.0)}
 """Linear RGB."""
 FIRST_LIGHT_KEY = LightKey(0.0, 0.0, 0.7, 0.7, 0.7)
@@ -87,13 +89,13 @@ LIGHT_KEYS = (
 
 
 def camera_keyframes(score: Score) -> list[dict[str, Any]]:
-    """The show's camera for a dance of this score, a keyframe a frame, as `POST /v1/motions/{id}/scene` takes them."""
+    """Return the camera for a score, one keyframe per frame, as `POST /v1/motions/{id}/scene` accepts them."""
     time = _keyframe_times(score)
-    aside, above, away, x, y = _interpolate_keys(score, time, FIRST_CAMERA_KEY, CAMERA_KEYS).T
-    aside, above = np.radians(aside), np.radians(above)
+    azimuth, elevation, distance, x, y = _interpolate_keys(score, time, FIRST_CAMERA_KEY, CAMERA_KEYS).T
+    azimuth, elevation = np.radians(azimuth), np.radians(elevation)
     gaze = np.stack([x, y, np.zeros_like(x)], axis=1)
-    level = away * np.cos(above)
-    place = gaze + np.stack([level * np.sin(aside), away * np.sin(above), level * np.cos(aside)], axis=1)
+    level = distance * np.cos(elevation)
+    place = gaze + np.stack([level * np.sin(azimuth), distance * np.sin(elevation), level * np.cos(azimuth)], axis=1)
     return [
         {"time": round(at * 1e6), "position": here.tolist(), "gaze": there.tolist(), "fov": FIELD_OF_VIEW_RAD}
         for at, here, there in zip(time, place, gaze, strict=True)
@@ -101,7 +103,7 @@ def camera_keyframes(score: Score) -> list[dict[str, Any]]:
 
 
 def light_keyframes(score: Score) -> list[list[dict[str, Any]]]:
-    """The key light, the warm and the cool one behind, for a dance of this score; as `camera`."""
+    """Return the key light and the warm and cool rim lights for a score, as `camera_keyframes`."""
     time = _keyframe_times(score)
     return [
         [
@@ -127,7 +129,7 @@ def _keyframe_times(score: Score) -> Array:
 def _interpolate_keys(
     score: Score, time: Array, initial: CameraKey | LightKey, keys: tuple[CameraKey | LightKey, ...]
 ) -> Array:
-    """The numbers after `beat` and `over` (n, k) over `time` (n,), seconds."""
+    """Interpolate the values after beat and transition (n, k) over `time` (n,) seconds."""
     start = now = np.array(initial[2:])
     moves = []
     for key in keys:

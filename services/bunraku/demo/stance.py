@@ -1,4 +1,4 @@
-"""Standing: the hips placed so that the weight is where it must be, and legs that reach both feet."""
+"""Stance: hips placed so that the weight is at its target, and legs that reach both feet."""
 
 from __future__ import annotations
 
@@ -14,22 +14,21 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, Figure
 
 KNEE_CLEARANCE_M = 0.002
-"""Metres by which a leg stays shorter than it is at rest, so that the knee never locks."""
+"""Distance by which a leg stays shorter than at rest, so that the knee never locks."""
 REACH_SOFTNESS_M = 0.008
-"""Metres over which the hips yield to a leg that becomes too short, instead of stopping dead."""
+"""Range over which the hips yield to a leg that becomes too short, instead of stopping abruptly."""
 _BALANCE_ITERATIONS = 5
-"""Each round leaves about a fifth of the error of the weight: five leave less than a tenth of a millimetre."""
+"""Each iteration leaves about a fifth of the error of the weight: five leave less than 0.1 mm."""
 _TOE_TIPS: dict[Side, int] = {"left": mass.LEFT_TOES, "right": mass.RIGHT_TOES}
 
 
 def solve_stance(
     figure: Figure, rotations: Array, feet: Mapping[Side, FootTrack], facing: Array, height: Array, weight_target: Array
 ) -> Array:
-    """Sets hips, knees, ankles and toes in `rotations` (n, 18, 4) and returns the root's position (n, 3) in metres.
+    """Set hips, knees, ankles and toes in `rotations` (n, 18, 4) and return the root's position (n, 3) in metres.
 
-    All other rotations are given; so are `feet`, where the hips face (n,) in radians, the `height` (n,) in metres
-    that the root has if the legs are long enough for it, and where the centre of mass is to be, `weight` (n, 2), x
-    and z in metres.
+    All other rotations are given; so are `feet`, the hips' `facing` (n,) in radians, the `height` (n,) in metres that
+    the root has if the legs are long enough, and `weight_target` (n, 2), x and z of the centre of mass in metres.
     """
     nowhere = np.zeros((len(rotations), 3))
     still = skeleton.joint_and_tip_positions(figure, nowhere, rotations)
@@ -64,7 +63,7 @@ def _leg_joints(side: Side) -> tuple[int, int, int, int]:
 
 
 def _solve_leg(figure: Figure, side: Side, foot: FootTrack, hip: Array, facing: Array) -> tuple[Array, Array]:
-    """World orientation of the thigh (n, 4) and bend of the knee (n,) of a leg from `hip` (n, 3) to the foot.
+    """Return world orientation of the thigh (n, 4) and bend of the knee (n,) of a leg from `hip` (n, 3) to the foot.
 
     The knee points between the hips' facing and the foot's, and 8 degrees out.
     """
@@ -79,14 +78,15 @@ def _solve_leg(figure: Figure, side: Side, foot: FootTrack, hip: Array, facing: 
 def _reachable_height(
     figure: Figure, feet: Mapping[Side, FootTrack], root: Array, local_points: Array, height: Array
 ) -> Array:
-    """The root's height (n,): `height`, or less where a leg would be too short; a smooth minimum, below all limits."""
+    """Return the root's height (n,): `height`, or less if a leg would be too short; a smooth minimum below all
+    limits."""
     limits = [height]
     for side, foot in feet.items():
         hip, knee, ankle, _ = _leg_joints(side)
         longest = two_bone_ik.end_distance(figure.offsets[knee], figure.offsets[ankle]) - KNEE_CLEARANCE_M
-        aside = np.sum((root + local_points[:, hip] - foot.ankle_position)[:, [0, 2]] ** 2, axis=-1)
+        horizontal = np.sum((root + local_points[:, hip] - foot.ankle_position)[:, [0, 2]] ** 2, axis=-1)
         limits.append(
-            foot.ankle_position[:, 1] - local_points[:, hip, 1] + np.sqrt(np.clip(longest**2 - aside, 0.0, None))
+            foot.ankle_position[:, 1] - local_points[:, hip, 1] + np.sqrt(np.clip(longest**2 - horizontal, 0.0, None))
         )
     lowest = np.min(limits, axis=0)
     soft: Array = lowest - REACH_SOFTNESS_M * np.log(

@@ -1,4 +1,4 @@
-"""Samples as a WAV file's bytes."""
+"""WAV writer."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bunraku.motion.rotation import Array
 
 
 def write_wav(samples: Array) -> bytes:
-    """A file of 16 bits a sample of `samples` (n, channels), -1..1, 48,000 a second; what is beyond is clipped."""
+    """Return a 16-bit WAV file of `samples` (n, channels) at 48 kHz; samples beyond -1..1 are clipped."""
     count, channels = samples.shape
     data = np.round(np.clip(samples, -1, 1) * 32_767).astype("<i2").tobytes()
     align = 2 * channels

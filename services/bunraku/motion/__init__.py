@@ -1,1 +1,1 @@
-"""Pure: rotations, the figure, readers and writers of motion capture, and the dance of our own."""
+"""Rotations, skeletons, BVH reader and writer, joint naming, analysis. Pure."""

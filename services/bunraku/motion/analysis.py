@@ -1,4 +1,4 @@
-"""From a recorded skeleton to the paper's 19 channels (paper 2): one figure, one motion, and how well they fit."""
+"""Conversion of a recorded skeleton to the paper's 19 channels (paper 2), with the error of the fit."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from bunraku.motion.skeleton import (
 from bunraku.motion.trunk_fit import fit_trunk
 
 FLOOR_TOLERANCE_M = 0.5
-"""The height is left alone while the lowest point of the feet is within this of the floor, metres."""
+"""The height is kept if the lowest point of the feet is within this distance of the floor."""
 CALIBRATION_POSE_LIMITS = (0.05, 4.0)
-"""A first frame is no part of the dance if its joints are, on average, this many metres from the second and this many
-times the largest step after."""
+"""The first frame is a calibration pose if its mean joint distance to the second exceeds the first limit, in metres,
+and exceeds the largest later step by the second limit, a factor."""
 
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """What was made of a source.
+    """Result of the analysis of a source.
 
-    `motion` is the dance at the source's frame rate; `profile` says whose names the joints have ("shape": nobody's);
-    `mapped` is H-Anim joint -> source joint; `rest` the source's rest pose ("T", "A", "I", "bone-aligned", "other");
-    `unit` its unit of length; `guessed` sentences for the person who sent it. `fit_mean` and `fit_max` are the
-    distances of the figure's joints from the source's, over all mapped joints and frames, in millimetres.
+    `motion` has the source's frame rate; `profile` is the naming convention ("shape": none matched); `source_joints`
+    maps H-Anim joints to source joints; `rest_pose` is "T", "A", "I", "bone-aligned" or "other"; `unit` the unit of
+    length; `assumptions` are sentences for the uploader. Fit errors are distances between the figure's joints and the
+    source's, over all mapped joints and frames, in millimetres.
     """
 
     motion: Motion
@@ -53,11 +53,11 @@ class Analysis:
 
 
 def analyse(bvh: Bvh) -> Analysis:
-    """The 19 channels of `bvh` for a figure with its limb lengths.
+    """Fit the 19 channels and a figure with the source's limb lengths to `bvh`.
 
-    The figure is at rest in H-Anim's I-pose, facing z, y up; elbows, wrists, knees, ankles and finger tips lie straight
-    below the joint before, so that an elbow bends about -x and a knee about x. Raises `UnreadableMotion` where the
-    skeleton is no humanoid.
+    The figure's rest pose is H-Anim's I-pose, facing z, y up; elbows, wrists, knees, ankles and finger tips lie
+    straight below the previous joint, so that an elbow bends about -x and a knee about x. Raises `UnreadableMotion` if
+    the skeleton is not humanoid.
     """
     naming = map_by_name(bvh.names, bvh.parents) or map_by_shape(bvh)
     guessed = [*bvh.notes, *naming.assumptions]
@@ -94,10 +94,10 @@ def analyse(bvh: Bvh) -> Analysis:
 
 
 def _complete_mapping(bvh: Bvh, joints: dict[str, int], assumptions: list[str]) -> dict[str, int]:
-    """The mapping with root and head, where names or shape left them open.
+    """Return the mapping with root and head, if names or shape left them open.
 
-    The root is where legs and trunk part, whatever it is called: files have a joint on the floor above it, or a
-    pelvis below it that carries the legs only, which is then the sacroiliac.
+    The root is the joint where legs and trunk separate, whatever its name: files may have a joint on the floor above
+    it, or a pelvis below it that carries only the legs, which is then the sacroiliac.
     """
     joints = dict(joints)
     hips = [joints["l_hip"], joints["r_hip"]]
@@ -118,7 +118,7 @@ def _complete_mapping(bvh: Bvh, joints: dict[str, int], assumptions: list[str]) 
 
 
 def _starts_with_calibration_pose(fit: FigureFit) -> bool:
-    """Whether the first frame is a pose to calibrate by, set before a dance that is smooth without it."""
+    """Return whether the first frame is a calibration pose before an otherwise smooth motion."""
     if len(fit.position) < 4:
         return False
     local = fit.position[:, list(fit.joints.values())] - fit.position[:, [fit.joints[0]]]
@@ -137,7 +137,7 @@ def _move_to_floor(fit: FigureFit, assumptions: list[str]) -> None:
 
 
 def _build_motion(fit: FigureFit, fps: float) -> Motion:
-    """The figure's channels; at rest its lowest point is on the floor."""
+    """Return the figure's motion; in its rest pose the lowest point is on the floor."""
     rotations = fit.joint_orientations.copy()
     parents = fit.joint_orientations[:, PARENTS[1:]]
     rotations[:, 1:] = rotation.multiply(rotation.conjugate(parents), fit.joint_orientations[:, 1:])

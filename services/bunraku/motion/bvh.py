@@ -1,8 +1,8 @@
-"""Reading BVH (Biovision Hierarchy): a tree of joints, then one row of channel values for every frame.
+"""Reader of BVH (Biovision Hierarchy): a tree of joints, then one row of channel values per frame.
 
-There is no standard; the common ground is Meredith and Maddock, "Motion Capture File Formats Explained" (2001). This
-reader takes what real exporters write and says in `notes` where it had to choose; what it cannot read raises
-`UnreadableMotion` with the line. It runs in time and memory linear in the file, without recursion.
+There is no standard; the common ground is Meredith and Maddock, "Motion Capture File Formats Explained" (2001). The
+reader accepts what exporters really write and reports its choices in `notes`; a file that it cannot read raises
+`UnreadableMotion` with the line number. Time and memory are linear in the size of the file, without recursion.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ BYTE_ORDER_MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\
 
 @dataclass(frozen=True, slots=True)
 class Bvh:
-    """A BVH file as it stands: units, axes and names are the file's own.
+    """Contents of a BVH file in its own units, axes and names.
 
     For J joints, parents before children: `names`, `parents` (-1 for the root), `offsets` (J, 3) from the parent,
-    `channels` (each a tuple of "Xposition" ... "Zrotation" in the file's order) and `lines`, where each is declared.
-    `ends` are the End Sites. `frames` (n, C) holds the channel values in the order of the joints, angles in degrees;
-    `frame_time` is in seconds. `notes` are sentences on what was not as it should be.
+    `channels` (each a tuple of "Xposition" ... "Zrotation" in the file's order) and `joint_lines`, line numbers of their
+    declarations. `ends` are the End Sites. `frames` (n, C) holds the channel values in the order of the joints, angles
+    in degrees; `frame_time` is in seconds. `notes` are sentences about irregularities.
     """
 
     names: tuple[str, ...]
@@ -41,7 +41,7 @@ class Bvh:
 
     @property
     def fps(self) -> float:
-        """Frames per second: the whole number that `frame_time` was rounded from, where there is one."""
+        """Frames per second: the whole number that `frame_time` was rounded from, if there is one."""
         rate = 1.0 / self.frame_time
         if abs(rate - round(rate)) < 1e-9 * rate:
             return float(round(rate))
@@ -53,14 +53,14 @@ class Bvh:
 
 
 def parse_bvh(data: bytes) -> Bvh:
-    """The BVH file in `data`, in UTF-8, UTF-16 with a byte order mark or Latin-1.
+    """Parse a BVH file in UTF-8, UTF-16 with a byte order mark, or Latin-1.
 
-    Raises `UnreadableMotion` for what is not a BVH file or has no sound motion in it.
+    Raises `UnreadableMotion` if the data is not a BVH file or contains no valid motion.
     """
     text = _normalise_text(data)
     if not text or text.isspace():
         raise UnreadableMotion(
-            "Empty file", "there is nothing in it", hint="export the motion again and send that file"
+            "Empty file", "the file has no content", hint="export the motion again and send that file"
         )
     hierarchy = parse_hierarchy(text)
     width = sum(len(channels) for channels in hierarchy.channels)
@@ -83,7 +83,7 @@ def parse_bvh(data: bytes) -> Bvh:
 
 
 def _normalise_text(data: bytes) -> bytes:
-    """`data` without byte order mark, in an encoding that keeps ASCII, lines ending in a line feed."""
+    """Return `data` without byte order mark, in an ASCII-compatible encoding, with line feeds only."""
     for mark, encoding in BYTE_ORDER_MARKS:
         if data.startswith(mark):
             data = data[len(mark) :]

@@ -1,4 +1,4 @@
-"""The second half of a BVH file: the frame count, the frame time and the channel values of every frame."""
+"""Motion section of a BVH file: frame count, frame time and channel values."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 from bunraku.motion.rotation import Array
 
 DEFAULT_FRAME_TIME_S = 1.0 / 30.0
-"""Seconds a frame, where the file does not say."""
+"""Frame time if the file has none."""
 MIN_FRAME_TIME_S, MAX_FRAME_TIME_S = 0.001, 10.0
-"""Seconds a frame: what lies outside is no motion capture."""
+"""Range of a plausible frame time."""
 
-# not the # of 1.#QNAN, which is a number gone wrong
+# does not match the # of 1.#QNAN, a broken number
 _COMMENT = re.compile(rb"(?<!\S)(?:#|//)[^\n]*")
 _DECIMAL = re.compile(rb"(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?")
 _HEADER_FIELD = re.compile(rb"\s*(frames|frame[ \t]*time)[ \t]*:?[ \t]*([^\s]*)", re.IGNORECASE)
 
 
 def parse_frames(text: bytes, start: int, line: int, channel_count: int) -> tuple[Array, float, list[str]]:
-    """Channel values (n, width), seconds a frame, and sentences on what was not as it should be.
+    """Return the channel values (n, `channel_count`), the frame time in seconds, and sentences about irregularities.
 
-    `text` is the whole file (line feeds only), `start` the byte after the word MOTION, which stands on `line`.
+    `text` is the whole file (line feeds only), `start` the byte after the word MOTION, `line` the line of that word.
+    Raises `UnreadableMotion`.
     """
     notes: list[str] = []
     if text.find(b"#", start) >= 0 or text.find(b"//", start) >= 0:
@@ -96,7 +97,7 @@ def _parse_frame_time(word: bytes, line: int) -> float | None:
 
 
 def _detect_comma_role(text: bytes, position: int) -> int:
-    """Decimal commas stand between digits where no point does; others separate."""
+    """Return the role of commas: decimal between digits if the file has no point, else separators."""
     if text.find(b",", position) < 0:
         return NO_COMMA
     if text.find(b".", position) >= 0 or re.compile(rb",\s").search(text, position):
@@ -111,22 +112,21 @@ def _invalid_value_error(text: bytes, position: int, line: int) -> UnreadableMot
     if lower.startswith((b"nan", b"inf", b"1.#", b"-1.#")):
         title, hint = "Not a finite number", "the export went wrong in this frame; cut it out or export again"
     elif _DECIMAL.fullmatch(lower):
-        title, hint = "Not a finite number", "it is larger than a number can be; export again"
+        title, hint = "Not a finite number", "the number is too large; export again"
     elif lower in (b"hierarchy", b"root", b"motion"):
         title, hint = "Two motions in one file", "send one motion a file"
     else:
         title, hint = "Not a number", "a frame holds decimal numbers only"
-    return UnreadableMotion(title, f"{quote_excerpt(word)} stands where a channel value should", line=line, hint=hint)
+    return UnreadableMotion(title, f"{quote_excerpt(word)} is not a channel value", line=line, hint=hint)
 
 
 def _count_complete_frames(
     lines: LineStatistics, declared: int | None, channel_count: int, line: int, notes: list[str]
 ) -> int:
-    """The number of whole frames on `lines`, the first of them line `line` of the file, or a refusal where they cannot
-    be frames of `width` values.
+    """Return the number of complete frames; raise `UnreadableMotion` if the values are not frames of `channel_count`.
 
-    One frame a line is usual, and then each line is checked. Frames that share lines or run over several are only
-    checked in sum.
+    `line` is the line of the first frame. Usually each line holds one frame, and every line is checked. If frames share
+    lines or span several, only the total is checked.
     """
     if lines.word_count < channel_count:
         raise UnreadableMotion(
@@ -160,7 +160,7 @@ def _count_complete_frames(
 
 
 def _find_inconsistent_line(lines: LineStatistics, declared: int | None, channel_count: int) -> tuple[int, int] | None:
-    """The line that shows that the values are not frames of `width`, and how many it has."""
+    """Return the line that contradicts frames of `channel_count` values, and its number of values, or None."""
     rest = lines.word_count % channel_count
     first_odd = (
         (lines.first_mismatch, lines.first_mismatch_words)

@@ -1,4 +1,4 @@
-"""The first half of a BVH file: the tree of joints, from HIERARCHY to MOTION."""
+"""Hierarchy section of a BVH file: the tree of joints, from HIERARCHY to MOTION."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _DECIMAL_COMMA = re.compile(rb"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 
 @dataclass(frozen=True, slots=True)
 class EndSite:
-    """Where the last bone of a chain ends: `offset` (3,) from joint `parent`, in the file's units."""
+    """End of the last bone of a chain: `offset` (3,) from joint `parent`, in the file's units."""
 
     parent: int
     offset: Array
@@ -35,7 +35,7 @@ class EndSite:
 
 @dataclass(frozen=True, slots=True)
 class Hierarchy:
-    """The joints as in `bvh.Bvh`; `end` is the byte after the word MOTION and `end_line` its line."""
+    """Joints as in `bvh.Bvh`; `motion_start` is the byte after the word MOTION and `motion_line` its line."""
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
@@ -50,32 +50,32 @@ class Hierarchy:
 
 @dataclass(slots=True)
 class _Tokenizer:
-    """The words of `text` one after the other, with the line of the last."""
+    """Iterator over the words of `text`, with the line of the last one."""
 
     text: bytes
     position: int = 0
     line: int = 1
 
     def skip_separators(self) -> None:
-        """Go on to the next word, over space, blank lines and comments (# or //)."""
+        """Skip space, blank lines and comments (# or //)."""
         if between := _SEPARATOR.match(self.text, self.position):
             self.line += self.text.count(b"\n", self.position, between.end())
             self.position = between.end()
 
     def peek(self) -> bytes:
-        """The next word, not taken; empty at the end of the file."""
+        """Return the next word without consuming it; empty at the end of the file."""
         self.skip_separators()
         word = _WORD.match(self.text, self.position)
         return word.group() if word else b""
 
     def next_token(self) -> bytes:
-        """The next word; empty at the end of the file."""
+        """Consume and return the next word; empty at the end of the file."""
         word = self.peek()
         self.position += len(word)
         return word
 
     def next_name(self) -> bytes:
-        """The rest of the line up to a brace, without the space around it: names may hold spaces."""
+        """Consume the rest of the line up to a brace, stripped: names may contain spaces."""
         rest = _NAME.match(self.text, self.position)
         name = rest.group().strip() if rest else b""
         if len(name) > MAX_NAME_BYTES:
@@ -91,9 +91,9 @@ class _Tokenizer:
 
 @dataclass(slots=True)
 class _HierarchyBuilder:
-    """What has been read so far; `stack` is the way from the root to the open brace, None for an End Site.
+    """Joints parsed so far; `stack` is the path from the root to the open brace, None for an End Site.
 
-    `offsets`, `channels` and the offsets of `ends` are None until the file gives them.
+    `offsets`, `channels` and the offsets of `ends` are None until the file declares them.
     """
 
     names: list[bytes] = field(default_factory=list)
@@ -107,7 +107,7 @@ class _HierarchyBuilder:
 
 
 def parse_hierarchy(text: bytes) -> Hierarchy:
-    """The joints of the BVH file `text` (line feeds only, encoding that keeps ASCII)."""
+    """Parse the joints of the BVH file `text` (line feeds only, ASCII-compatible). Raises `UnreadableMotion`."""
     words = _Tokenizer(text)
     tree = _HierarchyBuilder()
     first = words.peek().lower()
@@ -208,7 +208,7 @@ def _parse_joint(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
 
 
 def _open_joint(builder: _HierarchyBuilder, tokens: _Tokenizer, parent: int) -> None:
-    """Open a joint below `parent`."""
+    """Append a joint below `parent` and open its brace."""
     line = tokens.line
     if len(builder.names) >= MAX_JOINTS:
         raise UnreadableMotion(
@@ -273,7 +273,10 @@ def _expect_open_brace(tokens: _Tokenizer, name: bytes) -> None:
 def _parse_offset(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
     if not builder.stack:
         raise UnreadableMotion(
-            "OFFSET in the wrong place", "it belongs to no joint", line=tokens.line, hint="check the braces above"
+            "OFFSET in the wrong place",
+            "this OFFSET belongs to no joint",
+            line=tokens.line,
+            hint="check the braces above",
         )
     line = tokens.line
     joint = builder.stack[-1]
@@ -297,7 +300,7 @@ def _duplicate_keyword_error(keyword: str, line: int) -> UnreadableMotion:
 
 
 def _parse_number(tokens: _Tokenizer, line: int) -> float:
-    """The next word, of the OFFSET on `line`, as a finite number; a decimal comma is as good as a point."""
+    """Parse the next word of the OFFSET on `line` as a finite number, with a decimal point or comma."""
     word = tokens.next_token()
     plain = word.replace(b",", b".") if _DECIMAL_COMMA.fullmatch(word) else word.rstrip(b",")
     try:
@@ -320,7 +323,10 @@ def _parse_channels(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
     joint = builder.stack[-1] if builder.stack else None
     if joint is None:
         raise UnreadableMotion(
-            "CHANNELS in the wrong place", "they belong to no joint", line=line, hint="only joints have channels"
+            "CHANNELS in the wrong place",
+            "these CHANNELS belong to no joint",
+            line=line,
+            hint="only joints have channels",
         )
     if builder.channels[joint] is not None:
         raise _duplicate_keyword_error("CHANNELS", line)
@@ -363,7 +369,7 @@ def _parse_channels(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
 
 
 def _decode_names(names: list[bytes]) -> tuple[str, ...]:
-    """The names as text: UTF-8 if all of them are, else Latin-1."""
+    """Decode names as UTF-8 if all of them are valid, else as Latin-1."""
     try:
         return tuple(name.decode("utf-8") for name in names)
     except UnicodeDecodeError:

@@ -1,4 +1,4 @@
-"""Where the joints of a BVH file are, frame by frame."""
+"""Forward kinematics of a BVH file."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from bunraku.motion.rotation import Array
 
 
 def channel_columns(bvh: Bvh) -> list[int]:
-    """For each joint, the column of `bvh.frames` where its channels begin."""
+    """Return, for each joint, the first column of its channels in `bvh.frames`."""
     widths = [len(channels) for channels in bvh.channels]
     return [0, *np.cumsum(widths)[:-1].tolist()]
 
 
 def rest_positions(bvh: Bvh) -> Array:
-    """Positions (J, 3) of all joints with no rotation, the root at the origin; the file's units and axes."""
+    """Return the positions (J, 3) of all joints without rotation, root at the origin, in the file's units and axes."""
     position = np.zeros((len(bvh.names), 3))
     for joint, parent in enumerate(bvh.parents):
         if parent >= 0:
@@ -26,21 +26,20 @@ def rest_positions(bvh: Bvh) -> Array:
 
 
 def ancestor_chain(bvh: Bvh, joint: int) -> list[int]:
-    """`joint` and its ancestors up to the root."""
-    way = []
+    """Return `joint` and its ancestors up to the root."""
+    chain = []
     while joint >= 0:
-        way.append(joint)
+        chain.append(joint)
         joint = bvh.parents[joint]
-    return way
+    return chain
 
 
 def forward_kinematics(bvh: Bvh, joints: list[int], frames: npt.NDArray[np.int64] | None = None) -> tuple[Array, Array]:
-    """World positions (n, J, 3) and orientations (n, J, 4) of `joints` and their ancestors; others stay zero.
+    """Return world positions (n, J, 3) and orientations (n, J, 4) of `joints` and their ancestors; others stay zero.
 
-    `frames` chooses frames by index (default: all). In the file's units and axes. Rotation channels turn in the
-    order in which they stand, each about the axis that the ones before have turned. Position channels stand in
-    place of the offset, as exporters mean them; below the root, where they stay nearer to zero than to the offset,
-    they are added to it.
+    `frames` selects frames by index (default: all). Units and axes are the file's. Rotation channels apply in file
+    order, each about the axis rotated by the previous ones. Position channels replace the offset, as exporters mean
+    them; below the root, if they stay nearer to zero than to the offset, they are added to it.
     """
     values = bvh.frames if frames is None else bvh.frames[frames]
     position = np.zeros((len(values), len(bvh.names), 3))
@@ -60,7 +59,7 @@ def forward_kinematics(bvh: Bvh, joints: list[int], frames: npt.NDArray[np.int64
 
 
 def _local_transform(bvh: Bvh, joint: int, values: Array, column: int) -> tuple[Array, Array]:
-    """Rotation (n, 4) and offset (n, 3) or (3,) of a joint in its parent."""
+    """Return rotation (n, 4) and offset (n, 3) of a joint relative to its parent."""
     turned = np.tile(rotation.IDENTITY, (len(values), 1))
     offset = bvh.offsets[joint]
     moved = np.tile(offset, (len(values), 1))
@@ -73,7 +72,7 @@ def _local_transform(bvh: Bvh, joint: int, values: Array, column: int) -> tuple[
             moved[:, axis] = track
     given = ["XYZ".index(c[0]) for c in bvh.channels[joint] if c.endswith("position")]
     if given and bvh.parents[joint] >= 0:
-        # over the whole clip, so that all choices of frames are read alike
+        # over the whole clip, so that the result does not depend on the selected frames
         columns = [column + index for index, c in enumerate(bvh.channels[joint]) if c.endswith("position")]
         mean = bvh.frames[:, columns].mean(axis=0)
         if np.linalg.norm(mean) < np.linalg.norm(mean - offset[given]):

@@ -1,4 +1,4 @@
-"""Motion as files that other programs read."""
+"""BVH writer."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ CENTIMETRES_PER_METRE = 100.0
 
 
 def euler_zxy(q: Array) -> Array:
-    """Angles (..., 3) in degrees of unit quaternions (..., 4), to be turned about z, then x, then y, each about the
-    axis the ones before have turned; the one about x lies within 90 degrees. Where x is at 90, y is zero.
+    """Return Euler angles (..., 3) in degrees of unit quaternions (..., 4), applied about z, x and y.
+
+    Each rotation is about the axis rotated by the previous ones; the angle about x is within 90 degrees. Where it is
+    90, the angle about y is zero.
     """
     w, x, y, z = (q[..., i] for i in range(4))
     sine = 2.0 * (w * x + y * z)
@@ -29,10 +31,10 @@ def euler_zxy(q: Array) -> Array:
 
 
 def write_bvh(motion: Motion) -> bytes:
-    """`motion` as BVH in centimetres, y up, facing z, with H-Anim joint names and its I-pose as the rest pose.
+    """Write `motion` as BVH in centimetres, y up, facing z, with H-Anim joint names and the I-pose as rest pose.
 
-    The root has six channels, whose positions are absolute; all joints turn in the order z, x, y. Lengths have 6
-    decimals, angles 6.
+    The root has six channels with absolute positions; all joints rotate in the order z, x, y. Lengths and angles have 6
+    decimals.
     """
     offsets = motion.figure.offsets * CENTIMETRES_PER_METRE
     offsets[0] = 0.0

@@ -1,8 +1,8 @@
-"""How a movement starts and stops: eases, and tracks made by adding movements up.
+"""Easing functions, and tracks composed of eased moves.
 
-A track is the sum of single movements from key to key, each with its own begin and end; where they overlap the body
-flows through a key instead of stopping there (superposition of submovements: Flash and Henis 1991, "Arm trajectory
-modifications during reaching towards visual targets").
+A track is the sum of moves, each with its own start and duration; where they overlap the body flows through a key
+instead of stopping there (superposition of submovements: Flash and Henis 1991, "Arm trajectory modifications during
+reaching towards visual targets").
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ EasingFunction = Callable[[Array], Array]
 
 
 def minimum_jerk(u: Array) -> Array:
-    """0 to 1 while `u` runs from 0 to 1, at rest at both ends (Flash and Hogan 1985); constant outside."""
+    """Ease from 0 to 1 for `u` from 0 to 1, at rest at both ends (Flash and Hogan 1985); constant outside."""
     u = np.clip(u, 0.0, 1.0)
     eased: Array = u * u * u * (10.0 + u * (6.0 * u - 15.0))
     return eased
 
 
 def ease_out(u: Array) -> Array:
-    """0 to 1 with a sharp start and a soft end, as a puppet moves: speed 20 u (1 - u)^3, at its most at u = 1/4."""
+    """Ease from 0 to 1 with a sharp start and a soft end: speed 20 u (1 - u)^3, maximal at u = 1/4."""
     u = np.clip(u, 0.0, 1.0)
     eased: Array = u * u * (10.0 + u * (-20.0 + u * (15.0 - 4.0 * u)))
     return eased
 
 
 def ease_in(u: Array) -> Array:
-    """`crisp` backwards: a soft start and a sharp end, as a stamping foot comes down."""
+    """Ease from 0 to 1 with a soft start and a sharp end, the reverse of `ease_out`."""
     eased: Array = 1.0 - ease_out(1.0 - np.asarray(u))
     return eased
 
 
 @dataclass(frozen=True, slots=True)
 class EasedMove:
-    """A change by `delta` (k,) that begins at `begin` and takes `duration`, above zero, both in seconds."""
+    """Change by `delta` (k,) that starts at `start` and takes `duration` > 0, both in seconds."""
 
     start: float
     duration: float
@@ -48,7 +48,7 @@ class EasedMove:
 
 
 def superpose(time: Array, start: Array, moves: Sequence[EasedMove]) -> Array:
-    """The track (n, k) over `time` (n,) seconds that begins at `start` (k,) and makes all `moves`."""
+    """Return the track (n, k) over `time` (n,) seconds that starts at `start` (k,) and adds all `moves`."""
     track = np.tile(np.asarray(start, dtype=np.float64), (len(time), 1))
     for move in moves:
         track += move.ease((time - move.start) / move.duration)[:, None] * move.delta
@@ -56,14 +56,15 @@ def superpose(time: Array, start: Array, moves: Sequence[EasedMove]) -> Array:
 
 
 def bump(time: Array, begin: float, peak: float, end: float) -> Array:
-    """A swell (n,) from 0 at `begin` to 1 at `peak` and back to 0 at `end`, seconds, at rest at all three."""
+    """Rise (n,) from 0 at `begin` to 1 at `peak` and fall to 0 at `end`, in seconds, at rest at all three."""
     return minimum_jerk((time - begin) / (peak - begin)) - minimum_jerk((time - peak) / (end - peak))
 
 
 def hermite(time: Array, knots: Array, values: Array, slopes: Array) -> Array:
-    """The cubic Hermite spline (n,) through `values` (m,) with `slopes` (m,) at rising `knots` (m,) seconds.
+    """Evaluate the cubic Hermite spline (n,) through `values` (m,) with `slopes` (m,) at ascending `knots` (m,)
+    seconds.
 
-    Outside the knots it keeps the first and the last value.
+    Outside the knots the first and the last value are constant.
     """
     i = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
     span = knots[i + 1] - knots[i]

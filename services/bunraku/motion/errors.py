@@ -1,14 +1,14 @@
-"""What a reader says of motion it cannot read."""
+"""Errors of motion readers."""
 
 from __future__ import annotations
 
 
 class UnreadableMotion(Exception):
-    """A file that cannot be read as motion, in words for the person who sent it.
+    """Motion file that cannot be read, described for the person who sent it.
 
-    The fields are those of a problem document (RFC 9457) and the project's additions to it: `title` what is wrong in
-    general, `detail` what is wrong here, `line` the line in the file counted from 1, `field` the joint or keyword,
-    `hint` what to do. `line` and `field` are None where nothing can be pointed at.
+    The attributes are those of a problem document (RFC 9457) and this project's extensions: `title` the general
+    problem, `detail` this occurrence, `line` the line number in the file, from 1, `field` the joint or keyword, `hint`
+    the remedy. `line` and `field` are None if no place can be named.
     """
 
     def __init__(
@@ -24,7 +24,7 @@ class UnreadableMotion(Exception):
 
 
 def quote_excerpt(text: bytes | str, limit: int = 40) -> str:
-    """`text` in quotes for a message, unprintable characters escaped, cut to `limit` characters."""
+    """Return `text` in quotes for a message: unprintable characters escaped, cut to `limit` characters."""
     if isinstance(text, bytes):
         text = text[: 4 * limit].decode("utf-8", "replace")
     text = text if len(text) <= limit else text[:limit] + "…"

@@ -1,4 +1,4 @@
-"""A figure in the making: the source in its axes, and the joints placed so far."""
+"""State of a figure while it is fitted to a source."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, PARENTS
 
 @dataclass(slots=True)
 class FigureFit:
-    """The source in the figure's axes and metres, n frames, and the figure so far.
+    """Source in the figure's axes and metres, n frames, and the figure's joints fitted so far.
 
-    `joints` H-Anim index -> source index; `position` (n, J, 3) the source's joints and `turn` (n, J, 4) each one's
-    rotation from its rest; `rested` (J, 3) the source at rest, `axes` (J, 4) its joints' orientations there. Of the
-    figure: `offsets` and `tips` (18, 3), `placed` (n, 18, 3) and `oriented` (n, 18, 4) in the world.
+    `joints` maps H-Anim index to source index; `position` (n, J, 3) are the source's joints and `turn` (n, J, 4) their
+    rotation from rest; `rest_positions` (J, 3) and `rest_orientations` (J, 4) describe the source at rest. Of the
+    figure: `offsets` and `tips` (18, 3), `joint_positions` (n, 18, 3) and `joint_orientations` (n, 18, 4) in the world.
     """
 
     bvh: Bvh
@@ -42,7 +42,7 @@ class FigureFit:
 
     @classmethod
     def from_bvh(cls, bvh: Bvh, joints: dict[str, int], rest: RestPose) -> FigureFit:
-        """The whole clip of `bvh` in the figure's axes, nothing placed yet."""
+        """Return the whole clip of `bvh` in the figure's axes, with no joint placed yet."""
         index = {JOINT_INDEX[name]: source for name, source in joints.items()}
         used = sorted({ancestor for source in index.values() for ancestor in ancestor_chain(bvh, source)})
         position, orientation = forward_kinematics(bvh, used)
@@ -61,11 +61,11 @@ class FigureFit:
         )
 
     def without_first_frame(self) -> FigureFit:
-        """The same without its first frame."""
+        """Return the fit without its first frame."""
         return replace(self, position=self.position[1:], turn=self.turn[1:])
 
     def place_joint(self, joint: int, offset: Array, orientation: Array) -> None:
-        """Place a joint of the figure: its `offset` (3,) in its parent, its world `orientation` (n, 4)."""
+        """Place a joint of the figure: `offset` (3,) in its parent, world `orientation` (n, 4)."""
         parent = PARENTS[joint]
         self.offsets[joint] = offset
         self.joint_positions[:, joint] = self.joint_positions[:, parent] + rotation.rotate(
@@ -74,25 +74,25 @@ class FigureFit:
         self.joint_orientations[:, joint] = orientation
 
     def relative_positions(self, joint: int, sources: list[int]) -> Array:
-        """Positions (n, m, 3) of `sources` from where the figure's `joint` is."""
+        """Return positions (n, m, 3) of `sources` relative to the figure's `joint`, in world axes."""
         found: Array = self.position[:, sources] - self.joint_positions[:, [joint]]
         return found
 
     def mean_offset(self, parent: int, source: int) -> Array:
-        """Where a source joint lies in the figure's joint `parent` on average (3,)."""
+        """Return the mean position (3,) of a source joint in the frame of the figure's joint `parent`."""
         place: Array = procrustes.mean_local_positions(
             self.joint_orientations[:, parent], self.relative_positions(parent, [source])
         )[0]
         return place
 
     def measure_bone(self, joint: int) -> tuple[Array, float]:
-        """The source's bone from `joint` to the next, at rest (3,), and its mean length."""
+        """Return the source's bone from `joint` to the next at rest (3,), and its mean length."""
         start, end = self.joints[joint], self.joints[joint + 1]
         length = np.linalg.norm(self.position[:, end] - self.position[:, start], axis=-1).mean()
         return self.rest_positions[end] - self.rest_positions[start], float(length)
 
     def farthest_descendant(self, source: int) -> Array | None:
-        """From a source joint to the farthest point that hangs from it at rest (3,); None where nothing does."""
+        """Return the vector (3,) from a source joint to its farthest descendant at rest; None if it has none."""
         below = [joint for joint in range(source, len(self.bvh.parents)) if source in ancestor_chain(self.bvh, joint)]
         found = [self.rest_positions[joint] - self.rest_positions[source] for joint in below[1:]]
         found += [

@@ -1,4 +1,4 @@
-"""The figure's arms and legs: how they lie at rest, and how they follow the source's joints."""
+"""Fit of the figure's arms and legs: rest directions, and rotations that follow the source's joints."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, standard_figure
 
 HAND_LENGTH_M, TOE_LENGTH_M = 0.18, 0.07
-"""Metres beyond wrist and midtarsal: where error is measured."""
+"""Default tips beyond wrist and midtarsal, where the codec's error is measured."""
 HAND_LENGTH_RANGE_M = (0.10, 0.26)
 FOOT_LENGTH_RANGE_M = (0.08, 0.35)
-"""A source's own hand and foot are believed within these, metres."""
+"""Ranges within which the source's own hand and foot lengths are used."""
 INSTEP_RATIO = 0.65
-"""Part of a foot that lies before the ball, for a source whose foot is one bone."""
+"""Share of a foot before the ball, for a source whose foot is one bone."""
 
 DOWN: Array = np.array([0.0, -1.0, 0.0])
 FORWARD: Array = np.array([0.0, 0.0, 1.0])
 MIN_LATERAL_COMPONENT = 0.35
-"""A bone whose part across and up is smaller than this points forwards or back."""
+"""Bones whose component in the frontal plane is smaller than this point forwards or backwards."""
 
 
 def rotation_to_hanging(bone: Array) -> Array:
-    """The turn (4,) that brings a limb's bone (3,), in the figure's axes, to hang straight down.
+    """Return the rotation (4,) that brings a limb's bone (3,), in the figure's axes, to hang straight down.
 
-    First about z, as an arm is lowered from a T- or A-pose: a palm that faced the floor then faces the thigh. What is
-    left, forwards or back, goes about x. A bone that points forwards at rest goes about x alone.
+    First about z, as an arm is lowered from a T- or A-pose: a palm that faced the floor then faces the thigh. The rest,
+    forwards or backwards, is about x. A bone that points forwards at rest rotates about x only.
     """
     x, y, z = rotation.normalise(bone).tolist()
     across = float(np.hypot(x, y))
@@ -38,16 +38,17 @@ def rotation_to_hanging(bone: Array) -> Array:
 
 
 def aim_at(orientation: Array, offset: Array, start: Array, target: Array) -> Array:
-    """`orientation` (n, 4) with the least turn that points `offset` (3,) from `start` (n, 3) at `target` (n, 3)."""
+    """Return `orientation` (n, 4) with the smallest rotation that aims `offset` (3,) from `start` (n, 3) at `target`
+    (n, 3)."""
     there = target - start
     turn = rotation.rotation_between(rotation.rotate(orientation, offset), there)
-    # a target at the joint itself gives no direction
+    # a target at the joint itself has no direction
     near = np.linalg.norm(there, axis=-1, keepdims=True) < 1e-6
     return rotation.normalise(rotation.multiply(np.where(near, rotation.IDENTITY, turn), orientation))
 
 
 def fit_leg(fit: FigureFit, side: str) -> None:
-    """Place hip, knee, ankle and midtarsal of `side` ("l" or "r") and the toes' tip; the hip's offset is known."""
+    """Place hip, knee, ankle and midtarsal of `side` ("l" or "r") and the toe tip; the hip's offset is known."""
     hip, knee, ankle, midtarsal = (JOINT_INDEX[f"{side}_{name}"] for name in ("hip", "knee", "ankle", "midtarsal"))
     _fit_long_bones(fit, hip, knee)
     fit.offsets[midtarsal], turn, toes = _fit_foot(fit, ankle, midtarsal)
@@ -78,9 +79,9 @@ def fit_arm(fit: FigureFit, side: str) -> None:
 
 
 def _fit_long_bones(fit: FigureFit, upper: int, lower: int) -> Array:
-    """Place a limb's two long bones, straight below one another at rest; the turn (4,) of the lower from the source.
+    """Place a limb's two long bones, one straight below the other at rest; return the rest rotation (4,) of the lower.
 
-    Where the source's limb ends at `lower`, its bone is as long as the upper and goes on straight.
+    If the source's limb ends at `lower`, the lower bone gets the length and direction of the upper.
     """
     bone, length = fit.measure_bone(upper)
     turn = rotation_to_hanging(bone)
@@ -95,9 +96,9 @@ def _fit_long_bones(fit: FigureFit, upper: int, lower: int) -> Array:
 
 
 def _fit_joint(fit: FigureFit, joint: int, turn: Array) -> None:
-    """Place `joint`, turned as the source's, and aimed so that the next joint is where the source has it.
+    """Place `joint` with the source's rotation, aimed so that the next joint coincides with the source's.
 
-    `turn` (4,) brings the source's rest to the figure's. The offsets of both joints are known.
+    `turn` (4,) rotates the source's rest pose to the figure's. The offsets of both joints are known.
     """
     orientation = rotation.multiply(fit.turn[:, fit.joints[joint]], rotation.conjugate(turn))
     fit.place_joint(joint, fit.offsets[joint], orientation)
@@ -110,9 +111,9 @@ LIMB_END_JOINTS = tuple(JOINT_INDEX[f"{side}_{name}"] for side in "lr" for name 
 
 
 def _fit_foot(fit: FigureFit, ankle: int, midtarsal: int) -> tuple[Array, Array, Array]:
-    """The midtarsal's offset (3,), the turn (4,) from the source's rest to it, and the way of the toes (3,).
+    """Return the midtarsal's offset (3,), the rotation (4,) from the source's rest to it, and the toes' direction (3,).
 
-    A foot that stands flat in the source is kept as it is; one that points elsewhere is turned to the front.
+    A foot that stands flat in the source keeps its direction; any other is rotated to the front.
     """
     standard = standard_figure().offsets[midtarsal] * np.array([0.0, 1.0, 1.0])
     if midtarsal in fit.joints and ankle in fit.joints:
@@ -134,6 +135,6 @@ def _fit_foot(fit: FigureFit, ankle: int, midtarsal: int) -> tuple[Array, Array,
 
 
 def _points_forward(foot: Array) -> bool:
-    """Whether a bone of the foot (3,), in the figure's axes, points to the front and not up."""
+    """Return whether a bone of the foot (3,), in the figure's axes, points forwards and not upwards."""
     x, y, z = rotation.normalise(foot).tolist()
     return bool(z > 0.5 and abs(x) < 0.6 and y < 0.3)

@@ -1,4 +1,4 @@
-"""Which joint of a source is which joint of the figure, by their names."""
+"""Mapping of source joints to the figure's joints by their names."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 from bunraku.motion.naming_profile import LIMB_JOINT_NAMES, PROFILES, NamingProfile
 
 REQUIRED_LIMB_JOINTS = ("hip", "knee", "shoulder", "elbow")
-"""Limb joints both sides must have for a profile to fit."""
+"""Limb joints that a profile must match on both sides."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointMapping:
-    """H-Anim joint names and the source joint's index for each; `guessed` are sentences on what was not certain."""
+    """Source joint index for each H-Anim joint name; `assumptions` are sentences about uncertain choices."""
 
     profile: str
     joints: dict[str, int]
@@ -23,13 +23,13 @@ class JointMapping:
 
 
 def normalise_name(name: str) -> str:
-    """A name without namespace, case, and all but letters and digits: "rig:upper_arm.L" is "upperarml"."""
+    """Return a name without namespace, case and punctuation: "rig:upper_arm.L" -> "upperarml"."""
     local = re.split(r"[:|]", name.strip().rstrip(":|"))[-1]
     return "".join(character for character in local.lower() if character.isalnum())
 
 
 def is_descendant(parents: Sequence[int], joint: int, ancestor: int) -> bool:
-    """Whether `joint` hangs from `ancestor`, at any depth."""
+    """Return whether `joint` is below `ancestor`, at any depth."""
     while joint >= 0:
         joint = parents[joint]
         if joint == ancestor:
@@ -38,16 +38,16 @@ def is_descendant(parents: Sequence[int], joint: int, ancestor: int) -> bool:
 
 
 def common_ancestor(parents: Sequence[int], joints: Sequence[int]) -> int:
-    """The lowest joint that is, or is above, all of `joints`."""
-    ways: list[list[int]] = []
+    """Return the lowest joint that is, or is above, all of `joints`."""
+    paths: list[list[int]] = []
     for below in joints:
-        joint, way = below, [below]
+        joint, path = below, [below]
         while parents[joint] >= 0:
             joint = parents[joint]
-            way.append(joint)
-        ways.append(way[::-1])
+            path.append(joint)
+        paths.append(path[::-1])
     common = 0
-    for step in zip(*ways, strict=False):
+    for step in zip(*paths, strict=False):
         if len(set(step)) > 1:
             break
         common = step[0]
@@ -55,7 +55,7 @@ def common_ancestor(parents: Sequence[int], joints: Sequence[int]) -> int:
 
 
 def map_by_name(names: Sequence[str], parents: Sequence[int]) -> JointMapping | None:
-    """The profile that names most joints, and its mapping; None where none has the limbs or they do not hang right."""
+    """Return the mapping of the profile that matches most joints, or None if none matches valid limbs."""
     index: dict[str, int] = {}
     for joint, name in enumerate(names):
         index.setdefault(normalise_name(name), joint)
@@ -73,7 +73,7 @@ def map_by_name(names: Sequence[str], parents: Sequence[int]) -> JointMapping | 
 
 
 def _candidate_prefixes(profile: NamingProfile, index: dict[str, int]) -> list[str]:
-    """What may stand before all names: what stands before the left knee's."""
+    """Return possible common prefixes of all names: those before the left knee's name."""
     found = {""}
     for pattern in profile.limb_patterns["knee"].split("|"):
         knee = pattern.format(side=profile.side_words[0])
@@ -96,12 +96,12 @@ def _match_profile(profile: NamingProfile, prefix: str, index: dict[str, int]) -
 
 
 def _has_valid_limbs(joints: dict[str, int], parents: Sequence[int]) -> bool:
-    """Whether the limbs are all there, each joint below the one it should hang from."""
+    """Return whether all required limb joints exist, each below its predecessor."""
     for side in "lr":
         if any(f"{side}_{joint}" not in joints for joint in REQUIRED_LIMB_JOINTS):
             return False
         for chain in (LIMB_JOINT_NAMES[:4], LIMB_JOINT_NAMES[4:]):
-            there = [joints[f"{side}_{joint}"] for joint in chain if f"{side}_{joint}" in joints]
-            if not all(is_descendant(parents, below, above) for above, below in itertools.pairwise(there)):
+            present = [joints[f"{side}_{joint}"] for joint in chain if f"{side}_{joint}" in joints]
+            if not all(is_descendant(parents, below, above) for above, below in itertools.pairwise(present)):
                 return False
     return True

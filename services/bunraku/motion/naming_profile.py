@@ -1,9 +1,9 @@
-"""How the programs people capture and animate with name the joints of a body.
+"""Joint naming conventions of capture and animation programs.
 
-Names are compared without case and without anything but letters and digits, after a namespace ("rig:") and a common
-prefix ("Character1_") are taken off: "upper_arm.L" is `upperarml`. In a pattern `{side}` is the side word, and `|`
-parts alternatives. A `sign` is a regular expression on the bare names that tells a profile from one that shares its
-names; it adds nothing to the mapping.
+Names are compared without case and everything but letters and digits, after removal of a namespace ("rig:") and a
+common prefix ("Character1_"): "upper_arm.L" is `upperarml`. In a pattern `{side}` is the side word, and `|` separates
+alternatives. A `marker` is a regular expression on the normalised names that distinguishes a profile from another with
+the same names; it does not contribute to the mapping.
 """
 
 from __future__ import annotations
@@ -13,8 +13,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class NamingProfile:
-    """Names of one family of skeletons: `centre` maps H-Anim joints to patterns, `limbs` the H-Anim joint without its
-    "l_" or "r_"; `sides` are the words for left and right."""
+    """Naming convention of one family of skeletons.
+
+    `side_words` are the words for left and right; `trunk_patterns` maps H-Anim joints to patterns, `limb_patterns`
+    H-Anim joints without "l_" or "r_".
+    """
 
     name: str
     side_words: tuple[str, str]
@@ -31,7 +34,7 @@ SIDE_LETTERS = ("l", "r")
 def _limb_profile(
     name: str, sides: tuple[str, str], root: str, head: str, limbs: str, marker: str = ""
 ) -> NamingProfile:
-    """A profile whose `limbs` are seven patterns in the order of `LIMB_JOINTS`."""
+    """Return a profile from seven `limbs` patterns in the order of `LIMB_JOINT_NAMES`."""
     patterns = dict(zip(LIMB_JOINT_NAMES, limbs.split(), strict=True))
     return NamingProfile(name, sides, {"humanoid_root": root, "skullbase": head}, patterns, marker)
 

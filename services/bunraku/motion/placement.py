@@ -1,4 +1,4 @@
-"""Where a performer dances on a stage: its whole dance turned about y and moved (SPEC.md, Track `motion`)."""
+"""Placement of a performer on a stage: the whole motion rotated about y and moved."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 
 MAX_STAGE_DISTANCE_M = 100.0
-"""Metres that x and z may be from the middle of the stage."""
+"""Bound of x and z, from the centre of the stage."""
 
 
 class Placement(NamedTuple):
-    """`turn` radians about y, from z towards x, and then `x` and `z` metres, in the world's frame."""
+    """Rotation `turn` in radians about y, from z towards x, then translation `x` and `z` in metres, world frame."""
 
     x: float = 0.0
     z: float = 0.0
@@ -23,19 +23,21 @@ class Placement(NamedTuple):
 
     @classmethod
     def parse(cls, value: Any) -> Self:
-        """The place in a list `[x, z, turn]`; raises ValueError where it is none."""
+        """Return the placement in a list `[x, z, turn]`; raise ValueError if it is invalid."""
         if not isinstance(value, list | tuple) or len(value) != 3:
-            raise ValueError("a place is x, z and turn, three numbers")
+            raise ValueError("a placement is [x, z, turn], three numbers")
         numbers = [float(number) if isinstance(number, int | float) else float("nan") for number in value]
         if not all(map(isfinite, numbers)):
-            raise ValueError("a place is x, z and turn, three finite numbers")
+            raise ValueError("a placement is [x, z, turn], three finite numbers")
         if max(abs(numbers[0]), abs(numbers[1])) > MAX_STAGE_DISTANCE_M:
-            raise ValueError(f"x and z of a place are within {MAX_STAGE_DISTANCE_M:g} metres")
+            raise ValueError(f"x and z of a placement are within {MAX_STAGE_DISTANCE_M:g} metres")
         return cls(*numbers)
 
     def apply(self, root: Array, rotations: Array) -> tuple[Array, Array]:
-        """Root positions (..., 3), metres, and joint rotations (..., 18, 4), as they are on the stage. Only the root's
-        rotation is another."""
+        """Return root positions (..., 3) in metres and joint rotations (..., 18, 4) on the stage.
+
+        Only the root's rotation changes.
+        """
         if self == STAGE_CENTRE:
             return root, rotations
         turned = rotations.copy()
@@ -50,18 +52,18 @@ class Placement(NamedTuple):
 
 
 STAGE_CENTRE = Placement()
-"""In the middle of the stage, as it is told."""
+"""Centre of the stage, without rotation."""
 
 
 def place_in_row(centres: list[Array], gaps: list[float], turns: list[float]) -> list[Placement]:
-    """Places beside each other along x, from the left of who looks at them to the right, about the middle.
+    """Return placements side by side along x, left to right as the audience sees them, centred.
 
-    `middles` (2,) are x and z of the middle of each dance before it is turned, which comes to stand at z 0; `apart` is
-    how far each is from the next, metres: one fewer.
+    `centres` (2,) are x and z of the centre of each motion before its rotation, which is placed at z 0; `gaps` are the
+    distances between neighbours in metres, one fewer.
     """
-    places, at = [], -sum(gaps) / 2
-    for (x, z), turn, following in zip(centres, turns, (*gaps, 0.0), strict=True):
+    placements, x_position = [], -sum(gaps) / 2
+    for (x, z), turn, gap in zip(centres, turns, (*gaps, 0.0), strict=True):
         sine, cosine = sin(turn), cos(turn)
-        places.append(Placement(at - (cosine * x + sine * z), -(cosine * z - sine * x), turn))
-        at += following
-    return places
+        placements.append(Placement(x_position - (cosine * x + sine * z), -(cosine * z - sine * x), turn))
+        x_position += gap
+    return placements

@@ -1,8 +1,8 @@
-"""Fitting one joint to the points that hang from it.
+"""Fit of one joint's orientation to the points that it carries.
 
-A source bends its spine in several joints, LOA-1 between root and head in one, vl5. So vl5's orientation is solved: in
-each frame the rotation that brings neck and shoulders nearest to the source's (Kabsch 1976), in turn with the points'
-own places in the joint, which are the mean over the frames (generalised Procrustes analysis, Gower 1975).
+A source bends its spine in several joints, LOA-1 between root and head in one, vl5. The orientation of vl5 is therefore
+solved: in each frame the rotation that brings neck and shoulders nearest to the source's (Kabsch 1976), alternating
+with the points' local positions, which are the mean over the frames (generalised Procrustes analysis, Gower 1975).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ PROCRUSTES_ITERATIONS = 12
 
 
 def solve_kabsch(points: Array, targets: Array, weights: Array) -> Array:
-    """Rotations (..., 4) that bring `points` (m, 3) nearest to `targets` (..., m, 3); `weights` (m) of the squares."""
+    """Return rotations (..., 4) from `points` (m, 3) to the nearest of `targets` (..., m, 3); `weights` (m,)."""
     covariance = np.einsum("m,...mi,mj->...ij", weights, targets, points)
     u, _, v = np.linalg.svd(covariance)
     proper = np.linalg.det(u) * np.linalg.det(v)
@@ -25,22 +25,25 @@ def solve_kabsch(points: Array, targets: Array, weights: Array) -> Array:
 
 
 def mean_local_positions(orientation: Array, targets: Array) -> Array:
-    """Where points `targets` (n, m, 3), relative to a joint, lie in it on average (m, 3); `orientation` (n, 4)."""
+    """Return the mean positions (m, 3) of `targets` (n, m, 3), relative to a joint, in its frame; `orientation` (n, 4)."""
     places: Array = rotation.rotate(rotation.conjugate(orientation)[:, None], targets).mean(axis=0)
     return places
 
 
 def rms_error(orientation: Array, local_positions: Array, targets: Array, weights: Array) -> float:
-    """Weighted RMS distance of `places` (m, 3), turned by `orientation` (n, 4), from `targets` (n, m, 3)."""
+    """Return the weighted RMS distance of `local_positions` (m, 3) from `targets` (n, m, 3).
+
+    `orientation` (n, 4) rotates the local positions.
+    """
     apart = np.sum((rotation.rotate(orientation[:, None], local_positions) - targets) ** 2, axis=-1)
     return float(np.sqrt((apart @ weights).mean() / weights.sum()))
 
 
 def fit_local_positions(orientation: Array, targets: Array, weights: Array, rest_positions: Array) -> Array:
-    """Places (m, 3) that, turned afresh in every frame, come nearest to `targets` (n, m, 3).
+    """Return local positions (m, 3) that, rotated anew in every frame, come nearest to `targets` (n, m, 3).
 
-    `orientation` (n, 4) is where to begin. The places are turned as a whole to lie nearest to `rested` (m, 3), so that
-    the joint's identity is the source's rest.
+    `orientation` (n, 4) is the initial guess. The result is rotated as a whole to lie nearest to `rest_positions` (m,
+    3), so that the joint's identity is the source's rest.
     """
     places = mean_local_positions(orientation, targets)
     for _ in range(PROCRUSTES_ITERATIONS):

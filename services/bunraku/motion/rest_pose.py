@@ -1,8 +1,8 @@
-"""The source's rest pose, its unit and its axes.
+"""Detection of the source's rest pose, unit and axes.
 
-The rest pose of a BVH file is what its offsets give with no rotation. Usually a body stands in it: arms out (T), half
-down (A) or down (I). Some exporters lay all bones along one axis and keep the pose in the rotations; then the frame
-of the clip in which the body stands straightest takes the rest pose's place.
+The rest pose of a BVH file follows from its offsets without rotation. Usually a body stands in it: arms out (T), half
+down (A) or down (I). Some exporters lay all bones along one axis and keep the pose in the rotations; then the frame of
+the clip in which the body stands straightest replaces it.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from bunraku.motion.bvh_kinematics import rest_positions
 from bunraku.motion.rotation import Array
 
 REFERENCE_LEG_M = 0.82
-"""A grown dancer's leg, hip to ankle, metres: what the unit is told from."""
+"""Leg of an adult, hip to ankle, from which the unit is detected."""
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "CMU unit (0.45 scaled inch)": 0.0254 / 0.45}
-"""Metres per unit. The CMU database counts in inches scaled by 0.45 (mocap.cs.cmu.edu, its FAQ)."""
+"""Metres per unit. The CMU database uses inches scaled by 0.45 (mocap.cs.cmu.edu, FAQ)."""
 MAX_LEG_LOG_RATIO = np.log(1.55)
-"""How far, as a ratio, a leg may be from `LEG`: from a child's to a giant's."""
+"""Largest deviation of a leg from `REFERENCE_LEG_M`, as the logarithm of a ratio: a child's to a giant's."""
 MAX_SAMPLED_FRAMES = 256
-"""Frames looked at to tell unit, axes and sides."""
+"""Frames examined to detect unit, axes and sides."""
 
 SIGNED_AXES: Array = np.concatenate([np.eye(3), -np.eye(3)])
 
 
 @dataclass(frozen=True, slots=True)
 class RestPose:
-    """How the source stands and measures.
+    """Rest pose, unit and axes of the source.
 
     `pose` is "T", "A", "I", "bone-aligned" or "other"; `unit` its name and `scale` metres per unit. `positions` (J, 3)
-    and `orientations` (J, 4) are the source's joints at rest, in its own unit and axes; `upright` (4,) turns these axes
-    into the figure's (y up, facing z, x to the left), and `world` (4,) the axes of the motion into ours.
+    and `orientations` (J, 4) are the source's joints at rest, in its own unit and axes; `rest_to_figure` (4,) rotates
+    these axes to the figure's (y up, facing z, x to the left), and `motion_to_figure` (4,) the axes of the motion.
     """
 
     pose: str
@@ -48,23 +48,23 @@ class RestPose:
 
 
 def sample_frames(bvh: Bvh) -> np.ndarray:
-    """Indices of at most `SAMPLES` frames, evenly over the clip, the first included."""
+    """Return indices of at most `MAX_SAMPLED_FRAMES` frames, evenly over the clip, including the first."""
     return np.unique(np.linspace(0, len(bvh.frames) - 1, MAX_SAMPLED_FRAMES).astype(np.int64))
 
 
 def resolve_sides(position: Array, joints: dict[str, int]) -> tuple[dict[str, int], list[str]]:
-    """`joints` with left and right as the body's front shows them, and what was changed.
+    """Return `joints` with left and right as the body's front shows them, and sentences about changes.
 
-    `position` (n, J, 3) are sampled frames. Toes point forwards and knees bend forwards; arms are on the side of
-    the legs they are over.
+    `position` (n, J, 3) are sampled frames. Toes point forwards and knees bend forwards; arms are above the legs of the
+    same side.
     """
     joints = dict(joints)
-    said = []
+    notes = []
     across = position[:, joints["l_hip"]] - position[:, joints["r_hip"]]
     shoulders = position[:, joints["l_shoulder"]] - position[:, joints["r_shoulder"]]
     if np.mean(np.sum(rotation.normalise(across) * rotation.normalise(shoulders), axis=-1)) < -0.3:
         _swap_sides(joints, ("shoulder", "elbow", "wrist"))
-        said.append("Left and right arm were exchanged: they are over the other leg.")
+        notes.append("Left and right arm were exchanged: they are over the other leg.")
     up = _body_up(position, joints)
     forward = rotation.normalise(np.cross(position[:, joints["l_hip"]] - position[:, joints["r_hip"]], up))
     shown = 0.0
@@ -79,14 +79,14 @@ def resolve_sides(position: Array, joints: dict[str, int]) -> tuple[dict[str, in
             shown += float(np.median(np.sum(foot * forward, axis=-1))) / size
     if shown < -0.1:
         _swap_sides(joints, ("hip", "knee", "ankle", "midtarsal", "shoulder", "elbow", "wrist"))
-        said.append("Left and right were exchanged: toes and knees point the other way.")
-    return joints, said
+        notes.append("Left and right were exchanged: toes and knees point the other way.")
+    return joints, notes
 
 
 def find_rest_pose(
     bvh: Bvh, joints: dict[str, int], frames: np.ndarray, position: Array, orientation: Array
 ) -> RestPose:
-    """The rest pose of `bvh`, whose H-Anim `joints` are given by source index.
+    """Detect the rest pose of `bvh`; `joints` maps H-Anim joints to source indices.
 
     `position` (n, J, 3) and `orientation` (n, J, 4) are the sampled `frames` in the source's unit and axes.
     """
@@ -138,7 +138,7 @@ def _lowest_leg_joint(joints: dict[str, int]) -> str:
 
 
 def _body_up(position: Array, joints: dict[str, int]) -> Array:
-    """The way (..., 3) from feet over hips to shoulders, at unit length: trunk and legs count alike."""
+    """Return the unit direction (..., 3) from feet over hips to shoulders; trunk and legs have equal weight."""
     trunk = _midpoint(position, joints, "shoulder") - _midpoint(position, joints, "hip")
     legs = _midpoint(position, joints, "hip") - _midpoint(position, joints, _lowest_leg_joint(joints))
     return rotation.normalise(rotation.normalise(trunk) + rotation.normalise(legs))
@@ -150,7 +150,7 @@ def _nearest_axis(direction: Array) -> Array:
 
 
 def _detect_unit(position: Array, joints: dict[str, int], assumptions: list[str]) -> tuple[str, float]:
-    """The unit in which a leg is nearest to a dancer's."""
+    """Return the unit in which a leg is nearest to `REFERENCE_LEG_M`, and metres per unit."""
     bones = [("hip", "knee"), ("knee", "ankle")] if _lowest_leg_joint(joints) == "ankle" else [("hip", "knee")] * 2
     leg = 0.5 * sum(
         float(np.median(np.linalg.norm(position[:, joints[f"{s}_{a}"]] - position[:, joints[f"{s}_{b}"]], axis=-1)))
@@ -168,7 +168,7 @@ def _detect_unit(position: Array, joints: dict[str, int], assumptions: list[str]
 
 
 def _is_standing(position: Array, joints: dict[str, int]) -> bool:
-    """Whether a body stands in these positions (J, 3): trunk up, both legs down, hips and shoulders across alike."""
+    """Return whether the positions (J, 3) show a standing body: trunk up, legs down, hips and shoulders parallel."""
     trunk = rotation.normalise(_midpoint(position, joints, "shoulder") - _midpoint(position, joints, "hip"))
     end = _lowest_leg_joint(joints)
     legs = [rotation.normalise(position[joints[f"{s}_hip"]] - position[joints[f"{s}_{end}"]]) for s in "lr"]
@@ -179,7 +179,7 @@ def _is_standing(position: Array, joints: dict[str, int]) -> bool:
 
 
 def _figure_axes(position: Array, joints: dict[str, int], up: Array) -> Array:
-    """The rotation that brings `up` to y and the body's left to x; within 10 degrees of an axis it stays one."""
+    """Return the rotation that brings `up` to y and the body's left to x; within 10 degrees it snaps to an axis."""
     left = (position[joints["l_hip"]] - position[joints["r_hip"]]) + (
         position[joints["l_shoulder"]] - position[joints["r_shoulder"]]
     )
@@ -193,9 +193,9 @@ def _figure_axes(position: Array, joints: dict[str, int], up: Array) -> Array:
 def _resolve_motion_axes(
     upright: Array, up: Array, position: Array, joints: dict[str, int], assumptions: list[str]
 ) -> Array:
-    """The turn of the motion's axes: the rest pose's, unless the body stands on another axis through the clip.
+    """Return the rotation of the motion's axes: the rest pose's, unless the body stands on another axis in the clip.
 
-    A body that lies has its hips near the floor; one that stands in other axes has them a leg's length along these.
+    A lying body has its hips near the floor; one that stands in other axes has them a leg's length along these axes.
     """
     axis = _nearest_axis(up)
     rested = rotation.rotate(upright, axis)
@@ -208,7 +208,7 @@ def _resolve_motion_axes(
 
 
 def _classify_arms(position: Array, joints: dict[str, int]) -> str:
-    """T, A, I or other, from the arms' angle to straight down."""
+    """Return "T", "A", "I" or "other" from the arms' angle to straight down."""
     down = -_body_up(position[None], joints)[0]
     across = rotation.normalise(position[joints["l_hip"]] - position[joints["r_hip"]])
     angles = []
@@ -224,21 +224,23 @@ def _classify_arms(position: Array, joints: dict[str, int]) -> str:
 
 
 def _straightness(position: Array, joints: dict[str, int], up: Array) -> Array:
-    """How near each frame (n) is to standing straight with arms straight, beside the body."""
+    """Score each frame (n,) by how straight the body stands, with straight arms beside it."""
 
-    def way(a: str, b: str) -> Array:
+    def direction(a: str, b: str) -> Array:
         return rotation.normalise(position[:, joints[b]] - position[:, joints[a]])
 
     end = _lowest_leg_joint(joints)
-    across = way("r_hip", "l_hip")
-    score: Array = 2.0 * _body_up(position, joints) @ up + np.sum(across * way("r_shoulder", "l_shoulder"), axis=-1)
+    across = direction("r_hip", "l_hip")
+    score: Array = 2.0 * _body_up(position, joints) @ up + np.sum(
+        across * direction("r_shoulder", "l_shoulder"), axis=-1
+    )
     for side in "lr":
-        thigh = way(f"{side}_hip", f"{side}_knee")
-        arm = way(f"{side}_shoulder", f"{side}_elbow")
+        thigh = direction(f"{side}_hip", f"{side}_knee")
+        arm = direction(f"{side}_shoulder", f"{side}_elbow")
         forward = np.cross(across, up)
         score = score - thigh @ up - np.abs(np.sum(arm * forward, axis=-1)) - np.maximum(arm @ up, 0.0)
         if end == "ankle":
-            score = score + np.sum(thigh * way(f"{side}_knee", f"{side}_ankle"), axis=-1)
+            score = score + np.sum(thigh * direction(f"{side}_knee", f"{side}_ankle"), axis=-1)
         if f"{side}_wrist" in joints:
-            score = score + np.sum(arm * way(f"{side}_elbow", f"{side}_wrist"), axis=-1)
+            score = score + np.sum(arm * direction(f"{side}_elbow", f"{side}_wrist"), axis=-1)
     return score

@@ -1,6 +1,6 @@
 """Rotations as unit quaternions, over whole arrays.
 
-A quaternion is an array (..., 4), order w x y z, and turns column vectors: `rotate(q, v)` is q v q*. A rotation
+A quaternion is an array (..., 4), order w x y z, and rotates column vectors: `rotate(q, v)` is q v q*. A rotation
 vector is an array (..., 3): axis times angle in radians. Frames are right-handed. All functions broadcast over the
 leading axes and return float64.
 """
@@ -16,7 +16,7 @@ IDENTITY: Array = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def multiply(a: Array, b: Array) -> Array:
-    """The rotation `b` followed by `a`: (..., 4) times (..., 4) is (..., 4)."""
+    """Return the rotation `b` followed by `a`: (..., 4) times (..., 4) is (..., 4)."""
     aw, ax, ay, az = (a[..., i] for i in range(4))
     bw, bx, by, bz = (b[..., i] for i in range(4))
     return np.stack(
@@ -31,20 +31,20 @@ def multiply(a: Array, b: Array) -> Array:
 
 
 def conjugate(q: Array) -> Array:
-    """The opposite rotation of a unit quaternion (..., 4)."""
+    """Return the inverse rotation of a unit quaternion (..., 4)."""
     turned: Array = q * np.array([1.0, -1.0, -1.0, -1.0])
     return turned
 
 
 def normalise(q: Array) -> Array:
-    """`q` (..., n) at unit length; a zero stays zero."""
+    """Return `q` (..., n) at unit length; a zero vector stays zero."""
     length = np.linalg.norm(q, axis=-1, keepdims=True)
     unit: Array = np.divide(q, length, out=np.zeros_like(q, dtype=np.float64), where=length > 0)
     return unit
 
 
 def rotate(q: Array, v: Array) -> Array:
-    """The vector `v` (..., 3) turned by `q` (..., 4)."""
+    """Rotate the vector `v` (..., 3) by `q` (..., 4)."""
     w, x, y, z = (q[..., i] for i in range(4))
     a, b, c = (v[..., i] for i in range(3))
     # by components: a cross product of whole arrays takes twice as long
@@ -53,9 +53,9 @@ def rotate(q: Array, v: Array) -> Array:
 
 
 def from_rotation_vector(v: Array) -> Array:
-    """Quaternion (..., 4) of a rotation vector (..., 3) in radians, of any length."""
+    """Return the quaternion (..., 4) of a rotation vector (..., 3) in radians, of any length."""
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    # sin(a/2)/a, by its series below 1e-4 where the quotient would lose digits
+    # sin(a/2)/a, by its series below 1e-4, where the quotient would lose digits
     small = angle < 1e-4
     safe = np.where(small, 1.0, angle)
     scale = np.where(small, 0.5 - angle**2 / 48.0, np.sin(0.5 * safe) / safe)
@@ -63,7 +63,7 @@ def from_rotation_vector(v: Array) -> Array:
 
 
 def to_rotation_vector(q: Array) -> Array:
-    """The shortest rotation vector (..., 3), of at most pi radians, of a unit quaternion (..., 4)."""
+    """Return the shortest rotation vector (..., 3), of at most pi radians, of a unit quaternion (..., 4)."""
     q = np.where(q[..., :1] < 0, -q, q)
     u = q[..., 1:]
     sine = np.linalg.norm(u, axis=-1, keepdims=True)
@@ -75,9 +75,9 @@ def to_rotation_vector(q: Array) -> Array:
 
 
 def to_axis_angle(q: Array) -> Array:
-    """Axis and angle (..., 4): unit axis x y z and angle in 0..pi, the form of the paper's channels (paper 2).
+    """Return axis and angle (..., 4): unit axis x y z and angle in 0..pi, the form of the paper's channels (paper 2).
 
-    Where there is no rotation the axis is y.
+    Without rotation the axis is y.
     """
     v = to_rotation_vector(q)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
@@ -87,12 +87,12 @@ def to_axis_angle(q: Array) -> Array:
 
 
 def from_axis_angle(a: Array) -> Array:
-    """Quaternion (..., 4) of a unit axis and an angle in radians (..., 4)."""
+    """Return the quaternion (..., 4) of a unit axis and an angle in radians (..., 4)."""
     return from_rotation_vector(a[..., :3] * a[..., 3:])
 
 
 def from_coordinate_axis(axis: int, angle: Array) -> Array:
-    """Quaternion (..., 4) of a turn by `angle` (...) radians about x, y or z (`axis` 0, 1, 2)."""
+    """Return the quaternion (..., 4) of a rotation by `angle` (...) radians about x, y or z (`axis` 0, 1, 2)."""
     angle = np.asarray(angle, dtype=np.float64)
     q = np.zeros((*angle.shape, 4))
     q[..., 0] = np.cos(0.5 * angle)
@@ -101,9 +101,9 @@ def from_coordinate_axis(axis: int, angle: Array) -> Array:
 
 
 def rotation_between(a: Array, b: Array) -> Array:
-    """The shortest rotation (..., 4) that brings the direction of `a` (..., 3) to that of `b`.
+    """Return the shortest rotation (..., 4) that brings the direction of `a` (..., 3) to that of `b`.
 
-    Opposite directions turn about an axis square to `a`; a zero vector turns nothing.
+    Opposite directions rotate about an axis perpendicular to `a`; a zero vector gives the identity.
     """
     a, b = np.broadcast_arrays(normalise(np.asarray(a, dtype=np.float64)), normalise(np.asarray(b, dtype=np.float64)))
     dot = np.sum(a * b, axis=-1, keepdims=True)
@@ -116,7 +116,7 @@ def rotation_between(a: Array, b: Array) -> Array:
 
 
 def from_matrix(m: Array) -> Array:
-    """Quaternion (..., 4) of rotation matrices (..., 3, 3) (Shepperd 1978: the largest component first)."""
+    """Return the quaternion (..., 4) of rotation matrices (..., 3, 3) (Shepperd 1978: largest component first)."""
     t = np.trace(m, axis1=-2, axis2=-1)
     d = np.stack([t, m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]], axis=-1)
     which = np.argmax(d, axis=-1)
@@ -135,28 +135,28 @@ def from_matrix(m: Array) -> Array:
 
 
 def to_matrix(q: Array) -> Array:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4); columns are the turned axes."""
+    """Return the rotation matrices (..., 3, 3) of unit quaternions (..., 4); columns are the rotated axes."""
     columns = [rotate(q, np.eye(3)[i]) for i in range(3)]
     return np.stack(columns, axis=-1)
 
 
 def slerp(a: Array, b: Array, t: Array | float) -> Array:
-    """From `a` (..., 4) at t = 0 to `b` at t = 1 by the shorter way, at even angular speed; `t` (...)."""
+    """Interpolate from `a` (..., 4) at t = 0 to `b` at t = 1 by the shorter arc, at constant speed; `t` (...)."""
     t = np.asarray(t, dtype=np.float64)
     return multiply(a, from_rotation_vector(to_rotation_vector(multiply(conjugate(a), b)) * t[..., None]))
 
 
 def unwrap_rotation_vectors(v: Array) -> Array:
-    """Rotation vectors (n, ..., 3) of the same rotations, each the nearest equivalent to the one before.
+    """Return rotation vectors (n, ..., 3) of the same rotations, each the equivalent nearest to the previous one.
 
-    A rotation vector may be lengthened by any multiple of 2 pi along its axis; choosing the nearest leaves a track
-    without the jumps at pi that a transform would have to pay for.
+    A rotation vector may be lengthened by any multiple of 2 pi along its axis; choosing the nearest avoids jumps at pi,
+    which a transform would have to code.
     """
     out = np.array(v, dtype=np.float64)
     for i in range(1, len(out)):
         here, before = out[i], out[i - 1]
         angle = np.linalg.norm(here, axis=-1, keepdims=True)
-        # where nothing is turned any axis will do: the one so far
+        # without rotation the axis is arbitrary: keep the previous one
         axis = np.where(angle > 1e-9, here / np.where(angle > 1e-9, angle, 1.0), normalise(before))
         along = np.sum(axis * before, axis=-1, keepdims=True)
         turns = np.round((along - angle) / (2.0 * np.pi))

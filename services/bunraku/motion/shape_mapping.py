@@ -1,8 +1,8 @@
-"""Which joint of a source is which joint of the figure, by the skeleton's shape alone.
+"""Mapping of source joints to the figure's joints by the skeleton's shape alone.
 
-A body has two pairs of limbs, left and right alike; each limb has two long bones in a row. The longer pair is the
-legs. The head is at the end of the longest branch above the arms. Only the tree and the lengths of bones are used, so
-the rest pose does not matter; which side is left is for `rest.sides` to say, from the motion.
+A body has two pairs of limbs, left and right alike; each limb has two long bones in a row. The longer pair is the legs.
+The head is at the end of the longest branch above the arms. Only the tree and the lengths of bones are used, so the
+rest pose does not matter; `rest_pose.resolve_sides` distinguishes left and right by the motion.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from bunraku.motion.name_mapping import JointMapping, common_ancestor, is_descen
 from bunraku.motion.rotation import Array
 
 MAX_LENGTH_DIFFERENCE = 0.15
-"""Bones of left and right may differ by this part of the longer."""
+"""Largest difference of left and right bones, as a share of the longer."""
 MIN_LIMB_RATIO = 0.15
-"""A limb is at least this part of the longest way from the root to a joint."""
+"""Smallest limb, as a share of the longest path from the root to a joint."""
 MAX_FOREARM_RATIO = 0.8
-"""Collar bone and upper arm are taken for an arm only where upper arm and forearm are under this part of them."""
+"""Collar bone and upper arm count as an arm only if upper arm and forearm are shorter than this share of them."""
 MIN_HEAD_RATIO = 0.12
-"""The head reaches at least this part of a leg's length above its joint."""
+"""Smallest extent of the head above its joint, as a share of a leg's length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +39,9 @@ class _LimbCandidate:
 
 
 def map_by_shape(bvh: Bvh) -> JointMapping:
-    """The mapping of joints that the skeleton's shape gives, sides not yet told apart.
+    """Return the mapping that the skeleton's shape gives, with sides not yet distinguished.
 
-    Raises `UnreadableMotion` where the skeleton has no two pairs of limbs.
+    Raises `UnreadableMotion` if the skeleton does not have two pairs of limbs.
     """
     parents = bvh.parents
     lengths = np.linalg.norm(bvh.offsets, axis=1)
@@ -71,31 +71,31 @@ def map_by_shape(bvh: Bvh) -> JointMapping:
     if head is not None:
         joints["skullbase"] = head
     names = ", ".join(f"{joint} = {bvh.names[source]}" for joint, source in sorted(joints.items()))
-    return JointMapping("shape", joints, [f"The names are none we know; the skeleton's shape gave {names}."])
+    return JointMapping("shape", joints, [f"No naming convention matches; the skeleton's shape gave {names}."])
 
 
 def find_head(bvh: Bvh, joints: dict[str, int]) -> int | None:
-    """The head's joint, from where the arms are: the end of the longest branch that leaves the spine above the hips."""
+    """Return the head's joint: the end of the longest branch that leaves the spine above the hips."""
     lengths = np.linalg.norm(bvh.offsets, axis=1)
     arms = [joints["l_shoulder"], joints["r_shoulder"]]
     legs = [joints["l_hip"], joints["r_hip"]]
     leg = lengths[joints["l_knee"]] + lengths[joints.get("l_ankle", joints["l_knee"])]
     chest = common_ancestor(bvh.parents, arms)
-    barred = {joint for limb in arms + legs for joint in ancestor_chain(bvh, limb)}
-    barred.discard(chest)
-    way = _longest_branch(bvh, lengths, chest, barred)
+    excluded = {joint for limb in arms + legs for joint in ancestor_chain(bvh, limb)}
+    excluded.discard(chest)
+    branch = _longest_branch(bvh, lengths, chest, excluded)
     above = 0.0
     ends = {end.parent: float(np.linalg.norm(end.offset)) for end in bvh.ends}
-    for joint in reversed(way):
+    for joint in reversed(branch):
         above = max(above, ends.get(joint, 0.0))
         if above >= MIN_HEAD_RATIO * leg:
             return joint
         above += lengths[joint]
-    return way[-1] if way else None
+    return branch[-1] if branch else None
 
 
 def _find_limb_pairs(bvh: Bvh, lengths: Array) -> list[tuple[_LimbCandidate, _LimbCandidate]]:
-    """Pairs of limbs that are alike and apart, the longest first."""
+    """Return pairs of limbs that are alike and disjoint, longest first."""
     depth = np.zeros(len(lengths))
     for joint, parent in enumerate(bvh.parents):
         if parent >= 0:
@@ -115,7 +115,7 @@ def _find_limb_pairs(bvh: Bvh, lengths: Array) -> list[tuple[_LimbCandidate, _Li
 def _skip_collar_bones(
     arms: tuple[_LimbCandidate, _LimbCandidate], pairs: list[tuple[_LimbCandidate, _LimbCandidate]]
 ) -> tuple[_LimbCandidate, _LimbCandidate]:
-    """The arms one bone further down where they began with the collar bone; a hand is too short to follow as one."""
+    """Return the arms one bone further down if they started with the collar bone, which a hand is too short for."""
     for pair in pairs:
         further = {arm.joints[:2] for arm in pair} == {arm.joints[1:] for arm in arms}
         if further and sum(arm.length for arm in pair) >= MAX_FOREARM_RATIO * sum(arm.length for arm in arms):
@@ -124,7 +124,7 @@ def _skip_collar_bones(
 
 
 def _find_limbs(bvh: Bvh, lengths: Array) -> list[_LimbCandidate]:
-    """All pairs of bones in a row, neither over twice the other; joints of no length between them are passed over."""
+    """Return all pairs of consecutive bones, neither over twice the other; zero-length joints between are skipped."""
     short = 1e-3 * max(float(lengths.max()), 1e-12)
     found = []
     for end, middle in enumerate(bvh.parents):
@@ -140,27 +140,27 @@ def _find_limbs(bvh: Bvh, lengths: Array) -> list[_LimbCandidate]:
 
 
 def _are_disjoint(a: _LimbCandidate, b: _LimbCandidate, parents: tuple[int, ...]) -> bool:
-    """Whether two limbs share no joint and neither hangs from the other."""
+    """Return whether two limbs share no joint and neither is below the other."""
     if set(a.joints) & set(b.joints):
         return False
     return not is_descendant(parents, a.joints[0], b.joints[0]) and not is_descendant(parents, b.joints[0], a.joints[0])
 
 
 def _longest_branch(bvh: Bvh, lengths: Array, start: int, excluded: set[int]) -> list[int]:
-    """The joints below `start` along its longest branch, without those `barred`."""
+    """Return the joints below `start` along its longest branch, without those in `excluded`."""
     reach = np.zeros(len(lengths))
     longest: dict[int, int] = {}
     for end in bvh.ends:
         reach[end.parent] = max(reach[end.parent], float(np.linalg.norm(end.offset)))
     for joint in range(len(lengths) - 1, 0, -1):
         parent = bvh.parents[joint]
-        way = lengths[joint] + reach[joint]
-        if joint not in excluded and (parent not in longest or way > reach[parent]):
+        length = lengths[joint] + reach[joint]
+        if joint not in excluded and (parent not in longest or length > reach[parent]):
             longest[parent] = joint
-            reach[parent] = max(reach[parent], way)
-    way_down = []
+            reach[parent] = max(reach[parent], length)
+    branch_joints = []
     joint = start
     while joint in longest:
         joint = longest[joint]
-        way_down.append(joint)
-    return way_down
+        branch_joints.append(joint)
+    return branch_joints

@@ -1,6 +1,6 @@
-"""The H-Anim LOA-1 figure: a root and 17 joints, as the paper's channels name them (paper 2, 3).
+"""H-Anim LOA-1 figure: a root and 17 joints, as the paper's channels name them (paper 2, 3).
 
-Frame: right-handed, metres, y up, z the way the figure faces, x to its left. At rest every local rotation is the
+Frame: right-handed, metres, y up, z the direction the figure faces, x to its left. At rest every local rotation is the
 identity and the figure stands in H-Anim's I-pose, arms down. World positions: P[k] = P[parent] + R[parent] offset[k].
 """
 
@@ -47,13 +47,16 @@ TIP_JOINTS: tuple[int, ...] = (
     JOINT_INDEX["l_midtarsal"],
     JOINT_INDEX["r_midtarsal"],
 )
-"""Joints that carry a tip beyond them: crown, finger tips, toe tips."""
+"""Joints with a tip beyond them: crown, finger tips, toe tips."""
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """Limb lengths of one dancer: `offsets` (18, 3), each joint from its parent (row 0: the root's rest position), and
-    `tips` (18, 3), from a joint of `TIPS` to its tip (zero elsewhere); metres in the rest pose."""
+    """Limb lengths of one performer, in metres in the rest pose.
+
+    `offsets` (18, 3) are each joint's position from its parent (row 0: the root's rest position), `tips` (18, 3) the
+    vector from a joint of `TIP_JOINTS` to its tip (zero elsewhere).
+    """
 
     offsets: Array
     tips: Array
@@ -65,7 +68,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """One dance, `n` frames at a steady rate.
+    """Motion of one figure, `n` frames at a constant rate.
 
     `root` (n, 3) is the root's position in metres; `rotations` (n, 18, 4) the unit quaternions of the joints in the
     frame of their parent (row 0: the root's orientation in the world); `fps` frames per second.
@@ -90,12 +93,12 @@ class Motion:
 
     @property
     def duration(self) -> float:
-        """Seconds: frames / fps, so that a loop has no gap."""
+        """Duration in seconds: frames / fps, so that a loop has no gap."""
         return len(self.root) / self.fps
 
 
 def standard_figure() -> Figure:
-    """The figure of the H-Anim specification's LOA-1 example, 1.75 m tall, its hand and toe tips included."""
+    """Return the figure of the H-Anim specification's LOA-1 example, 1.75 m tall, with hand and toe tips."""
     left = {
         "l_hip": (0.0961, 0.9124, -0.0001),
         "l_knee": (0.1040, 0.4867, 0.0308),
@@ -125,7 +128,7 @@ def standard_figure() -> Figure:
 
 
 def world_transforms(figure: Figure, root: Array, rotations: Array) -> tuple[Array, Array]:
-    """World positions (..., 18, 3) in metres and orientations (..., 18, 4) of all joints.
+    """Return world positions (..., 18, 3) in metres and orientations (..., 18, 4) of all joints.
 
     `root` (..., 3) and `rotations` (..., 18, 4) are one pose or many, as in `Motion`.
     """
@@ -141,22 +144,26 @@ def world_transforms(figure: Figure, root: Array, rotations: Array) -> tuple[Arr
 
 
 def joint_and_tip_positions(figure: Figure, root: Array, rotations: Array) -> Array:
-    """World positions (..., 23, 3) in metres of the 18 joints and the 5 tips: where the codec's error is measured."""
+    """Return world positions (..., 23, 3) in metres of the 18 joints and the 5 tips.
+
+    The codec's error is measured at these points.
+    """
     position, orientation = world_transforms(figure, root, rotations)
     tip = [position[..., k, :] + rotation.rotate(orientation[..., k, :], figure.tips[k]) for k in TIP_JOINTS]
     return np.concatenate([position, np.stack(tip, axis=-2)], axis=-2)
 
 
 def to_channels(motion: Motion) -> list[Array]:
-    """The paper's 19 channels: root position (n, 3) in metres, then root and 17 joints as axis and angle (n, 4)."""
+    """Return the paper's 19 channels: root position (n, 3) in metres, then 18 joints as axis and angle (n, 4)."""
     turned = rotation.to_axis_angle(motion.rotations)
     return [motion.root, *(turned[:, k] for k in range(JOINT_COUNT))]
 
 
 def mean_facing(motion: Motion) -> float:
-    """Where the dance faces over its length: radians about y from z towards x; 0 where it has no one front.
+    """Return the direction the motion faces on average: radians about y from z towards x; 0 if there is no main
+    direction.
 
-    The mean of the pelvis's forward direction on the floor; a dance that turns about has a short mean, and no front.
+    It is the mean of the pelvis's forward direction on the floor; a motion that turns around has a short mean.
     """
     forward = rotation.rotate(motion.rotations[:, 0], np.array([0.0, 0.0, 1.0])).mean(axis=0)
     return float(np.arctan2(forward[0], forward[2])) if np.hypot(forward[0], forward[2]) > 0.5 else 0.0

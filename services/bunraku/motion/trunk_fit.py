@@ -1,4 +1,4 @@
-"""The figure's trunk: root, sacroiliac, vl5 and skullbase."""
+"""Fit of the figure's trunk: root, sacroiliac, vl5 and skullbase."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX
 
 CROWN_OFFSET_M = 0.20
-"""Metres from skullbase to the crown: where error is measured."""
+"""Distance from skullbase to the crown, where the codec's error is measured."""
 NECK_LENGTH_M = 0.12
-"""Metres from between the shoulders to the skullbase of a source that has no head."""
+"""Distance from the middle of the shoulders to the skullbase, for a source without head."""
 CHEST_POINT_WEIGHTS: Array = np.array([1.0, 2.0, 2.0])
-"""Skullbase and shoulders: a shoulder carries an arm."""
+"""Weights of skullbase and shoulders: a shoulder carries an arm."""
 MIN_IMPROVEMENT_M = 1e-4
-"""Metres by which a way that is less plain must be better to be taken."""
+"""Smallest gain for which a more complex solution is preferred."""
 MAX_SAMPLED_FRAMES = 200
 
 HIPS = ("l_hip", "r_hip")
@@ -29,7 +29,7 @@ SHOULDERS = ("l_shoulder", "r_shoulder")
 
 
 def fit_trunk(fit: FigureFit) -> None:
-    """Place root, sacroiliac, vl5 and skullbase, and say where hips and shoulders hang from them."""
+    """Place root, sacroiliac, vl5 and skullbase, and set the offsets of hips and shoulders."""
     root = fit.joints[0]
     fit.joint_positions[:, 0], fit.joint_orientations[:, 0] = fit.position[:, root], fit.turn[:, root]
     _fit_pelvis(fit)
@@ -38,7 +38,7 @@ def fit_trunk(fit: FigureFit) -> None:
 
 
 def _fit_pelvis(fit: FigureFit) -> None:
-    """sacroiliac: the source's, else at the root; where the hips move in it, turned as their line turns."""
+    """Place the sacroiliac at the source's pelvis or at the root; if the hips move in it, rotate it with their axis."""
     pelvis = JOINT_INDEX["sacroiliac"]
     source = fit.joints.get(pelvis)
     if source is None:
@@ -58,7 +58,7 @@ def _fit_pelvis(fit: FigureFit) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _ChestCandidate:
-    """vl5 at the source joint `source`, turned as `turned` (None: solved), with its points at `places` (m, 3)."""
+    """Candidate for vl5: position of one source joint, orientation of another (None: solved), local points (m, 3)."""
 
     error: float
     position_joint: int
@@ -67,17 +67,17 @@ class _ChestCandidate:
 
 
 def _fit_chest(fit: FigureFit) -> None:
-    """vl5: the place in the source's spine, and the turn (one of its joints' or the solved one), that fit best."""
+    """Place vl5 at the position in the source's spine and with the orientation (a joint's or solved) that fit best."""
     vl5 = JOINT_INDEX["vl5"]
     carried = [JOINT_INDEX[name] for name in ("skullbase", *SHOULDERS) if JOINT_INDEX[name] in fit.joints]
     sources = [fit.joints[joint] for joint in carried]
     weights = CHEST_POINT_WEIGHTS[-len(carried) :]
     root = fit.joints[0]
     above = ancestor_chain(fit.bvh, root)
-    way = ancestor_chain(
+    shoulder_chain = ancestor_chain(
         fit.bvh, common_ancestor(fit.bvh.parents, [fit.joints[JOINT_INDEX[name]] for name in SHOULDERS])
     )
-    spine = [joint for joint in reversed(way) if joint not in above] or [root]
+    spine = [joint for joint in reversed(shoulder_chain) if joint not in above] or [root]
     chosen = _select_chest(fit, spine, sources, weights)
     if chosen.position_joint != root:
         fit.joints[vl5] = chosen.position_joint
@@ -96,7 +96,7 @@ def _fit_chest(fit: FigureFit) -> None:
 
 
 def _select_chest(fit: FigureFit, spine: list[int], sources: list[int], weights: Array) -> _ChestCandidate:
-    """Try every place and turn on a sample of frames; the first of equals is kept."""
+    """Try every position and orientation on a sample of frames; the first of equal results is kept."""
     few = np.unique(np.linspace(0, len(fit.position) - 1, MAX_SAMPLED_FRAMES).astype(np.int64))
     choices: list[_ChestCandidate] = []
     for source in spine:
