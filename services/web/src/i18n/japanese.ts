@@ -1,6 +1,6 @@
-/** The page in Japanese, by the English. Limbs are the puppet's own left and right, as in the English. */
+/** Japanese translations of the page's texts. Left and right are the puppet's own, as in English. */
 export const JAPANESE_PAGE_MESSAGES = {
-  // between words
+  // punctuation
   ", ": "、",
   "; ": "、",
   "{title}: {detail}": "{title}：{detail}",
@@ -9,44 +9,45 @@ export const JAPANESE_PAGE_MESSAGES = {
   "{detail}. {hint}": "{detail}。{hint}",
   "{part} of {whole}": "{part} / {whole}",
   // the stage
-  "A wooden puppet dancing on a stage before a disc of gold leaf. Take its hands and legs with the strings' buttons or the keys 1 to 4.":
+  "A wooden puppet dancing before a disc of gold leaf. Take its hands and legs by button or by the keys 1 to 4.":
     "金箔の円を背に、舞台で踊る木の人形。糸のボタンか1〜4のキーで、手足を持って動かせます。",
   "This browser cannot draw the stage": "このブラウザでは舞台を表示できません",
   "It needs WebGL 2. Try another browser, or switch on hardware acceleration.":
     "WebGL 2が必要です。別のブラウザで開くか、ハードウェアアクセラレーションを有効にしてください。",
   "The stage went dark": "舞台が暗くなりました",
-  "The graphics were taken away; they come back by themselves. If they do not, load the page again.":
+  "The browser stopped the graphics. They usually return by themselves; if not, reload this page.":
     "描画が中断されました。自動で戻ります。戻らないときはページを再読み込みしてください。",
   "The stage is empty": "舞台は空いています",
-  "Nobody dances here now. Come again when somebody does.": "いまは上演していません。また後でお越しください。",
+  "No performance is running now. Come back later.": "いまは上演していません。また後でお越しください。",
   "Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it.":
     "モーションキャプチャーのファイルをこのページにドロップするか、演目から選ぶと、人形が踊ります。",
   "The dance has ended": "演目は終わりました",
   "The session has ended": "この舞台は終わりました",
-  "The line was lost: {reason}": "接続が切れました：{reason}",
-  // a stage in another site's page
+  "Connection lost, reconnecting: {reason}": "接続が切れました。再接続しています：{reason}",
+  // embedded element
   "A wooden puppet dancing on a stage before a disc of gold leaf": "金箔の円を背に、舞台で踊る木の人形",
   "The stage": "舞台",
-  "No stage is here": "ここに舞台はありません",
-  "{address} is no address of a stage.": "{address}は舞台のアドレスではありません。",
-  "What draws it could not be loaded. Load this page again.":
-    "描画するプログラムを読み込めませんでした。このページを再読み込みしてください。",
-  "Its server cannot show it now. It is tried again and again.": "いまサーバーが応答できません。自動で再接続します。",
+  "No stage here": "ここに舞台はありません",
+  "{address} is not the address of a stage. Check the src attribute.":
+    "{address}は舞台のアドレスではありません。src属性を確かめてください。",
+  "The renderer could not be loaded. Check your connection, then reload this page.":
+    "描画するプログラムを読み込めませんでした。接続を確かめて、このページを再読み込みしてください。",
+  "The server cannot show it now. Retrying automatically.": "いまサーバーが応答できません。自動で再接続します。",
   "The stage cannot be shown here": "ここでは舞台を表示できません",
   "The stage does not answer": "舞台が応答しません",
-  "This page came over https, and browsers let it speak with no server that has none.":
+  "This page uses https, so browsers do not let it connect to a server without https.":
     "このページはhttpsで開かれているため、httpsでないサーバーには接続できません。",
-  "This page was opened from a file. The stage's server lets such pages in only if BUNRAKU_ORIGINS has null in it.":
+  "This page was opened from a file. The stage's server allows such pages only if BUNRAKU_ORIGINS contains null.":
     "このページはファイルから開かれています。サーバーのBUNRAKU_ORIGINSにnullがある場合だけ接続できます。",
-  "The stage's server does not know this site. Its host can let it in: BUNRAKU_ORIGINS={origin}":
+  "The stage's server does not allow this site. Its operator can allow it: BUNRAKU_ORIGINS={origin}":
     "舞台のサーバーはこのサイトを許可していません。サーバーの管理者が許可できます：BUNRAKU_ORIGINS={origin}",
-  "Its server cannot be reached now. It is tried again and again.":
-    "いまサーバーに接続できません。自動で再接続します。",
+  "The server cannot be reached now. Retrying automatically.": "いまサーバーに接続できません。自動で再接続します。",
   // header
   Home: "ホーム",
   "Share link": "リンクを共有",
   "Link copied": "リンクをコピーしました",
-  "Link copied: who has it may watch, for a week": "リンクをコピーしました。1週間、リンクを知っている人が観られます",
+  "Link copied. Anyone who has it can watch for one week":
+    "リンクをコピーしました。1週間、リンクを知っている人が観られます",
   "Copy this link: {link}": "このリンクをコピーしてください：{link}",
   "Keys and gamepad": "キーとゲームパッド",
   "Light theme": "明るいテーマ",
@@ -78,7 +79,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "low detail": "低精度",
   "good detail": "高精度",
   "full detail": "最高精度",
-  "not here yet": "未読み込み",
+  "not loaded yet": "未読み込み",
   good: "良好",
   "short of data": "データ不足",
   "not connected": "未接続",
@@ -89,21 +90,22 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Drop a dance here": "ここに踊りをドロップ",
   "motion .bvh, up to 64 MB, or press to choose": "BVHファイル、64 MBまで。押して選択",
   "Drop a dance, or an avatar to dance as": "踊りか、踊らせるアバターをドロップ",
-  // one's own avatar
+  // avatar
   "Dance as": "踊り手",
   "The puppet": "人形",
-  "A VRM file, or a GLB with humanoid bones. It stays in this browser: nothing is uploaded, and everyone else still sees the puppet.":
+  "A VRM file, or a GLB with humanoid bones. It stays in this browser; everyone else still sees the puppet.":
     "VRM、または人型のボーンを持つGLB。このブラウザの中だけで使われ、アップロードされません。ほかの人には人形が見えます。",
   "Remove the avatar {name}": "アバター「{name}」を削除",
   "Choose your own avatar": "自分のアバターを選ぶ",
   "Choose another avatar": "別のアバターを選ぶ",
   "Reading {name}": "「{name}」を読み込み中",
   "{name} dances here; everyone else sees the puppet": "「{name}」が踊ります。ほかの人には人形が見えます",
-  "{name} dances here; everyone else sees the puppet. This browser keeps it for this visit only":
+  "{name} dances here, for this visit only: this browser cannot store it. Everyone else sees the puppet":
     "「{name}」が踊ります。ほかの人には人形が見えます。このブラウザには保存できないため、今回だけ使えます",
   "It could not be read": "読み込めませんでした",
-  "the file or what reads it did not come": "ファイルか、読み込むためのプログラムを取得できませんでした",
-  "Try again when the line is back.": "接続が戻ったら、もう一度お試しください。",
+  "the file or the program that reads it could not be loaded":
+    "ファイルか、読み込むためのプログラムを取得できませんでした",
+  "Check your connection, then try again.": "接続を確かめて、もう一度お試しください。",
   "It is too large": "大きすぎます",
   "it has {size} MB, and {most} MB are the most": "{size} MBあります。{most} MBまで読み込めます",
   "Export it with smaller textures.": "テクスチャを小さくして書き出してください。",
@@ -135,8 +137,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   "with music": "音楽つき",
   "{count} dancers": "{count}人",
   "Add {name} to the stage": "「{name}」を舞台に加える",
-  "There is no more room on the stage": "舞台に空きがありません",
-  "{count} dancers are the most that a stage has": "1つの舞台で踊れるのは{count}人までです",
+  "The stage is full": "舞台に空きがありません",
+  "a stage holds at most {count} dancers": "1つの舞台で踊れるのは{count}人までです",
   "This dance": "この演目",
   "Remove {name}": "「{name}」を削除",
   'Remove "{name}" from the library?': "「{name}」を演目から削除しますか？",
@@ -158,7 +160,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "writing the file": "書き出し中",
   "Saved {name}": "保存しました：{name}",
   "Save a picture": "写真を保存",
-  "This browser could not draw the picture": "このブラウザでは写真を作れませんでした",
+  "The picture could not be drawn. Try again": "写真を作れませんでした。もう一度お試しください",
   "save a picture of the stage": "舞台の写真を保存",
   "Upload of {name}": "「{name}」のアップロード",
   "Cancel the upload of {name}": "「{name}」のアップロードをキャンセル",
@@ -166,7 +168,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   Dismiss: "閉じる",
   waiting: "待機中",
   sending: "送信中",
-  "waiting for its turn": "順番待ち",
+  queued: "順番待ち",
   "reading the dance": "読み取り中",
   "encoding the dance": "変換中",
   "{seconds} s left": "残り{seconds}秒",
@@ -196,7 +198,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Release {limb}": "{limb}を放す",
   "Give {limb}": "{limb}を譲る",
   "Ask for {limb}": "{limb}を希望する",
-  "Ask no longer for {limb}": "{limb}の希望を取り消す",
+  "Withdraw the request for {limb}": "{limb}の希望を取り消す",
   "Take the {limb}": "{limb}を持つ",
   "Release the {limb}, held by you": "{limb}を放す（あなたが持っています）",
   "Move the {limb}": "{limb}を動かす",
@@ -214,12 +216,12 @@ export const JAPANESE_PAGE_MESSAGES = {
   "{name} holds the {limb}": "{limb}は{name}さんが持っています",
   "You ask {name} for the {limb}": "{name}さんの返事を待っています（{limb}）",
   "The {limb} is free now": "{limb}が空きました",
-  "The {limb} was not given": "{limb}は譲ってもらえませんでした",
-  "The {limb} was let go": "{limb}は放されました",
+  "Your request for the {limb} was not granted": "{limb}は譲ってもらえませんでした",
+  "The {limb} was released": "{limb}は放されました",
   "The {limb} is yours": "{limb}を受け取りました",
-  "The line is lost; ask again when it is back": "接続が切れています。戻ったらもう一度お試しください",
-  "Reach for a string that another holds, then ask for it": "ほかの人が持つ糸を選ぶと、希望できます",
-  "Nobody asks for a string of yours": "あなたの糸を希望している人はいません",
+  "Not connected. Ask again when the connection is back": "接続が切れています。戻ったらもう一度お試しください",
+  "Reach for a string that someone else holds, then ask for it": "ほかの人が持つ糸を選ぶと、希望できます",
+  "Nobody is asking for your strings": "あなたの糸を希望している人はいません",
   "Drag a ring on the stage, or press {first} to {last}.": "舞台の輪をドラッグするか、{first}〜{last}を押します。",
   "Touch, gamepad and keys": "タッチ・ゲームパッド・キー",
   right: "右",
@@ -228,31 +230,31 @@ export const JAPANESE_PAGE_MESSAGES = {
   down: "下",
   nearer: "手前",
   further: "奥",
-  // line
-  Line: "回線",
-  Rate: "レート",
+  // connection
+  Connection: "回線",
+  Bitrate: "ビットレート",
   Buffer: "バッファ",
   "Clock error": "時計の誤差",
   Latency: "遅延",
   "No dance yet": "演目なし",
-  "Rate {rate} of {rates}": "レート{rate} / {rates}",
+  "Level {level} of {levels}": "レベル{level} / {levels}",
   ", {reason}": "：{reason}",
   "1 gap": "途切れ1回",
   "{count} gaps": "途切れ{count}回",
   "no gaps": "途切れなし",
   "{seconds} s": "{seconds}秒",
-  "goal {seconds} s": "目標{seconds}秒",
+  "target {seconds} s": "目標{seconds}秒",
   "offset {time}": "ずれ {time}",
   measuring: "計測中",
   "first pose {time}": "表示まで {time}",
-  "{label} over the last minute, now {shown}, scale to {top}": "直近1分の{label}、現在{shown}、目盛りは{top}まで",
-  "the best there is": "最高の品質",
-  "as much as the line carries": "回線に合わせています",
-  "so that pulled limbs come in time": "操る手足を優先しています",
-  "as drawing takes this machine long": "端末の描画に合わせています",
-  "until more is ready ahead": "先読みを待っています",
-  "more is tried once this goes well": "安定したら品質を上げます",
-  "as nobody looks at this tab": "タブが表示されていません",
+  "{label} over the last minute, now {value}, scale to {top}": "直近1分の{label}、現在{value}、目盛りは{top}まで",
+  "the best available": "最高の品質",
+  "as much as the connection allows": "回線に合わせています",
+  "so that controlled limbs arrive in time": "操る手足を優先しています",
+  "since drawing is slow on this device": "端末の描画に合わせています",
+  "until more is buffered": "先読みを待っています",
+  "raised once this level is stable": "安定したら品質を上げます",
+  "since this tab is in the background": "タブが表示されていません",
   "pinned by the address": "アドレスで指定",
   "chosen by the server": "サーバーが選択",
   "{reason} ({rate} kbit/s)": "{reason}（{rate} kbit/s）",
@@ -260,12 +262,12 @@ export const JAPANESE_PAGE_MESSAGES = {
   "{count} messages could not be read": "読み取れないメッセージが{count}件あります",
   "waiting for the first block": "最初のブロックを待っています",
   "waiting for a block": "ブロックを待っています",
-  "{label}, nothing yet": "{label}、データなし",
-  // why a line ends
+  "{label}, no data yet": "{label}、データなし",
+  // reasons for the end of a connection
   "closed here": "こちらで閉じました",
   "closed with code {code}": "コード{code}で閉じられました",
-  "the server has ended it": "サーバーが終了しました",
-  "the line was lost": "回線が途切れました",
+  "ended by the server": "サーバーが終了しました",
+  "the connection was lost": "回線が途切れました",
   "the server failed": "サーバーで障害が起きました",
   "the server restarts": "サーバーを再起動しています",
   "the server is too busy": "サーバーが混み合っています",
@@ -277,12 +279,12 @@ export const JAPANESE_PAGE_MESSAGES = {
   "it answered {status}": "応答は{status}でした",
   "No answer": "サーバーから応答がありません",
   "the server cannot be reached": "サーバーに接続できません",
-  "look at the line, then try again": "回線を確かめて、もう一度お試しください",
+  "check your connection, then try again": "回線を確かめて、もう一度お試しください",
   // keys and gamepad
   Close: "閉じる",
-  "The list of keys could not be fetched; try again when the line is back":
-    "キーの一覧を読み込めませんでした。接続が戻ったらもう一度お試しください",
-  "Back to the default": "初期設定に戻す",
+  "The key settings could not be loaded. Check your connection, then try again":
+    "キーの設定を読み込めませんでした。接続を確かめて、もう一度お試しください",
+  "Reset to defaults": "初期設定に戻す",
   "{pad} is connected": "{pad}を接続しました",
   "Press any button of a gamepad to connect it": "ゲームパッドのボタンを押すと接続します",
   "Dead zone of the sticks": "スティックの遊び",
@@ -292,19 +294,19 @@ export const JAPANESE_PAGE_MESSAGES = {
   "{limb} {way}": "{limb}を{way}へ",
   "pull the held string {way}": "持った糸を{way}へ引く",
   "held string": "持った糸",
-  "take or let go the {limb}": "{limb}を持つ・放す",
+  "take or release the {limb}": "{limb}を持つ・放す",
   "next dancer": "次の踊り手",
-  "ask for the string that another holds": "ほかの人が持つ糸を希望する",
-  "give the string that is asked for": "希望された糸を譲る",
+  "ask for a string that someone else holds": "ほかの人が持つ糸を希望する",
+  "give a requested string": "希望された糸を譲る",
   "play or pause": "再生・一時停止",
   "seek back by one block": "1ブロック戻る",
   "seek forward by one block": "1ブロック進む",
-  "the show's camera, or your own seat": "演出カメラと自分の席の切り替え",
+  "the show's camera or your own view": "演出カメラと自分の視点の切り替え",
   "sound on or off": "音のオン・オフ",
   "keep this as a new dance": "新しい演目として残す",
   library: "演目",
   strings: "糸",
-  line: "回線",
+  connection: "回線",
   play: "再生",
   "seek back": "戻る",
   forward: "進む",
@@ -313,20 +315,20 @@ export const JAPANESE_PAGE_MESSAGES = {
   keep: "残す",
   "hold {button}: {commands}": "{button}を押しながら：{commands}",
   "Gamepad: {parts}": "ゲームパッド：{parts}",
-  "Press a key or a button of the gamepad for: {command}. Escape for none.":
+  "Press a key or gamepad button for: {command}. Escape cancels.":
     "「{command}」に使うキーかゲームパッドのボタンを押してください。Escで取りやめます。",
   "{control}: {command}": "{control}：{command}",
-  "{control}: {command}. It does this too: {others}": "{control}：{command}。ほかの働き：{others}",
-  "{control}: {command}. Take away": "{control}：{command}。外す",
-  "Take away": "外す",
+  "{control}: {command}. Also bound to: {others}": "{control}：{command}。ほかの働き：{others}",
+  "{control}: {command}. Remove": "{control}：{command}。外す",
+  Remove: "外す",
   "{control} also: {command}": "{control}のほかの働き：{command}",
   "press a key": "キーを押す",
   "Bind a key or button: {command}": "キーかボタンを割り当てる：{command}",
-  "{escape} lets go and closes, {question} opens this page.":
+  "{escape} releases and closes, {question} opens this page.":
     "{escape}で放す・閉じる、{question}でこの画面を開きます。",
-  "The 14 inputs, each by itself": "14の入力を個別に設定",
-  "A hand has six, a leg its angle: as buttons, up and down. Right, up and nearer are yours, not the puppet's.":
-    "手は6方向、足は角度（上下）で動きます。右・上・手前は、人形ではなくあなたから見た向きです。",
+  "The 14 inputs, one by one": "14の入力を個別に設定",
+  "Each hand has six inputs, each leg two: up and down. Right, up and nearer are as you see the stage.":
+    "手は6方向、足は2方向（上下）に動きます。右・上・手前は、人形ではなくあなたから見た向きです。",
   "Num ": "テンキー",
   "Middle button": "中ボタン",
   "Right button": "右ボタン",
@@ -340,7 +342,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Axis {number} {sign}": "軸{number} {sign}",
 } as const;
 
-/** What the server says that people meet most, by its own English; a value in it may be such a text too. */
+/** Japanese translations of frequent texts from the server. A value in such a text may itself have a translation. */
 export const JAPANESE_SERVER_MESSAGES = {
   "Not a BVH file": "BVHファイルではありません",
   "it begins with {word}": "先頭が{word}になっています",

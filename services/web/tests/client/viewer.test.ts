@@ -321,7 +321,7 @@ describe("when the line is lost", () => {
     viewer.addEventListener("closed", (event) => reasons.push((event as CustomEvent<string>).detail));
     FakeWebSocket.last.receive(data(0, 1, best));
     FakeWebSocket.last.endWith(1006);
-    expect(viewer.statistics().reason).toBe("the line was lost");
+    expect(viewer.statistics().reason).toBe("the connection was lost");
     advanceTime(250);
     expect(viewer.positionAt(now)).toBeCloseTo(0.25, 9);
     expect(viewer.poseAt(now)).not.toBeNull();
@@ -329,7 +329,7 @@ describe("when the line is lost", () => {
     FakeWebSocket.last.receive(header(), description(), timeline({ epoch: 1, position: 100_000 }));
     expect([...viewer.blocks]).toEqual([1, -1, -1]);
     expect(viewer.positionAt(now)).toBeCloseTo(0.35, 9);
-    expect(reasons).toEqual(["the line was lost"]);
+    expect(reasons).toEqual(["the connection was lost"]);
     expect(viewer.isClosed).toBe(false);
   });
 
