@@ -54,7 +54,7 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python services/bunraku/codec/*.py proto/prior.json services/bunraku/motion/bvh_numbers.py services/bunraku/marionette/*.py
+.setup/warm: .setup/python services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py proto/prior.json services/bunraku/motion/bvh_numbers.py services/bunraku/marionette/*.py
 	@echo "setup: compiling reader, codec and what moves limbs"
 	@$(BIN)/bunraku warm
 	@touch $@
