@@ -154,7 +154,7 @@ def train(
 ) -> list[Array]:
     """Return parameters after `steps` of Adam on random batches, with warm-up and cosine decay of the learning rate.
 
-    `report` receives a line of progress every 300 steps.
+    `report` receives the progress every 300 steps.
     """
     random, parameters = np.random.default_rng(seed), [p.copy() for p in parameters]
     first, second = [np.zeros_like(p) for p in parameters], [np.zeros_like(p) for p in parameters]

@@ -18,7 +18,7 @@ def test_weights_decrease_along_a_limb_and_are_smallest_about_a_bone() -> None:
     assert (np.linalg.svd(weights, compute_uv=False) > 0.05).all()
     for name in ("l_knee", "r_elbow", "skullbase"):
         rows = np.linalg.norm(weights[1 + JOINT_INDEX[name]], axis=1)
-        # a rotation about the second axis, the bone, moves only what is off the bone
+        # a rotation about the second axis, the bone, moves only points off the bone
         assert rows[1] < 0.5 * min(rows[0], rows[2])
 
 

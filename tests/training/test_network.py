@@ -24,7 +24,8 @@ def loss_and_gradients(
     parameters: list[network.Array], features: object, labels: object
 ) -> tuple[float, list[network.Array]]:
     gradients = [np.zeros_like(p) for p in parameters]
-    total = network._accumulate_loss(features, labels, np.arange(len(labels)), *parameters, *gradients)  # type: ignore[arg-type]
+    rows = np.arange(len(labels))  # type: ignore[arg-type]
+    total = network._accumulate_loss(features, labels, rows, *parameters, *gradients)  # type: ignore[arg-type]
     return total, gradients
 
 

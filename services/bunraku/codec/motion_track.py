@@ -23,7 +23,7 @@ BASE_STEP_M = 2.0**-16
 _MOVING_REFERENCE_BITS = 2
 """Fractional bits of references in radians, of a motion that moves."""
 _STILL_REFERENCE_BITS = 14
-"""The same of a motion whose joints stand still."""
+"""Fractional bits of references in radians, of a motion whose joints stand still."""
 
 _GRID_TO_MEAN_ERROR_RATIO = 0.4e-3
 """Grid of a figure, in metres, per mm of mean error. A finer grid costs more bytes than it gains."""
@@ -49,7 +49,7 @@ class MotionTrack(Timing):
 
     @property
     def is_still(self) -> bool:
-        """Whether the joints stand still, so that the references are their pose."""
+        """True if the joints stand still, so that the references are their pose."""
         return self.skeleton.reference_bits == _STILL_REFERENCE_BITS
 
     def reference_rotations(self, heading: int = 0) -> Array:
