@@ -124,7 +124,7 @@ def test_performers_keep_their_blocks() -> None:
         for packets, source_packets in zip(three.packets[number], source, strict=True):
             for packet, source_packet in zip(packets, source_packets, strict=True):
                 assert Data.unpack(packet) == replace(Data.unpack(source_packet), track=number)
-    with pytest.raises(ValueError, match="at most 4 performers, this one would have 6"):
+    with pytest.raises(ValueError, match="at most 4 performers, this would have 6"):
         add_performers("many", three, [three], placements * 2)
 
 
@@ -144,7 +144,7 @@ def test_more_tracks_than_a_data_message_can_number_are_refused() -> None:
     still = encode_scene(sample_camera(0.1, 30.0), error_bounds_mm=(10.0,))
     full = pack_and_unpack("m", *[still] * (MAX_TRACKS - 1))
     assert len(full.tracks) == MAX_TRACKS == 16
-    with pytest.raises(ValueError, match="at most 16 tracks, this one would have 17"):
+    with pytest.raises(ValueError, match="at most 16 tracks, this would have 17"):
         pack_motion("m", ENCODED, [still] * MAX_TRACKS)
     with pytest.raises(ValueError, match="at most 16 tracks"):
         add_audio_track("n", full, encoded_audio(full, 1.0))

@@ -154,7 +154,7 @@ def add_performers(
     performers = [track for track in own if track.type == "motion"]
     performers += [track for other in others for track in _stored_tracks(other) if track.type == "motion"]
     if len(performers) > MAX_PERFORMERS:
-        raise ValueError(f"A motion has at most {MAX_PERFORMERS} performers, this one would have {len(performers)}.")
+        raise ValueError(f"A motion has at most {MAX_PERFORMERS} performers, this would have {len(performers)}.")
     placed = [
         track._replace(description=track.description | {"place": list(placement)})
         for track, placement in zip(performers, placements, strict=True)
@@ -198,7 +198,7 @@ def unpack_motion(motion_id: str, packed: bytes) -> StoredMotion:
 def _pack_object(motion_id: str, tracks: Sequence[_ObjectTrack]) -> tuple[bytes, list[str]]:
     """Return an object and the types of its tracks. Raises ValueError for more than MAX_TRACKS tracks."""
     if len(tracks) > MAX_TRACKS:
-        raise ValueError(f"A motion has at most {MAX_TRACKS} tracks, this one would have {len(tracks)}.")
+        raise ValueError(f"A motion has at most {MAX_TRACKS} tracks, this would have {len(tracks)}.")
     packets = [
         [
             [Data(number, level, index, block).pack() for index, block in enumerate(blocks)]
