@@ -54,7 +54,7 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python services/bunraku/codec/*.py proto/prior.json services/bunraku/motion/_kernels.py services/bunraku/marionette/*.py
+.setup/warm: .setup/python $(wildcard services/bunraku/*/_kernels.py services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py services/bunraku/marionette/*.py) proto/prior.json proto/constants.json
 	@echo "setup: compiling reader, codec and what moves limbs"
 	@$(BIN)/bunraku warm
 	@touch $@

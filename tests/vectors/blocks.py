@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bunraku.codec import coefficients
-from bunraku.codec.block_encoder import BlockEncoder
+from bunraku.codec.block_encoder import MEAN_ERROR_REFINEMENT, BlockEncoder
 from bunraku.codec.coefficients import BlockHeader
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_track import MotionTrack, plan_motion_track
@@ -119,7 +119,9 @@ def make_vectors() -> dict[str, Any]:
         (2, statue, 0, 120, "mean"),
     )
     for number, of, index, step, goal in goals:
-        coded = BlockEncoder(tracks[number], of, load_shipped_prior()).encode_block(index, step, goal)
+        coded = BlockEncoder(tracks[number], of, load_shipped_prior()).encode_block(
+            index, step, MEAN_ERROR_REFINEMENT if goal == "mean" else None
+        )
         valid.append(block_vector(tracks[number], number, coded.data))
     random = np.random.default_rng(9)
     for number, frames, step, heading, count, most in (

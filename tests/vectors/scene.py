@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from bunraku.codec import coefficients
-from bunraku.codec.coefficients import SCENE_CHANNEL_COUNT, BlockHeader
-from bunraku.codec.prior import IntArray, load_shipped_prior
+from bunraku.codec.coefficients import BlockHeader
+from bunraku.codec.prior import SCENE_CHANNEL_COUNT, IntArray, load_shipped_prior
 from bunraku.codec.scene import SceneSamples, SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import encode_scene

@@ -26,7 +26,7 @@ def test_golden_blocks_are_read_and_written_as_they_stand() -> None:
             for number, data in packets
         ]
         assert told == [packet | {"data": base64.b64decode(packet["data"])} for packet in valid["packets"]]
-        assert all(tracks[valid["track"]].block_of(packet.number) == valid["index"] for packet in packets)
+        assert all(tracks[valid["track"]].block_of_packet(packet.number) == valid["index"] for packet in packets)
         assert pack_audio_block(packets[0].number if packets else 0, [packet.data for packet in packets]) == block
 
 

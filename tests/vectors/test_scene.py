@@ -8,9 +8,8 @@ import json
 import pytest
 
 from bunraku.codec import coefficients
-from bunraku.codec.coefficients import SCENE_CHANNEL_COUNT
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import load_shipped_prior
+from bunraku.codec.prior import SCENE_CHANNEL_COUNT, load_shipped_prior
 from bunraku.codec.scene import parse_scene_track
 from bunraku.codec.scene_decoder import decode_scene_block
 from tests.vectors import scene

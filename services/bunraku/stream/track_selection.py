@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bunraku.codec.audio import AudioTrack
-from bunraku.codec.coefficients import SCENE_CHANNEL_COUNT
 from bunraku.codec.container import StoredMotion, Track
 from bunraku.codec.motion_track import MotionTrack
+from bunraku.codec.prior import SCENE_CHANNEL_COUNT
 from bunraku.codec.scene import SceneTrack
 from bunraku.delivery import allocation
 from bunraku.delivery.block_scheduler import ScheduledTrack

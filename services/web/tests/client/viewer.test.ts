@@ -424,15 +424,15 @@ describe("what cannot be played", () => {
 
   test.each([
     ["no motion", [{ type: "audio" }], "the stream has no motion in it"],
-    ["another codec", [{ ...goldenDescription(), codec: "bunraku.motion/9" }], "motion is of codec bunraku.motion/9"],
-    ["no frames", [{ ...goldenDescription(), frames: 0 }], "motion needs frames"],
+    ["another codec", [{ ...goldenDescription(), codec: "bunraku.motion/9" }], "Unsupported motion codec bunraku.motion/9"],
+    ["no frames", [{ ...goldenDescription(), frames: 0 }], "motion track: frames must"],
     [
       "a dancer cut short",
       [{ ...goldenDescription(), dancer: new Uint8Array(0) }],
-      "a dancer has 1..1024 bytes, not 0",
+      "Invalid skeleton description: 0 bytes",
     ],
-    ["no rates", [{ ...goldenDescription(), rates: [] }], "motion needs rates"],
-    ["a rate of nothing", [{ ...goldenDescription(), rates: [null] }], "rate 0 needs kbps"],
+    ["no rates", [{ ...goldenDescription(), rates: [] }], "motion track: rates must"],
+    ["a rate of nothing", [{ ...goldenDescription(), rates: [null] }], "rate 0 must have kbps"],
   ])("%s ends it and says why", (_, tracks, why) => {
     viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
     FakeWebSocket.last.accept();
