@@ -61,7 +61,7 @@ export async function downloadMotion(
   } catch (error) {
     signal?.throwIfAborted();
     if (error instanceof DamagedBlock || error instanceof MalformedMessage)
-      throw new ProblemError(0, "This dance cannot be read", error.message);
+      throw new ProblemError(0, "This motion cannot be read", error.message);
     throw error;
   }
 }

@@ -1,4 +1,4 @@
-/** Statistics of a viewer, and the measurements that they are made of. */
+/** Statistics of a viewer and their collector. */
 
 import type { Translator } from "../i18n/translator";
 import type { ReferenceClock } from "../playout/clock";

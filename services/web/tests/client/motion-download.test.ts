@@ -73,7 +73,7 @@ test("blocks of another performer are those of its track", async () => {
   });
   const { store } = await downloadMotion("m", { performer: 1 });
   expect([[...store.levels], store.track.frames, paths.length]).toEqual([[1, 1, 1], 66, 4]);
-  await expect(downloadMotion("m", { performer: 2 })).rejects.toThrow("This dance cannot be read");
+  await expect(downloadMotion("m", { performer: 2 })).rejects.toThrow("This motion cannot be read");
 });
 
 test("track longer than the first performer's is cut", async () => {
@@ -108,7 +108,7 @@ test("damaged block or missing motion is a problem", async () => {
   );
   await expect(downloadMotion("m")).rejects.toThrow(ProblemError);
   stubServer(() => pack({ name: "Description", motion: "m", first: null, tracks: [] }));
-  await expect(downloadMotion("m")).rejects.toThrow("This dance cannot be read");
+  await expect(downloadMotion("m")).rejects.toThrow("This motion cannot be read");
 });
 
 test("abort rejects with its reason", async () => {

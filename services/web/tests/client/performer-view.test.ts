@@ -64,7 +64,7 @@ test("shorter track stands still at its end", () => {
   expect(view.pose(frame(0))).toEqual(still);
 });
 
-test("overlay replaces limbs of its own performer only", () => {
+test("overlay replaces the limbs of one performer only", () => {
   const overlays = new OverlayBuffer();
   overlays.put({ name: "Overlay", sequence: 0, due: 1_000_000, limbs: new Map([[5, new Int16Array(9)]]), earlier: [] });
   const [other, overlaid] = [0, 1].map((number) => {

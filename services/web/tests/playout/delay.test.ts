@@ -7,8 +7,8 @@ const FRAME_INTERVAL_US = 33_334;
 const OVERLAY_LEAD_US = 26_666;
 
 /**
- * Simulate a link with `networkDelay` (microseconds, by message number) for `seconds`. Return the share of messages that
- * arrive too late for the delay in use, from second `after` on, and the final delay.
+ * Simulate a link with `networkDelay` (microseconds, by message number) for `seconds`. Return the share of messages
+ * that arrive too late for the delay in use, from second `after` on, and the final delay.
  */
 function lateShare(networkDelay: (nth: number) => number, seconds: number, after: number): [number, number] {
   const delay = new PlayoutDelay();
