@@ -18,6 +18,7 @@ from bunraku.delivery.block_scheduler import (
     BlockScheduler,
     ScheduledBlock,
     ScheduledTrack,
+    SendPolicy,
     newly_due_blocks,
 )
 from bunraku.playout.timeline import edit, start
@@ -27,7 +28,7 @@ from tests.delivery.schedulers import CAMERA, ONE_MINUTE, SECOND_US, TRACK, moti
 
 def drain_all(pacer: BlockScheduler, state: TimelineState, clock: int, rate: int) -> list[ScheduledBlock]:
     sent = []
-    while (due := pacer.next_block(state, clock, rate)) is not None:
+    while (due := pacer.next_block(state, clock, SendPolicy(rate))) is not None:
         sent.append(due)
         assert len(sent) < 100
     return sent
@@ -61,7 +62,7 @@ def test_it_stops_at_the_end_without_a_loop_and_follows_a_seek() -> None:
 @given(st.integers(0, 40 * SECOND_US), st.integers(-3, 9))
 def test_the_block_on_show_always_comes_first(clock: int, rate: int) -> None:
     state = start("m", TRACK.duration_us, 0)
-    due = motion_scheduler().next_block(state, clock, rate)
+    due = motion_scheduler().next_block(state, clock, SendPolicy(rate))
     assert due is not None
     assert due.index == TRACK.block_at(clock % TRACK.duration_us)
 
@@ -109,7 +110,7 @@ def drain_levels(
     pacer: BlockScheduler, state: TimelineState, rate: int, audio: int | None
 ) -> list[tuple[int, int, int]]:
     sent = []
-    while (due := pacer.next_block(state, 0, rate, audio_level=audio)) is not None:
+    while (due := pacer.next_block(state, 0, SendPolicy(rate, audio))) is not None:
         sent.append((due.track, due.index, due.level))
         assert len(sent) < 100
     return sent
@@ -130,7 +131,7 @@ def test_in_a_loop_sound_is_bettered_as_it_comes_near_again() -> None:
         sent = []
         for clock in range(0, 3 * timing.duration_us, 100_000):
             while (
-                due := pacer.next_block(state, clock, 0, audio_level=0 if clock < timing.duration_us else 2)
+                due := pacer.next_block(state, clock, SendPolicy(0, 0 if clock < timing.duration_us else 2))
             ) is not None:
                 sent.append((due.track, due.index, due.level))
         sound = [(index, rate) for track, index, rate in sent if track == 1]
@@ -156,7 +157,7 @@ def test_a_viewer_of_the_camera_alone_is_sent_that() -> None:
     state = start("m", TRACK.duration_us, 0)
     pacer = BlockScheduler([ScheduledTrack(1, CAMERA, 3, False)])
     assert [(due.track, due.index, due.level) for due in drain_all(pacer, state, 0, 3)] == [(1, i, 2) for i in range(5)]
-    assert BlockScheduler([]).next_block(state, 0, 3) is None
+    assert BlockScheduler([]).next_block(state, 0, SendPolicy(3)) is None
     assert BlockScheduler([]).time_until_next(state, 0) is None
 
 
@@ -203,7 +204,7 @@ def test_a_net_goes_before_what_is_not_shown_at_once_and_is_filled_again_in_one_
     state = start("m", 60 * SECOND_US, 0)
     pacer = BlockScheduler([ScheduledTrack(0, ONE_MINUTE, 5, True)])
     sent = []
-    while (due := pacer.next_block(state, 0, 4, prefetch=True)) is not None:
+    while (due := pacer.next_block(state, 0, SendPolicy(4, prefetch=True))) is not None:
         sent.append((due.index, due.level))
     net = [index for index, rate in sent if rate == 0]
     assert net == sorted(net)
@@ -218,7 +219,7 @@ def test_a_net_goes_before_what_is_not_shown_at_once_and_is_filled_again_in_one_
     fills = []
     for clock in range(0, 25 * SECOND_US, SECOND_US):
         low = 0
-        while (due := pacer.next_block(state, clock, 4, prefetch=True)) is not None:
+        while (due := pacer.next_block(state, clock, SendPolicy(4, prefetch=True))) is not None:
             low += due.level == 0
         if low:
             fills.append(low)
@@ -230,10 +231,10 @@ def test_a_net_goes_before_what_is_not_shown_at_once_and_is_filled_again_in_one_
 def test_until_something_may_be_bettered_the_net_alone_is_sent(position: int, rate: int) -> None:
     state = start("m", 60 * SECOND_US, 0, position=position)
     pacer = BlockScheduler([ScheduledTrack(0, ONE_MINUTE, 5, True)])
-    sent = list(iter(lambda: pacer.next_block(state, 0, rate, prefetch=True, allow_upgrades=False), None))
+    sent = list(iter(lambda: pacer.next_block(state, 0, SendPolicy(rate, prefetch=True, allow_upgrades=False)), None))
     assert {due.level for due in sent} == {0}
     assert len({due.index for due in sent}) == len(sent) >= MAX_PREFETCH_US // SECOND_US
-    better = list(iter(lambda: pacer.next_block(state, 0, rate, prefetch=True), None))
+    better = list(iter(lambda: pacer.next_block(state, 0, SendPolicy(rate, prefetch=True)), None))
     assert better
     assert all(due.is_upgrade and due.level == rate for due in better)
 
@@ -242,7 +243,7 @@ def test_until_something_may_be_bettered_the_net_alone_is_sent(position: int, ra
 def test_without_room_to_spare_only_what_is_missing_soon_goes(position: int, rate: int) -> None:
     state = start("m", 60 * SECOND_US, 0, position=position)
     pacer = BlockScheduler([ScheduledTrack(0, ONE_MINUTE, 5, True)])
-    while (due := pacer.next_block(state, 0, rate, prefetch=True, has_spare_capacity=False)) is not None:
+    while (due := pacer.next_block(state, 0, SendPolicy(rate, prefetch=True, has_spare_capacity=False))) is not None:
         assert not due.is_upgrade
         assert due.lead_us <= URGENT_PREFETCH_US
         assert due.level == 0
@@ -255,7 +256,7 @@ def test_what_a_viewer_has_is_not_sent_again(rates: list[int], net: bool) -> Non
     for index, rate in enumerate(rates):
         if rate >= 0:
             pacer.mark_sent(0, index, rate)
-    while (due := pacer.next_block(state, 0, 3, prefetch=net)) is not None:
+    while (due := pacer.next_block(state, 0, SendPolicy(3, prefetch=net))) is not None:
         assert due.index >= len(rates) or due.level > rates[due.index]
 
 
@@ -264,10 +265,10 @@ def told_by_next(
 ) -> list[tuple[int, int, int]]:
     """What comes within reach by `clock` for one who was sent, one by one, all that was before."""
     pacer = BlockScheduler(tracks)
-    while pacer.next_block(state, clock - 2 * SCHEDULING_MARGIN_US, rate, audio) is not None:
+    while pacer.next_block(state, clock - 2 * SCHEDULING_MARGIN_US, SendPolicy(rate, audio)) is not None:
         pass
     found = []
-    while (due := pacer.next_block(state, clock, rate, audio)) is not None:
+    while (due := pacer.next_block(state, clock, SendPolicy(rate, audio))) is not None:
         found.append((due.track, due.index, due.level))
     return found
 
@@ -290,7 +291,9 @@ def test_arrivals_are_what_one_who_has_all_before_is_sent(
     tracks = [ScheduledTrack(n, timing, 3, n == 0, n == 1) for n, timing in enumerate(timings)]
     state = TimelineState(1, "one", 0, 0, True, loop, timings[0].duration_us)
     clock = begin + (BlockScheduler(tracks).time_until_next(state, begin) or 0)
-    told = [(due.track, due.index, due.level) for due in newly_due_blocks(tracks, state, clock, rate, audio)]
+    told = [
+        (due.track, due.index, due.level) for due in newly_due_blocks(tracks, state, clock, SendPolicy(rate, audio))
+    ]
     assert told == told_by_next(tracks, state, clock, rate, audio)
 
 
@@ -300,7 +303,9 @@ def test_over_a_narrow_line_the_motion_goes_a_while_ahead_of_sound_and_late_soun
     )
     state = start("m", ONE_MINUTE.duration_us, 0)
     sent: list[tuple[int, int]] = []
-    while (due := pacer.next_block(state, 500_000, 2, 1, prefetch=True)) is not None and not due.is_prefetch:
+    while (
+        due := pacer.next_block(state, 500_000, SendPolicy(2, 1, prefetch=True))
+    ) is not None and not due.is_prefetch:
         if not due.is_upgrade:
             sent.append((due.track, ONE_MINUTE.start_us(due.index)))
     sound = [at for track, at in sent if track == 1]

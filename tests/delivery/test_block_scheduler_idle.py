@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec.timing import Timing, plan_timing
-from bunraku.delivery.block_scheduler import UPGRADE_FIRST_US, BlockScheduler, ScheduledBlock, ScheduledTrack
+from bunraku.delivery.block_scheduler import (
+    UPGRADE_FIRST_US,
+    BlockScheduler,
+    ScheduledBlock,
+    ScheduledTrack,
+    SendPolicy,
+)
 from bunraku.playout.timeline import start
 from bunraku.wire.messages import TimelineState
 from tests.delivery.schedulers import CAMERA, ONE_MINUTE, SECOND_US, TRACK, motion_and_scene_scheduler, motion_scheduler
@@ -26,7 +32,7 @@ def troupe() -> BlockScheduler:
 def drain_idle(
     pacer: BlockScheduler, state: TimelineState, clock: int, rate: int, idle: int, net: bool = False
 ) -> list[ScheduledBlock]:
-    sent = list(iter(lambda: pacer.next_block(state, clock, rate, 0, prefetch=net, idle_level=idle), None))
+    sent = list(iter(lambda: pacer.next_block(state, clock, SendPolicy(rate, 0, prefetch=net, idle_level=idle)), None))
     assert len(sent) < 200
     return sent
 
@@ -99,9 +105,11 @@ def test_what_is_one_block_is_always_on_show() -> None:
 
 def test_without_room_or_before_the_net_is_there_nothing_on_show_is_bettered() -> None:
     state = start("m", TRACK.duration_us, 0, playing=False)
-    for more in ({"spare": False}, {"better": False}):
+    for more in ({"has_spare_capacity": False}, {"allow_upgrades": False}):
         pacer = motion_scheduler()
-        drained = list(iter(lambda: pacer.next_block(state, 0, 0, prefetch=True, idle_level=3, **more), None))  # noqa: B023
+        drained = list(
+            iter(lambda: pacer.next_block(state, 0, SendPolicy(0, prefetch=True, idle_level=3, **more)), None)
+        )  # noqa: B023
         assert {due.level for due in drained} == {0}
 
 

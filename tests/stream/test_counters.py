@@ -3,11 +3,12 @@ from __future__ import annotations
 import pytest
 
 from bunraku.messaging.bus import MemoryBus
+from bunraku.runtime.clock import clock
 from bunraku.runtime.metrics import Metrics
 from bunraku.storage.motion_store import MotionStore
 from bunraku.stream import metrics
+from bunraku.stream.context import StreamContext
 from bunraku.stream.counters import TIMEOUT_REASON, StreamCounters
-from bunraku.stream.tick_scheduler import TickScheduler
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket.connection import WebSocketConnection
@@ -22,7 +23,9 @@ class FakeViewer:
 
     def __init__(self, choice: tuple[int, str] | None = None) -> None:
         self.transport = FakeTransport()
-        self.connection: WebSocketConnection = self.transport.open_connection(ViewerConnection(TickScheduler()))
+        self.connection: WebSocketConnection = self.transport.open_connection(
+            ViewerConnection(StreamContext.create(clock))
+        )
         self.choice = choice
 
 
@@ -62,8 +65,9 @@ def test_what_waits_for_full_lines_is_known() -> None:
 
 
 async def test_a_viewer_counts_what_it_is_sent_and_what_is_skipped() -> None:
-    attendance = StreamCounters()
-    viewer, line = ViewerConnection(TickScheduler(), counters=attendance), FakeTransport()
+    context = StreamContext.create(clock)
+    attendance = context.counters
+    viewer, line = ViewerConnection(context), FakeTransport()
     outlet = line.open_connection(viewer)
     attendance.count_writes(outlet)
     viewer.open(outlet)
@@ -83,8 +87,9 @@ async def test_a_viewer_counts_what_it_is_sent_and_what_is_skipped() -> None:
 
 @pytest.mark.parametrize("times", [1, 3])
 async def test_one_who_is_dropped_is_dropped_once(times: int) -> None:
-    attendance = StreamCounters()
-    viewer, line = ViewerConnection(TickScheduler(), counters=attendance), FakeTransport()
+    context = StreamContext.create(clock)
+    attendance = context.counters
+    viewer, line = ViewerConnection(context), FakeTransport()
     viewer.open(line.open_connection(viewer))
     for _ in range(times):
         viewer.disconnect(CloseConnection(TRY_AGAIN_LATER, "Too slow", "come again"))
@@ -94,7 +99,7 @@ async def test_one_who_is_dropped_is_dropped_once(times: int) -> None:
 
 
 def test_no_name_is_told_twice() -> None:
-    told, watched = Metrics(), WatchedSessions(MemoryBus(), MotionStore.open("memory:///"))
+    told, watched = Metrics(), WatchedSessions(MemoryBus(), MotionStore.open("memory:///"), StreamContext.create(clock))
     metrics.register_metrics(told, StreamCounters(), watched)
     with pytest.raises(ValueError, match="bunraku_viewers"):
         metrics.register_metrics(told, StreamCounters(), watched)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from bunraku.delivery.congestion import bytes_on_wire
-from bunraku.stream.flow_control import UNCONSTRAINED_CHECKS, FlowControl
+from bunraku.stream.flow_control import UNCONSTRAINED_CHECKS, FlowControl, LinkState, PrefetchState
 from bunraku.websocket.link import AckedLink
 from tests.delivery.virtual_link import VirtualLink
 from tests.stream.fake_transport import parse_frames
@@ -15,7 +15,7 @@ def count_overlays(sender: SimulatedSender, seconds: int) -> int:
     written = 0
     for _ in range(30 * seconds):
         sender.at += 33_333
-        steady = sender.flow.is_unconstrained
+        steady = sender.flow.state.skips_overlay_check
         if sender.flow.can_write_overlay():
             (sender.write_untracked if steady else sender.write)(90)
             written += 1
@@ -26,12 +26,12 @@ def test_on_a_quick_line_all_is_written_and_the_system_is_not_asked() -> None:
     for delay in (500, 40_000):
         sender = SimulatedSender(1e7, delay)
         assert count_overlays(sender, 10) == 300
-        assert sender.flow.is_unconstrained
+        assert sender.flow.state.skips_overlay_check
         sender.reads = 0
         assert count_overlays(sender, 60) == 1800
         assert sender.reads == 0
         sender.flow.reassess()
-        assert sender.flow.is_unconstrained
+        assert sender.flow.state.skips_overlay_check
         assert 1 <= sender.reads <= 2
 
 
@@ -43,10 +43,10 @@ def test_a_quick_line_that_becomes_narrow_is_found_out_by_a_look_and_a_narrow_on
         for _ in range(20):
             count_overlays(sender, 1)
             sender.flow.reassess()
-        found = [(sender.flow.is_unconstrained, sender.flow.is_unlimited)]
+        found = [(sender.flow.state.skips_overlay_check, (sender.flow.state is LinkState.UNLIMITED))]
         sender.reduced_throughput = None
         count_overlays(sender, 30)
-        found.append((sender.flow.is_unconstrained, sender.flow.is_unlimited))
+        found.append((sender.flow.state.skips_overlay_check, (sender.flow.state is LinkState.UNLIMITED)))
         assert found == [(False, False), (True, delay == 500)]
 
 
@@ -61,7 +61,7 @@ def test_blocks_over_a_line_that_is_far_go_on_beside_overlays_that_are_not_told_
     assert sender.flow.window.written > 0.9 * (200 * 1_500 + 10 * 30 * 90)
     sender.at += 250_000
     sender.flow.reassess()
-    assert sender.flow.is_unconstrained
+    assert sender.flow.state.skips_overlay_check
 
 
 def test_a_narrow_line_is_noticed_and_not_written_to_unasked() -> None:
@@ -141,7 +141,7 @@ def test_no_block_that_can_wait_makes_worse_what_waits_as_a_line_becomes_slower(
 def test_a_net_has_come_once_all_that_was_written_till_then_is_acknowledged() -> None:
     sender = SimulatedSender(3_000.0, 75_000)
     sender.write(300)
-    states = [(sender.flow.is_prefetch_delivered, sender.flow.is_awaiting_ack)]
+    states = [(sender.flow.prefetch_state is PrefetchState.DELIVERED, sender.flow.is_awaiting_ack)]
     sender.flow.mark_prefetch_sent()
     sender.write(300)
     # what is written later does not count
@@ -149,12 +149,12 @@ def test_a_net_has_come_once_all_that_was_written_till_then_is_acknowledged() ->
     while sender.flow.window.in_flight_bytes:
         sender.at += 1_000
         sender.flow.has_capacity()
-        now = sender.flow.is_prefetch_delivered, sender.flow.is_awaiting_ack
+        now = sender.flow.prefetch_state is PrefetchState.DELIVERED, sender.flow.is_awaiting_ack
         if now != states[-1]:
             states.append(now)
             assert sender.flow.window.in_flight_bytes == bytes_on_wire(300) * now[0]
     assert states == [(False, True), (True, False)]
-    assert FlowControl(None, lambda: 0).is_prefetch_delivered
+    assert FlowControl(None, lambda: 0).prefetch_state is PrefetchState.DELIVERED
 
 
 def test_a_closed_line_has_room_so_that_who_writes_is_told() -> None:
@@ -199,17 +199,29 @@ class ProxiedSender:
 
 def test_behind_a_proxy_a_line_is_far_until_it_answers_soon() -> None:
     near = ProxiedSender(1e7, 1_000)
-    assert (near.flow.is_high_rtt, near.flow.is_unmeasured, near.flow.is_unlimited) == (True, True, False)
+    assert (near.flow.state.is_high_rtt, near.flow.is_unmeasured, (near.flow.state is LinkState.UNLIMITED)) == (
+        True,
+        True,
+        False,
+    )
     near.write(1_000)
     assert near.flow.is_awaiting_ack
     near.advance_time(5_000)
-    assert (near.flow.is_high_rtt, near.flow.is_unconstrained, near.flow.is_unlimited) == (False, True, True)
+    assert (
+        near.flow.state.is_high_rtt,
+        near.flow.state.skips_overlay_check,
+        (near.flow.state is LinkState.UNLIMITED),
+    ) == (False, True, True)
     # nothing is asked of what is written unasked
     assert near.flow.probe(90) == b""
     far = ProxiedSender(1e6, 40_000)
     far.write(1_000)
     far.advance_time(100_000)
-    assert (far.flow.is_high_rtt, far.flow.is_unmeasured, far.flow.is_unlimited) == (True, False, False)
+    assert (far.flow.state.is_high_rtt, far.flow.is_unmeasured, (far.flow.state is LinkState.UNLIMITED)) == (
+        True,
+        False,
+        False,
+    )
 
 
 def test_behind_a_proxy_a_narrow_line_is_not_filled() -> None:
@@ -233,12 +245,12 @@ def test_behind_a_proxy_a_near_line_whose_answers_stay_out_is_quick_no_more() ->
     near = ProxiedSender(1e7, 1_000)
     near.write(1_000)
     near.advance_time(5_000)
-    assert near.flow.is_unlimited
+    assert near.flow.state is LinkState.UNLIMITED
     # a look asks, and this answer stays out
     assert near.flow.probe(0)
     near.at += 50_000
     near.flow.reassess()
-    assert near.flow.is_unconstrained
+    assert near.flow.state.skips_overlay_check
     near.at += 400_000
     near.flow.reassess()
-    assert not near.flow.is_unconstrained
+    assert not near.flow.state.skips_overlay_check

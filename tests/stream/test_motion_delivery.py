@@ -14,7 +14,7 @@ from bunraku.delivery.congestion import HEADER_BYTES
 from bunraku.delivery.resume import ResumeState
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.playout import timeline
-from bunraku.stream.flow_control import FlowControl
+from bunraku.stream.flow_control import FlowControl, LinkState, PrefetchState
 from bunraku.stream.motion_delivery import MAX_IDLE_BLOCK_S, MotionDelivery
 from bunraku.stream.track_selection import TRACK_TYPES
 from bunraku.websocket.frame import frame_payload
@@ -216,10 +216,7 @@ def test_a_line_too_narrow_for_sound_gets_a_better_motion() -> None:
 
     def chosen(bps: float) -> tuple[int, int]:
         playing = MotionDelivery(motion, TRACK_TYPES, None)
-        carrying = SimpleNamespace(
-            narrow=True, net_came=True, carries=bps / 8, unknown=False, far=True, blocks_turn=lambda: True
-        )
-        playing.next_packet(state, 0, cast(FlowControl, carrying), -10_000_000)
+        playing.next_packet(state, 0, flow_with_throughput(bps), -10_000_000)
         return playing.allocation.motion_level, playing.allocation.audio_level
 
     lowest, best, sound = motion.bitrates_kbps[0][0], motion.bitrates_kbps[0][-1], motion.bitrates_kbps[1][0]
@@ -233,12 +230,12 @@ def test_a_line_too_narrow_for_sound_gets_a_better_motion() -> None:
 def flow_with_throughput(bps: float | None) -> FlowControl:
     """A flow over a line that is known to carry so much, None where it is quick."""
     known = SimpleNamespace(
-        narrow=bps is not None,
-        net_came=True,
-        carries=bps and bps / 8,
-        unknown=False,
-        far=bps is not None,
-        blocks_turn=lambda: True,
+        state=LinkState.UNLIMITED if bps is None else LinkState.HIGH_RTT_LIMITED,
+        is_constrained=bps is not None,
+        prefetch_state=PrefetchState.DELIVERED,
+        throughput=bps and bps / 8,
+        is_unmeasured=False,
+        may_send_block=lambda: True,
     )
     return cast(FlowControl, known)
 

@@ -11,9 +11,9 @@ from bunraku.delivery.resume import ResumeState
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.runtime.clock import clock
-from bunraku.stream import viewer_connection
+from bunraku.stream.context import StreamContext
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, MAX_PENDING_PINGS
-from bunraku.stream.tick_scheduler import TickScheduler
+from bunraku.stream.track_selection import ViewerOptions
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
@@ -32,6 +32,7 @@ from bunraku.wire.messages import (
 )
 from bunraku.wire.overlay import Overlay
 from tests.stream.fake_transport import FakeTransport, parse_frames
+from tests.stream.sync_viewer import VirtualTime
 from tests.vectors.blocks import random_motion
 from tests.vectors.scene import sample_camera, sample_light
 
@@ -55,8 +56,9 @@ def open_viewer(
     motion: StoredMotion, playing: bool = True, now: int | None = None, **options: object
 ) -> tuple[ViewerConnection, FakeTransport, TimelineState]:
     """A viewer of a motion whose line is open, and the timeline that it was given at `now`."""
-    viewer, line = ViewerConnection(TickScheduler(), **options), FakeTransport()  # type: ignore[arg-type]
-    state = timeline.start(motion.id, motion.first_track.duration_us, clock() if now is None else now, playing=playing)
+    context = StreamContext.create(clock if now is None else lambda: now)
+    viewer, line = ViewerConnection(context, ViewerOptions(**options)), FakeTransport()  # type: ignore[arg-type]
+    state = timeline.start(motion.id, motion.first_track.duration_us, context.clock(), playing=playing)
     viewer.set_timeline(state, motion)
     viewer.open(line.open_connection(viewer))
     return viewer, line, state
@@ -71,7 +73,7 @@ def overlay_frame(number: int) -> bytes:
 
 
 async def test_all_that_is_known_leaves_in_one_piece(motions: dict[str, StoredMotion]) -> None:
-    viewer, line = ViewerConnection(TickScheduler()), FakeTransport()
+    viewer, line = ViewerConnection(StreamContext.create(clock)), FakeTransport()
     viewer.set_timeline(timeline.start("one", 9_200_000, clock()), motions["one"])
     viewer.send_control(PRESENCE)
     viewer.send_overlay(overlay_frame(3))
@@ -163,7 +165,7 @@ async def test_reports_change_the_rate(motions: dict[str, StoredMotion]) -> None
 
 async def test_private_timelines_are_edited_others_not(motions: dict[str, StoredMotion]) -> None:
     for private in (True, False):
-        viewer, line, _ = open_viewer(motions["one"], private=private)
+        viewer, line, _ = open_viewer(motions["one"], has_own_timeline=private)
         viewer.on_message(Edit(playing=False).pack())
         assert [s.playing for s in messages_of_type(TimelineState, line) if isinstance(s, TimelineState)] == [
             True,
@@ -173,10 +175,9 @@ async def test_private_timelines_are_edited_others_not(motions: dict[str, Stored
 
 @pytest.mark.parametrize("playing", [True, False])
 async def test_what_a_timeline_begins_with_goes_though_it_lies_a_little_ahead(
-    motions: dict[str, StoredMotion], monkeypatch: pytest.MonkeyPatch, playing: bool
+    motions: dict[str, StoredMotion], playing: bool
 ) -> None:
     now = clock()
-    monkeypatch.setattr(viewer_connection, "clock", lambda: now)
     viewer, line, state = open_viewer(motions["one"], playing=playing, now=now)
     before = len(messages_of_type(Data, line))
     viewer.set_timeline(timeline.edit(state, now + 100_000, position=6_200_000), motions["one"])
@@ -184,7 +185,7 @@ async def test_what_a_timeline_begins_with_goes_though_it_lies_a_little_ahead(
     track, sent = motions["one"].first_track, messages_of_type(Data, line)[before:]
     assert next(message.index for message in sent if isinstance(message, Data)) == track.block_at(6_200_000)
     # the next comes within reach when the stage has begun and gone so far
-    following = viewer._next_block_at
+    following = viewer._feed.next_block_at
     if not playing:
         assert following is None
         return
@@ -212,32 +213,27 @@ async def test_all_tracks_are_counted_and_sent_the_motion_first(motions: dict[st
 
 
 async def test_only_the_tracks_that_are_wanted_are_sent(motions: dict[str, StoredMotion]) -> None:
-    _, line, _ = open_viewer(motions["filmed"], wanted=("light", "audio"))
+    _, line, _ = open_viewer(motions["filmed"], track_types=("light", "audio"))
     assert {(d.track, d.index) for d in messages_of_type(Data, line) if isinstance(d, Data)} == {(2, 0), (2, 1)}
 
 
-async def test_the_silent_are_asked_once_and_then_gone(
-    motions: dict[str, StoredMotion], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    viewer, line, _ = open_viewer(motions["one"])
-    began = clock()
-    now = [began]
-    monkeypatch.setattr(viewer_connection, "clock", lambda: now[0])
+async def test_the_silent_are_asked_once_and_then_gone(motions: dict[str, StoredMotion]) -> None:
+    time = VirtualTime()
+    viewer, line = ViewerConnection(time.context), FakeTransport()
+    viewer.set_timeline(timeline.start("one", 9_200_000, time.now), motions["one"])
+    viewer.open(line.open_connection(viewer))
     for second in range(18):
-        now[0] = began + second * 1_000_000
+        time.now = time.start + second * 1_000_000
         viewer.tick()
     assert [opcode for opcode, _ in parse_frames(line.sent)].count(9) == 1
     assert not line.aborted
-    now[0] = began + 19_000_000
+    time.now = time.start + 19_000_000
     viewer.tick()
     assert line.aborted
 
 
-async def test_turns_come_when_blocks_are_due_and_not_for_all_at_once(
-    motions: dict[str, StoredMotion], monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_turns_come_when_blocks_are_due_and_not_for_all_at_once(motions: dict[str, StoredMotion]) -> None:
     now = clock()
-    monkeypatch.setattr(viewer_connection, "clock", lambda: now)
     found = [open_viewer(motions["one"], now=now) for _ in range(50)]
     turns = [viewer._next_tick() - now for viewer, _, _ in found]
     assert all(0 < turn <= 2_000_000 for turn in turns)
@@ -257,7 +253,7 @@ async def test_a_failure_is_said_and_ends_it(
     (problem,) = messages_of_type(Problem, line)
     assert isinstance(problem, Problem)
     assert problem.title == "Our fault"
-    assert "a viewer's turn failed" in caplog.text
+    assert "Sending to a viewer failed" in caplog.text
 
 
 def sent_blocks(line: FakeTransport) -> list[tuple[int, int, int]]:
@@ -279,26 +275,26 @@ async def test_sound_goes_with_the_dance_at_its_lowest_until_the_line_has_shown_
 
 async def test_a_pinned_rate_pins_the_dance_and_the_sound_goes_with_the_line(motions: dict[str, StoredMotion]) -> None:
     for pinned, sound, expected in ((1, 2, [(0, 1, 1), (1, 1, 0)]), (0, 0, [(0, 1, 0), (1, 1, 0)])):
-        viewer, line, _ = open_viewer(motions["sung"], pinned=pinned)
+        viewer, line, _ = open_viewer(motions["sung"], pinned_level=pinned)
         assert sent_blocks(line)[2:4] == expected
-        assert viewer._delivery is not None
-        choice = viewer._delivery.selector
+        assert viewer._feed.delivery is not None
+        choice = viewer._feed.delivery.selector
         for second in range(1, 9):
             choice.process_report(Report(buffer=4_000_000), clock() + second * 2_000_000)
-        assert viewer._delivery.allocation[:2] == (pinned, sound)
+        assert viewer._feed.delivery.allocation[:2] == (pinned, sound)
 
 
 async def test_who_wants_no_sound_gets_none_and_who_wants_it_alone_gets_that(motions: dict[str, StoredMotion]) -> None:
-    _, line, _ = open_viewer(motions["sung"], wanted=("motion",))
+    _, line, _ = open_viewer(motions["sung"], track_types=("motion",))
     assert {track for track, _, _ in sent_blocks(line)} == {0}
-    _, line, _ = open_viewer(motions["sung"], wanted=("audio",))
+    _, line, _ = open_viewer(motions["sung"], track_types=("audio",))
     assert sent_blocks(line)[:4] == [(1, index, 0) for index in range(4)]
 
 
 async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dict[str, StoredMotion]) -> None:
-    viewer, line, _ = open_viewer(motions["sung"], private=True)
-    assert viewer._delivery is not None
-    choice = viewer._delivery
+    viewer, line, _ = open_viewer(motions["sung"], has_own_timeline=True)
+    assert viewer._feed.delivery is not None
+    choice = viewer._feed.delivery
     for second in range(1, 6):
         choice.process_report(Report(buffer=0), clock() + second * 2_000_000)
     before = len(sent_blocks(line))
@@ -310,20 +306,20 @@ async def test_a_line_that_does_not_carry_both_gets_the_dance_alone(motions: dic
 
 
 async def test_who_comes_back_is_not_sent_again_what_it_holds(motions: dict[str, StoredMotion]) -> None:
-    _, line, _ = open_viewer(motions["one"], playing=False, held=ResumeState("one", 0, (1, 1, -1, 0)))
+    _, line, _ = open_viewer(motions["one"], playing=False, resume_state=ResumeState("one", 0, (1, 1, -1, 0)))
     assert [type(message) for message in line.messages[:2]] == [ChannelHeader, TimelineState]
     data = [message for message in line.messages if isinstance(message, Data)]
     assert {(d.index, d.rate) for d in data if d.index < 4} == {(2, 1), (3, 1)}
 
 
 async def test_held_blocks_of_another_motion_are_no_matter(motions: dict[str, StoredMotion]) -> None:
-    _, line, _ = open_viewer(motions["one"], playing=False, held=ResumeState("two", 0, (1, 1)))
+    _, line, _ = open_viewer(motions["one"], playing=False, resume_state=ResumeState("two", 0, (1, 1)))
     assert [type(message) for message in line.messages[:3]] == [ChannelHeader, Description, TimelineState]
     assert [message.index for message in line.messages if isinstance(message, Data)][:2] == [0, 1]
 
 
 async def test_a_viewer_is_told_once_what_was_chosen_and_why(motions: dict[str, StoredMotion]) -> None:
-    viewer, line, _ = open_viewer(motions["one"], playing=False, pinned=0)
+    viewer, line, _ = open_viewer(motions["one"], playing=False, pinned_level=0)
     viewer.on_message(Ping(1, 2).pack())
     viewer.tick()
     assert messages_of_type(Choice, line) == [Choice(0, "pinned")]
@@ -344,7 +340,7 @@ async def test_a_viewer_is_told_when_the_reason_is_another(motions: dict[str, St
 async def test_tracks_after_the_last_wanted_one_are_not_described(motions: dict[str, StoredMotion]) -> None:
     kinds = []
     for wanted in (("motion",), ("motion", "camera"), ("motion", "camera", "light")):
-        _, line, _ = open_viewer(motions["filmed"], playing=False, wanted=wanted)
+        _, line, _ = open_viewer(motions["filmed"], playing=False, track_types=wanted)
         (described,) = messages_of_type(Description, line)
         assert isinstance(described, Description)
         kinds.append([track["type"] for track in described.tracks])

@@ -10,9 +10,8 @@ from bunraku.codec.container import StoredMotion, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.playout import timeline
 from bunraku.runtime.clock import clock
-from bunraku.stream import viewer_connection
-from bunraku.stream.tick_scheduler import TickScheduler
-from bunraku.stream.viewer_connection import ViewerConnection
+from bunraku.stream.context import StreamContext
+from bunraku.stream.viewer_connection import LOW_RTT_CHECK_INTERVAL_US, ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.link import LinkSample
 from bunraku.wire.messages import Choice, Data, Ping, Pong, TimelineState
@@ -65,13 +64,10 @@ class ConstrainedTransport(FakeTransport):
 class ConstrainedViewer:
     """A viewer over such a line, and its time."""
 
-    def __init__(
-        self, motion: StoredMotion, monkeypatch: pytest.MonkeyPatch, rate: float = 3_600.0, delay: int = 75_000
-    ) -> None:
+    def __init__(self, motion: StoredMotion, rate: float = 3_600.0, delay: int = 75_000) -> None:
         self.started_at = self.at = clock()
-        monkeypatch.setattr(viewer_connection, "clock", lambda: self.at)
         self.transport = ConstrainedTransport(lambda: self.at, rate, delay)
-        self.viewer = ViewerConnection(TickScheduler())
+        self.viewer = ViewerConnection(StreamContext.create(lambda: self.at))
         self.state: TimelineState = timeline.start(motion.id, motion.first_track.duration_us, self.at)
         self.viewer.set_timeline(self.state, motion)
         self.viewer.open(self.transport.open_connection(self.viewer), self.transport)
@@ -95,9 +91,9 @@ class ConstrainedViewer:
 
 
 async def test_the_first_block_is_small_and_goes_with_what_says_of_it_and_no_more_until_something_comes_back(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+    motion: StoredMotion,
 ) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch)
+    watching = ConstrainedViewer(motion)
     blocks = [data for _, _, data in watching.messages_of_type(Data)]
     assert next((data.index, data.rate) for data in blocks if isinstance(data, Data)) == (0, 0)
     assert all(data.rate == 0 for data in blocks if isinstance(data, Data))
@@ -107,10 +103,8 @@ async def test_the_first_block_is_small_and_goes_with_what_says_of_it_and_no_mor
     watching.viewer.on_close()
 
 
-async def test_blocks_and_a_net_of_them_come_in_time_and_the_line_is_not_filled(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch)
+async def test_blocks_and_a_net_of_them_come_in_time_and_the_line_is_not_filled(motion: StoredMotion) -> None:
+    watching = ConstrainedViewer(motion)
     for _ in range(300):
         watching.advance_time(100_000)
         assert watching.transport.link.unacked_bytes(watching.at) < 6_000
@@ -126,10 +120,8 @@ async def test_blocks_and_a_net_of_them_come_in_time_and_the_line_is_not_filled(
     watching.viewer.on_close()
 
 
-async def test_each_overlay_that_leaves_is_the_newest_and_comes_soon(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch)
+async def test_each_overlay_that_leaves_is_the_newest_and_comes_soon(motion: StoredMotion) -> None:
+    watching = ConstrainedViewer(motion)
     watching.advance_time(4_000_000)
     made: dict[int, int] = {}
     for number in range(1, 600):
@@ -152,19 +144,20 @@ async def test_each_overlay_that_leaves_is_the_newest_and_comes_soon(
     watching.viewer.on_close()
 
 
-async def test_while_a_line_turns_out_slower_no_word_on_the_rate_takes_room_from_overlays(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch, 7_000.0)
+async def test_while_a_line_turns_out_slower_no_word_on_the_rate_takes_room_from_overlays(motion: StoredMotion) -> None:
+    watching = ConstrainedViewer(motion, 7_000.0)
     watching.advance_time(4_000_000)
     number, slowing, told = 0, 0, len(watching.messages_of_type(Choice))
     while watching.at < watching.started_at + 14_000_000:
         if watching.at > watching.started_at + 9_000_000:
             watching.transport.rate = 1_800.0
         number += 1
-        if watching.viewer._flow.is_slowing and watching.viewer._delivery is not None:
+        if watching.viewer._flow.is_slowing and watching.viewer._feed.delivery is not None:
             # as if another rate had been chosen
-            watching.viewer._delivery.has_unsent_choice, watching.viewer._delivery._announced_choice = True, None
+            watching.viewer._feed.delivery.has_unsent_choice, watching.viewer._feed.delivery._announced_choice = (
+                True,
+                None,
+            )
         watching.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
         for _ in range(7):
             slower = watching.viewer._flow.is_slowing
@@ -178,8 +171,8 @@ async def test_while_a_line_turns_out_slower_no_word_on_the_rate_takes_room_from
     watching.viewer.on_close()
 
 
-async def test_what_must_arrive_waits_for_no_room(motion: StoredMotion, monkeypatch: pytest.MonkeyPatch) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch)
+async def test_what_must_arrive_waits_for_no_room(motion: StoredMotion) -> None:
+    watching = ConstrainedViewer(motion)
     assert not watching.viewer._flow.has_capacity()
     watching.viewer.on_message(Ping(1, 2).pack())
     assert watching.messages_of_type(Pong)
@@ -197,9 +190,9 @@ def pair() -> StoredMotion:
 
 
 async def test_while_the_stage_stands_what_is_on_show_is_bettered_first_and_once_and_then_the_line_falls_still(
-    pair: StoredMotion, monkeypatch: pytest.MonkeyPatch
+    pair: StoredMotion,
 ) -> None:
-    watching = ConstrainedViewer(pair, monkeypatch, 1_800.0)
+    watching = ConstrainedViewer(pair, 1_800.0)
     watching.advance_time(16_000_000)
     assert watching.viewer.choice is not None
     assert watching.viewer.choice[0] < 3
@@ -225,15 +218,13 @@ async def test_while_the_stage_stands_what_is_on_show_is_bettered_first_and_once
     watching.viewer.on_close()
 
 
-async def test_a_loop_that_is_there_whole_comes_better_than_the_line_carries_as_it_dances(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+async def test_a_loop_that_is_there_whole_comes_better_than_the_line_carries_as_it_dances() -> None:
     dances = [
         encode_motion(random_motion(8.0, 30.0, seed), error_bounds_mm=(60.0, 20.0, 8.0, 3.0), grade="live")
         for seed in (9, 8)
     ]
     loop = unpack_motion("loop", pack_motion("loop", dances[0], others=dances[1:]))
-    watching = ConstrainedViewer(loop, monkeypatch, 1_200.0)
+    watching = ConstrainedViewer(loop, 1_200.0)
     watching.advance_time(60_000_000)
     assert watching.viewer.choice is not None
     assert watching.viewer.choice[0] < 3
@@ -246,9 +237,9 @@ async def test_a_loop_that_is_there_whole_comes_better_than_the_line_carries_as_
 
 
 async def test_a_quick_line_is_not_asked_for_overlays_and_one_that_becomes_slow_is_no_longer_written_to_unasked(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+    motion: StoredMotion,
 ) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch, 1e7, 500)
+    watching = ConstrainedViewer(motion, 1e7, 500)
     before = watching.transport.reads
     for number in range(100):
         watching.at += 33_000
@@ -256,7 +247,7 @@ async def test_a_quick_line_is_not_asked_for_overlays_and_one_that_becomes_slow_
     assert watching.transport.reads == before
     assert len(watching.messages_of_type(Overlay)) == 100
     assert watching.viewer.accepts_direct_writes
-    watching.at += viewer_connection.LOW_RTT_CHECK_INTERVAL_US
+    watching.at += LOW_RTT_CHECK_INTERVAL_US
     watching.transport.link.write(watching.at, 2_000_000)
     watching.transport.sent += bytes(2_000_000)
     watching.viewer.tick()

@@ -10,9 +10,10 @@ from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.messaging.bus import MemoryBus, NoResponse
 from bunraku.playout import timeline
+from bunraku.runtime.clock import clock
 from bunraku.storage.motion_store import MotionStore
 from bunraku.stream import watched_session
-from bunraku.stream.tick_scheduler import TickScheduler
+from bunraku.stream.context import StreamContext
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket.frame import encode_frame
@@ -49,7 +50,7 @@ def serve_session_state(bus: MemoryBus, state: TimelineState = STATE) -> list[in
 
 
 async def join_viewer(watched: WatchedSessions) -> tuple[ViewerConnection, FakeTransport]:
-    viewer, line = ViewerConnection(TickScheduler()), FakeTransport()
+    viewer, line = ViewerConnection(watched._context), FakeTransport()
     (await watched.open("s")).add_viewer(viewer)
     viewer.open(line.open_connection(viewer))
     return viewer, line
@@ -58,7 +59,7 @@ async def join_viewer(watched: WatchedSessions) -> tuple[ViewerConnection, FakeT
 async def test_one_subscription_serves_all_viewers_and_ends_with_the_last(library: MotionStore) -> None:
     bus = MemoryBus()
     serve_session_state(bus)
-    watched = WatchedSessions(bus, library)
+    watched = WatchedSessions(bus, library, StreamContext.create(clock))
     there = [await join_viewer(watched) for _ in range(3)]
     assert len(bus._handlers["session.s.overlay"]) == 1
     pulled = Overlay(2, 6, {1: (0,) * 9}).pack()
@@ -78,7 +79,7 @@ async def test_one_subscription_serves_all_viewers_and_ends_with_the_last(librar
 async def test_one_without_room_gets_the_newest_and_holds_up_nobody(library: MotionStore) -> None:
     bus = MemoryBus()
     serve_session_state(bus)
-    watched = WatchedSessions(bus, library)
+    watched = WatchedSessions(bus, library, StreamContext.create(clock))
     (_, slow), (_, quick) = [await join_viewer(watched) for _ in range(2)]
     slow.has_capacity = False
     for number in range(10, 20):
@@ -99,7 +100,7 @@ async def test_many_who_come_and_go_are_counted_seldom(library: MotionStore, mon
     monkeypatch.setattr(watched_session, "VIEWER_COUNT_INTERVAL_S", 0.02)
     bus = MemoryBus()
     heard = serve_session_state(bus)
-    watched = WatchedSessions(bus, library)
+    watched = WatchedSessions(bus, library, StreamContext.create(clock))
     there = [await join_viewer(watched) for _ in range(40)]
     assert len(heard) < 20
     async with asyncio.timeout(10):
@@ -115,7 +116,7 @@ async def test_what_was_published_while_the_bus_was_away_is_asked_for(
 ) -> None:
     bus = MemoryBus()
     returned: list[Callable[[], None]] = []
-    monkeypatch.setattr(bus, "on_return", returned.append)
+    monkeypatch.setattr(bus, "on_reconnect", returned.append)
     state: list[bytes | None] = [STATE.pack(), PRESENCE.pack(), Overlay(1, 5, {2: (0,) * 9}).pack()]
 
     async def answer(_: bytes) -> bytes:
@@ -123,7 +124,7 @@ async def test_what_was_published_while_the_bus_was_away_is_asked_for(
         return packed
 
     bus.serve("session.s.state", answer)
-    watched = WatchedSessions(bus, library)
+    watched = WatchedSessions(bus, library, StreamContext.create(clock))
     viewer, line = await join_viewer(watched)
     await asyncio.gather(*watched._resync_tasks)
     assert [m.limbs.keys() for m in line.messages if isinstance(m, Overlay)] == [{2}]
@@ -140,7 +141,7 @@ async def test_what_was_published_while_the_bus_was_away_is_asked_for(
 async def test_a_session_that_goes_on_elsewhere_hears_how_many_watch(library: MotionStore) -> None:
     bus = MemoryBus()
     heard = serve_session_state(bus)
-    watched = WatchedSessions(bus, library)
+    watched = WatchedSessions(bus, library, StreamContext.create(clock))
     there = [await join_viewer(watched) for _ in range(3)]
     heard.clear()
     bus.publish("session.s.appear", b"")
@@ -159,16 +160,16 @@ async def test_what_cannot_be_a_session_is_not_asked_for(
         asked.append(subject)
         return b""
 
-    monkeypatch.setattr(bus, "ask", ask)
+    monkeypatch.setattr(bus, "request", ask)
     with pytest.raises(NoResponse):
-        await WatchedSessions(bus, library).open(session)
+        await WatchedSessions(bus, library, StreamContext.create(clock)).open(session)
     assert asked == []
 
 
 async def test_another_motion_comes_to_all(library: MotionStore) -> None:
     bus = MemoryBus()
     serve_session_state(bus)
-    watched = WatchedSessions(bus, library)
+    watched = WatchedSessions(bus, library, StreamContext.create(clock))
     there = [await join_viewer(watched) for _ in range(2)]
     other = timeline.change_motion(STATE, 5_000, "n", 2_000_000)
     bus.publish("session.s.timeline", other.pack())
@@ -183,13 +184,13 @@ async def test_another_motion_comes_to_all(library: MotionStore) -> None:
 
 async def test_a_session_that_is_not_there_is_said_so(library: MotionStore) -> None:
     with pytest.raises(NoResponse):
-        await WatchedSessions(MemoryBus(), library).open("s")
+        await WatchedSessions(MemoryBus(), library, StreamContext.create(clock)).open("s")
 
 
 async def test_a_session_whose_motion_is_not_there_is_refused_and_let_go(library: MotionStore) -> None:
     bus = MemoryBus()
     heard = serve_session_state(bus, timeline.start("none", 2_000_000, 1_000))
-    watched = WatchedSessions(bus, library)
+    watched = WatchedSessions(bus, library, StreamContext.create(clock))
     with pytest.raises(CloseConnection) as refused:
         await watched.open("s")
     assert refused.value.code == NOT_FOUND

@@ -161,8 +161,8 @@ class CongestionWindow:
             )
         self._in_flight.append(
             _InFlightMessage(
-                self._written, self._wire_written, at, self.in_flight_bytes - self._excess_in_flight, large, self._wire_acked, since,
-                self._drained_at - self._drain_correction,
+                self._written, self._wire_written, at, self.in_flight_bytes - self._excess_in_flight, large,
+                self._wire_acked, since, self._drained_at - self._drain_correction,
             )
         )  # fmt: skip
 
