@@ -105,11 +105,10 @@ def test_what_is_one_block_is_always_on_show() -> None:
 
 def test_without_room_or_before_the_net_is_there_nothing_on_show_is_bettered() -> None:
     state = start("m", TRACK.duration_us, 0, playing=False)
-    for more in ({"has_spare_capacity": False}, {"allow_upgrades": False}):
+    blocked = SendPolicy(0, prefetch=True, idle_level=3)
+    for policy in (blocked._replace(has_spare_capacity=False), blocked._replace(allow_upgrades=False)):
         pacer = motion_scheduler()
-        drained = list(
-            iter(lambda: pacer.next_block(state, 0, SendPolicy(0, prefetch=True, idle_level=3, **more)), None)
-        )  # noqa: B023
+        drained = list(iter(lambda: pacer.next_block(state, 0, policy), None))  # noqa: B023
         assert {due.level for due in drained} == {0}
 
 

@@ -72,9 +72,9 @@ def test_a_better_rate_takes_the_place_of_a_lower_one() -> None:
 
 def test_what_is_not_of_this_sound_is_refused() -> None:
     store, _ = filled(LONG)
-    with pytest.raises(DamagedBlock, match="none of number"):
+    with pytest.raises(DamagedBlock, match="packets only"):
         store.put_encoded(1, 3, pack_audio_block(store.track.packet_count - 1, random_packets(2, 9, 1)))
     with pytest.raises(DamagedBlock):
         store.put_encoded(1, 3, b"\1")
-    with pytest.raises(ValueError, match="not of this motion"):
+    with pytest.raises(ValueError, match="not belong to this track"):
         store.put_encoded(LONG.block_count, 3, b"")

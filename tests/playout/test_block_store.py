@@ -75,9 +75,9 @@ def test_the_end_of_a_loop_leads_into_its_beginning() -> None:
 def test_blocks_of_another_motion_are_refused() -> None:
     held = filled_store()
     other = encode_motion(random_motion(0.7, 30.0, 3), error_bounds_mm=(20.0,), grade="live")
-    with pytest.raises(ValueError, match="not of this motion"):
+    with pytest.raises(ValueError, match="not belong to this track"):
         held.put(3, 0, decode_motion_block(other.track, other.ladder[0].blocks[0]))
-    with pytest.raises(ValueError, match="not of this motion"):
+    with pytest.raises(ValueError, match="not belong to this track"):
         held.put(4, 0, decode_motion_block(ENCODED.track, ENCODED.ladder[0].blocks[0]))
 
 

@@ -52,5 +52,5 @@ def test_without_a_dance_there_is_nothing_to_show(described: list[dict[str, Any]
 
 
 def test_without_a_place_for_the_first_there_is_nothing_to_show(dance: dict[str, Any]) -> None:
-    with pytest.raises(DamagedBlock, match="no place to dance at"):
+    with pytest.raises(DamagedBlock, match="invalid placement"):
         TrackSet([dance | {"place": [0.0, 900.0, 0.0]}, dance])

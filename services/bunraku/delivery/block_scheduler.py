@@ -1,4 +1,4 @@
-"""Scheduler of the blocks that one viewer is sent (design.md, The line).
+"""Scheduler of the blocks that one viewer is sent (design.md, Network).
 
 The server sends ahead of the play position, in this order:
 
@@ -50,8 +50,8 @@ PREFETCH_REFILL_US = 20_000_000
 MIN_UPGRADE_LEAD_US = 500_000
 """Minimum lead time of an upgrade, microseconds: it must be decoded before it is shown."""
 MIN_AUDIO_UPGRADE_LEAD_US = SEND_AHEAD_US - 1_000_000
-"""The same for audio, except in short motions: audio is upgraded as it comes within reach again in a loop. Upgrading
-all buffered audio would fill a link for data that is heard once for a few seconds."""
+"""Minimum lead time of an audio upgrade, microseconds, except in short motions. Audio is upgraded as it comes within
+reach again in a loop: upgrading all buffered audio would fill a link for data that is heard once for a few seconds."""
 
 
 class SendPolicy(NamedTuple):

@@ -38,7 +38,7 @@ LevelQuery = Annotated[int | None, Query(ge=0, le=15)]
 TracksQuery = Annotated[str, Query(max_length=64)]
 ResumeQuery = Annotated[str, Query(max_length=400)]
 MAX_RESUME_AGE_US = 60_000_000
-"""A viewer may date the start of its own timeline back or ahead by at most this, microseconds."""
+"""A viewer may date the start of its timeline back or ahead by at most this, microseconds."""
 
 
 def create_app(context: ServiceContext) -> FastAPI:

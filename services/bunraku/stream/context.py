@@ -20,5 +20,5 @@ class StreamContext:
 
     @classmethod
     def create(cls, clock: Callable[[], int]) -> StreamContext:
-        """Return a context with a scheduler and counters of its own."""
+        """Return a context with a new scheduler and new counters."""
         return cls(clock, TickScheduler(clock), StreamCounters())

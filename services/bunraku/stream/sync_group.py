@@ -1,9 +1,9 @@
 """Synchronised groups: viewers of one session that are due the same blocks and are served by one write.
 
 The cost of a fan-out is the walk from viewer to viewer, whose objects lie all over the memory, not the write. A viewer
-on an unlimited link that has been sent all blocks within reach therefore needs no tick of its own for the following
+on an unlimited link that has been sent all blocks within reach therefore needs no separate tick for the following
 ones: it joins a group, which has one tick for all members. Blocks are due to all viewers of a session at once; each
-group sends them with a delay of its own, up to a second, which spreads the load of the server.
+group sends them with its own delay of up to a second, which spreads the load of the server.
 
 All times are clock times in microseconds.
 """

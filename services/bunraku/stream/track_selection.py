@@ -22,7 +22,7 @@ TRACK_TYPES = ("motion", "audio", "camera", "light")
 
 @dataclass(frozen=True, slots=True)
 class ViewerOptions:
-    """What a viewer requests in the URL of its stream."""
+    """Options that a viewer sends in the URL of its stream."""
 
     pinned_level: int | None = None
     """Bitrate level of the motion to keep to; None to adapt it."""

@@ -1,6 +1,6 @@
 """Connection of one viewer: what it is sent, in which order, and how its messages are handled (SPEC.md, Sockets).
 
-A viewer has no task of its own. It acts when something is published for it, when it sends a message, when its
+A viewer has no separate task. It acts when something is published for it, when it sends a message, when its
 connection becomes writable, and in its scheduler ticks (`bunraku.stream.tick_scheduler`). While the connection is not
 writable, control messages are queued up to a limit, and only the newest overlay is kept. A viewer whose queue is full
 is disconnected with a reason; one that is silent is sent a Ping, and disconnected if no answer arrives.
@@ -41,7 +41,7 @@ WRITE_BATCH_BYTES = 16_384
 HIGH_RTT_CHECK_INTERVAL_US = 250_000
 """Interval between reassessments of an unchecked high-RTT link, microseconds."""
 LOW_RTT_CHECK_INTERVAL_US = 4_000_000
-"""The same for a low-RTT link, microseconds: the system calls cost as much as a block."""
+"""Interval between reassessments of a low-RTT link, microseconds: the system calls cost as much as a block."""
 
 _log = logging.getLogger(__name__)
 _NO_FLOW_CONTROL = FlowControl(None, lambda: 0)
@@ -187,7 +187,7 @@ class ViewerConnection:
             self.group.remove_viewer(self)
 
     def tick(self) -> None:
-        """Check the heartbeat, send what is due, and schedule the next tick."""
+        """Check the heartbeat, send due data, and schedule the next tick."""
         now = self._context.clock()
         if self._heartbeat.check(self.connection, now):
             self._send_due(now, check_flow=True)
@@ -260,7 +260,7 @@ class ViewerConnection:
             self._set_timer(self._quiet_period.ends_at - now)
             return
         feed.next_block_at = None
-        # each Pong is a packet of its own, as the Ping was, so that both directions take equally long
+        # each Pong is a separate packet, as the Ping was, so that both directions take equally long
         for pong in self._queue.take_pongs():
             self._write(pong)
         if priority := b"".join(self._take_priority_frames()):
