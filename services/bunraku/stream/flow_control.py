@@ -69,6 +69,8 @@ class LinkState(Enum):
     def __init__(self, is_high_rtt: bool, skips_overlay_check: bool) -> None:
         self.is_high_rtt = is_high_rtt
         self.skips_overlay_check = skips_overlay_check
+        # plain attributes: access to an enum's members by name is slow in Python 3.11, and this runs for each message
+        self.is_unlimited = skips_overlay_check and not is_high_rtt
 
     @classmethod
     def initial(cls, rtt_us: int) -> LinkState:
@@ -143,12 +145,12 @@ class FlowControl:
 
     def record_write(self, size: int) -> None:
         """Record that `size` bytes were written at once."""
-        if self._link is not None and self.state is not LinkState.UNLIMITED:
+        if self._link is not None and not self.state.is_unlimited:
             self.window.record_write(self._clock(), size)
 
     def probe(self, size: int, /) -> bytes:
         """Return the bytes to write together with `size` bytes of data; a size of 0 asks for a probe alone."""
-        return b"" if self._link is None or (size and self.state is LinkState.UNLIMITED) else self._link.probe(size)
+        return b"" if self._link is None or (size and self.state.is_unlimited) else self._link.probe(size)
 
     def on_probe_echo(self, payload: bytes) -> None:
         """Process the client's answer to a probe."""
@@ -167,7 +169,7 @@ class FlowControl:
             if not self.state.is_high_rtt:
                 self._count_check(self.has_capacity() and not self.is_constrained)
             return
-        has_capacity = self.state is LinkState.UNLIMITED or (self.has_capacity() and not self.is_constrained)
+        has_capacity = self.state.is_unlimited or (self.has_capacity() and not self.is_constrained)
         try:
             sample = self._link.sample()
         except OSError:

@@ -21,7 +21,7 @@ from bunraku.codec.container import StoredMotion
 from bunraku.playout import timeline
 from bunraku.stream.context import StreamContext
 from bunraku.stream.counters import TIMEOUT_REASON
-from bunraku.stream.flow_control import FlowControl, Link, LinkState
+from bunraku.stream.flow_control import FlowControl, Link
 from bunraku.stream.heartbeat import Heartbeat, QuietPeriod
 from bunraku.stream.motion_delivery import OVERLAY_SHARING_US, MotionFeed
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, SendQueue
@@ -210,7 +210,7 @@ class ViewerConnection:
                     self._check_flow(now)
                 if self._sync.group is not None and not self._stays_in_sync(now):
                     self._sync.leave(self._feed.delivery)
-                if self._flow.state is not LinkState.UNLIMITED:
+                if not self._flow.state.is_unlimited:
                     self._send_constrained(now)
                 elif self._sync.group is None:
                     self._send_unlimited(now)
@@ -232,7 +232,7 @@ class ViewerConnection:
         flow.reassess()
         if flow.state.skips_overlay_check != skipped_check:
             self._invalidate_writable()
-        interval = LOW_RTT_CHECK_INTERVAL_US if flow.state is LinkState.UNLIMITED else HIGH_RTT_CHECK_INTERVAL_US
+        interval = LOW_RTT_CHECK_INTERVAL_US if flow.state.is_unlimited else HIGH_RTT_CHECK_INTERVAL_US
         self._next_flow_check_at = now + interval - 1
 
     def _send_unlimited(self, now: int) -> None:
@@ -336,7 +336,7 @@ class ViewerConnection:
         delivery = self._feed.delivery
         assert delivery is not None
         return (
-            self._flow.state is LinkState.UNLIMITED
+            self._flow.state.is_unlimited
             and self._sync.is_valid(now, delivery.allocation)
             and not (self._queue or delivery.has_unsent_choice)
         )
@@ -358,8 +358,8 @@ class ViewerConnection:
         state, next_block_at = self._flow.state, self._feed.next_block_at
         if next_block_at is not None:
             # a constrained link sends just in time, so its blocks are not spread
-            due = min(due, next_block_at + (self._sync.phase if state is LinkState.UNLIMITED else 0))
-        if state is LinkState.HIGH_RTT:
+            due = min(due, next_block_at + (self._sync.phase if state.is_unlimited else 0))
+        if state.is_high_rtt and state.skips_overlay_check:
             due = min(due, self._context.clock() + HIGH_RTT_CHECK_INTERVAL_US)
         return due
 
