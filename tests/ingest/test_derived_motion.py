@@ -7,13 +7,13 @@ import pytest
 
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
-from bunraku.http.problem_details import ProblemError
 from bunraku.ingest.derived_motion import DerivedMotionFactory
 from bunraku.ingest.motion import UploadOperation
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
-from bunraku.storage.catalogue import CatalogueEntry
+from bunraku.storage.record import CatalogueEntry
 from tests.vectors.blocks import random_motion
 
 ENCODED = encode_motion(random_motion(1.2, 30.0, 3), error_bounds_mm=(30.0,), grade="live")

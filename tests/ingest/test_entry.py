@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from bunraku.ingest.entry import entry_json
-from bunraku.storage.catalogue import CatalogueEntry
+from bunraku.storage.record import CatalogueEntry
 
 
 def test_a_motion_is_told_with_the_time_when_it_was_made() -> None:

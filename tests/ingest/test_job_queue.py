@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from sqlalchemy import func, select
 
-from bunraku.http import request_id
-from bunraku.http.problem_details import ProblemError
 from bunraku.ingest import job_queue
 from bunraku.ingest.job_queue import JobQueue
+from bunraku.runtime import request_id
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
-from bunraku.storage.catalogue import Job
+from bunraku.storage.record import Job
 from bunraku.storage.table import JOBS
 
 

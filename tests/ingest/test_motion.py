@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.ingest.motion import UploadOperation, derive_motion_id
 from bunraku.runtime.context import open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from tests.servers import make_bvh_clip
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.ingest.persistence import check_quota, store_motion
 from bunraku.ingest.result import JobResult
 from bunraku.runtime.context import open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 
 RESULT = JobResult(b"packed", {})

@@ -10,7 +10,6 @@ from typing import Any
 import msgpack
 import pytest
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.ingest import recording
 from bunraku.ingest.app import create_app
 from bunraku.ingest.motion import UploadOperation
@@ -20,6 +19,7 @@ from bunraku.messaging.bus import NoResponse
 from bunraku.messaging.recording_request import MAX_RECORDING_S
 from bunraku.playout import timeline
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from tests.servers import make_bvh_clip
 

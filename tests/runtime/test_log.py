@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from bunraku.http import request_id
-from bunraku.runtime import log
+from bunraku.runtime import log, request_id
 
 
 @pytest.fixture(autouse=True)

@@ -14,8 +14,8 @@ import traceback
 import alembic.command  # noqa: F401
 import asyncpg  # noqa: F401
 
-from bunraku.storage.catalogue import CatalogueEntry
 from bunraku.storage.catalogue_sql import SqlCatalogue
+from bunraku.storage.record import CatalogueEntry
 
 
 async def open_and_write(url: str, number: int) -> None:

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.storage.catalogue import Catalogue, CatalogueEntry
+from bunraku.storage.catalogue import Catalogue
+from bunraku.storage.record import CatalogueEntry
 
 
 async def test_it_opens_once_at_its_first_use(url: str) -> None:

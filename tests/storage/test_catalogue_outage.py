@@ -13,7 +13,8 @@ from fastapi import FastAPI
 
 from bunraku.http import problem_details
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.storage.catalogue import Catalogue, CatalogueEntry
+from bunraku.storage.catalogue import Catalogue
+from bunraku.storage.record import CatalogueEntry
 from tests.processes import ServerProcess
 from tests.storage.conftest import create_database
 

@@ -6,8 +6,8 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from bunraku.storage.catalogue import CatalogueEntry, InvalidCursor
 from bunraku.storage.catalogue_sql import SqlCatalogue
+from bunraku.storage.record import CatalogueEntry, InvalidCursor
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from bunraku.storage.catalogue import Job
 from bunraku.storage.catalogue_sql import SqlCatalogue
+from bunraku.storage.record import Job
 
 
 @pytest.fixture

@@ -17,9 +17,9 @@ from sqlalchemy import Connection, inspect, text
 from sqlalchemy.ext.asyncio import create_async_engine
 
 from bunraku.storage import migration
-from bunraku.storage.catalogue import CatalogueEntry
 from bunraku.storage.catalogue_sql import SqlCatalogue
 from bunraku.storage.migration import HEAD_REVISION, UnknownSchemaVersion, read_schema_version
+from bunraku.storage.record import CatalogueEntry
 from bunraku.storage.table import METADATA
 from tests.conftest import REPOSITORY
 

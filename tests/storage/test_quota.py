@@ -10,8 +10,8 @@ from sqlalchemy import text
 from sqlalchemy.ext.asyncio import create_async_engine
 
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.storage.catalogue import CatalogueEntry, Quota, QuotaExceeded
 from bunraku.storage.catalogue_sql import SqlCatalogue
+from bunraku.storage.record import CatalogueEntry, Quota, QuotaExceeded
 
 
 def make_entry(name: str, subject: str = "aiko", size: int = 10) -> CatalogueEntry:

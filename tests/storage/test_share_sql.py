@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from bunraku.storage.catalogue import Share
 from bunraku.storage.catalogue_sql import SqlCatalogue
+from bunraku.storage.record import Share
 
 
 def make_share(number: int, subject: str = "aiko", expires: int = 1_000) -> Share:

@@ -15,7 +15,7 @@ from bunraku.http.problem_details import ProblemError
 from bunraku.http.ticket_store import TICKET_LIFETIME_S, TooManyTickets
 from bunraku.http.timestamp import format_timestamp
 from bunraku.runtime.context import ServiceContext
-from bunraku.storage.catalogue import Share
+from bunraku.storage.record import Share
 
 DEFAULT_SHARE_LIFETIME_S = 7 * 86_400
 MAX_SHARE_LIFETIME_S = 31 * 86_400

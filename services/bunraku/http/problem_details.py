@@ -11,36 +11,15 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from bunraku.http import request_id
+from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.problem import ProblemError as ProblemError
 
 MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER_S = 2
 """Seconds after which a request that could not be served is worth another try."""
 
 _log = logging.getLogger(__name__)
-
-
-class ProblemError(Exception):
-    """An answer with `status`, a `title` for the kind of problem, a `detail` for this one, and what helps (`field`,
-    `hint`, `line` ...)."""
-
-    def __init__(self, status: int, title: str, detail: str, **extra: Any) -> None:
-        super().__init__(detail)
-        self.status = status
-        self.title = title
-        self.detail = detail
-        self.extra = extra
-
-    def to_dict(self) -> dict[str, Any]:
-        """The problem as services tell it to each other on the bus, plain values; `of` is the way back."""
-        extra = {name: value for name, value in self.extra.items() if value is not None}
-        return {"status": self.status, "title": self.title, "detail": self.detail, **extra}
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> ProblemError:
-        """The problem that another service told of."""
-        return cls(**values)
 
 
 def problem_response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import msgpack
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http import request_id
 from bunraku.messaging.bus import Bus, NoResponse, Subscription, is_subject_token
+from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.clock import clock
 from bunraku.storage.motion_store import MotionStore

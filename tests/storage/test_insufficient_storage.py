@@ -12,8 +12,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from bunraku.http.insufficient_storage import insufficient_storage, is_disk_full, translate_disk_full
-from bunraku.http.problem_details import ProblemError
+from bunraku.runtime.insufficient_storage import insufficient_storage, is_disk_full, translate_disk_full
+from bunraku.runtime.problem import ProblemError
 from bunraku.storage.object_storage import ObjectStorage
 from tests.servers import make_bvh_clip, run_server
 

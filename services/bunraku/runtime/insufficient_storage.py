@@ -1,4 +1,4 @@
-"""What is answered where there is no room: 507, before anything is acknowledged."""
+"""Full disks and quotas of the file system as problem 507."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import contextlib
 import errno
 from collections.abc import Iterator
 
-from bunraku.http.problem_details import ProblemError
+from bunraku.runtime.problem import ProblemError
 
 _DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
 
 
 def insufficient_storage(resource: str) -> ProblemError:
-    """The answer where `what` has no room."""
+    """Return the problem for a backend without space; nothing of the request has been stored."""
     return ProblemError(
         507,
         "No room left",
-        f"{resource} has no room left; nothing of this was kept",
-        hint="remove motions, or give it more",
+        f"{resource} has no space left; nothing of this request was stored",
+        hint="remove motions, or add storage space",
     )
 
 
 def is_disk_full(error: BaseException) -> bool:
-    """Whether an error of the operating system, or one that tells of it in words only, says that there is no room."""
+    """Return whether an error reports a full disk, as an errno or in its text."""
     if isinstance(error, OSError) and error.errno is not None:
         return error.errno in _DISK_FULL_ERRNOS
     return any(f"os error {number})" in str(error) for number in _DISK_FULL_ERRNOS)
@@ -30,7 +30,7 @@ def is_disk_full(error: BaseException) -> bool:
 
 @contextlib.contextmanager
 def translate_disk_full(resource: str) -> Iterator[None]:
-    """Raises `full` in place of what the operating system says of a full disk or quota."""
+    """Raise `insufficient_storage` instead of an OSError for a full disk or quota."""
     try:
         yield
     except OSError as error:
