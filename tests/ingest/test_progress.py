@@ -18,12 +18,12 @@ async def poll_progress(
     """Return the reported progress of an upload, up to a stage or to the end of `posting`."""
     reports: list[Any] = []
     while not posting.done() and (until is None or not reports or reports[-1]["stage"] != until):
-        answer = await http.get(f"/v1/uploads/{upload}")
-        if answer.status_code == 200:
-            assert answer.headers["cache-control"] == "no-store"
-            reports.append(answer.json())
+        response = await http.get(f"/v1/uploads/{upload}")
+        if response.status_code == 200:
+            assert response.headers["cache-control"] == "no-store"
+            reports.append(response.json())
         else:
-            assert answer.status_code == 404
+            assert response.status_code == 404
     return reports
 
 
@@ -70,11 +70,11 @@ async def test_disconnect_cancels_the_upload(tmp_path: Path) -> None:
                 pass
             assert (await http.get("/v1/motions")).json()["items"] == []
             # all slots are free again
-            answers = [
+            responses = [
                 await post(http, f"upload-{number:02}", make_bvh_clip(0.2, 902))
                 for number in range(MAX_ACTIVE_OPERATIONS + 1)
             ]
-            assert {answer.status_code for answer in answers} == {200, 201}
+            assert {response.status_code for response in responses} == {200, 201}
 
 
 @pytest.mark.parametrize("name", ["short", "x" * 65, "with%20blank", "né-à-mesure"])

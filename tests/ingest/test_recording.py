@@ -37,7 +37,7 @@ async def context(tmp_path: Path) -> AsyncIterator[ServiceContext]:
 
 
 @pytest.fixture
-async def dance(context: ServiceContext, tmp_path: Path) -> str:
+async def motion_id(context: ServiceContext, tmp_path: Path) -> str:
     """Store a motion of 2 s and the log `log` of a session that played it."""
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(2.0, 51))
@@ -69,17 +69,17 @@ async def send_request(context: ServiceContext, message: bytes) -> dict[str, Any
     return response
 
 
-async def test_session_is_recorded_as_a_motion(context: ServiceContext, dance: str) -> None:
+async def test_session_is_recorded_as_a_motion(context: ServiceContext, motion_id: str) -> None:
     camera = [[float(START_CLOCK_US), 0.0, 1.2, 4.0, 0.0, 1.0, 0.0, 0.5]]
     motion = (await send_request(context, make_request(camera=camera)))["motion"]
     entry = await context.catalogue.get_motion(motion["id"])
     stored = await context.motion_store.get(motion["id"])
-    known = await context.catalogue.get_motion(dance)
+    known = await context.catalogue.get_motion(motion_id)
     assert entry is not None
     assert stored is not None
     assert known is not None
     assert motion["name"] == "Swan, kept"
-    assert motion["source"] == f"kept from a session of Swan ({dance})"
+    assert motion["source"] == f"kept from a session of Swan ({motion_id})"
     assert (motion["duration"], motion["frames"], motion["fps"]) == (1.0, 60, 60)
     assert motion["tracks"] == ["motion", "camera"]
     assert motion["joints"] == known.description["joints"]
@@ -88,7 +88,7 @@ async def test_session_is_recorded_as_a_motion(context: ServiceContext, dance: s
     assert named["name"] == "My duet"
     assert named["id"] != motion["id"]
     page, _ = await context.catalogue.list_motions(9)
-    assert [e.id for e in page] == [named["id"], motion["id"], dance]
+    assert [e.id for e in page] == [named["id"], motion["id"], motion_id]
 
 
 @pytest.mark.parametrize(
@@ -102,29 +102,29 @@ async def test_session_is_recorded_as_a_motion(context: ServiceContext, dance: s
     ],
 )
 async def test_impossible_recording_is_a_problem_and_not_stored(
-    context: ServiceContext, dance: str, changes: dict[str, Any], status: int, field: str
+    context: ServiceContext, motion_id: str, changes: dict[str, Any], status: int, field: str
 ) -> None:
     problem = (await send_request(context, make_request(**changes)))["problem"]
     assert (problem["status"], problem["field"]) == (status, field)
     assert problem["title"]
     assert problem["detail"]
-    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [dance]
+    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [motion_id]
 
 
-async def test_unreadable_log_is_a_problem(context: ServiceContext, dance: str) -> None:
+async def test_unreadable_log_is_a_problem(context: ServiceContext, motion_id: str) -> None:
     await context.motion_store.put_log("log", b"\xc1")
     problem = (await send_request(context, make_request()))["problem"]
     assert problem["status"] == 422
     assert problem["title"] == "Unreadable log"
-    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [dance]
+    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [motion_id]
 
 
-async def test_removed_motion_is_a_problem(context: ServiceContext, dance: str) -> None:
-    await context.motion_store.remove(dance)
+async def test_removed_motion_is_a_problem(context: ServiceContext, motion_id: str) -> None:
+    await context.motion_store.remove(motion_id)
     assert (await send_request(context, make_request()))["problem"]["title"] == "Cannot be replayed"
 
 
-@pytest.mark.usefixtures("dance")
+@pytest.mark.usefixtures("motion_id")
 async def test_recording_beyond_the_limit_gets_503(
     context: ServiceContext,
 ) -> None:
@@ -137,20 +137,20 @@ async def test_recording_beyond_the_limit_gets_503(
     assert "motion" in msgpack.unpackb(await operation.handle_message(b"order"))
 
 
-async def test_slow_recording_is_cancelled(context: ServiceContext, dance: str) -> None:
+async def test_slow_recording_is_cancelled(context: ServiceContext, motion_id: str) -> None:
     operation = RecordingOperation(context, WorkerSlots(), timeout_s=0.001)
     await context.motion_store.put_log("order", make_request())
     problem = msgpack.unpackb(await operation.handle_message(b"order"))["problem"]
     assert (problem["status"], problem["title"]) == (503, "Busy")
-    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [dance]
+    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [motion_id]
 
 
-async def test_abandoned_request_leaves_no_process(context: ServiceContext, dance: str) -> None:
+async def test_abandoned_request_leaves_no_process(context: ServiceContext, motion_id: str) -> None:
     await context.motion_store.put_log("order", make_request())
     with pytest.raises(NoResponse):
         await context.bus.request(RECORDING_SUBJECT, b"order", timeout_s=0.1)
     assert not multiprocessing.active_children()
-    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [dance]
+    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [motion_id]
     assert "motion" in await send_request(context, make_request())
 
 
@@ -169,15 +169,21 @@ async def test_stopped_service_does_not_respond(tmp_path: Path) -> None:
             await opened.bus.request(RECORDING_SUBJECT, make_request())
 
 
-VALID: dict[str, Any] = {"log": "l", "name": "Mine", "begin": 1_000_000, "end": 3_000_000, "camera": [[1, *range(7)]]}
+VALID_REQUEST: dict[str, Any] = {
+    "log": "l",
+    "name": "Mine",
+    "begin": 1_000_000,
+    "end": 3_000_000,
+    "camera": [[1, *range(7)]],
+}
 
 
 def test_recording_request_is_parsed() -> None:
-    request = parse_recording_request(msgpack.packb(VALID | {"later": "more"}))
+    request = parse_recording_request(msgpack.packb(VALID_REQUEST | {"later": "more"}))
     assert (request.log, request.name, request.begin, request.end) == ("l", "Mine", 1_000_000, 3_000_000)
     assert request.camera == [[1, 0, 1, 2, 3, 4, 5, 6]]
     assert request.frame_count == 120
-    minimal = parse_recording_request(msgpack.packb({key: VALID[key] for key in ("log", "begin", "end")}))
+    minimal = parse_recording_request(msgpack.packb({key: VALID_REQUEST[key] for key in ("log", "begin", "end")}))
     assert (minimal.name, minimal.camera) == (None, [])
 
 
@@ -198,7 +204,7 @@ def test_recording_request_is_parsed() -> None:
 )
 def test_invalid_request_names_its_field(changes: dict[str, Any], field: str) -> None:
     with pytest.raises(ProblemError) as raised:
-        parse_recording_request(msgpack.packb(VALID | changes))
+        parse_recording_request(msgpack.packb(VALID_REQUEST | changes))
     assert raised.value.status == 422
     assert raised.value.extra["field"] == field
 

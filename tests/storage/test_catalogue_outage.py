@@ -109,10 +109,10 @@ async def test_outage_is_a_503_with_retry_after(server: ServerProcess, catalogue
     async with httpx2.AsyncClient(transport=httpx2.ASGITransport(app), base_url="http://stage") as http:
         assert (await http.get("/")).json() == 1
         server.kill()
-        answer = await http.get("/")
-        assert answer.status_code == 503
-        assert answer.headers["retry-after"]
-        assert str(server.port) not in answer.text
+        response = await http.get("/")
+        assert response.status_code == 503
+        assert response.headers["retry-after"]
+        assert str(server.port) not in response.text
         server.start()
         await wait_until_available(catalogue)
         assert (await http.get("/")).json() == 2

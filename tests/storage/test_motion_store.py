@@ -198,7 +198,7 @@ def test_combined_performers_keep_their_blocks() -> None:
     three = container.unpack_motion("three", packed)
     # cameras of the other motions are not copied
     assert kinds == ["motion", "motion", "motion", "camera"]
-    assert [dance.placement for dance in three.performers] == places
+    assert [performer.placement for performer in three.performers] == places
     assert three.first_track.duration_us == one.first_track.duration_us
     assert three.performers[1].track.fps == 60.0
     for number, of in enumerate((one.packets[0], two.packets[0], one.packets[0], one.packets[1])):
@@ -211,7 +211,7 @@ def test_combined_performers_keep_their_blocks() -> None:
         "lit", container.replace_scene_tracks("lit", three, [camera, camera], {"camera"})[0]
     )
     assert [type(track).__name__ for track in again.tracks] == ["MotionTrack"] * 3 + ["SceneTrack"] * 2
-    assert [dance.placement for dance in again.performers] == places
+    assert [performer.placement for performer in again.performers] == places
 
 
 def test_performers_beyond_16_tracks_are_rejected() -> None:

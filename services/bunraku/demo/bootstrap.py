@@ -103,9 +103,7 @@ async def _create_motion(context: ServiceContext, fingerprint: str) -> str:
             await context.motion_store.remove(previous)
         slots = WorkerSlots()
         await MotionOperation(context, slots).ingest_file(motion, SourceFile(source, f"{title}.bvh"))
-        with_music, _ = await AudioOperation(context, slots).add_audio(
-            motion, SourceFile(song, f"{title}.wav"), digest
-        )
+        with_music, _ = await AudioOperation(context, slots).add_audio(motion, SourceFile(song, f"{title}.wav"), digest)
         staged, _ = await SceneOperation(context, slots).add_scene(
             with_music.id, await asyncio.to_thread(_build_staging)
         )

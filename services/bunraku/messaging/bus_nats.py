@@ -29,6 +29,7 @@ from bunraku.messaging.nats_connection import (
     HEARTBEAT_INTERVAL_S,
     MAX_MISSED_HEARTBEATS,
     NatsConnection,
+    NatsMessage,
     parse_servers,
 )
 from bunraku.runtime import request_id
@@ -39,8 +40,7 @@ RECONNECT_DELAY_RANGE_S = (0.1, 0.4)
 _INBOX_SUBSCRIPTION_ID = 0
 """Id of the subscription that receives responses."""
 _NO_RESPONDERS_STATUS, _FAILED_STATUS = b"503", b"500"
-_DeliveryCallback = Callable[[str, bytes, bytes], None]
-"""Function of reply subject, message and raw headers."""
+_DeliveryCallback = Callable[[NatsMessage], None]
 
 _log = logging.getLogger(__name__)
 
@@ -111,25 +111,22 @@ class NatsBus:
         self._connection.publish(subject, data)
 
     def subscribe(self, subject: str, handler: MessageHandler) -> Subscription:
-        return self._subscribe_raw(subject, "", lambda _, data, __: deliver(handler, subject, data))
+        return self._subscribe_raw(subject, "", lambda message: deliver(handler, subject, message.data))
 
     def serve(self, subject: str, responder: Responder) -> Subscription:
-
-        async def respond(reply: str, data: bytes, request: str) -> None:
+        async def respond(message: NatsMessage) -> None:
             try:
-                with request_id.bind(request):
-                    response = await call_responder(responder, subject, data)
-                self.publish(reply, response)
+                with request_id.bind(request_id.from_message_headers(message.headers)):
+                    response = await call_responder(responder, subject, message.data)
+                self.publish(message.reply, response)
             except (ResponderFailed, BackendUnavailable) as error:
                 if self._connection is not None:
-                    self._connection.respond_error(
-                        reply, error.backend if isinstance(error, BackendUnavailable) else ""
-                    )
+                    backend = error.backend if isinstance(error, BackendUnavailable) else ""
+                    self._connection.respond_error(message.reply, backend)
 
-        def on_request(reply: str, data: bytes, headers: bytes) -> None:
-            if reply:
-                request = request_id.from_message_headers(headers)
-                task = asyncio.create_task(respond(reply, data, request), name=f"response to {subject}")
+        def on_request(message: NatsMessage) -> None:
+            if message.reply:
+                task = asyncio.create_task(respond(message), name=f"response to {subject}")
                 self._response_tasks.add(task)
                 task.add_done_callback(self._response_tasks.discard)
 
@@ -179,25 +176,23 @@ class NatsBus:
         finally:
             del self._pending_requests[token]
 
-    def on_message(
-        self, subscription_id: int, subject: str, reply: str, data: bytes, headers: bytes, status: bytes
-    ) -> None:
-        if subscription_id != _INBOX_SUBSCRIPTION_ID:
+    def on_message(self, message: NatsMessage) -> None:
+        if message.subscription_id != _INBOX_SUBSCRIPTION_ID:
             # messages to an ended subscription may still arrive
-            if subscription_id in self._subscriptions:
-                self._subscriptions[subscription_id][1](reply, data, headers)
+            if message.subscription_id in self._subscriptions:
+                self._subscriptions[message.subscription_id][1](message)
             return
-        pending = self._pending_requests.get(subject.rpartition(".")[2])
+        pending = self._pending_requests.get(message.subject.rpartition(".")[2])
         if pending is None or pending.done():
             return
-        if status == _NO_RESPONDERS_STATUS:
+        if message.status == _NO_RESPONDERS_STATUS:
             pending.set_exception(NoResponse("no responder"))
-        elif status == _FAILED_STATUS and data:
-            pending.set_exception(BackendUnavailable(data.decode(), "reported by the responder"))
-        elif status == _FAILED_STATUS:
+        elif message.status == _FAILED_STATUS and message.data:
+            pending.set_exception(BackendUnavailable(message.data.decode(), "reported by the responder"))
+        elif message.status == _FAILED_STATUS:
             pending.set_exception(ResponderFailed("the responder raised an exception"))
         else:
-            pending.set_result(data)
+            pending.set_result(message.data)
 
     def _subscribe_raw(self, subject: str, group: str, on_delivery: _DeliveryCallback) -> Subscription:
         number = next(self._subscription_ids)

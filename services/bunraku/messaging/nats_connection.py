@@ -11,7 +11,7 @@ import json
 import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import Any, NamedTuple, Protocol, cast
 from urllib.parse import unquote, urlsplit
 
 from bunraku import __version__
@@ -60,17 +60,25 @@ def parse_servers(url: str) -> list[NatsServer]:
     return servers
 
 
+class NatsMessage(NamedTuple):
+    """A message for a subscription."""
+
+    subscription_id: int
+    subject: str
+    reply: str
+    """Subject for the response, empty if none is expected."""
+    data: bytes
+    headers: bytes
+    """Raw headers, empty if there are none."""
+    status: bytes
+    """Empty, 500 for a failed response, or the server's 503 for a request without a responder."""
+
+
 class NatsListener(Protocol):
     """Receiver of the messages of a connection."""
 
-    def on_message(
-        self, subscription_id: int, subject: str, reply: str, data: bytes, headers: bytes, status: bytes
-    ) -> None:
-        """Receive a message for a subscription.
-
-        `headers` are raw, empty if there are none. `status` is empty, 500 for a failed response, or the server's 503 if
-        a request has no responder.
-        """
+    def on_message(self, message: NatsMessage) -> None:
+        """Process a message at once."""
 
 
 class NatsConnection(asyncio.Protocol):
@@ -239,9 +247,15 @@ class NatsConnection(asyncio.Protocol):
                 headers = payload[:header_bytes]
                 status = headers.split(b"\r\n", 1)[0].split()[1:2]
                 reply = words[2].decode() if len(words) == (5 if has_headers else 4) else ""
-                number, subject = int(words[1]), words[0].decode()
                 self._listener.on_message(
-                    number, subject, reply, payload[header_bytes:], headers, status[0] if status else b""
+                    NatsMessage(
+                        subscription_id=int(words[1]),
+                        subject=words[0].decode(),
+                        reply=reply,
+                        data=payload[header_bytes:],
+                        headers=headers,
+                        status=status[0] if status else b"",
+                    )
                 )
                 return payload_start + size + 2
             case b"PING":

@@ -187,7 +187,7 @@ class _Collector(Collector):
 
 
 def _restrict_to_metrics_path(app: Any) -> Any:
-    def answer(environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
+    def serve_metrics(environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
         if environ.get("PATH_INFO") != METRICS_PATH:
             start("404 Not Found", [("Content-Type", "text/plain; charset=utf-8")])
             return [b"Not found. Metrics are served at /metrics.\n"]
@@ -197,4 +197,4 @@ def _restrict_to_metrics_path(app: Any) -> Any:
         body: Iterable[bytes] = app(environ, start)
         return body
 
-    return answer
+    return serve_metrics

@@ -46,16 +46,16 @@ def test_recording_follows_pauses_and_seeks() -> None:
     request = RecordingRequest(log="l", begin=START_CLOCK_US + SECOND_US // 2, end=START_CLOCK_US + SECOND_US * 5 // 2)
     motion, store = unpack_recording(encode_recording("recorded", request, make_log(one, paused, sought), MOTIONS))
     assert (motion.first_track.fps, motion.first_track.frames) == (60, 120)
-    dance = load_blocks("one")
+    original = load_blocks("one")
     for frame in range(120):
         clock = request.begin + round(frame * 1e6 / 60)
         state = replay.timeline_at(clock)
         assert state is not None
-        expected, actual = dance.pose_at(timeline.position_at(state, clock)), store.pose_at(round(frame * 1e6 / 60))
+        expected, actual = original.pose_at(timeline.position_at(state, clock)), store.pose_at(round(frame * 1e6 / 60))
         assert expected is not None
         assert actual is not None
         error = joint_and_tip_positions(motion.first_track.figure, *actual) - joint_and_tip_positions(
-            dance.track.figure, *expected
+            original.track.figure, *expected
         )
         assert np.linalg.norm(error, axis=-1).max() < 1e-3
 
@@ -70,9 +70,9 @@ def test_recording_inherits_front_and_figure() -> None:
     )
     motion, _ = unpack_recording(result)
     assert isinstance(result, JobResult)
-    dance = MOTIONS["one"]
-    assert motion.performers[0].front == dance.performers[0].front
-    np.testing.assert_array_equal(motion.first_track.figure.offsets, dance.first_track.figure.offsets)
+    played = MOTIONS["one"]
+    assert motion.performers[0].front == played.performers[0].front
+    np.testing.assert_array_equal(motion.first_track.figure.offsets, played.first_track.figure.offsets)
     assert motion.first_track.first_frames == 30
     assert result.description["kept_from"] == "one"
     assert result.description["tracks"] == ["motion"]
@@ -83,7 +83,7 @@ def test_recording_inherits_front_and_figure() -> None:
 def test_all_performers_are_recorded_with_their_overlays() -> None:
     log, both = InputLog(), MOTIONS["both"]
     log.add_timeline(timeline.start("both", 3 * SECOND_US, START_CLOCK_US))
-    marionettes = LoggedMarionettes(Marionettes([dance.track.figure for dance in both.performers]), "both", log)
+    marionettes = LoggedMarionettes(Marionettes([performer.track.figure for performer in both.performers]), "both", log)
     replay = SessionReplay(log, MOTIONS)
     marionettes.claim(4, "ada", START_CLOCK_US)
     for frame in range(120):
@@ -101,24 +101,24 @@ def test_all_performers_are_recorded_with_their_overlays() -> None:
     assert isinstance(result, JobResult)
     assert (result.description["tracks"], result.description["performers"]) == (["motion", "motion"], 2)
     recorded = container.unpack_motion("recorded", result.packed)
-    assert [dance.placement for dance in recorded.performers] == list(PLACEMENTS)
-    assert [dance.front for dance in recorded.performers] == [dance.front for dance in both.performers]
+    assert [performer.placement for performer in recorded.performers] == list(PLACEMENTS)
+    assert [performer.front for performer in recorded.performers] == [performer.front for performer in both.performers]
     motion_poses = replay.motion_poses_at(START_CLOCK_US + SECOND_US)
     viewer_poses = next(replay.replay_poses([START_CLOCK_US + SECOND_US]))
     assert motion_poses is not None
     assert viewer_poses is not None
-    for index, dance in enumerate(recorded.performers):
-        store = MotionBlockStore(dance.track)
-        for index, packet in enumerate(dance.packets[-1]):
-            store.put(index, 0, decode_motion_block(dance.track, Data.unpack(packet).block))
+    for index, performer in enumerate(recorded.performers):
+        store = MotionBlockStore(performer.track)
+        for index, packet in enumerate(performer.packets[-1]):
+            store.put(index, 0, decode_motion_block(performer.track, Data.unpack(packet).block))
         actual = store.pose_at(SECOND_US)
         assert actual is not None
-        error = joint_and_tip_positions(dance.track.figure, *actual) - joint_and_tip_positions(
-            dance.track.figure, *viewer_poses[index]
+        error = joint_and_tip_positions(performer.track.figure, *actual) - joint_and_tip_positions(
+            performer.track.figure, *viewer_poses[index]
         )
         assert np.linalg.norm(error, axis=-1).max() < 1e-3
-        displacement = joint_and_tip_positions(dance.track.figure, *viewer_poses[index]) - joint_and_tip_positions(
-            dance.track.figure, *motion_poses[index]
+        displacement = joint_and_tip_positions(performer.track.figure, *viewer_poses[index]) - joint_and_tip_positions(
+            performer.track.figure, *motion_poses[index]
         )
         assert (np.linalg.norm(displacement, axis=-1).max() > 0.1) == (index == 1)
 

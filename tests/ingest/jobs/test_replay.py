@@ -78,7 +78,7 @@ class SimulatedSession:
 
 
 def figures_of(motion: str) -> list[Figure]:
-    return [dance.track.figure for dance in MOTIONS[motion].performers]
+    return [performer.track.figure for performer in MOTIONS[motion].performers]
 
 
 def assert_same_poses(one: list[Pose], other: list[Pose]) -> None:

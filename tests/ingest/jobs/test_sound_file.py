@@ -67,11 +67,11 @@ def test_surround_is_mixed_to_stereo_without_clipping(tmp_path: Path) -> None:
 
 def test_samples_beyond_the_limit_are_not_read(tmp_path: Path) -> None:
     path = write_audio(tmp_path / "a.flac", make_tone(2.0, 44_100), 44_100)
-    whole = read_file(path)
-    np.testing.assert_array_equal(read_file(path, 30_001), whole[:30_001])
+    complete = read_file(path)
+    np.testing.assert_array_equal(read_file(path, 30_001), complete[:30_001])
     # damaged data beyond the limit is not read either
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 3 // 4])
-    np.testing.assert_array_equal(read_file(path, 30_001), whole[:30_001])
+    np.testing.assert_array_equal(read_file(path, 30_001), complete[:30_001])
 
 
 def make_wav(
@@ -144,15 +144,15 @@ def test_unreadable_file_is_rejected_with_the_reason(tmp_path: Path) -> None:
 
 def test_tags_are_skipped(tmp_path: Path) -> None:
     sound = struct.pack("<800h", *range(800))
-    whole = make_wav(sound, len(sound))
+    complete = make_wav(sound, len(sound))
     title = b"LIST" + struct.pack("<I", 4 + 8 + 6) + b"INFOINAM" + struct.pack("<I", 6) + b"\xc9t\xe9 \xff\0"
-    tagged = whole[:4] + struct.pack("<I", len(whole) + len(title) - 8) + whole[8:36] + title + whole[36:]
+    tagged = complete[:4] + struct.pack("<I", len(complete) + len(title) - 8) + complete[8:36] + title + complete[36:]
     song = make_sound(tmp_path, "mp3")
     picture = (
         b"ID3\x03\x00\x00" + bytes([0, 0, 8, 0]) + b"APIC\x00\x00\x03\xf0\x00\x00\x00image/png\0\3\0" + b"\x89PNG" * 249
     )
     picture = picture.ljust(10 + 1024, b"\0")
-    for name, plain, more in (("wav", whole, tagged), ("mp3", song, picture + song)):
+    for name, plain, more in (("wav", complete, tagged), ("mp3", song, picture + song)):
         path = tmp_path / name
         path.write_bytes(plain)
         bare = read_file(path)
@@ -162,18 +162,18 @@ def test_tags_are_skipped(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["mp3", "opus.ogg", "vorbis.ogg"])
 def test_truncated_file_without_a_length_is_decoded(tmp_path: Path, kind: str) -> None:
-    whole = make_sound(tmp_path, kind, 8.0)
+    complete = make_sound(tmp_path, kind, 8.0)
     path = tmp_path / "part"
-    path.write_bytes(whole[: len(whole) // 2])
+    path.write_bytes(complete[: len(complete) // 2])
     assert 2 * 48_000 < len(read_file(path)) < 6 * 48_000
 
 
 @pytest.mark.parametrize("kind", ["wav", "flac", "mp3", "opus.ogg", "vorbis.ogg"])
 def test_damaged_file_is_rejected_or_decoded_within_bounds(tmp_path: Path, kind: str) -> None:
-    whole, random = make_sound(tmp_path, kind), np.random.default_rng(3)
+    complete, random = make_sound(tmp_path, kind), np.random.default_rng(3)
     path = tmp_path / "damaged"
     for _ in range(20):
-        damaged = bytearray(whole)
+        damaged = bytearray(complete)
         at = int(random.integers(len(damaged)))
         damaged[at : at + 200] = random.bytes(min(200, len(damaged) - at))
         path.write_bytes(damaged)
