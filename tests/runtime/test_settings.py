@@ -23,7 +23,7 @@ def test_defaults_lie_in_the_data_folder_and_environment_overrides(
 
 def test_each_setting_is_documented_with_its_default() -> None:
     rows = re.findall(
-        r"^\| (`BUNRAKU_.*?) \| (.*?) \|", (REPOSITORY / "docs" / "settings.md").read_text(), re.MULTILINE
+        r"^\| (`BUNRAKU_.*?) \| (.*?) \|", (REPOSITORY / "docs" / "operations.md").read_text(), re.MULTILINE
     )
     documented: dict[str, str] = {}
     for names, defaults in rows:

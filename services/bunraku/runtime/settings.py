@@ -1,6 +1,6 @@
 """Settings of a process: environment variables `BUNRAKU_...`, with defaults for a single machine.
 
-`docs/settings.md` documents them for operators.
+`docs/operations.md` documents them for operators.
 """
 
 from __future__ import annotations
