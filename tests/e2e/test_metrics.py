@@ -197,5 +197,5 @@ def test_who_is_turned_away_is_counted_by_why(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("address", ["9100", "localhost:http", "0.0.0.0:0"])
 def test_a_wrong_address_is_refused(address: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="metrics are at host:port"):
+    with pytest.raises(ValueError, match="expected host:port"):
         Settings(data=tmp_path, metrics=address)

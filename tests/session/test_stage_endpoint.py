@@ -9,10 +9,10 @@ import pytest
 
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
-from bunraku.http.problem_details import ProblemError
 from bunraku.playout import timeline
 from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
 from bunraku.session.puppeteer_connection import PuppeteerConnection

@@ -3,9 +3,9 @@ from __future__ import annotations
 import msgpack
 import pytest
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.messaging.bus import MemoryBus
 from bunraku.messaging.key_value import MemoryKeyValueStore
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage_proxy import StageProxy

@@ -13,10 +13,10 @@ from fastapi import FastAPI, Header, Request, Response
 from bunraku import __version__
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, requires
-from bunraku.http.problem_details import ProblemError
 from bunraku.ik import batch
 from bunraku.marionette import bend_table, figures
 from bunraku.marionette.proportions import Proportions, ProportionsError
+from bunraku.runtime.problem import ProblemError
 
 MAX_CACHED_TABLES = 256
 """Tables kept as bytes: 2 MB."""

@@ -10,9 +10,10 @@ import numpy as np
 from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from bunraku.http.problem_details import ProblemError, invalid_field_problem
+from bunraku.http.problem_details import invalid_field_problem
 from bunraku.marionette import arm_batch, bend_table, leg
 from bunraku.marionette.proportions import Proportions
+from bunraku.runtime.problem import ProblemError
 
 JSON = "application/json"
 MSGPACK = "application/msgpack"

@@ -14,8 +14,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from bunraku.http import problem_details
 from bunraku.http.access_control import Access, Role, access_of, requires
-from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session import control_endpoint, metrics, recorder
 from bunraku.session.recorder import Recording
 from bunraku.session.schema import NewSession, SessionEdit

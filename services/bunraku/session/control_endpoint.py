@@ -11,10 +11,10 @@ from http import HTTPStatus
 from starlette.websockets import WebSocket
 
 from bunraku.http.access_control import access_of
-from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.counters import RATE_LIMITED, SessionCounters
 from bunraku.session.puppeteer_connection import MAX_QUEUED_MESSAGES, PuppeteerConnection
 from bunraku.session.stage_endpoint import PUPPETEER_HEARTBEAT_S

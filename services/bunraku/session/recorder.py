@@ -7,10 +7,10 @@ from typing import Annotated, Any
 import msgpack
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.messaging.bus import NoResponse
 from bunraku.messaging.recording_request import MAX_CAMERA_KEYFRAMES, MAX_RECORDING_S
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.stage_proxy import StageProxy
 
 INGEST_TIMEOUT_S = 120.0

@@ -18,14 +18,14 @@ from typing import Any, NamedTuple
 import msgpack
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http import request_id
-from bunraku.http.problem_details import ProblemError
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueEntry, RevisionConflict
 from bunraku.playout import timeline
+from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.counters import SessionCounters
 from bunraku.session.stage import Stage, make_marionettes
 from bunraku.session.stage_endpoint import StageEndpoint, session_json

@@ -17,12 +17,12 @@ from typing import Any, Protocol
 import msgpack
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http.problem_details import ProblemError
 from bunraku.messaging.bus import Subscription
 from bunraku.messaging.recording_request import MAX_RECORDING_S
 from bunraku.playout.timeline import position_at
 from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.puppeteer_roster import SessionFull
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import Stage

@@ -6,9 +6,9 @@ from typing import Any
 
 import msgpack
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 

@@ -13,12 +13,13 @@ from bunraku.codec.container import StoredMotion
 from bunraku.delivery.resume import ResumeState
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
-from bunraku.http.problem_details import ProblemError, motion_not_found
+from bunraku.http.problem_details import motion_not_found
 from bunraku.messaging.bus import NoResponse, is_subject_token
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
 from bunraku.playout import timeline
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.stream import metrics
 from bunraku.stream.context import StreamContext
 from bunraku.stream.flow_control import Link

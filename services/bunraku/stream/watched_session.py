@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import msgpack
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http import request_id
 from bunraku.messaging.bus import Bus, NoResponse, Subscription, is_subject_token
+from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.storage.motion_store import MotionStore
 from bunraku.stream.context import StreamContext

@@ -1,7 +1,7 @@
-"""What one request is called, in every line of every process that has to do with it, and in the answer.
+"""Id of an HTTP request, in the log lines of all processes that handle it and in its response.
 
-The gateway names it, or a proxy before that; where nobody has, the first process does. Over the bus the name goes with
-questions, never with what is published: that is of the moment, and comes many times a second.
+The gateway or a proxy before it assigns the id, else the first process does. On the bus, requests carry the id;
+published messages do not, as they are too frequent.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ _current_id: ContextVar[str] = ContextVar("request_id", default="")
 
 
 def current() -> str:
-    """The request that is at work here; empty where none is."""
+    """Return the id of the current request, empty without one."""
     return _current_id.get()
 
 
 def accept_or_generate(header_values: list[str]) -> str:
-    """The name that a request came with, where it has one that is well formed; else a new one."""
+    """Return the id in the request's header if there is one valid value, else a new id."""
     return (
         header_values[0]
         if len(header_values) == 1 and _ID_PATTERN.fullmatch(header_values[0])
@@ -35,8 +35,7 @@ def accept_or_generate(header_values: list[str]) -> str:
 
 @contextmanager
 def bind(request: str) -> Iterator[None]:
-    """While this lasts the request of this name is at work here; none where it is empty, for what outlives the request
-    that begins it."""
+    """Set the current id inside the block; an empty id is for tasks that outlive the request that started them."""
     token = _current_id.set(request)
     try:
         yield
@@ -45,12 +44,12 @@ def bind(request: str) -> Iterator[None]:
 
 
 def message_headers() -> Mapping[str, str]:
-    """What goes with a question over the bus."""
+    """Return the headers of a bus request."""
     request = _current_id.get()
     return {REQUEST_ID_HEADER: request} if request else {}
 
 
 def from_message_headers(raw_headers: bytes) -> str:
-    """The name in the headers of a message of the bus; empty where there is none."""
+    """Return the id in the raw headers of a bus message, empty without one."""
     found = _HEADER_LINE.search(raw_headers) if raw_headers else None
     return found[1].decode() if found else ""
