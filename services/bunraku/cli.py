@@ -354,7 +354,7 @@ def warm() -> None:
     from bunraku.ingest.jobs import motion  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
     from bunraku.session import limb_solver
 
-    limb_solver.warm_up_solver()
+    limb_solver.load_compiled_solver()
 
 
 def _parse_motion_address(address: str, error_message: str) -> tuple[str | None, str]:

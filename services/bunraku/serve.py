@@ -8,7 +8,7 @@ import logging
 import socket
 import sys
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 from signal import SIGINT, SIGTERM
@@ -147,7 +147,7 @@ async def compose_app(
             add_security_scheme(whole)
             app.openapi = whole.openapi  # type: ignore[method-assign]
             app.mount("/", _page_app())
-        loading = asyncio.create_task(_warm_up(backing, services), name="load what is needed later")
+        loading = asyncio.create_task(_warm_up(backing, apps), name="load what is needed later")
         stack.push_async_callback(_cancel_and_wait, loading)
         if demo:
             opening = open_demo_stage(backing, apps["session"].state.sessions)
@@ -241,21 +241,22 @@ async def _complete_before_ready(work: Awaitable[None], task_name: str, readines
         readiness_state.pending_preparations.discard(task_name)
 
 
-async def _warm_up(context: ServiceContext, services: Collection[str]) -> None:
+async def _warm_up(context: ServiceContext, apps: Mapping[str, FastAPI]) -> None:
     """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
     await asyncio.sleep(WARM_UP_DELAY_S)
     # whoever comes by a link for viewers is looked up in it
-    if "ingest" in services or context.authenticator.requires_token:
+    if "ingest" in apps or context.authenticator.requires_token:
         try:
             await context.catalogue.open()
         except BackendUnavailable as error:
             # it is tried again when it is used
             _log.warning("%s", error)
-    if "stream" in services:
+    if "stream" in apps:
         await asyncio.to_thread(multicast.warm_up)
-    if "session" in services:
+    if "session" in apps:
         await asyncio.to_thread(motion_decoder.warm_up)
-        await asyncio.to_thread(limb_solver.warm_up_solver)
+        solver = await asyncio.to_thread(limb_solver.load_compiled_solver)
+        apps["session"].state.sessions.use_solver(solver)
     # what is loaded by now stays: the collector need not walk through it again and again while limbs are solved
     gc.freeze()
     gc.set_threshold(*GC_THRESHOLDS)

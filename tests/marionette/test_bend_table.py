@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bunraku.marionette import arm, bend_table
-from bunraku.marionette.planar_arm import TABLE_SIDE
-from bunraku.marionette.proportions import MAX_TIP_DISTANCE, Proportions, ProportionsError
+from bunraku.marionette.constants import MAX_TIP_DISTANCE, TABLE_SIDE
+from bunraku.marionette.proportions import Proportions, ProportionsError
 from tests.marionette.fixtures import ARM_PROPORTIONS
 
 

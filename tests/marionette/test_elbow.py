@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from bunraku.marionette import shoulder as limit
 from bunraku.marionette import vector
-from bunraku.marionette.controlled_limb import MAX_REACH, MIN_REACH
-from bunraku.marionette.elbow import Elbow, elevation, lift_angle, vertical_normal
+from bunraku.marionette.constants import MAX_REACH, MIN_REACH
+from bunraku.marionette.elbow import Elbow
+from bunraku.marionette.elbow_step import elevation, lift_angle, vertical_normal
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.vector import Vector
 from bunraku.motion.skeleton import standard_figure

@@ -39,7 +39,7 @@ class OwnershipMachine(RuleBasedStateMachine):
         due = {limb for limb in self.held if self.now - self.heard[limb] >= INPUT_TIMEOUT_US}
         assert {limb for limb, _ in lost} == due
         for limb, who in lost:
-            assert self.held.pop(limb)[0] == who
+            assert self.held.pop(Limb(limb))[0] == who
 
     @rule(limb=limbs, who=people)
     def claim(self, limb: Limb, who: str) -> None:

@@ -111,7 +111,7 @@ async def test_a_dance_is_decoded_once_for_all_stages_and_forgotten_with_the_las
         decoded += 1
         return decode_motion_block(track, data)
 
-    monkeypatch.setattr(poses_module, "decode_block", counted)
+    monkeypatch.setattr(poses_module, "decode_motion_block", counted)
     timelines = TimelineHistory()
     timelines.put(timeline.start("one", motion.first_track.duration_us, 0))
     stages = [PoseCache(motion, timelines) for _ in range(5)]

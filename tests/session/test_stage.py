@@ -24,7 +24,7 @@ from bunraku.playout.timeline import position_at
 from bunraku.runtime.clock import clock
 from bunraku.session import puppeteer_roster
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
-from bunraku.session.stage import EDIT_LEAD_US, FRAME_INTERVAL_US, FRAMES_PER_MESSAGE, Stage, make_marionettes
+from bunraku.session.stage import EDIT_LEAD_US, FRAME_INTERVAL_US, FRAMES_PER_MESSAGE, SessionStart, Stage
 from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import (
     Alive,
@@ -93,7 +93,7 @@ async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
     await asyncio.to_thread(motion_decoder.warm_up)
     motion = await stored_motion("one", 5)
     state = timeline.start("one", motion.first_track.duration_us, clock())
-    opened = Stage("s", motion, make_marionettes(motion), bus, state, state.clock)
+    opened = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
     yield opened
     await opened.close()
 
@@ -232,7 +232,7 @@ async def test_who_missed_that_a_limb_was_lost_is_told_again(stage: Stage, said:
     ben = join_stage(stage, "Ben")
     stage.receive(aiko.puppeteer, Claim(0))
     # it is taken from her while nothing can be said
-    stage._marionettes.release(0, aiko.id, last_grant(aiko).epoch, clock())
+    stage._ownership.release(0, aiko.id, last_grant(aiko).epoch, clock())
     for _ in range(5):
         stage.receive(aiko.puppeteer, said)
         stage.receive(ben.puppeteer, said)
@@ -261,7 +261,7 @@ async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(
 async def test_the_limbs_of_all_performers_are_pulled_and_one_message_tells_of_them(bus: MemoryBus) -> None:
     motion, audience = MOTIONS["both"], StageMessages(bus)
     state = timeline.start("both", motion.first_track.duration_us, clock())
-    stage = Stage("s", motion, make_marionettes(motion), bus, state, state.clock)
+    stage = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
     aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
     stage.receive(aiko.puppeteer, Claim(1))
     stage.receive(ben.puppeteer, Claim(6))

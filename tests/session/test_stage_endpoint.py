@@ -11,13 +11,12 @@ from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.http.problem_details import ProblemError
 from bunraku.playout import timeline
-from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
 from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
-from bunraku.session.stage import Stage, make_marionettes
+from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.wire.messages import Claim
@@ -58,8 +57,8 @@ def owner() -> FakeStageOwner:
 async def door(backing: ServiceContext, owner: FakeStageOwner) -> AsyncIterator[StageEndpoint]:
     stored = await backing.motion_store.get("one")
     assert stored is not None
-    state = timeline.start("one", stored.first_track.duration_us, clock())
-    stage = Stage("s", stored, make_marionettes(stored), backing.bus, state, state.clock)
+    state = timeline.start("one", stored.first_track.duration_us, backing.clock())
+    stage = Stage(SessionStart("s", stored, state, state.clock), backing.bus, backing.clock)
     opened = StageEndpoint(stage, backing, owner, 1)
     yield opened
     await opened.close()

@@ -11,7 +11,7 @@ from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.ingest.jobs.recording import encode_recording, sample_camera
 from bunraku.ingest.jobs.replay import SessionReplay
 from bunraku.ingest.result import JobRejection, JobResult
-from bunraku.marionette.input_log import InputLog, LoggedMarionettes
+from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.ownership import LimbInput
 from bunraku.messaging.recording_request import RecordingRequest
@@ -81,17 +81,17 @@ def test_its_front_and_figure_are_the_dances_and_its_start_is_short() -> None:
 
 
 def test_of_several_performers_all_are_kept_where_they_stood_with_what_was_pulled_of_each() -> None:
-    log, both = InputLog(), MOTIONS["both"]
+    log, both = InputLog("both"), MOTIONS["both"]
     log.add_timeline(timeline.start("both", 3 * SECOND_US, START_CLOCK_US))
-    troupe = LoggedMarionettes(Marionettes([dance.track.figure for dance in both.performers]), "both", log)
+    troupe = Marionettes([dance.track.figure for dance in both.performers], recorder=log)
     showing = SessionReplay(log, MOTIONS)
-    troupe.claim(4, "ada", START_CLOCK_US)
+    troupe.ownership.claim(4, "ada", START_CLOCK_US)
     for frame in range(120):
         now = START_CLOCK_US + frame * 16_667
-        troupe.apply_input("ada", LimbInput(4, 1, 1, frame + 1, now, (0.7, 0.3, 0.3)), now)
+        troupe.ownership.apply_input("ada", LimbInput(4, 1, 1, frame + 1, now, (0.7, 0.3, 0.3)), now)
         poses = showing.motion_poses_at(now + 60_000)
         assert poses is not None
-        troupe.compute_overlay([rotations for _, rotations in poses], now + 60_000, now)
+        troupe.compute_overlay([rotations for _, rotations in poses], now, now + 60_000)
     made = encode_recording(
         "kept", RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + 2 * SECOND_US), log.pack(), MOTIONS
     )
@@ -187,12 +187,12 @@ def test_a_dance_that_began_within_the_interval_is_kept_from_there() -> None:
 
 def test_what_is_no_longer_remembered_is_not_kept_as_if_nothing_had_been_done(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bunraku.marionette.input_log.MAX_LOG_BYTES", 100)
-    log = InputLog()
+    log = InputLog("one")
     log.add_timeline(timeline.start("one", 3 * SECOND_US, START_CLOCK_US))
-    puppet = LoggedMarionettes(Marionettes([MOTIONS["one"].first_track.figure]), "one", log)
-    puppet.claim(0, "ada", START_CLOCK_US)
+    puppet = Marionettes([MOTIONS["one"].first_track.figure], recorder=log)
+    puppet.ownership.claim(0, "ada", START_CLOCK_US)
     for later in range(1, 30):
-        puppet.keep_alive("ada", [0], START_CLOCK_US + later * SECOND_US // 10)
+        puppet.ownership.keep_alive("ada", [0], START_CLOCK_US + later * SECOND_US // 10)
     order = RecordingRequest(log="l", begin=START_CLOCK_US + SECOND_US, end=START_CLOCK_US + 5 * SECOND_US)
     refused = encode_recording("kept", order, log.pack(), MOTIONS)
     assert isinstance(refused, JobRejection)
