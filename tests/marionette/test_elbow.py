@@ -107,7 +107,7 @@ def test_small_measures(tip: Vector) -> None:
 def test_it_follows_once_it_has_begun() -> None:
     elbow = Elbow(RIG.arm, RIG.shoulder)
     assert not elbow.has_begun
-    with pytest.raises(RuntimeError, match="begun"):
+    with pytest.raises(RuntimeError, match="begin"):
         elbow.step(UP, 0.5, UP, FRAME_S)
     elbow.begin(UP, (1.0, 0.0, 0.0), 0.2)
     known = [elbow.has_begun]

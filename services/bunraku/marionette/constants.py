@@ -125,9 +125,9 @@ MIN_SOLVE_WEIGHT = _float("min_solve_weight")
 """Blend weight of a limb that is still returning although its blend is over."""
 
 # Controller input
-FULL_HAND_SPEED = _float("full_hand_speed_arm_lengths_per_s")
+MAX_HAND_SPEED = _float("full_hand_speed_arm_lengths_per_s")
 """Speed of a hand along one axis at full deflection."""
-FULL_LEG_SPEED = _float("full_leg_speed_rad_per_s")
+MAX_LEG_SPEED = _float("full_leg_speed_rad_per_s")
 """Speed of a thigh at full deflection."""
 MAX_TARGET_DURATION_US = int(CONSTANTS["max_target_duration_us"])
 """Longest interpolation to a new target."""

@@ -17,7 +17,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from bunraku.marionette import vector
-from bunraku.marionette.constants import FULL_HAND_SPEED, FULL_LEG_SPEED, MAX_TARGET_DURATION_US
+from bunraku.marionette.constants import MAX_HAND_SPEED, MAX_LEG_SPEED, MAX_TARGET_DURATION_US
 from bunraku.marionette.leg import clamp_thigh
 from bunraku.marionette.vector import ZERO, Vector
 
@@ -151,7 +151,7 @@ class LimbTarget:
         )
 
     def _scale_velocity(self, values: Vector) -> Vector:
-        full_speed = FULL_HAND_SPEED if self._is_hand else FULL_LEG_SPEED
+        full_speed = MAX_HAND_SPEED if self._is_hand else MAX_LEG_SPEED
         x, y, z = (min(max(part, -1.0), 1.0) * full_speed for part in values)
         return (x, y, z) if self._is_hand else (x, 0.0, 0.0)
 

@@ -8,19 +8,11 @@
  */
 
 import type { Numbers } from "../motion/rotation";
-import {
-  MAX_ELBOW_BEND_RAD,
-  MAX_TIP_DISTANCE,
-  MAX_WRIST_BEND_RAD,
-  minTipDistance,
-  type Proportions,
-} from "./proportions";
+import { MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD, MIN_TARGET_DISTANCE, TABLE_SIDE } from "./constants";
+import { minTipDistance, type Proportions } from "./proportions";
 
-const TABLE_SIDE = 64;
 /** Sine of half the wrist's limit. */
 const MAX_HALF_BEND_SINE = Math.sin(MAX_WRIST_BEND_RAD / 2);
-/** A target nearer to the shoulder than this has no direction to keep. */
-const MIN_TARGET_DISTANCE = 1e-12;
 /** A level distance is 0 below this: far under any that matters, far above where a square loses digits. */
 const MIN_HORIZONTAL_DISTANCE = 1e-150;
 

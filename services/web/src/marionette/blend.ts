@@ -21,13 +21,9 @@ import {
   setVector,
   unit,
 } from "../motion/vector";
+import { DISTANCE_WEIGHT, MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S, SWIVEL_RESET_WEIGHT } from "./constants";
 import type { ArmRig } from "./limb-rig";
-import { FULL_TURN_RAD, MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S, TwistLimiter } from "./twist";
-
-/** Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more. */
-const SWIVEL_RESET_WEIGHT = 0.05;
-/** An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned quite otherwise, at any weight. */
-const DISTANCE_WEIGHT = 2;
+import { FULL_TURN_RAD, TwistLimiter } from "./twist";
 
 /** One arm on its way. It remembers which way round the elbow swings, and how far its links are turned. */
 export class ArmBlend {

@@ -9,22 +9,20 @@ import type { Numbers } from "../motion/rotation";
 import type { Figure } from "../motion/skeleton";
 import { addScaled, distanceBetween, length } from "../motion/vector";
 import { ArmBlend } from "./blend";
+import {
+  ARRIVAL_TOLERANCE,
+  HAND_ACCELERATION,
+  MAX_HAND_RETURN_ACCELERATION,
+  MAX_REACH,
+  MAX_TIP_DISTANCE,
+  MIN_REACH,
+  MIN_SOLVE_WEIGHT,
+  THIGH_ACCELERATION,
+} from "./constants";
 import { Elbow, liftAngle } from "./elbow";
 import { Follower } from "./follower";
-import { DirectionAlignment, HAND_ACCELERATION, JointBlend, returnAcceleration, THIGH_ACCELERATION } from "./handover";
+import { DirectionAlignment, JointBlend, returnAcceleration } from "./handover";
 import { ArmRig, LegRig } from "./limb-rig";
-import { MAX_TIP_DISTANCE } from "./proportions";
-
-/** Arm lengths: a pulled arm is never quite locked, so that its elbow leaves the line at a bounded speed. */
-export const MAX_REACH = 0.9995;
-/** Arm lengths from the shoulder that a hand is pulled to at least: nearer in, the elbow would have to whirl. */
-export const MIN_REACH = 0.15;
-/** Arm lengths per second squared, against the dance, that a hand let go comes back with at most. */
-const MAX_HAND_RETURN_ACCELERATION = 79;
-/** Arm lengths, or radians, within which a limb is the dance's again. */
-const ARRIVAL_TOLERANCE = 1e-6;
-/** A limb on its last way home is still solved for. */
-const MIN_WEIGHT = 1e-9;
 
 const ZERO_VELOCITY = new Float64Array(3);
 
@@ -177,7 +175,18 @@ export class ControlledHand extends ControlledLimb {
     addScaled(target, 0, tip, 0, hand, 0, -1);
     addScaled(target, 0, hand, 0, target, 0, weight);
     this.alignment.update(around, 0, own, target, weight);
-    this.blend.blend(out, outAt, rotations, at, bent, target, around, normal, Math.max(weight, MIN_WEIGHT), seconds);
+    this.blend.blend(
+      out,
+      outAt,
+      rotations,
+      at,
+      bent,
+      target,
+      around,
+      normal,
+      Math.max(weight, MIN_SOLVE_WEIGHT),
+      seconds,
+    );
     return true;
   }
 
@@ -222,7 +231,7 @@ export class ControlledLeg extends ControlledLimb {
       if (weight <= 0 && Math.abs(thigh[0] - own[0]) < ARRIVAL_TOLERANCE) return false;
     }
     rig.solve(hung, 0, thigh[0], rotations);
-    this.blend.blend(out, outAt, rotations, 4 * rig.firstJointIndex, hung, 0, Math.max(weight, MIN_WEIGHT));
+    this.blend.blend(out, outAt, rotations, 4 * rig.firstJointIndex, hung, 0, Math.max(weight, MIN_SOLVE_WEIGHT));
     return true;
   }
 

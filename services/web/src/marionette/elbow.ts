@@ -22,25 +22,20 @@ import {
   unit,
 } from "../motion/vector";
 import type { Arm } from "./arm";
-import { MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD } from "./proportions";
+import {
+  CAP_CLEARANCE_RAD,
+  HALF_SWING_DISTANCE,
+  MAX_ELBOW_BEND_RAD,
+  MAX_ELBOW_SPEED,
+  MAX_LIFT_SPEED,
+  MAX_OFFSET_PER_SLACK,
+  MAX_SWING_SPEED_RAD_S,
+  MAX_TIP_DISTANCE,
+  MAX_WRIST_BEND_RAD,
+  MIN_SWING_SPEED,
+  SWING_HALF_LIFE_S,
+} from "./constants";
 import type { ShoulderLimit } from "./shoulder";
-
-/** Distance from the vertical axis, in arm lengths, at which the plane is drawn half as fast as far away. */
-const HALF_SWING_DISTANCE = 0.05;
-/** Seconds in which the swing left to do halves, far from the axis. */
-const SWING_HALF_LIFE_S = 0.08;
-/** Radians per second that the plane swings at most. */
-const MAX_SWING_SPEED_RAD_S = 2 * Math.PI;
-/** Arm lengths per second: what the hand's way and the change of bend leave of this is there for the swing. */
-export const MAX_ELBOW_SPEED = 1.68;
-/** Arm lengths that the elbow is off the chord at most, for each arm length that the tip is short of full stretch. */
-const MAX_OFFSET_PER_SLACK = 2.4;
-/** Arm lengths per second that are there for the swing in any case. */
-const MIN_SWING_SPEED = 0.1;
-/** Radians that an upper arm keeps from where no shoulder goes. */
-const CAP_CLEARANCE_RAD = 1e-7;
-/** Arm lengths per second that the elbow leaves or nears the chord beyond what the tip asks for. */
-const MAX_LIFT_SPEED = 1.2;
 
 /**
  * An arm's freedoms settled: where the `tip` (3) is, in arm lengths (not where it was asked to be only while the shoulder's

@@ -15,13 +15,7 @@ import {
   setVector,
   unit,
 } from "../motion/vector";
-
-/** Arm lengths (radians, of a thigh) per second: a target that moved faster has jumped, and has no speed of its own. */
-const MAX_TARGET_SPEED = 4;
-/** Arm lengths (radians) per second: no hand or thigh is sent farther in a second than that. */
-const MAX_LIMB_SPEED = 5;
-/** Arm lengths from the shoulder within which a hand on its way elsewhere does not come: it goes round. */
-const SHOULDER_CLEARANCE = 0.35;
+import { MAX_LIMB_SPEED, MAX_TARGET_SPEED, SHOULDER_CLEARANCE } from "./constants";
 
 const FORWARDS = Float64Array.of(0, 0, 1);
 

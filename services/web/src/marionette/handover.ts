@@ -6,20 +6,13 @@
 
 import { conjugate, multiply, type Numbers, rotate } from "../motion/rotation";
 import { dot, normalise, rotationBetween, setVector, unit } from "../motion/vector";
-
-/** Seconds from the dance's way of holding a limb to the marionette's. */
-export const BLEND_IN_S = 0.15;
-/** Seconds from the marionette's way to the dance's. */
-export const BLEND_OUT_S = 0.35;
-/** Arm lengths per second squared: a quarter of an arm is crossed in 0.11 s. */
-export const HAND_ACCELERATION = 79;
-/** Radians per second squared. */
-export const THIGH_ACCELERATION = 60;
-/** Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds. */
-const RETURN_DURATION_S = 0.28;
-/** Cosine of half the angle (of 270 degrees) that a joint goes round at most where the other way is shorter by now. */
-const MIN_HALF_ANGLE_COSINE = -0.7;
-const MIN_RETURN_ACCELERATION = 6;
+import {
+  BLEND_IN_S,
+  BLEND_OUT_S,
+  MIN_HALF_ANGLE_COSINE,
+  MIN_RETURN_ACCELERATION,
+  RETURN_DURATION_S,
+} from "./constants";
 
 /**
  * What brings a limb back in `RETURN` that is `distance` away and goes away at `speed`, by braking, speeding up and braking

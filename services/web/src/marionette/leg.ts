@@ -1,9 +1,6 @@
 /** The leg (paper 4): the thigh is lifted by an angle (radians) from straight down, the shank hangs, the ankle is fixed. */
 
-/** The farthest back a thigh is pulled. */
-export const MIN_THIGH_ANGLE_RAD = -Math.PI / 4;
-/** The farthest up a thigh is pulled. */
-export const MAX_THIGH_ANGLE_RAD = (2 * Math.PI) / 3;
+import { MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD } from "./constants";
 
 /** The nearest angle a thigh is pulled to. */
 export function clampThigh(theta: number): number {

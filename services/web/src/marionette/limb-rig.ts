@@ -20,9 +20,10 @@ import {
   unit,
 } from "../motion/vector";
 import { Arm } from "./arm";
+import { MAX_WRIST_BEND_RAD } from "./constants";
 import { elevation, verticalNormal } from "./elbow";
 import { clampThigh, kneeBend } from "./leg";
-import { MAX_WRIST_BEND_RAD, type Proportions, proportionsFromLinks } from "./proportions";
+import { type Proportions, proportionsFromLinks } from "./proportions";
 import { ShoulderLimit } from "./shoulder";
 
 const SACROILIAC_INDEX = 1;

@@ -6,8 +6,8 @@
 
 import { type Numbers, rotate } from "../motion/rotation";
 import { anyPerpendicular, combine, cross, dot, fromAxisAngle, length, rejectFrom, unit } from "../motion/vector";
+import { CAP_EDGE_MARGIN_RAD, LEFT_SHOULDER_CAPS } from "./constants";
 
-const EDGE_MARGIN_RAD = 1e-9;
 const FULL_TURN_RAD = 2 * Math.PI;
 
 /** Directions within `radius` radians of the unit vector `axis` (3), where no upper arm goes. */
@@ -16,23 +16,12 @@ export interface ExclusionCap {
   readonly radius: number;
 }
 
-function makeCap(side: number, up: number, forwards: number, degrees: number): ExclusionCap {
-  const axis = Float64Array.of(side, up, forwards);
-  unit(axis, 0, axis, 0);
-  return { axis, radius: (degrees * Math.PI) / 180 };
-}
-
-/** Where no left upper arm goes. Ranges: American Academy of Orthopaedic Surgeons, Joint Motion (1965), rounded out. */
-const LEFT_CAPS: readonly ExclusionCap[] = [
-  // straight back: extension ends at 60 degrees, horizontal abduction 45 to 50 behind the side
-  makeCap(0, 0.2, -1, 42),
-  // up and back: flexion and abduction end overhead, at 180 degrees
-  makeCap(0, 0.75, -0.85, 47),
-  // across the back: no farther than the arm's own side
-  makeCap(-1, -0.1, -0.75, 46),
-  // across the chest: horizontal adduction ends at 130 to 140 degrees from the side
-  makeCap(-1, 0.15, -0.05, 42),
-];
+/** Excluded directions of the left upper arm. */
+const LEFT_CAPS: readonly ExclusionCap[] = LEFT_SHOULDER_CAPS.map(({ axis, radius }) => {
+  const direction = Float64Array.from(axis);
+  unit(direction, 0, direction, 0);
+  return { axis: direction, radius };
+});
 
 const crossProduct = new Float64Array(3);
 
@@ -55,7 +44,7 @@ function depthInCap({ axis, radius }: ExclusionCap, direction: Numbers): number 
 function capCorners(one: ExclusionCap, other: ExclusionCap): Float64Array[] {
   const d = dot(one.axis, 0, other.axis, 0);
   const square = 1 - d * d;
-  if (square < EDGE_MARGIN_RAD) return [];
+  if (square < CAP_EDGE_MARGIN_RAD) return [];
   const a = (Math.cos(one.radius) - d * Math.cos(other.radius)) / square;
   const b = (Math.cos(other.radius) - d * Math.cos(one.radius)) / square;
   const middle = new Float64Array(3),
@@ -87,7 +76,7 @@ export class ShoulderLimit {
       : LEFT_CAPS;
     this.corners = this.caps
       .flatMap((one, i) => this.caps.slice(i + 1).flatMap((other) => capCorners(one, other)))
-      .filter((corner) => this.depthInCaps(corner) <= EDGE_MARGIN_RAD);
+      .filter((corner) => this.depthInCaps(corner) <= CAP_EDGE_MARGIN_RAD);
     this.blockedMiddles = new Float64Array(this.caps.length);
     this.blockedHalfWidths = new Float64Array(this.caps.length);
   }
@@ -105,7 +94,7 @@ export class ShoulderLimit {
     let nearest = Infinity;
     for (const one of this.caps) {
       this.computeEdge(direction, one, one.radius);
-      if (this.depthInCaps(this.edge) <= EDGE_MARGIN_RAD)
+      if (this.depthInCaps(this.edge) <= CAP_EDGE_MARGIN_RAD)
         nearest = Math.min(nearest, angleBetween(this.edge, direction));
     }
     for (const corner of this.corners) nearest = Math.min(nearest, angleBetween(corner, direction));
@@ -126,7 +115,7 @@ export class ShoulderLimit {
     for (const one of this.caps) {
       if (!(depthInCap(one, step) > 0 && depthInCap(one, begin) <= 0)) continue;
       // along the edge, to the side that leads on
-      this.computeEdge(step, one, one.radius + EDGE_MARGIN_RAD);
+      this.computeEdge(step, one, one.radius + CAP_EDGE_MARGIN_RAD);
       step.set(this.edge);
     }
     // in a corner of two caps it stays where it is
@@ -157,7 +146,7 @@ export class ShoulderLimit {
     let least: number | null = null;
     for (let i = 0; i < closed; i++) {
       for (const sign of [-1, 1]) {
-        const turn = wrapAngle(middles[i] + sign * (halves[i] + EDGE_MARGIN_RAD));
+        const turn = wrapAngle(middles[i] + sign * (halves[i] + CAP_EDGE_MARGIN_RAD));
         if (this.isAllowed(turn, closed) && (least === null || Math.abs(turn) < Math.abs(least))) least = turn;
       }
     }

@@ -7,11 +7,8 @@
 
 import { conjugate, multiply, type Numbers, rotate } from "../motion/rotation";
 import { dot, fromAxisAngle, normalise, rotationBetween, setVector, unit } from "../motion/vector";
+import { MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S } from "./constants";
 
-/** Radians per second that a link turns about itself at most. */
-export const MAX_TWIST_SPEED_RAD_S = 5 * Math.PI;
-/** Radians that a link is behind at most; beyond, it takes the other way round. */
-export const MAX_TWIST_LAG_RAD = 1.5 * Math.PI;
 /** Radians of a whole turn. */
 export const FULL_TURN_RAD = 2 * Math.PI;
 
