@@ -102,7 +102,10 @@ def test_a_batch_in_either_form(client: TestClient, said: str, heard: str) -> No
     for name, angle in zip(("t0", "t1", "t2"), wanted.angles(), strict=True):
         np.testing.assert_array_equal(got["arms"][name], angle)
     np.testing.assert_allclose(got["arms"]["tip"], asked["targets"], atol=1e-12)
-    assert got["legs"] == {"hip": [0.7, -0.2, constants.MAX_THIGH_ANGLE_RAD], "knee": [0.7, 0.0, constants.MAX_THIGH_ANGLE_RAD]}
+    assert got["legs"] == {
+        "hip": [0.7, -0.2, constants.MAX_THIGH_ANGLE_RAD],
+        "knee": [0.7, 0.0, constants.MAX_THIGH_ANGLE_RAD],
+    }
 
 
 def test_the_answer_is_in_the_requests_form_unless_another_is_accepted(client: TestClient) -> None:

@@ -54,7 +54,7 @@ class ArmConstants(NamedTuple):
     folded_far_squared: float
     """(d + hand)^2."""
     half_lean_sine: float
-    """Sine of half the angle between the line to that wrist and the folded forearm; negative."""
+    """Sine of half the angle between the segment to that wrist and the folded forearm; negative."""
     half_lean_cosine: float
     max_half_bend_sine: float
     """Limit of the wrist."""

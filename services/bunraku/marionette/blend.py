@@ -1,6 +1,6 @@
 """Blend of an arm between the stored motion's joints and the solver's.
 
-Both arms are expressed in the frame of their chord, the line from shoulder to tip with the plane of the elbow. There
+Both arms are expressed in the frame of their chord, the segment from shoulder to tip with the plane of the elbow. There
 they differ little, and interpolating their joints moves the tip little; the arm is then closed on the target again, so
 that the tip is exact throughout. The jumps that remain affect only the swivel of the elbow about the chord and the
 twist of the bones, and both change at a bounded speed.

@@ -49,7 +49,7 @@ MIN_TARGET_DISTANCE = _float("min_target_distance_arm_lengths")
 TABLE_SIDE = int(CONSTANTS["bend_table_nodes_per_side"])
 """Nodes per side of a bend table: rows by distance, columns from straight down to straight up."""
 MAX_REACH = _float("max_reach_arm_lengths")
-"""Largest distance of a controlled hand: the arm never locks, so that the elbow leaves the line at a bounded speed."""
+"""Largest distance of a controlled hand: the arm never locks, so that the elbow straightens out at a bounded speed."""
 MIN_REACH = _float("min_reach_arm_lengths")
 """Smallest distance of a controlled hand from the shoulder: nearer in, the elbow would have to whirl."""
 MIN_THIGH_ANGLE_RAD = _radians("min_thigh_angle_deg")
@@ -68,7 +68,7 @@ MAX_ELBOW_SPEED = _float("max_elbow_speed_arm_lengths_per_s")
 MAX_OFFSET_PER_SLACK = _float("max_elbow_offset_per_slack_ratio")
 """Largest distance of the elbow from the chord per distance of the tip from full stretch.
 
-Gravity alone would snap the elbow into the line with the last of the slack.
+Gravity alone would straighten the elbow with the last of the slack.
 """
 MAX_LIFT_SPEED = _float("max_lift_speed_arm_lengths_per_s")
 """Speed at which the elbow leaves or nears the chord beyond what the tip requires, arm lengths per second."""

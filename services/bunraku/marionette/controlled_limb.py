@@ -47,7 +47,7 @@ class _ControlledLimb:
 
     @property
     def is_controlled(self) -> bool:
-        """Whether the limb differs from the motion."""
+        """True if the limb differs from the motion."""
         return self._follower is not None
 
     @property

@@ -25,7 +25,7 @@ class Elbow:
 
     @property
     def has_begun(self) -> bool:
-        """Whether `begin` was called since the last reset."""
+        """True if `begin` was called since the last reset."""
         return self._state is not None
 
     def begin(self, direction: Vector, normal: Vector, lift: float) -> None:

@@ -1,6 +1,6 @@
 """One time step of the elbow: where gravity puts it, at a bounded speed, within the shoulder's limit.
 
-With the hand tip given, an arm has two freedoms. It turns about the chord, the line from shoulder to tip. And it trades
+With the hand tip given, an arm has two freedoms. It turns about the chord, the segment from shoulder to tip. And it trades
 the bend of the wrist for the bend of the elbow, which lifts the upper arm off the chord. Gravity alone would put the
 arm into the vertical plane with the bend of least energy. That plane is undefined straight above and below the
 shoulder, so a hand that passes there would throw the elbow across; and an arm that leaves full stretch would snap its

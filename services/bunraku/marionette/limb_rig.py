@@ -44,7 +44,7 @@ class Limb(IntEnum):
 
     @property
     def is_hand(self) -> bool:
-        """Whether the target is a position; the target of a leg is an angle."""
+        """True if the target is a position; the target of a leg is an angle."""
         return self in (Limb.LEFT_HAND, Limb.RIGHT_HAND)
 
     @property

@@ -18,7 +18,7 @@ OverlayJoints = dict[int, JointRotations]
 
 
 class Marionettes:
-    """One to four marionettes; each behaves as if it were alone.
+    """One to four marionettes; each is independent of the others.
 
     Puppeteers act on `ownership`. The marionettes compute the overlay that follows from it. `now` is clock time in
     integer µs and must not run backwards.
@@ -64,7 +64,7 @@ class Marionettes:
 
     @property
     def needs_full_rate(self) -> bool:
-        """Whether any marionette needs every frame."""
+        """True if any marionette needs every frame."""
         return any(marionette.needs_full_rate for marionette in self._marionettes)
 
     def observe_poses(self, poses: Sequence[Array], now: int, due: int = 0) -> None:

@@ -98,7 +98,7 @@ class Marionette:
 
     @property
     def needs_full_rate(self) -> bool:
-        """Whether a limb is in a hand-over or moves fast: then every frame matters, not only every second one."""
+        """True if a limb is in a hand-over or moves fast: then every frame matters, not only every second one."""
         return any(
             limb.is_controlled and (0.0 < handover.progress < 1.0 or limb.speed > FULL_RATE_SPEED)
             for handover, limb in zip(self._handovers, self._limbs, strict=True)

@@ -138,7 +138,7 @@ class Ownership:
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether no limb is held and all are back in the motion."""
+        """True if no limb is held and all are back in the motion."""
         return all(state.target is None for state in self._limbs)
 
     def target(self, limb: int) -> LimbTarget | None:

@@ -26,7 +26,7 @@ _TOTAL_PARTS = 10_000
 
 
 class ProportionsError(ValueError):
-    """Proportions outside the supported range; `field` names the part, `hint` says what to do."""
+    """Proportions outside the supported range; `field` names the part, `hint` the remedy."""
 
     def __init__(self, message: str, field: str, hint: str) -> None:
         super().__init__(message)

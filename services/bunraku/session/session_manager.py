@@ -83,7 +83,7 @@ class SessionManager:
     ) -> dict[str, Any]:
         """Open a session and return it as the API shows it; raises `ProblemError`.
 
-        With an id of its own, `session`, raises `RevisionConflict` if any replica has a session with that id.
+        With a given id, `session`, raises `RevisionConflict` if any replica has a session with that id.
         """
         stored = await self.load_motion(motion)
         if len(self._endpoints) >= MAX_SESSIONS:
