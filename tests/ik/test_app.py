@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from bunraku.ik.app import create_app
-from bunraku.marionette import constants, arm_batch, bend_table, figures, leg
+from bunraku.marionette import arm_batch, bend_table, constants, figures
 from bunraku.marionette.proportions import Proportions
 
 IDENTITY = "396-352-252-560-320-120"

@@ -1,12 +1,12 @@
 """One time step of the elbow: where gravity puts it, at a bounded speed, within the shoulder's limit.
 
-With the hand tip given, an arm has two freedoms. It turns about the chord, the segment from shoulder to tip. And it trades
-the bend of the wrist for the bend of the elbow, which lifts the upper arm off the chord. Gravity alone would put the
-arm into the vertical plane with the bend of least energy. That plane is undefined straight above and below the
+With the hand tip given, an arm has two freedoms. It turns about the chord, the segment from shoulder to tip. And it
+trades the bend of the wrist for the bend of the elbow, which lifts the upper arm off the chord. Gravity alone would
+put the arm into the vertical plane with the bend of least energy. That plane is undefined straight above and below the
 shoulder, so a hand that passes there would throw the elbow across; and an arm that leaves full stretch would snap its
 elbow out. So both freedoms have a state: the plane is carried along with the hand by the shortest rotation and swings
-towards the vertical plane, the faster the farther the hand is from the axis, and the lift follows gravity's. The tip is
-exact at every instant, because only the two freedoms are slowed down, never the hand.
+towards the vertical plane, the faster the farther the hand is from the axis, and the lift follows gravity's. The tip
+is exact at every instant, because only the two freedoms are slowed down, never the hand.
 
 Plain functions of plain numbers, so that `_kernels` can compile them.
 """

@@ -2,8 +2,8 @@
 
 The value is a hand target (arm lengths, in the shoulder's frame) or a thigh angle (radians, the first of three). A
 target input is approached linearly, in the time between the last two inputs, so that a stream of inputs moves evenly
-and not in steps. A velocity input moves the value until the next input. Inputs are applied in the order of their sequence
-numbers: a late input is inserted at its place, and the value is the same as if it had come in time.
+and not in steps. A velocity input moves the value until the next input. Inputs are applied in the order of their
+sequence numbers: a late input is inserted at its place, and the value is the same as if it had come in time.
 
 The sample time of an input is on the sender's clock. It is compared with the sender's other inputs only: the one with
 the smallest delay is taken to have had none. So the offset of that clock does not matter. Times are clock time in µs.

@@ -1,10 +1,10 @@
 """Limit of the shoulder: a few spherical caps of directions that the upper arm cannot take.
 
-With the hand tip given, an arm is free to turn about the chord, the segment from shoulder to tip, and to bend the wrist.
-If gravity would put the upper arm into a cap, the arm turns about the chord by the smallest angle that leads out. If no
-turn helps, the wrist bends differently; if no bend helps, the hand is brought nearer in its direction. (Reach cones:
-Wilhelms and Van Gelder, Fast and Easy Reach-Cone Joint Limits, 2001; caps are their complement, for which every answer
-has a closed form.)
+With the hand tip given, an arm is free to turn about the chord, the segment from shoulder to tip, and to bend the
+wrist. If gravity would put the upper arm into a cap, the arm turns about the chord by the smallest angle that leads
+out. If no turn helps, the wrist bends differently; if no bend helps, the hand is brought nearer in its direction.
+(Reach cones: Wilhelms and Van Gelder, Fast and Easy Reach-Cone Joint Limits, 2001; caps are their complement, for
+which every answer has a closed form.)
 
 Directions are unit vectors on the axes of vl5: x to the left, y up, z forwards.
 """

@@ -1,6 +1,7 @@
 /**
- * Constants of the limb solver that TypeScript and Python share (`marionette/constants.py`), from `proto/constants.json`. Lengths
- * are in arm lengths, angles in radians. A quantity of a limb is in arm lengths for a hand and in radians for a thigh.
+ * Constants of the limb solver that TypeScript and Python (`marionette/constants.py`) share, from
+ * `proto/constants.json`. Lengths are in arm lengths, angles in radians. A quantity of a limb is in arm lengths
+ * for a hand and in radians for a thigh.
  */
 
 import values from "../../../../proto/constants.json";
@@ -26,7 +27,7 @@ export const MIN_TIP_DISTANCE_FACTOR = values.min_tip_distance_factor;
 export const MIN_TARGET_DISTANCE = values.min_target_distance_arm_lengths;
 /** Nodes per side of a bend table: rows by distance, columns from straight down to straight up. */
 export const TABLE_SIDE = values.bend_table_nodes_per_side;
-/** Largest distance of a controlled hand: the arm never locks, so that the elbow leaves the line at a bounded speed. */
+/** Largest distance of a controlled hand: the arm never locks, so that the elbow bends at a bounded speed. */
 export const MAX_REACH = values.max_reach_arm_lengths;
 /** Smallest distance of a controlled hand from the shoulder: nearer in, the elbow would have to whirl. */
 export const MIN_REACH = values.min_reach_arm_lengths;
@@ -51,8 +52,8 @@ export const CAP_CLEARANCE_RAD = values.cap_clearance_rad;
 /** Tolerance of tests against the edge of an exclusion cap. */
 export const CAP_EDGE_MARGIN_RAD = values.cap_edge_margin_rad;
 /**
- * Axes (not of unit length) and radii of the caps of directions that the left upper arm cannot take: straight back, up and
- * back, across the back, across the chest. `marionette/constants.py` names the source of the ranges.
+ * Axes (not of unit length) and radii of the caps of directions that the left upper arm cannot take: straight
+ * back, up and back, across the back, across the chest. `marionette/constants.py` names the source of the ranges.
  */
 export const LEFT_SHOULDER_CAPS = values.left_shoulder_caps.map((cap) => ({
   axis: cap.axis_xyz,

@@ -1,7 +1,7 @@
 /**
- * How far a shoulder lets the upper arm go: a few round holes in the sphere of its directions (after Wilhelms and Van Gelder,
- * Fast and Easy Reach-Cone Joint Limits, 2001, as caps where no upper arm goes). Directions are unit vectors on the axes of vl5:
- * x to the left, y up, z forwards. As `marionette/shoulder.py`.
+ * Limit of the shoulder: spherical caps of directions that the upper arm cannot take (complement of the reach
+ * cones of Wilhelms and Van Gelder, Fast and Easy Reach-Cone Joint Limits, 2001). Directions are unit vectors on
+ * the axes of vl5: x to the left, y up, z forwards. Python: `marionette/shoulder.py`.
  */
 
 import { type Numbers, rotate } from "../motion/rotation";
@@ -10,7 +10,7 @@ import { CAP_EDGE_MARGIN_RAD, LEFT_SHOULDER_CAPS } from "./constants";
 
 const FULL_TURN_RAD = 2 * Math.PI;
 
-/** Directions within `radius` radians of the unit vector `axis` (3), where no upper arm goes. */
+/** Excluded directions: those within `radius` radians of the unit vector `axis` (3). */
 export interface ExclusionCap {
   readonly axis: Float64Array;
   readonly radius: number;
@@ -25,7 +25,7 @@ const LEFT_CAPS: readonly ExclusionCap[] = LEFT_SHOULDER_CAPS.map(({ axis, radiu
 
 const crossProduct = new Float64Array(3);
 
-/** The angle of two unit vectors (3), radians. */
+/** Return the angle between two unit vectors (3), radians. */
 function angleBetween(a: Numbers, b: Numbers): number {
   cross(crossProduct, 0, a, 0, b, 0);
   return Math.atan2(length(crossProduct, 0), dot(a, 0, b, 0));
@@ -40,7 +40,7 @@ function depthInCap({ axis, radius }: ExclusionCap, direction: Numbers): number 
   return radius - angleBetween(axis, direction);
 }
 
-/** Where the edges of two caps cross: none, or two unit vectors. */
+/** Return the two unit vectors where the edges of two caps cross, or none. */
 function capCorners(one: ExclusionCap, other: ExclusionCap): Float64Array[] {
   const d = dot(one.axis, 0, other.axis, 0);
   const square = 1 - d * d;
@@ -57,11 +57,11 @@ function capCorners(one: ExclusionCap, other: ExclusionCap): Float64Array[] {
   return [off, -off].map((by) => middle.map((part, i) => part + side[i] * by));
 }
 
-/** One shoulder's limit. `Elbow` says where the elbow goes. */
+/** Limit of one shoulder. */
 export class ShoulderLimit {
   readonly caps: readonly ExclusionCap[];
   private readonly corners: readonly Float64Array[];
-  /** Turns that a cap closes: of each its middle and half its width. */
+  /** Blocked intervals of turns, one per cap: middle and half width. */
   private readonly blockedMiddles: Float64Array;
   private readonly blockedHalfWidths: Float64Array;
   private readonly edge = new Float64Array(3);
@@ -69,7 +69,7 @@ export class ShoulderLimit {
   private readonly step = new Float64Array(3);
   private readonly spin = new Float64Array(4);
 
-  /** The right shoulder's caps are the left one's, mirrored. */
+  /** The caps of the right shoulder mirror those of the left one. */
   constructor(right: boolean) {
     this.caps = right
       ? LEFT_CAPS.map(({ axis, radius }) => ({ axis: Float64Array.of(-axis[0], axis[1], axis[2]), radius }))
@@ -81,14 +81,14 @@ export class ShoulderLimit {
     this.blockedHalfWidths = new Float64Array(this.caps.length);
   }
 
-  /** How far a unit vector (3) is inside a cap, radians; not above zero where a shoulder goes. */
+  /** Return the largest depth of a unit vector (3) inside a cap, radians; at most zero for an allowed direction. */
   depthInCaps(direction: Numbers): number {
     let depth = -Infinity;
     for (const one of this.caps) depth = Math.max(depth, depthInCap(one, direction));
     return depth;
   }
 
-  /** The angle from a unit vector (3) to the nearest direction that a shoulder has, radians. */
+  /** Return the angle from a unit vector (3) to the nearest allowed direction, radians. */
   angleToAllowed(direction: Numbers): number {
     if (this.depthInCaps(direction) <= 0) return 0;
     let nearest = Infinity;
@@ -101,7 +101,10 @@ export class ShoulderLimit {
     return nearest;
   }
 
-  /** Into `out` (3) the unit vector `most` radians from `begin` on a way to `end` round the caps; `end` where it is nearer. */
+  /**
+   * Write the unit vector (3) `maxAngle` radians from `begin` on a path to `end` round the caps; `end` if it is
+   * nearer.
+   */
   stepToward(out: Numbers, begin: Numbers, end: Numbers, maxAngle: number): void {
     if (angleBetween(begin, end) <= maxAngle) {
       out.set(end);
@@ -114,17 +117,17 @@ export class ShoulderLimit {
     rotate(step, 0, spin, 0, begin, 0);
     for (const one of this.caps) {
       if (!(depthInCap(one, step) > 0 && depthInCap(one, begin) <= 0)) continue;
-      // along the edge, to the side that leads on
+      // along the edge, on the side that leads on
       this.computeEdge(step, one, one.radius + CAP_EDGE_MARGIN_RAD);
       step.set(this.edge);
     }
-    // in a corner of two caps it stays where it is
+    // stay in a corner of two caps
     out.set(this.depthInCaps(step) <= Math.max(this.depthInCaps(begin), 0) ? step : begin);
   }
 
   /**
-   * The least turn about the unit `chord` from shoulder to tip, radians, that brings the upper arm where a shoulder goes; null
-   * where none does. The upper arm is `lift` radians off the chord, below it in the plane of the unit `normal` (square to it).
+   * Return the smallest turn about the unit `chord`, radians, that gives the upper arm an allowed direction; null
+   * for none. The upper arm is `lift` radians below the chord in the plane of the unit `normal`.
    */
   minAllowedTurn(chord: Numbers, normal: Numbers, lift: number): number | null {
     const { blockedMiddles: middles, blockedHalfWidths: halves, side } = this;
@@ -160,7 +163,7 @@ export class ShoulderLimit {
     return true;
   }
 
-  /** Into `edge` the direction `radius` radians from the cap's axis, on the side of `direction`. */
+  /** Compute the direction `radius` radians from the cap's axis, on the side of `direction`. */
   private computeEdge(direction: Numbers, { axis }: ExclusionCap, radius: number): void {
     const { edge } = this;
     rejectFrom(edge, 0, direction, 0, axis, 0);
