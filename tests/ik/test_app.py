@@ -38,7 +38,7 @@ def test_the_table_is_immutable_and_known_by_its_content(client: TestClient) -> 
 
 
 @pytest.mark.parametrize("wrapped", ["{}", "W/{}", '"other", {}', "*"])
-def test_a_client_that_has_it_is_told_so(client: TestClient, wrapped: str) -> None:
+def test_matching_etag_gives_304(client: TestClient, wrapped: str) -> None:
     etag = client.get(TABLE).headers["etag"]
     answer = client.get(TABLE, headers={"If-None-Match": wrapped.format(etag)})
     assert answer.status_code == 304

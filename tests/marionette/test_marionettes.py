@@ -18,7 +18,7 @@ def expect_grant(answer: LimbGrant | LimbRefusal) -> LimbGrant:
     return answer
 
 
-def test_each_puppet_is_as_if_it_were_alone() -> None:
+def test_marionettes_of_a_stage_are_independent() -> None:
     troupe, alone = Marionettes([FIGURE] * 3), [Marionette(FIGURE) for _ in range(3)]
     pulled = {0: (0, 1), 5: (1, 1), 10: (2, 1)}
     # a hand of the first, the other hand of the second, a leg of the third: limb l of performer k is 4 k + l
@@ -61,7 +61,7 @@ def test_limbs_of_all_are_held_asked_for_and_lost_by_their_number() -> None:
     assert troupe.ownership.holders() == (None,) * 8
 
 
-def test_who_goes_takes_their_limbs_with_them_and_an_epoch_never_comes_again() -> None:
+def test_limbs_of_removed_performers_are_lost_and_epochs_never_repeat() -> None:
     troupe = Marionettes([FIGURE] * 2)
     expect_grant(troupe.ownership.claim(1, "ada", 0))
     assert expect_grant(troupe.ownership.claim(5, "bo", 0)).epoch == 1
@@ -76,7 +76,7 @@ def test_who_goes_takes_their_limbs_with_them_and_an_epoch_never_comes_again() -
 
 
 @pytest.mark.parametrize("count", [0, 5])
-def test_a_stage_has_one_to_four(count: int) -> None:
+def test_stage_has_one_to_four_performers(count: int) -> None:
     troupe = Marionettes([FIGURE])
     with pytest.raises(ValueError, match="1 to 4"):
         troupe.set_figures([FIGURE] * count)

@@ -83,7 +83,9 @@ async def test_an_edit_is_noted_before_it_is_acknowledged(
 
 
 @pytest.mark.usefixtures("door")
-async def test_a_full_stage_says_so(backing: ServiceContext, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_join_of_a_full_stage_is_refused_with_503(
+    backing: ServiceContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 1)
     await join_stage(backing, "a")
     with pytest.raises(ProblemError, match="1 puppeteers are here") as refused:
@@ -92,7 +94,7 @@ async def test_a_full_stage_says_so(backing: ServiceContext, monkeypatch: pytest
 
 
 @pytest.mark.usefixtures("door")
-async def test_one_whom_the_stage_does_not_know_is_told_so(backing: ServiceContext) -> None:
+async def test_unknown_puppeteer_is_notified(backing: ServiceContext) -> None:
     stage, visitor = StageProxy("s", backing.bus, backing.key_values), PuppeteerConnection()
     backing.bus.subscribe(stage.outgoing_subject(visitor), visitor.send)
     stage.send(visitor, None)
@@ -101,7 +103,7 @@ async def test_one_whom_the_stage_does_not_know_is_told_so(backing: ServiceConte
     assert visitor.is_unknown
 
 
-async def test_those_whose_replica_died_leave_and_the_others_stay(backing: ServiceContext, door: StageEndpoint) -> None:
+async def test_puppeteer_of_a_dead_replica_is_removed(backing: ServiceContext, door: StageEndpoint) -> None:
     stage, dead = await join_stage(backing, "dead")
     _, here = await join_stage(backing, "here")
     stage.send(dead, Claim(0).pack())

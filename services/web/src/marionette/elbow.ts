@@ -171,7 +171,7 @@ export class Elbow {
     const most = (moved + left) / upper;
     hanging.normal.set(normal);
     if (this.hasLastUpperArm && (turn === null || angleBetween(upperArm, this.lastUpperArm) > most)) {
-      // the shoulder's limit leaves only a long way: the hand waits for the elbow, and near the shoulder the elbow waits too
+      // the shoulder's limit leaves only a long way: the hand waits for the elbow; near the shoulder both wait
       if (turn !== null) shoulder.stepToward(this.lastUpperArm, this.lastUpperArm, upperArm, most);
       for (let i = 0; i < 3; i++) wanted[i] = direction[i] * reach;
       this.reachFromUpperArm(this.lastUpperArm, wanted);
