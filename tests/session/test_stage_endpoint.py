@@ -83,9 +83,7 @@ async def test_an_edit_is_noted_before_it_is_acknowledged(
 
 
 @pytest.mark.usefixtures("door")
-async def test_join_of_a_full_stage_is_refused_with_503(
-    backing: ServiceContext, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_join_of_a_full_stage_gives_503(backing: ServiceContext, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 1)
     await join_stage(backing, "a")
     with pytest.raises(ProblemError, match="1 puppeteers are here") as refused:
