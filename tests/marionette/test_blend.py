@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from bunraku.marionette import vector
 from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.elbow import elevation, vertical_normal
-from bunraku.marionette.limb_rig import ArmRig, JointRotations, Limb
-from bunraku.marionette.vector import IDENTITY
+from bunraku.marionette.elbow_step import elevation, vertical_normal
+from bunraku.marionette.limb_rig import ArmRig, Limb
+from bunraku.marionette.vector import IDENTITY, JointRotations
 from bunraku.motion.skeleton import standard_figure
 from tests.marionette.fixtures import random_motion
 

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.marionette import handover, vector
-from bunraku.marionette.handover import RETURN_DURATION_S, DirectionAlignment, Handover, JointBlend, return_acceleration
+from bunraku.marionette.constants import RETURN_DURATION_S
+from bunraku.marionette.handover import DirectionAlignment, Handover, JointBlend, return_acceleration
 from bunraku.marionette.vector import IDENTITY, Vector
 
 parts = st.floats(-1.0, 1.0)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from bunraku.marionette import bend_table, planar_arm
 from bunraku.marionette.arm import Arm
-from bunraku.marionette.proportions import MAX_TIP_DISTANCE, Proportions
+from bunraku.marionette.constants import MAX_TIP_DISTANCE
+from bunraku.marionette.proportions import Proportions
 from tests.marionette.fixtures import ARM_PROPORTIONS
 
 shares = st.floats(0.0, 1.0)

@@ -1,28 +1,26 @@
-"""Upper arm, forearm and hand in their plane, one arm at a time: the triangle they make, closed by numbers alone.
+"""Upper arm, forearm and hand in their plane, one arm at a time.
 
-Plain functions of plain numbers, so that `compiled` can compile them as they stand. Angles are in radians, lengths in
-arm lengths; `r` is the tip's distance from the shoulder, within `inner`..`OUTER_RADIUS`.
+Plain functions of plain numbers, so that `_kernels` can compile them. Angles are in radians, lengths in arm lengths;
+`r` is the tip's distance from the shoulder, between the arm's smallest solved distance and `MAX_TIP_DISTANCE`.
 """
 
 from __future__ import annotations
 
 from math import acos, asin, atan2, cos, sin, sqrt
 
-from bunraku.marionette.proportions import MAX_ELBOW_BEND_RAD, MAX_WRIST_BEND_RAD
+from bunraku.marionette.constants import MAX_ELBOW_BEND_RAD, MAX_WRIST_BEND_RAD, TABLE_SIDE
 from bunraku.motion.rotation import Array
 
-TABLE_SIDE = 64
-"""A table has SIDE x SIDE nodes: rows from the inner radius to the outer, columns from straight down to straight up."""
-
-
 ArmGeometry = tuple[float, float, float, float, float, float]
-"""Lengths of upper arm, forearm and hand, and what follows from them: the nearest that a tip is solved for; the
-distance from shoulder to wrist with the elbow bent to its limit, and that wrist's angle from the upper arm. A plain
-tuple, as those are handed to compiled code in no time."""
+"""Lengths of upper arm, forearm and hand, and three numbers that follow from them.
+
+These are the smallest solved distance of the tip, the distance from shoulder to wrist with the elbow bent to its limit,
+and that wrist's angle from the upper arm. A plain tuple: passing one to compiled code costs almost nothing.
+"""
 
 
 def bend_limits(geometry: ArmGeometry, r: float) -> tuple[float, float]:
-    """Least and greatest wrist bend that reach `r` with elbow and wrist within their limits."""
+    """Return the smallest and largest wrist bend that reach `r` with elbow and wrist within their limits."""
     upper, fore, hand, _, folded, lean = geometry
     straight = upper + fore
     high = min(MAX_WRIST_BEND_RAD, clamped_acos((r * r - straight * straight - hand * hand) / (2.0 * straight * hand)))
@@ -31,8 +29,10 @@ def bend_limits(geometry: ArmGeometry, r: float) -> tuple[float, float]:
 
 
 def gravity_bend(geometry: ArmGeometry, nodes: Array, r: float, beta: float) -> float:
-    """The wrist bend at which gravity leaves an arm with its tip at `r` and elevation `beta`, from its table `nodes`
-    (SIDE, SIDE), float64."""
+    """Return the wrist bend of least energy with the tip at `r` and elevation `beta`.
+
+    `nodes` (64, 64) is the arm's bend table in float64.
+    """
     q = sqrt((1.0 - r) / (1.0 - geometry[3]))
     level, up = cos(beta), sin(beta)
     u = (1.0 - q) * (1.0 + 0.75 * q) * (TABLE_SIDE - 1)
@@ -47,10 +47,10 @@ def gravity_bend(geometry: ArmGeometry, nodes: Array, r: float, beta: float) -> 
 
 
 def close_chain(geometry: ArmGeometry, r: float, beta: float, bend: float) -> tuple[float, float, float]:
-    """Angles t0, t1, t2 of the links that bring the tip to `r` and elevation `beta` with the wrist bent by `bend`,
-    elbow below.
+    """Return the link angles t0, t1, t2 with the tip at `r` and elevation `beta`, the wrist bent by `bend`.
 
-    Exact for any `bend` within `limits`; beyond them the arm does not reach, or a joint breaks its limit.
+    The elbow is below the chord. The result is exact for any `bend` within `bend_limits`; beyond them the arm does not
+    reach, or a joint exceeds its limit.
     """
     upper, fore, hand, _, _, _ = geometry
     x, y = fore + hand * cos(bend), hand * sin(bend)
@@ -61,15 +61,15 @@ def close_chain(geometry: ArmGeometry, r: float, beta: float, bend: float) -> tu
 
 
 def lift_for_bend(geometry: ArmGeometry, r: float, bend: float) -> float:
-    """How far the upper arm is off the chord, the line from shoulder to tip, with the wrist bent by `bend`."""
+    """Return the angle of the upper arm off the chord (from shoulder to tip) with the wrist bent by `bend`."""
     upper, fore, hand, _, _, _ = geometry
     square = fore * fore + hand * hand + 2.0 * fore * hand * cos(bend)
     return clamped_acos((upper * upper + r * r - square) / (2.0 * upper * r))
 
 
 def bend_for_lift(geometry: ArmGeometry, r: float, lift: float, min_bend: float, max_bend: float) -> float:
-    """The wrist bend, within `low`..`high`, of an upper arm `lift` off the chord."""
-    # at a limit the cosine has lost the digits that tell the bend
+    """Return the wrist bend, within `min_bend` and `max_bend`, of an upper arm `lift` off the chord."""
+    # at a limit the cosine has no digits left for the bend
     if lift >= lift_for_bend(geometry, r, min_bend):
         return min_bend
     upper, fore, hand, _, _, _ = geometry
@@ -79,7 +79,7 @@ def bend_for_lift(geometry: ArmGeometry, r: float, lift: float, min_bend: float,
 
 
 def max_distance_for_lift(geometry: ArmGeometry, r: float, lift: float) -> float:
-    """The farthest distance, no farther than `r`, whose upper arm is lifted by `lift` off the chord."""
+    """Return the largest distance up to `r` at which the upper arm can be `lift` off the chord."""
     near, far = geometry[3], r
     for _ in range(40):
         middle = 0.5 * (near + far)
@@ -91,5 +91,5 @@ def max_distance_for_lift(geometry: ArmGeometry, r: float, lift: float) -> float
 
 
 def clamped_acos(x: float) -> float:
-    """The arc cosine of a number that rounding may have brought beyond -1..1."""
+    """Return the arc cosine of a number that rounding may have moved beyond -1..1."""
     return acos(min(max(x, -1.0), 1.0))

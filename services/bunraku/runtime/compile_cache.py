@@ -16,7 +16,8 @@ def compile_cache_folder(package: str) -> str | None:
     set.
     """
     sources = sha256()
-    for file in sorted((PACKAGE_FOLDER / package).glob("*.py")):
+    files = (file for file in (PACKAGE_FOLDER / package).iterdir() if file.suffix in (".py", ".json"))
+    for file in sorted(files):
         sources.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
     configured = os.environ.get("NUMBA_CACHE_DIR")
     parent = Path(configured) / package if configured else PACKAGE_FOLDER / package / "__pycache__"

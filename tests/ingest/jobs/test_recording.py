@@ -11,7 +11,7 @@ from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.ingest.jobs.recording import encode_recording, sample_camera
 from bunraku.ingest.jobs.replay import SessionReplay
 from bunraku.ingest.result import JobRejection, JobResult
-from bunraku.marionette.input_log import InputLog, LoggedMarionettes
+from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.ownership import LimbInput
 from bunraku.messaging.recording_request import RecordingRequest
@@ -81,17 +81,17 @@ def test_recording_inherits_front_and_figure() -> None:
 
 
 def test_all_performers_are_recorded_with_their_overlays() -> None:
-    log, both = InputLog(), MOTIONS["both"]
+    log, both = InputLog("both"), MOTIONS["both"]
     log.add_timeline(timeline.start("both", 3 * SECOND_US, START_CLOCK_US))
-    marionettes = LoggedMarionettes(Marionettes([performer.track.figure for performer in both.performers]), "both", log)
+    marionettes = Marionettes([performer.track.figure for performer in both.performers], recorder=log)
     replay = SessionReplay(log, MOTIONS)
-    marionettes.claim(4, "ada", START_CLOCK_US)
+    marionettes.ownership.claim(4, "ada", START_CLOCK_US)
     for frame in range(120):
         now = START_CLOCK_US + frame * 16_667
-        marionettes.apply_input("ada", LimbInput(4, 1, 1, frame + 1, now, (0.7, 0.3, 0.3)), now)
+        marionettes.ownership.apply_input("ada", LimbInput(4, 1, 1, frame + 1, now, (0.7, 0.3, 0.3)), now)
         poses = replay.motion_poses_at(now + 60_000)
         assert poses is not None
-        marionettes.compute_overlay([rotations for _, rotations in poses], now + 60_000, now)
+        marionettes.compute_overlay([rotations for _, rotations in poses], now, now + 60_000)
     result = encode_recording(
         "recorded",
         RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + 2 * SECOND_US),
@@ -107,20 +107,20 @@ def test_all_performers_are_recorded_with_their_overlays() -> None:
     viewer_poses = next(replay.replay_poses([START_CLOCK_US + SECOND_US]))
     assert motion_poses is not None
     assert viewer_poses is not None
-    for index, performer in enumerate(recorded.performers):
+    for number, performer in enumerate(recorded.performers):
         store = MotionBlockStore(performer.track)
         for index, packet in enumerate(performer.packets[-1]):
             store.put(index, 0, decode_motion_block(performer.track, Data.unpack(packet).block))
         actual = store.pose_at(SECOND_US)
         assert actual is not None
         error = joint_and_tip_positions(performer.track.figure, *actual) - joint_and_tip_positions(
-            performer.track.figure, *viewer_poses[index]
+            performer.track.figure, *viewer_poses[number]
         )
         assert np.linalg.norm(error, axis=-1).max() < 1e-3
-        displacement = joint_and_tip_positions(performer.track.figure, *viewer_poses[index]) - joint_and_tip_positions(
-            performer.track.figure, *motion_poses[index]
+        displacement = joint_and_tip_positions(performer.track.figure, *viewer_poses[number]) - joint_and_tip_positions(
+            performer.track.figure, *motion_poses[number]
         )
-        assert (np.linalg.norm(displacement, axis=-1).max() > 0.1) == (index == 1)
+        assert (np.linalg.norm(displacement, axis=-1).max() > 0.1) == (number == 1)
 
 
 def test_camera_keyframes_become_a_track() -> None:
@@ -190,12 +190,12 @@ def test_recording_starts_with_the_motion() -> None:
 
 def test_interval_before_the_complete_log_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bunraku.marionette.input_log.MAX_LOG_BYTES", 100)
-    log = InputLog()
+    log = InputLog("one")
     log.add_timeline(timeline.start("one", 3 * SECOND_US, START_CLOCK_US))
-    marionettes = LoggedMarionettes(Marionettes([MOTIONS["one"].first_track.figure]), "one", log)
-    marionettes.claim(0, "ada", START_CLOCK_US)
+    marionettes = Marionettes([MOTIONS["one"].first_track.figure], recorder=log)
+    marionettes.ownership.claim(0, "ada", START_CLOCK_US)
     for later in range(1, 30):
-        marionettes.keep_alive("ada", [0], START_CLOCK_US + later * SECOND_US // 10)
+        marionettes.ownership.keep_alive("ada", [0], START_CLOCK_US + later * SECOND_US // 10)
     request = RecordingRequest(log="l", begin=START_CLOCK_US + SECOND_US, end=START_CLOCK_US + 5 * SECOND_US)
     rejected = encode_recording("recorded", request, log.pack(), MOTIONS)
     assert isinstance(rejected, JobRejection)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay
-from bunraku.marionette.input_log import InputLog, LoggedMarionettes
+from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.ownership import LimbGrant, LimbInput
 from bunraku.motion.skeleton import Figure
@@ -25,10 +25,10 @@ class SimulatedSession:
     """Session with one viewer, driven tick by tick as the session service does."""
 
     def __init__(self, motion: str) -> None:
-        self.log = InputLog()
+        self.log = InputLog(motion)
         self.state = timeline.start(motion, MOTIONS[motion].first_track.duration_us, START_CLOCK_US)
         self.log.add_timeline(self.state)
-        self.marionettes = LoggedMarionettes(Marionettes(figures_of(motion)), motion, self.log)
+        self.marionettes = Marionettes(figures_of(motion), recorder=self.log)
         self.clock = START_CLOCK_US
         self._viewer_overlays = OverlayBuffer()
         self._was_at_rest = True
@@ -57,20 +57,20 @@ class SimulatedSession:
         return SessionReplay(self.log, MOTIONS)
 
     def _overlay(self) -> None:
-        if self.marionettes.marionettes.is_at_rest:
+        if self.marionettes.ownership.is_at_rest:
             self._was_at_rest = True
             return
         for back in (2 * TICK_US, TICK_US) if self._was_at_rest else ():
             before = self._replay().motion_poses_at(self.clock + OVERLAY_LEAD_US - back)
             assert before is not None
             self.marionettes.observe_poses(
-                [rotations for _, rotations in before], self.clock + OVERLAY_LEAD_US - back, self.clock - back
+                [rotations for _, rotations in before], self.clock - back, self.clock + OVERLAY_LEAD_US - back
             )
         self._was_at_rest = False
         poses = self._replay().motion_poses_at(self.clock + OVERLAY_LEAD_US)
         assert poses is not None
         overlay = self.marionettes.compute_overlay(
-            [rotations for _, rotations in poses], self.clock + OVERLAY_LEAD_US, self.clock
+            [rotations for _, rotations in poses], self.clock, self.clock + OVERLAY_LEAD_US
         )
         limbs = {limb: pack_joints(joints) for limb, joints in overlay.items()}
         self._sequence += 1
@@ -93,20 +93,20 @@ def session_controlled_twice(motion: str, second: tuple[int, ...] = (1, 2)) -> S
     for _ in stage.run(0.5):
         pass
     for limbs, seconds in (((0,), 1.2), (second, 0.7)):
-        grants = [stage.marionettes.claim(limb, "ada", stage.clock) for limb in limbs]
+        grants = [stage.marionettes.ownership.claim(limb, "ada", stage.clock) for limb in limbs]
         for number, now in enumerate(stage.run(seconds)):
             for grant in grants:
                 assert isinstance(grant, LimbGrant)
                 values = (0.5 + 0.3 * np.sin(number / 9), 0.2, 0.4) if grant.limb % 4 < 2 else (0.6, 0.0, 0.0)
-                stage.marionettes.apply_input(
+                stage.marionettes.ownership.apply_input(
                     "ada", LimbInput(grant.limb, 1, grant.epoch, number + 1, now, values), now
                 )
         for grant in grants:
             assert isinstance(grant, LimbGrant)
-            assert stage.marionettes.release(grant.limb, "ada", grant.epoch, stage.clock)
+            assert stage.marionettes.ownership.release(grant.limb, "ada", grant.epoch, stage.clock)
         for _ in stage.run(1.5):
             pass
-        assert stage.marionettes.marionettes.is_at_rest
+        assert stage.marionettes.ownership.is_at_rest
     return stage
 
 
@@ -134,12 +134,12 @@ def test_replay_from_any_time_equals_what_the_viewer_saw(motion: str, second: tu
 
 def test_replay_follows_pause_seek_and_motion_change() -> None:
     stage = SimulatedSession("one")
-    grant = stage.marionettes.claim(1, "ada", stage.clock)
+    grant = stage.marionettes.ownership.claim(1, "ada", stage.clock)
     assert isinstance(grant, LimbGrant)
     changed = 0
     for number, now in enumerate(stage.run(4.0)):
         values = (0.5 + 0.3 * np.sin(number / 9), 0.2, 0.4)
-        stage.marionettes.apply_input("ada", LimbInput(1, 1, grant.epoch, number + 1, now, values), now)
+        stage.marionettes.ownership.apply_input("ada", LimbInput(1, 1, grant.epoch, number + 1, now, values), now)
         if number == 40:
             stage.edit(timeline.edit(stage.state, now + OVERLAY_LEAD_US, playing=False))
         elif number == 70:
