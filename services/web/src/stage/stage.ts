@@ -1,4 +1,7 @@
-/** The stage: puppet, disc, floor, lights, strings and the seat in the audience. Draws what it is given; keeps no time. */
+/**
+ * The stage: performers, backdrop, floor, lights, strings and the audience's camera. It draws what it is given and
+ * reads no clock.
+ */
 import {
   ACESFilmicToneMapping,
   type IUniform,
@@ -30,22 +33,25 @@ import { LOOKS, type Look, type Theme } from "./scenery/look";
 import { Scenery } from "./scenery/scenery";
 import { type StringState, Strings } from "./strings/strings";
 
-/** Pixel ratios above these cost more than they show. */
+/** Limits of the pixel ratio: higher ones cost more than they show. */
 const MAX_PIXEL_RATIO = { desktop: 2, phone: 1.75 };
-/** Pixels at the top that belong to the header and a bar's name, and the share of a low picture's height that they have at most. */
+/** Pixels at the top that the header and a bar's name take, and their maximum share of a low picture. */
 const HEADROOM_PX = 120;
 const HEADROOM_SHARE = 0.2;
 
-/** What a bar and a face take on the standard figure. */
+/** Extents of a control bar and a face on the standard figure. */
 const BAR_EXTENT: WorldExtent = { across: 0.17, up: 0.07, down: 0.05 };
 const FACE_EXTENT: WorldExtent = { across: 0.1, up: 0.16, down: 0.14 };
 
-/** How far to the side the lights reach that stand about one dancer, metres. */
+/** Half the width that the lights cover for one performer, in metres. */
 const LIT_HALF_WIDTH_M = 1.2;
 
-/** Movements of the stage's own take no longer step than this, seconds. */
+/** Longest step of the stage's own movements, in seconds. */
 const MAX_STEP_S = 0.1;
-/** The stage is drawn without a dancer only if none came on for so long, seconds: its picture would stand in the way of theirs. */
+/**
+ * The stage is drawn without performers only after this delay, in seconds: drawing it earlier would delay their first
+ * frame.
+ */
 const EMPTY_STAGE_DELAY_S = 1;
 
 export class Stage {
@@ -53,12 +59,12 @@ export class Stage {
   readonly rig = new FollowRig();
   readonly strings = new Strings();
   readonly audience = new AudienceCamera();
-  /** Where the audience's camera was, for keeping. */
+  /** Recorded path of the audience's camera. */
   readonly cameraRecorder = new CameraRecorder();
   readonly renderer: WebGLRenderer;
-  /** Whose strings are at hand, by whom a narrow picture of several is framed; null: all are to be seen. */
+  /** Performer that this page's inputs act on, which a narrow picture frames; null frames all. */
   selectedPerformer: number | null = null;
-  /** Whether the graphics are done with a frame that has a dancer in it. */
+  /** True if the graphics processor has completed a frame with a performer. */
   hasDrawnPerformer = false;
   readonly #performerGroup: PerformerGroup;
   readonly #scenery = new Scenery();
@@ -82,7 +88,7 @@ export class Stage {
   #hasRenderedPerformer = false;
   #isTakingPicture = false;
 
-  /** Draws on `canvas` with its `graphics`. Throws where the browser has no WebGL 2. */
+  /** Create a stage that draws on `canvas`. Throw if the browser has no WebGL 2. */
   constructor(canvas: HTMLCanvasElement, { context, quality }: Graphics = openGraphics(canvas)) {
     this.#quality = quality;
     const { simpleMaterials: plain } = quality.quality;
@@ -96,41 +102,41 @@ export class Stage {
     this.#performerGroup = new PerformerGroup(this.#floorHeight);
     this.rig.group.add(this.audience.camera, this.#lights.group);
     this.scene.add(this.rig.group, this.#performerGroup.group);
-    // drawn in software what is behind the dancers takes longer than they do, who come first then
+    // Software rendering shows the performers first: the scenery takes longer to draw than they do.
     if (!plain) this.#addScenery();
-    // three.js' own listener stands before this one: its side of the context is there again by then
+    // three.js registered its listener earlier: its part of the context is restored by then.
     canvas.addEventListener("webglcontextrestored", () => this.#onContextRestored());
     this.#applyQuality();
   }
 
-  /** Who dance, in the order of the motion's tracks. */
+  /** Performers in the order of the motion's tracks. */
   get performers(): readonly Performer[] {
     return this.#performerGroup.performers;
   }
 
-  /** The first of them, the show's: the puppet, or an avatar in its place. */
+  /** The first performer: the puppet, or an avatar in its place. */
   get puppet(): Performer | null {
     return this.performers[0] ?? null;
   }
 
-  /** No easing, no swing: for people who asked for less motion. */
+  /** Disables easing and swing. */
   set reducedMotion(on: boolean) {
     this.#reducedMotion = on;
     this.audience.reducedMotion = on;
     this.strings.reducedMotion = on;
   }
 
-  /** Whether the motion on the stage has a camera of its own, the show's. */
+  /** True if the motion has a camera. */
   get hasMotionCamera(): boolean {
     return this.audience.hasMotionCamera;
   }
 
-  /** Whether the show's camera is followed, by choice or by default; false where there is none. */
+  /** True if the motion's camera is followed, by choice or by default; false if there is none. */
   get followsMotionCamera(): boolean {
     return this.audience.followsMotionCamera;
   }
 
-  /** Follows the show's camera where there is one, or returns to the audience's own seat; dragging the view does the latter. */
+  /** Follow the motion's camera, or return to the audience view; dragging the view also returns. */
   followMotionCamera(enabled: boolean): void {
     this.audience.followMotionCamera(enabled);
   }
@@ -149,8 +155,8 @@ export class Stage {
   }
 
   /**
-   * Takes the limb lengths of a motion's dancers, for whom puppets are carved, and turns to where the first one's dance faces (radians about y from z towards x). Those
-   * whose lengths are told again dance on, and the others come on beside them.
+   * Set the limb lengths of the motion's performers and turn to the front of the first (radians about y from z towards
+   * x). Performers with unchanged lengths stay, and others join them.
    */
   setFigures(figures: readonly Figure[], front = 0): void {
     const before = this.performers.length;
@@ -165,13 +171,16 @@ export class Stage {
     this.#compileShaders();
   }
 
-  /** Has the dance of a performer, by number, danced by whom `make` makes for a dancer's lengths, from now on; null: by the puppet. */
+  /** Set the factory of a performer (an index); null restores the puppet. */
   setPerformerFactory(factory: PerformerFactory | null, performer = 0): void {
     this.#performerGroup.setPerformerFactory(factory, performer);
     if (this.puppet) this.#compileShaders();
   }
 
-  /** CSS pixels; `sides` are those that something stands before to the left and to the right, between which several dancers are seen, and `below` a sheet's. */
+  /**
+   * Set the size of the canvas in CSS pixels, the widths covered at the left and right, between which several
+   * performers are framed, and the height of a sheet at the bottom.
+   */
   resize(
     width: number,
     height: number,
@@ -192,9 +201,10 @@ export class Stage {
   }
 
   /**
-   * Moves everything on to the performers' poses (null: none yet) and their strings, by number of the limb, and draws it if the graphics are done with the frame
-   * before; `interval` is the seconds since the last call, `show` the seven numbers of the show's camera, null where there is
-   * none, `lights` are the show's, and `clock` the clock time of the poses in microseconds, by which the camera is remembered.
+   * Advance to the poses of the performers (null: none yet) and draw if the last frame is complete. `states` are the
+   * strings by limb number, `interval` the seconds since the last call, `motionCamera` the seven numbers of the
+   * motion's camera (null if there is none), `lights` those of the motion, and `clock` the clock time of the poses in
+   * microseconds, which the recorded camera refers to.
    */
   draw(
     poses: readonly (Pose | null)[],
@@ -225,7 +235,7 @@ export class Stage {
       posed ? this.#handReach(audience.hidesPerformers ? [shown[own]] : shown) : 0,
       motionCamera,
     );
-    // what is about the dancers is as wide as the picture of them
+    // The scenery is as wide as the picture of all performers.
     const { distanceScale: wide } = audience;
     this.#scenery.group.scale.setScalar(wide);
     rig.widthScale = wide;
@@ -266,17 +276,17 @@ export class Stage {
     if (slow) this.#applyQuality();
   }
 
-  /** Gives back all that the graphics hold; the stage and its canvas draw no more. */
+  /** Release all graphics resources; the stage cannot draw afterwards. */
   dispose(): void {
     this.#performerGroup.dispose();
     this.scene.environment?.dispose();
     this.#pictures.dispose();
     this.renderer.dispose();
-    // with the context goes what is in it; browsers keep a few only, and would take an old one from another stage
+    // Frees the context's memory at once: browsers keep few contexts and would take one from another stage.
     this.renderer.forceContextLoss();
   }
 
-  /** The stage as it was last moved on to, strings and all, as PNG: in the best quality, whatever this machine draws otherwise. */
+  /** Return the stage with its strings as PNG, in the best quality, whatever this machine normally draws. */
   takePicture(): Promise<Blob> {
     const { mesh } = this.#floor;
     const glossy = createFloor(this.#backdrop, this.#scenery.group, this.rig.floorOffset, false);
@@ -300,27 +310,30 @@ export class Stage {
     }
   }
 
-  /** CSS pixels of a world place. */
+  /** Return the position on the screen, in CSS pixels, of a world position. */
   toScreen(at: Vector3): { x: number; y: number } {
     const clip = at.clone().project(this.audience.camera);
     return { x: (clip.x * 0.5 + 0.5) * this.#width, y: (0.5 - clip.y * 0.5) * this.#height };
   }
 
-  /** Where a limb's bar is on the screen, CSS pixels; null while there is none. */
+  /** Return the box of a limb's control bar on the screen, in CSS pixels; null if there is none. */
   barBox(limb: number): ScreenBox | null {
     const at = this.strings.barPosition(limb);
-    // drawn larger from further away, as all of the strings
+    // Strings are drawn larger at a distance.
     return at && this.#screenBox(at, BAR_EXTENT, Math.sqrt(this.audience.distanceScale));
   }
 
-  /** Where the faces are on the screen, CSS pixels. */
+  /** Boxes of the faces on the screen, in CSS pixels. */
   get faceBoxes(): ScreenBox[] {
     return this.#performerGroup.visiblePerformers.map((performer) =>
       this.#screenBox(new Vector3().setFromMatrixPosition(performer.joint("skullbase")), FACE_EXTENT),
     );
   }
 
-  /** World place under a pixel, on the plane through `through` that faces the camera; null behind the camera. */
+  /**
+   * Return the world position of a pixel on the plane through `through` that faces the camera; null if it is behind the
+   * camera.
+   */
   fromScreen(x: number, y: number, through: Vector3): Vector3 | null {
     const { camera } = this.audience;
     this.#caster.setFromCamera(new Vector2((x / this.#width) * 2 - 1, 1 - (y / this.#height) * 2), camera);
@@ -328,7 +341,7 @@ export class Stage {
     return this.#caster.ray.intersectPlane(new Plane().setFromNormalAndCoplanarPoint(facing, through), new Vector3());
   }
 
-  /** The camera's right, up and backward directions in the world. */
+  /** Return the camera's right, up or backward direction in the world frame. */
   right(): Vector3 {
     return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 0);
   }
@@ -341,7 +354,7 @@ export class Stage {
     return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 2);
   }
 
-  /** World place of the hand nearer to the audience. */
+  /** Return the world position of the hand nearer to the camera. */
   nearerHand(): Vector3 | null {
     const { puppet } = this;
     if (!puppet) return null;
@@ -362,7 +375,6 @@ export class Stage {
     );
   }
 
-  /** Puts up what is about the dancers. */
   #addScenery(): void {
     if (this.#scenery.group.parent) return;
     this.rig.group.add(this.#scenery.group);
@@ -371,11 +383,11 @@ export class Stage {
   }
 
   #compileShaders(): void {
-    // Every shader there will be, side by side: one after the other as they come into sight takes longer, and stutters.
+    // Compile all shaders together: one after the other, when first visible, takes longer and causes stutter.
     this.renderer.compile(this.scene, this.audience.camera);
   }
 
-  /** The disc keeps its proportion to the dancer. */
+  /** The disc keeps its proportion to the performer. */
   #placeDisc(): void {
     const [radius, height] = this.#framing === "phone" || this.#framing === "sheet" ? [0.98, 1.36] : [1.06, 1.3];
     this.#backdrop.discRadius.value = radius * this.audience.scale;
@@ -389,7 +401,7 @@ export class Stage {
       : createEnvironmentMap(this.renderer, this.#look);
   }
 
-  /** The graphics context was lost and is there again. What was uploaded is by three.js, but not what was drawn for later. */
+  /** Restore what three.js does not: it uploads resources again, but does not render the environment map again. */
   #onContextRestored(): void {
     this.#updateEnvironment();
     this.#frameFence.reset();
@@ -397,16 +409,16 @@ export class Stage {
     this.#sinceDrawnS = 0;
   }
 
-  /** Just before a frame is drawn, as it empties the canvas: and only where it is another. */
+  /** Resize the canvas right before drawing, since resizing clears it, and only if the size has changed. */
   #setSize(): void {
     const ratio = this.#pixelRatio * this.#quality.quality.pixelRatioScale;
     const size = this.renderer.getSize(new Vector2());
     if (ratio === this.renderer.getPixelRatio() && size.x === this.#width && size.y === this.#height) return;
-    // both at once: each time that its size changes a canvas waits for the graphics
+    // Both at once: each size change of a canvas waits for the graphics processor.
     this.renderer.setDrawingBufferSize(this.#width, this.#height, ratio);
   }
 
-  /** Only the lacquer of the night mirrors, and only where the machine is up to it. */
+  /** Only the lacquer of the night look reflects, and only in a quality that allows it. */
   #applyQuality({ reflection, shadows, simpleMaterials: plain } = this.#quality.quality): void {
     this.#lights.castsShadows = shadows;
     this.#performerGroup.setQuality(this.#look.dark && reflection, plain);
