@@ -1,4 +1,4 @@
-/** The package as somebody has it who installs it: packed, installed without a line, and a small program that uses it. */
+/** Tests of the npm package: packed, installed offline, and used by a small program. */
 import { execFileSync } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -8,13 +8,15 @@ import { afterAll, beforeAll, expect, test } from "vitest";
 const WEB = resolve(import.meta.dirname, "..");
 const COMPILER = join(WEB, "node_modules/typescript/bin/tsc");
 
-/** Every `@ts-expect-error` fails where the type is missing: then anything would do. */
+/** Each `@ts-expect-error` fails if its type is missing, since anything would be accepted then. */
 const PROGRAM = `
-import { Access, decodeBlock, JOINTS, MotionTrack, pack, Puppeteer, restPose, Stage, unpack, Viewer, type Message, type Pose } from "bunraku";
+import { Access, decodeBlock, JOINTS, MotionTrack, pack, Puppeteer, restPose, Stage, unpack, Viewer } from "bunraku";
+import type { Message, Pose } from "bunraku";
 import "bunraku/element";
 import { BunrakuStage } from "bunraku/element";
 
-const viewer = new Viewer({ url: "wss://stage.example/v1/sessions/one/stream", access: new Access("https://stage.example", null) });
+const access = new Access("https://stage.example", null);
+const viewer = new Viewer({ url: "wss://stage.example/v1/sessions/one/stream", access });
 const puppeteer = new Puppeteer({ url: null, viewer });
 puppeteer.target(0, 0.1, 0.2, 0.3);
 const pose: Pose | null = viewer.poseAt(0);
@@ -41,19 +43,19 @@ element.seek(element.duration / 2);
 
 export const message: Message | null = unpack(pack({ name: "Claim", limb: 0 }));
 export const block = decodeBlock(MotionTrack.fromDescription({}), new Uint8Array());
-block.at(0, restPose());
+block.poseAt(0, restPose());
 
-// @ts-expect-error: a theme that there is none of
+// @ts-expect-error: not a theme
 element.theme = "noon";
-// @ts-expect-error: how loud is a number
+// @ts-expect-error: the volume is a number
 element.volume = "loud";
 // @ts-expect-error: seconds are a number
 element.seek("half");
-// @ts-expect-error: a viewer has to know where to
+// @ts-expect-error: a viewer needs a URL
 new Viewer({});
-// @ts-expect-error: a limb is claimed by its number
+// @ts-expect-error: limbs are numbers
 puppeteer.claim("left hand");
-// @ts-expect-error: nothing of the kind
+// @ts-expect-error: no such property
 element.stage?.scene.children[0].nothing;
 `;
 
@@ -75,7 +77,7 @@ beforeAll(() => {
     run("npm", ["pack", "--silent", "--json", "--pack-destination", folder], join(WEB, "dist")),
   ) as { filename: string }[];
   writeFileSync(join(folder, "package.json"), '{ "private": true, "type": "module" }');
-  // three.js is the installer's to choose; here it is that of this project, as there is no line to fetch one by
+  // three.js is a peer dependency; the project's copy is linked, since the installation is offline.
   run(
     "npm",
     ["install", `./${filename}`, "--offline", "--legacy-peer-deps", "--no-audit", "--no-fund", "--silent"],
@@ -93,7 +95,7 @@ test.each([
   ["bundler", "ESNext"],
   ["nodenext", "NodeNext"],
 ])(
-  "a program that uses it is checked against its types, by the resolution %s",
+  "a program type-checks against the package with resolution %s",
   (resolution, module) => {
     const options = {
       target: "ES2023",
@@ -111,10 +113,12 @@ test.each([
   60_000,
 );
 
-test("it can be loaded where there is no page, and reads what comes over the line", () => {
+test("it loads without a DOM and parses messages", () => {
   const program = `
     const { JOINTS, pack, unpack, BunrakuStage, MotionTrack } = await import("bunraku");
-    console.log(JSON.stringify([JOINTS.length, unpack(pack({ name: "Claim", limb: 3 })), typeof BunrakuStage, typeof MotionTrack.fromDescription]));`;
+    const message = unpack(pack({ name: "Claim", limb: 3 }));
+    const types = [typeof BunrakuStage, typeof MotionTrack.fromDescription];
+    console.log(JSON.stringify([JOINTS.length, message, ...types]));`;
   expect(JSON.parse(run(process.execPath, ["--input-type=module", "-e", program], folder))).toEqual([
     18,
     { name: "Claim", limb: 3 },
@@ -123,12 +127,12 @@ test("it can be loaded where there is no page, and reads what comes over the lin
   ]);
 });
 
-test("it says what it is, and holds nothing but what is built", () => {
+test("its manifest is complete, and it contains only build output", () => {
   const installed = join(folder, "node_modules/bunraku");
-  const said = JSON.parse(readFileSync(join(installed, "package.json"), "utf8")) as Record<string, unknown>;
-  const own = JSON.parse(readFileSync(join(WEB, "package.json"), "utf8")) as { version: string };
-  expect(said).toMatchObject({ name: "bunraku", version: own.version, type: "module" });
-  expect(said["dependencies"]).toBeUndefined();
+  const manifest = JSON.parse(readFileSync(join(installed, "package.json"), "utf8")) as Record<string, unknown>;
+  const ownManifest = JSON.parse(readFileSync(join(WEB, "package.json"), "utf8")) as { version: string };
+  expect(manifest).toMatchObject({ name: "bunraku", version: ownManifest.version, type: "module" });
+  expect(manifest["dependencies"]).toBeUndefined();
   expect(readFileSync(join(installed, "LICENSES.md"), "utf8")).toContain("@msgpack/msgpack");
   const files = run("npm", ["pack", "--dry-run", "--json", "--silent"], installed);
   const [{ files: packed, size }] = JSON.parse(files) as { files: { path: string }[]; size: number }[];
@@ -140,6 +144,6 @@ test("it says what it is, and holds nothing but what is built", () => {
           !/^(package\.json|(README|LICENSES)\.md|bunraku(-stage)?\.js|parts\/.+\.js|types\/.+\.d\.ts)$/.test(path),
       ),
   ).toEqual([]);
-  // a quarter of it is the decoder for browsers that have none, which no other fetches
+  // A quarter of it is the decoder for browsers without one, which others do not load.
   expect(size).toBeLessThan(300_000);
 });

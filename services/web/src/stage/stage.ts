@@ -2,29 +2,19 @@
  * The stage: performers, backdrop, floor, lights, strings and the audience's camera. It draws what it is given and
  * reads no clock.
  */
-import {
-  ACESFilmicToneMapping,
-  type IUniform,
-  PCFShadowMap,
-  Plane,
-  Raycaster,
-  Scene,
-  Vector2,
-  Vector3,
-  WebGLRenderer,
-} from "three";
+import { type IUniform, Scene, Vector3, type WebGLRenderer } from "three";
 import type { Figure, Pose } from "../motion/skeleton";
 import type { LightState } from "../playout/light-state";
 import { AudienceCamera, type Framing } from "./camera/audience-camera";
 import { CameraRecorder } from "./camera/camera-recorder";
 import { FollowRig } from "./camera/follow-rig";
-import { projectBox, type ScreenBox, type WorldExtent } from "./camera/screen-box";
+import type { ScreenBox, WorldExtent } from "./camera/screen-box";
+import { ScreenProjection } from "./camera/screen-projection";
 import type { Performer } from "./puppet/performer";
 import { type PerformerFactory, PerformerGroup } from "./puppet/performer-group";
-import { FrameFence } from "./rendering/frame-fence";
+import { FrameRenderer } from "./rendering/frame-renderer";
 import { type Graphics, openGraphics } from "./rendering/graphics";
-import { PictureRenderer, pictureSize } from "./rendering/picture";
-import { type AdaptiveQuality, QUALITY_LEVELS } from "./rendering/quality";
+import { QUALITY_LEVELS } from "./rendering/quality";
 import { applyLookToBackdrop, createBackdrop, createBackdropUniforms } from "./scenery/backdrop";
 import { createEnvironmentMap } from "./scenery/environment-map";
 import { createFloor, type Floor } from "./scenery/floor";
@@ -64,49 +54,42 @@ export class Stage {
   readonly renderer: WebGLRenderer;
   /** Performer that this page's inputs act on, which a narrow picture frames; null frames all. */
   selectedPerformer: number | null = null;
-  /** True if the graphics processor has completed a frame with a performer. */
-  hasDrawnPerformer = false;
   readonly #performerGroup: PerformerGroup;
   readonly #scenery = new Scenery();
   readonly #backdrop = createBackdropUniforms();
   readonly #floor: Floor;
   readonly #lights = createLights();
   readonly #floorHeight: IUniform<number> = { value: 0 };
-  readonly #caster = new Raycaster();
+  readonly #projection = new ScreenProjection(this.audience.camera);
   #look: Look = LOOKS.night;
   #theme: Theme | null = null;
-  #width = 1;
-  #height = 1;
   #reducedMotion = false;
-  #pixelRatio = 1;
   #framing: Framing = "desktop";
-  readonly #quality: AdaptiveQuality;
-  readonly #frameFence: FrameFence;
-  readonly #pictures = new PictureRenderer();
-  #sinceDrawnS = 0;
+  readonly #frameRenderer: FrameRenderer;
   #emptyS = 0;
-  #hasRenderedPerformer = false;
-  #isTakingPicture = false;
+  /** Progress of the first frame with a performer. */
+  #firstFrame: "pending" | "submitted" | "complete" = "pending";
 
   /** Create a stage that draws on `canvas`. Throw if the browser has no WebGL 2. */
-  constructor(canvas: HTMLCanvasElement, { context, quality }: Graphics = openGraphics(canvas)) {
-    this.#quality = quality;
-    const { simpleMaterials: plain } = quality.quality;
-    this.#floor = createFloor(this.#backdrop, this.#scenery.group, this.rig.floorOffset, plain);
-    this.renderer = new WebGLRenderer({ canvas, context });
-    this.#frameFence = new FrameFence(context);
-    this.renderer.toneMapping = ACESFilmicToneMapping;
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = PCFShadowMap;
+  constructor(canvas: HTMLCanvasElement, graphics: Graphics = openGraphics(canvas)) {
+    this.#frameRenderer = new FrameRenderer(canvas, graphics);
+    this.renderer = this.#frameRenderer.renderer;
+    const { simpleMaterials } = this.#frameRenderer.quality;
+    this.#floor = createFloor(this.#backdrop, this.#scenery.group, this.rig.floorOffset, simpleMaterials);
     this.#scenery.group.add(createBackdrop(this.#backdrop), this.#floor.mesh);
     this.#performerGroup = new PerformerGroup(this.#floorHeight);
     this.rig.group.add(this.audience.camera, this.#lights.group);
     this.scene.add(this.rig.group, this.#performerGroup.group);
     // Software rendering shows the performers first: the scenery takes longer to draw than they do.
-    if (!plain) this.#addScenery();
+    if (!simpleMaterials) this.#addScenery();
     // three.js registered its listener earlier: its part of the context is restored by then.
     canvas.addEventListener("webglcontextrestored", () => this.#onContextRestored());
     this.#applyQuality();
+  }
+
+  /** True if the graphics processor has completed a frame with a performer. */
+  get hasDrawnPerformer(): boolean {
+    return this.#firstFrame === "complete";
   }
 
   /** Performers in the order of the motion's tracks. */
@@ -159,10 +142,10 @@ export class Stage {
    * x). Performers with unchanged lengths stay, and others join them.
    */
   setFigures(figures: readonly Figure[], front = 0): void {
-    const before = this.performers.length;
-    const others = this.#performerGroup.setFigures(figures);
-    if (!others && this.performers.length === before) return;
-    if (others) {
+    const previousCount = this.performers.length;
+    const isReplaced = this.#performerGroup.setFigures(figures);
+    if (!isReplaced && this.performers.length === previousCount) return;
+    if (isReplaced) {
       this.audience.scale = this.puppet?.scale ?? 1;
       this.#placeDisc();
       this.rig.reset(front);
@@ -189,10 +172,9 @@ export class Stage {
     [left, right]: readonly [number, number] = [0, 0],
     sheetHeight = 0,
   ): void {
-    const sharpest = framing === "desktop" ? MAX_PIXEL_RATIO.desktop : MAX_PIXEL_RATIO.phone;
-    this.#width = width;
-    this.#height = height;
-    this.#pixelRatio = Math.min(pixelRatio, sharpest);
+    const maxPixelRatio = framing === "desktop" ? MAX_PIXEL_RATIO.desktop : MAX_PIXEL_RATIO.phone;
+    this.#frameRenderer.resize(width, height, Math.min(pixelRatio, maxPixelRatio));
+    Object.assign(this.#projection, { width, height });
     this.#framing = framing;
     this.#placeDisc();
     this.audience.setFraming(framing, height, sheetHeight);
@@ -217,73 +199,40 @@ export class Stage {
     const { audience, rig } = this;
     const seconds = Math.min(interval, MAX_STEP_S);
     this.#performerGroup.apply(poses, this.#reducedMotion ? 0 : seconds);
-    const { visiblePerformers: shown } = this.#performerGroup;
-    const posed = poses.some((pose) => pose !== null) && shown.length > 0;
-    if (posed) {
-      rig.follow(shown, seconds);
+    const { visiblePerformers } = this.#performerGroup;
+    const hasPose = poses.some((pose) => pose !== null) && visiblePerformers.length > 0;
+    if (hasPose) {
+      rig.follow(visiblePerformers, seconds);
       this.#floorHeight.value = rig.group.position.y;
     }
     rig.group.updateMatrixWorld(true);
-    const own = this.selectedPerformer === null ? -1 : shown.indexOf(this.performers[this.selectedPerformer]);
-    if (posed)
-      audience.placePerformers(
-        shown.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))),
-        own < 0 ? null : own,
-      );
-    audience.update(
-      seconds,
-      posed ? this.#handReach(audience.hidesPerformers ? [shown[own]] : shown) : 0,
-      motionCamera,
-    );
+    this.#updateAudience(hasPose ? visiblePerformers : [], seconds, motionCamera);
     // The scenery is as wide as the picture of all performers.
-    const { distanceScale: wide } = audience;
-    this.#scenery.group.scale.setScalar(wide);
-    rig.widthScale = wide;
+    const { distanceScale } = audience;
+    this.#scenery.group.scale.setScalar(distanceScale);
+    rig.widthScale = distanceScale;
     this.#lights.update(
       lights,
       this.#reducedMotion ? Infinity : seconds,
-      Math.max(wide, audience.maxSideOffset / LIT_HALF_WIDTH_M),
+      Math.max(distanceScale, audience.maxSideOffset / LIT_HALF_WIDTH_M),
     );
     this.scene.environmentIntensity = this.#look.environment * this.#lights.ambientLevel;
     this.#scenery.update(audience.view, audience.isAudienceView, seconds);
-    if (posed && clock !== null) this.cameraRecorder.add(clock, audience.view, audience.isCustomView);
-    if (posed) {
-      const seat = {
-        ground: this.#floorHeight.value,
-        ceiling: this.#ceilingHeight(),
-        right: this.right(),
-        distanceScale: wide,
-      };
-      this.strings.update(
-        this.performers.map((one) => (one.group.visible ? one : null)),
-        states,
-        this.#look,
-        seconds,
-        seat,
-      );
-    }
-    this.#sinceDrawnS += interval;
-    if (!this.#frameFence.isReady) return;
-    this.hasDrawnPerformer = this.#hasRenderedPerformer;
-    if (posed) this.#hasRenderedPerformer = true;
-    else if ((this.#emptyS += seconds) < EMPTY_STAGE_DELAY_S) return;
-    if (this.hasDrawnPerformer || !this.#hasRenderedPerformer) this.#addScenery();
-    this.#setSize();
-    this.renderer.render(this.scene, audience.camera);
-    this.#frameFence.insert();
-    const slow = posed && !this.#isTakingPicture && this.#quality.addFrameTime(this.#sinceDrawnS);
-    this.#sinceDrawnS = 0;
-    if (slow) this.#applyQuality();
+    if (hasPose && clock !== null) this.cameraRecorder.add(clock, audience.view, audience.isCustomView);
+    if (hasPose) this.#updateStrings(states, seconds);
+    if (!this.#frameRenderer.advance(interval)) return;
+    if (this.#firstFrame === "submitted") this.#firstFrame = "complete";
+    if (!hasPose && (this.#emptyS += seconds) < EMPTY_STAGE_DELAY_S) return;
+    if (hasPose && this.#firstFrame === "pending") this.#firstFrame = "submitted";
+    if (this.#firstFrame !== "submitted") this.#addScenery();
+    if (this.#frameRenderer.draw(this.scene, audience.camera, hasPose)) this.#applyQuality();
   }
 
   /** Release all graphics resources; the stage cannot draw afterwards. */
   dispose(): void {
     this.#performerGroup.dispose();
     this.scene.environment?.dispose();
-    this.#pictures.dispose();
-    this.renderer.dispose();
-    // Frees the context's memory at once: browsers keep few contexts and would take one from another stage.
-    this.renderer.forceContextLoss();
+    this.#frameRenderer.dispose();
   }
 
   /** Return the stage with its strings as PNG, in the best quality, whatever this machine normally draws. */
@@ -294,14 +243,8 @@ export class Stage {
     this.#scenery.group.remove(mesh);
     this.#scenery.group.add(glossy.mesh);
     this.#applyQuality(QUALITY_LEVELS[0]);
-    this.#isTakingPicture = true;
     try {
-      return this.#pictures
-        .render(this.scene, this.audience.camera, this.#look, pictureSize(this.#width, this.#height))
-        .finally(() => {
-          this.#isTakingPicture = false;
-          this.#quality.restart();
-        });
+      return this.#frameRenderer.takePicture(this.scene, this.audience.camera, this.#look);
     } finally {
       this.#applyQuality();
       this.#scenery.group.remove(glossy.mesh);
@@ -312,21 +255,25 @@ export class Stage {
 
   /** Return the position on the screen, in CSS pixels, of a world position. */
   toScreen(at: Vector3): { x: number; y: number } {
-    const clip = at.clone().project(this.audience.camera);
-    return { x: (clip.x * 0.5 + 0.5) * this.#width, y: (0.5 - clip.y * 0.5) * this.#height };
+    return this.#projection.toScreen(at);
   }
 
   /** Return the box of a limb's control bar on the screen, in CSS pixels; null if there is none. */
   barBox(limb: number): ScreenBox | null {
     const at = this.strings.barPosition(limb);
     // Strings are drawn larger at a distance.
-    return at && this.#screenBox(at, BAR_EXTENT, Math.sqrt(this.audience.distanceScale));
+    const { scale, distanceScale } = this.audience;
+    return at && this.#projection.boxAt(at, BAR_EXTENT, scale * Math.sqrt(distanceScale));
   }
 
   /** Boxes of the faces on the screen, in CSS pixels. */
   get faceBoxes(): ScreenBox[] {
     return this.#performerGroup.visiblePerformers.map((performer) =>
-      this.#screenBox(new Vector3().setFromMatrixPosition(performer.joint("skullbase")), FACE_EXTENT),
+      this.#projection.boxAt(
+        new Vector3().setFromMatrixPosition(performer.joint("skullbase")),
+        FACE_EXTENT,
+        this.audience.scale,
+      ),
     );
   }
 
@@ -335,10 +282,7 @@ export class Stage {
    * camera.
    */
   fromScreen(x: number, y: number, through: Vector3): Vector3 | null {
-    const { camera } = this.audience;
-    this.#caster.setFromCamera(new Vector2((x / this.#width) * 2 - 1, 1 - (y / this.#height) * 2), camera);
-    const facing = camera.getWorldDirection(new Vector3());
-    return this.#caster.ray.intersectPlane(new Plane().setFromNormalAndCoplanarPoint(facing, through), new Vector3());
+    return this.#projection.fromScreen(x, y, through);
   }
 
   /** Return the camera's right, up or backward direction in the world frame. */
@@ -363,23 +307,35 @@ export class Stage {
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
-  #screenBox(at: Vector3, { across, up, down }: WorldExtent, times = 1): ScreenBox {
-    const { camera } = this.audience;
-    const scale = this.audience.scale * times;
-    return projectBox(
-      at,
-      { across: across * scale, up: up * scale, down: down * scale },
-      camera,
-      this.#width,
-      this.#height,
-    );
-  }
-
   #addScenery(): void {
     if (this.#scenery.group.parent) return;
     this.rig.group.add(this.#scenery.group);
     this.scene.add(this.strings.group);
     if (this.puppet) this.#compileShaders();
+  }
+
+  /** Move the audience's camera; `posed` are the performers with a pose. */
+  #updateAudience(posed: readonly Performer[], seconds: number, motionCamera: ArrayLike<number> | null): void {
+    const { audience, rig, selectedPerformer } = this;
+    const selected = selectedPerformer === null ? -1 : posed.indexOf(this.performers[selectedPerformer]);
+    if (posed.length > 0)
+      audience.placePerformers(
+        posed.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))),
+        selected < 0 ? null : selected,
+      );
+    const framed = audience.hidesPerformers && selected >= 0 ? [posed[selected]] : posed;
+    audience.update(seconds, posed.length > 0 ? this.#handReach(framed) : 0, motionCamera);
+  }
+
+  #updateStrings(states: readonly StringState[], seconds: number): void {
+    const view = {
+      ground: this.#floorHeight.value,
+      ceiling: this.#ceilingHeight(),
+      right: this.right(),
+      distanceScale: this.audience.distanceScale,
+    };
+    const performers = this.performers.map((performer) => (performer.group.visible ? performer : null));
+    this.strings.update(performers, states, this.#look, seconds, view);
   }
 
   #compileShaders(): void {
@@ -396,7 +352,7 @@ export class Stage {
 
   #updateEnvironment(): void {
     this.scene.environment?.dispose();
-    this.scene.environment = this.#quality.quality.simpleMaterials
+    this.scene.environment = this.#frameRenderer.quality.simpleMaterials
       ? null
       : createEnvironmentMap(this.renderer, this.#look);
   }
@@ -404,37 +360,27 @@ export class Stage {
   /** Restore what three.js does not: it uploads resources again, but does not render the environment map again. */
   #onContextRestored(): void {
     this.#updateEnvironment();
-    this.#frameFence.reset();
-    this.#quality.restart();
-    this.#sinceDrawnS = 0;
-  }
-
-  /** Resize the canvas right before drawing, since resizing clears it, and only if the size has changed. */
-  #setSize(): void {
-    const ratio = this.#pixelRatio * this.#quality.quality.pixelRatioScale;
-    const size = this.renderer.getSize(new Vector2());
-    if (ratio === this.renderer.getPixelRatio() && size.x === this.#width && size.y === this.#height) return;
-    // Both at once: each size change of a canvas waits for the graphics processor.
-    this.renderer.setDrawingBufferSize(this.#width, this.#height, ratio);
+    this.#frameRenderer.reset();
   }
 
   /** Only the lacquer of the night look reflects, and only in a quality that allows it. */
-  #applyQuality({ reflection, shadows, simpleMaterials: plain } = this.#quality.quality): void {
+  #applyQuality({ reflection, shadows, simpleMaterials } = this.#frameRenderer.quality): void {
     this.#lights.castsShadows = shadows;
-    this.#performerGroup.setQuality(this.#look.dark && reflection, plain);
+    this.#performerGroup.setQuality(this.#look.dark && reflection, simpleMaterials);
   }
 
-  #handReach(shown: readonly Performer[]): number {
+  #handReach(performers: readonly Performer[]): number {
     const at = new Vector3();
     return Math.max(
-      ...shown.flatMap((performer) =>
+      ...performers.flatMap((performer) =>
         [0, 1].map((limb) => Math.abs(performer.handle(limb, at).project(this.audience.camera).x)),
       ),
     );
   }
 
   #ceilingHeight(): number {
-    const middle = this.rig.group.localToWorld(new Vector3(0, 1, 0));
-    return this.fromScreen(this.#width / 2, Math.min(HEADROOM_PX, HEADROOM_SHARE * this.#height), middle)?.y ?? 2.2;
+    const { width, height } = this.#projection;
+    const centre = this.rig.group.localToWorld(new Vector3(0, 1, 0));
+    return this.fromScreen(width / 2, Math.min(HEADROOM_PX, HEADROOM_SHARE * height), centre)?.y ?? 2.2;
   }
 }
