@@ -1,7 +1,7 @@
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 
-/** Adds `modulepreload` links for the stage's chunk and its imports, so that they load in parallel with the page's script. */
+/** Adds `modulepreload` links for the stage's chunk and its imports: they load in parallel with the page's script. */
 const preloadStage: Plugin = {
   name: "preload-stage",
   transformIndexHtml: {

@@ -1,7 +1,7 @@
-/** Build of the embeddable scripts (at stable URLs) and of the examples page, into the folder of the page and after it. */
+/** Build of the embeddable scripts (at stable URLs) and the examples page, into the folder of the page and after it. */
 import { defineConfig } from "vite";
 
-/** Entry points, served as `embed/NAME.js`. The chunks they import have a content hash in their names and are cached forever. */
+/** Entry points, served as `embed/NAME.js`. Their chunks have a content hash in their names and are cached forever. */
 const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/package.ts" };
 
 /** Modules for rendering and for the examples page, which the element does not need at startup. */

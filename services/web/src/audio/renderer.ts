@@ -53,8 +53,8 @@ export function silentBoundary(channels: number): SlotBoundary {
 /** Return the packets that spans of the motion need, in the order in which they are heard, possibly repeated. */
 export function requiredPackets(track: AudioTrack, spans: readonly TimelineSpan[]): number[] {
   const numbers: number[] = [];
-  for (const { start: from, end: to, position, isMoving: moving } of spans) {
-    if (!moving) continue;
+  for (const { start: from, end: to, position, isMoving } of spans) {
+    if (!isMoving) continue;
     const margin = (HALF_TAPS * 1e6) / SAMPLE_RATE;
     const first = Math.max(track.packetAt(position - margin), 0);
     const last = Math.min(track.packetAt(position + to - from + margin), track.packetCount - 1);

@@ -147,14 +147,14 @@ export class Avatar implements Performer {
     group.position.set(0, 0, 0);
     group.updateMatrixWorld(true);
     const hips = this.#hipCentre(scratchCentre);
-    const dancers = scratch
+    const figureHips = scratch
       .setFromMatrixPosition(this.joint("l_hip"))
       .add(scratchB.setFromMatrixPosition(this.joint("r_hip")))
       .multiplyScalar(0.5);
     group.position.set(
-      this.#rootScale * dancers.x - hips.x,
+      this.#rootScale * figureHips.x - hips.x,
       this.#streamedLowestY() - this.#avatarLowestY(),
-      this.#rootScale * dancers.z - hips.z,
+      this.#rootScale * figureHips.z - hips.z,
     );
     group.updateMatrixWorld(true);
     this.root.copy(this.joint("humanoid_root")).setPosition(this.#hipCentre(scratchCentre));

@@ -30,8 +30,8 @@ export function dimMToonMaterials(materials: Iterable<Material>): void {
 const GLASS_OPACITY = 0.25;
 
 /**
- * Remove material features that the stage's renderer does without: maps with a second texture lookup, iridescence, and
- * transmission, which would need another render pass. Glass becomes transparent instead.
+ * Remove material features that the stage does not render: bump, light, alpha and displacement maps, iridescence,
+ * dispersion, and transmission, which would need another render pass. Clear glass becomes transparent instead.
  */
 export function simplifyMaterials(materials: Iterable<Material>): void {
   for (const material of materials) {

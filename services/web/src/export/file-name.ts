@@ -14,10 +14,10 @@ const WINDOWS_DEVICE = /^(con|prn|aux|nul|com\d|lpt\d)$/i;
  * of a file among several, is never truncated.
  */
 export function fileName(name: string, extension: string, suffix = ""): string {
-  const plain = name.normalize("NFC").replace(UNSAFE_CHARACTERS, " ").replace(/\s+/g, " ");
-  const short = [...plain]
+  const cleaned = name.normalize("NFC").replace(UNSAFE_CHARACTERS, " ").replace(/\s+/g, " ");
+  const truncated = [...cleaned]
     .slice(0, MAX_NAME_CHARACTERS)
     .join("")
     .replace(/^[\s.]+|[\s.]+$/g, "");
-  return `${short === "" || WINDOWS_DEVICE.test(short) ? `dance${short && ` ${short}`}` : short}${suffix}.${extension}`;
+  return `${truncated === "" || WINDOWS_DEVICE.test(truncated) ? `dance${truncated && ` ${truncated}`}` : truncated}${suffix}.${extension}`;
 }

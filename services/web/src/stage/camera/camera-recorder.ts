@@ -1,8 +1,8 @@
 /**
- * Recorder of the audience's camera over the last ten minutes, as sparse keyframes. Straight lines between keyframes
- * stay within `POSITION_TOLERANCE_M` and `FOV_TOLERANCE_RAD` of every sample. Method: swing filter. Each sample narrows
- * the range of slopes that a line from the last keyframe may have; the first sample outside that range starts a new
- * line.
+ * Recorder of the audience's camera over the last ten minutes, as sparse keyframes. The segments between keyframes stay
+ * within `POSITION_TOLERANCE_M` and `FOV_TOLERANCE_RAD` of every sample. Method: swing filter. Each sample narrows the
+ * range of slopes that a segment from the last keyframe may have; the first sample outside that range starts a new
+ * segment.
  */
 import type { CameraKeyframe } from "../../client/api";
 import { RowQueue } from "./row-queue";
@@ -28,9 +28,9 @@ const SAMPLE_LENGTH = 1 + CAMERA_NUMBERS;
 
 export class CameraRecorder {
   readonly #keyframes = new RowQueue(SAMPLE_LENGTH);
-  /** Last keyframe, where the current line begins. */
+  /** Last keyframe, where the current segment begins. */
   #lastKeyframe: Sample | null = null;
-  /** Newest sample, where the current line may end. */
+  /** Newest sample, where the current segment may end. */
   #newest: Sample | null = null;
   /** Clock time of the last view that the user had changed. */
   #lastMovedUs = -Infinity;
@@ -62,7 +62,7 @@ export class CameraRecorder {
    * throughout, in ascending order.
    */
   keyframes(begin = -Infinity, end = Infinity): CameraKeyframe[] {
-    const all = Array.from({ length: this.#keyframes.length }, (_, nth) => this.#keyframes.at(nth) as Sample);
+    const all = Array.from({ length: this.#keyframes.length }, (_, index) => this.#keyframes.at(index) as Sample);
     if (this.#newest) all.push(this.#newest);
     const first = Math.max(
       0,
@@ -89,13 +89,13 @@ export class CameraRecorder {
     this.#newest = null;
     this.#minSlopes.fill(-Infinity);
     this.#maxSlopes.fill(Infinity);
-    // Keep the keyframe before the oldest remembered time: the line starts there.
+    // Keep the keyframe before the oldest remembered time: its segment starts there.
     const before = this.#keyframes.countUpTo(key[0] - MAX_AGE_US) - 1;
     this.#keyframes.drop(Math.max(before, this.#keyframes.length - MAX_KEYFRAMES, 0));
     return key;
   }
 
-  /** Return whether a line from the last keyframe to `sample` is within the tolerance of all samples between. */
+  /** Return whether a segment from the last keyframe to `sample` is within the tolerance of all samples between. */
   #isWithinTolerance(key: Sample, sample: Sample): boolean {
     const span = sample[0] - key[0];
     for (let n = 0; n < CAMERA_NUMBERS; n++) {

@@ -22,9 +22,9 @@ export class RowQueue {
    */
   at(index: number): Float64Array | null {
     const { width } = this;
-    const nth = index < 0 ? this.#length + index : index;
-    if (nth < 0 || nth >= this.#length) return null;
-    const begin = (this.#first + nth) * width;
+    const row = index < 0 ? this.#length + index : index;
+    if (row < 0 || row >= this.#length) return null;
+    const begin = (this.#first + row) * width;
     return this.#numbers.subarray(begin, begin + width);
   }
 

@@ -20,7 +20,7 @@ export class PerformerGroup {
 
   /** `floorHeight` is the height of the reflecting floor. */
   constructor(private readonly floorHeight: IUniform<number>) {
-    this.group.name = "troupe";
+    this.group.name = "performers";
   }
 
   /** Performers in the order of the motion's tracks. */

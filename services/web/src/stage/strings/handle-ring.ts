@@ -15,7 +15,7 @@ const MAX_RINGS = MAX_LIMBS;
 export interface HandleRing {
   colour: string;
   alpha: number;
-  /** Radius in metres, and the line width as a share of it. */
+  /** Radius in metres, and the stroke width as a share of it. */
   radius: number;
   lineShare: number;
   glow: number;

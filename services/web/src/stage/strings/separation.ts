@@ -1,4 +1,4 @@
-/** Separation of objects on a line. Pure. */
+/** Separation of objects along one dimension. Pure. */
 
 /**
  * Return the positions nearest to `positions` (least squares) that are at least `minDistance` apart, in the same order:

@@ -152,17 +152,17 @@ export class Strings {
     motion.highlight = this.#approach(motion.highlight, state.isHighlighted ? 1 : 0, seconds, 0.16);
     motion.shake = this.#approach(motion.shake, 0, seconds, 0.4);
     const shake = motion.shake > 0 ? Math.sin(motion.shake * 4 * Math.PI) * 0.01 * size : 0;
-    const shown = handle.clone().addScaledVector(right, shake);
+    const ringPosition = handle.clone().addScaledVector(right, shake);
     const tension = state.pullTarget
       ? Math.min(1, 0.35 + state.pullTarget.distanceTo(handle) / TAUT_ERROR_M)
       : held
         ? 0.75
         : 0;
     const bar = motion.held > 0.01 ? this.#animateBar(motion, goal, limbIndex, seconds, size) : null;
-    this.#drawRing(limb, shown, motion, state, look, size);
+    this.#drawRing(limb, ringPosition, motion, state, look, size);
     if (held) {
       const hook = motion.bar.clone().setY(motion.bar.y - HOOK_OFFSET_M * (size / scale));
-      this.#threads.set(limb, shown, hook, {
+      this.#threads.set(limb, ringPosition, hook, {
         colour: look.puppeteerColours[motion.puppeteer],
         alpha: 1,
         tension,
@@ -170,9 +170,9 @@ export class Strings {
         fadesOut: false,
       });
     } else {
-      const top = shown.clone().setY(shown.y + (limbIndex < 2 ? 0.62 : 0.26) * scale);
+      const top = ringPosition.clone().setY(ringPosition.y + (limbIndex < 2 ? 0.62 : 0.26) * scale);
       const alpha = look.threadOpacity * (state.isDimmed ? DIMMED_SHARE : 1);
-      this.#threads.set(limb, shown, top, {
+      this.#threads.set(limb, ringPosition, top, {
         colour: look.threadColour,
         alpha,
         tension: 0,
@@ -281,9 +281,9 @@ function separateBars(goals: readonly Vector3[], right: Vector3, scale: number):
     else level.push([goal]);
   }
   for (const bars of level) {
-    const places = bars.map((bar) => bar.dot(right));
-    separate(places, MIN_BAR_DISTANCE_M * scale).forEach((place, nth) =>
-      bars[nth].addScaledVector(right, place - places[nth]),
+    const positions = bars.map((bar) => bar.dot(right));
+    separate(positions, MIN_BAR_DISTANCE_M * scale).forEach((position, index) =>
+      bars[index].addScaledVector(right, position - positions[index]),
     );
   }
 }

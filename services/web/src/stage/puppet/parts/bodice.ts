@@ -54,8 +54,8 @@ const section = curve(BODICE);
 /** Return the z of the bodice's front at x, y. */
 function frontDepth(x: number, y: number): number {
   const [centre, wide, deep, power] = section(Math.min(y, 1.512));
-  const aside = Math.min(0.985, Math.abs(x) / wide);
-  return centre + deep * (1 - aside ** power) ** (1 / power);
+  const lateral = Math.min(0.985, Math.abs(x) / wide);
+  return centre + deep * (1 - lateral ** power) ** (1 / power);
 }
 
 export function addBodice(builder: GeometryBuilder): void {

@@ -83,11 +83,11 @@ function createFootPart(
   return grid(
     (u, v) => {
       const z = back + (front - back) * v;
-      const [aside, half, top] = section(z);
+      const [lateral, half, top] = section(z);
       const [c, s] = [Math.cos(u * 2 * Math.PI), Math.sin(u * 2 * Math.PI)];
       const height = top + SOLE_HEIGHT_M;
       const y = -SOLE_HEIGHT_M + height * 0.36 + (s > 0 ? s ** 0.9 * height * 0.64 : -((-s) ** 0.45) * height * 0.36);
-      return new Vector3(centre + aside * sign + signedPower(c, 0.8) * half, y, z);
+      return new Vector3(centre + lateral * sign + signedPower(c, 0.8) * half, y, z);
     },
     columns,
     rows,
