@@ -6,7 +6,7 @@ export const MAX_FILE_BYTES = 100e6;
 
 /** Reason why a file cannot be used as an avatar, for the user. */
 export class AvatarError extends Error {
-  override readonly name = "AvatarProblem";
+  override readonly name = "AvatarError";
 
   constructor(
     readonly title: string,
@@ -19,16 +19,16 @@ export class AvatarError extends Error {
 
 /** Return the hint that helps with most files. */
 export function exportAgainHint(): string {
-  return translate("Export it anew, or try another file.");
+  return translate("Export it again, or try another file.");
 }
 
 /** Return the error for a file of this size in bytes. */
 export function fileTooLarge(bytes: number): AvatarError {
   return new AvatarError(
-    translate("It is too large"),
-    translate("it has {size} MB, and {most} MB are the most", {
+    translate("File too large"),
+    translate("{size} MB; the limit is {max} MB", {
       size: Math.ceil(bytes / 1e6),
-      most: MAX_FILE_BYTES / 1e6,
+      max: MAX_FILE_BYTES / 1e6,
     }),
     translate("Export it with smaller textures."),
   );
@@ -36,5 +36,5 @@ export function fileTooLarge(bytes: number): AvatarError {
 
 /** Return the error for a file whose meshes or textures cannot be read. */
 export function fileBroken(detail: string): AvatarError {
-  return new AvatarError(translate("It is broken"), detail, exportAgainHint());
+  return new AvatarError(translate("File damaged"), detail, exportAgainHint());
 }

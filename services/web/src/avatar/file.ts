@@ -36,8 +36,8 @@ export function parseAvatarFile(bytes: ArrayBuffer): AvatarFile {
     const compression = COMPRESSION_EXTENSIONS[String(required)];
     if (compression)
       throw new AvatarError(
-        translate("It is compressed"),
-        translate("this page does not read {compression}", { compression }),
+        translate("Unsupported compression"),
+        translate("{compression} is not supported", { compression }),
         translate("Export it without {compression}.", { compression }),
       );
   }
@@ -48,8 +48,8 @@ export function parseAvatarFile(bytes: ArrayBuffer): AvatarFile {
   for (const uri of externalCandidates.map((part) => asText(asRecord(part).uri))) {
     if (uri)
       throw new AvatarError(
-        translate("It is not all in one file"),
-        translate('it refers to "{address}"', { address: uri.slice(0, 60) }),
+        translate("Not a single file"),
+        translate("it refers to the external file {address}", { address: uri.slice(0, 60) }),
         translate(EXPORT_AS_GLB),
       );
   }
@@ -62,20 +62,16 @@ export function parseAvatarFile(bytes: ArrayBuffer): AvatarFile {
   if (missing.length > 0) {
     const detail =
       bones.size === 0
-        ? translate("no humanoid bones were found in it")
-        : translate("these bones were not found: {bones}", { bones: joinList(missing) });
+        ? translate("no humanoid bones found")
+        : translate("missing bones: {bones}", { bones: joinList(missing) });
     throw new AvatarError(
-      translate("It is no humanoid that can dance"),
+      translate("No usable humanoid"),
       detail,
-      translate("Bones are known in VRM files, and by the names of Mixamo, VRoid, Unreal, Unity and H-Anim."),
+      translate("Bones are found in VRM files and by the names of Mixamo, VRoid, Unreal, Unity and H-Anim."),
     );
   }
   if (asList(json.meshes).length === 0)
-    throw new AvatarError(
-      translate("There is nothing to see"),
-      translate("it has bones, but no mesh"),
-      exportAgainHint(),
-    );
+    throw new AvatarError(translate("Nothing to draw"), translate("it has bones, but no mesh"), exportAgainHint());
   return { vrm: vrmDeclaration !== null, name: vrmDeclaration?.name ?? null, bones };
 }
 
@@ -83,26 +79,26 @@ function parseJsonChunk(bytes: ArrayBuffer): unknown {
   const view = new DataView(bytes);
   if (bytes.byteLength < HEADER_BYTES || view.getUint32(0, true) !== MAGIC)
     throw new AvatarError(
-      translate("It is no GLB"),
-      translate("it does not begin as binary glTF does"),
+      translate("Not a GLB file"),
+      translate("it does not start like binary glTF"),
       translate(EXPORT_AS_GLB),
     );
   if (view.getUint32(4, true) !== 2)
     throw new AvatarError(
-      translate("It is of another age"),
-      translate("it is glTF of version {version}, and 2 is read here", { version: view.getUint32(4, true) }),
+      translate("Unsupported glTF version"),
+      translate("version {version}; only version 2 is supported", { version: view.getUint32(4, true) }),
       exportAgainHint(),
     );
   if (bytes.byteLength < HEADER_BYTES + CHUNK_HEADER_BYTES || view.getUint32(8, true) > bytes.byteLength)
-    throw fileBroken(translate("it ends before it should"));
+    throw fileBroken(translate("the file is truncated"));
   const length = view.getUint32(HEADER_BYTES, true);
   const begin = HEADER_BYTES + CHUNK_HEADER_BYTES;
   if (view.getUint32(HEADER_BYTES + 4, true) !== JSON_CHUNK || begin + length > bytes.byteLength)
-    throw fileBroken(translate("its description is not where it should be"));
+    throw fileBroken(translate("the JSON chunk is missing or too long"));
   try {
     return JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, begin, length)));
   } catch {
-    throw fileBroken(translate("its description cannot be read"));
+    throw fileBroken(translate("the JSON chunk cannot be parsed"));
   }
 }
 

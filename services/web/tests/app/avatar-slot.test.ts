@@ -191,8 +191,8 @@ describe("what cannot be", () => {
     await casting.load(file({ without: ["leftHand"] }, "handless.glb"));
     await casting.load(new File(["solid cube"], "cube.glb"));
     expect(visit.problems.map(([name, title, detail]) => [name, title, detail])).toEqual([
-      ["handless.glb", "It is no humanoid that can dance", "these bones were not found: left hand"],
-      ["cube.glb", "It is no GLB", "it does not begin as binary glTF does"],
+      ["handless.glb", "No usable humanoid", "missing bones: left hand"],
+      ["cube.glb", "Not a GLB file", "it does not start like binary glTF"],
     ]);
     expect([visit.shown, visit.files.get("avatar")?.name]).toEqual([
       { name: "sato.v2", dancing: true, reading: null },

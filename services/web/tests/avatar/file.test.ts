@@ -68,20 +68,20 @@ describe("usable files", () => {
 describe("unusable files", () => {
   test("are other formats or versions of glTF", () => {
     expect(errorOf(new TextEncoder().encode('{"asset":{"version":"2.0"},"nodes":[]}').buffer).title).toBe(
-      "It is no GLB",
+      "Not a GLB file",
     );
-    expect(errorOf(new ArrayBuffer(3)).title).toBe("It is no GLB");
+    expect(errorOf(new ArrayBuffer(3)).title).toBe("Not a GLB file");
     expect(errorOf(glb(createDescription(), { version: 1 })).detail).toContain("version 1");
   });
 
   test("are truncated or have a broken description", () => {
     const whole = glb(createDescription());
     for (const length of [12, 19, whole.byteLength - 1])
-      expect(errorOf(whole.slice(0, length)).detail).toContain("ends before");
-    expect(errorOf(glb(null, { text: '{"nodes": [' })).detail).toContain("cannot be read");
+      expect(errorOf(whole.slice(0, length)).detail).toContain("truncated");
+    expect(errorOf(glb(null, { text: '{"nodes": [' })).detail).toContain("cannot be parsed");
     const elsewhere = glb(createDescription());
     new DataView(elsewhere).setUint32(12, 1e6, true);
-    expect(errorOf(elsewhere).detail).toContain("not where it should be");
+    expect(errorOf(elsewhere).detail).toContain("missing or too long");
   });
 
   test("lack bones, and the missing ones are named", () => {
@@ -98,7 +98,7 @@ describe("unusable files", () => {
   });
 
   test("have no mesh, external files or an unsupported compression", () => {
-    expect(errorOf(glb({ ...createDescription(), meshes: [] })).title).toBe("There is nothing to see");
+    expect(errorOf(glb({ ...createDescription(), meshes: [] })).title).toBe("Nothing to draw");
     expect(
       errorOf(glb({ ...createDescription(), images: [{ uri: "https://example.org/skin.png" }] })).detail,
     ).toContain("skin.png");
@@ -111,7 +111,7 @@ describe("unusable files", () => {
   });
 
   test("are too large, with the size and the limit", () => {
-    expect(fileTooLarge(MAX_FILE_BYTES + 1).detail).toBe("it has 101 MB, and 100 MB are the most");
-    expect(errorOf(new ArrayBuffer(MAX_FILE_BYTES + 1)).title).toBe("It is too large");
+    expect(fileTooLarge(MAX_FILE_BYTES + 1).detail).toBe("101 MB; the limit is 100 MB");
+    expect(errorOf(new ArrayBuffer(MAX_FILE_BYTES + 1)).title).toBe("File too large");
   });
 });

@@ -33,8 +33,8 @@ describe("a parsed model", () => {
     const cut = whole.slice(0, end);
     new DataView(cut.buffer).setUint32(8, end, true);
     await expect(AvatarModel.parse(cut.buffer, "mine")).rejects.toMatchObject({
-      name: "AvatarProblem",
-      title: "It is broken",
+      name: "AvatarError",
+      title: "File damaged",
     });
     await expect(AvatarModel.parse(new ArrayBuffer(8), "mine")).rejects.toBeInstanceOf(AvatarError);
   });
