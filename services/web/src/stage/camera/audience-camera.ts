@@ -30,7 +30,7 @@ const REFERENCE_TRANSPORT_SHARE = 110 / 900;
  * without, in metres; share of the picture between feet and sheet; limit of the visible height.
  */
 const HEADER_HEIGHT_PX = 80;
-const [ROOMY, TALL] = [2, 1.75];
+const [HEIGHT_WITH_HEADROOM_M, STANDING_HEIGHT_M] = [2, 1.75];
 const FOOT_MARGIN_SHARE = 0.03;
 const MAX_VISIBLE_HEIGHT_M = 9;
 const HALF_FOV_RAD = (13 * Math.PI) / 180;
@@ -97,7 +97,7 @@ export class AudienceCamera {
   /** Choice of the user; null until they choose. */
   #followChoice: boolean | null = null;
   /** True if the user has dragged the view away from the motion's camera. */
-  #dragged = false;
+  #isDragged = false;
   /** Progress of the blend to the motion's camera, 0..1. */
   #blendShare = 0;
   /** True if this motion's camera has been used: the first time there is a cut to it. */
@@ -115,10 +115,10 @@ export class AudienceCamera {
    * framed between them; a single one is centred if the centre is free.
    */
   set coveredSides({ left, right, width }: { left: number; right: number; width: number }) {
-    const free = 1 - (left + right) / width;
-    const narrow = free < MIN_FREE_SHARE;
-    this.#freeShare = narrow ? 1 : free;
-    this.#freeCentre = narrow ? 0 : (left - right) / 2 / width;
+    const freeShare = 1 - (left + right) / width;
+    const isTooNarrow = freeShare < MIN_FREE_SHARE;
+    this.#freeShare = isTooNarrow ? 1 : freeShare;
+    this.#freeCentre = isTooNarrow ? 0 : (left - right) / 2 / width;
     this.#soloShift = Math.max(left, right) / width > MAX_COVERED_SHARE ? this.#freeCentre : 0;
   }
 
@@ -128,12 +128,12 @@ export class AudienceCamera {
    */
   setFraming(framing: Framing, height: number, sheetHeight = 0): void {
     const [visible, look] = FRAMING_VIEWS[framing];
-    const lost = Math.max(0, (TRANSPORT_HEIGHT_PX[framing] ?? 0) / height - REFERENCE_TRANSPORT_SHARE);
+    const coveredShare = Math.max(0, (TRANSPORT_HEIGHT_PX[framing] ?? 0) / height - REFERENCE_TRANSPORT_SHARE);
     this.#isNarrow = framing === "phone" || framing === "sheet";
     this.#targetFraming =
       framing === "sheet" && sheetHeight > 0
         ? framingAboveSheet(visible, sheetHeight / height, HEADER_HEIGHT_PX / height)
-        : [visible / (1 - lost), look - (visible / (1 - lost)) * (lost / 2)];
+        : [visible / (1 - coveredShare), look - (visible / (1 - coveredShare)) * (coveredShare / 2)];
   }
 
   resize(aspect: number): void {
@@ -150,7 +150,7 @@ export class AudienceCamera {
    * reduced motion.
    */
   get followsMotionCamera(): boolean {
-    return this.#hasMotionCamera && !this.#dragged && (this.#followChoice ?? !this.reducedMotion);
+    return this.#hasMotionCamera && !this.#isDragged && (this.#followChoice ?? !this.reducedMotion);
   }
 
   /** True if the view is entirely the audience's. */
@@ -166,12 +166,12 @@ export class AudienceCamera {
   /** Follow the motion's camera, or return to the audience view. The choice holds until the next call. */
   followMotionCamera(enabled: boolean): void {
     this.#followChoice = enabled;
-    this.#dragged = false;
+    this.#isDragged = false;
   }
 
   /** Start another motion: cut to its camera, and follow it even if the user dragged away from the one before. */
   cut(): void {
-    this.#dragged = false;
+    this.#isDragged = false;
     this.#hasSeenMotionCamera = false;
     this.#hasMotionCamera = false;
     this.#blendShare = 0;
@@ -217,7 +217,7 @@ export class AudienceCamera {
    * Turn the audience view by a drag, in radians. It springs back 4 s after the last drag. Leave the motion's camera.
    */
   orbit(yaw: number, pitch: number): void {
-    this.#dragged ||= this.followsMotionCamera;
+    this.#isDragged ||= this.followsMotionCamera;
     this.#yaw = Math.min(MAX_YAW_RAD, Math.max(-MAX_YAW_RAD, this.#yaw + yaw));
     this.#pitch = Math.min(MAX_PITCH_RAD, Math.max(MIN_PITCH_RAD, this.#pitch + pitch));
     this.#sinceOrbitS = 0;
@@ -329,6 +329,9 @@ function framingAboveSheet(
   header: number,
 ): readonly [visible: number, look: number] {
   const foot = 1 - sheet - FOOT_MARGIN_SHARE;
-  const visible = Math.min(MAX_VISIBLE_HEIGHT_M, Math.max(minVisible, ROOMY / Math.max(foot - header, 1e-3)));
-  return [visible, Math.max(visible * (foot - 0.5), TALL - visible * (0.5 - header))];
+  const visible = Math.min(
+    MAX_VISIBLE_HEIGHT_M,
+    Math.max(minVisible, HEIGHT_WITH_HEADROOM_M / Math.max(foot - header, 1e-3)),
+  );
+  return [visible, Math.max(visible * (foot - 0.5), STANDING_HEIGHT_M - visible * (0.5 - header))];
 }
