@@ -225,7 +225,7 @@ class Report(_MapMessage):
     buffer: Annotated[SafeInteger, Field(description="Microseconds of motion ready ahead of the play position.")]
     decode: Annotated[SafeInteger, Field(description="Microseconds to decode a block.")] = 0
     frame: Annotated[SafeInteger, Field(description="Microseconds to draw a frame.")] = 0
-    hidden: Annotated[Flag, Field(description="Whether the page is in the background.")] = False
+    hidden: Annotated[Flag, Field(description="True while the page is in the background.")] = False
 
 
 @dataclass(frozen=True, slots=True)

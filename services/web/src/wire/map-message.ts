@@ -100,7 +100,7 @@ const NAME_BY_TYPE = new Map(
   Object.keys(MESSAGE_FIELDS).map((name) => [MESSAGE_TYPES[name as MapMessageName], name as MapMessageName]),
 );
 
-/** Whether messages of this type byte are a map. */
+/** Returns true if messages of this type byte are a map. */
 export function isMapType(type: number): boolean {
   return NAME_BY_TYPE.has(type);
 }

@@ -174,7 +174,7 @@ export interface Report {
   decode: number;
   /** Microseconds to draw a frame. */
   frame: number;
-  /** Whether the page is in the background. */
+  /** True while the page is in the background. */
   hidden: boolean;
 }
 

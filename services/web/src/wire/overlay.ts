@@ -13,7 +13,7 @@ export interface Overlay {
   due: number;
   /** By limb number three rotation vectors, nine integers in units of pi/32767. */
   limbs: Map<number, Int16Array>;
-  /** The same limbs in the frames before, oldest first, `OVERLAY_FRAME_INTERVAL_US` apart. */
+  /** Frames before this one with the same limbs, oldest first, `OVERLAY_FRAME_INTERVAL_US` apart. */
   earlier: Map<number, Int16Array>[];
 }
 
