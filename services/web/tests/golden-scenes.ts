@@ -1,7 +1,4 @@
-/**
- * The golden camera of `proto/vectors/scene.json`: 78 frames at 30 fps in three blocks, as long as the first golden
- * motion.
- */
+/** Camera of `proto/vectors/scene.json`: 78 frames at 30 fps in three blocks, the timing of the first golden motion. */
 
 import { decodeBase64, loadVectors } from "./golden-vectors";
 
@@ -12,17 +9,17 @@ interface Scenes {
 
 const golden = loadVectors<Scenes>("scene");
 
-/** Return the Description's map of a golden camera or light. */
-export function goldenScene(index = 0): { type: string } & Record<string, unknown> {
-  return golden.tracks[index] as { type: string } & Record<string, unknown>;
+/** Returns a golden camera or light as the map of a Description. */
+export function goldenScene(which = 0): { type: string } & Record<string, unknown> {
+  return golden.tracks[which] as { type: string } & Record<string, unknown>;
 }
 
-/** The camera's three blocks at the lower and at the higher bitrate level. */
+/** The camera's three blocks at its lower and its higher level. */
 export const goldenCameraBlocks = [0, 3].map((first) =>
   golden.valid.slice(first, first + 3).map((vector) => decodeBase64(vector.block)),
 );
 
-/** Return the numbers of the first and the last frame of a camera block at the higher bitrate level. */
+/** Returns the values at the first and last frame of block `index` of the camera at its higher level. */
 export function goldenCameraNumbers(index: number): [first: number[], last: number[]] {
   const { values } = golden.valid[3 + index];
   return [values[0].numbers, values[2].numbers];
