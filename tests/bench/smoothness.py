@@ -15,17 +15,17 @@ from typing import NamedTuple
 import numpy as np
 
 from bunraku.demo import choreography
-from bunraku.marionette import shoulder as limit
-from bunraku.marionette import vector
 from bunraku.marionette.bodies import BODIES
 from bunraku.marionette.constants import MAX_REACH, MIN_REACH
 from bunraku.marionette.elbow import Elbow
-from bunraku.marionette.elbow_step import elevation
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.merge import Marionette, apply_overlay
 from bunraku.marionette.ownership import LimbGrant, LimbInput
 from bunraku.marionette.proportions import Proportions
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import shoulder as limit
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import elevation
+from bunraku.marionette.solver.vector import Vector
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure, standard_figure
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import MAX_HAND_SPEED, MAX_LEG_SPEED, MAX_TARGET_DURATION_US
 from bunraku.marionette.controlled_limb import ControlledHand, ControlledLeg
 from bunraku.marionette.handover import Handover
 from bunraku.marionette.limb_rig import Limb, Pose
 from bunraku.marionette.limb_target import HOLD_TIMEOUT_US, MAX_REORDERED_INPUTS, clamp_to_reach
 from bunraku.marionette.ownership import INPUT_TIMEOUT_US
-from bunraku.marionette.vector import JointRotations, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import JointRotations, Vector
 from bunraku.motion.skeleton import Figure
 
 

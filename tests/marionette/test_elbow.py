@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bunraku.marionette import shoulder as limit
-from bunraku.marionette import vector
 from bunraku.marionette.constants import MAX_REACH, MIN_REACH
 from bunraku.marionette.elbow import Elbow
-from bunraku.marionette.elbow_step import elevation, lift_angle, vertical_normal
 from bunraku.marionette.limb_rig import ArmRig, Limb
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import shoulder as limit
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import elevation, lift_angle, vertical_normal
+from bunraku.marionette.solver.vector import Vector
 from bunraku.motion.skeleton import standard_figure
 from tests.bench.smoothness import measure_elbow_steps, slow_paths
 

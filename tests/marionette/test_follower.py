@@ -5,10 +5,10 @@ from math import cos, sin
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import MAX_LIMB_SPEED, SHOULDER_CLEARANCE
 from bunraku.marionette.follower import Follower
-from bunraku.marionette.vector import ZERO, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import ZERO, Vector
 
 FRAME_S = 1.0 / 60.0
 MAX_ACCELERATION = 75.0

@@ -12,8 +12,8 @@ from bunraku.marionette import arm_batch, bend_table
 from bunraku.marionette.controlled_limb import ControlledHand
 from bunraku.marionette.limb_rig import Limb
 from bunraku.marionette.proportions import Proportions
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.vector import ZERO
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.vector import ZERO
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import standard_figure
 from bunraku.runtime.compile_cache import compile_cache_folder

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import constants, leg, vector
+from bunraku.marionette import constants, leg
 from bunraku.marionette.limb_rig import LegRig, Limb
-from bunraku.marionette.vector import JointRotations, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import JointRotations, Vector
 from bunraku.motion.skeleton import standard_figure
 from tests.marionette.fixtures import random_motion
 

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import constants, vector
+from bunraku.marionette import constants
 from bunraku.marionette.limb_rig import ArmRig, LegRig, Limb
 from bunraku.marionette.proportions import ProportionsError
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import Vector
 from bunraku.motion import rotation, skeleton
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, Figure, standard_figure

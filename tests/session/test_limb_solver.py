@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bunraku.marionette.solver import PYTHON_SOLVER
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER
 from bunraku.session import limb_solver
 
 

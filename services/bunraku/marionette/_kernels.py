@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 from numba import config, njit
 
-from bunraku.marionette import arm_batch, vector
+from bunraku.marionette import arm_batch
 from bunraku.marionette.arm import BendTable
 from bunraku.marionette.arm_batch import ArmConstants, SolvedArms, arm_constants
-from bunraku.marionette.elbow_step import ElbowState
 from bunraku.marionette.limb_rig import BEND_AXIS, UP, ArmRig, Limb
 from bunraku.marionette.proportions import Proportions
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.twist_step import NO_TWIST_LAG
-from bunraku.marionette.vector import ZERO
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import ElbowState
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.twist_step import NO_TWIST_LAG
+from bunraku.marionette.solver.vector import ZERO
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import standard_figure
 

@@ -17,10 +17,10 @@ from math import atan2, cos, hypot, sin
 import numpy as np
 import numpy.typing as npt
 
-from bunraku.marionette import planar_arm
 from bunraku.marionette.constants import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD
-from bunraku.marionette.planar_arm import ArmGeometry
 from bunraku.marionette.proportions import Proportions
+from bunraku.marionette.solver import planar_arm
+from bunraku.marionette.solver.planar_arm import ArmGeometry
 from bunraku.motion.rotation import Array
 
 BendTable = npt.NDArray[np.float16]

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from math import atan2, cbrt, copysign, hypot, pi, sqrt
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import (
     DISTANCE_WEIGHT,
     MAX_TWIST_LAG_RAD,
@@ -18,9 +17,10 @@ from bunraku.marionette.constants import (
     SWIVEL_RESET_WEIGHT,
 )
 from bunraku.marionette.limb_rig import ArmRig
-from bunraku.marionette.solver import LimbSolver
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.limb_solver import LimbSolver
+from bunraku.marionette.solver.vector import JointRotations, Quaternion, Vector
 from bunraku.marionette.twist import TwistLimiter
-from bunraku.marionette.vector import JointRotations, Quaternion, Vector
 
 
 class ArmBlend:

@@ -7,7 +7,6 @@ is a hand tip in the shoulder's frame in arm lengths, or a thigh angle in radian
 
 from __future__ import annotations
 
-from bunraku.marionette import vector
 from bunraku.marionette.blend import ArmBlend
 from bunraku.marionette.constants import (
     ARRIVAL_TOLERANCE,
@@ -20,12 +19,13 @@ from bunraku.marionette.constants import (
     THIGH_ACCELERATION,
 )
 from bunraku.marionette.elbow import Elbow
-from bunraku.marionette.elbow_step import lift_angle
 from bunraku.marionette.follower import Follower
 from bunraku.marionette.handover import DirectionAlignment, JointBlend, return_acceleration
 from bunraku.marionette.limb_rig import ArmRig, LegRig, Limb, Pose
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.vector import ZERO, JointRotations, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import lift_angle
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.vector import ZERO, JointRotations, Vector
 from bunraku.motion.skeleton import Figure
 
 

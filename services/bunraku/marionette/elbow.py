@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from bunraku.marionette import vector
 from bunraku.marionette.arm import Arm
-from bunraku.marionette.elbow_step import ArmConfiguration, ElbowState
-from bunraku.marionette.shoulder import ShoulderLimit
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import ArmConfiguration, ElbowState
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.shoulder import ShoulderLimit
+from bunraku.marionette.solver.vector import Vector
 
 
 class Elbow:

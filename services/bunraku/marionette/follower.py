@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import inf
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import MAX_TARGET_SPEED
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.vector import ZERO, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.vector import ZERO, Vector
 
 
 class Follower:

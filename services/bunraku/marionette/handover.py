@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from math import atan2, pi, sqrt
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import (
     BLEND_IN_S,
     BLEND_OUT_S,
@@ -16,7 +15,8 @@ from bunraku.marionette.constants import (
     MIN_RETURN_ACCELERATION,
     RETURN_DURATION_S,
 )
-from bunraku.marionette.vector import JointRotations, Quaternion, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import JointRotations, Quaternion, Vector
 
 
 def return_acceleration(distance: float, speed: float, max_acceleration: float) -> float:

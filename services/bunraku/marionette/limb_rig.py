@@ -14,15 +14,15 @@ from collections.abc import Sequence
 from enum import IntEnum
 from math import atan2, pi
 
-from bunraku.marionette import vector
 from bunraku.marionette.arm import Arm
 from bunraku.marionette.bend_table import load_bend_table
-from bunraku.marionette.elbow_step import elevation, vertical_normal
 from bunraku.marionette.leg import clamp_thigh, knee_bend
 from bunraku.marionette.proportions import Proportions
-from bunraku.marionette.shoulder import make_shoulder_limit
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.vector import JointRotations, Quaternion, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import elevation, vertical_normal
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.shoulder import make_shoulder_limit
+from bunraku.marionette.solver.vector import JointRotations, Quaternion, Vector
 from bunraku.motion.skeleton import JOINT_INDEX, Figure
 
 Pose = Sequence[Sequence[float]]

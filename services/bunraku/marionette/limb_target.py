@@ -16,10 +16,10 @@ from enum import IntEnum
 from math import isfinite
 from typing import NamedTuple
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import MAX_HAND_SPEED, MAX_LEG_SPEED, MAX_TARGET_DURATION_US
 from bunraku.marionette.leg import clamp_thigh
-from bunraku.marionette.vector import ZERO, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import ZERO, Vector
 
 HOLD_TIMEOUT_US = 250_000
 """Time without an input after which the limb holds still; also the largest assumed delay of an input."""

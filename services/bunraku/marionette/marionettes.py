@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from bunraku.marionette.merge import Marionette
 from bunraku.marionette.ownership import INITIAL_EPOCHS, LIMBS_PER_PERFORMER, Ownership
 from bunraku.marionette.recorder import CommandKind, CommandRecorder
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.vector import JointRotations
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.vector import JointRotations
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 from bunraku.wire.limbs import MAX_PERFORMERS

@@ -15,8 +15,8 @@ from bunraku.marionette.controlled_limb import ControlledHand, ControlledLeg
 from bunraku.marionette.handover import Handover
 from bunraku.marionette.limb_rig import ALL_LIMBS, Limb, Pose
 from bunraku.marionette.ownership import LIMBS_PER_PERFORMER, Ownership
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.vector import JointRotations
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.vector import JointRotations
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 

@@ -15,7 +15,7 @@ from typing import Literal
 from bunraku.marionette.limb_rig import ALL_LIMBS, Limb
 from bunraku.marionette.limb_target import InputKind, LateInput, LimbTarget
 from bunraku.marionette.recorder import CommandKind, CommandRecorder
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver.vector import Vector
 from bunraku.wire.limbs import MAX_LIMBS
 
 INPUT_TIMEOUT_US = 500_000

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from bunraku.marionette import vector
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.twist_step import NO_TWIST_LAG, BoneDirections
-from bunraku.marionette.vector import JointRotations, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.twist_step import NO_TWIST_LAG, BoneDirections
+from bunraku.marionette.solver.vector import JointRotations, Vector
 
 
 class TwistLimiter:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from threading import Lock
 
 from bunraku.kernels import load_kernels
-from bunraku.marionette.solver import LimbSolver
+from bunraku.marionette.solver.limb_solver import LimbSolver
 from bunraku.runtime.compile_cache import compile_cache_folder
 
 _load_lock = Lock()

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import msgpack
 
 from bunraku.codec.container import StoredMotion
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueEntry, RevisionConflict
 from bunraku.playout import timeline
 from bunraku.runtime import request_id

@@ -20,7 +20,7 @@ from bunraku.codec.container import StoredMotion
 from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes, OverlayJoints
 from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, LimbRefusal
-from bunraku.marionette.solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.messaging.bus import Bus, Subscription
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline

@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import bend_table, planar_arm
+from bunraku.marionette import bend_table
 from bunraku.marionette.arm import Arm
 from bunraku.marionette.constants import MAX_TIP_DISTANCE
 from bunraku.marionette.proportions import Proportions
+from bunraku.marionette.solver import planar_arm
 from tests.marionette.fixtures import ARM_PROPORTIONS
 
 shares = st.floats(0.0, 1.0)

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from math import atan2, copysign, pi
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S
-from bunraku.marionette.vector import JointRotations, Quaternion, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import JointRotations, Quaternion, Vector
 
 NO_TWIST_LAG = (0.0, 0.0, 0.0)
 

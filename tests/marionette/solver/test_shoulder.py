@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import vector
-from bunraku.marionette.shoulder import (
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.shoulder import (
     LEFT_CAPS,
     angle_to_allowed,
     depth_in_caps,
@@ -15,7 +15,7 @@ from bunraku.marionette.shoulder import (
     min_allowed_turn,
     step_toward,
 )
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver.vector import Vector
 
 SHOULDER = make_shoulder_limit(right=False)
 parts = st.floats(-1.0, 1.0)

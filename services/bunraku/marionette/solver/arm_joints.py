@@ -5,10 +5,10 @@ Plain functions of plain numbers, so that `_kernels` can compile them.
 
 from __future__ import annotations
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import MAX_WRIST_BEND_RAD
-from bunraku.marionette.planar_arm import ArmGeometry, close_chain
-from bunraku.marionette.vector import JointRotations, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.planar_arm import ArmGeometry, close_chain
+from bunraku.marionette.solver.vector import JointRotations, Vector
 
 
 def joint_positions(bones: tuple[Vector, Vector, Vector], joints: JointRotations) -> tuple[Vector, Vector, Vector]:

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import MAX_LIMB_SPEED, SHOULDER_CLEARANCE
-from bunraku.marionette.vector import ZERO, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import ZERO, Vector
 
 
 def advance(

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from bunraku.marionette import arm_joints, elbow_step, follower_step, twist_step
-from bunraku.marionette.elbow_step import ElbowState
-from bunraku.marionette.planar_arm import ArmGeometry
-from bunraku.marionette.shoulder import ShoulderLimit
-from bunraku.marionette.twist_step import BoneDirections
-from bunraku.marionette.vector import JointRotations, Vector
+from bunraku.marionette.solver import arm_joints, elbow_step, follower_step, twist_step
+from bunraku.marionette.solver.elbow_step import ElbowState
+from bunraku.marionette.solver.planar_arm import ArmGeometry
+from bunraku.marionette.solver.shoulder import ShoulderLimit
+from bunraku.marionette.solver.twist_step import BoneDirections
+from bunraku.marionette.solver.vector import JointRotations, Vector
 from bunraku.motion.rotation import Array
 
 

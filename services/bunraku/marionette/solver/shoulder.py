@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from math import acos, atan2, cos, inf, nan, pi, sin, sqrt
 
-from bunraku.marionette import vector
 from bunraku.marionette.constants import CAP_EDGE_MARGIN_RAD, LEFT_SHOULDER_CAPS
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import Vector
 
 ExclusionCap = tuple[Vector, float]
 """Unit axis and radius in radians of a cap of excluded directions."""

@@ -16,9 +16,6 @@ from __future__ import annotations
 from math import asin, atan2, cos, exp, isnan, log, pi, sin, sqrt
 from typing import NamedTuple
 
-from bunraku.marionette import planar_arm as link
-from bunraku.marionette import shoulder as limit
-from bunraku.marionette import vector
 from bunraku.marionette.constants import (
     CAP_CLEARANCE_RAD,
     HALF_SWING_DISTANCE,
@@ -32,9 +29,12 @@ from bunraku.marionette.constants import (
     MIN_SWING_SPEED,
     SWING_HALF_LIFE_S,
 )
-from bunraku.marionette.planar_arm import ArmGeometry
-from bunraku.marionette.shoulder import ShoulderLimit
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import planar_arm as link
+from bunraku.marionette.solver import shoulder as limit
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.planar_arm import ArmGeometry
+from bunraku.marionette.solver.shoulder import ShoulderLimit
+from bunraku.marionette.solver.vector import Vector
 from bunraku.motion.rotation import Array
 
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import vector
-from bunraku.marionette.vector import Quaternion, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import Quaternion, Vector
 from bunraku.motion import rotation
 
 parts = st.floats(-2.0, 2.0)
