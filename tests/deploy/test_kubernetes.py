@@ -245,9 +245,7 @@ def test_only_the_gateway_is_reachable_from_outside(rendered: RenderedOverlay) -
                 ]
                 assert pods
                 for pod in pods:
-                    assert port["port"] in {
-                        per_replica["name"] for per_replica in pod["spec"]["containers"][0]["ports"]
-                    }
+                    assert port["port"] in {named["name"] for named in pod["spec"]["containers"][0]["ports"]}
 
 
 def test_pods_are_replaced_one_at_a_time(rendered: RenderedOverlay) -> None:
