@@ -12,7 +12,7 @@ BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 # the machine's Node if it is new enough, else the one that setup puts here
 export PATH := $(CURDIR)/.tools/node:$(PATH)
-WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/vite.config.ts services/web/vite.embed.config.ts services/web/lean-three.ts services/web/unused-members.ts proto/prior.json -type f 2>/dev/null)
+WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/vite.config.ts services/web/vite.embed.config.ts proto/prior.json proto/constants.json -type f 2>/dev/null)
 
 .PHONY: pictures test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
 
@@ -54,7 +54,7 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python services/bunraku/codec/*.py proto/prior.json services/bunraku/motion/_kernels.py services/bunraku/marionette/*.py
+.setup/warm: .setup/python $(wildcard services/bunraku/*/_kernels.py services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py services/bunraku/marionette/*.py) proto/prior.json proto/constants.json
 	@echo "setup: compiling reader, codec and what moves limbs"
 	@$(BIN)/bunraku warm
 	@touch $@

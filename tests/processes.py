@@ -1,4 +1,4 @@
-"""Servers of others that tests own: each a process with a port and a folder of its own, ended by its number."""
+"""Third-party servers for tests. Each is a process with its own port and folder, and is ended by its process id."""
 
 from __future__ import annotations
 
@@ -21,22 +21,25 @@ import pytest
 
 START_TIMEOUT_S = 30.0
 PORTS_PER_WORKER = 1_000
-"""Ports that one of the processes of the tests has."""
+"""Number of ports of an xdist worker."""
 
 
 def find_program(program: str, *folders: Path) -> str:
-    """Where a program is; without it a test is skipped, and fails in CI."""
-    found = shutil.which(program, path=os.pathsep.join([os.environ.get("PATH", ""), "/usr/sbin", *map(str, folders)]))
-    if found is None:
+    """Return the path of a program. Without it, skip the test, or fail in CI."""
+    path = shutil.which(program, path=os.pathsep.join([os.environ.get("PATH", ""), "/usr/sbin", *map(str, folders)]))
+    if path is None:
         if os.environ.get("CI"):
-            pytest.fail(f"in CI {program} must be there")
+            pytest.fail(f"{program} is missing in CI")
         pytest.skip(f"{program} is not installed")
-    return found
+    return path
 
 
 def free_port() -> int:
-    """A port that nobody has, below those that a system gives who asks for any: one of these may be another test's
-    before its server has started, or while it is killed."""
+    """Return a free port below the ephemeral range.
+
+    A port of the ephemeral range could be assigned to another socket before the server has started, or while it is
+    stopped.
+    """
     for port in _PORTS:
         with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
             break
@@ -44,7 +47,7 @@ def free_port() -> int:
 
 
 def _ports() -> Iterator[int]:
-    """Those of this process of the tests, over and over: another begins elsewhere, and another run mostly so."""
+    """Yield the ports of this xdist worker in a cycle. The start depends on the process id."""
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     first = 12_000 + PORTS_PER_WORKER * (worker % 20)
     for number in itertools.count(os.getpid()):
@@ -55,24 +58,24 @@ _PORTS = _ports()
 
 
 class ServerProcess:
-    """A server process that can be killed, stood still and started again at the same place."""
+    """Server process that can be paused, killed and restarted on the same port and folder."""
 
     def __init__(
         self, command: list[str], port: int, folder: Path, user: str | None = None, ready: Sequence[str] = ()
     ) -> None:
-        """`ready` is a command that succeeds once it takes connections; without one its port says so."""
+        """`ready` is a command that succeeds once the server is ready. Without it, an open port is sufficient."""
         self.command, self.port, self.folder, self._user, self._ready = command, port, folder, user, ready
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
-        """Start it; returns when it takes connections."""
+        """Start the process and wait until it accepts connections."""
         log = self.folder / "log"
-        with log.open("ab") as said:
+        with log.open("ab") as output:
             self._process = subprocess.Popen(
-                self.command, stdout=said, stderr=said, stdin=subprocess.DEVNULL, cwd=self.folder, user=self._user
+                self.command, stdout=output, stderr=output, stdin=subprocess.DEVNULL, cwd=self.folder, user=self._user
             )
-        end = time.monotonic() + START_TIMEOUT_S
-        while time.monotonic() < end and self._process.poll() is None:
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while time.monotonic() < deadline and self._process.poll() is None:
             try:
                 socket.create_connection(("127.0.0.1", self.port), 1).close()
                 if not self._ready or subprocess.run(self._ready, stdout=subprocess.DEVNULL).returncode == 0:
@@ -85,22 +88,22 @@ class ServerProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process that runs."""
+        """Id of the running process."""
         assert self._process is not None
         return self._process.pid
 
     def pause(self) -> None:
-        """It, and its own processes, stand still; returns when they do."""
-        everyone = self._process_tree()
-        for pid in everyone:
+        """Pause the process and its children. Return when they have stopped."""
+        pids = self._process_tree()
+        for pid in pids:
             _send_signal(pid, signal.SIGSTOP)
-        end = time.monotonic() + START_TIMEOUT_S
-        while any(_process_state(pid) not in "TXZ" for pid in everyone):
-            assert time.monotonic() < end, "it does not stand still"
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while any(_process_state(pid) not in "TXZ" for pid in pids):
+            assert time.monotonic() < deadline, "the process did not pause"
             time.sleep(0.005)
 
     def resume(self) -> None:
-        """They go on."""
+        """Resume the process and its children."""
         for pid in self._process_tree():
             _send_signal(pid, signal.SIGCONT)
 
@@ -109,13 +112,13 @@ class ServerProcess:
         return [pid, *map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())]
 
     def kill(self) -> None:
-        """End it, and its own processes, as a power cut does."""
+        """Kill the process and its children with SIGKILL, like a power cut."""
         for pid in self._process_tree():
             _send_signal(pid, signal.SIGKILL)
         self._terminate(signal.SIGKILL)
 
     def stop(self) -> None:
-        """End it; nothing happens where it has ended."""
+        """Stop the process with SIGINT. Do nothing if it has ended."""
         self._terminate(signal.SIGINT)
 
     def _terminate(self, number: signal.Signals) -> None:
@@ -131,7 +134,7 @@ class ServerProcess:
 
 
 def cpu_seconds(pid: int) -> float:
-    """What a process has used of a processor in user and kernel mode, seconds, without its children's."""
+    """Return the CPU time of a process in user and kernel mode, in seconds, without its children."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -142,7 +145,7 @@ def _send_signal(pid: int, number: signal.Signals) -> None:
 
 
 def _process_state(pid: int) -> str:
-    """T: stands still; X: is gone."""
+    """Return the state letter of proc(5): T is stopped, Z a zombie, X dead or missing."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0].upper()
     except (FileNotFoundError, ProcessLookupError):
@@ -150,7 +153,7 @@ def _process_state(pid: int) -> str:
 
 
 @contextmanager
-def _run(server: ServerProcess) -> Iterator[ServerProcess]:
+def _run_process(server: ServerProcess) -> Iterator[ServerProcess]:
     try:
         server.start()
         yield server
@@ -160,16 +163,16 @@ def _run(server: ServerProcess) -> Iterator[ServerProcess]:
 
 @contextmanager
 def run_nats_server(folder: Path, *options: str) -> Iterator[ServerProcess]:
-    """A nats-server; skips the test where there is none."""
+    """Run a nats-server. Skip the test if none is installed."""
     port = free_port()
     program = find_program("nats-server")
-    with _run(ServerProcess([program, "-a", "127.0.0.1", "-p", str(port), *options], port, folder)) as server:
+    with _run_process(ServerProcess([program, "-a", "127.0.0.1", "-p", str(port), *options], port, folder)) as server:
         yield server
 
 
 @contextmanager
 def run_jetstream(folder: Path) -> Iterator[ServerProcess]:
-    """A nats-server that keeps what it is given, also when it is killed; skips the test where there is none."""
+    """Run a nats-server with durable storage. Skip the test if none is installed."""
     config = folder / "nats.conf"
     config.write_text(f'jetstream {{ store_dir: "{folder / "store"}" }}\n')
     with run_nats_server(folder, "-c", str(config)) as server:
@@ -177,16 +180,16 @@ def run_jetstream(folder: Path) -> Iterator[ServerProcess]:
 
 
 def nats_url_of(server: ServerProcess) -> str:
-    """The bus's address of a nats-server."""
+    """Return the URL of a nats-server for the setting BUNRAKU_BUS."""
     return f"nats://127.0.0.1:{server.port}"
 
 
 @contextmanager
 def run_postgres() -> Iterator[ServerProcess]:
-    """A PostgreSQL server without a password, its only user `postgres`; skips the test where there is none."""
+    """Run a PostgreSQL server without a password, with the user `postgres`. Skip the test if none is installed."""
     debian = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
     initdb, program = find_program("initdb", *debian), find_program("postgres", *debian)
-    # it refuses to run as root, and whom it runs as has no way into the tests' own folder
+    # it refuses to run as root, and another user cannot access the folder of the tests
     user = _unprivileged_user() if os.geteuid() == 0 else None
     with tempfile.TemporaryDirectory(prefix="bunraku-postgres-", dir="/tmp") as name:
         folder = Path(name)
@@ -207,10 +210,10 @@ def run_postgres() -> Iterator[ServerProcess]:
             "fsync": "off",
             "shared_buffers": "16MB",
         }
-        set_to = (word for option, value in options.items() for word in ("-c", f"{option}={value}"))
-        command = [program, "-D", str(folder / "data"), *set_to]
+        arguments = (word for option, value in options.items() for word in ("-c", f"{option}={value}"))
+        command = [program, "-D", str(folder / "data"), *arguments]
         ready = [find_program("pg_isready", *debian), "-q", "-h", "127.0.0.1", "-p", str(port)]
-        with _run(ServerProcess(command, port, folder, user, ready)) as server:
+        with _run_process(ServerProcess(command, port, folder, user, ready)) as server:
             yield server
 
 
@@ -221,14 +224,14 @@ def _unprivileged_user() -> str:
         except KeyError:
             continue
         return name
-    pytest.skip("PostgreSQL does not run as root, and there is nobody else")
+    pytest.skip("PostgreSQL does not run as root, and there is no other user")
 
 
 @contextmanager
 def run_s3_server(folder: Path) -> Iterator[ServerProcess]:
-    """moto's server, which speaks the S3 API and keeps everything in memory."""
+    """Run moto's server, an S3 API with storage in memory."""
     port = free_port()
-    with _run(
+    with _run_process(
         ServerProcess([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)], port, folder)
     ) as server:
         yield server

@@ -1,4 +1,4 @@
-"""Real servers for tests: the composed app on a free port of its own, keeping its things in a folder of its own."""
+"""Servers for tests: the composed app on a free port, with its own data folder."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def run_server(
     services: Collection[str] = SERVICES,
     **settings: object,
 ) -> Iterator[str]:
-    """The address of a server that runs in a thread until the block ends; it listens at `host`."""
+    """Run a server in a thread and yield its address."""
     listening = socket.create_server((host, 0))
     url = f"http://127.0.0.1:{listening.getsockname()[1]}"
     started, ended = threading.Event(), threading.Event()
@@ -33,13 +33,15 @@ def run_server(
 
     def run() -> None:
         async def until_ended() -> None:
-            given = Settings(data=data, **settings)  # type: ignore[arg-type]
-            serving = asyncio.create_task(serve(given, listening, demo=demo, on_ready=started.set, services=services))
-            ending = asyncio.create_task(asyncio.to_thread(ended.wait))
-            await asyncio.wait((serving, ending), return_when=asyncio.FIRST_COMPLETED)
+            server_settings = Settings(data=data, **settings)  # type: ignore[arg-type]
+            serving = asyncio.create_task(
+                serve(server_settings, listening, demo=demo, on_ready=started.set, services=services)
+            )
+            waiting = asyncio.create_task(asyncio.to_thread(ended.wait))
+            await asyncio.wait((serving, waiting), return_when=asyncio.FIRST_COMPLETED)
             ended.set()
             serving.cancel()
-            await asyncio.gather(serving, ending, return_exceptions=True)
+            await asyncio.gather(serving, waiting, return_exceptions=True)
             if not serving.cancelled() and (error := serving.exception()) is not None:
                 raise error
 
@@ -59,11 +61,11 @@ def run_server(
     finally:
         ended.set()
         thread.join(20)
-        assert not thread.is_alive(), "the server did not end"
+        assert not thread.is_alive(), "the server did not stop"
         assert not failures, failures
 
 
 def make_bvh_clip(seconds: float = 3.4, seed: int = 3, fps: float = 30.0) -> bytes:
-    """A small BVH file of arbitrary smooth movement."""
+    """Return a small BVH file with random smooth motion."""
     motion = random_motion(seconds, fps, seed)
     return write_bvh(Motion(motion.figure, fps, motion.root * 0.1 + [0, 0.85, 0], motion.rotations))

@@ -12,7 +12,7 @@ from tests.audio import make_tone, write_audio
 RUN = CliRunner()
 
 
-def test_upload_list_watch_and_version_speak_json(server: str, clip_file: Path) -> None:
+def test_upload_list_watch_and_version_print_json(server: str, clip_file: Path) -> None:
     uploaded = RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"])
     assert uploaded.exit_code == 0, uploaded.output
     motion = json.loads(uploaded.stdout)["id"]
@@ -21,14 +21,14 @@ def test_upload_list_watch_and_version_speak_json(server: str, clip_file: Path) 
     for address in (motion, f"{server}/v1/motions/{motion}", f"{server}/v1/motions/{motion}/stream"):
         watched = RUN.invoke(app, ["watch", address, "--server", server, "--seconds", "0.4", "--json"])
         assert watched.exit_code == 0, watched.output
-        figures = json.loads(watched.stdout)
-        assert figures["frames"] > 0
-        assert figures["first_pose_ms"] > 0
-        assert (figures["camera_blocks"], figures["camera"]) == (0, None)
+        statistics = json.loads(watched.stdout)
+        assert statistics["frames"] > 0
+        assert statistics["first_pose_ms"] > 0
+        assert (statistics["camera_blocks"], statistics["camera"]) == (0, None)
     assert json.loads(RUN.invoke(app, ["version", "--json"]).stdout) == {"version": __version__}
 
 
-def test_audio_is_added_and_told(server: str, clip_file: Path, tmp_path: Path) -> None:
+def test_audio_creates_a_motion_with_sound(server: str, clip_file: Path, tmp_path: Path) -> None:
     song = str(write_audio(tmp_path / "song.wav", make_tone(1.0, 48_000), 48_000))
     motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
     added = RUN.invoke(app, ["audio", f"{server}/v1/motions/{motion}", song, "--json"])
@@ -42,7 +42,7 @@ def test_audio_is_added_and_told(server: str, clip_file: Path, tmp_path: Path) -
     assert json.loads(watched.stdout)["audio_blocks"] > 0
 
 
-def test_a_camera_and_lights_are_added_from_keyframes(server: str, clip_file: Path, tmp_path: Path) -> None:
+def test_scene_creates_a_motion_with_lights(server: str, clip_file: Path, tmp_path: Path) -> None:
     motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
     show = tmp_path / "show.json"
     light = {"time": 0, "position": [-2, 4, 4], "colour": [1, 0.8, 0.5], "intensity": 1}
@@ -54,32 +54,32 @@ def test_a_camera_and_lights_are_added_from_keyframes(server: str, clip_file: Pa
     shown = RUN.invoke(app, ["scene", motion, str(show), "--server", server])
     assert shown.stdout == f"motion, light of {lit['name']}: {lit['id']}\n"
     show.write_text("{lights:")
-    refused = RUN.invoke(app, ["scene", motion, str(show), "--server", server])
-    assert refused.exit_code != 0
-    assert "show.json is no JSON" in refused.output
+    rejected = RUN.invoke(app, ["scene", motion, str(show), "--server", server])
+    assert rejected.exit_code != 0
+    assert "show.json is not JSON" in rejected.output
 
 
-def test_dances_are_put_side_by_side(server: str, clip_file: Path) -> None:
+def test_perform_creates_a_motion_with_several_performers(server: str, clip_file: Path) -> None:
     motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
-    made = RUN.invoke(app, ["perform", f"{server}/v1/motions/{motion}", motion, motion, "--json"])
-    assert made.exit_code == 0, made.output
-    trio = json.loads(made.stdout)
+    created = RUN.invoke(app, ["perform", f"{server}/v1/motions/{motion}", motion, motion, "--json"])
+    assert created.exit_code == 0, created.output
+    trio = json.loads(created.stdout)
     assert (trio["performers"], trio["tracks"]) == (3, ["motion"] * 3)
     shown = RUN.invoke(app, ["perform", motion, motion, motion, "--server", server])
     assert shown.stdout == f"3 performers, {trio['name']}: {trio['id']}\n"
-    refused = RUN.invoke(app, ["perform", trio["id"], motion, motion, "--server", server])
-    assert refused.exit_code != 0
-    assert "at most 4 performers" in refused.output
+    rejected = RUN.invoke(app, ["perform", trio["id"], motion, motion, "--server", server])
+    assert rejected.exit_code != 0
+    assert "at most 4 performers" in rejected.output
 
 
-def test_for_people_there_are_tables(server: str, clip_file: Path) -> None:
+def test_tables_are_printed_without_json(server: str, clip_file: Path) -> None:
     shown = RUN.invoke(app, ["upload", str(clip_file), "--server", server])
     assert "18 of 18" in shown.stdout
     assert "kbit/s" in shown.stdout
     assert clip_file.stem in RUN.invoke(app, ["list", "--server", server]).stdout
 
 
-def test_failures_are_said_in_words(server: str, tmp_path: Path) -> None:
+def test_failures_print_an_error_without_traceback(server: str, tmp_path: Path) -> None:
     bad = tmp_path / "bad.bvh"
     bad.write_text("nothing")
     for arguments in (
@@ -103,14 +103,14 @@ def test_failures_are_said_in_words(server: str, tmp_path: Path) -> None:
         assert not isinstance(result.exception, Exception) or isinstance(result.exception, SystemExit)
 
 
-def test_a_crowd_watches_and_its_figures_are_said(server: str, clip_file: Path) -> None:
+def test_bench_viewers_prints_statistics(server: str, clip_file: Path) -> None:
     motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
-    given = ["bench", "viewers", "--n", "5", "--seconds", "0.3", "--url", f"{server}/v1/motions/{motion}"]
-    figures = json.loads(RUN.invoke(app, [*given, "--json"]).stdout)
-    assert (figures["viewers"], figures["joined"], figures["dropped"], figures["stalls"]) == (5, 5, 0, 0)
-    table = RUN.invoke(app, given)
+    command = ["bench", "viewers", "--n", "5", "--seconds", "0.3", "--url", f"{server}/v1/motions/{motion}"]
+    statistics = json.loads(RUN.invoke(app, [*command, "--json"]).stdout)
+    assert (statistics["viewers"], statistics["joined"], statistics["dropped"], statistics["stalls"]) == (5, 5, 0, 0)
+    table = RUN.invoke(app, command)
     assert table.exit_code == 0
     assert "block late ms p99" in table.stdout
-    refused = RUN.invoke(app, ["bench", "viewers", "--n", "2", "--url", "ws://127.0.0.1:9/v1/sessions/s/stream"])
-    assert refused.exit_code == 1
-    assert "Traceback" not in refused.output
+    rejected = RUN.invoke(app, ["bench", "viewers", "--n", "2", "--url", "ws://127.0.0.1:9/v1/sessions/s/stream"])
+    assert rejected.exit_code == 1
+    assert "Traceback" not in rejected.output

@@ -11,7 +11,7 @@ from bunraku.runtime.settings import Settings
 from tests.servers import run_server
 
 
-async def test_everything_is_at_one_address_and_described(server: str) -> None:
+async def test_all_services_are_served_and_described(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
         assert (await http.get("/v1/health")).json() == {"status": "ok", "version": __version__}
         described = (await http.get("/v1/openapi.json")).json()
@@ -32,21 +32,21 @@ async def test_everything_is_at_one_address_and_described(server: str) -> None:
     }
 
 
-async def test_the_page_alone_describes_the_whole_interface(tmp_path: Path, server: str) -> None:
+async def test_page_process_describes_the_whole_api(tmp_path: Path, server: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
-        whole = (await http.get("/v1/openapi.json")).json()["paths"]
+        description = (await http.get("/v1/openapi.json")).json()["paths"]
     async with serve.compose_app(Settings(data=tmp_path), services=("page",)) as app:
         transport = httpx2.ASGITransport(app)
         async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
-            assert (await http.get("/v1/openapi.json")).json()["paths"] == whole
+            assert (await http.get("/v1/openapi.json")).json()["paths"] == description
             assert (await http.get("/readyz")).json() == {"status": "ready"}
             assert (await http.get("/v1/motions")).status_code != 200
 
 
-def test_a_server_may_have_as_many_viewers_as_its_system_lets_it(tmp_path: Path) -> None:
+def test_server_raises_the_open_file_limit(tmp_path: Path) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    few = min(512, hard)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (few, hard))
+    low = min(512, hard)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (low, hard))
     try:
         with run_server(tmp_path / "data", services=("stream",)):
             assert resource.getrlimit(resource.RLIMIT_NOFILE) == (hard, hard)
@@ -54,21 +54,21 @@ def test_a_server_may_have_as_many_viewers_as_its_system_lets_it(tmp_path: Path)
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-async def test_a_process_with_everything_is_ready(server: str) -> None:
+async def test_server_with_all_services_is_ready(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
         assert (await http.get("/livez")).json() == {"status": "ok"}
         assert (await http.get("/readyz")).json() == {"status": "ready"}
 
 
 @pytest.mark.parametrize("path", ["/v1/nothing", "/v1/motions/none", "/v1/sessions/none"])
-async def test_what_is_not_there_is_a_problem_document(server: str, path: str) -> None:
+async def test_missing_resource_is_a_problem_document(server: str, path: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
         answer = await http.get(path)
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "application/problem+json"
 
 
-async def test_the_page_is_asked_for_anew_and_its_parts_are_kept(
+async def test_page_is_revalidated_and_its_assets_are_immutable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = tmp_path / "page"
@@ -87,36 +87,37 @@ async def test_the_page_is_asked_for_anew_and_its_parts_are_kept(
     assert missing.status_code == 404
 
 
-async def test_pages_of_every_site_may_load_the_element_and_only_that(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_only_embed_scripts_have_open_cors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = tmp_path / "page"
     (page / "assets").mkdir(parents=True)
     (page / "embed" / "parts").mkdir(parents=True)
     for name in ("index.html", "assets/index-abc.js", "embed/bunraku-stage.js", "embed/parts/stage-abc.js"):
         (page / name).write_text("export {};" * 500)
     monkeypatch.setattr(serve, "PAGE_FOLDER", page)
-    lasting = "public, max-age=31536000, immutable"
-    for origins, known in (("", "*"), ("https://dance.example", "https://dance.example")):
+    immutable = "public, max-age=31536000, immutable"
+    for origins, allowed in (("", "*"), ("https://dance.example", "https://dance.example")):
         with run_server(tmp_path / "data", origins=origins) as url:
             async with httpx2.AsyncClient(base_url=url) as http:
-                for asking, told in ((None, "*"), ("https://dance.example", known), ("https://other.example", "*")):
-                    headers = {"Origin": asking} if asking else {}
+                expected_by_origin = {None: "*", "https://dance.example": allowed, "https://other.example": "*"}
+                for origin, expected in expected_by_origin.items():
+                    headers = {"Origin": origin} if origin else {}
                     entry = await http.get("/embed/bunraku-stage.js", headers=headers)
                     part = await http.get("/embed/parts/stage-abc.js", headers=headers)
-                    for answer, kept in ((entry, "no-cache"), (part, lasting)):
+                    for answer, cache_control in ((entry, "no-cache"), (part, immutable)):
                         assert answer.status_code == 200
-                        assert answer.headers["cache-control"] == kept
-                        # both name the origin, which the page that asked is of
-                        assert answer.headers["access-control-allow-origin"] == told
+                        assert answer.headers["cache-control"] == cache_control
+                        # both responses allow the origin of the requesting page
+                        assert answer.headers["access-control-allow-origin"] == expected
                         assert "javascript" in answer.headers["content-type"]
-                again = await http.get("/embed/bunraku-stage.js", headers={"If-None-Match": entry.headers["etag"]})
-                assert again.status_code == 304
+                revalidated = await http.get(
+                    "/embed/bunraku-stage.js", headers={"If-None-Match": entry.headers["etag"]}
+                )
+                assert revalidated.status_code == 304
                 own = await http.get("/assets/index-abc.js", headers={"Origin": "https://other.example"})
                 assert "access-control-allow-origin" not in own.headers
 
 
-async def test_without_a_built_page_it_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_missing_page_build_is_a_503_with_instructions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serve, "PAGE_FOLDER", tmp_path / "nowhere")
     async with serve.compose_app(Settings(data=tmp_path / "data")) as app:
         transport = httpx2.ASGITransport(app)

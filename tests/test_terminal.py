@@ -7,16 +7,16 @@ import pytest
 from bunraku import terminal
 
 
-def test_words_are_printed_as_they_stand(capsys: pytest.CaptureFixture[str]) -> None:
-    words = "[bold]a [name] of somebody's[/bold] " + 60 * "long "
-    terminal.print_plain(words)
-    assert capsys.readouterr().out == f"{words}\n"
+def test_print_plain_ignores_markup_and_width(capsys: pytest.CaptureFixture[str]) -> None:
+    text = "[bold]a [name] in brackets[/bold] " + 60 * "long "
+    terminal.print_plain(text)
+    assert capsys.readouterr().out == f"{text}\n"
 
 
-def test_figures_are_printed_by_their_names_and_what_did_not_come_is_a_dash(capsys: pytest.CaptureFixture[str]) -> None:
-    figures = {"first_pose_ms": None, "gaps": 0}
-    terminal.print_statistics(figures, as_json=False)
+def test_statistics_are_printed_as_table_or_json(capsys: pytest.CaptureFixture[str]) -> None:
+    statistics = {"first_pose_ms": None, "gaps": 0}
+    terminal.print_statistics(statistics, as_json=False)
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert rows == [["first", "pose", "ms", "-"], ["gaps", "0"]]
-    terminal.print_statistics(figures, as_json=True)
-    assert json.loads(capsys.readouterr().out) == figures
+    terminal.print_statistics(statistics, as_json=True)
+    assert json.loads(capsys.readouterr().out) == statistics

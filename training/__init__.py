@@ -1,1 +1,1 @@
-"""Trains what the codec ships: the prior of its coder, from clips whose licence allows it."""
+"""Training of the codec's prior, on clips with a licence that allows it."""

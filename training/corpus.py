@@ -1,4 +1,4 @@
-"""A folder of motion clips as 19 channels: `hanim19/*.npz`, with `CORPUS.csv` saying where each is from."""
+"""Corpus of motion clips: `hanim19/*.npz`, and `CORPUS.csv` with the origin and licence of each."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _UNKNOWN_ORIGIN = "origin not stated"
 
 
 def list_clips(corpus: Path) -> list[str]:
-    """The clips of the folder; raises FileNotFoundError where there are none."""
-    found = sorted(path.stem for path in (corpus / "hanim19").glob("*.npz"))
-    if not found:
-        raise FileNotFoundError(f"no clips in {corpus / 'hanim19'}")
-    return found
+    """Return the names of all clips. Raises FileNotFoundError if there are none."""
+    names = sorted(path.stem for path in (corpus / "hanim19").glob("*.npz"))
+    if not names:
+        raise FileNotFoundError(f"No clips in {corpus / 'hanim19'}. Name the folder that contains hanim19/*.npz.")
+    return names
 
 
 def load_clip(corpus: Path, name: str) -> Motion:
-    """One clip; metres, y up."""
+    """Return one clip in metres, y up."""
     with np.load(corpus / "hanim19" / f"{name}.npz") as clip:
         figure = Figure(clip["off"].astype(np.float64), clip["tip"].astype(np.float64))
         rotations = rotation.normalise(clip["Q"].astype(np.float64))
@@ -30,8 +30,10 @@ def load_clip(corpus: Path, name: str) -> Motion:
 
 
 def clip_family(name: str) -> str:
-    """Clips that could share dancers, stages or tools; figures are told with priors that saw none of a clip's
-    family."""
+    """Return the family of a clip: clips that may share dancers, stages or tools.
+
+    Benchmarks use a prior that was trained without the family of the clip.
+    """
     for family in ("perfume", "isaac", "mass"):
         if name.startswith(family):
             return family
@@ -39,7 +41,7 @@ def clip_family(name: str) -> str:
 
 
 def licensed_clips(corpus: Path) -> set[str]:
-    """The clips that may be learned from: with a licence stated for the motion itself."""
+    """Return the clips that may be used for training: those with a licence stated for the motion itself."""
     with (corpus / "CORPUS.csv").open(encoding="utf-8", newline="") as rows:
         return {
             row["clip"]
@@ -49,8 +51,8 @@ def licensed_clips(corpus: Path) -> set[str]:
 
 
 def mirror_motion(motion: Motion) -> Motion:
-    """The same dance with left and right exchanged."""
-    twin = [JOINTS.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2:]) for n in JOINTS]
+    """Return the motion with left and right exchanged."""
+    mirror = [JOINTS.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2:]) for n in JOINTS]
     flip = np.array([-1.0, 1.0, 1.0])
-    figure = Figure(motion.figure.offsets[twin] * flip, motion.figure.tips[twin] * flip)
-    return Motion(figure, motion.fps, motion.root * flip, motion.rotations[:, twin] * [1.0, 1.0, -1.0, -1.0])
+    figure = Figure(motion.figure.offsets[mirror] * flip, motion.figure.tips[mirror] * flip)
+    return Motion(figure, motion.fps, motion.root * flip, motion.rotations[:, mirror] * [1.0, 1.0, -1.0, -1.0])

@@ -1,3 +1,3 @@
-"""Bunraku: a humanoid dances in the browser, and the people watching pull its strings."""
+"""Bunraku: streams humanoid motion to browsers and lets several people control the limbs at the same time."""
 
 __version__ = "0.1.0"

@@ -1,4 +1,4 @@
-"""The command `bunraku`."""
+"""Command line of Bunraku."""
 
 from __future__ import annotations
 
@@ -36,25 +36,27 @@ from bunraku.terminal import (
     run_request,
 )
 
-app = typer.Typer(
-    help="A humanoid dances in the browser, and the people watching pull its strings.", no_args_is_help=True
-)
+app = typer.Typer(help="Stream humanoid motion to browsers, and let viewers control the limbs.", no_args_is_help=True)
 app.command()(token)
 app.command()(share)
+
+MotionArgument = Annotated[str, typer.Argument(help="Id or address of a motion.")]
+ResourceArgument = Annotated[str, typer.Argument(help="Id or address of a motion or session.")]
+SessionArgument = Annotated[str, typer.Argument(help="Id or address of a session.")]
 
 
 @app.command()
 def up(
-    host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port to listen at; 0: any free one.", min=0, max=65535)] = 8000,
-    data: Annotated[Path | None, typer.Option(help="Folder for what is kept; default .bunraku.")] = None,
-    demo: Annotated[bool, typer.Option("--demo", help="Open a stage with Bunraku's own dance.")] = False,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on; 0 selects a free port.", min=0, max=65535)] = 8000,
+    data: Annotated[Path | None, typer.Option(help="Data folder; default .bunraku.")] = None,
+    demo: Annotated[bool, typer.Option("--demo", help="Open a stage with Bunraku's demo dance.")] = False,
     service: Annotated[
-        list[str] | None, typer.Option(help="Serve this alone, of stream, ingest, ik, session, page; may be repeated.")
+        list[str] | None, typer.Option(help="Run only this service: stream, ingest, ik, session or page. Repeatable.")
     ] = None,
     open_page: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
-    """Run everything in one process, until Ctrl-C. Several processes meet over a bus: BUNRAKU_BUS=nats://..."""
+    """Run the server until Ctrl-C. Several processes can share the work over a bus: BUNRAKU_BUS=nats://..."""
     from bunraku.runtime import log
     from bunraku.runtime.metrics import MetricsListenError
     from bunraku.runtime.settings import Settings
@@ -62,9 +64,9 @@ def up(
 
     services = SERVICES if service is None else tuple(service)
     if unknown := [name for name in services if name not in SERVICES]:
-        raise typer.BadParameter(f"{unknown[0]!r} is none of {', '.join(SERVICES)}", param_hint="--service")
+        raise typer.BadParameter(f"unknown service {unknown[0]!r}; use {', '.join(SERVICES)}", param_hint="--service")
     if demo and "session" not in services:
-        raise typer.BadParameter("the demo's stage is opened where sessions are", param_hint="--demo")
+        raise typer.BadParameter("the demo needs the service session: add --service session", param_hint="--demo")
 
     try:
         settings = Settings() if data is None else Settings(data=data)
@@ -72,30 +74,30 @@ def up(
         err.print(describe_setting_error(error), markup=False)
         raise typer.Exit(1) from None
     log.configure_logging(settings.logs, settings.log_level, "all" if service is None else ",".join(services))
-    own = ensure_secret(settings, host)
+    created_secret = ensure_secret(settings, host)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         listening = socket.create_server((host, port), family=family, backlog=1024)
     except OSError as error:
-        err.print(f"Cannot listen at {host}, port {port}: {error.strerror}. Another port: PORT={port + 1} make demo")
+        err.print(f"Cannot listen on {host}, port {port}: {error.strerror}. Choose another port with --port.")
         raise typer.Exit(1) from None
-    shown = f"[{host}]" if ":" in host else {"0.0.0.0": "127.0.0.1"}.get(host, host)
-    url = f"http://{shown}:{listening.getsockname()[1]}/"
+    url_host = f"[{host}]" if ":" in host else {"0.0.0.0": "127.0.0.1"}.get(host, host)
+    url = f"http://{url_host}:{listening.getsockname()[1]}/"
 
-    def ready() -> None:
+    def print_address() -> None:
         out.print(f"Bunraku {__version__} is at [link={url}]{url}[/link]", soft_wrap=True)
-        out.print(f"It keeps its motions in {settings.data}. Ctrl-C ends it.", soft_wrap=True)
-        guarded = bool(settings.secret.get_secret_value()) and "page" in services
-        link = make_operator_link(settings, url) if guarded else url
-        if guarded and (own or out.is_terminal):
-            print_plain(f"Who comes needs a link. Yours, for {DEFAULT_TOKEN_HOURS:g} hours:\n{link}")
-        elif guarded:
-            out.print(f"Who comes needs a link: `bunraku token --server {url}` makes one.", soft_wrap=True)
+        out.print(f"Data is stored in {settings.data}. Press Ctrl-C to stop.", soft_wrap=True)
+        is_protected = bool(settings.secret.get_secret_value()) and "page" in services
+        link = make_operator_link(settings, url) if is_protected else url
+        if is_protected and (created_secret or out.is_terminal):
+            print_plain(f"Clients need a link. Yours, valid for {DEFAULT_TOKEN_HOURS:g} hours:\n{link}")
+        elif is_protected:
+            out.print(f"Clients need a link: create one with `bunraku token --server {url}`.", soft_wrap=True)
         if open_page:
             webbrowser.open(link)
 
-    out.print("Setting the stage ..." if demo else "Starting ...")
-    serving = serve(settings, listening, demo=demo, on_ready=ready, services=services)
+    out.print("Preparing the demo ..." if demo else "Starting ...")
+    serving = serve(settings, listening, demo=demo, on_ready=print_address, services=services)
     try:
         if sys.platform == "win32":
             asyncio.run(serving)
@@ -106,7 +108,7 @@ def up(
     except MetricsListenError as error:
         err.print(str(error), markup=False)
         raise typer.Exit(1) from None
-    out.print("The curtain falls.")
+    out.print("Stopped.")
 
 
 @app.command()
@@ -116,10 +118,10 @@ def upload(
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Upload a motion file, and say what was made of it."""
+    """Upload a motion file and print the analysed motion."""
     from rich.table import Table
 
-    motion = _send_file(file, server, token, as_json, lambda client, *told: client.upload(file, *told))
+    motion = _send_file(file, server, token, as_json, lambda client, *callbacks: client.upload(file, *callbacks))
     if as_json:
         out.print_json(data=motion)
         return
@@ -127,87 +129,86 @@ def upload(
     table.add_row("id", motion["id"])
     table.add_row("length", f"{motion['duration']:.2f} s, {motion['frames']} frames at {motion['fps']:g} fps")
     table.add_row("joints", f"{len(motion['joints'])} of 18, names: {motion['profile']}")
-    table.add_row("fit", f"{motion['fit']['mean_mm']:.1f} mm mean, {motion['fit']['max_mm']:.1f} mm at most")
+    table.add_row("fit", f"{motion['fit']['mean_mm']:.1f} mm mean, {motion['fit']['max_mm']:.1f} mm maximum")
     table.add_row("rates", ", ".join(f"{rate['kbps']:.1f} kbit/s" for rate in motion["rates"]))
-    for guess in motion["guessed"]:
-        table.add_row("guessed", guess)
+    for assumption in motion["guessed"]:
+        table.add_row("assumed", assumption)
     out.print(table)
 
 
 @app.command()
 def audio(
-    motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
+    motion: MotionArgument,
     file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="WAV, FLAC, MP3 or Ogg.")],
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a new motion of one and a sound, which begins with it."""
-    base, identity = _parse_motion_address(motion, "sound is added to a motion: give one")
-    made = _send_file(
-        file, base or server, token, as_json, lambda client, *told: client.add_audio(identity, file, *told)
+    """Create a motion from another one and a sound that starts with it."""
+    base, motion_id = _parse_motion_address(motion)
+    created = _send_file(
+        file, base or server, token, as_json, lambda client, *callbacks: client.add_audio(motion_id, file, *callbacks)
     )
     if as_json:
-        out.print_json(data=made)
+        out.print_json(data=created)
         return
-    rates = ", ".join(f"{rate['kbps']:.0f}" for rate in made["audio"]["rates"])
-    print_plain(f"{made['audio']['seconds']:.1f} s of sound at {rates} kbit/s beside {made['name']}: {made['id']}")
+    rates = ", ".join(f"{rate['kbps']:.0f}" for rate in created["audio"]["rates"])
+    seconds = created["audio"]["seconds"]
+    print_plain(f"{seconds:.1f} s of sound at {rates} kbit/s with {created['name']}: {created['id']}")
 
 
 @app.command()
 def scene(
-    motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
-    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="JSON: camera, lights.")],
+    motion: MotionArgument,
+    file: Annotated[Path, typer.Argument(exists=True, dir_okay=False, readable=True, help="JSON with keyframes.")],
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a new motion of one with a camera and lights, from keyframes."""
+    """Create a motion from another one with a camera and lights from keyframes."""
     import json
 
     from bunraku.client.api import Client
 
-    base, identity = _parse_motion_address(motion, "a scene is added to a motion: give one")
+    base, motion_id = _parse_motion_address(motion)
     try:
         staging = json.loads(file.read_bytes())
     except ValueError as error:
-        raise typer.BadParameter(f"{file.name} is no JSON: {error}", param_hint="FILE") from None
+        raise typer.BadParameter(f"{file.name} is not JSON: {error}", param_hint="FILE") from None
 
-    async def run() -> dict[str, Any]:
+    async def request() -> dict[str, Any]:
         async with Client(base or server, token) as client:
-            return await client.add_scene(identity, staging)
+            return await client.add_scene(motion_id, staging)
 
-    made = run_request(run, base or server)
+    created = run_request(request, base or server)
     if as_json:
-        out.print_json(data=made)
+        out.print_json(data=created)
         return
-    print_plain(f"{', '.join(made['tracks'])} of {made['name']}: {made['id']}")
+    print_plain(f"{', '.join(created['tracks'])} of {created['name']}: {created['id']}")
 
 
 @app.command()
 def perform(
-    motion: Annotated[str, typer.Argument(help="A motion: its id, its page, or its API address.")],
-    others: Annotated[
-        list[str], typer.Argument(help="Ids of motions that dance beside it; the same one may come again.")
-    ],
+    motion: MotionArgument,
+    others: Annotated[list[str], typer.Argument(help="Ids of the motions of the other performers; repeatable.")],
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a new motion in which several dance side by side, four at most."""
+    """Create a motion with up to four performers side by side."""
     from bunraku.client.api import Client
 
-    base, identity = _parse_motion_address(motion, "motions dance side by side: give one")
+    base, motion_id = _parse_motion_address(motion)
 
-    async def run() -> dict[str, Any]:
+    async def request() -> dict[str, Any]:
         async with Client(base or server, token) as client:
-            return await client.add_performers(identity, others)
+            return await client.add_performers(motion_id, others)
 
-    made = run_request(run, base or server)
+    created = run_request(request, base or server)
     if as_json:
-        out.print_json(data=made)
+        out.print_json(data=created)
         return
-    print_plain(f"{made['performers']} performers, {made['name']}: {made['id']}")
+    print_plain(f"{created['performers']} performers, {created['name']}: {created['id']}")
 
 
 @app.command(name="list")
@@ -217,11 +218,11 @@ def list_motions(server: ServerOption = DEFAULT_SERVER, token: TokenOption = Non
 
     from bunraku.client.api import Client
 
-    async def run() -> list[dict[str, Any]]:
+    async def request() -> list[dict[str, Any]]:
         async with Client(server, token) as client:
             return await client.motions()
 
-    motions = run_request(run, server)
+    motions = run_request(request, server)
     if as_json:
         out.print_json(data=motions)
         return
@@ -235,56 +236,56 @@ def list_motions(server: ServerOption = DEFAULT_SERVER, token: TokenOption = Non
 
 @app.command()
 def watch(
-    url: Annotated[str, typer.Argument(help="A motion or session: its id, its page, or its API address.")],
-    seconds: Annotated[float, typer.Option(help="How long.", min=0.1, max=86400)] = 10.0,
+    url: ResourceArgument,
+    seconds: Annotated[float, typer.Option(help="Duration.", min=0.1, max=86400)] = 10.0,
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Watch without a screen, and print how it went."""
+    """Watch a stream without rendering and print statistics."""
     from bunraku.client import Client, StreamEnded, Viewer
 
-    async def run() -> dict[str, Any]:
+    async def request() -> dict[str, Any]:
         async with Client(server, token) as client:
             viewer = Viewer(await _resolve_stream_url(client, url), token=token)
         return (await viewer.watch(seconds)).as_json()
 
     try:
-        figures = run_request(run, server)
+        statistics = run_request(request, server)
     except StreamEnded as error:
         err.print(f"The stream ended: {error}")
         raise typer.Exit(1) from None
-    print_statistics(figures, as_json)
+    print_statistics(statistics, as_json)
 
 
 @app.command()
 def keep(
-    session: Annotated[str, typer.Argument(help="A session: its id, its page, or its API address.")],
+    session: SessionArgument,
     name: Annotated[
-        str | None, typer.Option(help="What the motion is called; default: as the dance, and kept.")
+        str | None, typer.Option(help="Name of the motion; default: derived from the session's motion.")
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(help="How much of what was shown last; default: all that can be kept.", min=0.1)
+        float | None, typer.Option(help="Length of the recording up to now; default: as long as possible.", min=0.1)
     ] = None,
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Keep what a session has shown as a new motion, pulled limbs and all."""
+    """Record a session, including the controlled limbs, as a new motion."""
     from bunraku.client.api import Client
 
-    async def run() -> dict[str, Any]:
-        base, kind, identity = parse_resource_address(session)
+    async def request() -> dict[str, Any]:
+        base, kind, resource_id = parse_resource_address(session)
         if kind == "motions":
-            raise typer.BadParameter("a motion is kept already: give a session", param_hint="SESSION")
+            raise typer.BadParameter("this is the address of a motion; give a session", param_hint="SESSION")
         async with Client(base or server, token) as client:
-            return await client.record(identity, name, seconds)
+            return await client.record(resource_id, name, seconds)
 
-    motion = run_request(run, server)
+    motion = run_request(request, server)
     if as_json:
         out.print_json(data=motion)
         return
-    print_plain(f"Kept {motion['duration']:.1f} s as {motion['id']}: {motion['name']}")
+    print_plain(f"Recorded {motion['duration']:.1f} s as {motion['id']}: {motion['name']}")
 
 
 bench = typer.Typer(help="Load-test a server.", no_args_is_help=True)
@@ -293,52 +294,53 @@ app.add_typer(bench, name="bench")
 
 @bench.callback()
 def _bench() -> None:
-    """Commands of their own below, also while there is but one."""
+    """Load-test a server."""
+    # without a callback, typer turns a group with a single command into that command
 
 
 @bench.command("viewers")
 def bench_viewers(
-    viewers: Annotated[int, typer.Option("--n", help="How many viewers.", min=1, max=100_000)] = 200,
+    viewers: Annotated[int, typer.Option("--n", help="Number of viewers.", min=1, max=100_000)] = 200,
     url: Annotated[
         str | None,
-        typer.Option("--url", help="A motion or session: its id, page or API address; default: the first session."),
+        typer.Option("--url", help="Id or address of a motion or session; default: the first session."),
     ] = None,
-    seconds: Annotated[float, typer.Option(help="How long they watch.", min=0.1, max=86400)] = 20.0,
-    joins: Annotated[float, typer.Option(help="How many join in a second.", min=0.1, max=10_000)] = 200.0,
+    seconds: Annotated[float, typer.Option(help="Duration.", min=0.1, max=86400)] = 20.0,
+    joins: Annotated[float, typer.Option(help="Viewers that connect per second.", min=0.1, max=10_000)] = 200.0,
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Have many viewers watch at once, and print how they fared."""
+    """Connect many viewers at once and print their statistics."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
     from bunraku.client.api import Client
     from bunraku.client.load_generator import FileLimitExceeded, run_load
 
-    async def run() -> dict[str, Any]:
+    async def request() -> dict[str, Any]:
         async with Client(server, token) as client:
-            found = url or await client.first_session()
-            if found is None:
-                raise typer.BadParameter(f"no session is open at {server}: name a motion", param_hint="--url")
-            stream = await _resolve_stream_url(client, found)
+            address = url or await client.first_session()
+            if address is None:
+                raise typer.BadParameter(f"no session is open at {server}; name a motion", param_hint="--url")
+            stream = await _resolve_stream_url(client, address)
         columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
         with Progress(*columns, console=err, disable=as_json or not err.is_terminal, transient=True) as progress:
             task = progress.add_task("joining", total=1)
 
-            def told(stage: str, share: float) -> None:
+            def on_progress(stage: str, share: float) -> None:
                 progress.update(task, description=stage, completed=share)
 
             return (
-                await run_load(stream, viewers, seconds, joins_per_second=joins, token=token, on_progress=told)
+                await run_load(stream, viewers, seconds, joins_per_second=joins, token=token, on_progress=on_progress)
             ).as_json()
 
     try:
-        figures = run_request(run, server)
+        statistics = run_request(request, server)
     except FileLimitExceeded as error:
         err.print(f"Too many viewers for one process: {error}")
         raise typer.Exit(1) from None
-    print_statistics(figures, as_json)
-    if figures["joined"] == 0:
+    print_statistics(statistics, as_json)
+    if statistics["joined"] == 0:
         raise typer.Exit(1)
 
 
@@ -350,30 +352,37 @@ def version(as_json: JsonOption = False) -> None:
 
 @app.command()
 def warm() -> None:
-    """Compile reader, codec and what moves limbs once, so that nobody waits for it (done by `make setup`)."""
-    from bunraku.ingest.jobs import motion  # noqa: F401 - importing it loads, and the first time compiles, what a job uses
+    """Compile the kernels ahead of time, so that the first requests do not wait (part of `make setup`)."""
+    from bunraku.ingest.jobs import motion  # noqa: F401 - importing it compiles the kernels of an upload
     from bunraku.session import limb_solver
 
-    limb_solver.warm_up_solver()
+    limb_solver.load_compiled_solver()
 
 
-def _parse_motion_address(address: str, error_message: str) -> tuple[str | None, str]:
-    """The server, if it is named, and the id of a motion; `otherwise` is said where a session is given."""
-    base, kind, identity = parse_resource_address(address)
+def _parse_motion_address(address: str) -> tuple[str | None, str]:
+    """Return the server, None if the address is only an id, and the id of a motion.
+
+    Raises `typer.BadParameter` for the address of a session.
+    """
+    base, kind, motion_id = parse_resource_address(address)
     if kind == "sessions":
-        raise typer.BadParameter(error_message, param_hint="MOTION")
-    return base, identity
+        raise typer.BadParameter("this is the address of a session; give a motion", param_hint="MOTION")
+    return base, motion_id
 
 
 def _send_file(
     file: Path, server: str, token: str | None, quiet: bool, send: Callable[..., Awaitable[dict[str, Any]]]
 ) -> dict[str, Any]:
-    """What the server makes of a file; `send` is told the client, and what to tell how far it is."""
+    """Send a file with a progress bar and return the created motion.
+
+    `send` gets the client, a callback for the sent and total bytes, and a callback for the stage of the processing and
+    its completed share.
+    """
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
     from bunraku.client.api import Client
 
-    async def run() -> dict[str, Any]:
+    async def request() -> dict[str, Any]:
         columns = (
             TextColumn("{task.fields[name]}", markup=False),
             BarColumn(),
@@ -383,26 +392,25 @@ def _send_file(
         with Progress(*columns, console=err, disable=quiet or not err.is_terminal, transient=True) as progress:
             task = progress.add_task("sending", name=file.name, total=1)
 
-            def at(stage: str, share: float) -> None:
+            def on_progress(stage: str, share: float) -> None:
                 progress.update(task, description=stage, completed=share)
 
             async with Client(server, token) as client:
-                return await send(client, lambda sent, size: at("sending", sent / size), at)
+                return await send(client, lambda sent, size: on_progress("sending", sent / size), on_progress)
 
-    made: dict[str, Any] = run_request(run, server)
-    return made
+    return run_request(request, server)
 
 
 async def _resolve_stream_url(client: Any, address: str) -> str:
-    """The socket of a motion or session, given by its address, its page or its id."""
+    """Return the WebSocket URL of a motion or session, given by its id or address."""
     from bunraku.client.api import Client
 
     if urlsplit(address).scheme in ("ws", "wss"):
         return address
-    base, kind, identity = parse_resource_address(address)
+    base, kind, resource_id = parse_resource_address(address)
     if base is not None:
-        return Client(base).socket_url(f"/v1/{kind}/{identity}/stream")
-    socket_url: str = client.socket_url(f"/v1/{await find_resource_kind(client, identity)}/{identity}/stream")
+        return Client(base).socket_url(f"/v1/{kind}/{resource_id}/stream")
+    socket_url: str = client.socket_url(f"/v1/{await find_resource_kind(client, resource_id)}/{resource_id}/stream")
     return socket_url
 
 

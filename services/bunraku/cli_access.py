@@ -1,4 +1,4 @@
-"""The commands `bunraku token` and `bunraku share`: who may come in, and by which link (docs/safety.md)."""
+"""Commands `bunraku token` and `bunraku share`, and the access settings of `bunraku up` (docs/security.md)."""
 
 from __future__ import annotations
 
@@ -25,20 +25,19 @@ if TYPE_CHECKING:
     from bunraku.runtime.settings import Settings
 
 DEFAULT_TOKEN_HOURS = 12.0
-"""That a token is good for, if nothing else is said."""
 
 
 def token(
-    role: Annotated[str, typer.Option(help="What it allows: view, control, ingest or admin.")] = "admin",
-    hours: Annotated[float, typer.Option(help="How long it is good.", min=0.01, max=168)] = DEFAULT_TOKEN_HOURS,
-    name: Annotated[str, typer.Option(help="Whose it is: quotas and the log go by it.")] = "operator",
-    session: Annotated[str | None, typer.Option(help="Bind it to this session.")] = None,
-    motion: Annotated[str | None, typer.Option(help="Bind it to this motion.")] = None,
-    data: Annotated[Path | None, typer.Option(help="Folder with the server's own secret; default .bunraku.")] = None,
-    server: Annotated[str | None, typer.Option(help="Print a link to the page of this server in its place.")] = None,
+    role: Annotated[str, typer.Option(help="Role of the holder: view, control, ingest or admin.")] = "admin",
+    hours: Annotated[float, typer.Option(help="Lifetime.", min=0.01, max=168)] = DEFAULT_TOKEN_HOURS,
+    name: Annotated[str, typer.Option(help="Name of the holder, used for quotas and in the log.")] = "operator",
+    session: Annotated[str | None, typer.Option(help="Limit the token to this session.")] = None,
+    motion: Annotated[str | None, typer.Option(help="Limit the token to this motion.")] = None,
+    data: Annotated[Path | None, typer.Option(help="Data folder with the server's secret; default .bunraku.")] = None,
+    server: Annotated[str | None, typer.Option(help="Print a link to the page of this server instead.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a token with the server's secret: BUNRAKU_SECRET, or the one that it made for itself."""
+    """Create a token, signed with BUNRAKU_SECRET or with the secret in the server's data folder."""
     from bunraku.http.access_control import Access, Role
     from bunraku.http.access_token import TokenSigner
     from bunraku.http.secret import load_secret
@@ -50,73 +49,79 @@ def token(
         secret = settings.secret.get_secret_value() or load_secret(settings.data)
         if secret is None:
             err.print(
-                f"There is no secret: set BUNRAKU_SECRET. A server that others reach makes one in {settings.data}."
+                f"No secret found. Set BUNRAKU_SECRET, or start a server that is reachable from other machines: it "
+                f"creates a secret in {settings.data}."
             )
             raise typer.Exit(1)
         now = time.time()
         access = Access(Role.parse(role), name[:64] or "operator", session, motion, int(now + hours * 3600))
-        made = TokenSigner(secret).mint(access, now)
+        signed = TokenSigner(secret).mint(access, now)
     except ValueError as error:
         err.print(describe_setting_error(error), markup=False)
         raise typer.Exit(1) from None
-    link = f"{server.rstrip('/')}/{f'?session={session}' if session else ''}#token={made}" if server else None
+    link = f"{server.rstrip('/')}/{f'?session={session}' if session else ''}#token={signed}" if server else None
     if as_json:
         out.print_json(
-            data={"token": made, "role": role, "expires": format_timestamp(access.expires or 0), "link": link}
+            data={"token": signed, "role": role, "expires": format_timestamp(access.expires or 0), "link": link}
         )
     else:
-        print_plain(link or made)
+        print_plain(link or signed)
 
 
 def share(
-    what: Annotated[str | None, typer.Argument(help="A session or motion: its id, its page, or its address.")] = None,
-    days: Annotated[float, typer.Option(help="How long the link is good.", min=0.001, max=31)] = 7.0,
-    revoke: Annotated[str | None, typer.Option(help="Revoke the link of this id.")] = None,
+    what: Annotated[str | None, typer.Argument(help="Id or address of a motion or session.")] = None,
+    days: Annotated[float, typer.Option(help="Lifetime of the link.", min=0.001, max=31)] = 7.0,
+    revoke: Annotated[str | None, typer.Option(help="Revoke the link with this id.")] = None,
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a link by which others may watch, and nothing else; without an argument, list the links."""
+    """Create a link with which others can watch a motion or session. Without an argument, list the links."""
     from bunraku.client.api import Client
 
-    base, kind, identity = parse_resource_address(what) if what is not None else (None, None, "")
-    at = base or server
+    base, kind, resource_id = parse_resource_address(what) if what is not None else (None, None, "")
+    address = base or server
 
-    async def run() -> dict[str, Any]:
-        async with Client(at, token) as client:
+    async def request() -> dict[str, Any]:
+        async with Client(address, token) as client:
             if revoke is not None:
                 await client.revoke_share(revoke)
                 return {"revoked": revoke}
             if what is None:
                 return {"items": await client.shares()}
-            found = kind or await find_resource_kind(client, identity)
-            one = {found.removesuffix("s"): identity}
-            made = await client.share(**one, seconds=max(round(days * 86_400), 60))
-            return {**made, "link": f"{client.url}{made['link']}"}
+            found_kind = kind or await find_resource_kind(client, resource_id)
+            resource = {found_kind.removesuffix("s"): resource_id}
+            created = await client.share(**resource, seconds=max(round(days * 86_400), 60))
+            return {**created, "link": f"{client.url}{created['link']}"}
 
-    told = run_request(run, at)
+    result = run_request(request, address)
     if as_json:
-        out.print_json(data=told)
-    elif "items" in told:
-        for one in told["items"]:
-            shown = one["session"] or one["motion"]
-            print_plain(f"{one['id']}  {shown}  until {one['expires']}")
+        out.print_json(data=result)
+    elif "items" in result:
+        for one in result["items"]:
+            print_plain(f"{one['id']}  {one['session'] or one['motion']}  until {one['expires']}")
     else:
-        print_plain(f"Revoked {revoke}" if revoke is not None else told["link"])
+        print_plain(f"Revoked {revoke}" if revoke is not None else result["link"])
 
 
 def ensure_secret(settings: Settings, host: str) -> bool:
-    """See to it that what others reach asks who they are: where `host`, or where it is published, is not this machine's
-    alone and there is no secret, the server has its own. Whether that is so; raises `typer.Exit` where it cannot be."""
+    """Create a secret if the server is reachable from other machines and has none. Return whether it did.
+
+    The server is reachable if `host`, or the address at which it is published, is not a loopback address. Raises
+    `typer.Exit` if the server needs a secret that it cannot create.
+    """
     from pydantic import SecretStr
 
     from bunraku.http.secret import is_loopback, load_or_create_secret
 
-    reached = settings.published or host
-    if settings.secret.get_secret_value() or is_loopback(reached):
+    reachable_host = settings.published or host
+    if settings.secret.get_secret_value() or is_loopback(reachable_host):
         return False
     if settings.bus != "memory:":
-        err.print(f"Others reach {reached}: set BUNRAKU_SECRET, the same at all processes (docs/safety.md).")
+        err.print(
+            f"{reachable_host} is reachable from other machines: set BUNRAKU_SECRET to the same value for all "
+            "processes (docs/security.md)."
+        )
         raise typer.Exit(1)
     try:
         settings.secret = SecretStr(load_or_create_secret(settings.data))
@@ -127,7 +132,7 @@ def ensure_secret(settings: Settings, host: str) -> bool:
 
 
 def make_operator_link(settings: Settings, url: str) -> str:
-    """The link by which who runs the server at `url` comes in."""
+    """Return a link with the role admin for the operator of the server at `url`."""
     from bunraku.http.access_control import Access, Role
     from bunraku.http.access_token import TokenSigner
 
@@ -137,7 +142,7 @@ def make_operator_link(settings: Settings, url: str) -> str:
 
 
 def describe_setting_error(error: ValueError) -> str:
-    """What is wrong with a setting, without its value."""
+    """Return a message about an invalid setting that does not contain its value."""
     from pydantic import ValidationError
 
     if isinstance(error, ValidationError):

@@ -1,8 +1,8 @@
 """Loader of compiled kernels.
 
-A package with compiled code keeps its entry points in one private module, `_kernels`, the only one that imports numba.
-Importing numba takes seconds and compiling takes more, so a kernel module is loaded at its first use, or ahead of time
-by a service that warms up.
+A package with compiled code keeps it in a private module or subpackage `_kernels`, the only part of the package that
+imports numba. Importing numba takes seconds and compiling takes more. So callers load the kernels at their first use,
+or a service loads them in a thread after its start.
 """
 
 from __future__ import annotations
@@ -14,5 +14,5 @@ from types import ModuleType
 
 @cache
 def load_kernels(package: str) -> ModuleType:
-    """Import the kernels of a package of Bunraku, for example `"codec"`. Thread-safe; takes seconds the first time."""
+    """Import the kernels of a package, for example `"codec"`. Thread-safe; takes seconds the first time."""
     return import_module(f"bunraku.{package}._kernels")

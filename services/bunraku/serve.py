@@ -1,4 +1,4 @@
-"""The only wiring: backing, services and page in one process, or those of them that one process is for."""
+"""Composition root: opens the backends, creates the selected services and the page, and serves them as one app."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import logging
 import socket
 import sys
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager, suppress
 from pathlib import Path
 from signal import SIGINT, SIGTERM
@@ -16,10 +16,7 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
-from starlette.middleware.gzip import GZipMiddleware
-from starlette.responses import PlainTextResponse, Response
-from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Scope
+from starlette.routing import BaseRoute
 
 import bunraku.access.app
 import bunraku.ik.app
@@ -29,141 +26,132 @@ import bunraku.stream.app
 from bunraku import __version__
 from bunraku.codec import motion_decoder
 from bunraku.demo.bootstrap import open_demo_stage
-from bunraku.http import problem_details
 from bunraku.http.access_control import requires
 from bunraku.http.access_log import AccessLogMiddleware
 from bunraku.http.authorization import AuthorizationMiddleware, add_security_scheme, collect_route_rules
 from bunraku.http.cors import CorsMiddleware
 from bunraku.http.header_timeout import MAX_HEADER_BYTES, HeaderTimeoutProtocol
 from bunraku.http.origin import parse_origins
-from bunraku.runtime import readiness
+from bunraku.http.problem_details import install_problem_handlers
+from bunraku.page_files import create_page_app
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
-from bunraku.runtime.readiness import Dependency, Readiness
+from bunraku.runtime.readiness import Dependency, Readiness, install_health_routes
 from bunraku.runtime.settings import Settings
 from bunraku.session import limb_solver
-from bunraku.websocket import multicast
 from bunraku.websocket.handoff import HandoffProtocol
 from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES
 
 PAGE_FOLDER = Path(__file__).parent / "page"
-PAGE_HEADERS = {
-    "Content-Security-Policy": "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; "
-    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; media-src 'self' data: blob:; "
-    "worker-src 'self' blob:; "
-    "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-}
-"""The page runs what this server has, stands in no other page's frame, and tells no other site where it is from."""
-IMMUTABLE_PREFIXES = ("assets/", "embed/parts/")
-"""Where the page's files have their content's hash in their names."""
-CROSS_ORIGIN_PREFIX = "embed/"
-"""The page's scripts that pages of every site may load: they are public, and what they then ask for is not."""
 GC_THRESHOLDS = (20_000, 20, 50)
-"""When the collector looks for cycles: vectors are many and short-lived, cycles few."""
+"""Thresholds of the garbage collector: numeric code creates many short-lived objects and few cycles."""
 SERVICES = ("stream", "ingest", "ik", "session", "page")
-"""What a process may serve. Paths are looked up in this order: viewers come by the thousand."""
+"""Services that a process may run. Routes are matched in this order; viewers are the most frequent clients."""
+ACCESS_SERVICE = "access"
+"""Service that every process runs, because it has no state."""
 REQUIRED_BACKENDS: dict[str, tuple[Dependency, ...]] = {
     "stream": ("bus", "library"),
     "ingest": ("bus", "catalogue", "library"),
     "session": ("bus", "register", "library"),
 }
-"""What a service cannot work without."""
+"""Backends without which a service is not ready."""
 WARM_UP_DELAY_S = 1.5
-"""Seconds in which the first page has the process to itself."""
+"""Time after the start in which the process only serves, so that the first page loads quickly."""
+SHUTDOWN_TIMEOUT_S = 2
+
+ServiceFactory = Callable[[], FastAPI]
 
 _log = logging.getLogger(__name__)
-
-
-class PageFiles(StaticFiles):
-    """The built page: names with a hash in them are kept for ever, the rest is asked for anew."""
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        """As `StaticFiles`, with caching."""
-        response = await super().get_response(path, scope)
-        response.headers["Cache-Control"] = (
-            "public, max-age=31536000, immutable" if path.startswith(IMMUTABLE_PREFIXES) else "no-cache"
-        )
-        response.headers.update(PAGE_HEADERS)
-        if path.startswith(CROSS_ORIGIN_PREFIX):
-            response.headers["Access-Control-Allow-Origin"] = "*"
-        return response
 
 
 @asynccontextmanager
 async def compose_app(
     settings: Settings, *, demo: bool = False, services: Collection[str] = SERVICES
 ) -> AsyncIterator[FastAPI]:
-    """Services (of `SERVICES`) as one app, upon what `settings` name; with `demo`, a stage with our own dance."""
+    """Open the backends of `settings` and yield one app with the given services of `SERVICES`.
+
+    With `demo`, also open a stage with Bunraku's own dance.
+    """
     async with AsyncExitStack() as stack:
-        backing = await stack.enter_async_context(open_context(settings))
-        stack.enter_context(backing.metrics.serve(settings.metrics))
-        made: dict[str, Callable[[], FastAPI]] = {
-            "stream": lambda: bunraku.stream.app.create_app(backing),
-            "ingest": lambda: bunraku.ingest.app.create_app(backing),
-            "ik": bunraku.ik.app.create_app,
-            "session": lambda: bunraku.session.app.create_app(backing),
-        }
-        apps = {name: make() for name, make in made.items() if name in services}
-        # every process has this one: it keeps nothing itself
-        apps["access"] = bunraku.access.app.create_app(backing)
+        context = await stack.enter_async_context(open_context(settings))
+        stack.enter_context(context.metrics.serve(settings.metrics))
+        factories = _service_factories(context)
+        apps = {name: create() for name, create in factories.items() if name in (*services, ACCESS_SERVICE)}
+        readiness = Readiness(context, [backend for name in apps for backend in REQUIRED_BACKENDS.get(name, ())])
+
         app = FastAPI(title="Bunraku", version=__version__, docs_url="/v1/docs", openapi_url="/v1/openapi.json")
-        problem_details.install_problem_handlers(app)
-        known = list(app.router.routes)
-        state = Readiness(backing, [need for name in apps for need in REQUIRED_BACKENDS.get(name, ())])
-        readiness.install_health_routes(app, state)
+        install_problem_handlers(app)
+        routes = list(app.router.routes)
+        install_health_routes(app, readiness)
         for service in apps.values():
             await stack.enter_async_context(service.router.lifespan_context(service))
             app.include_router(service.router)
-            known += service.router.routes
-
-        @app.get("/v1/health", tags=["health"])
-        @requires(None)
-        async def health() -> dict[str, Any]:
-            """Whether this process serves."""
-            return {"status": "ok", "version": __version__}
-
-        known.append(app.router.routes[-1])
+            routes += service.router.routes
+        routes.append(_add_version_route(app))
         add_security_scheme(app)
-        app.add_middleware(
-            AuthorizationMiddleware,
-            authenticator=backing.authenticator,
-            rules=collect_route_rules(known),
-            settings=settings,
-            metrics=backing.metrics,
-        )
-        if origins := parse_origins(settings.origins):
-            app.add_middleware(CorsMiddleware, origins=origins)
-        app.add_middleware(AccessLogMiddleware, metrics=backing.metrics)
+        _add_middleware(app, context, routes)
         if "page" in services:
-            # the page goes with an account of the whole interface, whoever serves it
-            whole = FastAPI(title=app.title, version=app.version)
-            for service in (app, *(make() for name, make in made.items() if name not in apps)):
-                whole.include_router(service.router)
-                if service is not app:
-                    # each says there, too, what it needs
-                    collect_route_rules(service.router.routes)
-            add_security_scheme(whole)
-            app.openapi = whole.openapi  # type: ignore[method-assign]
-            app.mount("/", _page_app())
-        loading = asyncio.create_task(_warm_up(backing, services), name="load what is needed later")
-        stack.push_async_callback(_cancel_and_wait, loading)
+            _describe_all_services(app, [create for name, create in factories.items() if name not in apps])
+            app.mount("/", create_page_app(PAGE_FOLDER))
+
+        stack.push_async_callback(_cancel_and_wait, asyncio.create_task(_warm_up(context, apps), name="warm up"))
         if demo:
-            opening = open_demo_stage(backing, apps["session"].state.sessions)
+            opening = open_demo_stage(context, apps["session"].state.sessions)
             if settings.bus == "memory:":
                 await opening
             else:
-                # what the replicas share may be away: meanwhile this one says so
-                setting = asyncio.create_task(
-                    _complete_before_ready(opening, "the demo's stage", state), name="set the demo's stage"
+                # shared backends may be unavailable; the process serves meanwhile and reports that it is not ready
+                task = asyncio.create_task(
+                    _complete_before_ready(opening, "the demo's stage", readiness), name="open the demo's stage"
                 )
-                stack.push_async_callback(_cancel_and_wait, setting)
+                stack.push_async_callback(_cancel_and_wait, task)
         yield app
 
 
+def _service_factories(context: ServiceContext) -> dict[str, ServiceFactory]:
+    """Return the factory of each service, in the order in which routes are matched."""
+    return {
+        "stream": lambda: bunraku.stream.app.create_app(context),
+        "ingest": lambda: bunraku.ingest.app.create_app(context),
+        "ik": bunraku.ik.app.create_app,
+        "session": lambda: bunraku.session.app.create_app(context),
+        ACCESS_SERVICE: lambda: bunraku.access.app.create_app(context),
+    }
+
+
+def _add_version_route(app: FastAPI) -> BaseRoute:
+    @app.get("/v1/health", tags=["health"])
+    @requires(None)
+    async def health() -> dict[str, Any]:
+        """Return the version of the running process."""
+        return {"status": "ok", "version": __version__}
+
+    return app.router.routes[-1]
+
+
+def _add_middleware(app: FastAPI, context: ServiceContext, routes: list[BaseRoute]) -> None:
+    """Add the middleware of all services. The last one added is the outermost."""
+    app.add_middleware(AuthorizationMiddleware, context=context, rules=collect_route_rules(routes))
+    if origins := parse_origins(context.settings.origins):
+        app.add_middleware(CorsMiddleware, origins=origins)
+    app.add_middleware(AccessLogMiddleware, metrics=context.metrics, clock=context.clock)
+
+
+def _describe_all_services(app: FastAPI, other_services: list[ServiceFactory]) -> None:
+    """Make the API description of `app` include the services that other processes run."""
+    description = FastAPI(title=app.title, version=app.version)
+    description.include_router(app.router)
+    for create in other_services:
+        router = create().router
+        description.include_router(router)
+        # adds the required roles to the description
+        collect_route_rules(router.routes)
+    add_security_scheme(description)
+    app.openapi = description.openapi  # type: ignore[method-assign]
+
+
 def uvicorn_protocol_options() -> dict[str, Any]:
-    """uvicorn's options for what comes over the line."""
+    """Return uvicorn's options for the HTTP and WebSocket protocols."""
     return {
         "http": HeaderTimeoutProtocol,
         "h11_max_incomplete_event_size": MAX_HEADER_BYTES,
@@ -171,6 +159,31 @@ def uvicorn_protocol_options() -> dict[str, Any]:
         "ws_max_size": MAX_CLIENT_MESSAGE_BYTES,
         "ws_per_message_deflate": False,
     }
+
+
+class _Server(uvicorn.Server):
+    """uvicorn server that reports its start and ends without raising the signal again."""
+
+    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._on_ready = on_ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._on_ready()
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        # uvicorn's own method raises the signal again before the services have closed
+        loop = asyncio.get_running_loop()
+        signals = (SIGINT, SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+        for number in signals:
+            loop.add_signal_handler(number, self.handle_exit, number, None)
+        try:
+            yield
+        finally:
+            for number in signals:
+                loop.remove_signal_handler(number)
 
 
 async def serve(
@@ -181,82 +194,64 @@ async def serve(
     on_ready: Callable[[], None],
     services: Collection[str] = SERVICES,
 ) -> None:
-    """Serve on a listening socket until SIGINT or SIGTERM; `ready` is called once requests are answered."""
+    """Serve on a listening socket until SIGINT or SIGTERM. Call `on_ready` once requests are accepted."""
     _raise_open_file_limit()
-
-    class Server(uvicorn.Server):
-        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-            await super().startup(sockets)
-            on_ready()
-
-        @contextmanager
-        def capture_signals(self) -> Iterator[None]:
-            # uvicorn's own raises the signal again before the services have closed; here it only ends the serving
-            loop = asyncio.get_running_loop()
-            signals = (SIGINT, SIGTERM) if threading.current_thread() is threading.main_thread() else ()
-            for number in signals:
-                loop.add_signal_handler(number, self.handle_exit, number, None)
-            try:
-                yield
-            finally:
-                for number in signals:
-                    loop.remove_signal_handler(number)
-
     with listening_socket:
         async with compose_app(settings, demo=demo, services=services) as app:
             config = uvicorn.Config(
                 app,
                 **uvicorn_protocol_options(),
                 lifespan="off",
-                # it tells of queries at INFO, and they may have tickets; how its log is written the command says
+                # the command configures logging; at level INFO uvicorn would log queries, which may contain tickets
                 log_config=None,
                 log_level="warning",
                 access_log=False,
                 server_header=False,
-                timeout_graceful_shutdown=2,
+                timeout_graceful_shutdown=SHUTDOWN_TIMEOUT_S,
             )
-            await Server(config).serve(sockets=[listening_socket])
+            await _Server(config, on_ready).serve(sockets=[listening_socket])
 
 
 def _raise_open_file_limit() -> None:
-    """Each viewer is an open file, and many systems let a process have 1,024 of them until it asks for more."""
+    """Raise the limit on open files: each viewer needs one, and the default is often 1,024."""
     if sys.platform == "win32":
         return
     import resource
 
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    # some say that there is no limit, and have one
+    # some systems report no limit and reject it
     with suppress(ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
-async def _complete_before_ready(work: Awaitable[None], task_name: str, readiness_state: Readiness) -> None:
-    """Not ready until `work` is done."""
-    readiness_state.pending_preparations.add(task_name)
+async def _complete_before_ready(work: Awaitable[None], name: str, readiness: Readiness) -> None:
+    """Report that the process is not ready until `work` has completed."""
+    readiness.pending_preparations.add(name)
     try:
         await work
     except Exception:
-        _log.exception("%s is not there", task_name)
+        _log.exception("cannot prepare %s", name)
     else:
-        readiness_state.pending_preparations.discard(task_name)
+        readiness.pending_preparations.discard(name)
 
 
-async def _warm_up(context: ServiceContext, services: Collection[str]) -> None:
-    """Load what takes seconds, so that nobody waits for it: after the page, one after the other, in a thread."""
+async def _warm_up(context: ServiceContext, apps: Mapping[str, FastAPI]) -> None:
+    """Load in a thread what takes seconds to load, so that no request waits for it."""
     await asyncio.sleep(WARM_UP_DELAY_S)
-    # whoever comes by a link for viewers is looked up in it
-    if "ingest" in services or context.authenticator.requires_token:
+    # the catalogue is needed for uploads and to check links for viewers
+    if "ingest" in apps or context.authenticator.requires_token:
         try:
             await context.catalogue.open()
         except BackendUnavailable as error:
-            # it is tried again when it is used
+            # each use of the catalogue tries again
             _log.warning("%s", error)
-    if "stream" in services:
-        await asyncio.to_thread(multicast.warm_up)
-    if "session" in services:
+    if "stream" in apps:
+        await asyncio.to_thread(apps["stream"].state.multicast_sender.load)
+    if "session" in apps:
         await asyncio.to_thread(motion_decoder.warm_up)
-        await asyncio.to_thread(limb_solver.warm_up_solver)
-    # what is loaded by now stays: the collector need not walk through it again and again while limbs are solved
+        solver = await asyncio.to_thread(limb_solver.load_compiled_solver)
+        apps["session"].state.sessions.use_solver(solver)
+    # the objects loaded so far are permanent: exclude them from collections
     gc.freeze()
     gc.set_threshold(*GC_THRESHOLDS)
 
@@ -264,9 +259,3 @@ async def _warm_up(context: ServiceContext, services: Collection[str]) -> None:
 async def _cancel_and_wait(task: asyncio.Task[None]) -> None:
     task.cancel()
     await asyncio.wait((task,))
-
-
-def _page_app() -> ASGIApp:
-    if not (PAGE_FOLDER / "index.html").is_file():
-        return PlainTextResponse("The page is not built here: run `make setup`. The API is at /v1/docs.\n", 503)
-    return GZipMiddleware(PageFiles(directory=PAGE_FOLDER, html=True), minimum_size=1000)

@@ -1,34 +1,40 @@
-"""What the commands share: where they print, which server they ask, and how they say that it went wrong."""
+"""Functions that the commands share: output, addresses of motions and sessions, errors of requests."""
 
 from __future__ import annotations
 
 import asyncio
 import re
-from typing import Annotated, Any
+from collections.abc import Awaitable, Callable
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
 import typer
 from rich.console import Console
 
+if TYPE_CHECKING:
+    from bunraku.client.api import Client
+
 out = Console()
 err = Console(stderr=True)
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-ServerOption = Annotated[str, typer.Option("--server", envvar="BUNRAKU_SERVER", help="Address of a running Bunraku.")]
+ServerOption = Annotated[str, typer.Option("--server", envvar="BUNRAKU_SERVER", help="Address of a running server.")]
 TokenOption = Annotated[
     str | None,
-    typer.Option("--token", envvar="BUNRAKU_TOKEN", show_envvar=True, help="What lets in, if the server asks for it."),
+    typer.Option("--token", envvar="BUNRAKU_TOKEN", show_envvar=True, help="Token, if the server requires one."),
 ]
 DEFAULT_SERVER = "http://127.0.0.1:8000"
 
+Result = TypeVar("Result")
+
 
 def print_plain(text: str) -> None:
-    """Print words as they stand."""
+    """Print text without markup, highlighting or line wrapping."""
     out.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def print_statistics(statistics: dict[str, Any], as_json: bool) -> None:
-    """Print figures by their names."""
+    """Print named values as a table or as JSON."""
     from rich.table import Table
 
     if as_json:
@@ -41,8 +47,11 @@ def print_statistics(statistics: dict[str, Any], as_json: bool) -> None:
 
 
 def parse_resource_address(address: str) -> tuple[str | None, str | None, str]:
-    """Server, kind (`motions` or `sessions`) and id of what is given by its page or its API address; of a mere id only
-    that. Raises `typer.BadParameter` for an address of something else."""
+    """Return the server, kind (`motions` or `sessions`) and id of a motion or session.
+
+    `address` is the URL of its page or of its API resource, or only its id; then server and kind are None. Raises
+    `typer.BadParameter` for any other URL.
+    """
     parts = urlsplit(address)
     if parts.scheme not in ("http", "https", "ws", "wss"):
         return None, None, address
@@ -50,14 +59,14 @@ def parse_resource_address(address: str) -> tuple[str | None, str | None, str]:
     query = dict(pair.partition("=")[::2] for pair in parts.query.split("&"))
     if "session" in query:
         return base, "sessions", unquote(query["session"])
-    found = re.fullmatch(r"(.*)/v1/(motions|sessions)/([^/]+)(?:/(?:stream)?)?", parts.path)
-    if found is None:
-        raise typer.BadParameter(f"no motion and no session is at {address}")
-    return base + found[1], found[2], unquote(found[3])
+    match = re.fullmatch(r"(.*)/v1/(motions|sessions)/([^/]+)(?:/(?:stream)?)?", parts.path)
+    if match is None:
+        raise typer.BadParameter(f"{address} is not the address of a motion or session")
+    return base + match[1], match[2], unquote(match[3])
 
 
-async def find_resource_kind(client: Any, resource_id: str) -> str:
-    """Whether an id is of `sessions` or `motions`; raises `ServerProblem` where it is of neither."""
+async def find_resource_kind(client: Client, resource_id: str) -> str:
+    """Return whether an id belongs to `sessions` or `motions`. Raises `ServerProblem` if it belongs to neither."""
     from bunraku.client.api import ServerProblem
 
     try:
@@ -70,17 +79,20 @@ async def find_resource_kind(client: Any, resource_id: str) -> str:
     return "sessions"
 
 
-def run_request(request: Any, server: str) -> Any:
-    """The result of `run`, its failures said in words."""
+def run_request(request: Callable[[], Awaitable[Result]], server: str) -> Result:
+    """Return the result of `request`. If it fails, print the error and raise `typer.Exit`."""
     import httpx2
     from websockets.exceptions import WebSocketException
 
     from bunraku.client.api import ServerProblem
 
+    async def run() -> Result:
+        return await request()
+
     try:
-        return asyncio.run(request())
+        return asyncio.run(run())
     except ServerProblem as problem:
         err.print(str(problem))
     except (httpx2.TransportError, OSError, WebSocketException) as error:
-        err.print(f"No Bunraku answers at {server}: {error}. Is `bunraku up` running?")
+        err.print(f"Cannot reach Bunraku at {server}: {error}. Start it with `bunraku up`.")
     raise typer.Exit(1)

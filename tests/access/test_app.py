@@ -27,21 +27,21 @@ def motion(http: httpx2.Client) -> str:
     return str(http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 5)).json()["id"])
 
 
-def test_a_link_is_told_once_and_lasts_a_week_if_nothing_else_is_said(http: httpx2.Client, motion: str) -> None:
+def test_created_link_has_a_token_and_the_default_lifetime(http: httpx2.Client, motion: str) -> None:
     answer = http.post("/v1/shares", json={"motion": motion})
-    made = answer.json()
-    assert (answer.status_code, answer.headers["location"]) == (201, f"/v1/shares/{made['id']}")
+    created = answer.json()
+    assert (answer.status_code, answer.headers["location"]) == (201, f"/v1/shares/{created['id']}")
     assert answer.headers["cache-control"] == "no-store"
-    assert made["link"] == f"/?motion={motion}#share={made['token']}"
-    lasts = datetime.fromisoformat(made["expires"]) - datetime.fromisoformat(made["created"])
-    assert lasts.total_seconds() == DEFAULT_SHARE_LIFETIME_S
-    (listed,) = [one for one in http.get("/v1/shares").json()["items"] if one["id"] == made["id"]]
-    assert listed == {key: made[key] for key in ("id", "session", "motion", "by", "created", "expires")}
+    assert created["link"] == f"/?motion={motion}#share={created['token']}"
+    lifetime = datetime.fromisoformat(created["expires"]) - datetime.fromisoformat(created["created"])
+    assert lifetime.total_seconds() == DEFAULT_SHARE_LIFETIME_S
+    (listed,) = [one for one in http.get("/v1/shares").json()["items"] if one["id"] == created["id"]]
+    assert listed == {key: created[key] for key in ("id", "session", "motion", "by", "created", "expires")}
     assert listed["by"] == "host"
 
 
 @pytest.mark.parametrize(
-    ("asked", "status"),
+    ("request_body", "status"),
     [
         ({}, 422),
         ({"motion": "m", "session": "s"}, 422),
@@ -55,26 +55,26 @@ def test_a_link_is_told_once_and_lasts_a_week_if_nothing_else_is_said(http: http
         ({"motion": "m", "role": "admin"}, 422),
     ],
 )
-def test_what_cannot_be_shared_is_refused(http: httpx2.Client, asked: dict[str, object], status: int) -> None:
-    answer = http.post("/v1/shares", json=asked)
+def test_invalid_share_request_is_rejected(http: httpx2.Client, request_body: dict[str, object], status: int) -> None:
+    answer = http.post("/v1/shares", json=request_body)
     assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json")
 
 
-def test_newer_links_come_first_and_no_more_than_are_asked_for(http: httpx2.Client, motion: str) -> None:
-    given = bearer_headers(make_token(Role.CONTROL, "aiko"))
+def test_list_is_limited_to_the_requested_number_of_own_links(http: httpx2.Client, motion: str) -> None:
+    headers = bearer_headers(make_token(Role.CONTROL, "aiko"))
     for _ in range(3):
-        assert http.post("/v1/shares", json={"motion": motion}, headers=given).status_code == 201
-    assert len(http.get("/v1/shares?limit=2", headers=given).json()["items"]) == 2
-    assert len(http.get("/v1/shares", headers=given).json()["items"]) == 3
+        assert http.post("/v1/shares", json={"motion": motion}, headers=headers).status_code == 201
+    assert len(http.get("/v1/shares?limit=2", headers=headers).json()["items"]) == 2
+    assert len(http.get("/v1/shares", headers=headers).json()["items"]) == 3
 
 
-def test_a_ticket_is_short_and_kept_by_nobody(http: httpx2.Client) -> None:
+def test_ticket_response_is_not_cacheable(http: httpx2.Client) -> None:
     answer = http.post("/v1/tickets")
     assert answer.json() == {"ticket": answer.json()["ticket"], "seconds": 30.0}
     assert len(answer.json()["ticket"]) == 48
     assert answer.headers["cache-control"] == "no-store"
 
 
-def test_more_tickets_than_are_kept_are_a_429(http: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_tickets_are_a_429(http: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ticket_store, "MAX_TICKETS", 0)
     assert http.post("/v1/tickets").status_code == 429

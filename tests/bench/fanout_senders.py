@@ -33,7 +33,6 @@ from bunraku.playout import timeline
 from bunraku.runtime.clock import clock
 from bunraku.runtime.context import open_context
 from bunraku.runtime.settings import Settings
-from bunraku.websocket import multicast
 from bunraku.websocket.connection import WebSocketConnection
 from bunraku.wire.messages import Presence
 from bunraku.wire.overlay import Overlay
@@ -127,7 +126,7 @@ async def run_bunraku(listening: socket.socket, size: int, hertz: int, *, playin
                 return sum(viewers.values())
 
             app = bunraku.stream.app.create_app(backing)
-            await asyncio.to_thread(multicast.warm_up)
+            await asyncio.to_thread(app.state.multicast_sender.load)
             server = await start_server(app, listening, lifespan="off", **uvicorn_protocol_options())
             await run_sender(listening, send, size, hertz, lambda: max_queued_bytes(server))
 

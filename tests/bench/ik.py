@@ -18,12 +18,14 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.marionette import arm_batch, bend_table, jit
+from bunraku.kernels import load_kernels
+from bunraku.marionette import arm_batch, bend_table
 from bunraku.marionette.arm import BendTable
 from bunraku.marionette.arm_batch import SolvedArms
 from bunraku.marionette.bodies import BODIES
+from bunraku.marionette.constants import MAX_TIP_DISTANCE
 from bunraku.marionette.paper import PAPER_BYTES
-from bunraku.marionette.proportions import MAX_TIP_DISTANCE, Proportions
+from bunraku.marionette.proportions import Proportions
 from bunraku.motion.rotation import Array
 from tests.bench import ik_accuracy, smoothness
 from tests.bench.ik_peers import NodeProcess, SlsqpSolver, processor_rate
@@ -104,7 +106,8 @@ def measure_speeds(random: np.random.Generator) -> dict[str, float]:
     def batches(solve: Callable[[Proportions, BendTable, Array], SolvedArms], targets: Array) -> float:
         return processor_rate(lambda: sum(len(solve(proportions, stored, targets).tip) for _ in range(20)))
 
-    jit.solve_arms(proportions, stored, orders["jumps"])
+    compiled_solve_arms = load_kernels("marionette").solve_arms
+    compiled_solve_arms(proportions, stored, orders["jumps"])
     rates: dict[str, dict[str, list[float]]] = {order: {} for order in orders}
     errors: dict[str, dict[str, float]] = {}
     with NodeProcess() as node:
@@ -117,7 +120,7 @@ def measure_speeds(random: np.random.Generator) -> dict[str, float]:
                 found = {name: median(turns) for name, turns in answer["orders"][order]["rates"].items()}
                 found["numpy"], found["compiled"] = (
                     batches(arm_batch.solve_arms, targets),
-                    batches(jit.solve_arms, targets),
+                    batches(compiled_solve_arms, targets),
                 )
                 few = targets[nth * SLSQP_TARGET_COUNT : (nth + 1) * SLSQP_TARGET_COUNT]
                 found["slsqp"] = processor_rate(lambda few=few: slsqp.solve(few))  # type: ignore[misc]

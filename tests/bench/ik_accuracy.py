@@ -9,8 +9,9 @@ import numpy as np
 
 from bunraku.marionette import arm_batch
 from bunraku.marionette.arm import BendTable, close_chain, wrist_bend_limits
+from bunraku.marionette.constants import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD
 from bunraku.marionette.paper import build_paper_table, joint_positions, tip_error
-from bunraku.marionette.proportions import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD, Proportions
+from bunraku.marionette.proportions import Proportions
 from bunraku.motion.rotation import Array
 
 _SCAN_SAMPLES = 257

@@ -34,9 +34,9 @@ from bunraku.client.api import Client
 from bunraku.client.message_socket import MessageSocket
 from bunraku.client.puppeteer import ControlRefused, Puppeteer
 from bunraku.codec.motion_track import parse_motion_track
-from bunraku.marionette import vector
 from bunraku.marionette.limb_rig import ArmRig, Limb
-from bunraku.marionette.vector import Quaternion, Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import Quaternion, Vector
 from bunraku.motion.skeleton import Figure
 from bunraku.playout.overlay_buffer import RADIANS_PER_UNIT
 from bunraku.runtime.clock import clock

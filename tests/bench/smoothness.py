@@ -15,16 +15,17 @@ from typing import NamedTuple
 import numpy as np
 
 from bunraku.demo import choreography
-from bunraku.marionette import shoulder as limit
-from bunraku.marionette import vector
 from bunraku.marionette.bodies import BODIES
-from bunraku.marionette.controlled_limb import MAX_REACH, MIN_REACH
-from bunraku.marionette.elbow import Elbow, elevation
+from bunraku.marionette.constants import MAX_REACH, MIN_REACH
+from bunraku.marionette.elbow import Elbow
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.merge import Marionette, apply_overlay
 from bunraku.marionette.ownership import LimbGrant, LimbInput
 from bunraku.marionette.proportions import Proportions
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import shoulder as limit
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import elevation
+from bunraku.marionette.solver.vector import Vector
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure, standard_figure
 
@@ -143,7 +144,7 @@ def measure_handover(
     granted = times[3] + phase
     puppet.observe_pose(poses[begin - 1], times[2])
     puppet.observe_pose(poses[begin], times[3])
-    grant = puppet.claim(limb, "one", granted)
+    grant = puppet.ownership.claim(limb, "one", granted)
     assert isinstance(grant, LimbGrant)
     target = vector.add(own[3], away)
     taken = back = released = 0
@@ -151,10 +152,10 @@ def measure_handover(
     for k in range(4, len(own)):
         now = times[k]
         if k == 34:
-            puppet.release(limb, "one", grant.epoch, now - FRAME_US + phase)
+            puppet.ownership.release(limb, "one", grant.epoch, now - FRAME_US + phase)
             released = now - FRAME_US + phase
         elif k < 34:
-            puppet.apply_input(
+            puppet.ownership.apply_input(
                 "one", LimbInput(limb, 1, grant.epoch, k, now - FRAME_US + phase, target), now - FRAME_US + phase
             )
         merged = apply_overlay(poses[begin - 3 + k], puppet.compute_overlay(poses[begin - 3 + k], now))

@@ -6,7 +6,7 @@ import pytest
 from bunraku.marionette import arm_batch, bend_table
 from bunraku.marionette.arm import close_chain, wrist_bend_limits
 from bunraku.marionette.bodies import BODIES, Body
-from bunraku.marionette.proportions import MAX_TIP_DISTANCE
+from bunraku.marionette.constants import MAX_TIP_DISTANCE
 from tests.bench import ik_accuracy
 from tests.bench.ik import report_speeds, wandering_targets
 from tests.bench.ik_peers import SlsqpSolver

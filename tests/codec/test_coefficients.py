@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec import coefficients, prior
-from bunraku.codec.coefficients import MAX_BLOCK_BYTES, SCENE_CHANNEL_COUNT, BlockHeader
+from bunraku.codec.coefficients import MAX_BLOCK_BYTES, BlockHeader
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import IntArray
+from bunraku.codec.prior import SCENE_CHANNEL_COUNT, IntArray
 from bunraku.motion.skeleton import CHANNEL_COUNT
 
 PRIOR = prior.load_shipped_prior()
@@ -17,8 +17,8 @@ FPS = 30.0
 
 def random_coefficients(seed: int, count: int, magnitude: float) -> IntArray:
     random = np.random.default_rng(seed)
-    fall = magnitude / (1 + np.arange(count)) ** 1.5
-    return np.round(random.laplace(0, 1, (CHANNEL_COUNT, 3, count)) * fall).astype(np.int64)
+    spectrum = magnitude / (1 + np.arange(count)) ** 1.5
+    return np.round(random.laplace(0, 1, (CHANNEL_COUNT, 3, count)) * spectrum).astype(np.int64)
 
 
 @given(
@@ -28,47 +28,43 @@ def random_coefficients(seed: int, count: int, magnitude: float) -> IntArray:
     st.builds(BlockHeader, st.integers(60, 512), st.integers(0, 255), st.integers(-32, 31)),
     st.sampled_from([60, 30]),
 )
-def test_heads_and_coefficients_come_back_bit_for_bit(
-    seed: int, count: int, size: float, head: BlockHeader, usual: int
+def test_header_and_coefficients_round_trip(
+    seed: int, count: int, magnitude: float, header: BlockHeader, nominal_frames: int
 ) -> None:
-    q = random_coefficients(seed, count, size)
-    again, back = coefficients.decode_coefficients(
-        PRIOR, coefficients.encode_coefficients(PRIOR, head, q, usual, FPS), usual, FPS
-    )
-    assert again == head
-    used = back.shape[2]
-    np.testing.assert_array_equal(back, q[:, :, :used])
+    q = random_coefficients(seed, count, magnitude)
+    data = coefficients.encode_coefficients(PRIOR, header, q, nominal_frames, FPS)
+    decoded_header, decoded = coefficients.decode_coefficients(PRIOR, data, nominal_frames, FPS)
+    assert decoded_header == header
+    used = decoded.shape[2]
+    np.testing.assert_array_equal(decoded, q[:, :, :used])
     assert not q[:, :, used:].any()
 
 
 @given(st.integers(0, 1000), st.integers(1, 60), st.floats(0, 20_000), st.integers(60, 512), st.integers(0, 255))
-def test_a_scene_comes_back_bit_for_bit(seed: int, count: int, size: float, frames: int, step: int) -> None:
-    q = random_coefficients(seed, count, size)[:SCENE_CHANNEL_COUNT]
+def test_scene_block_round_trips(seed: int, count: int, magnitude: float, frames: int, step: int) -> None:
+    q = random_coefficients(seed, count, magnitude)[:SCENE_CHANNEL_COUNT]
     q[2, 1:] = 0
-    head = BlockHeader(frames, step, 0)
-    again, back = coefficients.decode_coefficients(
-        PRIOR, coefficients.encode_coefficients(PRIOR, head, q, 60, FPS), 60, FPS, SCENE_CHANNEL_COUNT
-    )
-    assert again == head
-    used = back.shape[2]
-    np.testing.assert_array_equal(back, q[:, :, :used])
+    header = BlockHeader(frames, step, 0)
+    data = coefficients.encode_coefficients(PRIOR, header, q, 60, FPS)
+    decoded_header, decoded = coefficients.decode_coefficients(PRIOR, data, 60, FPS, SCENE_CHANNEL_COUNT)
+    assert decoded_header == header
+    used = decoded.shape[2]
+    np.testing.assert_array_equal(decoded, q[:, :, :used])
     assert not q[:, :, used:].any()
 
 
-def test_the_largest_numbers_come_back_and_larger_ones_are_refused() -> None:
-    head = BlockHeader(30, 0, 0)
+def test_largest_coefficients_round_trip_and_larger_ones_are_refused() -> None:
+    header = BlockHeader(30, 0, 0)
     q = np.zeros((CHANNEL_COUNT, 3, 2), dtype=np.int64)
     q[0, 0], q[18, 2] = ((1 << 19) - 2, -(1 << 18)), (-5, 1 << 17)
-    np.testing.assert_array_equal(
-        coefficients.decode_coefficients(PRIOR, coefficients.encode_coefficients(PRIOR, head, q, 30, FPS), 30, FPS)[1],
-        q,
-    )
+    data = coefficients.encode_coefficients(PRIOR, header, q, 30, FPS)
+    np.testing.assert_array_equal(coefficients.decode_coefficients(PRIOR, data, 30, FPS)[1], q)
     q[18, 2, 1] = 1 << 40
     with pytest.raises(ValueError, match="too large"):
-        coefficients.encode_coefficients(PRIOR, head, q, 30, FPS)
+        coefficients.encode_coefficients(PRIOR, header, q, 30, FPS)
 
 
-def test_head_and_end_cost_few_bytes() -> None:
+def test_block_of_zeros_costs_few_bytes() -> None:
     q = np.zeros((CHANNEL_COUNT, 3, 30), dtype=np.int64)
     assert len(coefficients.encode_coefficients(PRIOR, BlockHeader(30, 200, -32), q, 30, FPS)) <= 6
     assert len(coefficients.encode_coefficients(PRIOR, BlockHeader(499, 200, -32), q, 30, FPS)) <= 9
@@ -76,15 +72,15 @@ def test_head_and_end_cost_few_bytes() -> None:
 
 
 @given(st.binary(max_size=300), st.integers(1, 120))
-def test_any_bytes_decode_or_are_refused(data: bytes, usual: int) -> None:
+def test_arbitrary_bytes_are_decoded_or_refused(data: bytes, nominal_frames: int) -> None:
     try:
-        head, q = coefficients.decode_coefficients(PRIOR, data, usual, FPS)
+        header, q = coefficients.decode_coefficients(PRIOR, data, nominal_frames, FPS)
     except DamagedBlock:
         return
-    assert q.shape[2] <= head.frames <= 512
+    assert q.shape[2] <= header.frames <= 512
     assert abs(q).max(initial=0) < 1 << 36
 
 
-def test_too_many_bytes_are_refused() -> None:
+def test_too_long_block_is_refused() -> None:
     with pytest.raises(DamagedBlock, match="bytes"):
         coefficients.decode_coefficients(PRIOR, bytes(MAX_BLOCK_BYTES + 1), 30, FPS)

@@ -20,34 +20,34 @@ from tests.vectors.blocks import random_motion
 
 def load_clip(shared: Path, name: str) -> Motion:
     clip = np.load(shared / "mocap" / "hanim19" / f"{name}.npz")
-    parts = {key: clip[key].astype(np.float64) for key in ("off", "tip", "root", "Q")}
-    return Motion(Figure(parts["off"], parts["tip"]), float(clip["fps"]), parts["root"], parts["Q"])
+    arrays = {key: clip[key].astype(np.float64) for key in ("off", "tip", "root", "Q")}
+    return Motion(Figure(arrays["off"], arrays["tip"]), float(clip["fps"]), arrays["root"], arrays["Q"])
 
 
 def decoded_points(encoded: EncodedMotion, level: int) -> np.ndarray:
-    """World points of all frames as a viewer has them."""
+    """Return the world points of all frames as a viewer decodes them."""
     blocks = [decode_motion_block(encoded.track, data) for data in encoded.ladder[level].blocks]
     poses = [block.pose_at(np.arange(block.frames, dtype=np.float64)) for block in blocks]
     return joint_and_tip_positions(encoded.track.figure, *(np.concatenate(part) for part in zip(*poses, strict=True)))
 
 
 @pytest.mark.parametrize("grade", ["live", "best"])
-def test_the_ladder_rises_and_every_rate_keeps_its_bound(grade: str) -> None:
+def test_bitrates_rise_and_every_level_meets_its_bound(grade: str) -> None:
     motion = random_motion(3.2, 30.0, 5)
     encoded = encode_motion(motion, grade=grade)  # type: ignore[arg-type]
     assert len(encoded.ladder) == len(ERROR_BOUNDS_MM) >= 5
-    assert [rate.kbps for rate in encoded.ladder] == sorted(rate.kbps for rate in encoded.ladder)
+    assert [level.kbps for level in encoded.ladder] == sorted(level.kbps for level in encoded.ladder)
     truth = joint_and_tip_positions(motion.figure, motion.root, motion.rotations)
-    for number, (rate, bound) in enumerate(zip(encoded.ladder, ERROR_BOUNDS_MM, strict=True)):
+    for number, (level, bound) in enumerate(zip(encoded.ladder, ERROR_BOUNDS_MM, strict=True)):
         error = np.linalg.norm(decoded_points(encoded, number) - truth, axis=-1) * 1e3
-        assert error.max() <= bound == rate.error_bound_mm
-        assert rate.max_error_mm == pytest.approx(error.max())
-        assert rate.mean_error_mm == pytest.approx(error.mean())
+        assert error.max() <= bound == level.error_bound_mm
+        assert level.max_error_mm == pytest.approx(error.max())
+        assert level.mean_error_mm == pytest.approx(error.mean())
 
 
 @pytest.mark.parametrize("fps", [24.0, 29.97, 120.0])
 @pytest.mark.parametrize("block_seconds", [0.25, 0.5, 1.0, 2.0])
-def test_blocks_of_any_length_keep_the_bound(fps: float, block_seconds: float) -> None:
+def test_blocks_of_any_length_meet_the_bound(fps: float, block_seconds: float) -> None:
     motion = random_motion(2.3, fps, 6)
     encoded = encode_motion(motion, block_seconds, error_bounds_mm=(4.0,), grade="live", first_seconds=0.2)
     assert encoded.track.first_frames == round(0.2 * fps)
@@ -55,62 +55,61 @@ def test_blocks_of_any_length_keep_the_bound(fps: float, block_seconds: float) -
     assert np.linalg.norm(decoded_points(encoded, 0) - truth, axis=-1).max() <= 4e-3
 
 
-def test_across_borders_nothing_jumps_by_more_than_the_errors() -> None:
-    """Two frames on either side of a border are each at most the bound off, so their step and the change of their steps
-    differ from the truth's by at most two and four bounds."""
+def test_jumps_at_block_borders_are_within_the_bound() -> None:
+    """Each frame is at most the bound off, so velocity and acceleration differ by at most two and four bounds."""
     motion, bound = random_motion(3.0, 60.0, 12), 5e-3
     encoded = encode_motion(motion, 0.5, error_bounds_mm=(bound * 1e3,))
-    truth, seen = joint_and_tip_positions(motion.figure, motion.root, motion.rotations), decoded_points(encoded, 0)
+    truth, decoded = joint_and_tip_positions(motion.figure, motion.root, motion.rotations), decoded_points(encoded, 0)
     for index in range(1, encoded.track.block_count):
         border = encoded.track.first_frame(index)
         for order in (1, 2):
             part = slice(border - 2, border + 2)
-            off = np.diff(seen[part], order, axis=0) - np.diff(truth[part], order, axis=0)
-            assert np.linalg.norm(off, axis=-1).max() <= 2**order * bound
+            difference = np.diff(decoded[part], order, axis=0) - np.diff(truth[part], order, axis=0)
+            assert np.linalg.norm(difference, axis=-1).max() <= 2**order * bound
 
 
-def test_the_mean_is_met_and_not_passed() -> None:
-    _, rate = encode_motion_to_mean_error(random_motion(3.2, 30.0, 5), 2.0)
-    assert 1.8 < rate.mean_error_mm <= 2.0
+def test_mean_error_is_met_and_not_exceeded() -> None:
+    _, level = encode_motion_to_mean_error(random_motion(3.2, 30.0, 5), 2.0)
+    assert 1.8 < level.mean_error_mm <= 2.0
 
 
-def test_a_still_puppet_costs_thirty_bytes_a_block_at_most() -> None:
+def test_still_pose_costs_at_most_30_bytes_per_block() -> None:
     motion = random_motion(4.0, 30.0, 5)
     still = Motion(motion.figure, 30.0, np.tile(motion.root[:1], (90, 1)), np.tile(motion.rotations[:1], (90, 1, 1)))
-    for rate in encode_motion(still).ladder:
-        assert max(map(len, rate.blocks)) <= 30
+    for level in encode_motion(still).ladder:
+        assert max(map(len, level.blocks)) <= 30
 
 
-def test_a_single_frame_is_a_motion() -> None:
+def test_single_frame_can_be_encoded() -> None:
     motion = random_motion(4.0, 30.0, 5)
     assert encode_motion(Motion(motion.figure, 30.0, motion.root[:1], motion.rotations[:1])).track.block_count == 1
 
 
 def test_progress_rises_to_one() -> None:
-    told: list[float] = []
-    encode_motion(random_motion(2.0, 30.0, 5), grade="live", on_progress=told.append)
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    progress: list[float] = []
+    encode_motion(random_motion(2.0, 30.0, 5), grade="live", on_progress=progress.append)
+    assert progress == sorted(progress)
+    assert progress[-1] == 1.0
 
 
-def test_threads_change_nothing() -> None:
+def test_threads_encode_the_same_bytes() -> None:
     motion = random_motion(2.0, 30.0, 5)
-    one = encode_motion(motion, error_bounds_mm=(20.0, 5.0, 60.0))
+    serial = encode_motion(motion, error_bounds_mm=(20.0, 5.0, 60.0))
     with ThreadPoolExecutor(3) as pool:
-        more = encode_motion(motion, error_bounds_mm=(20.0, 5.0, 60.0), map_levels=pool.map)
-    assert [rate.blocks for rate in one.ladder] == [rate.blocks for rate in more.ladder]
-    assert [rate.error_bound_mm for rate in more.ladder] == [20.0, 5.0, 60.0]
+        parallel = encode_motion(motion, error_bounds_mm=(20.0, 5.0, 60.0), map_levels=pool.map)
+    assert [level.blocks for level in serial.ladder] == [level.blocks for level in parallel.ladder]
+    assert [level.error_bound_mm for level in parallel.ladder] == [20.0, 5.0, 60.0]
 
 
-def test_a_block_beyond_its_bound_is_never_let_through() -> None:
+def test_level_beyond_its_bound_is_refused() -> None:
     motion = random_motion(1.0, 30.0, 5)
     encoded = encode_motion(motion, error_bounds_mm=(20.0,))
     with pytest.raises(ValueError, match=r"0\.001"):
         measure_level(encoded.track, motion, encoded.ladder[0].blocks, 0.001)
 
 
-def test_real_dance_is_small_and_near(shared: Path) -> None:
-    rates = encode_motion(load_clip(shared, "perfume_A")).ladder
-    assert rates[0].kbps < 0.8
-    assert rates[2].kbps < 2.5
-    assert rates[4].kbps < 8.0
+def test_bitrates_of_a_recorded_dance(shared: Path) -> None:
+    ladder = encode_motion(load_clip(shared, "perfume_A")).ladder
+    assert ladder[0].kbps < 0.8
+    assert ladder[2].kbps < 2.5
+    assert ladder[4].kbps < 8.0

@@ -10,11 +10,11 @@ from bunraku.codec.prior import FREQUENCY_CLASS_OF, MAGNITUDE_LEVELS, RELATIVE_C
 from bunraku.motion.skeleton import JOINTS
 
 
-def test_levels_are_sixteen_log_2() -> None:
+def test_magnitude_levels_are_16_log2() -> None:
     np.testing.assert_array_equal(MAGNITUDE_LEVELS, np.round(16 * np.log2(1 + np.arange(4096))))
 
 
-def test_relatives_are_coded_before_and_mirrors_are_the_other_side() -> None:
+def test_relative_channels_are_earlier_and_mirrors_are_on_the_left() -> None:
     channels = np.arange(19)
     assert (channels > RELATIVE_CHANNELS).all()
     channel = {name: index + 1 for index, name in enumerate(JOINTS)}
@@ -25,26 +25,26 @@ def test_relatives_are_coded_before_and_mirrors_are_the_other_side() -> None:
     assert grandparent[channel["l_wrist"]] == channel["l_shoulder"]
 
 
-def test_classes_rise_with_the_frequency() -> None:
+def test_frequency_classes() -> None:
     assert FREQUENCY_CLASS_OF[[0, 1, 2, 3, 4, 5, 8, 9, 15, 16, 512]].tolist() == [0, 1, 2, 3, 3, 4, 4, 5, 5, 6, 6]
 
 
-def test_the_shipped_prior_is_within_what_32_bits_can_add_up() -> None:
+def test_shipped_prior_cannot_overflow_32_bits() -> None:
     shipped = prior.load_shipped_prior()
     for name, array in shipped._asdict().items():
         assert array.shape == getattr(SHAPES, name)
     assert max(abs(shipped.linear).max(), abs(shipped.hidden).max(), abs(shipped.out).max()) < 1 << 15
     for bias in (shipped.bias, shipped.hidden_bias, shipped.hidden_class):
         assert abs(bias).max() <= 1 << 22
-    for odds in (shipped.hazard, shipped.sign):
-        assert 0 < odds.min() <= odds.max() < 1 << 15
+    for probabilities in (shipped.hazard, shipped.sign):
+        assert 0 < probabilities.min() <= probabilities.max() < 1 << 15
 
 
-def test_a_prior_survives_its_json_and_wrong_shapes_are_refused() -> None:
+def test_prior_round_trips_through_json_and_wrong_shape_is_refused() -> None:
     shipped = prior.load_shipped_prior()
     values = json.loads(prior.format_prior(shipped))
-    for ours, again in zip(shipped, prior.parse_prior(values), strict=True):
-        np.testing.assert_array_equal(ours, again)
+    for array, parsed in zip(shipped, prior.parse_prior(values), strict=True):
+        np.testing.assert_array_equal(array, parsed)
     with pytest.raises(ValueError, match="hazard"):
         prior.parse_prior(values | {"hazard": [[1, 2]]})
     assert set(values) == set(Prior._fields)

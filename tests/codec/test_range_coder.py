@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.codec.range_coder import (
+from bunraku.codec._kernels.range_coder import (
     HALF_PROBABILITY,
     decode_bit,
     encode_bit,
@@ -24,27 +24,27 @@ def encode_bits(bits: list[tuple[int, int]]) -> bytes:
 
 
 @given(BITS)
-def test_bits_come_back_as_they_went(bits: list[tuple[int, int]]) -> None:
+def test_bits_round_trip(bits: list[tuple[int, int]]) -> None:
     data = np.array(bytearray(encode_bits(bits)), dtype=np.uint8)
     state = start_decoder(data)
     assert [decode_bit(state, data, probability) for _, probability in bits] == [bit for bit, _ in bits]
 
 
-def test_a_carry_runs_through_waiting_bytes() -> None:
-    # unlikely zeros push LOW up against the top, where carries happen
+def test_carry_propagates_through_pending_bytes() -> None:
+    # improbable zeros push LOW towards the top of the range, where carries occur
     bits = [(0, 32704)] * 40 + [(1, 64)] * 3 + [(0, 32704)] * 40
     data = np.array(bytearray(encode_bits(bits)), dtype=np.uint8)
     state = start_decoder(data)
     assert [decode_bit(state, data, probability) for _, probability in bits] == [bit for bit, _ in bits]
 
 
-def test_bytes_are_near_what_theory_allows() -> None:
+def test_coded_size_is_close_to_the_entropy() -> None:
     random = np.random.default_rng(3)
     bits = [(int(random.random() < 0.05), round(0.05 * 32768)) for _ in range(10_000)]
     entropy = -(0.05 * np.log2(0.05) + 0.95 * np.log2(0.95)) * 10_000 / 8
     assert len(encode_bits(bits)) < 1.1 * entropy
 
 
-def test_certain_bits_cost_next_to_nothing_and_even_bits_one_each() -> None:
+def test_predicted_bits_are_nearly_free_and_random_bits_cost_one() -> None:
     assert len(encode_bits([(1, 32704)] * 1000)) <= 4
     assert len(encode_bits([(i & 1, HALF_PROBABILITY) for i in range(800)])) <= 101

@@ -25,37 +25,40 @@ from tests.vectors.scene import sample_camera, sample_light
     st.floats(MIN_FIELD_OF_VIEW_RAD, MAX_FIELD_OF_VIEW_RAD),
     st.lists(st.floats(0, MAX_SCENE_VALUE), min_size=4, max_size=4),
 )
-def test_numbers_come_back_through_the_channels(places: list[float], view: float, lit: list[float]) -> None:
-    scenes: list[tuple[SceneKind, list[float]]] = [("camera", [*places, view]), ("light", [*places[:3], *lit])]
-    for kind, numbers in scenes:
-        scene = SceneSamples(kind, 30.0, np.array([numbers, numbers]))
+def test_values_round_trip_through_channels(positions: list[float], field_of_view: float, light: list[float]) -> None:
+    scenes: list[tuple[SceneKind, list[float]]] = [
+        ("camera", [*positions, field_of_view]),
+        ("light", [*positions[:3], *light]),
+    ]
+    for kind, values in scenes:
+        scene = SceneSamples(kind, 30.0, np.array([values, values]))
         track = plan_scene_track(scene, plan_timing(30.0, 2))
         channels = track.to_channels(scene.values)
-        assert np.abs(channels).max() < 1e-9, "a scene that stands still is its reference"
+        assert np.abs(channels).max() < 1e-9, "the reference of a still scene must be the scene itself"
         assert not channels[:, 2, 1:].any()
         np.testing.assert_allclose(track.from_channels(channels), scene.values, rtol=1e-9, atol=1e-9)
 
 
-def test_an_error_in_the_coded_numbers_is_what_the_contract_says_of_it() -> None:
-    """10 mm: 1 cm of a camera's place and gaze, half a degree of view; 2 cm of a light's place, 1 % of the roots."""
+def test_error_in_the_channels_is_as_specified_in_the_values() -> None:
+    """10 mm: 1 cm of a camera's position and target, 0.5 degrees; 2 cm of a light's position, 1 % of its roots."""
     for scene in (sample_camera(2.0, 30.0), sample_light(2.0, 30.0)):
         track = plan_scene_track(scene, plan_timing(30.0, len(scene.values)))
         channels = track.to_channels(scene.values)
         channels[:, :2] += 0.01 / np.sqrt(3)
         channels[:, 2, 0] += 0.01
-        off = np.abs(track.from_channels(channels) - scene.values)
-        place = np.linalg.norm(off[:, :3], axis=1)
+        error = np.abs(track.from_channels(channels) - scene.values)
+        position_error = np.linalg.norm(error[:, :3], axis=1)
         if scene.kind == "camera":
-            np.testing.assert_allclose(place, 0.01)
-            np.testing.assert_allclose(np.linalg.norm(off[:, 3:6], axis=1), 0.01)
-            assert 0.25 < np.degrees(off[:, 6]).max() < 0.5
+            np.testing.assert_allclose(position_error, 0.01)
+            np.testing.assert_allclose(np.linalg.norm(error[:, 3:6], axis=1), 0.01)
+            assert 0.25 < np.degrees(error[:, 6]).max() < 0.5
         else:
-            np.testing.assert_allclose(place, 0.02)
+            np.testing.assert_allclose(position_error, 0.02)
             roots = np.sqrt(track.from_channels(channels) / 800)[:, 6] - np.sqrt(scene.values / 800)[:, 6]
             np.testing.assert_allclose(roots, 0.01, atol=1e-12)
 
 
-def test_whatever_is_decoded_is_a_view_and_no_negative_light() -> None:
+def test_decoded_values_are_always_valid() -> None:
     for scene in (sample_camera(0.2, 30.0), sample_light(0.2, 30.0)):
         track = plan_scene_track(scene, plan_timing(30.0, len(scene.values)))
         values = track.from_channels(np.array([-1e9, -3.0, 0.0, 3.0, 1e9])[:, None, None] * np.ones((5, 3, 3)))
@@ -66,51 +69,51 @@ def test_whatever_is_decoded_is_a_view_and_no_negative_light() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "number", "value", "says"),
+    ("kind", "index", "value", "message"),
     [
-        ("camera", 0, np.nan, "frame 2 of a camera"),
+        ("camera", 0, np.nan, "camera: frame 2"),
         ("camera", 4, np.inf, "1e"),
         ("camera", 6, 0.0, "field of view"),
         ("camera", 6, np.pi, "field of view"),
         ("light", 5, -0.1, "not negative"),
-        ("light", 6, -1.0, "frame 2 of a light"),
+        ("light", 6, -1.0, "light: frame 2"),
         ("light", 6, 2e6, "1e"),
     ],
 )
-def test_what_cannot_be_coded_is_refused_with_its_frame(kind: SceneKind, number: int, value: float, says: str) -> None:
+def test_invalid_value_is_refused_with_its_frame(kind: SceneKind, index: int, value: float, message: str) -> None:
     values = np.ones((4, 7))
-    values[2, number] = value
-    with pytest.raises(ValueError, match=says):
+    values[2, index] = value
+    with pytest.raises(ValueError, match=message):
         SceneSamples(kind, 30.0, values)
 
 
 @pytest.mark.parametrize("shape", [(0, 7), (5, 6), (7,)])
-def test_a_scene_has_frames_of_seven_numbers(shape: tuple[int, ...]) -> None:
-    with pytest.raises(ValueError, match="7 numbers a frame"):
+def test_wrong_shape_is_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="at least one frame of 7 values"):
         SceneSamples("light", 30.0, np.ones(shape))
 
 
-def test_a_light_that_is_always_out_has_a_track() -> None:
+def test_light_that_is_always_off_has_a_track() -> None:
     scene = SceneSamples("light", 30.0, np.zeros((3, 7)))
     assert plan_scene_track(scene, plan_timing(30.0, 3)).full == 1.0
 
 
-def test_a_track_survives_its_description() -> None:
+def test_description_round_trips() -> None:
     for scene in (sample_camera(2.6, 29.97), sample_light(2.6, 29.97)):
         track = plan_scene_track(scene, plan_timing(29.97, len(scene.values), 0.5, 0.2))
-        again = parse_scene_track(describe_scene_track(track, []))
-        np.testing.assert_array_equal(again.reference, track.reference)
-        np.testing.assert_array_equal(again.to_channels(scene.values), track.to_channels(scene.values))
-        assert (again.kind, again.full, again.block_count) == (track.kind, track.full, track.block_count)
+        parsed = parse_scene_track(describe_scene_track(track, []))
+        np.testing.assert_array_equal(parsed.reference, track.reference)
+        np.testing.assert_array_equal(parsed.to_channels(scene.values), track.to_channels(scene.values))
+        assert (parsed.kind, parsed.full, parsed.block_count) == (track.kind, track.full, track.block_count)
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "says"),
+    ("key", "value", "message"),
     [
         ("type", "motion", "camera or light"),
         ("type", ["camera"], "camera or light"),
         ("codec", "bunraku.motion/2", "bunraku.motion/2"),
-        ("fps", "fast", "a light's track has numbers"),
+        ("fps", "fast", "Invalid light track: fps must be a number"),
         ("full", 0, "above zero"),
         ("full", None, "above zero"),
         ("full", 1e7, "at most"),
@@ -120,7 +123,7 @@ def test_a_track_survives_its_description() -> None:
         ("reference", None, "7 numbers"),
     ],
 )
-def test_a_wrong_description_is_refused(key: str, value: object, says: str) -> None:
-    described = describe_scene_track(plan_scene_track(sample_light(1.0, 30.0), plan_timing(30.0, 30)), [])
-    with pytest.raises(DamagedBlock, match=says):
-        parse_scene_track(described | {key: value})
+def test_invalid_description_is_refused(key: str, value: object, message: str) -> None:
+    description = describe_scene_track(plan_scene_track(sample_light(1.0, 30.0), plan_timing(30.0, 30)), [])
+    with pytest.raises(DamagedBlock, match=message):
+        parse_scene_track(description | {key: value})

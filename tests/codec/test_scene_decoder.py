@@ -12,22 +12,22 @@ from tests.vectors.scene import sample_camera, sample_light
 SCENES = [encode_scene(make(2.0, 30.0), error_bounds_mm=(4.0,)) for make in (sample_camera, sample_light)]
 
 
-def test_it_is_a_function_of_time() -> None:
+def test_block_can_be_evaluated_between_frames() -> None:
     for make, scene in zip((sample_camera, sample_light), SCENES, strict=True):
         instants = np.arange(8, 8 * 29) / 8.0
         values = decode_scene_block(scene.track, scene.ladder[0].blocks[0]).values_at(instants)
-        fine = make(2.0, 240.0).values[8 : 8 * 29]
-        off = scene.track.to_channels(values) - scene.track.to_channels(fine)
-        assert np.linalg.norm(off, axis=-1).max() < 0.01
+        oversampled = make(2.0, 240.0).values[8 : 8 * 29]
+        error = scene.track.to_channels(values) - scene.track.to_channels(oversampled)
+        assert np.linalg.norm(error, axis=-1).max() < 0.01
 
 
 @given(st.sampled_from(SCENES), st.data())
-def test_damage_is_survived(scene: EncodedScene, data: st.DataObject) -> None:
-    track, whole = scene.track, scene.ladder[0].blocks[1]
-    damaged = bytearray(whole)
-    bit = data.draw(st.integers(0, len(whole) * 8 - 1))
+def test_damaged_block_is_decoded_or_refused(scene: EncodedScene, data: st.DataObject) -> None:
+    track, valid = scene.track, scene.ladder[0].blocks[1]
+    damaged = bytearray(valid)
+    bit = data.draw(st.integers(0, len(valid) * 8 - 1))
     damaged[bit // 8] ^= 1 << bit % 8
-    for broken in (bytes(damaged), whole[: data.draw(st.integers(0, len(whole)))], data.draw(st.binary(max_size=400))):
+    for broken in (bytes(damaged), valid[: data.draw(st.integers(0, len(valid)))], data.draw(st.binary(max_size=400))):
         try:
             block = decode_scene_block(track, broken)
         except DamagedBlock:

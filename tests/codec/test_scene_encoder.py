@@ -16,30 +16,28 @@ from tests.vectors.scene import sample_camera, sample_light
 
 
 def decoded_values(encoded: EncodedScene, level: int) -> Array:
-    """All frames as a viewer has them, who only has the Description and the blocks."""
+    """Return the values of all frames as a viewer decodes them from the Description and the blocks."""
     track = parse_scene_track(encoded.describe())
     blocks = [decode_scene_block(track, data) for data in encoded.ladder[level].blocks]
     return np.concatenate([block.values_at(np.arange(block.frames, dtype=np.float64)) for block in blocks])
 
 
 def channel_errors(encoded: EncodedScene, scene: SceneSamples, level: int) -> Array:
-    """Weighted errors (n, 3), mm."""
+    """Return the weighted errors (n, 3) in mm."""
     track = encoded.track
-    error: Array = (
-        np.linalg.norm(track.to_channels(decoded_values(encoded, level)) - track.to_channels(scene.values), axis=-1)
-        * 1e3
-    )
+    difference = track.to_channels(decoded_values(encoded, level)) - track.to_channels(scene.values)
+    error: Array = np.linalg.norm(difference, axis=-1) * 1e3
     return error
 
 
 @st.composite
 def scene_samples(draw: st.DrawFn) -> SceneSamples:
-    """Smooth or rough movement of any size, from frames of one to a few seconds."""
+    """Generate smooth or rough movement of any extent, from one frame to a few seconds."""
     kind: SceneKind = draw(st.sampled_from(["camera", "light"]))
     random = np.random.default_rng(draw(st.integers(0, 1 << 32)))
-    frames, smooth = draw(st.integers(1, 60)), draw(st.integers(1, 30))
-    walk = np.cumsum(random.normal(0, 1, (frames + smooth, 7)), axis=0)
-    walk = np.mean([walk[i : i + frames] for i in range(smooth)], axis=0) * 10.0 ** draw(st.integers(-4, 1))
+    frames, window = draw(st.integers(1, 60)), draw(st.integers(1, 30))
+    walk = np.cumsum(random.normal(0, 1, (frames + window, 7)), axis=0)
+    walk = np.mean([walk[i : i + frames] for i in range(window)], axis=0) * 10.0 ** draw(st.integers(-4, 1))
     if kind == "camera":
         walk[:, 6] = 1.5 + np.tanh(walk[:, 6])
     else:
@@ -55,25 +53,25 @@ def test_every_frame_of_any_scene_is_within_the_bound(
     encoded = encode_scene(scene, block_seconds, (bound,), first_seconds)
     error = channel_errors(encoded, scene, 0)
     assert error.shape == (len(scene.values), 3)
-    # a viewer's arithmetic has its own last digits
+    # the viewer's arithmetic may differ in the last digits
     assert error.max() <= bound * (1 + 1e-9)
     assert encoded.ladder[0].max_error_mm == pytest.approx(error.max(), abs=1e-9)
     assert encoded.ladder[0].mean_error_mm == pytest.approx(error.mean(), abs=1e-9)
 
 
 @pytest.mark.parametrize("make", [sample_camera, sample_light])
-def test_the_ladder_rises_and_a_camera_at_a_centimetre_costs_little(make: type[SceneSamples]) -> None:
+def test_bitrates_rise_and_10_mm_costs_less_than_45_bytes_per_second(make: type[SceneSamples]) -> None:
     scene = make(10.0, 30.0)  # type: ignore[call-arg,arg-type]
     encoded = encode_scene(scene)
     assert len(encoded.ladder) == len(SCENE_ERROR_BOUNDS_MM) == len(ERROR_BOUNDS_MM)
-    assert [rate.kbps for rate in encoded.ladder] == sorted(rate.kbps for rate in encoded.ladder)
-    for number, (rate, bound) in enumerate(zip(encoded.ladder, SCENE_ERROR_BOUNDS_MM, strict=True)):
-        assert channel_errors(encoded, scene, number).max() <= bound == rate.error_bound_mm
-        assert rate.kbps == pytest.approx(sum(map(len, rate.blocks)) * 8e-3 / 10.0)
+    assert [level.kbps for level in encoded.ladder] == sorted(level.kbps for level in encoded.ladder)
+    for number, (level, bound) in enumerate(zip(encoded.ladder, SCENE_ERROR_BOUNDS_MM, strict=True)):
+        assert channel_errors(encoded, scene, number).max() <= bound == level.error_bound_mm
+        assert level.kbps == pytest.approx(sum(map(len, level.blocks)) * 8e-3 / 10.0)
     assert encoded.ladder[SCENE_ERROR_BOUNDS_MM.index(10.0)].kbps * 125 < 45
 
 
-def test_a_centimetre_and_half_a_degree() -> None:
+def test_10_mm_is_one_centimetre_and_half_a_degree() -> None:
     scene = sample_camera(5.0, 30.0)
     error = np.abs(decoded_values(encode_scene(scene, error_bounds_mm=(10.0,)), 0) - scene.values)
     assert np.linalg.norm(error[:, :3], axis=1).max() <= 0.01
@@ -82,39 +80,38 @@ def test_a_centimetre_and_half_a_degree() -> None:
 
 
 @pytest.mark.parametrize("make", [sample_camera, sample_light])
-def test_what_stands_still_costs_four_bytes_a_block_and_is_exact(make: type[SceneSamples]) -> None:
-    one = make(1.0, 30.0)  # type: ignore[call-arg,arg-type]
-    scene = SceneSamples(one.kind, 30.0, np.repeat(one.values[:1], 95, axis=0))
+def test_still_scene_costs_4_bytes_per_block_and_is_exact(make: type[SceneSamples]) -> None:
+    moving = make(1.0, 30.0)  # type: ignore[call-arg,arg-type]
+    scene = SceneSamples(moving.kind, 30.0, np.repeat(moving.values[:1], 95, axis=0))
     encoded = encode_scene(scene)
-    for number, rate in enumerate(encoded.ladder):
-        assert max(map(len, rate.blocks)) <= 4
+    for number, level in enumerate(encoded.ladder):
+        assert max(map(len, level.blocks)) <= 4
         np.testing.assert_allclose(decoded_values(encoded, number), scene.values, atol=1e-9)
 
 
-def test_a_light_goes_out_entirely() -> None:
+def test_light_goes_out_entirely() -> None:
     scene = sample_light(3.0, 30.0)
     dark = scene.values[:, 6] == 0
     assert dark.any()
     assert decoded_values(encode_scene(scene, error_bounds_mm=(10.0,)), 0)[dark, 6].max() <= 800 * 0.01**2
 
 
-def test_across_borders_nothing_jumps_by_more_than_the_errors() -> None:
-    """Two frames on either side of a border are each at most the bound off, so their step and the change of their steps
-    differ from the truth's by at most two and four bounds."""
+def test_jumps_at_block_borders_are_within_the_bound() -> None:
+    """Each frame is at most the bound off, so velocity and acceleration differ by at most two and four bounds."""
     bound = 5.0
     for scene in (sample_camera(4.0, 60.0), sample_light(4.0, 60.0)):
         encoded = encode_scene(scene, 0.5, (bound,))
         track = encoded.track
-        seen, truth = track.to_channels(decoded_values(encoded, 0)), track.to_channels(scene.values)
+        decoded, truth = track.to_channels(decoded_values(encoded, 0)), track.to_channels(scene.values)
         assert track.block_count == 8
         for index in range(1, track.block_count):
             part = slice(track.first_frame(index) - 2, track.first_frame(index) + 2)
             for order in (1, 2):
-                wrong = np.diff(seen[part], order, axis=0) - np.diff(truth[part], order, axis=0)
-                assert np.linalg.norm(wrong, axis=-1).max() * 1e3 <= 2**order * bound
+                difference = np.diff(decoded[part], order, axis=0) - np.diff(truth[part], order, axis=0)
+                assert np.linalg.norm(difference, axis=-1).max() * 1e3 <= 2**order * bound
 
 
-def test_blocks_are_where_the_motion_has_its_own() -> None:
+def test_blocks_start_with_those_of_the_motion() -> None:
     motion = plan_motion_track(random_motion(3.3, 30.0, 2), 1.0, 0.5)
     scene = encode_scene(sample_camera(3.3, 30.0), 1.0, (20.0,), 0.5).track
     assert [scene.start_us(i) for i in range(scene.block_count)] == [
@@ -122,6 +119,6 @@ def test_blocks_are_where_the_motion_has_its_own() -> None:
     ]
 
 
-def test_a_movement_that_no_step_can_hold_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"block 0 of the camera cannot be held to 1e-06 mm"):
+def test_unreachable_bound_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"Block 0 of the camera cannot be encoded within 1e-06 mm"):
         encode_scene(sample_camera(1.0, 30.0), error_bounds_mm=(1e-6,))

@@ -26,60 +26,60 @@ MAX_LIMB_M = (1 << 17) * grid_unit_m(MAX_GRID)
     st.integers(0, MAX_REFERENCE_BITS),
     st.integers(0, 30_000),
 )
-def test_dancers_survive_their_bytes(seed: int, size: float, grid: int, bits: int, turn: int) -> None:
+def test_description_round_trips(seed: int, length: float, grid: int, bits: int, max_reference: int) -> None:
     random = np.random.default_rng(seed)
     tips = np.zeros((JOINT_COUNT, 3))
-    tips[list(TIP_JOINTS)] = random.normal(0, size, (len(TIP_JOINTS), 3)).clip(-3, 3)
-    figure = snap_to_grid(Figure(random.normal(0, size, (JOINT_COUNT, 3)).clip(-3, 3), tips), grid)
-    reference = random.integers(-turn, turn + 1, (18, 3)).astype(np.float64)
-    again = SkeletonDescription.unpack(SkeletonDescription(figure, grid, reference, bits).pack())
-    np.testing.assert_allclose(again.figure.offsets, figure.offsets, atol=1e-12)
-    np.testing.assert_allclose(again.figure.tips, figure.tips, atol=1e-12)
-    np.testing.assert_array_equal(again.reference, reference)
-    assert (again.grid, again.reference_bits) == (grid, bits)
+    tips[list(TIP_JOINTS)] = random.normal(0, length, (len(TIP_JOINTS), 3)).clip(-3, 3)
+    figure = snap_to_grid(Figure(random.normal(0, length, (JOINT_COUNT, 3)).clip(-3, 3), tips), grid)
+    reference = random.integers(-max_reference, max_reference + 1, (18, 3)).astype(np.float64)
+    unpacked = SkeletonDescription.unpack(SkeletonDescription(figure, grid, reference, bits).pack())
+    np.testing.assert_allclose(unpacked.figure.offsets, figure.offsets, atol=1e-12)
+    np.testing.assert_allclose(unpacked.figure.tips, figure.tips, atol=1e-12)
+    np.testing.assert_array_equal(unpacked.reference, reference)
+    assert (unpacked.grid, unpacked.reference_bits) == (grid, bits)
 
 
-def test_a_mirrored_figure_costs_one_side_whatever_axes_its_bones_have() -> None:
+def test_symmetric_figure_costs_one_side_whatever_its_axes() -> None:
     reference, figure = np.zeros((18, 3)), snap_to_grid(standard_figure(), 2)
-    size = len(SkeletonDescription(figure, 2, reference, 2).pack())
-    assert size <= 70
+    symmetric_bytes = len(SkeletonDescription(figure, 2, reference, 2).pack())
+    assert symmetric_bytes <= 70
     offsets = figure.offsets.copy()
     offsets[JOINT_INDEX["r_knee"]] = offsets[JOINT_INDEX["l_knee"]]
     offsets[JOINT_INDEX["r_elbow"]] = offsets[JOINT_INDEX["l_elbow"]] * [1, -1, -1]
-    assert len(SkeletonDescription(Figure(offsets, figure.tips), 2, reference, 2).pack()) <= size + 2
+    assert len(SkeletonDescription(Figure(offsets, figure.tips), 2, reference, 2).pack()) <= symmetric_bytes + 2
 
 
-def test_the_figure_moves_by_half_a_grid_step_at_most() -> None:
+def test_rounding_to_the_grid_is_within_half_a_unit() -> None:
     figure = standard_figure()
     for grid in range(MAX_GRID + 1):
         assert abs(snap_to_grid(figure, grid).offsets - figure.offsets).max() <= grid_unit_m(grid) / 2 + 1e-12
 
 
-def test_giants_are_refused() -> None:
+def test_too_long_bone_is_refused() -> None:
     figure = standard_figure()
     with pytest.raises(ValueError, match=r"9\.1 m long; 3\.3"):
         snap_to_grid(Figure(figure.offsets + np.eye(JOINT_COUNT, 3) * 9.0, figure.tips), 0)
 
 
 @given(st.binary(max_size=200))
-def test_any_bytes_are_a_dancer_or_refused(data: bytes) -> None:
+def test_arbitrary_bytes_are_decoded_or_refused(data: bytes) -> None:
     try:
-        dancer = SkeletonDescription.unpack(data)
+        skeleton = SkeletonDescription.unpack(data)
     except DamagedBlock:
         return
-    assert abs(dancer.figure.offsets).max() < 2 * MAX_LIMB_M
-    assert dancer.reference_bits <= MAX_REFERENCE_BITS
+    assert abs(skeleton.figure.offsets).max() < 2 * MAX_LIMB_M
+    assert skeleton.reference_bits <= MAX_REFERENCE_BITS
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "message"),
     [
-        (b"", "not 0"),
-        (bytes(MAX_SKELETON_BYTES + 1), "not 1025"),
-        (bytes([15, 0]), "most"),
-        (bytes([8 << 4, 0]), "most"),
+        (b"", "0 bytes"),
+        (bytes(MAX_SKELETON_BYTES + 1), "1025 bytes"),
+        (bytes([15, 0]), "15 reference bits, at most"),
+        (bytes([8 << 4, 0]), "grid 8"),
     ],
 )
-def test_wrong_dancers_are_refused(data: bytes, says: str) -> None:
-    with pytest.raises(DamagedBlock, match=says):
+def test_invalid_description_is_refused(data: bytes, message: str) -> None:
+    with pytest.raises(DamagedBlock, match=message):
         SkeletonDescription.unpack(data)

@@ -9,7 +9,7 @@ from bunraku.codec.timing import Timing, parse_timing, plan_timing
 
 
 @given(st.floats(1, 240), st.integers(1, 5000), st.floats(0.1, 3), st.none() | st.floats(0.01, 5))
-def test_blocks_tile_any_track_and_are_found_by_time(
+def test_blocks_cover_the_track_and_are_found_by_time(
     fps: float, frames: int, block: float, first: float | None
 ) -> None:
     timing = plan_timing(fps, frames, block, first)
@@ -24,10 +24,10 @@ def test_blocks_tile_any_track_and_are_found_by_time(
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "says"),
+    ("key", "value", "message"),
     [
-        ("fps", "fast", "a light's track has numbers"),
-        ("frames", 2.5, "numbers"),
+        ("fps", "fast", "Invalid light track: fps must be a number"),
+        ("frames", 2.5, "integers"),
         ("fps", 0, "above zero"),
         ("fps", float("nan"), "above zero"),
         ("fps", float("inf"), "above zero"),
@@ -36,8 +36,8 @@ def test_blocks_tile_any_track_and_are_found_by_time(
         ("first_frames", 91, "1..512"),
     ],
 )
-def test_a_wrong_timing_is_refused(key: str, value: object, says: str) -> None:
-    described: dict[str, object] = {"fps": 30, "frames": 90, "block_frames": 30, "first_frames": 15}
-    assert parse_timing(described, "light") == Timing(30.0, 90, 30, 15)
-    with pytest.raises(DamagedBlock, match=says):
-        parse_timing(described | {key: value}, "light")
+def test_invalid_timing_is_refused(key: str, value: object, message: str) -> None:
+    description: dict[str, object] = {"fps": 30, "frames": 90, "block_frames": 30, "first_frames": 15}
+    assert parse_timing(description, "light") == Timing(30.0, 90, 30, 15)
+    with pytest.raises(DamagedBlock, match=message):
+        parse_timing(description | {key: value}, "light")

@@ -199,5 +199,5 @@ def test_rejected_requests_are_counted_by_reason(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("address", ["9100", "localhost:http", "0.0.0.0:0"])
 def test_invalid_metrics_address_is_rejected(address: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="metrics are at host:port"):
+    with pytest.raises(ValueError, match="expected host:port"):
         Settings(data=tmp_path, metrics=address)

@@ -13,7 +13,7 @@ from pathlib import Path
 import atheris
 import numpy as np
 
-import bunraku.codec.entropy_coder  # noqa: F401 - compiled, so it must be here before the instrumenting begins
+import bunraku.codec._kernels  # noqa: F401 - compiled code, imported before the instrumentation starts
 
 INSTRUMENTED = [
     "bunraku.codec.audio",

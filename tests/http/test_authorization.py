@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -25,37 +26,39 @@ from bunraku.stream.app import create_app as stream
 from tests.credentials import SECRET, bearer_headers, make_token
 
 
-async def test_every_route_of_every_service_says_what_it_needs(tmp_path: Path) -> None:
-    async with open_context(Settings(data=tmp_path)) as backing:
-        apps = [ik(), *(make(backing) for make in (ingest, stream, session, access))]
-        told = [way for app in apps for way in collect_route_rules(app.router.routes) if way.route.startswith("/v1/")]
-    assert len(told) >= 24
-    # beside health, and what says which routes there are, nothing of the API is for everybody
-    assert all(way.requirement.role is not None for way in told)
-    sockets = {way.route: way.requirement.role for way in told if not way.methods}
-    assert sockets == {
+async def test_every_route_declares_its_requirement(tmp_path: Path) -> None:
+    async with open_context(Settings(data=tmp_path)) as context:
+        apps = [ik(), *(make(context) for make in (ingest, stream, session, access))]
+        rules = [
+            rule for app in apps for rule in collect_route_rules(app.router.routes) if rule.route.startswith("/v1/")
+        ]
+    assert len(rules) >= 24
+    # public API routes are only health and the API description, which these services do not have
+    assert all(rule.requirement.role is not None for rule in rules)
+    websocket_roles = {rule.route: rule.requirement.role for rule in rules if not rule.methods}
+    assert websocket_roles == {
         "/v1/motions/{motion}/stream": Role.VIEW,
         "/v1/sessions/{session}/stream": Role.VIEW,
         "/v1/sessions/{session}/control": Role.CONTROL,
     }
 
 
-def test_an_app_with_a_route_that_does_not_say_is_not_guarded() -> None:
+def test_route_without_requirement_raises() -> None:
     app = FastAPI(openapi_url=None)
 
     @app.get("/v1/secret")
     async def forgotten() -> None: ...
 
-    with pytest.raises(UndeclaredRequirement, match="/v1/secret does not say what it needs"):
+    with pytest.raises(UndeclaredRequirement, match="/v1/secret declares no requirement"):
         collect_route_rules(app.router.routes)
-    with pytest.raises(UndeclaredRequirement, match="neither a route nor a socket"):
+    with pytest.raises(UndeclaredRequirement, match="neither an HTTP route nor a WebSocket"):
         collect_route_rules([Mount("/v1/more", FastAPI())])
 
 
 @asynccontextmanager
-async def guarded_app(tmp_path: Path, **given: Any) -> AsyncIterator[tuple[FastAPI, httpx2.AsyncClient]]:
-    settings = Settings(data=tmp_path, **given)
-    async with open_context(settings) as backing:
+async def protected_app(tmp_path: Path, **options: Any) -> AsyncIterator[tuple[FastAPI, httpx2.AsyncClient]]:
+    settings = Settings(data=tmp_path, **options)
+    async with open_context(settings) as context:
         app = FastAPI()
         problem_details.install_problem_handlers(app)
 
@@ -76,40 +79,37 @@ async def guarded_app(tmp_path: Path, **given: Any) -> AsyncIterator[tuple[FastA
 
         app.add_middleware(
             AuthorizationMiddleware,
-            authenticator=backing.authenticator,
+            # a clock that stands still makes the rate limits exact
+            context=dataclasses.replace(context, clock=lambda: 1_000_000),
             rules=collect_route_rules(app.router.routes),
-            settings=settings,
-            metrics=backing.metrics,
         )
-        # what nobody has told the guard of is not there
+        # a route that is added after the rules were collected
         app.get("/v1/later")(mine)
         transport = httpx2.ASGITransport(app, client=("192.0.2.1", 1))
         async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
             yield app, http
 
 
-async def test_who_comes_is_known_to_the_route(tmp_path: Path) -> None:
-    async with guarded_app(tmp_path, secret=SECRET) as (_, http):
+async def test_route_receives_the_access_of_the_token(tmp_path: Path) -> None:
+    async with protected_app(tmp_path, secret=SECRET) as (_, http):
         assert (await http.get("/v1/mine", headers=bearer_headers(make_token(subject="aiko")))).json() == "aiko"
         assert (await http.get("/v1/mine")).status_code == 401
         assert (await http.get("/page")).json() == "page"
-        for given in ("Basic YTpi", "Bearer", "Bearer ", "bearer x", make_token()):
-            assert (await http.get("/v1/mine", headers={"Authorization": given})).status_code == 401
+        for header in ("Basic YTpi", "Bearer", "Bearer ", "bearer x", make_token()):
+            assert (await http.get("/v1/mine", headers={"Authorization": header})).status_code == 401
 
 
 @pytest.mark.parametrize("path", ["/v1/later", "/v1/mine/", "/v1/", "/v1/mine/more", "/v1//mine"])
 @pytest.mark.parametrize("secret", ["", SECRET])
-async def test_a_path_of_the_api_that_the_guard_does_not_know_is_not_there(
-    tmp_path: Path, path: str, secret: str
-) -> None:
-    async with guarded_app(tmp_path, secret=secret) as (_, http):
+async def test_api_path_without_rule_is_not_found(tmp_path: Path, path: str, secret: str) -> None:
+    async with protected_app(tmp_path, secret=secret) as (_, http):
         answer = await http.get(path, headers=bearer_headers(make_token()))
         assert (answer.status_code, answer.headers["content-type"]) == (404, "application/problem+json")
 
 
-async def test_pages_of_other_sites_change_nothing_and_may_read_what_all_may(tmp_path: Path) -> None:
+async def test_other_sites_may_read_but_not_change(tmp_path: Path) -> None:
     for secret in ("", SECRET):
-        async with guarded_app(tmp_path, secret=secret, origins="https://dance.example") as (_, http):
+        async with protected_app(tmp_path, secret=secret, origins="https://dance.example") as (_, http):
             http.headers.update(bearer_headers(make_token()))
             for origin, status in (
                 ("http://stage", 200),
@@ -124,29 +124,29 @@ async def test_pages_of_other_sites_change_nothing_and_may_read_what_all_may(tmp
                 assert (await http.get("/v1/mine", headers={"Origin": origin})).status_code == 200
 
 
-async def test_without_a_secret_only_names_of_this_machine_are_answered(tmp_path: Path) -> None:
-    async with guarded_app(tmp_path) as (_, http):
+async def test_server_without_secret_accepts_only_local_host_names(tmp_path: Path) -> None:
+    async with protected_app(tmp_path) as (_, http):
         for host in ("evil.example", "evil.example:8000", "127.0.0.1.evil.example"):
             answer = await http.get("/v1/mine", headers={"Host": host, "Origin": f"http://{host}"})
             assert answer.status_code == 403
             assert "BUNRAKU_SECRET" in answer.json()["hint"]
         for host in ("127.0.0.1:8000", "localhost", "[::1]:8000", "192.168.1.5"):
             assert (await http.get("/v1/mine", headers={"Host": host})).status_code == 200
-    async with guarded_app(tmp_path, secret=SECRET) as (_, http):
-        given = {"Host": "dance.example", **bearer_headers(make_token())}
-        assert (await http.get("/v1/mine", headers=given)).status_code == 200
+    async with protected_app(tmp_path, secret=SECRET) as (_, http):
+        headers = {"Host": "dance.example", **bearer_headers(make_token())}
+        assert (await http.get("/v1/mine", headers=headers)).status_code == 200
 
 
-async def test_a_body_that_is_too_large_is_refused_whether_it_says_so_or_not(tmp_path: Path) -> None:
-    async def pieces() -> AsyncIterator[bytes]:
+async def test_too_large_body_is_rejected_with_and_without_length(tmp_path: Path) -> None:
+    async def chunks() -> AsyncIterator[bytes]:
         for _ in range(20):
             yield b"x" * 10
 
-    async with guarded_app(tmp_path) as (_, http):
+    async with protected_app(tmp_path) as (_, http):
         assert (await http.put("/v1/changed", content=b"x" * 100)).json() == 100
         for answer in (
             await http.put("/v1/changed", content=b"x" * 101),
-            await http.put("/v1/changed", content=pieces()),
+            await http.put("/v1/changed", content=chunks()),
             await http.put("/v1/changed", content=b"", headers={"Content-Length": "9" * 30}),
         ):
             assert answer.status_code == 413
@@ -154,18 +154,18 @@ async def test_a_body_that_is_too_large_is_refused_whether_it_says_so_or_not(tmp
             assert "100 bytes" in answer.json()["detail"]
 
 
-async def test_who_guesses_tokens_is_slowed_down_by_address(tmp_path: Path) -> None:
-    async with guarded_app(tmp_path, secret=SECRET, connects=1.0) as (app, http):
-        told = [(await http.get("/v1/mine", headers=bearer_headers("guess"))).status_code for _ in range(12)]
-        assert told == [401] * 10 + [429] * 2
-        # one who has a token is not
+async def test_invalid_tokens_are_rate_limited_by_address(tmp_path: Path) -> None:
+    async with protected_app(tmp_path, secret=SECRET, connects=1.0) as (app, http):
+        statuses = [(await http.get("/v1/mine", headers=bearer_headers("guess"))).status_code for _ in range(12)]
+        assert statuses == [401] * 10 + [429] * 2
+        # a client with a valid token is not limited
         assert (await http.get("/v1/mine", headers=bearer_headers(make_token()))).status_code == 200
         transport = httpx2.ASGITransport(app, client=("192.0.2.2", 1))
         async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as other:
             assert (await other.get("/v1/mine")).status_code == 401
 
 
-async def test_the_description_says_how_to_come_in(tmp_path: Path) -> None:
+async def test_api_description_includes_security_and_roles(tmp_path: Path) -> None:
     async with compose_app(Settings(data=tmp_path)) as app:
         described = app.openapi()
     assert described["components"]["securitySchemes"]["token"]["scheme"] == "bearer"
@@ -174,26 +174,26 @@ async def test_the_description_says_how_to_come_in(tmp_path: Path) -> None:
     assert "security" not in described["paths"]["/v1/health"]["get"]
 
 
-async def test_pages_of_allowed_sites_are_told_that_they_may_read_what_is_answered(tmp_path: Path) -> None:
+async def test_allowed_origins_get_cors_headers(tmp_path: Path) -> None:
     async with compose_app(Settings(data=tmp_path, secret=SecretStr(SECRET), origins="https://dance.example")) as app:
         transport = httpx2.ASGITransport(app)
         async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
-            for origin, told in (("https://dance.example", "https://dance.example"), ("https://evil.example", None)):
-                asked = {"Origin": origin, "Access-Control-Request-Method": "POST"}
-                asked["Access-Control-Request-Headers"] = "authorization"
-                preflight = await http.options("/v1/sessions", headers=asked)
-                assert preflight.headers.get("access-control-allow-origin") == told
+            for origin, allowed in (("https://dance.example", "https://dance.example"), ("https://evil.example", None)):
+                preflight_headers = {"Origin": origin, "Access-Control-Request-Method": "POST"}
+                preflight_headers["Access-Control-Request-Headers"] = "authorization"
+                preflight = await http.options("/v1/sessions", headers=preflight_headers)
+                assert preflight.headers.get("access-control-allow-origin") == allowed
                 answer = await http.get("/v1/motions", headers={"Origin": origin})
                 assert answer.status_code == 401
-                assert answer.headers.get("access-control-allow-origin") == told
+                assert answer.headers.get("access-control-allow-origin") == allowed
 
 
-async def test_tickets_count_as_the_sockets_that_they_are_for(tmp_path: Path) -> None:
+async def test_tickets_count_towards_the_connection_rate(tmp_path: Path) -> None:
     async with compose_app(Settings(data=tmp_path, secret=SecretStr(SECRET), connects=1.0)) as app:
         transport = httpx2.ASGITransport(app)
         async with httpx2.AsyncClient(
             transport=transport, base_url="http://stage", headers=bearer_headers(make_token())
         ) as http:
-            told = [(await http.post("/v1/tickets")).status_code for _ in range(12)]
-            assert told == [201] * 10 + [429] * 2
+            statuses = [(await http.post("/v1/tickets")).status_code for _ in range(12)]
+            assert statuses == [201] * 10 + [429] * 2
             assert (await http.get("/v1/motions")).status_code == 200

@@ -18,7 +18,7 @@ TIMEOUT_S = 20
 def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(header_timeout, "HEADER_TIMEOUT_S", 0.5)
-        with run_server(Path(tmp_path_factory.mktemp("hasty"))) as url:
+        with run_server(Path(tmp_path_factory.mktemp("header-timeout"))) as url:
             yield url
 
 
@@ -28,16 +28,16 @@ async def open_connection(url: str) -> tuple[asyncio.StreamReader, asyncio.Strea
 
 
 async def read_until_closed(reader: asyncio.StreamReader) -> bytes:
-    """What comes before the connection is ended."""
-    said = b""
+    """Return all data until the end of the connection."""
+    received = b""
     async with asyncio.timeout(TIMEOUT_S):
         with contextlib.suppress(ConnectionError):
             while more := await reader.read(65_536):
-                said += more
-    return said
+                received += more
+    return received
 
 
-async def test_who_says_nothing_or_half_is_cut_off(url: str) -> None:
+async def test_incomplete_headers_end_the_connection(url: str) -> None:
     for half in (b"", b"GET", b"GET /v1/health HTTP/1.1\r\nHost: s"):
         reader, writer = await open_connection(url)
         writer.write(half)
@@ -45,7 +45,7 @@ async def test_who_says_nothing_or_half_is_cut_off(url: str) -> None:
         writer.close()
 
 
-async def test_the_second_request_of_a_connection_has_as_long_as_the_first(url: str) -> None:
+async def test_timeout_applies_to_each_request_of_a_connection(url: str) -> None:
     reader, writer = await open_connection(url)
     request = b"GET /v1/health HTTP/1.1\r\nHost: stage\r\n\r\n"
     for _ in range(3):
@@ -59,7 +59,7 @@ async def test_the_second_request_of_a_connection_has_as_long_as_the_first(url: 
     writer.close()
 
 
-async def test_the_rest_of_a_body_that_was_answered_is_not_waited_for_long(url: str) -> None:
+async def test_timeout_applies_to_the_rest_of_an_answered_body(url: str) -> None:
     reader, writer = await open_connection(url)
     writer.write(b"POST /v1/nothing HTTP/1.1\r\nHost: stage\r\nContent-Length: 100000\r\n\r\n")
 
@@ -77,7 +77,7 @@ async def test_the_rest_of_a_body_that_was_answered_is_not_waited_for_long(url: 
     writer.close()
 
 
-async def test_who_sends_the_rest_goes_on_with_the_connection(url: str) -> None:
+async def test_connection_continues_after_the_rest_of_a_body(url: str) -> None:
     reader, writer = await open_connection(url)
     writer.write(b"POST /v1/nothing HTTP/1.1\r\nHost: stage\r\nContent-Length: 10\r\n\r\n")
     assert (await reader.readuntil(b"}")).startswith(b"HTTP/1.1 404")

@@ -12,7 +12,7 @@ ALLOWED_ORIGINS = parse_origins("https://dance.example, http://other.example:808
     [
         (None, "stage.example"),
         ("http://stage.example", "stage.example"),
-        # a proxy has ended TLS
+        # a proxy has terminated TLS
         ("https://stage.example", "stage.example"),
         ("https://stage.example", "stage.example:443"),
         ("http://stage.example:8000", "stage.example:8000"),
@@ -22,7 +22,7 @@ ALLOWED_ORIGINS = parse_origins("https://dance.example, http://other.example:808
         ("http://other.example:8080", "stage.example"),
     ],
 )
-def test_its_own_pages_and_those_that_are_named_may(origin: str | None, host: str) -> None:
+def test_own_and_allowed_origins_are_allowed(origin: str | None, host: str) -> None:
     assert is_allowed_origin(origin, host, ALLOWED_ORIGINS)
 
 
@@ -43,24 +43,24 @@ def test_its_own_pages_and_those_that_are_named_may(origin: str | None, host: st
         ("http://stage.example", ""),
     ],
 )
-def test_others_may_not(origin: str, host: str) -> None:
+def test_other_origins_are_rejected(origin: str, host: str) -> None:
     assert not is_allowed_origin(origin, host, ALLOWED_ORIGINS)
 
 
 @pytest.mark.parametrize(
     "text", ["dance.example", "https://", "ftp://dance.example", "https://dance.example/page", "*"]
 )
-def test_what_is_no_origin_is_refused(text: str) -> None:
+def test_invalid_origin_raises(text: str) -> None:
     with pytest.raises(ValueError, match="an origin is like"):
         parse_origins(text)
 
 
-def test_pages_without_an_origin_may_where_that_is_said() -> None:
+def test_opaque_origin_is_allowed_only_if_configured() -> None:
     assert is_allowed_origin("null", "stage.example", parse_origins("https://dance.example,null"))
     assert not is_allowed_origin("null", "stage.example", ALLOWED_ORIGINS)
 
 
-def test_none_are_none() -> None:
+def test_empty_text_has_no_origins() -> None:
     assert parse_origins("") == parse_origins(" , ") == frozenset()
 
 
@@ -82,5 +82,5 @@ def test_none_are_none() -> None:
         ("[::1", False),
     ],
 )
-def test_names_that_could_be_anybody_s_are_not_local(host: str, is_local: bool) -> None:
+def test_foreign_host_names_are_not_local(host: str, is_local: bool) -> None:
     assert is_local_host(host, ALLOWED_ORIGINS) is is_local

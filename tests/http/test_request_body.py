@@ -9,14 +9,14 @@ from starlette.types import Message, Receive
 from bunraku.http.request_body import MIN_BODY_BYTES_PER_S, limit_body
 
 
-def body_receiver(*pieces: bytes) -> Receive:
-    """A body in pieces; after it nothing comes for ever."""
-    left = [
-        {"type": "http.request", "body": piece, "more_body": nth + 1 < len(pieces)} for nth, piece in enumerate(pieces)
+def body_receiver(*chunks: bytes) -> Receive:
+    """Return a `receive` for a body in chunks. After the body it never returns."""
+    messages = [
+        {"type": "http.request", "body": chunk, "more_body": nth + 1 < len(chunks)} for nth, chunk in enumerate(chunks)
     ]
 
     async def receive() -> Message:
-        return left.pop(0) if left else await asyncio.Future()
+        return messages.pop(0) if messages else await asyncio.Future()
 
     return receive
 
@@ -30,48 +30,48 @@ async def read_body(receive: Receive) -> bytes:
             return body
 
 
-async def test_a_body_within_its_bounds_comes_as_it_is() -> None:
+async def test_body_within_its_limits_is_unchanged() -> None:
     assert (
         await read_body(limit_body(body_receiver(b"a" * 10, b"b" * 10), 20, 1.0, lambda: 0.0)) == b"a" * 10 + b"b" * 10
     )
     assert await read_body(limit_body(body_receiver(b"a" * 100), None, 1.0, lambda: 0.0)) == b"a" * 100
 
 
-async def test_one_that_is_too_large_is_refused_with_the_piece_that_makes_it_so() -> None:
+async def test_too_large_body_is_rejected_at_the_exceeding_chunk() -> None:
     with pytest.raises(HTTPException) as refused:
         await read_body(limit_body(body_receiver(b"a" * 10, b"b" * 11, b"c"), 20, 1.0, lambda: 0.0))
     assert (refused.value.status_code, refused.value.headers) == (413, {"Connection": "close"})
 
 
-async def test_one_that_comes_drop_by_drop_is_refused_when_its_time_is_over() -> None:
+async def test_slow_body_is_rejected_after_the_timeout() -> None:
     clock = 0.0
 
-    async def drops() -> Message:
+    async def receive_slowly() -> Message:
         nonlocal clock
         clock += 1.0
-        # the last one would never come
+        # the last chunk never arrives
         return {"type": "http.request", "body": b"x", "more_body": True} if clock < 9 else await asyncio.Future()
 
-    receive = limit_body(drops, None, 8.0, lambda: clock)
+    receive = limit_body(receive_slowly, None, 8.0, lambda: clock)
     with pytest.raises(HTTPException) as refused:
         await read_body(receive)
     assert refused.value.status_code == 408
     assert "bytes in" in str(refused.value.detail)
 
 
-async def test_who_sends_fast_enough_has_all_the_time_that_takes() -> None:
+async def test_body_at_the_minimum_rate_has_no_time_limit() -> None:
     clock = 0.0
-    pieces = body_receiver(*[b"x" * MIN_BODY_BYTES_PER_S] * 100)
+    chunks = body_receiver(*[b"x" * MIN_BODY_BYTES_PER_S] * 100)
 
-    async def steady() -> Message:
+    async def receive_steadily() -> Message:
         nonlocal clock
         clock += 1.0
-        return await pieces()
+        return await chunks()
 
-    assert len(await read_body(limit_body(steady, None, 5.0, lambda: clock))) == 100 * MIN_BODY_BYTES_PER_S
+    assert len(await read_body(limit_body(receive_steadily, None, 5.0, lambda: clock))) == 100 * MIN_BODY_BYTES_PER_S
 
 
-async def test_after_the_body_there_is_no_limit() -> None:
+async def test_waiting_after_the_body_is_not_limited() -> None:
     receive = limit_body(body_receiver(b"x"), None, 0.01, lambda: 0.0)
     await read_body(receive)
     waiting = asyncio.ensure_future(receive())

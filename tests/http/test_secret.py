@@ -8,7 +8,7 @@ from bunraku.http.access_token import MIN_SECRET_BYTES
 from bunraku.http.secret import SECRET_FILE_NAME, is_loopback, load_or_create_secret, load_secret
 
 
-def test_a_secret_is_made_once_and_its_owner_alone_reads_it(tmp_path: Path) -> None:
+def test_secret_is_created_once_and_readable_by_its_owner_only(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     assert load_secret(folder) is None
     secret = load_or_create_secret(folder)
@@ -18,7 +18,7 @@ def test_a_secret_is_made_once_and_its_owner_alone_reads_it(tmp_path: Path) -> N
     assert load_or_create_secret(tmp_path / "other") != secret
 
 
-def test_one_that_others_can_read_or_that_is_short_is_refused(tmp_path: Path) -> None:
+def test_readable_or_short_secret_raises(tmp_path: Path) -> None:
     load_or_create_secret(tmp_path)
     (tmp_path / SECRET_FILE_NAME).chmod(0o640)
     with pytest.raises(ValueError, match="chmod 600"):
@@ -30,7 +30,7 @@ def test_one_that_others_can_read_or_that_is_short_is_refused(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("host", "alone"),
+    ("host", "expected"),
     [
         ("127.0.0.1", True),
         ("127.1.2.3", True),
@@ -43,5 +43,5 @@ def test_one_that_others_can_read_or_that_is_short_is_refused(tmp_path: Path) ->
         ("", False),
     ],
 )
-def test_who_reaches_a_host(host: str, alone: bool) -> None:
-    assert is_loopback(host) is alone
+def test_loopback_hosts(host: str, expected: bool) -> None:
+    assert is_loopback(host) is expected

@@ -9,45 +9,45 @@ from bunraku.http.token_bucket import KeyedTokenBuckets, TokenBucket, client_net
 
 @given(
     rate=st.floats(0.5, 100),
-    most=st.floats(1, 100),
+    burst=st.floats(1, 100),
     waits=st.lists(st.floats(0, 5), max_size=200),
 )
-def test_no_more_is_allowed_than_what_flows_in(rate: float, most: float, waits: list[float]) -> None:
-    bucket, now, taken = TokenBucket(rate, most), 0.0, 0
+def test_taken_tokens_never_exceed_burst_plus_rate(rate: float, burst: float, waits: list[float]) -> None:
+    bucket, now, taken = TokenBucket(rate, burst), 0.0, 0
     for wait in waits:
         now += wait
         taken += bucket.take(now)
-        assert taken <= most + rate * now + 1e-6
+        assert taken <= burst + rate * now + 1e-6
 
 
-def test_a_full_bucket_at_once_and_then_the_rate() -> None:
+def test_burst_is_available_at_once_then_the_rate() -> None:
     bucket = TokenBucket(10, 5, now=100.0)
     assert sum(bucket.take(100.0) for _ in range(20)) == 5
     assert not bucket.take(100.05)
     assert bucket.take(100.15)
     assert not bucket.is_full(100.2)
     assert bucket.is_full(200.0)
-    # a clock that goes back gives nothing
+    # a clock that steps back adds no tokens
     assert bucket.take(150.0)
     assert sum(bucket.take(0.0) for _ in range(20)) == 4
 
 
-def test_everyone_has_their_own_and_only_so_many_are_kept() -> None:
+def test_keys_have_separate_buckets_and_their_number_is_limited() -> None:
     buckets = KeyedTokenBuckets(1, 2, max_keys=3)
     assert [buckets.take("a", 0.0) for _ in range(3)] == [True, True, False]
     assert buckets.take("b", 0.0)
     assert not buckets.take("a", 0.5)
-    for who in "cdef":
-        assert buckets.take(who, 0.5)
-    # of many who come at once the oldest is forgotten
+    for key in "cdef":
+        assert buckets.take(key, 0.5)
+    # above the limit the least recently used key is evicted
     assert len(buckets._buckets) == 3
-    # and of whom nothing was heard for long
+    # full buckets are evicted as well
     assert buckets.take("g", 100.0)
     assert len(buckets._buckets) == 1
 
 
 @pytest.mark.parametrize(
-    ("address", "whose"),
+    ("address", "network"),
     [
         ("192.0.2.7", "192.0.2.7"),
         ("::ffff:192.0.2.7", "192.0.2.7"),
@@ -56,5 +56,5 @@ def test_everyone_has_their_own_and_only_so_many_are_kept() -> None:
         ("a pipe", "a pipe"),
     ],
 )
-def test_a_house_has_one_address(address: str, whose: str) -> None:
-    assert client_network(address) == whose
+def test_client_network_groups_ipv6_addresses(address: str, network: str) -> None:
+    assert client_network(address) == network

@@ -10,24 +10,28 @@ from tests.vectors.blocks import random_motion
 from training import corpus
 
 
-def test_a_mirrored_dance_is_the_dance_in_a_mirror() -> None:
+def test_mirrored_motion_has_mirrored_positions() -> None:
     motion = random_motion(0.5, 30.0, 3)
-    twin = corpus.mirror_motion(motion)
-    here = world_transforms(motion.figure, motion.root, motion.rotations)[0]
-    there = world_transforms(twin.figure, twin.root, twin.rotations)[0]
+    mirrored = corpus.mirror_motion(motion)
+    positions = world_transforms(motion.figure, motion.root, motion.rotations)[0]
+    mirrored_positions = world_transforms(mirrored.figure, mirrored.root, mirrored.rotations)[0]
     flip = np.array([-1.0, 1.0, 1.0])
-    np.testing.assert_allclose(there[:, JOINT_INDEX["l_wrist"]], here[:, JOINT_INDEX["r_wrist"]] * flip, atol=1e-9)
-    np.testing.assert_allclose(there[:, JOINT_INDEX["skullbase"]], here[:, JOINT_INDEX["skullbase"]] * flip, atol=1e-9)
+    np.testing.assert_allclose(
+        mirrored_positions[:, JOINT_INDEX["l_wrist"]], positions[:, JOINT_INDEX["r_wrist"]] * flip, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        mirrored_positions[:, JOINT_INDEX["skullbase"]], positions[:, JOINT_INDEX["skullbase"]] * flip, atol=1e-9
+    )
 
 
-def test_only_licensed_motion_is_learned_from(tmp_path: Path) -> None:
+def test_clips_without_a_licence_are_excluded(tmp_path: Path) -> None:
     (tmp_path / "CORPUS.csv").write_text(
         "clip,licence_as_stated\na,MIT\nb,repo LICENSE Apache-2.0; motion origin not stated\nc,\n", encoding="utf-8"
     )
     assert corpus.licensed_clips(tmp_path) == {"a"}
 
 
-def test_families_and_an_empty_folder(tmp_path: Path) -> None:
+def test_families_and_empty_folder(tmp_path: Path) -> None:
     assert [corpus.clip_family(name) for name in ("perfume_A", "isaac_01_01", "mass_cart", "13_07")] == [
         "perfume",
         "isaac",
@@ -38,7 +42,7 @@ def test_families_and_an_empty_folder(tmp_path: Path) -> None:
         corpus.list_clips(tmp_path)
 
 
-def test_real_clips_are_read(shared: Path) -> None:
+def test_recorded_clip_is_loaded(shared: Path) -> None:
     folder = shared / "mocap"
     assert corpus.licensed_clips(folder) < set(corpus.list_clips(folder))
     motion = corpus.load_clip(folder, "perfume_C")

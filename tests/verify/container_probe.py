@@ -45,6 +45,7 @@ async def measure_bus_latency() -> dict[str, float]:
 async def count_inputs(session: str) -> dict[str, int]:
     """How many inputs were applied, and how many of them a second time."""
     from bunraku.marionette import input_log
+    from bunraku.marionette.recorder import CommandKind
 
     async with open_context(Settings()) as backing:
         said = msgpack.unpackb(await backing.bus.request(f"session.{session}.log", msgpack.packb(60.0), 10.0))
@@ -56,8 +57,9 @@ async def count_inputs(session: str) -> dict[str, int]:
     for passage in input_log.InputLog.unpack(data)._segments:
         at = 0
         while at < len(passage.records):
-            layout = input_log._RECORDS[passage.records[at]]
-            if passage.records[at] == input_log._INPUT:
+            kind = CommandKind(passage.records[at])
+            layout = input_log._RECORDS[kind]
+            if kind is CommandKind.INPUT:
                 _, who, limb, _, epoch, sequence, *_ = layout.unpack_from(passage.records, at + 1)
                 seen.append((who, limb, epoch, sequence))
             at += 1 + layout.size

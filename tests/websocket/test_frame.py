@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from websockets.frames import Frame
-from websockets.frames import Opcode as Theirs
+from websockets.frames import Opcode as LibraryOpcode
 
 from bunraku.websocket.frame import (
     ClientFrameParser,
@@ -21,9 +21,9 @@ from bunraku.websocket.frame import (
 
 
 @pytest.mark.parametrize("size", [0, 1, 125, 126, 65_535, 65_536, 70_000])
-def test_a_frame_is_what_the_standard_says(size: int) -> None:
+def test_encode_frame_agrees_with_the_websockets_library(size: int) -> None:
     message = bytes(index & 0xFF for index in range(size))
-    assert encode_frame(message) == Frame(Theirs.BINARY, message).serialize(mask=False)
+    assert encode_frame(message) == Frame(LibraryOpcode.BINARY, message).serialize(mask=False)
 
 
 @given(
@@ -38,30 +38,30 @@ def test_a_frame_is_what_the_standard_says(size: int) -> None:
     ),
     st.randoms(use_true_random=False),
 )
-def test_what_another_library_writes_is_read_however_it_is_cut(sent: list[tuple[Opcode, object]], cuts: object) -> None:
+def test_parser_reassembles_frames_split_at_any_byte(sent: list[tuple[Opcode, object]], cuts: object) -> None:
     data, expected = b"", []
     for opcode, payload in sent:
         if isinstance(payload, bytes):
-            data += Frame(Theirs(opcode), payload).serialize(mask=True)
+            data += Frame(LibraryOpcode(opcode), payload).serialize(mask=True)
             expected.append((opcode, payload))
         else:
             assert isinstance(payload, list)
             for nth, part in enumerate(payload):
-                kind = Theirs(opcode) if nth == 0 else Theirs.CONT
+                kind = LibraryOpcode(opcode) if nth == 0 else LibraryOpcode.CONT
                 data += Frame(kind, part, fin=nth == len(payload) - 1).serialize(mask=True)
-                # a ping may come between the parts
-                data += Frame(Theirs.PING, b"between").serialize(mask=True)
+                # control frames may be interleaved with fragments
+                data += Frame(LibraryOpcode.PING, b"between").serialize(mask=True)
                 if nth < len(payload) - 1:
                     expected.append((Opcode.PING, b"between"))
             expected += [(opcode, b"".join(payload)), (Opcode.PING, b"between")]
-    borders = sorted(cuts.randint(0, len(data)) for _ in range(5))  # type: ignore[attr-defined]
-    frames = ClientFrameParser(1200)
-    found = [whole for a, b in pairwise([0, *borders, len(data)]) for whole in frames.parse(data[a:b])]
-    assert found == expected
+    cut_points = sorted(cuts.randint(0, len(data)) for _ in range(5))  # type: ignore[attr-defined]
+    parser = ClientFrameParser(1200)
+    parsed = [message for a, b in pairwise([0, *cut_points, len(data)]) for message in parser.parse(data[a:b])]
+    assert parsed == expected
 
 
-def masked(head: int, payload: bytes, said: int | None = None) -> bytes:
-    size = len(payload) if said is None else said
+def masked(head: int, payload: bytes, length_field: int | None = None) -> bytes:
+    size = len(payload) if length_field is None else length_field
     length = bytes([0x80 | size]) if size < 126 else b"\xfe" + size.to_bytes(2, "big")
     return bytes([head]) + length + bytes(4) + payload
 
@@ -81,15 +81,15 @@ def masked(head: int, payload: bytes, said: int | None = None) -> bytes:
         (masked(0x02, bytes(600)) + masked(0x80, bytes(600)), 1009),
     ],
 )
-def test_what_a_client_may_not_send_is_said_to_be_broken(data: bytes, code: int) -> None:
-    with pytest.raises(FrameError) as broken:
+def test_protocol_violation_raises_frame_error(data: bytes, code: int) -> None:
+    with pytest.raises(FrameError) as raised:
         list(ClientFrameParser(1024).parse(data))
-    assert broken.value.code == code
-    assert broken.value.detail
+    assert raised.value.code == code
+    assert raised.value.detail
 
 
 @given(st.binary(max_size=300))
-def test_nothing_that_comes_is_worse_than_broken(data: bytes) -> None:
+def test_arbitrary_bytes_raise_only_frame_errors(data: bytes) -> None:
     with contextlib.suppress(FrameError):
         for opcode, payload in ClientFrameParser(64).parse(data):
             assert opcode in Opcode
@@ -97,18 +97,18 @@ def test_nothing_that_comes_is_worse_than_broken(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("size", [0, 125, 126, 65_535, 65_536])
-def test_the_message_of_a_frame_is_what_was_framed(size: int) -> None:
+def test_frame_payload_inverts_encode_frame(size: int) -> None:
     sent = bytes(number % 251 for number in range(size))
     assert frame_payload(encode_frame(sent)) == sent
 
 
-def test_a_close_is_short_and_is_answered_with_its_code() -> None:
-    closing = encode_close_frame(1013, "é" * 200)
-    assert closing[:2] == bytes([0x88, len(closing) - 2])
-    assert len(closing) <= 127
-    closing[4:].decode()
+def test_close_frame_is_truncated_and_its_code_is_echoed() -> None:
+    frame = encode_close_frame(1013, "é" * 200)
+    assert frame[:2] == bytes([0x88, len(frame) - 2])
+    assert len(frame) <= 127
+    frame[4:].decode()
     assert parse_close_code(b"") == 1000
     assert parse_close_code(b"\x03\xe9bye") == 1001
     assert parse_close_code((4404).to_bytes(2, "big")) == 4404
-    for refused in (b"\x03", (1005).to_bytes(2, "big"), (999).to_bytes(2, "big"), (5000).to_bytes(2, "big")):
-        assert parse_close_code(refused) == 1002
+    for invalid in (b"\x03", (1005).to_bytes(2, "big"), (999).to_bytes(2, "big"), (5000).to_bytes(2, "big")):
+        assert parse_close_code(invalid) == 1002

@@ -20,7 +20,7 @@ from bunraku.websocket.subprotocol import CloseConnection
 
 
 class RecordingListener:
-    """A listener that keeps what it is told."""
+    """Listener that records its events and echoes messages."""
 
     def __init__(self) -> None:
         self.messages: list[bytes] = []
@@ -30,10 +30,10 @@ class RecordingListener:
         self.resumed = asyncio.Event()
 
     def on_message(self, message: bytes) -> None:
-        if message == b"refuse me":
-            raise CloseConnection(4404, "Nothing", "here")
+        if message == b"close me":
+            raise CloseConnection(4404, "No such motion", "none")
         self.messages.append(message)
-        self.connection.write(encode_frame(b"heard " + message))
+        self.connection.write(encode_frame(b"echo " + message))
 
     def on_pong(self, payload: bytes) -> None: ...
 
@@ -45,7 +45,7 @@ class RecordingListener:
         self.resumed.set()
 
     def on_close(self) -> None:
-        self.events.append("gone")
+        self.events.append("close")
         self.ended.set()
 
 
@@ -66,100 +66,100 @@ async def serve_app(endpoint: Callable[[WebSocket], Awaitable[None]]) -> AsyncIt
 
 @asynccontextmanager
 async def detached_client() -> AsyncIterator[tuple[ClientConnection, RecordingListener, uvicorn.Server]]:
-    """A client of a socket that was taken, who hears what comes, and the server."""
-    heard = RecordingListener()
+    """Yield a client of a detached connection, the listener of that connection, and the server."""
+    listener = RecordingListener()
 
-    async def talk(ws: WebSocket) -> None:
+    async def endpoint(ws: WebSocket) -> None:
         await ws.accept()
-        heard.connection = detach(ws, heard)
-        heard.connection.write(encode_frame(b"hello"))
+        listener.connection = detach(ws, listener)
+        listener.connection.write(encode_frame(b"hello"))
 
-    async with serve_app(talk) as (url, server), connect(url, compression=None, max_size=1 << 21) as client:
+    async with serve_app(endpoint) as (url, server), connect(url, compression=None, max_size=1 << 21) as client:
         assert await client.recv() == b"hello"
-        yield client, heard, server
+        yield client, listener, server
 
 
-async def test_what_is_taken_speaks_both_ways_and_ends_as_it_should() -> None:
-    async with detached_client() as (client, heard, _):
+async def test_detached_connection_sends_receives_and_closes() -> None:
+    async with detached_client() as (client, listener, _):
         await client.send(b"one")
         await client.send([b"t", b"w", b"o"])
-        assert [await client.recv(), await client.recv()] == [b"heard one", b"heard two"]
+        assert [await client.recv(), await client.recv()] == [b"echo one", b"echo two"]
         await (await client.ping())
-        before = heard.connection.last_received_at
-        heard.connection.send_ping()
+        before = listener.connection.last_received_at
+        listener.connection.send_ping()
         await (await client.ping())
-        assert heard.connection.last_received_at >= before
+        assert listener.connection.last_received_at >= before
         await client.close(1001, "enough")
-        await heard.ended.wait()
+        await listener.ended.wait()
         assert client.close_code == 1001
-        assert heard.events[-1] == "gone"
-        assert heard.events.count("gone") == 1
+        assert listener.events[-1] == "close"
+        assert listener.events.count("close") == 1
 
 
 @pytest.mark.parametrize(
-    ("sends", "code", "title"),
-    [(b"refuse me", 4404, b"Nothing"), ("text", 1008, b"Text"), (bytes(1025), 1009, b"Too large")],
+    ("message", "code", "title"),
+    [(b"close me", 4404, b"No such motion"), ("text", 1008, b"Text"), (bytes(1025), 1009, b"Too large")],
 )
-async def test_a_refusal_is_said_and_closes(sends: bytes | str, code: int, title: bytes) -> None:
-    async with detached_client() as (client, heard, _):
-        await client.send(sends)
-        said = b""
+async def test_close_reason_is_sent_before_the_close_code(message: bytes | str, code: int, title: bytes) -> None:
+    async with detached_client() as (client, listener, _):
+        await client.send(message)
+        received = b""
         with pytest.raises(ConnectionClosed):  # noqa: PT012
             while True:
-                said += bytes(await client.recv())  # type: ignore[arg-type]
-        assert title in said
+                received += bytes(await client.recv())  # type: ignore[arg-type]
+        assert title in received
         assert client.close_code == code
-        await heard.ended.wait()
+        await listener.ended.wait()
 
 
-async def test_who_does_not_read_pauses_the_outlet_and_resumes_it() -> None:
-    async with detached_client() as (client, heard, _):
+async def test_client_that_stops_reading_pauses_the_connection() -> None:
+    async with detached_client() as (client, listener, _):
         block = encode_frame(bytes(1 << 18))
         count = 0
-        while heard.connection.is_writable:
-            heard.connection.write(block)
+        while listener.connection.is_writable:
+            listener.connection.write(block)
             count += 1
             await asyncio.sleep(0)
-        assert heard.connection.buffered_bytes > 0
+        assert listener.connection.buffered_bytes > 0
         for _ in range(count):
             assert await client.recv() == bytes(1 << 18)
-        await heard.resumed.wait()
-        assert heard.events == ["pause", "resume"]
-        assert heard.connection.buffered_bytes == 0
+        await listener.resumed.wait()
+        assert listener.events == ["pause", "resume"]
+        assert listener.connection.buffered_bytes == 0
 
 
-async def test_one_that_is_gone_is_aborted() -> None:
-    async with detached_client() as (client, heard, _):
-        heard.connection.abort()
-        await heard.ended.wait()
+async def test_abort_ends_the_connection() -> None:
+    async with detached_client() as (client, listener, _):
+        listener.connection.abort()
+        await listener.ended.wait()
         with pytest.raises(ConnectionClosed):
             await client.recv()
 
 
-async def test_the_servers_end_closes_what_was_taken() -> None:
-    async with detached_client() as (client, heard, server):
+async def test_server_shutdown_closes_detached_connections() -> None:
+    async with detached_client() as (client, listener, server):
         server.should_exit = True
         with pytest.raises(ConnectionClosed):
             await client.recv()
         assert client.close_code == 1012
-        await heard.ended.wait()
+        await listener.ended.wait()
 
 
-async def test_other_sockets_are_served_the_usual_way() -> None:
-    async def talk(ws: WebSocket) -> None:
+async def test_connection_that_is_not_detached_uses_asgi() -> None:
+    async def endpoint(ws: WebSocket) -> None:
         await ws.accept()
         await ws.send_bytes(await ws.receive_bytes())
         await ws.close()
 
-    async with serve_app(talk) as (url, _), connect(url, compression=None) as client:
-        await client.send(b"there and back")
-        assert await client.recv() == b"there and back"
+    async with serve_app(endpoint) as (url, _), connect(url, compression=None) as client:
+        await client.send(b"echo")
+        assert await client.recv() == b"echo"
 
 
-def test_another_server_is_said_to_be_the_wrong_one() -> None:
-    async def nothing() -> None:
+def test_detach_from_another_server_protocol_raises() -> None:
+    async def unused() -> None:
         return
 
     scope = {"type": "websocket", "path": "/", "headers": [], "extensions": {"websocket.http.response": {}}}
-    with pytest.raises(RuntimeError, match=r"bunraku\.serve\.protocol"):
-        detach(WebSocket(scope, nothing, nothing), RecordingListener())  # type: ignore[arg-type]
+    with pytest.raises(RuntimeError, match=r"bunraku\.serve\.uvicorn_protocol_options"):
+        detach(WebSocket(scope, unused, unused), RecordingListener())  # type: ignore[arg-type]

@@ -2,17 +2,27 @@ from __future__ import annotations
 
 import asyncio
 import socket
+from collections.abc import Callable, Sequence
+from types import ModuleType
 from typing import Any
 
 import pytest
 
+from bunraku.kernels import load_kernels
 from bunraku.websocket import multicast
 from bunraku.websocket.connection import WebSocketConnection
-from bunraku.websocket.multicast import MulticastGroup
+from bunraku.websocket.multicast import (
+    MAX_PLAIN_GROUP,
+    PLAIN_SENDER,
+    CompiledSender,
+    LazySender,
+    MulticastGroup,
+    MulticastSender,
+)
 
 
 class SilentListener:
-    """A listener that heeds nothing."""
+    """Listener that ignores all events."""
 
     def on_message(self, message: bytes) -> None: ...
 
@@ -28,114 +38,105 @@ class SilentListener:
 async def open_connections(
     number: int, receive_buffer_bytes: int | None = None
 ) -> tuple[list[WebSocketConnection], list[socket.socket]]:
-    """Outlets over real sockets, and their other ends."""
+    """Return connections over real sockets, and the sockets of their clients."""
     loop = asyncio.get_running_loop()
-    mine, theirs = [], []
+    connections, clients = [], []
     for _ in range(number):
-        one, other = socket.socketpair()
+        server_side, client_side = socket.socketpair()
         if receive_buffer_bytes is not None:
-            other.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer_bytes)
-        transport, _ = await loop.create_connection(asyncio.Protocol, sock=one)
-        mine.append(WebSocketConnection(transport, SilentListener(), set()))
-        other.setblocking(False)
-        theirs.append(other)
-    return mine, theirs
+            client_side.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer_bytes)
+        transport, _ = await loop.create_connection(asyncio.Protocol, sock=server_side)
+        connections.append(WebSocketConnection(transport, SilentListener(), set()))
+        client_side.setblocking(False)
+        clients.append(client_side)
+    return connections, clients
 
 
-async def read_bytes(other: socket.socket, size: int) -> bytes:
+async def close_all(connections: Sequence[WebSocketConnection], clients: Sequence[socket.socket]) -> None:
+    for client in clients:
+        client.close()
+    for connection in connections:
+        connection.abort()
+    await asyncio.sleep(0)
+
+
+async def read_bytes(client: socket.socket, size: int) -> bytes:
     data = b""
     while len(data) < size:
-        data += await asyncio.get_running_loop().sock_recv(other, size - len(data))
+        data += await asyncio.get_running_loop().sock_recv(client, size - len(data))
     return data
 
 
-@pytest.fixture(params=[True, False], ids=["compiled", "plain"])
-def compiled(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> bool:
-    multicast.warm_up()
-    assert multicast._compiled_modules, "this system has send(2)"
-    if not request.param:
-        monkeypatch.setattr(multicast, "_compiled_modules", [])
-    return bool(request.param)
+@pytest.fixture(params=["compiled", "plain"])
+def sender(request: pytest.FixtureRequest) -> MulticastSender:
+    return CompiledSender(load_kernels("websocket")) if request.param == "compiled" else PLAIN_SENDER
 
 
 @pytest.mark.parametrize("number", [0, 1, 40])
-async def test_all_get_the_same(compiled: bool, number: int) -> None:
-    mine, theirs = await open_connections(number)
-    group = MulticastGroup(mine)
-    assert (group._file_descriptors is not None) == (compiled and number == 40)
-    group.write(b"one")
+async def test_all_connections_receive_the_same_bytes(sender: MulticastSender, number: int) -> None:
+    connections, clients = await open_connections(number)
+    group = MulticastGroup(connections, sender)
+    assert len(group) == number
+    # bytes that were sent without a transport
+    is_compiled = sender is not PLAIN_SENDER and number > MAX_PLAIN_GROUP
+    assert group.write(b"one") == (3 * number if is_compiled else 0)
     group.write(b"and another")
     async with asyncio.timeout(20):
-        assert [await read_bytes(other, 14) for other in theirs] == [b"oneand another"] * number
-    for other in theirs:
-        other.close()
-    for outlet in mine:
-        outlet.abort()
-    await asyncio.sleep(0)
+        assert [await read_bytes(client, 14) for client in clients] == [b"oneand another"] * number
+    await close_all(connections, clients)
 
 
-@pytest.mark.usefixtures("compiled")
-async def test_what_has_no_room_comes_later_and_whole() -> None:
-    mine, theirs = await open_connections(20, 4096)
-    block, wrote = bytes(range(251)) * 4, 0
-    stuck = theirs[7]
+async def test_bytes_that_a_socket_does_not_accept_are_sent_later(sender: MulticastSender) -> None:
+    connections, clients = await open_connections(20, 4096)
+    block, block_count = bytes(range(251)) * 4, 0
+    blocked = clients[7]
 
-    async def others() -> None:
-        for other in theirs:
-            if other is not stuck:
-                await read_bytes(other, len(block))
+    async def read_others() -> None:
+        for client in clients:
+            if client is not blocked:
+                await read_bytes(client, len(block))
 
     async with asyncio.timeout(60):
-        while mine[7].is_writable:
-            MulticastGroup(mine).write(block)
-            wrote += 1
-            await others()
-        assert [outlet.is_writable for outlet in mine].count(False) == 1
-        assert await read_bytes(stuck, wrote * len(block)) == block * wrote
-    for other in theirs:
-        other.close()
-    for outlet in mine:
-        outlet.abort()
-    await asyncio.sleep(0)
+        while connections[7].is_writable:
+            MulticastGroup(connections, sender).write(block)
+            block_count += 1
+            await read_others()
+        assert [connection.is_writable for connection in connections].count(False) == 1
+        assert await read_bytes(blocked, block_count * len(block)) == block * block_count
+    await close_all(connections, clients)
 
 
-@pytest.mark.usefixtures("compiled")
-async def test_one_that_is_broken_ends_and_the_others_go_on() -> None:
-    mine, theirs = await open_connections(20)
+async def test_broken_connection_ends_and_the_others_receive(sender: MulticastSender) -> None:
+    connections, clients = await open_connections(20)
     ended = asyncio.Event()
 
-    class Told(SilentListener):
-        def gone(self) -> None:
+    class CloseListener(SilentListener):
+        def on_close(self) -> None:
             ended.set()
 
-    mine[3]._listener = Told()
-    theirs[3].close()
-    MulticastGroup(mine).write(b"to all")
+    connections[3]._listener = CloseListener()
+    clients[3].close()
+    MulticastGroup(connections, sender).write(b"to all")
     async with asyncio.timeout(20):
-        for place, other in enumerate(theirs):
+        for place, client in enumerate(clients):
             if place != 3:
-                assert await read_bytes(other, 6) == b"to all"
+                assert await read_bytes(client, 6) == b"to all"
         await ended.wait()
-    for other in theirs:
-        other.close()
-    for outlet in mine:
-        outlet.abort()
-    await asyncio.sleep(0)
+    await close_all(connections, clients)
 
 
-@pytest.mark.usefixtures("compiled")
-async def test_what_is_encrypted_is_not_written_to_the_socket() -> None:
-    mine, theirs = await open_connections(12)
+async def test_encrypted_connection_is_written_through_its_transport(sender: MulticastSender) -> None:
+    connections, clients = await open_connections(12)
 
-    class Secret(asyncio.Transport):
-        """Says that it is encrypted, as asyncio's transports over TLS do."""
+    class TlsTransport(asyncio.Transport):
+        """Transport with an SSL context, like those of asyncio for TLS."""
 
         def __init__(self) -> None:
             super().__init__()
             self.written: list[bytes] = []
 
         def get_extra_info(self, name: str, default: Any = None) -> Any:
-            return theirs[0] if name == "socket" else (object() if name == "sslcontext" else default)
+            return clients[0] if name == "socket" else (object() if name == "sslcontext" else default)
 
         def set_protocol(self, protocol: asyncio.BaseProtocol) -> None: ...
 
@@ -144,11 +145,35 @@ async def test_what_is_encrypted_is_not_written_to_the_socket() -> None:
         def write(self, data: Any) -> None:
             self.written.append(bytes(data))
 
-    secret = Secret()
-    MulticastGroup([*mine, WebSocketConnection(secret, SilentListener(), set())]).write(b"hidden")
-    assert secret.written == [b"hidden"]
-    for other in theirs:
-        other.close()
-    for outlet in mine:
-        outlet.abort()
-    await asyncio.sleep(0)
+    transport = TlsTransport()
+    encrypted = WebSocketConnection(transport, SilentListener(), set())
+    MulticastGroup([*connections, encrypted], sender).write(b"hidden")
+    assert transport.written == [b"hidden"]
+    await close_all(connections, clients)
+
+
+async def test_lazy_sender_is_plain_until_loaded() -> None:
+    connections, clients = await open_connections(MAX_PLAIN_GROUP + 1)
+    lazy = LazySender()
+    assert MulticastGroup(connections, lazy).write(b"plain") == 0
+    lazy.load()
+    assert MulticastGroup(connections, lazy).write(b"compiled") == 8 * len(connections)
+    async with asyncio.timeout(20):
+        assert [await read_bytes(client, 13) for client in clients] == [b"plaincompiled"] * len(clients)
+    await close_all(connections, clients)
+
+
+@pytest.mark.parametrize("error", [ImportError, AttributeError])
+async def test_lazy_sender_stays_plain_without_posix_sockets(
+    monkeypatch: pytest.MonkeyPatch, error: type[Exception]
+) -> None:
+    def fail(_: str) -> ModuleType:
+        raise error
+
+    load: Callable[[str], ModuleType] = fail
+    monkeypatch.setattr(multicast, "load_kernels", load)
+    connections, clients = await open_connections(MAX_PLAIN_GROUP + 1)
+    lazy = LazySender()
+    lazy.load()
+    assert MulticastGroup(connections, lazy).write(b"plain") == 0
+    await close_all(connections, clients)

@@ -1,1 +1,1 @@
-"""Tickets for sockets, and links for viewers."""
+"""Access service: tickets for WebSockets, and links for viewers."""

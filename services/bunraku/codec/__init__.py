@@ -1,1 +1,1 @@
-"""Pure: channels to blocks and back."""
+"""Codec: motion, camera, light and audio to independent blocks and back, and the container of stored motions. Pure."""

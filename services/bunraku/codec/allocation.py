@@ -1,5 +1,4 @@
-"""Which of each block's encodings to send, so that all together keep a mean error with the fewest bytes (Lagrange's
-multiplier, as Shoham and Gersho 1988)."""
+"""Bit allocation among blocks with a Lagrange multiplier (Shoham and Gersho 1988)."""
 
 from __future__ import annotations
 
@@ -10,12 +9,26 @@ from bunraku.motion.rotation import Array
 
 
 def select_cheapest(sizes: Array, errors: Array, error_budget: float) -> npt.NDArray[np.int64]:
-    """Of each block (columns) the choice (rows), with `errors` that sum up to `budget` at most and `sizes` to near the
-    least there is. Raises ValueError where even the least errors are above the budget."""
+    """Select one encoding of each block, so that the errors sum up to at most the budget with few bytes.
+
+    Args:
+        sizes: Bytes (encodings, blocks).
+        errors: Errors (encodings, blocks).
+        error_budget: Limit of the sum of the selected errors.
+
+    Returns:
+        The selected encoding (blocks,). The total size is near the minimum.
+
+    Raises:
+        ValueError: Even the smallest errors exceed the budget.
+    """
     blocks = np.arange(sizes.shape[1])
-    if errors.min(axis=0).sum() > error_budget:
-        raise ValueError(f"errors of {errors.min(axis=0).sum():g} at least cannot be brought to {error_budget:g}")
-    picked: npt.NDArray[np.int64] = np.argmin(errors, axis=0)
+    smallest = errors.min(axis=0).sum()
+    if smallest > error_budget:
+        raise ValueError(
+            f"Error budget of {error_budget:g} is out of reach: the errors sum up to at least {smallest:g}."
+        )
+    selected: npt.NDArray[np.int64] = np.argmin(errors, axis=0)
     low, high = 1e-9, 1e9
     for _ in range(80):
         price = float(np.sqrt(low * high))
@@ -23,14 +36,16 @@ def select_cheapest(sizes: Array, errors: Array, error_budget: float) -> npt.NDA
         if errors[choice, blocks].sum() > error_budget:
             low = price
         else:
-            high, picked = price, choice
-    # what the hull leaves over
-    room = error_budget - errors[picked, blocks].sum()
+            high, selected = price, choice
+    # spend what remains of the budget on encodings that are not on the convex hull
+    remaining = error_budget - errors[selected, blocks].sum()
     while True:
-        gain, worse = sizes[picked, blocks] - sizes, errors - errors[picked, blocks]
-        worth = np.where((gain > 0) & (worse <= room), gain / np.maximum(worse, 1e-12), 0.0)
-        row, block = np.unravel_index(np.argmax(worth), worth.shape)
-        if worth[row, block] <= 0:
-            return picked
-        room -= worse[row, block]
-        picked[block] = row
+        saved_bytes, added_error = sizes[selected, blocks] - sizes, errors - errors[selected, blocks]
+        gain = np.where(
+            (saved_bytes > 0) & (added_error <= remaining), saved_bytes / np.maximum(added_error, 1e-12), 0.0
+        )
+        row, block = np.unravel_index(np.argmax(gain), gain.shape)
+        if gain[row, block] <= 0:
+            return selected
+        remaining -= added_error[row, block]
+        selected[block] = row

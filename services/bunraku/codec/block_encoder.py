@@ -1,42 +1,53 @@
-"""The encoder's choices for one block: which step, which passes, until the error is as asked."""
+"""Encoder of one motion block: search for the quantiser step that meets an error with the fewest bytes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
-from types import ModuleType
-from typing import Any, Literal
+from functools import cached_property, partial
+from typing import Literal
 
 import numpy as np
 
 from bunraku.codec import coefficients, transform
 from bunraku.codec.allocation import select_cheapest
+from bunraku.codec.block_input import BlockInput, KinematicChain, Quantiser, Refinement
 from bunraku.codec.coefficients import BlockHeader
 from bunraku.codec.motion_track import MotionTrack, step_size
 from bunraku.codec.prior import IntArray, Prior
+from bunraku.kernels import load_kernels
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, PARENTS, TIP_JOINTS, Motion, joint_and_tip_positions
 
+EncodingGrade = Literal["live", "best"]
+"""Effort of the encoder: `live` makes a single pass and accepts a step quickly, `best` refines and searches."""
+
 MIN_STEP, MAX_STEP = 0, 255
 POINT_COUNT = JOINT_COUNT + len(TIP_JOINTS)
-"""Joints and tips that an error is told of."""
-_MEAN_ERROR_SWEEPS = 5
-_ERROR_BOUND_SWEEPS = 8
-_LIVE_MIN_ERROR_SHARE = 0.6
-"""The live grade is content with a block whose largest error is this share of what it may be."""
-_MEAN_ERROR_BIT_PRICE = 0.35
+"""Joints and tips at which errors are measured."""
+MEAN_ERROR_REFINEMENT = Refinement(max_sweeps=5, bit_price=0.35)
+"""Second pass for a low mean error."""
+
 _MEAN_ERROR_BIT_PRICES = 0.28, 0.45
-"""Of a bit, in squared steps; a mean error is looked for at the first, then met with those on both its sides."""
+"""Bit prices of the candidates for a mean error: on both sides of the price of the step search."""
 _STEP_SEARCH_RADIUS = 6
-"""Steps up and down that blocks of one mean error may have."""
+"""Range of step indices, up and down, among the blocks of one mean error."""
+_ERROR_BOUND_SWEEPS = 8
 _ERROR_BOUND_BIT_PRICE = 0.6
+_LIVE_MIN_ERROR_SHARE = 0.6
+"""The `live` grade accepts a block whose largest error is at least this share of the bound."""
+_BOUND_MARGIN = 1 - 1e-6
+
+
+def error_bound_refinement(error_bound_mm: float) -> Refinement:
+    """Return the second pass that lowers the largest error of a block to a bound."""
+    return Refinement(_ERROR_BOUND_SWEEPS, _ERROR_BOUND_BIT_PRICE, error_bound_mm * 1e-3)
 
 
 @dataclass(frozen=True)
 class EncodedBlock:
-    """A block at one `step` index, and its error in mm at each point and frame (23, n)."""
+    """A block at one step index, and its errors in mm at each point and frame (23, n)."""
 
     step: int
     errors_mm: Array
@@ -44,21 +55,12 @@ class EncodedBlock:
 
     @cached_property
     def data(self) -> bytes:
-        """The block's bytes, coded when they are first asked for: most tries are never sent."""
+        """Bytes of the block. Encoded at the first access, because most candidates are discarded."""
         return self._encode()
 
 
-@cache
-def _load_kernels() -> tuple[ModuleType, ModuleType, ModuleType, ModuleType]:
-    """The passes load compiled code; programs that encode nothing never wait for it."""
-
-    from bunraku.codec import bit_cost, closed_loop, forward_kinematics, rate_distortion
-
-    return forward_kinematics, bit_cost, closed_loop, rate_distortion
-
-
 class BlockEncoder:
-    """Encodes the blocks of one motion upon its track."""
+    """Encoder of the blocks of one motion."""
 
     def __init__(self, track: MotionTrack, motion: Motion, prior: Prior) -> None:
         self._track = track
@@ -74,121 +76,142 @@ class BlockEncoder:
         )
 
     @cached_property
-    def _cost_table(self) -> Array:
-        table: Array = _load_kernels()[1].build_cost_table(self._prior)
+    def _costs(self) -> Array:
+        table: Array = load_kernels("codec").build_cost_table(self._prior)
         return table
 
-    def _kinematic_chain(self, heading: int) -> Any:
-        figure, reference = self._track.figure, self._track.reference_rotations(heading)
-        return _load_kernels()[0].KinematicChain(
-            figure.offsets, figure.tips, self._track.weights, self._track.inverse_weights, reference
-        )
-
-    def encode_block(
-        self,
-        index: int,
-        step: int,
-        goal: Literal["first", "mean", "most"],
-        error_bound_mm: float = 0.0,
-        bit_price: float = _MEAN_ERROR_BIT_PRICE,
-    ) -> EncodedBlock:
-        """Block `index` at one step: by the first pass alone, or refined for its mean error, a bit at `price` squared
-        steps, or until no point is more than `bound` mm off."""
-        forward_kinematics, _, closed_loop, rate_distortion = _load_kernels()
+    def _block_input(self, index: int, step: int, heading: int) -> BlockInput:
         track = self._track
         start, frames = track.first_frame(index), track.frames_in(index)
         part = slice(start, start + frames)
-        heading = self._track.nearest_heading(self._root[start + frames // 2])
-        body = self._kinematic_chain(heading)
         basis = np.ascontiguousarray(transform.cosine_basis(frames, frames, np.arange(frames, dtype=np.float64)).T)
-        size, length = step_size(step, frames), coefficients.duration_level(frames, track.fps)
-        truth = np.ascontiguousarray(self._orientation[:, part]), np.ascontiguousarray(self._points[:, part])
+        return BlockInput(
+            self._prior,
+            self._costs,
+            KinematicChain(
+                track.figure.offsets,
+                track.figure.tips,
+                track.weights,
+                track.inverse_weights,
+                track.reference_rotations(heading),
+            ),
+            Quantiser(basis, step, step_size(step, frames)),
+            coefficients.duration_level(frames, track.fps),
+            np.ascontiguousarray(self._orientation[:, part]),
+            np.ascontiguousarray(self._points[:, part]),
+        )
+
+    def encode_block(self, index: int, step: int, refinement: Refinement | None = None) -> EncodedBlock:
+        """Encode block `index` at one step index, in a single pass or with a second pass that refines it."""
+        kernels = load_kernels("codec")
+        track = self._track
+        start, frames = track.first_frame(index), track.frames_in(index)
+        heading = track.nearest_heading(self._root[start + frames // 2])
+        block = self._block_input(index, step, heading)
         q: IntArray = np.zeros((19, 3, frames), dtype=np.int64)
-        given = (self._prior, self._cost_table, body, *truth, basis, size, step, length, q)
-        decoded = closed_loop.quantise_closed_loop(*given)
-        if goal == "mean":
-            decoded = rate_distortion.refine_coefficients(*given, _MEAN_ERROR_SWEEPS, bit_price, 0.0)
-        elif goal == "most":
-            decoded = rate_distortion.refine_coefficients(
-                *given, _ERROR_BOUND_SWEEPS, _ERROR_BOUND_BIT_PRICE, error_bound_mm * 1e-3
-            )
+        decoded = kernels.quantise_closed_loop(block, q)
+        if refinement is not None:
+            decoded = kernels.refine_coefficients(block, q, refinement)
         if track.is_still:
-            # the joints' references are the pose itself: following the root's error would cost more than it mends
+            # the joints' references are the pose itself: joints that correct the root's error cost more than they gain
             q[2:] = 0
-            decoded = forward_kinematics.compute_points(body, q, size, basis)
-        head = BlockHeader(frames, step, heading)
-        write = partial(coefficients.encode_coefficients, self._prior, head, q, track.block_frames, track.fps)
-        return EncodedBlock(step, np.linalg.norm(decoded - truth[1], axis=-1) * 1e3, write)
+            decoded = kernels.compute_points(block.chain, block.quantiser, q)
+        header = BlockHeader(frames, step, heading)
+        encode = partial(coefficients.encode_coefficients, self._prior, header, q, track.block_frames, track.fps)
+        return EncodedBlock(step, np.linalg.norm(decoded - block.points, axis=-1) * 1e3, encode)
 
     def encode_within_bound(
-        self, index: int, error_bound_mm: float, grade: str, initial_step: int | None = None
+        self, index: int, error_bound_mm: float, grade: EncodingGrade, initial_step: int | None = None
     ) -> EncodedBlock:
-        """Block `index` with no point more than `bound` mm off, at the cheapest step found; the search starts at step
-        `near`. Raises ValueError where no step is fine enough."""
-        goal: Literal["first", "most"] = "first" if grade == "live" else "most"
-        tried: dict[int, EncodedBlock] = {}
+        """Encode block `index` with no point more than `error_bound_mm` off, at the cheapest step found.
 
-        def holds(step: int) -> bool:
-            if step not in tried:
-                tried[step] = self.encode_block(index, step, goal, error_bound_mm)
-            return bool(tried[step].errors_mm.max() <= error_bound_mm * (1 - 1e-6))
+        The search starts at `initial_step`, if given. Raises ValueError if the finest step does not meet the bound.
+        """
+        refinement = None if grade == "live" else error_bound_refinement(error_bound_mm)
+        candidates: dict[int, EncodedBlock] = {}
+
+        def meets_bound(step: int) -> bool:
+            if step not in candidates:
+                candidates[step] = self.encode_block(index, step, refinement)
+            return bool(candidates[step].errors_mm.max() <= error_bound_mm * _BOUND_MARGIN)
 
         step = (
             initial_step
             if initial_step is not None
             else int(np.clip(16 * np.log2(error_bound_mm * 2e-4 / 2.0**-16), MIN_STEP, MAX_STEP))
         )
-        good = step if holds(step) else None
+        coarsest_valid = step if meets_bound(step) else None
         for _ in range(6 if grade == "best" else 1):
-            most = max(float(tried[step].errors_mm.max()), 1e-9)
-            if grade == "live" and _LIVE_MIN_ERROR_SHARE * error_bound_mm < most <= error_bound_mm:
+            max_error = max(float(candidates[step].errors_mm.max()), 1e-9)
+            if grade == "live" and _LIVE_MIN_ERROR_SHARE * error_bound_mm < max_error <= error_bound_mm:
                 break
-            move = int(np.clip(np.round(16 * np.log2(error_bound_mm * 0.97 / most)), -48, 48))
-            if good is not None and abs(move) <= 1:
+            move = int(np.clip(np.round(16 * np.log2(error_bound_mm * 0.97 / max_error)), -48, 48))
+            if coarsest_valid is not None and abs(move) <= 1:
                 break
-            step = int(np.clip(step + (move or (-1 if good is None else 1)), MIN_STEP, MAX_STEP))
-            if step in tried:
+            step = int(np.clip(step + (move or (-1 if coarsest_valid is None else 1)), MIN_STEP, MAX_STEP))
+            if step in candidates:
                 break
-            if holds(step):
-                good = step if good is None else max(good, step)
-        step = min(tried)
-        while good is None:
+            if meets_bound(step):
+                coarsest_valid = step if coarsest_valid is None else max(coarsest_valid, step)
+        step = min(candidates)
+        while coarsest_valid is None:
             if step == MIN_STEP:
-                raise ValueError(f"block {index} cannot be held to {error_bound_mm} mm at the finest step")
+                raise ValueError(
+                    f"Block {index} cannot be encoded within {error_bound_mm} mm, even at the finest step."
+                )
             step = max(step - 4, MIN_STEP)
-            good = step if holds(step) else None
+            coarsest_valid = step if meets_bound(step) else None
         if grade == "best":
-            for more in (2, 4, 6):
-                if good + more <= MAX_STEP:
-                    holds(good + more)
-        return min((coded for step, coded in tried.items() if holds(step)), key=lambda coded: len(coded.data))
+            for coarser in (2, 4, 6):
+                if coarsest_valid + coarser <= MAX_STEP:
+                    meets_bound(coarsest_valid + coarser)
+        return min(
+            (block for step, block in candidates.items() if meets_bound(step)), key=lambda block: len(block.data)
+        )
 
     def encode_to_mean_error(self, mean_error_mm: float) -> list[EncodedBlock]:
-        """All blocks with a mean error over the motion of at most `mean` mm and near it: each at several steps and
-        prices, of which those are taken that together have the fewest bytes."""
-        blocks, budget = range(self._track.block_count), mean_error_mm * POINT_COUNT * self._track.frames
-        tried: dict[int, float] = {}
+        """Encode all blocks with a mean error over the motion of at most, and close to, `mean_error_mm`.
 
-        def at(step: int) -> float:
-            if step not in tried:
-                tried[step] = sum(float(self.encode_block(index, step, "mean").errors_mm.sum()) for index in blocks)
-            return tried[step]
+        Each block is encoded at several steps and bit prices; of these, the combination with the fewest bytes is taken.
+        Raises ValueError if the finest step does not reach the mean error.
+        """
+        blocks, budget = range(self._track.block_count), mean_error_mm * POINT_COUNT * self._track.frames
+        step = self._coarsest_step_within(budget, int(16 * np.log2(mean_error_mm * 2e-3 / 2.0**-16)))
+        if step is None:
+            raise ValueError(
+                f"The motion cannot be encoded with a mean error of {mean_error_mm} mm, even at the finest step."
+            )
+        steps = range(max(step - _STEP_SEARCH_RADIUS, MIN_STEP), min(step + _STEP_SEARCH_RADIUS, MAX_STEP) + 1, 2)
+        settings = [
+            (step, MEAN_ERROR_REFINEMENT._replace(bit_price=price))
+            for step in steps
+            for price in _MEAN_ERROR_BIT_PRICES
+        ]
+        candidates = [[self.encode_block(index, step, refinement) for index in blocks] for step, refinement in settings]
+        sizes = np.array([[float(len(block.data)) for block in row] for row in candidates])
+        errors = np.array([[float(block.errors_mm.sum()) for block in row] for row in candidates])
+        return [candidates[row][index] for index, row in enumerate(select_cheapest(sizes, errors, budget))]
+
+    def _coarsest_step_within(self, error_budget: float, initial_step: int) -> int | None:
+        """Return the coarsest step found at which the errors of all points and frames sum up to at most the budget."""
+        known: dict[int, float] = {}
+
+        def total_error(step: int) -> float:
+            if step not in known:
+                blocks = (
+                    self.encode_block(index, step, MEAN_ERROR_REFINEMENT) for index in range(self._track.block_count)
+                )
+                known[step] = sum(float(block.errors_mm.sum()) for block in blocks)
+            return known[step]
 
         low, high = MIN_STEP, MAX_STEP
-        step = int(np.clip(16 * np.log2(mean_error_mm * 2e-3 / 2.0**-16), MIN_STEP + 1, MAX_STEP - 1))
+        step = int(np.clip(initial_step, MIN_STEP + 1, MAX_STEP - 1))
         while high - low > 1:
-            error = at(step)
-            if error <= budget:
+            error = total_error(step)
+            if error <= error_budget:
                 low = step
             else:
                 high = step
-            guess = step + int(np.clip(np.round(19 * np.log2(budget / max(error, 1e-9))), -64, 64))
+            guess = step + int(np.clip(np.round(19 * np.log2(error_budget / max(error, 1e-9))), -64, 64))
             step = min(max(guess, low + 1), high - 1)
-        if at(low) > budget:
-            raise ValueError(f"the motion cannot be held to a mean error of {mean_error_mm} mm")
-        steps = range(max(low - _STEP_SEARCH_RADIUS, MIN_STEP), min(low + _STEP_SEARCH_RADIUS, MAX_STEP) + 1, 2)
-        tries = [(step, price) for step in steps for price in _MEAN_ERROR_BIT_PRICES]
-        coded = [[self.encode_block(index, step, "mean", bit_price=price) for index in blocks] for step, price in tries]
-        sizes = np.array([[float(len(block.data)) for block in row] for row in coded])
-        errors = np.array([[float(block.errors_mm.sum()) for block in row] for row in coded])
-        return [coded[row][index] for index, row in enumerate(select_cheapest(sizes, errors, budget))]
+        return low if total_error(low) <= error_budget else None

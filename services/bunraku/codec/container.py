@@ -1,14 +1,14 @@
-"""Container format of stored motions: one object holds a whole motion.
+"""Container format of stored motions: one object per motion, ready to be sent.
 
-An object is a MessagePack map of the Description and of every Data message of every track and bitrate level, ready to
-be sent. Functions that change a motion return a new object; the stored one stays as it is.
+An object is a MessagePack map of the Description message (`description`) and the Data messages of every track, bitrate
+level and block (`tracks`). Functions that change a motion return a new object; the stored one stays as it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import msgpack
 
@@ -22,15 +22,18 @@ from bunraku.wire.limbs import MAX_PERFORMERS
 from bunraku.wire.messages import Data, Description
 
 MAX_TRACKS = 16
-"""Tracks that a Data message can number."""
+"""Limit of the tracks of a motion: a Data message has four bits for the track."""
 
 Track = MotionTrack | SceneTrack | AudioTrack
 
 
 @dataclass(frozen=True, slots=True)
 class PerformerTracks:
-    """What one performer dances: its track, the Data messages by rate, lowest first, and index, where it faces, radians
-    about y from z towards x, and where on the stage it is danced."""
+    """The track of one performer.
+
+    `packets[level][index]` are its Data messages, lowest level first. `front` is the direction that it faces, in
+    radians about y from z towards x, and `placement` its place on the stage.
+    """
 
     track: MotionTrack
     packets: list[list[bytes]]
@@ -40,9 +43,12 @@ class PerformerTracks:
 
 @dataclass(frozen=True, slots=True)
 class StoredMotion:
-    """A motion as it is sent: the tracks of its Description, the performers' first, and `packets[track][rate][index]`,
-    whole Data messages, lowest rate first; its `dances`, one for each performer; `kbps` what each rate of each track
-    costs."""
+    """A motion as it is sent.
+
+    `description` is its Description message. `tracks` has the tracks, those of the performers first,
+    `packets[track][level][index]` their Data messages, and `bitrates_kbps[track][level]` their bitrates, lowest level
+    first.
+    """
 
     id: str
     description: bytes
@@ -53,144 +59,171 @@ class StoredMotion:
 
     @property
     def first_track(self) -> MotionTrack:
-        """The first performer's track, whose length is the motion's."""
+        """Track of the first performer, whose duration is that of the motion."""
         return self.performers[0].track
 
     @property
     def first_packets(self) -> list[list[bytes]]:
-        """The Data messages of the first performer's track, by rate and index."""
+        """Data messages of the first performer's track, by level and index."""
         return self.packets[0]
 
     @property
     def total_bytes(self) -> int:
-        """Bytes of all messages."""
-        packets = (packet for track in self.packets for rate in track for packet in rate)
+        """Size of all messages."""
+        packets = (packet for track in self.packets for level in track for packet in level)
         return len(self.description) + sum(map(len, packets))
+
+
+class _Level(Protocol):
+    @property
+    def blocks(self) -> list[bytes]: ...
+
+
+class _ObjectTrack(NamedTuple):
+    """A track on its way into an object: its entry in the Description, and its blocks by level and index."""
+
+    description: dict[str, Any]
+    blocks: list[list[bytes]]
+
+    @property
+    def type(self) -> str:
+        """Type of the track: `motion`, `camera`, `light` or `audio`."""
+        track_type: str = self.description["type"]
+        return track_type
 
 
 def pack_motion(
     motion_id: str, encoded: EncodedMotion, scenes: Sequence[EncodedScene] = (), others: Sequence[EncodedMotion] = ()
 ) -> bytes:
-    """The object of an encoded motion, with the `others` who dance with it, and the cameras and lights that belong to
-    it.
+    """Return the object of a motion: its performers (`encoded`, then `others`), then its cameras and lights.
 
-    Raises ValueError where there are more tracks than a Data message can number.
+    Raises ValueError for more than MAX_TRACKS tracks.
     """
-    tracks: list[EncodedMotion | EncodedScene] = [encoded, *others, *scenes]
-    if len(tracks) > MAX_TRACKS:
-        raise ValueError(f"a motion has at most {MAX_TRACKS} tracks, not {len(tracks)}")
-    packets = [
-        _pack_data_messages(number, [rate.blocks for rate in track.ladder]) for number, track in enumerate(tracks)
-    ]
-    description = Description(motion_id, [track.describe() for track in tracks]).pack()
-    packed: bytes = msgpack.packb({"description": description, "tracks": packets})
-    return packed
+    motions = [_new_track(motion.describe(), motion.ladder) for motion in (encoded, *others)]
+    return _pack_object(motion_id, [*motions, *(_new_track(scene.describe(), scene.ladder) for scene in scenes)])[0]
 
 
 def add_audio_track(motion_id: str, stored: StoredMotion, audio: EncodedAudio) -> tuple[bytes, list[str]]:
-    """The object of the motion of this id: `stored` with its audio, which replaces what audio there was; and the types
-    of its tracks. All other blocks are the same bytes.
+    """Return the object of a new motion: `stored` with its audio replaced by, or extended with, `audio`.
 
-    Raises ValueError where there are more tracks than a Data message can number.
+    Returns:
+        The object, and the types of its tracks.
+
+    Raises:
+        ValueError: There would be more than MAX_TRACKS tracks.
     """
-    described = _track_descriptions(stored)
-    packets = list(stored.packets)
-    number = next((n for n, track in enumerate(described) if track["type"] == "audio"), len(described))
-    if number == MAX_TRACKS:
-        raise ValueError(f"a motion has at most {MAX_TRACKS} tracks, and this one has them without audio")
-    described[number:] = [audio.describe(), *described[number + 1 :]]
-    packets[number:] = [_pack_data_messages(number, [rate.blocks for rate in audio.ladder]), *packets[number + 1 :]]
-    packed: bytes = msgpack.packb({"description": Description(motion_id, described).pack(), "tracks": packets})
-    return packed, [track["type"] for track in described]
+    tracks = _stored_tracks(stored)
+    number = next((n for n, track in enumerate(tracks) if track.type == "audio"), len(tracks))
+    tracks[number : number + 1] = [_new_track(audio.describe(), audio.ladder)]
+    return _pack_object(motion_id, tracks)
 
 
 def replace_scene_tracks(
     motion_id: str, stored: StoredMotion, scenes: Sequence[EncodedScene], replaced_types: Container[str]
 ) -> tuple[bytes, list[str]]:
-    """The object of the motion of this id: `stored` with cameras and lights, in place of its tracks of the `replaced`
-    types; and the types of its tracks. All other blocks are the same but for the number of their track.
+    """Return the object of a new motion: `stored` with `scenes` instead of its tracks of some types.
 
-    Raises ValueError where there are more tracks than a Data message can number.
+    Returns:
+        The object, and the types of its tracks.
+
+    Raises:
+        ValueError: There would be more than MAX_TRACKS tracks.
     """
-    described = _track_descriptions(stored)
-    kept = [number for number, track in enumerate(described) if track["type"] not in replaced_types]
-    if len(kept) + len(scenes) > MAX_TRACKS:
-        raise ValueError(f"a motion has at most {MAX_TRACKS} tracks, and this would have {len(kept) + len(scenes)}")
-    blocks = [[[Data.unpack(packet).block for packet in rate] for rate in stored.packets[number]] for number in kept]
-    blocks += [[rate.blocks for rate in scene.ladder] for scene in scenes]
-    tracks = [*(described[number] for number in kept), *(scene.describe() for scene in scenes)]
-    packets = [_pack_data_messages(number, rates) for number, rates in enumerate(blocks)]
-    packed: bytes = msgpack.packb({"description": Description(motion_id, tracks).pack(), "tracks": packets})
-    return packed, [track["type"] for track in tracks]
+    kept = [track for track in _stored_tracks(stored) if track.type not in replaced_types]
+    return _pack_object(motion_id, [*kept, *(_new_track(scene.describe(), scene.ladder) for scene in scenes)])
 
 
 def add_performers(
     motion_id: str, stored: StoredMotion, others: Sequence[StoredMotion], placements: Sequence[Placement]
 ) -> tuple[bytes, list[str]]:
-    """The object of the motion of this id: `stored` with the performers of `others` beside its own, each at its place
-    of `places`, in this order; and the types of its tracks. All blocks are the same but for the number of their track.
+    """Return the object of a new motion: `stored` with the performers of `others` after its own.
 
-    Raises ValueError where there are more performers or tracks than can be numbered.
+    Args:
+        motion_id: Id of the new motion.
+        stored: The motion whose scene and audio are kept.
+        others: Motions of which only the performers are added.
+        placements: Place on the stage of each performer, in this order.
+
+    Returns:
+        The object, and the types of its tracks.
+
+    Raises:
+        ValueError: There would be more than MAX_PERFORMERS performers or MAX_TRACKS tracks.
     """
-    own = _track_descriptions(stored)
-    dancing = [(said, at) for said, at in zip(own, stored.packets, strict=True) if said["type"] == "motion"]
-    beside = [(said, at) for said, at in zip(own, stored.packets, strict=True) if said["type"] != "motion"]
-    for other in others:
-        dancing += [
-            (said, at)
-            for said, at in zip(_track_descriptions(other), other.packets, strict=True)
-            if said["type"] == "motion"
-        ]
-    if len(dancing) > MAX_PERFORMERS:
-        raise ValueError(f"a stage has at most {MAX_PERFORMERS} performers, and this would have {len(dancing)}")
-    if len(dancing) + len(beside) > MAX_TRACKS:
-        raise ValueError(f"a motion has at most {MAX_TRACKS} tracks, not {len(dancing) + len(beside)}")
-    placed = [(said | {"place": list(place)}, at) for (said, at), place in zip(dancing, placements, strict=True)]
-    tracks = [said for said, _ in (*placed, *beside)]
-    packets = [
-        _pack_data_messages(number, [[Data.unpack(packet).block for packet in rate] for rate in at])
-        for number, (_, at) in enumerate((*placed, *beside))
+    own = _stored_tracks(stored)
+    performers = [track for track in own if track.type == "motion"]
+    performers += [track for other in others for track in _stored_tracks(other) if track.type == "motion"]
+    if len(performers) > MAX_PERFORMERS:
+        raise ValueError(f"A motion has at most {MAX_PERFORMERS} performers, this would have {len(performers)}.")
+    placed = [
+        track._replace(description=track.description | {"place": list(placement)})
+        for track, placement in zip(performers, placements, strict=True)
     ]
-    packed: bytes = msgpack.packb({"description": Description(motion_id, tracks).pack(), "tracks": packets})
-    return packed, [track["type"] for track in tracks]
-
-
-def _track_descriptions(stored: StoredMotion) -> list[dict[str, Any]]:
-    tracks: list[dict[str, Any]] = msgpack.unpackb(stored.description[1:])["tracks"]
-    return tracks
-
-
-def _pack_data_messages(track_number: int, levels: Sequence[Sequence[bytes]]) -> list[list[bytes]]:
-    """The Data messages of a track's blocks, by rate and index."""
-    return [
-        [Data(track_number, nth, index, block).pack() for index, block in enumerate(blocks)]
-        for nth, blocks in enumerate(levels)
-    ]
+    return _pack_object(motion_id, [*placed, *(track for track in own if track.type != "motion")])
 
 
 def unpack_motion(motion_id: str, packed: bytes) -> StoredMotion:
-    """The motion in an object that `pack_motion` made; raises `DamagedBlock` where it is in a codec that is not spoken."""
+    """Return the motion of an object. Raises `DamagedBlock` if it is of an unsupported codec."""
     values = msgpack.unpackb(packed)
-    described: list[dict[str, Any]] = msgpack.unpackb(values["description"][1:])["tracks"]
-    # objects from when a motion was one track have its packets alone
+    descriptions = _track_descriptions(values["description"])
+    # objects of the first release have only the packets of one track
     packets = values["tracks"] if "tracks" in values else [values["packets"]]
-    dances = tuple(
+    performers = tuple(
         PerformerTracks(
-            parse_motion_track(said),
-            at,
-            float(said.get("front", 0.0)),
-            Placement.parse(said.get("place", STAGE_CENTRE)),
+            parse_motion_track(description),
+            track_packets,
+            float(description.get("front", 0.0)),
+            Placement.parse(description.get("place", STAGE_CENTRE)),
         )
-        for said, at in zip(described, packets, strict=True)
-        if said["type"] == "motion"
+        for description, track_packets in zip(descriptions, packets, strict=True)
+        if description["type"] == "motion"
     )
-    first, beside = dances[0].track, described[len(dances) :]
-    tracks: tuple[Track, ...] = (
-        *(dance.track for dance in dances),
-        *(
-            parse_audio_track(track, first) if track["type"] == "audio" else parse_scene_track(track)
-            for track in beside
-        ),
+    first_track = performers[0].track
+    other_tracks = (
+        parse_audio_track(description, first_track)
+        if description["type"] == "audio"
+        else parse_scene_track(description)
+        for description in descriptions[len(performers) :]
     )
-    kbps = tuple(tuple(float(rate["kbps"]) for rate in track["rates"]) for track in described)
-    return StoredMotion(motion_id, values["description"], tracks, packets, dances, kbps)
+    return StoredMotion(
+        motion_id,
+        values["description"],
+        (*(performer.track for performer in performers), *other_tracks),
+        packets,
+        performers,
+        tuple(tuple(float(rate["kbps"]) for rate in description["rates"]) for description in descriptions),
+    )
+
+
+def _pack_object(motion_id: str, tracks: Sequence[_ObjectTrack]) -> tuple[bytes, list[str]]:
+    """Return an object and the types of its tracks. Raises ValueError for more than MAX_TRACKS tracks."""
+    if len(tracks) > MAX_TRACKS:
+        raise ValueError(f"A motion has at most {MAX_TRACKS} tracks, this would have {len(tracks)}.")
+    packets = [
+        [
+            [Data(number, level, index, block).pack() for index, block in enumerate(blocks)]
+            for level, blocks in enumerate(track.blocks)
+        ]
+        for number, track in enumerate(tracks)
+    ]
+    description = Description(motion_id, [track.description for track in tracks]).pack()
+    packed: bytes = msgpack.packb({"description": description, "tracks": packets})
+    return packed, [track.type for track in tracks]
+
+
+def _new_track(description: dict[str, Any], ladder: Iterable[_Level]) -> _ObjectTrack:
+    return _ObjectTrack(description, [level.blocks for level in ladder])
+
+
+def _stored_tracks(stored: StoredMotion) -> list[_ObjectTrack]:
+    """Return the tracks of a stored motion, their blocks taken out of the Data messages."""
+    return [
+        _ObjectTrack(description, [[Data.unpack(packet).block for packet in level] for level in packets])
+        for description, packets in zip(_track_descriptions(stored.description), stored.packets, strict=True)
+    ]
+
+
+def _track_descriptions(description: bytes) -> list[dict[str, Any]]:
+    """Return the entries of `tracks` in a Description message."""
+    tracks: list[dict[str, Any]] = msgpack.unpackb(description[1:])["tracks"]
+    return tracks

@@ -1,5 +1,5 @@
-"""What goes wrong with a block."""
+"""Errors of the codec."""
 
 
 class DamagedBlock(ValueError):
-    """A block that cannot be decoded: truncated, damaged, hostile, or of another format. The message says why."""
+    """Invalid bytes or description: truncated, damaged, hostile, or of another codec. The message gives the reason."""

@@ -1,5 +1,7 @@
-"""A few whole numbers to bytes and back (SPEC.md, Dancer), in plain Python: a service reads a dancer with every motion
-that it opens, and must not wait seconds for the compiled coder to load.
+"""Adaptive coder of a few integers (SPEC.md, Skeleton), in plain Python.
+
+A service parses a skeleton description for each motion that it opens, and must not wait seconds until the compiled
+entropy coder is loaded.
 """
 
 from __future__ import annotations
@@ -10,15 +12,15 @@ from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.prior import IntArray
 
 INTEGER_BITS_LIMIT = 17
-"""Bits of a number's size plus one, less one, are fewer."""
+"""The bit length of a coded magnitude plus one, minus one, is below this."""
 _HALF_PROBABILITY = 16384
 _INITIAL_LENGTH_PROBABILITY = 22938
-"""Odds of another bit before any number is seen, 0.7 in 1/32768."""
-_TOP = 1 << 24
+"""Initial probability of one more bit: 0.7, in 1/32768."""
+_RENORMALISATION_LIMIT = 1 << 24
 
 
 class _RangeEncoder:
-    """The range coder of `rangecoder`, all that is written being one number."""
+    """The range encoder of `_kernels.range_coder`. All that it has written is one big integer."""
 
     def __init__(self) -> None:
         self._low, self._range, self._byte_count = 0, 0xFFFFFFFF, 4
@@ -30,7 +32,7 @@ class _RangeEncoder:
         else:
             self._low += bound
             self._range -= bound
-        while self._range < _TOP:
+        while self._range < _RENORMALISATION_LIMIT:
             self._low, self._range, self._byte_count = self._low << 8, self._range << 8, self._byte_count + 1
         return bit
 
@@ -39,11 +41,11 @@ class _RangeEncoder:
             rounded = (self._low + (1 << shift) - 1) >> shift << shift
             if rounded < self._low + self._range:
                 return rounded.to_bytes(self._byte_count, "big").rstrip(b"\0")
-        raise AssertionError("the last interval holds a number")
+        raise AssertionError("the last interval contains an integer")
 
 
 class _RangeDecoder:
-    """The range decoder; past the end of `data` come zeros."""
+    """The range decoder of `_kernels.range_coder`. Past its end, `data` reads as zeros."""
 
     def __init__(self, data: bytes) -> None:
         self._data, self._position, self._range = data, 4, 0xFFFFFFFF
@@ -57,7 +59,7 @@ class _RangeDecoder:
         else:
             self._code -= bound
             self._range -= bound
-        while self._range < _TOP:
+        while self._range < _RENORMALISATION_LIMIT:
             byte = self._data[self._position] if self._position < len(self._data) else 0
             self._code, self._range, self._position = (
                 (self._code << 8 | byte) & 0xFFFFFFFF,
@@ -68,19 +70,29 @@ class _RangeDecoder:
 
 
 def encode_integers(values: IntArray, model_groups: IntArray, mirror_of: IntArray) -> bytes:
-    """Bytes of some whole numbers, each of a group with models of its own and perhaps with a twin before it, by its
-    place; raises ValueError for one above 2^16."""
+    """Encode integers.
+
+    Args:
+        values: The integers.
+        model_groups: Group of adaptive models of each integer.
+        mirror_of: Index of the earlier integer that predicts each integer, or -1.
+
+    Raises:
+        ValueError: A magnitude exceeds 2^16.
+    """
     coder = _RangeEncoder()
     if _code_integers(coder, [int(value) for value in values], model_groups, mirror_of, decoding=False) is None:
-        raise ValueError("a number is too large to be coded")
+        raise ValueError("Cannot encode an integer: its magnitude is too large.")
     return coder.finish()
 
 
 def decode_integers(data: bytes, model_groups: IntArray, mirror_of: IntArray) -> IntArray:
-    """The numbers of `encode_numbers`; raises `DamagedBlock`."""
+    """Decode the integers of `encode_integers`. Raises `DamagedBlock`."""
     values = _code_integers(_RangeDecoder(data), [0] * len(model_groups), model_groups, mirror_of, decoding=True)
     if values is None:
-        raise DamagedBlock(f"a number is longer than {INTEGER_BITS_LIMIT} bits, or less than none")
+        raise DamagedBlock(
+            f"Invalid skeleton description: an integer has {INTEGER_BITS_LIMIT} or more bits, or a negative magnitude."
+        )
     return np.array(values, dtype=np.int64)
 
 
@@ -92,36 +104,42 @@ def _code_integers(
     *,
     decoding: bool,
 ) -> list[int] | None:
-    """Write `values`, or read them: of each its size, or what that differs from its twin's, then its sign, or whether
-    that differs. None where a number cannot be."""
+    """Write or read `values`; return None if one is invalid.
+
+    Each integer is its magnitude, then its sign. A mirrored one is the difference of its magnitude from that of the
+    earlier integer, then whether the signs differ.
+    """
     lengths = [[_INITIAL_LENGTH_PROBABILITY] * INTEGER_BITS_LIMIT for _ in range(int(model_groups.max()) + 1)]
     signs = [[_HALF_PROBABILITY] for _ in lengths]
 
-    def learned(model: list[int], at: int, bit: int) -> int:
-        got = coder.code_bit(model[at], bit)
-        model[at] = min(max(model[at] + ((32768 * got - model[at]) >> 3), 1024), 31744)
-        return got
+    def code_adaptive(model: list[int], index: int, bit: int) -> int:
+        coded = coder.code_bit(model[index], bit)
+        model[index] = min(max(model[index] + ((32768 * coded - model[index]) >> 3), 1024), 31744)
+        return coded
 
-    for i, (group, twin) in enumerate(zip(model_groups.tolist(), mirror_of.tolist(), strict=True)):
-        like = abs(values[twin]) if twin >= 0 else 0
-        rest = abs(values[i]) - like
-        bits, length = (abs(rest) + 1).bit_length() - 1, 0
-        while length < INTEGER_BITS_LIMIT and learned(lengths[group], length, int(bits > length)):
+    for i, (group, mirror) in enumerate(zip(model_groups.tolist(), mirror_of.tolist(), strict=True)):
+        predicted = abs(values[mirror]) if mirror >= 0 else 0
+        difference = abs(values[i]) - predicted
+        bits, length = (abs(difference) + 1).bit_length() - 1, 0
+        while length < INTEGER_BITS_LIMIT and code_adaptive(lengths[group], length, int(bits > length)):
             length += 1
         if length == INTEGER_BITS_LIMIT:
             return None
-        size = 1
-        for place in range(length - 1, -1, -1):
-            size = size << 1 | coder.code_bit(_HALF_PROBABILITY, (abs(rest) + 1) >> place & 1)
-        size -= 1
-        if twin < 0:
-            negative = bool(size) and bool(coder.code_bit(_HALF_PROBABILITY, int(values[i] < 0)))
+        magnitude = 1
+        for position in range(length - 1, -1, -1):
+            magnitude = magnitude << 1 | coder.code_bit(_HALF_PROBABILITY, (abs(difference) + 1) >> position & 1)
+        magnitude -= 1
+        if mirror < 0:
+            negative = bool(magnitude) and bool(coder.code_bit(_HALF_PROBABILITY, int(values[i] < 0)))
         else:
-            size = like - size if size and coder.code_bit(_HALF_PROBABILITY, int(rest < 0)) else like + size
-            if size < 0:
+            if magnitude and coder.code_bit(_HALF_PROBABILITY, int(difference < 0)):
+                magnitude = -magnitude
+            magnitude += predicted
+            if magnitude < 0:
                 return None
-            other = values[twin] < 0
-            negative = other != (bool(size) and bool(learned(signs[group], 0, int((values[i] < 0) != other))))
+            mirror_negative = values[mirror] < 0
+            differs = bool(magnitude) and bool(code_adaptive(signs[group], 0, int((values[i] < 0) != mirror_negative)))
+            negative = mirror_negative != differs
         if decoding:
-            values[i] = -size if negative else size
+            values[i] = -magnitude if negative else magnitude
     return values

@@ -1,4 +1,4 @@
-"""A motion block to poses at any instant (SPEC.md, Motion block)."""
+"""Decoder of motion blocks: bytes to poses at any instant (SPEC.md, Motion block)."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ from bunraku.motion.rotation import Array
 
 @dataclass(frozen=True, slots=True)
 class MotionBlock:
-    """A decoded block: `frames` frames, quantised `q` (19, 3, K), their values (19, 3, K) in metres and radians, and
-    the rotations they are relative to (18, 4)."""
+    """A decoded block.
+
+    `q` (19, 3, K) are its quantised coefficients, `values` (19, 3, K) the dequantised ones in metres and radians, and
+    `reference` (18, 4) the rotations that they are relative to.
+    """
 
     frames: int
     q: IntArray
@@ -24,31 +27,36 @@ class MotionBlock:
     reference: Array
 
     def pose_at(self, instants: Array | float) -> tuple[Array, Array]:
-        """Root positions (m, 3) in metres and rotations (m, 18, 4) at `instants` (m,), in frames from the block's
-        first; any real in -1/2 .. frames - 1/2."""
+        """Evaluate the block at `instants` (m,), in frames from its first, any real in -1/2 .. frames - 1/2.
+
+        Returns:
+            Root positions (m, 3) in metres and rotations (m, 18, 4).
+        """
         tracks = transform.inverse_dct(self.values, self.frames, np.atleast_1d(np.asarray(instants, dtype=np.float64)))
         turned = rotation.from_rotation_vector(tracks[:, 1:])
         return tracks[:, 0], rotation.multiply(np.broadcast_to(self.reference, turned.shape), turned)
 
 
 def reconstruct(q: IntArray) -> Array:
-    """Values of quantised coefficients, in steps: a little below the middle, where values are denser (SPEC.md)."""
-    size = np.abs(q)
-    values: Array = np.sign(q) * (size - np.where(size == 1, 0.06, 0.03))
+    """Return the values of quantised coefficients in steps (SPEC.md, Quantiser).
+
+    They lie a little below the middle of the quantiser's intervals, because smaller values are more frequent.
+    """
+    magnitude = np.abs(q)
+    values: Array = np.sign(q) * (magnitude - np.where(magnitude == 1, 0.06, 0.03))
     return values
 
 
 def decode_motion_block(track: MotionTrack, data: bytes, prior: Prior | None = None) -> MotionBlock:
-    """Decode one block of `track`; raises `DamagedBlock` on what cannot be one.
+    """Decode one block of `track`. Raises `DamagedBlock`.
 
-    `prior` is the package's own unless another is given; nothing but the same prior decodes a block.
+    `prior` must be the one with which the block was encoded; the default is the shipped prior.
     """
-    head, q = coefficients.decode_coefficients(prior or load_shipped_prior(), data, track.block_frames, track.fps)
-    size = step_size(head.step, head.frames)
-    values = track.inverse_weights @ (reconstruct(q) * size)
-    return MotionBlock(head.frames, q, values, track.reference_rotations(head.heading))
+    header, q = coefficients.decode_coefficients(prior or load_shipped_prior(), data, track.block_frames, track.fps)
+    values = track.inverse_weights @ (reconstruct(q) * step_size(header.step, header.frames))
+    return MotionBlock(header.frames, q, values, track.reference_rotations(header.heading))
 
 
 def warm_up() -> None:
-    """Load or compile what decoding needs."""
+    """Load the code of the decoder, or compile it if it is not cached."""
     coefficients.warm_up(load_shipped_prior())

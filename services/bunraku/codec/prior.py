@@ -1,6 +1,7 @@
-"""What the coder expects of human motion before it has seen any: trained once (`training/`), shipped, never adapted.
+"""Prior of the context model: fixed integers, trained on human motion (`training/`) and never adapted.
 
-SPEC.md "Prior" is the definition. All numbers are integers, so that every decoder reaches the same bits.
+SPEC.md, Prior, is the definition. The module also contains the lookup tables of the context model. All numbers are
+integers, so that every decoder reaches the same bits.
 """
 
 from __future__ import annotations
@@ -17,30 +18,34 @@ from bunraku.motion.skeleton import CHANNEL_COUNT, JOINTS, PARENTS
 
 IntArray = npt.NDArray[np.int64]
 
+SCENE_CHANNEL_COUNT = 3
+"""Channels of a block of a camera or light, the last with one axis; a motion has `CHANNEL_COUNT`."""
 SHARED_FEATURES = 24
-"""Features of a frequency that its three axes share; `OWN` more are each axis's own."""
+"""Features of a frequency that its three axes share."""
 AXIS_FEATURES = 8
+"""Further features of each axis."""
 FEATURE_COUNT = SHARED_FEATURES + AXIS_FEATURES
 HIDDEN_UNITS = 8
 FREQUENCY_CLASSES = 7
 """Classes of frequencies: 0, 1, 2, 3-4, 5-8, 9-15, 16 and above."""
 HAZARD_ROWS = 48
-"""Scales of the hazards: 2^-7 .. 2^4.75 in quarter octaves."""
+"""Rows of a hazard table: scales from 2^-7 to 2^4.75 in quarter octaves."""
 HAZARD_TABLE_OF: IntArray = np.array([0, 0, 0, 1, 1, 2, 2], dtype=np.int64)
-"""Of each class the table of hazards: its sizes are spread alike."""
+"""Hazard table of each frequency class. Classes with similar distributions of magnitudes share a table."""
 UNARY_DECISIONS = 18
-"""Decisions "larger than this?" before an escape."""
+"""Decisions "magnitude greater than v?" before an escape."""
 SIGN_CONTEXTS = 15
-"""Sign contexts of a class: q[k-2] from -2 to 2, times the sign of q[k-4]."""
+"""Sign contexts of a class: q[k-2] limited to -2..2, combined with the sign of q[k-4]."""
 CHANNEL_AXES = 3 * CHANNEL_COUNT
 
 
 class Prior(NamedTuple):
-    """The network from features to a scale (int64, weights in 1/4096), the hazards of each scale, the signs' odds.
+    """Network from features to a scale, hazard tables, and sign probabilities, all int64.
 
-    `linear` (CLASSES, FEATURES) and `bias` (CLASSES, AXES); `hidden` (HIDDEN, FEATURES), `hidden_bias` (HIDDEN, AXES),
-    `hidden_class` (HIDDEN, CLASSES) and `out` (HIDDEN, CLASSES); `hazard` (3 * ROWS, UNARY), three tables, and `sign`
-    (CLASSES, SIGNS) are probabilities of a 1 in 1/32768.
+    The network has weights in 1/4096: `linear` (FREQUENCY_CLASSES, FEATURE_COUNT), `bias` (FREQUENCY_CLASSES,
+    CHANNEL_AXES), `hidden` (HIDDEN_UNITS, FEATURE_COUNT), `hidden_bias` (HIDDEN_UNITS, CHANNEL_AXES), `hidden_class`
+    and `out` (HIDDEN_UNITS, FREQUENCY_CLASSES). `hazard` (3 * HAZARD_ROWS, UNARY_DECISIONS), three tables, and `sign`
+    (FREQUENCY_CLASSES, SIGN_CONTEXTS) are probabilities of a 1 in 1/32768.
     """
 
     linear: IntArray
@@ -65,19 +70,16 @@ SHAPES = Prior(
 )
 """Shape of each array of a `Prior`."""
 
-_MIRROR_SIDE = {"l": "r", "r": "l"}
-
 
 def _relative_channels() -> IntArray:
-    """Of each channel its parent's, its mirror's and its grandparent's channel, -1 for none: (3, CHANNEL_COUNT).
+    """Return the parent's, mirror's and grandparent's channel of each channel, -1 for none: (3, CHANNEL_COUNT).
 
-    Only channels that come before count; a joint of the right side mirrors one of the left, any other the joint before.
+    Only earlier channels count. A joint of the right side mirrors one of the left, any other the joint before it.
     """
     parent = [-1, 0, *(p + 1 for p in PARENTS[1:])]
     mirror = [-1, -1]
     for k, name in enumerate(JOINTS[1:], 1):
-        twin = "l" + name[1:] if name.startswith("r_") else None
-        mirror.append(JOINTS.index(twin) + 1 if twin else k)
+        mirror.append(JOINTS.index("l" + name[1:]) + 1 if name.startswith("r_") else k)
     grandparent = [parent[p] if p >= 0 else -1 for p in parent]
     return np.array([parent, mirror, grandparent], dtype=np.int64)
 
@@ -86,30 +88,30 @@ RELATIVE_CHANNELS: IntArray = _relative_channels()
 
 
 def _magnitude_level(magnitude: int) -> int:
-    """16 log2(1 + size) to the nearest whole, in integers: half of floor(32 log2), rounded."""
+    """Return 16 log2(1 + magnitude) to the nearest integer: half of floor(32 log2), rounded."""
     return (((magnitude + 1) ** 32).bit_length()) >> 1
 
 
-MAGNITUDE_LEVELS: IntArray = np.array([_magnitude_level(size) for size in range(4096)], dtype=np.int64)
-"""`_level` of 0 .. 4095; larger ones count as the last."""
+MAGNITUDE_LEVELS: IntArray = np.array([_magnitude_level(magnitude) for magnitude in range(4096)], dtype=np.int64)
+"""Levels of the magnitudes 0..4095; larger ones have the level of 4095."""
 
 MAX_BLOCK_FRAMES = 512
-"""Frames of a block, at most: two seconds at 240 a second, and what a browser decodes in a tenth of one."""
+"""Limit of the frames of a block: two seconds at 240 fps, which a browser decodes in 0.1 s."""
 FREQUENCY_CLASS_OF: IntArray = np.digitize(np.arange(MAX_BLOCK_FRAMES + 1), [1, 2, 3, 5, 9, 16]).astype(np.int64)
 """Class of each frequency."""
 
 
 def parse_prior(values: dict[str, Any]) -> Prior:
-    """The prior in JSON values (lists of integers by name); raises ValueError where a shape is wrong."""
+    """Return the prior of JSON values (nested lists of integers by name). Raises ValueError for a wrong shape."""
     arrays = {name: np.array(values[name], dtype=np.int64) for name in Prior._fields}
     for name, array in arrays.items():
         if array.shape != getattr(SHAPES, name):
-            raise ValueError(f"a prior's {name} has shape {getattr(SHAPES, name)}, not {array.shape}")
+            raise ValueError(f"Invalid prior: {name} has shape {array.shape}, expected {getattr(SHAPES, name)}.")
     return Prior(**arrays)
 
 
 def format_prior(prior: Prior) -> str:
-    """`prior` as JSON, a row a line."""
+    """Return `prior` as JSON, one row per line."""
     parts = []
     for name, array in prior._asdict().items():
         rows = ",\n  ".join(json.dumps(row, separators=(",", ":")) for row in array.tolist())
@@ -119,5 +121,5 @@ def format_prior(prior: Prior) -> str:
 
 @cache
 def load_shipped_prior() -> Prior:
-    """The prior of the package, which every stream of `bunraku.motion/2` is coded with."""
+    """Return the prior of the package, with which every stream of `bunraku.motion/2` is coded."""
     return parse_prior(json.loads(resources.files("bunraku.codec").joinpath("prior.json").read_text(encoding="utf-8")))

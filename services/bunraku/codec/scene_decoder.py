@@ -1,4 +1,4 @@
-"""A block of a camera or a light to its numbers at any instant (SPEC.md, Tracks `camera` and `light`)."""
+"""Decoder of scene blocks: bytes to the values of a camera or light at any instant (SPEC.md, Scene block)."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.codec import coefficients, transform
-from bunraku.codec.coefficients import SCENE_CHANNEL_COUNT
 from bunraku.codec.motion_decoder import reconstruct
 from bunraku.codec.motion_track import step_size
-from bunraku.codec.prior import IntArray, Prior, load_shipped_prior
+from bunraku.codec.prior import SCENE_CHANNEL_COUNT, IntArray, Prior, load_shipped_prior
 from bunraku.codec.scene import SceneTrack
 from bunraku.motion.rotation import Array
 
 
 @dataclass(frozen=True, slots=True)
 class SceneBlock:
-    """A decoded block of `track`: `frames` frames, quantised `q` (3, 3, K) and their values (3, 3, K), metres."""
+    """A decoded block of `track`: quantised coefficients `q` (3, 3, K) and their `values` (3, 3, K), metres."""
 
     track: SceneTrack
     frames: int
@@ -25,15 +24,20 @@ class SceneBlock:
     values: Array
 
     def values_at(self, instants: Array | float) -> Array:
-        """The seven numbers (m, 7) at `instants` (m,), in frames from the block's first; any real in -1/2 .. frames -
-        1/2."""
+        """Return the seven values (m, 7) at `instants` (m,), in frames from the block's first.
+
+        Instants are any real in -1/2 .. frames - 1/2.
+        """
         instants = np.atleast_1d(np.asarray(instants, dtype=np.float64))
         return self.track.from_channels(transform.inverse_dct(self.values, self.frames, instants))
 
 
 def decode_scene_block(track: SceneTrack, data: bytes, prior: Prior | None = None) -> SceneBlock:
-    """Decode one block of `track`; raises `DamagedBlock` on what cannot be one. `prior` as in `decode_block`."""
-    head, q = coefficients.decode_coefficients(
+    """Decode one block of `track`. Raises `DamagedBlock`.
+
+    `prior` must be the one with which the block was encoded; the default is the shipped prior.
+    """
+    header, q = coefficients.decode_coefficients(
         prior or load_shipped_prior(), data, track.block_frames, track.fps, SCENE_CHANNEL_COUNT
     )
-    return SceneBlock(track, head.frames, q, reconstruct(q) * step_size(head.step, head.frames))
+    return SceneBlock(track, header.frames, q, reconstruct(q) * step_size(header.step, header.frames))

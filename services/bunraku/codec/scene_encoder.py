@@ -1,4 +1,4 @@
-"""A camera or light to blocks at several rates, each within its error (SPEC.md, Tracks `camera` and `light`)."""
+"""Encoder of scenes: a camera or light at several bitrate levels (SPEC.md, Tracks `camera` and `light`)."""
 
 from __future__ import annotations
 
@@ -20,29 +20,27 @@ from bunraku.codec.timing import plan_timing
 from bunraku.motion.rotation import Array
 
 SCENE_ERROR_BOUNDS_MM: tuple[float, ...] = (40.0, 20.0, 10.0, 4.0, 1.0)
-"""Largest weighted error of each rate at any frame, mm, lowest rate first; as many as a motion has by itself."""
+"""Largest weighted error of each bitrate level at any frame, lowest level first; as many levels as a motion has."""
 _MIN_STEP, _MAX_STEP = 0, 255
 _ROUNDING_OFFSETS = 0.5, 0.4, 0.3, 0.2
-"""What is added to a coefficient before it is rounded down: the less, the more zeros, but at a finer step."""
+"""Offsets that are added to a magnitude before it is rounded down. A smaller one gives more zeros at a finer step."""
 _COARSE_STEP_STRIDE = 16
-"""Steps are tried so far apart first, all at once, then all between two of these."""
+"""Distance of the step indices that are tried first; the indices between two of them follow."""
 _EXTRA_STEPS = 8
-"""Steps that are tried past those."""
+"""Further step indices that are tried."""
+_BOUND_MARGIN = 1 - 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class EncodedScene:
-    """A camera or light at every rate, lowest first; errors of a rate are weighted ones, mm."""
+    """A camera or light at every bitrate level, lowest first."""
 
     track: SceneTrack
     ladder: list[BitrateLevel]
 
     def describe(self) -> dict[str, Any]:
-        """What a Description says of this track."""
-        rates = [
-            {"kbps": round(r.kbps, 3), "mean": round(r.mean_error_mm, 3), "max": r.error_bound_mm} for r in self.ladder
-        ]
-        return describe_scene_track(self.track, rates)
+        """Return the entry of a Description's `tracks`."""
+        return describe_scene_track(self.track, [level.describe() for level in self.ladder])
 
 
 def encode_scene(
@@ -52,91 +50,102 @@ def encode_scene(
     first_seconds: float | None = None,
     prior: Prior | None = None,
 ) -> EncodedScene:
-    """Encode `scene` in independent blocks, timed as a motion's with the same seconds, at every largest weighted error
-    of `ladder` (mm); each block is checked by decoding it.
+    """Encode a scene in independent blocks, and check each block by decoding it.
 
-    Raises ValueError for a scene that no step can hold to its error.
+    Args:
+        scene: The camera or light.
+        block_seconds: Approximate length of the blocks; that of the motion keeps both in step.
+        error_bounds_mm: Largest weighted error of each bitrate level.
+        first_seconds: Length of the first block, if it differs.
+        prior: Prior of the context model; the default is the shipped one.
+
+    Raises:
+        ValueError: The finest step does not meet a bound.
     """
     track = plan_scene_track(scene, plan_timing(scene.fps, len(scene.values), block_seconds, first_seconds))
-    rates = []
-    for bound in error_bounds_mm:
+    ladder = []
+    for error_bound_mm in error_bounds_mm:
         blocks = [
-            _encode_scene_block(track, scene, index, bound, prior or load_shipped_prior())
+            _encode_scene_block(track, scene, index, error_bound_mm, prior or load_shipped_prior())
             for index in range(track.block_count)
         ]
         error = np.concatenate([measure_scene_error(track, scene, i, block, prior) for i, block in enumerate(blocks)])
         kbps = sum(map(len, blocks)) * 8e-3 * scene.fps / track.frames
-        rates.append(BitrateLevel(blocks, kbps, float(error.mean()), float(error.max()), float(bound)))
-    return EncodedScene(track, rates)
+        ladder.append(BitrateLevel(blocks, kbps, float(error.mean()), float(error.max()), float(error_bound_mm)))
+    return EncodedScene(track, ladder)
 
 
 def measure_scene_error(
     track: SceneTrack, scene: SceneSamples, index: int, block: bytes, prior: Prior | None = None
 ) -> Array:
-    """How far the channels (n, 3) of block `index` are off when decoded: weighted, mm."""
+    """Return the weighted errors of the channels (n, 3) of block `index`, decoded, in mm."""
     start, frames = track.first_frame(index), track.frames_in(index)
     values = decode_scene_block(track, block, prior).values_at(np.arange(frames, dtype=np.float64))
-    off = track.to_channels(values) - track.to_channels(scene.values[start : start + frames])
-    error: Array = np.linalg.norm(off, axis=-1) * 1e3
+    difference = track.to_channels(values) - track.to_channels(scene.values[start : start + frames])
+    error: Array = np.linalg.norm(difference, axis=-1) * 1e3
     return error
 
 
 def _encode_scene_block(
     track: SceneTrack, scene: SceneSamples, index: int, error_bound_mm: float, prior: Prior
 ) -> bytes:
-    """The smallest block found with no channel more than `bound` mm off at any frame."""
+    """Return the smallest block found of which no channel is more than `error_bound_mm` off at any frame."""
     start, frames = track.first_frame(index), track.frames_in(index)
     truth = track.to_channels(scene.values[start : start + frames])
-    found: list[bytes] = []
-    for rounding in _ROUNDING_OFFSETS:
-        tried = _StepSearch(truth, rounding)
-        step = tried.find_coarsest_step(error_bound_mm)
+    candidates: list[bytes] = []
+    for rounding_offset in _ROUNDING_OFFSETS:
+        search = _StepSearch(truth, rounding_offset)
+        step = search.find_coarsest_step(error_bound_mm)
         if step is None:
             continue
-        head = BlockHeader(frames, step, 0)
-        data = coefficients.encode_coefficients(prior, head, tried.quantise(step), track.block_frames, track.fps)
+        header = BlockHeader(frames, step, 0)
+        data = coefficients.encode_coefficients(prior, header, search.quantise(step), track.block_frames, track.fps)
         if measure_scene_error(track, scene, index, data, prior).max() <= error_bound_mm:
-            found.append(data)
-    if not found:
-        raise ValueError(f"block {index} of the {track.kind} cannot be held to {error_bound_mm} mm at the finest step")
-    return min(found, key=len)
+            candidates.append(data)
+    if not candidates:
+        raise ValueError(
+            f"Block {index} of the {track.kind} cannot be encoded within {error_bound_mm} mm, even at the finest step."
+        )
+    return min(candidates, key=len)
 
 
 class _StepSearch:
-    """Steps tried on one block's channels (n, 3, 3) with one rounding."""
+    """Search for the quantiser step of one block's channels (n, 3, 3) with one rounding offset."""
 
-    def __init__(self, truth: Array, rounding: float) -> None:
-        self._truth, self._rounding, self._frames = truth, rounding, len(truth)
+    def __init__(self, truth: Array, rounding_offset: float) -> None:
+        self._truth, self._rounding_offset, self._frames = truth, rounding_offset, len(truth)
         self._spectrum = transform.forward_dct(truth)
         self._basis = transform.cosine_basis(self._frames, self._frames, np.arange(self._frames, dtype=np.float64))
 
     def quantise(self, step: int) -> IntArray:
-        """Coefficients (3, 3, n) at step index `step`."""
-        whole: IntArray = self._quantise_steps(np.array([step]))[0]
-        return whole
+        """Return the coefficients (3, 3, n) at one step index."""
+        q: IntArray = self._quantise_steps(np.array([step]))[0]
+        return q
 
     def find_coarsest_step(self, error_bound_mm: float) -> int | None:
-        """The coarsest step found that holds `bound` mm: errors rise with the step, but not evenly, so some steps
-        beyond the first that does not hold are tried too."""
-        apart = np.arange(_MIN_STEP, _MAX_STEP + 1, _COARSE_STEP_STRIDE)
-        holding = self._meets_bound(apart, error_bound_mm)
-        last = int(np.argmin(holding)) if not holding.all() else len(apart)
-        begin = int(apart[last - 1]) if last else _MIN_STEP
-        near = np.arange(begin, min(begin + _COARSE_STEP_STRIDE + _EXTRA_STEPS, _MAX_STEP) + 1)
-        good = near[self._meets_bound(near, error_bound_mm)]
-        return int(good[-1]) if len(good) else None
+        """Return the coarsest step index found that meets a bound, or None.
+
+        Errors grow with the step, but not monotonically, so a few steps beyond the first failure are tried too.
+        """
+        coarse = np.arange(_MIN_STEP, _MAX_STEP + 1, _COARSE_STEP_STRIDE)
+        valid = self._meets_bound(coarse, error_bound_mm)
+        first_failure = int(np.argmin(valid)) if not valid.all() else len(coarse)
+        begin = int(coarse[first_failure - 1]) if first_failure else _MIN_STEP
+        fine = np.arange(begin, min(begin + _COARSE_STEP_STRIDE + _EXTRA_STEPS, _MAX_STEP) + 1)
+        valid_steps = fine[self._meets_bound(fine, error_bound_mm)]
+        return int(valid_steps[-1]) if len(valid_steps) else None
+
+    def _step_sizes(self, steps: IntArray) -> Array:
+        return np.array([step_size(int(step), self._frames) for step in steps])[:, None, None, None]
 
     def _quantise_steps(self, steps: IntArray) -> IntArray:
-        sizes = np.array([step_size(int(step), self._frames) for step in steps])[:, None, None, None]
-        whole: IntArray = (np.sign(self._spectrum) * np.floor(np.abs(self._spectrum) / sizes + self._rounding)).astype(
-            np.int64
-        )
-        return whole
+        magnitudes = np.floor(np.abs(self._spectrum) / self._step_sizes(steps) + self._rounding_offset)
+        q: IntArray = (np.sign(self._spectrum) * magnitudes).astype(np.int64)
+        return q
 
     def _meets_bound(self, steps: IntArray, error_bound_mm: float) -> npt.NDArray[np.bool_]:
-        """Of each of some steps, whether no channel is more than `bound` mm off at any frame."""
-        sizes = np.array([step_size(int(step), self._frames) for step in steps])[:, None, None, None]
-        shown = (reconstruct(self._quantise_steps(steps)) * sizes) @ self._basis.T
-        off = np.linalg.norm(np.moveaxis(shown, -1, 1) - self._truth, axis=-1)
-        held: npt.NDArray[np.bool_] = off.max(axis=(1, 2)) * 1e3 <= error_bound_mm * (1 - 1e-6)
-        return held
+        """Return for each step whether no channel is more than `error_bound_mm` off at any frame."""
+        decoded = (reconstruct(self._quantise_steps(steps)) * self._step_sizes(steps)) @ self._basis.T
+        error = np.linalg.norm(np.moveaxis(decoded, -1, 1) - self._truth, axis=-1)
+        valid: npt.NDArray[np.bool_] = error.max(axis=(1, 2)) * 1e3 <= error_bound_mm * _BOUND_MARGIN
+        return valid

@@ -1,7 +1,7 @@
-"""Tracks over time to cosine coefficients, and back to any instant.
+"""Cosine transform of channel values over time.
 
 The orthonormal DCT-II over the n frames of a block: x(t) = sum_k s_k X_k cos(pi (t + 1/2) k / n), s_0 = sqrt(1/n),
-s_k = sqrt(2/n). It is a function of continuous time, so a viewer draws at its own frame rate (SPEC.md, Transform).
+s_k = sqrt(2/n). It is a function of continuous time, so that a viewer draws at its own frame rate (SPEC.md, Transform).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from bunraku.motion.rotation import Array
 
 
 def cosine_basis(frames: int, count: int, instants: Array) -> Array:
-    """The first `count` cosines (m, count) of a block of `frames` frames at `instants` (m,), in frames."""
+    """Return the first `count` cosines (m, count) of a block of `frames` frames at `instants` (m,), in frames."""
     k = np.arange(count, dtype=np.float64)
     scale = np.full(count, np.sqrt(2.0 / frames))
     scale[:1] = np.sqrt(1.0 / frames)
@@ -23,7 +23,7 @@ def cosine_basis(frames: int, count: int, instants: Array) -> Array:
 
 
 def forward_dct(track: Array) -> Array:
-    """Coefficients (..., n) of tracks (n, ...), one value a frame."""
+    """Return the coefficients (..., n) of values (n, ...), one per frame."""
     frames = len(track)
     coefficients: Array = np.moveaxis(
         np.tensordot(cosine_basis(frames, frames, np.arange(frames, dtype=np.float64)), track, (0, 0)), 0, -1
@@ -32,10 +32,21 @@ def forward_dct(track: Array) -> Array:
 
 
 def inverse_dct(coefficients: Array, frames: int, instants: Array) -> Array:
-    """Tracks (m, ...) at `instants` (m,), in frames, of coefficients (..., count) of a block of `frames` frames; each
-    to the last bit the same, whatever other instants are asked for with it: a log replays to what was shown."""
+    """Evaluate a block at any instants.
+
+    The value at an instant is the same to the last bit, whatever other instants are requested with it: the replay of an
+    input log depends on it.
+
+    Args:
+        coefficients: (..., count).
+        frames: Frames of the block.
+        instants: (m,), in frames.
+
+    Returns:
+        Values (m, ...).
+    """
     *shape, count = coefficients.shape
     flat = np.ascontiguousarray(coefficients.reshape(math.prod(shape), count))
-    # not by BLAS, whose sums depend on how many there are
-    tracks: Array = np.einsum("mk,ck->mc", cosine_basis(frames, count, instants), flat)
-    return tracks.reshape(len(instants), *shape)
+    # not with BLAS: the order of its sums depends on the number of rows
+    values: Array = np.einsum("mk,ck->mc", cosine_basis(frames, count, instants), flat)
+    return values.reshape(len(instants), *shape)

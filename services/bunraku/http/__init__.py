@@ -1,1 +1,1 @@
-"""Authentication, authorization, CORS, limits, problem documents and the access log."""
+"""HTTP concerns of all services: authentication, authorization, CORS, limits, problem documents, access log."""

@@ -1,4 +1,4 @@
-"""Who may do what: roles, what a token allows, and what a route needs (docs/safety.md)."""
+"""Roles, the access that a token grants, and the access that a route requires (docs/security.md)."""
 
 from __future__ import annotations
 
@@ -10,44 +10,48 @@ from typing import Any, TypeVar
 from starlette.requests import HTTPConnection
 
 ACCESS_SCOPE_KEY = "bunraku.access"
-"""Of an ASGI scope: the `Access` with which it came, put there by the guard."""
+"""Key of the ASGI scope under which `AuthorizationMiddleware` stores the `Access` of a request or WebSocket."""
 DEFAULT_MAX_BODY_BYTES = 64 << 10
-"""Bytes of a request's body where a route says nothing else."""
+"""Maximum size of a request body for routes that declare none."""
 _REQUIREMENT_ATTRIBUTE = "__needs__"
 
 Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
 
 
 class Role(IntEnum):
-    """What one may do; each role may do what those before it may."""
+    """Permission level. Each role includes the permissions of the roles before it."""
 
     VIEW = 1
-    """See motions and sessions, and watch."""
+    """List motions and sessions, and watch them."""
     CONTROL = 2
-    """Pull limbs, edit timelines, open and end sessions, make links for viewers."""
+    """Control limbs, edit timelines, open and end sessions, create links for viewers."""
     INGEST = 3
-    """Store motions, and remove one's own."""
+    """Upload motions, and remove one's own."""
     ADMIN = 4
-    """Remove any motion, see and revoke all links."""
+    """Remove any motion, list and revoke all links."""
 
     @property
     def label(self) -> str:
-        """As tokens and people write it."""
+        """Name of the role in tokens and messages."""
         return self.name.lower()
 
     @classmethod
     def parse(cls, text: str) -> Role:
-        """The role of a word; raises ValueError."""
+        """Return the role with this label. Raises ValueError."""
         try:
             return cls[text.upper()]
         except KeyError:
-            raise ValueError(f"{text[:40]!r} is no role: {', '.join(role.label for role in cls)}") from None
+            labels = ", ".join(role.label for role in cls)
+            raise ValueError(f"unknown role {text[:40]!r}; use one of {labels}") from None
 
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """What somebody may do here: as `subject`, bound to one `session` or `motion` if there is one, until `expires`
-    (seconds since 1970). With a `share`, only while that link is not revoked."""
+    """Permissions of a token or ticket.
+
+    `subject` names the holder. Access can be bound to one `session` or `motion`. It ends at `expires`, in seconds since
+    1970, and, if it came from a link, when the link with the id `share` is revoked.
+    """
 
     role: Role
     subject: str = ""
@@ -58,20 +62,22 @@ class Access:
 
     @property
     def is_bound(self) -> bool:
-        """Whether it is to one session or motion."""
+        """True if the access is limited to one session or motion."""
         return self.session is not None or self.motion is not None
 
 
 FULL_ACCESS = Access(Role.ADMIN)
-"""What everybody may do at a server without a secret."""
+"""Access of every client at a server without a secret."""
 
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """What a route needs: a role, or None where anybody may come. One who is bound to a session or motion gets to the
-    routes that have it in their path, and to those that are for `all`, which look at the access themselves. `body` is
-    the largest body, bytes; None where the route counts them itself. A request that is `counted` is to its address as
-    opening a socket is."""
+    """Access that a route requires.
+
+    `role` is None for a public route. A client with bound access reaches the routes that have its session or motion in
+    their path, and those with `allow_bound`, which check the access themselves. `max_body_bytes` is None for a route
+    that limits the body itself. Requests to a `rate_limited` route count as connections of their address.
+    """
 
     role: Role | None
     allow_bound: bool = False
@@ -86,7 +92,7 @@ def requires(
     max_body_bytes: int | None = DEFAULT_MAX_BODY_BYTES,
     rate_limited: bool = False,
 ) -> Callable[[Endpoint], Endpoint]:
-    """Declare what a route needs, beneath the decorator that makes it one."""
+    """Declare the `Requirement` of an endpoint. Put this decorator below the one that registers the route."""
 
     def declare(endpoint: Endpoint) -> Endpoint:
         setattr(endpoint, _REQUIREMENT_ATTRIBUTE, Requirement(role, allow_bound, max_body_bytes, rate_limited))
@@ -96,12 +102,12 @@ def requires(
 
 
 def requirement_of(endpoint: object) -> Requirement | None:
-    """What the route of an endpoint needs, None where that was not declared."""
-    found: Requirement | None = getattr(endpoint, _REQUIREMENT_ATTRIBUTE, None)
-    return found
+    """Return the declared requirement of an endpoint, None if it has none."""
+    requirement: Requirement | None = getattr(endpoint, _REQUIREMENT_ATTRIBUTE, None)
+    return requirement
 
 
 def access_of(connection: HTTPConnection) -> Access:
-    """The access with which a request or a socket came; everything where no guard stands before the app."""
-    found: Access = connection.scope.get(ACCESS_SCOPE_KEY, FULL_ACCESS)
-    return found
+    """Return the access of a request or WebSocket. It is full access in an app without `AuthorizationMiddleware`."""
+    access: Access = connection.scope.get(ACCESS_SCOPE_KEY, FULL_ACCESS)
+    return access

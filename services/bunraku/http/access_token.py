@@ -1,6 +1,7 @@
-"""Capability tokens: JSON Web Tokens (RFC 7519) signed with the deployment's secret. Reads no clock: time comes in.
+"""Capability tokens: JSON Web Tokens (RFC 7519) signed with the secret of the deployment.
 
-The algorithm is HS256 and no other (RFC 8725, 3.1); issuer and audience are checked, and every claim's form.
+The only algorithm is HS256 (RFC 8725, section 3.1). Issuer and audience are verified, and the form of every claim.
+The module reads no clock; the time is an argument.
 """
 
 from __future__ import annotations
@@ -15,18 +16,18 @@ from bunraku.http.access_control import Access, Role
 
 ALGORITHM = "HS256"
 ISSUER = "bunraku"
-"""Issuer and audience."""
+"""Issuer and audience of tokens."""
 MIN_SECRET_BYTES = 32
-"""Bytes: a key of HS256 is no shorter than its hash (RFC 7518, 3.2)."""
+"""A key of HS256 must be at least as long as its hash (RFC 7518, section 3.2)."""
 MAX_TOKEN_LENGTH = 2_048
-"""Characters of a token."""
+"""Maximum number of characters of a token."""
 _REQUIRED_CLAIMS = ["iss", "aud", "exp", "iat", "jti", "sub"]
 _ID_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,64}")
 _MAX_SUBJECT_LENGTH = 64
 
 
 class InvalidToken(Exception):
-    """A token that allows nothing, and why: `expired`, or `invalid` with a `detail`."""
+    """Rejection of a token. `reason` is `expired` or `invalid`."""
 
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(detail)
@@ -34,22 +35,26 @@ class InvalidToken(Exception):
 
 
 class TokenSigner:
-    """Makes and reads the tokens of one secret, UTF-8; also reads those of the secrets `before` it."""
+    """Signer of tokens with one secret. Also verifies tokens that were signed with a previous secret."""
 
     def __init__(self, secret: str, *previous_secrets: str) -> None:
-        """Raises ValueError for a secret that is too short."""
+        """Raise ValueError for a secret that is too short."""
         for one in (secret, *previous_secrets):
             if len(one.encode()) < MIN_SECRET_BYTES:
-                raise ValueError(f"a secret has at least {MIN_SECRET_BYTES} bytes, this has {len(one.encode())}")
+                raise ValueError(
+                    f"the secret has {len(one.encode())} bytes, but at least {MIN_SECRET_BYTES} bytes are required"
+                )
         self._secrets = (secret, *previous_secrets)
 
     def mint(self, access: Access, now: float) -> str:
-        """A token that allows this from `now` on, seconds since 1970; raises ValueError where `access` never ends, or a
-        role that stores is bound."""
+        """Return a token that grants `access` from `now` on, in seconds since 1970.
+
+        Raises ValueError if the access never expires, or if its role permits uploads and it is bound.
+        """
         if access.expires is None:
-            raise ValueError("a token expires")
+            raise ValueError("a token must have an expiry time")
         if access.is_bound and access.role > Role.CONTROL:
-            raise ValueError("who stores motions is bound to none: leave out session and motion")
+            raise ValueError(f"a token with the role {access.role.label} cannot be bound to a session or motion")
         claims: dict[str, Any] = {
             "iss": ISSUER,
             "aud": ISSUER,
@@ -66,16 +71,16 @@ class TokenSigner:
         return jwt.encode(claims, self._secrets[0], ALGORITHM)
 
     def verify(self, token: str, now: float) -> Access:
-        """What a token allows at `now`, seconds since 1970; raises `BadToken`."""
+        """Return the access that a token grants at `now`, in seconds since 1970. Raises `InvalidToken`."""
         claims = self._decode_claims(token)
         expires = claims["exp"]
         if not isinstance(expires, int) or isinstance(expires, bool):
-            raise InvalidToken("invalid", "its expiry is no number")
+            raise InvalidToken("invalid", "its expiry time is not a number")
         if expires <= now:
             raise InvalidToken("expired", "it has expired")
         subject = claims["sub"]
         if not isinstance(subject, str) or len(subject) > _MAX_SUBJECT_LENGTH:
-            raise InvalidToken("invalid", "its subject is no short text")
+            raise InvalidToken("invalid", f"its subject is not a string of at most {_MAX_SUBJECT_LENGTH} characters")
         try:
             role = Role.parse(str(claims.get("role")))
             session, motion, share = (
@@ -86,13 +91,13 @@ class TokenSigner:
             raise InvalidToken("invalid", str(error)) from None
         access = Access(role, subject, session, motion, expires, share)
         if access.is_bound and role > Role.CONTROL:
-            raise InvalidToken("invalid", "a role that stores is bound to nothing")
+            raise InvalidToken("invalid", f"the role {role.label} cannot be bound to a session or motion")
         return access
 
     def _decode_claims(self, token: str) -> dict[str, Any]:
-        """The claims of a token that was signed here; raises `BadToken`."""
+        """Return the claims of a token with a valid signature. Raises `InvalidToken`."""
         if len(token) > MAX_TOKEN_LENGTH:
-            raise InvalidToken("invalid", f"a token has at most {MAX_TOKEN_LENGTH} characters")
+            raise InvalidToken("invalid", f"it has more than {MAX_TOKEN_LENGTH} characters")
         for nth, secret in enumerate(self._secrets):
             try:
                 return jwt.decode(
@@ -114,17 +119,17 @@ class TokenSigner:
             except jwt.InvalidAudienceError:
                 raise InvalidToken("invalid", "it is for another audience") from None
             except jwt.InvalidIssuerError:
-                raise InvalidToken("invalid", "it is of another issuer") from None
+                raise InvalidToken("invalid", "it has another issuer") from None
             except jwt.InvalidAlgorithmError:
                 raise InvalidToken("invalid", f"it is not signed with {ALGORITHM}") from None
             except jwt.MissingRequiredClaimError as error:
-                raise InvalidToken("invalid", f"it says no {error.claim}") from None
+                raise InvalidToken("invalid", f"it lacks the claim {error.claim}") from None
             except (jwt.PyJWTError, ValueError, TypeError, RecursionError):
-                raise InvalidToken("invalid", "it is no token") from None
+                raise InvalidToken("invalid", "it is not a JSON Web Token") from None
         raise AssertionError
 
 
 def _validate_id(name: str, value: object) -> str:
     if not isinstance(value, str) or not _ID_PATTERN.fullmatch(value):
-        raise ValueError(f"its {name} is no id")
+        raise ValueError(f"the {name} in a token must be an id: {_ID_PATTERN.pattern}")
     return value

@@ -1,6 +1,6 @@
-"""Who comes in: reads tokens, tickets and links for viewers, and ends what was opened with them.
+"""Authentication by token, ticket or link for viewers, and the end of connections whose access ends.
 
-A server without a secret lets everybody do everything: it is for one machine.
+A server without a secret grants full access to every client. Such a server is for use on one machine.
 """
 
 from __future__ import annotations
@@ -15,19 +15,20 @@ import msgpack
 
 from bunraku.http.access_control import FULL_ACCESS, Access, Role
 from bunraku.http.access_token import InvalidToken, TokenSigner
-from bunraku.http.problem_details import ProblemError
 from bunraku.http.ticket_store import TicketStore
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
-from bunraku.storage.catalogue import Catalogue, Share
+from bunraku.storage.catalogue import Catalogue
+from bunraku.storage.record import Share
 from bunraku.websocket.subprotocol import UNAUTHORIZED, CloseConnection
 
 SHARE_REVOKED_SUBJECT = "shares.revoked"
-"""The bus's subject of links that are revoked: their ids."""
+"""Bus subject of revoked links. A message is the id of a link."""
 NEW_LINK_HINT = "ask for a new link"
-_LINK_EXPIRED = ("Link expired", "this link, or token, was good for a while that is over")
-_LINK_REVOKED = ("Link revoked", "who made this link has ended it")
+_LINK_EXPIRED = ("Link expired", "this link or token has expired")
+_LINK_REVOKED = ("Link revoked", "this link was revoked")
 
 _log = logging.getLogger(__name__)
 
@@ -35,18 +36,18 @@ CloseCallback = Callable[[CloseConnection], None]
 
 
 def unauthorized(title: str, detail: str, hint: str = NEW_LINK_HINT) -> ProblemError:
-    """The answer to one who is not let in."""
+    """Return a problem with status 401."""
     return ProblemError(401, title, detail, hint=hint)
 
 
 class Authenticator:
-    """The gate of one replica. `now` is the time, seconds since 1970."""
+    """Authenticator of one replica. `clock` returns seconds since 1970."""
 
     def __init__(
         self, settings: Settings, catalogue: Catalogue, bus: Bus, clock: Callable[[], float] = time.time
     ) -> None:
-        secret, before = settings.secret.get_secret_value(), settings.secret_before.get_secret_value()
-        self._tokens = TokenSigner(secret, *([before] if before else [])) if secret else None
+        secret, previous = settings.secret.get_secret_value(), settings.secret_before.get_secret_value()
+        self._tokens = TokenSigner(secret, *([previous] if previous else [])) if secret else None
         self._catalogue = catalogue
         self._bus = bus
         self._clock = clock
@@ -60,11 +61,11 @@ class Authenticator:
 
     @property
     def requires_token(self) -> bool:
-        """Whether nobody comes in without a token."""
+        """True if the server has a secret, so that clients need a token."""
         return self._tokens is not None
 
     async def authenticate_token(self, token: str) -> Access:
-        """What a token allows now; raises `ProblemError` 401."""
+        """Return the access that a token grants now. Raises `ProblemError` 401."""
         if self._tokens is None:
             return FULL_ACCESS
         try:
@@ -72,18 +73,20 @@ class Authenticator:
         except InvalidToken as error:
             if error.reason == "expired":
                 raise unauthorized(*_LINK_EXPIRED) from None
-            raise unauthorized("Link not valid", f"this link, or token, is not good here: {error.detail}") from None
+            raise unauthorized("Link not valid", f"this link or token is not valid: {error.detail}") from None
         await self._check_share(access)
         return access
 
     async def authenticate_ticket(self, ticket: str) -> Access:
-        """What a ticket allows, once; raises `ProblemError` 401."""
+        """Redeem a ticket and return its access. Raises `ProblemError` 401."""
         if self._tokens is None:
             return FULL_ACCESS
         access = await self.tickets.redeem(ticket)
         if access is None or (access.expires is not None and access.expires <= self._clock()):
             raise unauthorized(
-                "Ticket not valid", "a ticket is good once, and for half a minute", "ask for another ticket"
+                "Ticket not valid",
+                "this ticket was used already or has expired; a ticket is valid once, for 30 s",
+                "request a new ticket",
             )
         await self._check_share(access)
         return access
@@ -91,28 +94,37 @@ class Authenticator:
     async def create_share(
         self, issuer: Access, session: str | None, motion: str | None, lifetime_s: int
     ) -> tuple[Share, str]:
-        """A new link for viewers and its token; raises `ProblemError` 409 where there is no secret."""
+        """Create a link for viewers and return it with its token.
+
+        Raises `ProblemError` 409 at a server without a secret.
+        """
         if self._tokens is None:
             raise ProblemError(
-                409, "Nothing to share", "this server has no secret: its page is for everybody who reaches it"
+                409,
+                "Nothing to share",
+                "this server has no secret, so its page is open to everyone who can reach it",
+                hint="share the address of the page",
             )
         now = int(self._clock())
-        ends = now + lifetime_s
-        share = Share(secrets.token_hex(9), now, ends, issuer.subject, session, motion)
-        token = self._tokens.mint(Access(Role.VIEW, f"share {share.id}", session, motion, ends, share.id), now)
+        expires = now + lifetime_s
+        share = Share(secrets.token_hex(9), now, expires, issuer.subject, session, motion)
+        token = self._tokens.mint(Access(Role.VIEW, f"share {share.id}", session, motion, expires, share.id), now)
         await self._catalogue.add_share(share)
-        _log.info("%s made link %s", issuer.subject or "somebody", share.id)
+        _log.info("%s created link %s", issuer.subject or "an unnamed client", share.id)
         return share, token
 
     async def revoke_share(self, share_id: str) -> bool:
-        """Revoke a link, whether it was there; what is open with it is ended, at all replicas."""
-        known = await self._catalogue.remove_share(share_id)
+        """Revoke a link and close its connections at all replicas. Return whether the link existed."""
+        existed = await self._catalogue.remove_share(share_id)
         self._bus.publish(SHARE_REVOKED_SUBJECT, share_id.encode())
-        _log.info("link %s is revoked", share_id)
-        return known
+        _log.info("link %s was revoked", share_id)
+        return existed
 
     async def can_view(self, access: Access, kind: str, resource_id: str) -> bool:
-        """Whether one who is bound may see this `motion` or `session`: its own, and of a session the motion on show."""
+        """Return whether a client may see a resource of `kind` `motion` or `session`.
+
+        Access that is bound to a session includes the motion that the session plays.
+        """
         if not access.is_bound or resource_id == getattr(access, kind):
             return True
         if kind == "motion" and access.session is not None:
@@ -120,41 +132,43 @@ class Authenticator:
         return False
 
     async def get_session_motion(self, session_id: str) -> str | None:
-        """The motion that a session plays, None where there is none."""
+        """Return the motion that a session plays, None if there is no such session."""
         if not is_subject_token(session_id):
             return None
         try:
-            answer = msgpack.unpackb(await self._bus.request(f"session.{session_id}.describe", msgpack.packb(None)))
+            response = msgpack.unpackb(await self._bus.request(f"session.{session_id}.describe", msgpack.packb(None)))
         except NoResponse:
             return None
-        found: Mapping[str, str] = answer.get("answer") or {}
-        return found.get("motion")
+        description: Mapping[str, str] = response.get("answer") or {}
+        return description.get("motion")
 
     def register_connection(self, access: Access, close: CloseCallback) -> Callable[[], None]:
-        """Call `end` when an open socket's access expires or is revoked; the answer is to be called when the socket has
-        ended by itself."""
+        """Arrange that `close` is called when the access of an open connection expires or is revoked.
+
+        Return a function to call when the connection has ended by itself.
+        """
         if access.expires is None:
             return _noop
-        left = max(access.expires - self._clock(), 0.0)
+        remaining_s = max(access.expires - self._clock(), 0.0)
         timer = asyncio.get_running_loop().call_later(
-            left, lambda: close(CloseConnection(UNAUTHORIZED, *_LINK_EXPIRED))
+            remaining_s, lambda: close(CloseConnection(UNAUTHORIZED, *_LINK_EXPIRED))
         )
         share = access.share
         if share is None:
             return timer.cancel
         self._close_callbacks.setdefault(share, set()).add(close)
 
-        def gone() -> None:
+        def unregister() -> None:
             timer.cancel()
             others = self._close_callbacks.get(share, set())
             others.discard(close)
             if not others:
                 self._close_callbacks.pop(share, None)
 
-        return gone
+        return unregister
 
     def close(self) -> None:
-        """Nobody comes in any more."""
+        """Release the bus subscriptions and discard all tickets."""
         for subscription in self._subscriptions:
             subscription.unsubscribe()
         for task in self._recheck_tasks:
@@ -166,12 +180,11 @@ class Authenticator:
             raise unauthorized(*_LINK_REVOKED)
 
     def _on_share_revoked(self, message: bytes) -> None:
-        # each is told once
-        for end in self._close_callbacks.pop(message.decode("ascii", "replace"), set()):
-            end(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
+        for close in self._close_callbacks.pop(message.decode("ascii", "replace"), set()):
+            close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
 
     def _recheck_shares(self) -> None:
-        """What was revoked while the bus was away is ended now."""
+        """Close the connections of links that were revoked while the bus was unavailable."""
 
         async def recheck() -> None:
             for share in tuple(self._close_callbacks):
@@ -179,12 +192,12 @@ class Authenticator:
                     if await self._catalogue.get_share(share) is None:
                         self._on_share_revoked(share.encode())
                 except BackendUnavailable as error:
-                    _log.warning("whether links were revoked is not known: %s", error)
+                    _log.warning("cannot check for revoked links: %s", error)
 
-        task = asyncio.create_task(recheck(), name="links that were revoked")
+        task = asyncio.create_task(recheck(), name="recheck revoked links")
         self._recheck_tasks.add(task)
         task.add_done_callback(self._recheck_tasks.discard)
 
 
 def _noop() -> None:
-    """There is nothing to end."""
+    pass

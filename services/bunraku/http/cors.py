@@ -1,6 +1,6 @@
-"""Pages of other sites that the settings name: what their browsers are told, so that they let them read the answers.
+"""CORS headers for the allowed origins (Fetch Standard, section 3.2).
 
-Fetch Standard, 3.2 (CORS protocol). Which they are says `bunraku.http.origin`; what others may not do, the guard.
+`bunraku.http.origin` parses the allowed origins; `AuthorizationMiddleware` rejects unsafe requests of other sites.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from starlette.datastructures import MutableHeaders
 from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bunraku.http.request_id import REQUEST_ID_HEADER
+from bunraku.runtime.request_id import REQUEST_ID_HEADER
 
 PREFLIGHT_MAX_AGE_S = 7_200
-"""How long a browser need not ask again whether it may ask; none keeps it longer."""
+"""Time for which browsers may cache a preflight response. No browser caches it for longer."""
 
 
 class CorsMiddleware:
-    """Stands before an app whose answers pages of `origins` may read."""
+    """Middleware that lets pages of `origins` read responses."""
 
     def __init__(self, app: ASGIApp, origins: Collection[str]) -> None:
         self._app = CORSMiddleware(
@@ -31,18 +31,17 @@ class CorsMiddleware:
         )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """As ASGI has it."""
         await self._app(scope, receive, _add_vary_origin(send) if scope["type"] == "http" else send)
 
 
 def _add_vary_origin(send: Send) -> Send:
-    """A cache on the way must not give one site's page what it kept for another's, or for one that said no origin."""
+    """Add `Vary: Origin` to every response, so that caches store one response per origin, and one for no origin."""
 
-    async def sending(message: Message) -> None:
+    async def send_with_vary(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             if "origin" not in headers.get("vary", "").lower().replace(" ", "").split(","):
                 headers.add_vary_header("Origin")
         await send(message)
 
-    return sending
+    return send_with_vary

@@ -1,6 +1,6 @@
-"""Which pages may open sockets and change things: those of the server itself, and those that the settings name.
+"""Checks of the Origin and Host headers: which sites may open WebSockets and change data.
 
-A browser tells of every page that asks where it is from (RFC 6454; RFC 6455, 10.2); what is no browser need not.
+Browsers send the origin of the requesting page (RFC 6454; RFC 6455, section 10.2). Other clients may omit it.
 """
 
 from __future__ import annotations
@@ -10,19 +10,22 @@ from collections.abc import Collection
 from urllib.parse import urlsplit
 
 OPAQUE_ORIGIN = "null"
-"""What a browser says of pages that have no origin: of files, and of frames in a sandbox, whosever they are."""
+"""Origin that browsers send for pages without one: local files and sandboxed frames of any site."""
 
 _DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
 
 
 def parse_origins(text: str) -> frozenset[str]:
-    """Origins with commas between them, as `https://dance.example`, or `null`; raises ValueError for what is none."""
+    """Parse comma-separated origins such as `https://dance.example` or `null`. Raises ValueError."""
     return frozenset(_validate_origin(one.strip()) for one in text.split(",") if one.strip())
 
 
 def is_allowed_origin(origin: str | None, host: str, allowed_origins: Collection[str]) -> bool:
-    """Whether a request with this Origin, to this Host, is not another site's: it has none, or the server's own (a
-    proxy may have ended TLS, so the scheme does not count), or one of `more`."""
+    """Return whether a request with these Origin and Host headers may change data.
+
+    It may if it has no origin, the server's own, or an allowed one. The scheme of the server's own origin does not
+    matter, because a proxy may have terminated TLS.
+    """
     if origin is None or _normalize_origin(origin) in allowed_origins:
         return True
     try:
@@ -35,9 +38,11 @@ def is_allowed_origin(origin: str | None, host: str, allowed_origins: Collection
 
 
 def is_local_host(host: str, allowed_origins: Collection[str]) -> bool:
-    """Whether a Host is one that a server without a secret answers to: an address, a name without a dot, or that of an
-    origin in `more`. Any other name could be of somebody who makes it lead here to get at what only this machine
-    should see (DNS rebinding)."""
+    """Return whether a server without a secret may answer requests with this Host header.
+
+    Allowed are addresses, names without a dot, and the hosts of the allowed origins. Any other name may belong to an
+    attacker who lets it resolve to this machine (DNS rebinding).
+    """
     try:
         name = (urlsplit(f"//{host}").hostname or "").rstrip(".")
     except ValueError:
@@ -56,7 +61,7 @@ def _validate_origin(origin: str) -> str:
         return OPAQUE_ORIGIN
     parts = urlsplit(origin)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.path.strip("/") or parts.query:
-        raise ValueError(f"an origin is like https://dance.example, not {origin!r}")
+        raise ValueError(f"{origin!r} is not an origin; an origin is like https://dance.example")
     return _normalize_origin(origin)
 
 
@@ -65,6 +70,6 @@ def _normalize_origin(origin: str) -> str:
 
 
 def _split_host_port(netloc: str, scheme: str) -> tuple[str, int]:
-    """Host and port; raises ValueError."""
+    """Return host and port. Raises ValueError."""
     parts = urlsplit(f"//{netloc}")
     return (parts.hostname or "").rstrip("."), parts.port or _DEFAULT_PORTS[scheme]

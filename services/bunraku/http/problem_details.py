@@ -1,51 +1,49 @@
-"""RFC 9457 problem documents: what HTTP answers when something is wrong."""
+"""Problem documents (RFC 9457): the error responses of the HTTP API."""
 
 from __future__ import annotations
 
 import logging
 from http import HTTPStatus
-from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from bunraku.http import request_id
+from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.problem import ProblemError
 
 MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER_S = 2
-"""Seconds after which a request that could not be served is worth another try."""
+"""Value of `Retry-After` in responses about an unavailable backend, in seconds."""
 
 _log = logging.getLogger(__name__)
 
 
-class ProblemError(Exception):
-    """An answer with `status`, a `title` for the kind of problem, a `detail` for this one, and what helps (`field`,
-    `hint`, `line` ...)."""
+def motion_not_found(motion_id: str) -> ProblemError:
+    """Return the problem for a motion that does not exist, or that the client may not see."""
+    return ProblemError(
+        404, "No such motion", f"there is no motion {motion_id[:40]!r}", hint="GET /v1/motions lists the motions"
+    )
 
-    def __init__(self, status: int, title: str, detail: str, **extra: Any) -> None:
-        super().__init__(detail)
-        self.status = status
-        self.title = title
-        self.detail = detail
-        self.extra = extra
 
-    def to_dict(self) -> dict[str, Any]:
-        """The problem as services tell it to each other on the bus, plain values; `of` is the way back."""
-        extra = {name: value for name, value in self.extra.items() if value is not None}
-        return {"status": self.status, "title": self.title, "detail": self.detail, **extra}
+def session_not_found(session_id: str) -> ProblemError:
+    """Return the problem for a session that does not exist, or that the client may not see."""
+    return ProblemError(404, "No such session", f"there is no session {session_id[:40]!r}")
 
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> ProblemError:
-        """The problem that another service told of."""
-        return cls(**values)
+
+def invalid_field_problem(location: tuple[int | str, ...], message: str) -> ProblemError:
+    """Return the problem for one field of a request.
+
+    `location` is the path to the field as in pydantic's errors, for example `("targets", 3, 1)`.
+    """
+    field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+    return ProblemError(422, "Invalid request", f"{field}: {message}" if field else message, field=field or None)
 
 
 def problem_response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:
-    """The problem as HTTP says it, with the name under which the logs have the request; fields that are None are left
-    out."""
+    """Return the HTTP response for a problem. Its `request_id` identifies the request in the logs."""
     body = {"type": "about:blank", **problem.to_dict()}
     if request := request_id.current():
         body["request_id"] = request
@@ -53,40 +51,37 @@ def problem_response(problem: ProblemError, headers: dict[str, str] | None = Non
 
 
 def unavailable_response(error: BackendUnavailable) -> JSONResponse:
-    """The answer while something is away."""
-    detail = f"{error.backend} does not answer now; nothing is lost by sending the request again"
-    problem = ProblemError(503, "Not available now", detail, hint="try again in a while")
+    """Return the HTTP response for a request that needs an unavailable backend."""
+    problem = ProblemError(
+        503,
+        "Not available now",
+        f"{error.backend} is unavailable; it is safe to send the request again",
+        hint="try again in a few seconds",
+    )
     return problem_response(problem, {"Retry-After": str(RETRY_AFTER_S)})
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    """Makes every error that `app` answers a problem document."""
+    """Answer every error of `app` with a problem document."""
 
     @app.exception_handler(ProblemError)
-    async def told(_: Request, error: ProblemError) -> JSONResponse:
-        # what else comes of a body that is too large is not wanted
-        return problem_response(
-            error, {"Connection": "close"} if error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE else None
-        )
+    async def answer_problem(_: Request, error: ProblemError) -> JSONResponse:
+        # the rest of a body that is too large is not read
+        too_large = error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE
+        return problem_response(error, {"Connection": "close"} if too_large else None)
 
     @app.exception_handler(BackendUnavailable)
-    async def away(request: Request, error: BackendUnavailable) -> JSONResponse:
+    async def answer_unavailable(request: Request, error: BackendUnavailable) -> JSONResponse:
         _log.warning("%s %s: %s", request.method, request.url.path, error)
         return unavailable_response(error)
 
     @app.exception_handler(RequestValidationError)
-    async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:
+    async def answer_invalid_request(_: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
         return problem_response(invalid_field_problem(first["loc"][1:], first["msg"]))
 
     @app.exception_handler(HTTPException)
-    async def refused(request: Request, error: HTTPException) -> JSONResponse:
+    async def answer_http_exception(request: Request, error: HTTPException) -> JSONResponse:
         title = HTTPStatus(error.status_code).phrase
         detail = f"{request.method} {request.url.path}: {error.detail}"
         return problem_response(ProblemError(error.status_code, title, detail), dict(error.headers or {}))
-
-
-def invalid_field_problem(location: tuple[int | str, ...], message: str) -> ProblemError:
-    """The problem of one field of a request, at `location` as pydantic gives it: `("targets", 3, 1)`."""
-    field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
-    return ProblemError(422, "Invalid request", f"{field}: {message}" if field else message, field=field or None)

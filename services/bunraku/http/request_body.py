@@ -1,4 +1,4 @@
-"""Bodies of requests, bounded in bytes and in time: what is too large or too slow is refused while it comes."""
+"""Limits on the size and the duration of request bodies, enforced while they are received."""
 
 from __future__ import annotations
 
@@ -9,37 +9,41 @@ from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
 MIN_BODY_BYTES_PER_S = 1_000
-"""Bytes a second that a body comes with at least, once it has had its time to begin."""
+"""Minimum rate of a body after the initial timeout, in bytes per second."""
 
 
-def content_too_large(max_bytes: int) -> HTTPException:
-    """The answer to a body of more bytes than it may have."""
-    return HTTPException(413, f"a body may have {max_bytes} bytes here", {"Connection": "close"})
+def too_large_detail(max_bytes: int) -> str:
+    """Return the error detail for a body that is too large."""
+    return f"the request body has more than {max_bytes} bytes, the limit of this route"
 
 
 def limit_body(receive: Receive, max_bytes: int | None, timeout_s: float, clock: Callable[[], float]) -> Receive:
-    """`receive`, which raises HTTPException 413 as soon as a body has more than `most` bytes, and 408 where it takes
-    more than `patience` seconds and one for each `SLOWEST` bytes. `now` is a clock in seconds."""
-    begun, size, whole = clock(), 0, False
+    """Return `receive` with limits on the request body. `clock` returns seconds.
 
-    async def receiving() -> Message:
-        nonlocal size, whole
-        if whole:
+    It raises HTTPException 413 as soon as the body has more than `max_bytes` bytes. It raises HTTPException 408 if the
+    body takes longer than `timeout_s` plus one second per `MIN_BODY_BYTES_PER_S` bytes.
+    """
+    # FastAPI passes on only HTTPException from `receive`, so these errors are no `ProblemError`
+    started_at, size, is_complete = clock(), 0, False
+
+    async def receive_limited() -> Message:
+        nonlocal size, is_complete
+        if is_complete:
             return await receive()
-        left = begun + timeout_s + size / MIN_BODY_BYTES_PER_S - clock()
+        remaining_s = started_at + timeout_s + size / MIN_BODY_BYTES_PER_S - clock()
         try:
-            async with asyncio.timeout(max(left, 0.0)):
+            async with asyncio.timeout(max(remaining_s, 0.0)):
                 message = await receive()
         except TimeoutError:
-            detail = f"the body came too slowly: {size} bytes in {clock() - begun:.0f} s"
+            detail = f"the request body arrived too slowly: {size} bytes in {clock() - started_at:.0f} s"
             raise HTTPException(408, detail, {"Connection": "close"}) from None
         if message["type"] == "http.request":
             size += len(message.get("body", b""))
-            whole = not message.get("more_body", False)
+            is_complete = not message.get("more_body", False)
             if max_bytes is not None and size > max_bytes:
-                raise content_too_large(max_bytes)
+                raise HTTPException(413, too_large_detail(max_bytes), {"Connection": "close"})
         else:
-            whole = True
+            is_complete = True
         return message
 
-    return receiving
+    return receive_limited

@@ -1,4 +1,4 @@
-"""Instants as the API writes them."""
+"""Timestamps in API responses."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from typing import Literal
 
 
 def format_timestamp(seconds: float, timespec: Literal["seconds", "milliseconds"] = "seconds") -> str:
-    """The time `seconds` after the beginning of 1970, in UTC (RFC 3339), to so many digits."""
+    """Format a time in seconds since 1970 as RFC 3339 in UTC."""
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec=timespec).replace("+00:00", "Z")

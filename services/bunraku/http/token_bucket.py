@@ -1,4 +1,4 @@
-"""Token buckets: so much a second, and so much at once. They read no clock: time comes in, seconds."""
+"""Token-bucket rate limiters. They read no clock; the time is an argument, in seconds."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import OrderedDict
 
 
 class TokenBucket:
-    """One who may do something `rate` times a second, and `most` times at once."""
+    """Limiter to `rate` actions per second and `burst` actions at once."""
 
     __slots__ = ("_burst", "_rate", "_refilled_at", "_tokens")
 
@@ -16,7 +16,7 @@ class TokenBucket:
         self._tokens, self._refilled_at = burst, now
 
     def take(self, now: float) -> bool:
-        """Whether one more is allowed."""
+        """Take a token. Return False if there is none."""
         self._refill(now)
         if self._tokens < 1.0:
             return False
@@ -24,7 +24,7 @@ class TokenBucket:
         return True
 
     def is_full(self, now: float) -> bool:
-        """Whether it is as if nothing had been taken."""
+        """Return whether the bucket is in its initial state again."""
         self._refill(now)
         return self._tokens >= self._burst
 
@@ -34,14 +34,14 @@ class TokenBucket:
 
 
 class KeyedTokenBuckets:
-    """A bucket for each of many; of `kept` at most. Whose is not kept any more has a full one."""
+    """Token bucket per key, for at most `max_keys` keys. An evicted key starts again with a full bucket."""
 
     def __init__(self, rate: float, burst: float, max_keys: int = 10_000) -> None:
         self._rate, self._burst, self._max_keys = rate, burst, max_keys
         self._buckets: OrderedDict[str, TokenBucket] = OrderedDict()
 
     def take(self, key: str, now: float) -> bool:
-        """Whether one more of `who` is allowed."""
+        """Take a token of `key`. Return False if there is none."""
         bucket = self._buckets.get(key)
         if bucket is None:
             self._evict(now)
@@ -50,7 +50,7 @@ class KeyedTokenBuckets:
         return bucket.take(now)
 
     def _evict(self, now: float) -> None:
-        """Those of whom nothing was heard for long; where all have much to do, the oldest."""
+        """Remove the least recently used buckets that are full, and as many as necessary to stay within `max_keys`."""
         while self._buckets and (
             len(self._buckets) >= self._max_keys or next(iter(self._buckets.values())).is_full(now)
         ):
@@ -58,13 +58,13 @@ class KeyedTokenBuckets:
 
 
 def client_network(address: str) -> str:
-    """Whom an address belongs to: itself, or of IPv6 the network of 64 bits, which is one house's."""
+    """Return the rate-limiting key of an address: an IPv4 address itself, the /64 network of an IPv6 address."""
     try:
-        found = ipaddress.ip_address(address)
+        parsed = ipaddress.ip_address(address)
     except ValueError:
         return address
-    if found.version == 6:
-        if found.ipv4_mapped is not None:
-            return str(found.ipv4_mapped)
-        return str(ipaddress.ip_network((found, 64), strict=False).network_address)
-    return str(found)
+    if parsed.version == 6:
+        if parsed.ipv4_mapped is not None:
+            return str(parsed.ipv4_mapped)
+        return str(ipaddress.ip_network((parsed, 64), strict=False).network_address)
+    return str(parsed)

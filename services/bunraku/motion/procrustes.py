@@ -16,7 +16,7 @@ PROCRUSTES_ITERATIONS = 12
 
 
 def solve_kabsch(points: Array, targets: Array, weights: Array) -> Array:
-    """Return rotations (..., 4) from `points` (m, 3) to the nearest of `targets` (..., m, 3); `weights` (m,)."""
+    """Return rotations (..., 4) of `points` (m, 3) nearest to `targets` (..., m, 3)."""
     covariance = np.einsum("m,...mi,mj->...ij", weights, targets, points)
     u, _, v = np.linalg.svd(covariance)
     proper = np.linalg.det(u) * np.linalg.det(v)

@@ -1,1 +1,1 @@
-"""Server-side WebSocket connections: framing, hand-off from ASGI, TCP state, multicast."""
+"""Server-side WebSocket connections: framing, hand-off from ASGI, link state, multicast."""

@@ -1,8 +1,9 @@
-"""A viewer's socket, once it is open: bytes go straight to the transport, and there is no task for what comes back.
+"""Server side of an open WebSocket connection, directly on the transport.
 
-What goes to every viewer of a session thirty times a second is the same bytes, and a task and a queue for each of them
-cost several times the writing. So a socket is accepted as any other (`bunraku.websocket.handoff`) and is then an `Outlet`,
-which is all that stays of it: uvicorn's protocol, its task and the scope of the request are let go.
+Every viewer of a session receives the same bytes thirty times a second. A task and a queue per viewer would cost
+several times as much as the write itself. Therefore a connection is accepted like any other and then detached from
+ASGI (`bunraku.websocket.handoff`): only a `WebSocketConnection` remains; uvicorn's protocol, its task and the request
+scope are released.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Protocol, cast
 
 from bunraku.runtime.clock import clock
 from bunraku.websocket.frame import (
+    MESSAGE_TOO_BIG,
     ClientFrameParser,
     FrameError,
     Opcode,
@@ -22,40 +24,44 @@ from bunraku.websocket.frame import (
     encode_frame,
     parse_close_code,
 )
-from bunraku.websocket.subprotocol import MESSAGE_TOO_BIG, POLICY_VIOLATION, CloseConnection
+from bunraku.websocket.subprotocol import POLICY_VIOLATION, SERVICE_RESTART, CloseConnection
 from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES, Problem
 
 CLOSE_TIMEOUT_S = 10.0
-"""Seconds that a client has to answer a Close."""
+"""Time for the client to answer a Close frame."""
 SEND_BUFFER_BYTES = 32 << 10
-"""What the kernel holds for a viewer, in payload of messages as they are here: Linux doubles the number that it is
-given, and counts a buffer's own size. What lies there cannot be taken back when something newer is to be sent."""
+"""Kernel send buffer of a viewer, in payload of typical messages. Linux doubles the value that it is given and counts
+the overhead of its buffers. Data in this buffer cannot be replaced when newer data is to be sent."""
 
 
 class ConnectionListener(Protocol):
-    """Who an outlet belongs to."""
+    """Owner of a connection, called for its events."""
 
     def on_message(self, message: bytes) -> None:
-        """A binary message came; raises `Refusal`, with which the outlet is closed."""
+        """Handle a binary message. Raise `CloseConnection` to close the connection."""
 
     def on_pong(self, payload: bytes) -> None:
-        """A Ping that had something to say came back."""
+        """Handle a Pong with a payload."""
 
     def on_pause(self) -> None:
-        """Something stays behind: the outlet is not `clear` any more."""
+        """Handle that the connection is no longer writable: the transport has buffered data."""
 
     def on_resume(self) -> None:
-        """All that was written is gone: the outlet is `clear` again."""
+        """Handle that the connection is writable again: the transport's buffer is empty."""
 
     def on_close(self) -> None:
-        """The connection has ended."""
+        """Handle the end of the connection."""
 
 
 class WebSocketConnection(asyncio.Protocol):
-    """One open socket; it is the transport's protocol. `clear` says that all that was written has left the process, and
-    `heard`, clock time in microseconds, when the other end last said anything."""
+    """Open WebSocket connection, the protocol of its transport.
+
+    `is_writable` is true while all written data has left the process. `last_received_at` is the clock time, in
+    microseconds, at which the client last sent anything.
+    """
 
     __slots__ = (
+        "_clock",
         "_close_timer",
         "_connections",
         "_listener",
@@ -68,61 +74,68 @@ class WebSocketConnection(asyncio.Protocol):
         "write",
     )
 
-    def __init__(self, transport: asyncio.Transport, listener: ConnectionListener, connections: set[object]) -> None:
-        """`connections` are the server's, which shuts them down when it ends."""
+    def __init__(
+        self,
+        transport: asyncio.Transport,
+        listener: ConnectionListener,
+        connections: set[object],
+        clock: Callable[[], int] = clock,
+    ) -> None:
+        """Take over `transport`. The server calls `shutdown` on all members of `connections` when it stops."""
         self._transport = transport
         self._listener = listener
         self._connections = connections
+        self._clock = clock
         self._parser = ClientFrameParser(MAX_CLIENT_MESSAGE_BYTES)
         self._close_timer: asyncio.TimerHandle | None = None
         self.is_writable = True
         self.last_received_at = clock()
         self.on_ended: Callable[[], None] | None = None
-        """Told once the connection has ended, beside its listener."""
+        """Called once when the connection has ended, before `ConnectionListener.on_close`."""
         self.write = transport.write
-        """Writes whole frames. Who writes only while `clear` keeps what waits to one write."""
+        """Write whole frames. A caller that writes only while `is_writable` has at most one write buffered."""
         self.file_descriptor: int | None = None
-        """The socket's file descriptor, where what is written to it goes out as it is; valid until `gone`."""
-        bare = transport.get_extra_info("socket")
-        if bare is not None:
+        """Descriptor of the socket, None for an encrypted connection. Valid until `ConnectionListener.on_close`."""
+        raw_socket = transport.get_extra_info("socket")
+        if raw_socket is not None:
             if transport.get_extra_info("sslcontext") is None:
-                self.file_descriptor = bare.fileno()
+                self.file_descriptor = raw_socket.fileno()
             with contextlib.suppress(OSError):
-                bare.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
-                # what is written goes at once; not every event loop sees to it
-                bare.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                raw_socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+                # not every event loop sets this
+                raw_socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         transport.set_protocol(self)
-        # paused with the first byte that stays behind, resumed with the last one that leaves
+        # pause at the first buffered byte, resume when the buffer is empty
         transport.set_write_buffer_limits(0, 0)
         connections.add(self)
 
     @property
     def buffered_bytes(self) -> int:
-        """Bytes that were written and are still in the process."""
+        """Number of written bytes that are still in the process."""
         return self._transport.get_write_buffer_size()
 
     @property
     def is_closing(self) -> bool:
-        """Whether the other end was told that this is the end."""
+        """True if this side has sent a Close frame first."""
         return self._close_timer is not None
 
     def send_ping(self) -> None:
-        """Ask for a sign of life; it changes `heard`."""
+        """Send an empty Ping. The Pong updates `last_received_at`."""
         if self.is_writable and self._close_timer is None:
             self.write(encode_frame(b"", Opcode.PING))
 
     def close_with_problem(self, reason: CloseConnection) -> None:
-        """Say why, and close."""
+        """Send a Problem message, then close the connection."""
         problem = encode_frame(Problem(reason.title, reason.detail).pack())
         self._close(problem + encode_close_frame(reason.code, f"{reason.title}: {reason.detail}"))
 
     def abort(self) -> None:
-        """End the connection with nothing said: nobody is there."""
+        """Close the connection without a Close frame, for a client that does not respond."""
         self._transport.abort()
 
     def shutdown(self) -> None:
-        """The server ends."""
-        self._close(encode_close_frame(1012))
+        """Close the connection because the server stops."""
+        self._close(encode_close_frame(SERVICE_RESTART))
         self._transport.close()
 
     def _close(self, final_bytes: bytes) -> None:
@@ -130,22 +143,21 @@ class WebSocketConnection(asyncio.Protocol):
             return
         self.write(final_bytes)
         self.pause_writing()
-        # closing at once, with something unread, would take back what was just said
+        # closing a socket with unread input at once would discard the bytes just written
         self._close_timer = asyncio.get_running_loop().call_later(CLOSE_TIMEOUT_S, self._transport.abort)
 
     def data_received(self, data: bytes) -> None:
-        """As asyncio has it."""
-        self.last_received_at = clock()
+        self.last_received_at = self._clock()
         try:
             for opcode, payload in self._parser.parse(data):
                 self._handle_frame(opcode, payload)
-        except FrameError as broken:
-            title = "Too large" if broken.code == MESSAGE_TOO_BIG else "Broken frame"
-            self.close_with_problem(CloseConnection(broken.code, title, broken.detail))
-            # where the next frame begins nobody knows, nor what would be an answer to the Close
+        except FrameError as error:
+            title = "Too large" if error.code == MESSAGE_TOO_BIG else "Broken frame"
+            self.close_with_problem(CloseConnection(error.code, title, error.detail))
+            # the parser has lost the frame boundaries, so it cannot recognise the client's Close frame
             self._transport.close()
-        except CloseConnection as refusal:
-            self.close_with_problem(refusal)
+        except CloseConnection as reason:
+            self.close_with_problem(reason)
 
     def _handle_frame(self, opcode: Opcode, payload: bytes) -> None:
         if opcode == Opcode.CLOSE:
@@ -158,25 +170,22 @@ class WebSocketConnection(asyncio.Protocol):
         elif opcode == Opcode.BINARY:
             self._listener.on_message(payload)
         elif opcode == Opcode.TEXT:
-            raise CloseConnection(POLICY_VIOLATION, "Text", "messages are binary")
+            raise CloseConnection(POLICY_VIOLATION, "Text", "received a text message; messages are binary")
         elif opcode == Opcode.PING and self.is_writable:
             self.write(encode_frame(payload, Opcode.PONG))
         elif opcode == Opcode.PONG and payload:
             self._listener.on_pong(payload)
 
     def pause_writing(self) -> None:
-        """As asyncio has it."""
         self.is_writable = False
         self._listener.on_pause()
 
     def resume_writing(self) -> None:
-        """As asyncio has it."""
         if self._close_timer is None and not self._transport.is_closing():
             self.is_writable = True
             self._listener.on_resume()
 
     def connection_lost(self, _: Exception | None) -> None:
-        """As asyncio has it."""
         self.is_writable = False
         self._connections.discard(self)
         if self._close_timer is not None:
@@ -191,4 +200,4 @@ class _ClosedConnection:
 
 
 CLOSED_CONNECTION = cast(WebSocketConnection, _ClosedConnection())
-"""In place of an outlet that is not there yet: it is never clear."""
+"""Placeholder for a connection that is not open yet. It is never writable."""

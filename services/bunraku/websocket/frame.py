@@ -1,7 +1,7 @@
-"""WebSocket frames (RFC 6455, section 5) as bytes: those of a server whole, those of a client as they come in pieces.
+"""WebSocket frames (RFC 6455, section 5): an encoder for the server, an incremental parser for the client's frames.
 
-What viewers say is short, and mostly nothing: their reader is some bytes of state, where that of the `websockets`
-library, which serves the other sockets, keeps 1.7 kB for each connection.
+Messages of viewers are short and rare, so the parser keeps a few bytes of state per connection. The parser of the
+`websockets` library, which serves the other endpoints, keeps 1.7 kB.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from enum import IntEnum
 
 MAX_CONTROL_BYTES = 125
-"""Bytes in a frame that is not of a message."""
+"""Maximum payload of a control frame (RFC 6455, section 5.5)."""
 PROTOCOL_ERROR = 1002
 MESSAGE_TOO_BIG = 1009
 _VALID_CLOSE_CODES = frozenset((1000, 1001, 1002, 1003, *range(1007, 1015), *range(3000, 5000)))
-"""What may be said in a Close (section 7.4)."""
+"""Codes that may be sent in a Close frame (RFC 6455, section 7.4)."""
 
 
 class Opcode(IntEnum):
-    """What a frame is."""
+    """Type of a frame (RFC 6455, section 5.2)."""
 
     CONTINUATION = 0
     TEXT = 1
@@ -33,7 +33,7 @@ _KNOWN_OPCODES = frozenset(int(opcode) for opcode in Opcode)
 
 
 class FrameError(Exception):
-    """What came is no frame that a client may send; the connection fails with `code`."""
+    """Violation of the framing protocol by a client. The connection is to be closed with `code`."""
 
     def __init__(self, code: int, detail: str) -> None:
         super().__init__(detail)
@@ -41,7 +41,7 @@ class FrameError(Exception):
 
 
 def encode_frame(message: bytes, opcode: int = Opcode.BINARY) -> bytes:
-    """A server's frame of a whole message, binary if nothing else is said: unmasked."""
+    """Return an unmasked, unfragmented frame."""
     size = len(message)
     if size < 126:
         return bytes((0x80 | opcode, size)) + message
@@ -51,19 +51,22 @@ def encode_frame(message: bytes, opcode: int = Opcode.BINARY) -> bytes:
 
 
 def frame_payload(framed: bytes) -> bytes:
-    """The message in a whole frame of a server, as `frame` made it."""
+    """Return the payload of a frame that `encode_frame` made."""
     size = framed[1]
     return framed[2 if size < 126 else 4 if size == 126 else 10 :]
 
 
 def encode_close_frame(code: int, reason: str = "") -> bytes:
-    """A server's Close; of `reason` what has room."""
+    """Return a Close frame. `reason` is truncated to the size of a control frame."""
     text = reason.encode()[: MAX_CONTROL_BYTES - 2].decode(errors="ignore").encode()
     return encode_frame(struct.pack(">H", code) + text, Opcode.CLOSE)
 
 
 def parse_close_code(payload: bytes) -> int:
-    """The code in a client's Close, to be sent back: 1000 where it has none, 1002 for one that may not be sent."""
+    """Return the code with which to answer a client's Close frame.
+
+    It is the client's code, 1000 if the payload is empty, and 1002 for a code that must not be sent.
+    """
     if not payload:
         return 1000
     code = int.from_bytes(payload[:2], "big")
@@ -71,21 +74,20 @@ def parse_close_code(payload: bytes) -> int:
 
 
 class ClientFrameParser:
-    """What a client sends, put together again."""
+    """Incremental parser of the frames of one client. Reassembles fragmented messages."""
 
     __slots__ = ("_buffer", "_fragments", "_max_message_bytes", "_message_opcode")
 
     def __init__(self, max_message_bytes: int) -> None:
-        """`largest`: the most bytes that a message may have."""
         self._max_message_bytes = max_message_bytes
         self._buffer = b""
         self._fragments: bytes | None = None
         self._message_opcode = Opcode.BINARY
 
     def parse(self, data: bytes) -> Iterator[tuple[Opcode, bytes]]:
-        """What has become whole with `data`: messages (TEXT, BINARY), PING, PONG and CLOSE, with their payloads.
+        """Yield the opcode and payload of each message and control frame that `data` completes.
 
-        Raises `BrokenFrame`; nothing may be read after that.
+        Raises `FrameError`. The parser must not be used after that.
         """
         if self._buffer:
             data, self._buffer = self._buffer + data, b""
@@ -94,43 +96,48 @@ class ClientFrameParser:
             head, size, body = data[at], data[at + 1], at + 2
             opcode = head & 0x0F
             if head & 0x70 or opcode not in _KNOWN_OPCODES:
-                raise FrameError(PROTOCOL_ERROR, "reserved bits and opcodes are not used")
+                raise FrameError(PROTOCOL_ERROR, "a frame has a reserved bit or opcode")
             if not size & 0x80:
-                raise FrameError(PROTOCOL_ERROR, "a client masks its frames")
+                raise FrameError(PROTOCOL_ERROR, "a frame is not masked; clients must mask their frames")
             size &= 0x7F
             if opcode >= Opcode.CLOSE and (size > MAX_CONTROL_BYTES or not head & 0x80):
-                raise FrameError(PROTOCOL_ERROR, f"a control frame is whole and has at most {MAX_CONTROL_BYTES} bytes")
+                raise FrameError(
+                    PROTOCOL_ERROR, f"a control frame is fragmented or has more than {MAX_CONTROL_BYTES} bytes"
+                )
             if size > MAX_CONTROL_BYTES:
-                wide = 2 if size == 126 else 8
-                if end - body < wide:
+                extended = 2 if size == 126 else 8
+                if end - body < extended:
                     break
-                size, body = int.from_bytes(data[body : body + wide], "big"), body + wide
+                size, body = int.from_bytes(data[body : body + extended], "big"), body + extended
             if size > self._max_message_bytes:
-                raise FrameError(MESSAGE_TOO_BIG, f"a message may have {self._max_message_bytes} bytes")
+                raise self._message_too_big()
             if end - body < 4 + size:
                 break
             payload = _unmask(data[body + 4 : body + 4 + size], data[body : body + 4])
             at = body + 4 + size
             if opcode >= Opcode.CLOSE:
                 yield Opcode(opcode), payload
-            elif (whole := self._assemble_message(opcode, payload, final=bool(head & 0x80))) is not None:
-                yield whole
+            elif (message := self._assemble_message(opcode, payload, final=bool(head & 0x80))) is not None:
+                yield message
         self._buffer = data[at:]
 
     def _assemble_message(self, opcode: int, payload: bytes, *, final: bool) -> tuple[Opcode, bytes] | None:
-        """A message that is whole with this frame."""
+        """Add a fragment. Return the message if this was its last one."""
         if (opcode == Opcode.CONTINUATION) != (self._fragments is not None):
-            raise FrameError(PROTOCOL_ERROR, "a message begins with its kind and goes on with continuations")
+            raise FrameError(PROTOCOL_ERROR, "a continuation frame is missing or follows no message")
         if self._fragments is None:
             self._message_opcode, self._fragments = Opcode(opcode), payload
         else:
             self._fragments += payload
         if len(self._fragments) > self._max_message_bytes:
-            raise FrameError(MESSAGE_TOO_BIG, f"a message may have {self._max_message_bytes} bytes")
+            raise self._message_too_big()
         if not final:
             return None
-        whole, self._fragments = self._fragments, None
-        return self._message_opcode, whole
+        message, self._fragments = self._fragments, None
+        return self._message_opcode, message
+
+    def _message_too_big(self) -> FrameError:
+        return FrameError(MESSAGE_TOO_BIG, f"a message has more than {self._max_message_bytes} bytes")
 
 
 def _unmask(payload: bytes, mask: bytes) -> bytes:

@@ -1,18 +1,20 @@
-"""How a WebSocket is taken out of ASGI's hands once it is accepted.
+"""Hand-off of an accepted WebSocket from ASGI to the application.
 
-uvicorn's protocol offers applications, as an ASGI extension of its own, to take the connection: what the application
-then writes goes to the transport, and what comes goes to the application, with nothing between.
+`HandoffProtocol` offers an ASGI extension with which an application takes over the connection. From then on the
+application writes to the transport and receives its data directly.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import cast
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
+from bunraku.runtime.clock import clock
 from bunraku.websocket import link
 from bunraku.websocket.connection import ConnectionListener, WebSocketConnection
 
@@ -20,13 +22,12 @@ HANDOFF_EXTENSION = "bunraku.take"
 
 
 class _DetachedTransport(asyncio.Transport):
-    """What is left to uvicorn of a connection that was taken: nothing that it does has an effect."""
+    """Inert transport for uvicorn's protocol after the hand-off."""
 
     def close(self) -> None:
-        """Nothing."""
+        pass
 
     def is_closing(self) -> bool:
-        """It is as if it were."""
         return True
 
 
@@ -34,10 +35,14 @@ _DETACHED_TRANSPORT = _DetachedTransport()
 
 
 class HandoffProtocol(WebSocketsSansIOProtocol):
-    """uvicorn's protocol, with the extension."""
+    """uvicorn's WebSocket protocol with the hand-off extension.
+
+    It uses attributes of the base class that uvicorn does not document; `pyproject.toml` bounds its version, and
+    `tests/test_library_interfaces.py` checks them.
+    """
 
     def handle_connect(self, event: Request) -> None:
-        """As the base has it; the application's task starts after this."""
+        # the application's task starts after this call, so it sees the extensions
         super().handle_connect(event)
         if not self.close_sent:
             extensions = self.scope["extensions"]
@@ -45,28 +50,32 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
             extensions[HANDOFF_EXTENSION] = {"take": self.detach}
             extensions[link.LINK_EXTENSION] = {"transport": self.transport}
 
-    def detach(self, listener: ConnectionListener) -> WebSocketConnection | None:
-        """The connection, accepted and not read from since; None where it has ended meanwhile."""
+    def detach(self, listener: ConnectionListener, clock: Callable[[], int]) -> WebSocketConnection | None:
+        """Return the accepted connection, None if it has ended.
+
+        Raises RuntimeError if data was already read from it.
+        """
         transport = self.transport
         if not self.handshake_complete or self.close_sent or self.disconnected or transport.is_closing():
             return None
         if not self.queue.empty() or self.conn.reader.buffer:
-            raise RuntimeError("a connection is taken before anything is read from it")
+            raise RuntimeError("data was read from the connection before its hand-off")
         self.stop_keepalive()
         self.connections.discard(self)
         self.transport = _DETACHED_TRANSPORT
-        return WebSocketConnection(transport, listener, cast(set[object], self.connections))
+        return WebSocketConnection(transport, listener, cast(set[object], self.connections), clock)
 
 
-def detach(socket: WebSocket, listener: ConnectionListener) -> WebSocketConnection:
-    """Take a socket that was accepted, with nothing awaited since; from here on the socket says no more.
+def detach(socket: WebSocket, listener: ConnectionListener, clock: Callable[[], int] = clock) -> WebSocketConnection:
+    """Take over an accepted WebSocket. The caller must not await anything between accepting it and this call.
 
-    Raises `WebSocketDisconnect` where the client has gone, RuntimeError where the server is not ours.
+    Raises `WebSocketDisconnect` if the client has disconnected, RuntimeError if the server does not use
+    `HandoffProtocol`.
     """
-    offered = (socket.scope.get("extensions") or {}).get(HANDOFF_EXTENSION)
-    if offered is None:
-        raise RuntimeError("viewers need a server with uvicorn's options of bunraku.serve.protocol()")
-    outlet: WebSocketConnection | None = offered["take"](listener)
-    if outlet is None:
+    extension = (socket.scope.get("extensions") or {}).get(HANDOFF_EXTENSION)
+    if extension is None:
+        raise RuntimeError("run uvicorn with the options of bunraku.serve.uvicorn_protocol_options()")
+    connection: WebSocketConnection | None = extension["take"](listener, clock)
+    if connection is None:
         raise WebSocketDisconnect(1006)
-    return outlet
+    return connection

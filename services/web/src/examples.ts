@@ -1,28 +1,28 @@
-/** The page of examples: its theme, its link's token, and the source of each as it would stand in another site's page. */
+/** Page of examples: theme button, access token, and the source of each example as another site would write it. */
 import { consumeUrlToken } from "./client/access";
 import { createTheme } from "./ui/theme";
 
-// first of all: the link's token leaves the address, and the stages come in by it
+// Remove the token from the address before anything else; the stages use it for access.
 consumeUrlToken();
 addEventListener("hashchange", () => consumeUrlToken() && location.reload());
 
 const button = document.querySelector<HTMLButtonElement>(".theme") as HTMLButtonElement;
-/** Stages that say no theme have the page's. */
+/** Stages without a theme attribute, which follow the page's. */
 const unthemedStages = document.querySelectorAll("bunraku-stage:not([theme])");
-const theme = createTheme((now) => {
-  button.textContent = now === "night" ? "Light theme" : "Dark theme";
-  for (const stage of unthemedStages) stage.setAttribute("theme", now);
+const theme = createTheme((current) => {
+  button.textContent = current === "night" ? "Light theme" : "Dark theme";
+  for (const stage of unthemedStages) stage.setAttribute("theme", current);
 });
 button.addEventListener("click", () => theme.toggle());
 
-/** What stands at an address of this server. */
+/** Fetch a text from this server. */
 async function fetchText(address: string): Promise<string> {
-  const answer = await fetch(address);
-  if (!answer.ok) throw new Error(`${address} answers ${answer.status}`);
-  return answer.text();
+  const response = await fetch(address);
+  if (!response.ok) throw new Error(`Request for ${address} failed with status ${response.status}.`);
+  return response.text();
 }
 
-/** Addresses of this server as another site's page has to write them. */
+/** Replace addresses relative to this server by absolute ones, as another site has to write them. */
 function withAbsoluteUrls(source: string): string {
   return source.replace(/(src=|from )"\//g, `$1"${location.origin}/`).trim();
 }
@@ -30,8 +30,8 @@ function withAbsoluteUrls(source: string): string {
 const sourceDocument = new DOMParser().parseFromString(await fetchText("./"), "text/html");
 for (const code of document.querySelectorAll<HTMLElement>("code[data-of]")) {
   const stages = sourceDocument.querySelector(`#${code.dataset["of"]}`)?.innerHTML ?? "";
-  const bare = stages.replaceAll('=""', "").trim();
-  code.textContent = withAbsoluteUrls(`<script type="module" src="/embed/bunraku-stage.js"></script>\n${bare}`);
+  const markup = stages.replaceAll('=""', "").trim();
+  code.textContent = withAbsoluteUrls(`<script type="module" src="/embed/bunraku-stage.js"></script>\n${markup}`);
 }
 for (const code of document.querySelectorAll<HTMLElement>("code[data-from]"))
   code.textContent = withAbsoluteUrls(await fetchText(code.dataset["from"] ?? ""));

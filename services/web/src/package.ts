@@ -1,15 +1,15 @@
-/** What the package `bunraku` gives: the element, what draws, what comes over the line, and what reads it. */
+/** Public interface of the npm package `bunraku`: element, viewer, puppeteer, stage, and wire format decoders. */
 
 export { Access, type Role, tabToken } from "./client/access";
 export { ProblemError } from "./client/problem";
 export { Puppeteer, type PuppeteerOptions } from "./client/puppeteer";
 export { type Presence, type Timeline, Viewer, type ViewerOptions, type ViewerStatistics } from "./client/viewer";
 export { DamagedBlock } from "./codec/errors";
-export { decodeMotionBlock as decodeBlock, MotionBlock } from "./codec/motion-decoder";
+export { decodeMotionBlock, MotionBlock } from "./codec/motion-decoder";
 export { MotionTrack } from "./codec/motion-track";
-export { parseStageAddress as readSource, type StageAddress as Source } from "./element/stage-address";
-export { BunrakuStage, type BunrakuStageEvents, type ThemePreference as ThemeWish } from "./element/stage-element";
-export type { Placement as Place, StagedPerformer as PerformerTrack } from "./motion/placement";
+export { parseStageAddress, type StageAddress } from "./element/stage-address";
+export { BunrakuStage, type BunrakuStageEvents, type ThemePreference } from "./element/stage-element";
+export type { Placement, StagedPerformer } from "./motion/placement";
 export { type Figure, JOINTS, LIMBS, type Pose, restPose } from "./motion/skeleton";
 export type { LightState } from "./playout/light-state";
 export type { Framing } from "./stage/camera/audience-camera";

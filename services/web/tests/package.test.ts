@@ -1,4 +1,4 @@
-/** The package as somebody has it who installs it: packed, installed without a line, and a small program that uses it. */
+/** The npm package as its users get it: packed, installed offline, and used by a small program. */
 import { execFileSync } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -8,13 +8,16 @@ import { afterAll, beforeAll, expect, test } from "vitest";
 const WEB = resolve(import.meta.dirname, "..");
 const COMPILER = join(WEB, "node_modules/typescript/bin/tsc");
 
-/** Every `@ts-expect-error` fails where the type is missing: then anything would do. */
+/** Program that uses the package's types. A missing type would make a `@ts-expect-error` fail. */
 const PROGRAM = `
-import { Access, decodeBlock, JOINTS, MotionTrack, pack, Puppeteer, restPose, Stage, unpack, Viewer, type Message, type Pose } from "bunraku";
+import { Access, decodeMotionBlock, JOINTS, MotionTrack, pack, parseStageAddress, Puppeteer, restPose } from "bunraku";
+import { Stage, unpack, Viewer, type Message, type Placement, type Pose, type StageAddress } from "bunraku";
+import type { StagedPerformer, ThemePreference } from "bunraku";
 import "bunraku/element";
 import { BunrakuStage } from "bunraku/element";
 
-const viewer = new Viewer({ url: "wss://stage.example/v1/sessions/one/stream", access: new Access("https://stage.example", null) });
+const access = new Access("https://stage.example", null);
+const viewer = new Viewer({ url: "wss://stage.example/v1/sessions/one/stream", access });
 const puppeteer = new Puppeteer({ url: null, viewer });
 puppeteer.target(0, 0.1, 0.2, 0.3);
 const pose: Pose | null = viewer.poseAt(0);
@@ -40,20 +43,23 @@ element.volume = 0.5;
 element.seek(element.duration / 2);
 
 export const message: Message | null = unpack(pack({ name: "Claim", limb: 0 }));
-export const block = decodeBlock(MotionTrack.fromDescription({}), new Uint8Array());
-block.at(0, restPose());
+export const address: StageAddress | null = parseStageAddress("https://stage.example/", "https://site.example/");
+export const theme: ThemePreference = element.theme;
+export const placement: Placement | undefined = (undefined as StagedPerformer | undefined)?.placement;
+export const block = decodeMotionBlock(MotionTrack.fromDescription({}), new Uint8Array());
+block.poseAt(0, restPose());
 
-// @ts-expect-error: a theme that there is none of
+// @ts-expect-error: no such theme
 element.theme = "noon";
-// @ts-expect-error: how loud is a number
+// @ts-expect-error: the volume is a number
 element.volume = "loud";
-// @ts-expect-error: seconds are a number
+// @ts-expect-error: a position is a number
 element.seek("half");
-// @ts-expect-error: a viewer has to know where to
+// @ts-expect-error: a viewer needs an address
 new Viewer({});
-// @ts-expect-error: a limb is claimed by its number
+// @ts-expect-error: a limb is a number
 puppeteer.claim("left hand");
-// @ts-expect-error: nothing of the kind
+// @ts-expect-error: no such member
 element.stage?.scene.children[0].nothing;
 `;
 
@@ -75,7 +81,7 @@ beforeAll(() => {
     run("npm", ["pack", "--silent", "--json", "--pack-destination", folder], join(WEB, "dist")),
   ) as { filename: string }[];
   writeFileSync(join(folder, "package.json"), '{ "private": true, "type": "module" }');
-  // three.js is the installer's to choose; here it is that of this project, as there is no line to fetch one by
+  // three.js is a peer dependency. Without a network, the test uses this project's installation of it.
   run(
     "npm",
     ["install", `./${filename}`, "--offline", "--legacy-peer-deps", "--no-audit", "--no-fund", "--silent"],
@@ -93,7 +99,7 @@ test.each([
   ["bundler", "ESNext"],
   ["nodenext", "NodeNext"],
 ])(
-  "a program that uses it is checked against its types, by the resolution %s",
+  "types are found with module resolution %s",
   (resolution, module) => {
     const options = {
       target: "ES2023",
@@ -111,10 +117,11 @@ test.each([
   60_000,
 );
 
-test("it can be loaded where there is no page, and reads what comes over the line", () => {
+test("package can be loaded without a page, and decodes messages", () => {
   const program = `
     const { JOINTS, pack, unpack, BunrakuStage, MotionTrack } = await import("bunraku");
-    console.log(JSON.stringify([JOINTS.length, unpack(pack({ name: "Claim", limb: 3 })), typeof BunrakuStage, typeof MotionTrack.fromDescription]));`;
+    const message = unpack(pack({ name: "Claim", limb: 3 }));
+    console.log(JSON.stringify([JOINTS.length, message, typeof BunrakuStage, typeof MotionTrack.fromDescription]));`;
   expect(JSON.parse(run(process.execPath, ["--input-type=module", "-e", program], folder))).toEqual([
     18,
     { name: "Claim", limb: 3 },
@@ -123,12 +130,12 @@ test("it can be loaded where there is no page, and reads what comes over the lin
   ]);
 });
 
-test("it says what it is, and holds nothing but what is built", () => {
+test("package has metadata and contains only built files", () => {
   const installed = join(folder, "node_modules/bunraku");
-  const said = JSON.parse(readFileSync(join(installed, "package.json"), "utf8")) as Record<string, unknown>;
+  const manifest = JSON.parse(readFileSync(join(installed, "package.json"), "utf8")) as Record<string, unknown>;
   const own = JSON.parse(readFileSync(join(WEB, "package.json"), "utf8")) as { version: string };
-  expect(said).toMatchObject({ name: "bunraku", version: own.version, type: "module" });
-  expect(said["dependencies"]).toBeUndefined();
+  expect(manifest).toMatchObject({ name: "bunraku", version: own.version, type: "module" });
+  expect(manifest["dependencies"]).toBeUndefined();
   expect(readFileSync(join(installed, "LICENSES.md"), "utf8")).toContain("@msgpack/msgpack");
   const files = run("npm", ["pack", "--dry-run", "--json", "--silent"], installed);
   const [{ files: packed, size }] = JSON.parse(files) as { files: { path: string }[]; size: number }[];
@@ -140,6 +147,6 @@ test("it says what it is, and holds nothing but what is built", () => {
           !/^(package\.json|(README|LICENSES)\.md|bunraku(-stage)?\.js|parts\/.+\.js|types\/.+\.d\.ts)$/.test(path),
       ),
   ).toEqual([]);
-  // a quarter of it is the decoder for browsers that have none, which no other fetches
+  // a quarter of this is the Opus decoder, which only browsers without one load
   expect(size).toBeLessThan(300_000);
 });

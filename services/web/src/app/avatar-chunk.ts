@@ -1,3 +1,3 @@
-/** Everything that stands on three-vrm, in one piece: it comes with the first avatar. */
+/** Bundle of everything that depends on three-vrm, loaded with the first avatar. */
 export { Avatar } from "../avatar/avatar";
 export { AvatarModel } from "../avatar/model";

@@ -1,4 +1,7 @@
-/** Who dances in the place of one of the dancers on this page: the puppet, or an avatar that the person brought, which never leaves the browser. */
+/**
+ * Avatars that replace the puppet on this page. An avatar's file is stored in this browser and never sent anywhere;
+ * all other viewers see the puppet.
+ */
 
 import { AvatarError, fileTooLarge, MAX_FILE_BYTES } from "../avatar/error";
 import type { AvatarModel } from "../avatar/model";
@@ -13,7 +16,7 @@ import type { LibraryPanel } from "../ui/library/library-panel";
 import type { ShowToast } from "../ui/notification/toast";
 import { MAX_PERFORMERS } from "../wire/limbs";
 
-/** Where the file is kept, and whether it dances; of dancers behind the first with their number from 1. */
+/** Storage keys of an avatar's file and of whether it is shown. Performers after the first append `.2`, `.3`, ... */
 const AVATAR_FILE_KEY = "avatar";
 const AVATAR_ACTIVE_KEY = "bunraku.avatar";
 
@@ -26,72 +29,75 @@ export interface AvatarSlotOptions {
   preferences: Pick<WebStorage, "get" | "put" | "remove">;
 }
 
+/** Avatar of one performer. */
 export class AvatarSlot {
   #stage: Pick<Stage, "setPerformerFactory"> | null = null;
   #model: AvatarModel | null = null;
-  /** Makes the avatar of the model for a dancer's lengths. */
+  /** Fits the model to a performer's figure. */
   #factory: PerformerFactory | null = null;
-  /** The same while it dances; null while the puppet does. */
+  /** `#factory` while the avatar is shown; null while the puppet is. */
   #activeFactory: PerformerFactory | null = null;
-  /** The file that is being read; a later one makes it stale. */
+  /** File that is being loaded. A file chosen later replaces it. */
   #pendingFile: File | null = null;
 
   #restored = false;
   readonly #fileKey: string;
   readonly #activeKey: string;
 
-  /** In the place of a performer, by number. */
   constructor(
     private readonly options: AvatarSlotOptions,
     private readonly performer = 0,
   ) {
-    const own = performer > 0 ? `.${performer + 1}` : "";
-    [this.#fileKey, this.#activeKey] = [AVATAR_FILE_KEY + own, AVATAR_ACTIVE_KEY + own];
+    const suffix = performer > 0 ? `.${performer + 1}` : "";
+    [this.#fileKey, this.#activeKey] = [AVATAR_FILE_KEY + suffix, AVATAR_ACTIVE_KEY + suffix];
     this.#render();
   }
 
-  /** The stage it is about, once there is one. */
+  /** Set the stage once it is ready. */
   set stage(stage: Pick<Stage, "setPerformerFactory">) {
     this.#stage = stage;
     if (this.#activeFactory) stage.setPerformerFactory(this.#activeFactory, this.performer);
   }
 
-  /** Brings back the avatar of the last visit, if there was one; once. */
+  /** Load the avatar of the last visit, if there was one. Later calls do nothing. */
   async restore(): Promise<void> {
     if (this.#restored) return;
     this.#restored = true;
-    const { files, preferences: choices } = this.options;
-    const dancing = choices.get(this.#activeKey);
-    if (dancing === null) return;
+    const { files, preferences } = this.options;
+    const active = preferences.get(this.#activeKey);
+    if (active === null) return;
     const file = await files.get(this.#fileKey);
     if (!file || this.#pendingFile || this.#model) return;
-    await this.#loadModel(file, dancing === "yes");
+    await this.#loadModel(file, active === "yes");
   }
 
-  /** Dances as what is in a file from now on, and at the next visit; tells why where it cannot. */
+  /** Show an avatar file instead of the puppet, now and at the next visit. Reports a file that cannot be used. */
   async load(file: File): Promise<void> {
     if (!(await this.#loadModel(file, true))) return;
-    const { page, files, preferences: choices } = this.options;
-    choices.put(this.#activeKey, "yes");
-    const kept = await files.put(this.#fileKey, file);
+    const { page, files, preferences } = this.options;
+    preferences.put(this.#activeKey, "yes");
+    const isStored = await files.put(this.#fileKey, file);
     const name = this.#model?.name ?? file.name;
     page.toast(
-      kept
+      isStored
         ? translate("{name} dances here; everyone else sees the puppet", { name })
-        : translate("{name} dances here; everyone else sees the puppet. This browser keeps it for this visit only", {
-            name,
-          }),
+        : translate(
+            "{name} dances here, for this visit only: this browser cannot store it. Everyone else sees the puppet",
+            {
+              name,
+            },
+          ),
     );
   }
 
-  /** The avatar dances, or the puppet does. */
+  /** Show the avatar, or the puppet. */
   setActive(active: boolean): void {
     if (!this.#model) return;
     this.options.preferences.put(this.#activeKey, active ? "yes" : "no");
     this.#applyActive(active);
   }
 
-  /** Forgets the avatar, also for the next visit. */
+  /** Remove the avatar, also from the browser's storage. */
   async remove(): Promise<void> {
     this.#pendingFile = null;
     this.#disposeModel();
@@ -121,12 +127,12 @@ export class AvatarSlot {
       if (this.#pendingFile !== file) return false;
       this.#pendingFile = null;
       this.#render();
-      const known = error instanceof AvatarError;
+      const isKnown = error instanceof AvatarError;
       page.library.problem(
         file.name,
-        known ? error.title : translate("It could not be read"),
-        known ? error.detail : translate("the file or what reads it did not come"),
-        known ? error.hint : translate("Try again when the line is back."),
+        isKnown ? error.title : translate("It could not be read"),
+        isKnown ? error.detail : translate("the file or the program that reads it could not be loaded"),
+        isKnown ? error.hint : translate("Check your connection, then try again."),
       );
       return false;
     }
@@ -138,7 +144,7 @@ export class AvatarSlot {
     this.#render();
   }
 
-  /** The puppet dances, and the model is no more. */
+  /** Show the puppet and free the model. */
   #disposeModel(): void {
     if (this.#activeFactory) this.#stage?.setPerformerFactory(null, this.performer);
     this.#activeFactory = this.#factory = null;
@@ -156,11 +162,11 @@ export class AvatarSlot {
   }
 }
 
-/** Who dances in the places of all the dancers that there may be. */
+/** Avatars of all performers. */
 export class AvatarSlots {
   readonly #slots: readonly AvatarSlot[];
 
-  /** The person brings avatars for the `choice`'s performer. */
+  /** A chosen file applies to the performer that `selectedPerformer` names. */
   constructor(
     options: AvatarSlotOptions,
     private readonly selectedPerformer: Pick<PerformerSelection, "performer">,
@@ -168,18 +174,18 @@ export class AvatarSlots {
     this.#slots = Array.from({ length: MAX_PERFORMERS }, (_, performer) => new AvatarSlot(options, performer));
   }
 
-  /** In the place of the chosen dancer. */
+  /** Slot of the selected performer. */
   get selected(): AvatarSlot {
     return this.#slots[this.selectedPerformer.performer];
   }
 
-  /** The stage they are about, once there is one. */
+  /** Set the stage once it is ready. */
   set stage(stage: Pick<Stage, "setPerformerFactory">) {
-    for (const casting of this.#slots) casting.stage = stage;
+    for (const slot of this.#slots) slot.stage = stage;
   }
 
-  /** Brings back the avatars of the last visit for so many dancers: those of others are not read before they are seen. */
+  /** Load the avatars of the last visit for the first `performerCount` performers. */
   restore(performerCount: number): void {
-    for (const casting of this.#slots.slice(0, performerCount)) void casting.restore();
+    for (const slot of this.#slots.slice(0, performerCount)) void slot.restore();
   }
 }

@@ -1,13 +1,17 @@
-/** A further dance beside those on the stage: asked of the library, and danced by everyone once it is there. */
+/** Adding the performers of another motion to those on the stage. */
 import { addPerformers } from "../client/api";
 import { translate } from "../i18n/translator";
-import type { LibraryPanel, MotionItem } from "../ui/library/library-panel";
+import type { LibraryPanel } from "../ui/library/library-panel";
+import type { MotionItem } from "../ui/library/motion-item";
 import type { MotionList } from "../ui/library/motion-list";
 import { showProblem } from "../ui/library/upload";
 import { MAX_PERFORMERS } from "../wire/limbs";
 import type { Playback } from "./playback";
 
-/** Adds who dances in `piece` to the stage of `room`, where there is room for them. The dance goes on where it is. What is wrong is told in the library. */
+/**
+ * Add the performers of `item` to the motion that `playback` shows. The server stores the result as a new motion, which
+ * replaces the shown one at the same position. Errors are reported in the library.
+ */
 export async function addMotionToStage(
   item: MotionItem,
   playback: Playback,
@@ -19,15 +23,15 @@ export async function addMotionToStage(
   if (performers.length + item.performers > MAX_PERFORMERS) {
     library.problem(
       item.name,
-      translate("There is no more room on the stage"),
-      translate("{count} dancers are the most that a stage has", { count: MAX_PERFORMERS }),
+      translate("The stage is full"),
+      translate("a stage holds at most {count} dancers", { count: MAX_PERFORMERS }),
       null,
     );
     return;
   }
   try {
     const { id } = await addPerformers(motion, [item.id]);
-    // it comes on also where the list of all did not come
+    // The new motion is played even if the list cannot be fetched now.
     await motions.refresh().catch(() => undefined);
     playback.edit({ motion: id, position: Math.round(playback.position(performance.now()) * 1e6) });
   } catch (error) {

@@ -1,5 +1,4 @@
-/** Who holds what, who asks for it, and what is done about it: between the session's word, one's own hands, and the page. */
-
+/** Claims of limbs: combines the session's state with this page's inputs, shows the result, and handles requests. */
 import { pageTranslator } from "../i18n/translator";
 import type { HoldSource, LimbController } from "../input/limb-controller";
 import { type Command, controlsOf, isPadControl, type Mapping } from "../input/mapping";
@@ -12,15 +11,15 @@ import type { Page } from "../ui/page";
 import { limbNumber } from "../wire/limbs";
 import type { Playback } from "./playback";
 
-/** What stands on the stage's chunk, and comes after the page. */
+/** Inputs that the stage bundle provides, after the page was built. */
 export interface StageInputs {
   hands: LimbController;
   velocity: VelocityInputs;
-  /** The ring of a limb shakes. */
+  /** Shake the ring of a limb, to show that it cannot be claimed. */
   shakeRing(limb: number): void;
 }
 
-/** Where it is shown: the page, or as much of one as there is. */
+/** Parts of the page, or of the embedded element, that show the state of the limbs. */
 export interface LimbControllerView {
   readonly toast: ShowToast;
   readonly strings: Pick<Page["strings"], "render" | "notice">;
@@ -31,12 +30,12 @@ export interface LimbControllerView {
 export class ClaimController {
   stageInputs: StageInputs | null = null;
   connected = false;
-  /** Whether this page only watches: nothing can be taken. */
+  /** True if this page may not claim limbs. */
   viewOnly = false;
-  /** Whose strings keys, pad and page act on. */
+  /** Performer whose limbs keys, gamepad and page controls act on. */
   readonly selectedPerformer = new PerformerSelection(() => this.render());
   #playback: Playback | null = null;
-  /** The limb that was reached for in vain: what "ask" asks for. */
+  /** Last limb whose claim failed: the one that a request without a limb asks for. */
   #contestedLimb: number | null = null;
 
   constructor(
@@ -45,23 +44,23 @@ export class ClaimController {
     private readonly translator = pageTranslator,
   ) {}
 
-  /** The session it is about from now on. */
+  /** Use another session from now on. */
   setPlayback(playback: Playback): void {
     this.#playback = playback;
     this.#contestedLimb = null;
     const { viewer, puppeteer } = playback;
     if (this.stageInputs) this.stageInputs.hands.puppeteer = puppeteer;
-    const on = <T>(name: string, told: (detail: T) => void) =>
-      puppeteer.addEventListener(name, (event) => told((event as CustomEvent<T>).detail));
+    const on = <T>(name: string, listener: (detail: T) => void) =>
+      puppeteer.addEventListener(name, (event) => listener((event as CustomEvent<T>).detail));
     const render = () => this.render();
-    const count = () => {
+    const updateCount = () => {
       this.selectedPerformer.count = Math.max(1, viewer.performers.length);
-      // those of who is on the stage no more
+      // Release the limbs of performers that left the stage.
       this.stageInputs?.hands.releaseAll(limbNumber(this.selectedPerformer.count, 0));
     };
-    count();
-    viewer.addEventListener("figure", count);
-    viewer.addEventListener("tracks", count);
+    updateCount();
+    viewer.addEventListener("figure", updateCount);
+    viewer.addEventListener("tracks", updateCount);
     viewer.addEventListener("presence", render);
     on("welcome", render);
     on("presence", render);
@@ -74,7 +73,7 @@ export class ClaimController {
     });
     on<{ limb: number; free: boolean }>("lapsed", ({ limb, free }) => {
       this.view.toast(
-        this.translator.translate(free ? "The {limb} is free now" : "The {limb} was not given", {
+        this.translator.translate(free ? "The {limb} is free now" : "Your request for the {limb} was not granted", {
           limb: this.#limbName(limb),
         }),
       );
@@ -85,28 +84,28 @@ export class ClaimController {
     );
   }
 
-  /** The limbs of all performers as the session says, and one's own at once, before it has answered. */
+  /** Return the state of all performers' limbs. Claims of this page are shown before the session confirms them. */
   limbStates(): LimbState[] {
     const { puppeteer, viewer } = this.#playback ?? {};
     const { hands, velocity } = this.stageInputs ?? {};
-    const who = [
+    const context = [
       viewer?.presence ?? null,
       puppeteer?.id ?? null,
       this.selectedPerformer.count,
       this.translator,
     ] as const;
-    const told = limbHolders(...who);
-    const asking = limbRequesters(...who);
-    return told.map((one, limb) => {
+    const holders = limbHolders(...context);
+    const requesters = limbRequesters(...context);
+    return holders.map((sessionHolder, limb) => {
       const mine = Boolean(hands?.source(limb));
       const holder = mine
         ? { id: puppeteer?.id ?? "", name: this.translator.translate("You"), colour: puppeteer?.colour ?? 0, mine }
-        : one?.mine
+        : sessionHolder?.mine
           ? null
-          : one;
+          : sessionHolder;
       return {
         holder,
-        requesters: asking[limb],
+        requesters: requesters[limb],
         requestedByMe: puppeteer?.isAsking(limb) ?? false,
         selected: velocity?.selectedLimb === limb && velocity.holds(limb),
       };
@@ -129,17 +128,20 @@ export class ClaimController {
     this.view.library?.danceAs.dancers(limbs, this.selectedPerformer.performer);
   }
 
-  /** Turns to the next performer, by a key or button: it is said, as what is seen of it is little. */
+  /** Select the next performer, and announce it: the change is hard to see on the stage. */
   selectNextPerformer(): void {
-    const { selectedPerformer: chosen } = this;
-    if (chosen.count < 2) return;
-    chosen.select((chosen.performer + 1) % chosen.count);
+    const { selectedPerformer: selected } = this;
+    if (selected.count < 2) return;
+    selected.select((selected.performer + 1) % selected.count);
     this.view.toast(
-      this.translator.translate("Dancer {number} of {count}", { number: chosen.performer + 1, count: chosen.count }),
+      this.translator.translate("Dancer {number} of {count}", {
+        number: selected.performer + 1,
+        count: selected.count,
+      }),
     );
   }
 
-  /** Takes a limb if it is free; if not, says who has it. */
+  /** Claim a limb if it is free; else show its holder. Returns whether it is held. */
   claim(limb: number, source: HoldSource): boolean {
     if (!this.isFree(limb) && !this.stageInputs?.hands.source(limb)) {
       this.onClaimRefused(limb);
@@ -148,7 +150,7 @@ export class ClaimController {
     return this.stageInputs?.hands.claim(limb, source) ?? false;
   }
 
-  /** The page's button of a limb: takes it, or lets it go. */
+  /** Claim a limb, or release it if this page holds it. */
   toggleClaim(limb: number): void {
     if (this.viewOnly) return;
     const { hands, velocity } = this.stageInputs ?? {};
@@ -156,16 +158,16 @@ export class ClaimController {
     else velocity?.hold(limb);
   }
 
-  /** A limb that was reached for is another's. */
+  /** Report a limb that could not be claimed, and offer to ask its holder for it. */
   onClaimRefused(limb: number): void {
     const state = this.limbStates()[limb];
     if (this.viewOnly || !state) return;
     this.stageInputs?.shakeRing(limb);
-    const { holder, requestedByMe: asked } = state;
+    const { holder, requestedByMe } = state;
     const name = this.#limbName(limb);
     if (!holder || holder.mine) {
-      this.view.toast(this.translator.translate("The {limb} was let go", { limb: name }));
-    } else if (asked) {
+      this.view.toast(this.translator.translate("The {limb} was released", { limb: name }));
+    } else if (requestedByMe) {
       this.view.toast(this.translator.translate("You ask {name} for the {limb}", { name: holder.name, limb: name }));
     } else {
       this.#contestedLimb = limb;
@@ -177,12 +179,12 @@ export class ClaimController {
     }
   }
 
-  /** Asks the holder for a limb; without one, for that which was reached for last. */
+  /** Ask the holder for a limb, by default for the last one whose claim failed. */
   requestLimb(limb = this.#contestedLimb): void {
     if (this.viewOnly) return;
     const holder = limb === null ? null : this.limbStates()[limb]?.holder;
     if (limb === null || !holder || holder.mine) {
-      this.view.toast(this.translator.translate("Reach for a string that another holds, then ask for it"));
+      this.view.toast(this.translator.translate("Reach for a string that someone else holds, then ask for it"));
       return;
     }
     this.#contestedLimb = null;
@@ -190,7 +192,7 @@ export class ClaimController {
     this.view.toast(
       this.#playback?.puppeteer.isAsking(limb)
         ? this.translator.translate("You ask {name} for the {limb}", { name: holder.name, limb: this.#limbName(limb) })
-        : this.translator.translate("The line is lost; ask again when it is back"),
+        : this.translator.translate("Not connected. Ask again when the connection is back"),
     );
     this.render();
   }
@@ -200,19 +202,21 @@ export class ClaimController {
     this.render();
   }
 
-  /** Gives a limb to the first who asks for it; without one, the selected limb if it is asked for, else any that is. */
+  /**
+   * Hand a limb over to the first requester, by default the selected limb if it is requested, else any requested one.
+   */
   handOver(limb = this.#nextRequestedLimb()): void {
     if (this.viewOnly) return;
-    if (limb === null) this.view.toast(this.translator.translate("Nobody asks for a string of yours"));
+    if (limb === null) this.view.toast(this.translator.translate("Nobody is asking for your strings"));
     else this.stageInputs?.hands.release(limb);
   }
 
   #nextRequestedLimb(): number | null {
     const limbs = this.limbStates();
-    const asked = limbsInKeyOrder(this.selectedPerformer.count).filter(
+    const requested = limbsInKeyOrder(this.selectedPerformer.count).filter(
       (limb) => limbs[limb].holder?.mine && limbs[limb].requesters.length > 0,
     );
-    return asked.find((limb) => limbs[limb].selected) ?? asked[0] ?? null;
+    return requested.find((limb) => limbs[limb].selected) ?? requested[0] ?? null;
   }
 
   #onLimbGranted(limb: number): void {

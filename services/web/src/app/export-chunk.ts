@@ -1,4 +1,4 @@
-/** Everything that makes files of dances, in one piece: fetched when somebody first wants one. */
-export { downloadMotion as bestBlocks } from "../client/motion-download";
-export { exportFile as makeFile } from "../export/export-file";
+/** Bundle of everything that exports motions as files, loaded at the first export. */
+export { downloadMotion } from "../client/motion-download";
+export { exportFile } from "../export/export-file";
 export { fileName } from "../export/file-name";

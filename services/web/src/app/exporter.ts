@@ -1,15 +1,15 @@
-/** What is taken from the page: dances as files, and the stage as a picture. Between library, writers, stage and the browser. */
+/** Export of motions as files, and of the stage as a picture. */
 import { ProblemError } from "../client/problem";
 import type { ExportFormat, ExportSource } from "../export/export-file";
 import { translate } from "../i18n/translator";
 import type { Stage } from "../stage/stage";
 import { saveFile } from "../ui/library/file-download";
-import type { MotionItem } from "../ui/library/library-panel";
+import type { MotionItem } from "../ui/library/motion-item";
 import { showProblem } from "../ui/library/upload";
 import type { Page } from "../ui/page";
 import type { Playback } from "./playback";
 
-/** Of a download's progress, the part in which its blocks come. */
+/** Share of a download's progress that fetching its blocks takes; writing the file takes the rest. */
 const FETCH_PROGRESS_SHARE = 0.5;
 
 export class Exporter {
@@ -17,36 +17,35 @@ export class Exporter {
 
   constructor(
     private readonly page: Page,
-    private readonly getState: () => { room: Playback | null; stage: Stage | null },
+    private readonly getState: () => { playback: Playback | null; stage: Stage | null },
   ) {}
 
-  /** Makes a file of the whole dances of these `performers` and saves it; what is wrong is told in the library. */
+  /** Write the whole motion of these performers to a file and save it. Errors are reported in the library. */
   async downloadMotion(motion: MotionItem, format: ExportFormat, performers: readonly number[]): Promise<void> {
     const abort = new AbortController();
     const { signal } = abort;
-    // one of several
-    const part =
+    const suffix =
       performers.length < motion.performers ? `, ${translate("Dancer {number}", { number: performers[0] + 1 })}` : "";
-    const row = this.page.library.addDownload(`${motion.name}${part}, ${format.toUpperCase()}`, () => abort.abort());
+    const row = this.page.library.addDownload(`${motion.name}${suffix}, ${format.toUpperCase()}`, () => abort.abort());
     try {
-      const [{ bestBlocks, fileName, makeFile }, looks] = await loadExportModules();
+      const [{ downloadMotion, exportFile, fileName }, puppets] = await loadExportModules();
       const sources: ExportSource[] = [];
       for (const performer of performers) {
-        const held = this.getState().room?.viewer.blocksOf(motion.id, performer) ?? null;
-        const told = (share: number) =>
+        const existing = this.getState().playback?.viewer.blocksOf(motion.id, performer) ?? null;
+        const onProgress = (share: number) =>
           row.showProgress(
             translate("fetching the dance"),
             ((sources.length + share) / performers.length) * FETCH_PROGRESS_SHARE,
           );
-        sources.push(await bestBlocks(motion.id, { performer, existing: held, signal, onProgress: told }));
+        sources.push(await downloadMotion(motion.id, { performer, existing, signal, onProgress }));
       }
-      const file = await makeFile(format, motion.name, sources, {
-        puppets: looks,
+      const file = await exportFile(format, motion.name, sources, {
+        puppets,
         signal,
         onProgress: (share) =>
           row.showProgress(translate("writing the file"), FETCH_PROGRESS_SHARE + share * (1 - FETCH_PROGRESS_SHARE)),
       });
-      this.#save(file, fileName(motion.name, format, part));
+      this.#save(file, fileName(motion.name, format, suffix));
     } catch (error) {
       if (!signal.aborted) showProblem(this.page.library, motion.name, error);
     } finally {
@@ -54,7 +53,7 @@ export class Exporter {
     }
   }
 
-  /** Saves the stage as it is now as a picture of this `name`. */
+  /** Save the current frame of the stage as a PNG file named after `name`. */
   async savePicture(name: string): Promise<void> {
     const { stage } = this.getState();
     if (!stage || this.#capturing) return;
@@ -67,7 +66,7 @@ export class Exporter {
       this.page.toast(
         error instanceof ProblemError
           ? translate("{title}: {detail}", error)
-          : translate("This browser could not draw the picture"),
+          : translate("The picture could not be drawn. Try again"),
       );
       if (!(error instanceof ProblemError)) console.warn(error);
     } finally {
@@ -81,14 +80,14 @@ export class Exporter {
   }
 }
 
-/** What makes files, fetched when it is first needed, and what the stage knows of the puppet's looks. */
+/** Load the exporters, and the stage's functions that build the puppet's model and face. */
 async function loadExportModules() {
   try {
-    const [files, { facePicture, puppetModel }] = await Promise.all([
+    const [exporters, { createPuppetModel, renderFacePng }] = await Promise.all([
       import("./export-chunk"),
       import("./stage-chunk"),
     ]);
-    return [files, { renderFacePng: facePicture, createModel: puppetModel }] as const;
+    return [exporters, { renderFacePng, createModel: createPuppetModel }] as const;
   } catch {
     throw ProblemError.unreachable();
   }

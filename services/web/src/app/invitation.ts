@@ -1,11 +1,9 @@
-/** On a first visit, some seconds of invitation by the hand nearer to the audience; over for good once a limb was taken. */
-
+/** Invitation to take a hand, shown on a first visit beside the hand nearer to the audience. */
 import type { Stage } from "../stage/stage";
 import { browserStorage, type WebStorage } from "../storage/web-storage";
 import type { NameTags } from "../ui/strings/name-tag";
 
 const INVITATION_SHOWN_KEY = "bunraku.invited";
-/** Milliseconds. */
 const INVITATION_DURATION_MS = 6_000;
 
 export class Invitation {
@@ -19,7 +17,7 @@ export class Invitation {
     this.#finished = storage.get(INVITATION_SHOWN_KEY) !== null;
   }
 
-  /** The dance is on show at local `now`, milliseconds. */
+  /** Show the invitation beside the hand at local time `now` in milliseconds, or end it after its duration. */
   update(now: number, stage: Pick<Stage, "nearerHand" | "toScreen">): void {
     if (this.#finished) return;
     this.#startedAtMs ??= now;
@@ -27,11 +25,11 @@ export class Invitation {
       this.finish();
       return;
     }
-    const at = stage.nearerHand();
-    this.tags.invite(at && stage.toScreen(at));
+    const hand = stage.nearerHand();
+    this.tags.invite(hand && stage.toScreen(hand));
   }
 
-  /** It was followed, or has been there for long enough. */
+  /** Hide the invitation, and never show it again in this browser. */
   finish(): void {
     if (this.#finished) return;
     this.#finished = true;

@@ -1,13 +1,16 @@
-/** The session, or the motion alone, being watched: its viewer and puppeteer, and the edits of its timeline. */
+/** Playback of a session or of a single motion: its viewer, its puppeteer, and edits of its timeline. */
 import { type Access, pageAccess } from "../client/access";
 import { createSession, editSession, listSessions, type Session, type SessionEdit } from "../client/api";
 import { Puppeteer } from "../client/puppeteer";
 import { Viewer } from "../client/viewer";
 
-/** After a seek the bar stands where it was put until the line has followed, at most this long. Milliseconds. */
+/** Longest time for which the seek bar shows the requested position before the timeline confirms it. */
 const SEEK_SETTLE_TIMEOUT_MS = 1200;
 
-/** The first session there is, else, for who may open one, a new one over the `newest` motion; null when there is nothing to dance. */
+/**
+ * Return the first running session. If there is none and `access` allows it, create one that plays the newest motion.
+ * Returns null if there is no session and none can be created.
+ */
 export async function findOrCreateSession(
   newestMotion: Promise<string | null>,
   access = pageAccess,
@@ -18,14 +21,14 @@ export async function findOrCreateSession(
   return motion ? createSession(motion) : null;
 }
 
-/** What is watched: a session, shared by all, or a motion, on a timeline of one's own. */
+/** Kind of playback: a session, whose timeline all viewers share, or a motion on a private timeline. */
 export type PlaybackKind = "sessions" | "motions";
 
 export interface PlaybackOptions {
   kind?: PlaybackKind;
-  /** How one comes in, and at which server. */
+  /** Server and credentials; the page's own by default. */
   access?: Access;
-  /** Only to be watched: no limb is to be taken from here. */
+  /** Open no control connection: limbs cannot be claimed. */
   viewOnly?: boolean;
 }
 
@@ -38,18 +41,18 @@ export class Playback {
   #pendingEdit: SessionEdit | null = null;
   #pendingSeek: { seconds: number; at: number; epoch: number } | null = null;
 
-  /** `failed` is told when an edit of the timeline was refused. */
+  /** `onEditError` is called if the server rejects an edit of the timeline. */
   constructor(
     readonly id: string,
     name: string,
     private readonly onEditError: (error: unknown) => void,
     options: PlaybackOptions = {},
   ) {
-    const { kind: place = "sessions", access = pageAccess, viewOnly: watching = false } = options;
-    [this.kind, this.access] = [place, access];
-    const base = `${(access.server || location.origin).replace(/^http/, "ws")}/v1/${place}/${encodeURIComponent(id)}`;
+    const { kind = "sessions", access = pageAccess, viewOnly = false } = options;
+    [this.kind, this.access] = [kind, access];
+    const base = `${(access.server || location.origin).replace(/^http/, "ws")}/v1/${kind}/${encodeURIComponent(id)}`;
     const control =
-      place === "sessions" && !watching && access.allows("control")
+      kind === "sessions" && !viewOnly && access.allows("control")
         ? `${base}/control?name=${encodeURIComponent(name)}`
         : null;
     this.viewer = new Viewer({ url: `${base}/stream`, access });
@@ -57,7 +60,7 @@ export class Playback {
     this.viewer.attach(this.puppeteer);
   }
 
-  /** Seconds in the motion, or where a seek under way will land. */
+  /** Return the position in the motion in seconds, or the target of a pending seek, at local time `now` in ms. */
   position(now: number): number {
     const { timeline } = this.viewer;
     if (
@@ -76,19 +79,22 @@ export class Playback {
     this.edit({ position: Math.round(seconds * 1e6) });
   }
 
-  /** Seeks on by so many blocks, or back, within the dance. */
+  /** Seek by a number of blocks, negative to go back, within the motion. */
   seekByBlocks(blocks: number, now: number): void {
     const { blocks: all, duration } = this.viewer;
     if (all.length === 0) return;
     this.seek(Math.min(duration, Math.max(0, this.position(now) + (blocks * duration) / all.length)), now);
   }
 
-  /** Whether the timeline may be edited from here. */
+  /** True if this page may edit the timeline. */
   get isEditable(): boolean {
     return this.kind === "motions" || this.access.allows("control");
   }
 
-  /** Edits the timeline, of a session for everyone. One edit is under way at a time; those made meanwhile are sent as one. */
+  /**
+   * Edit the timeline, for all viewers if it is a session's. One request is in flight at a time; edits made meanwhile
+   * are merged into the next one.
+   */
   edit(change: SessionEdit): void {
     if (!this.isEditable) return;
     if (this.kind === "motions") {

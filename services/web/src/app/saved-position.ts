@@ -1,5 +1,6 @@
-/** Where a motion watched alone was left, kept while the page is loaded anew. A session's timeline goes on by itself. */
-
+/**
+ * Position of a motion with a private timeline, saved while the page reloads. A session's timeline is on the server.
+ */
 import { tabStorage } from "../storage/web-storage";
 import type { Playback } from "./playback";
 
@@ -13,7 +14,7 @@ interface SavedPosition {
   loop: boolean;
 }
 
-/** Keeps where a room's motion is at local `now`, milliseconds. */
+/** Save the position of a motion at local time `now` in milliseconds. Does nothing for a session. */
 export function savePosition(playback: Playback, now: number): void {
   const { timeline } = playback.viewer;
   if (playback.kind !== "motions" || !timeline) return;
@@ -25,11 +26,11 @@ export function savePosition(playback: Playback, now: number): void {
   } satisfies SavedPosition);
 }
 
-/** Goes on where this room's motion was left, once. */
+/** Restore the saved position of this motion, and delete it. */
 export function restorePosition(playback: Playback): void {
-  const left = tabStorage.getJson(STORAGE_KEY) as SavedPosition | null;
+  const saved = tabStorage.getJson(STORAGE_KEY) as SavedPosition | null;
   tabStorage.remove(STORAGE_KEY);
-  if (left?.motion !== playback.id) return;
-  const { position, playing, loop } = left;
+  if (saved?.motion !== playback.id) return;
+  const { position, playing, loop } = saved;
   playback.viewer.addEventListener("timeline", () => playback.viewer.edit({ position, playing, loop }), { once: true });
 }

@@ -1,21 +1,21 @@
-/** The link by which others come to the same stage, told and copied. */
+/** Copying of a link to the session on the stage. */
 import { guarded } from "../client/access";
 import { shareSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import { translate } from "../i18n/translator";
 
 /**
- * Copies the page's address with its session, null for none; where the server asks who comes it is one by which others may watch.
- * `toast` is told what became of it; where nothing may be copied, the link itself.
+ * Copy a link to the session, or to the page if `session` is null. On a server with access control the link carries a
+ * token that allows viewing. `notify` receives the result, or the link itself if the clipboard is not available.
  */
 export async function copyShareLink(session: string | null, notify: (message: string) => void): Promise<void> {
   const url = new URL(location.href);
   url.search = session === null ? "" : `?session=${encodeURIComponent(session)}`;
-  let copied = translate("Link copied");
+  let message = translate("Link copied");
   if (guarded() && session !== null) {
     try {
       url.href = new URL(await shareSession(session), location.href).href;
-      copied = translate("Link copied: who has it may watch, for a week");
+      message = translate("Link copied. Anyone who has it can watch for one week");
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
       notify(translate("{title}: {detail}", error));
@@ -24,7 +24,7 @@ export async function copyShareLink(session: string | null, notify: (message: st
   }
   try {
     await navigator.clipboard.writeText(url.href);
-    notify(copied);
+    notify(message);
   } catch {
     notify(translate("Copy this link: {link}", { link: url.href }));
   }

@@ -1,20 +1,20 @@
-/** The sound of the motion on the stage: fetched where there is any and it is wanted, and the first gesture that lets it be heard. */
+/** Sound of the motion on the stage. Audio code is loaded once a motion has sound and the person wants to hear it. */
 import type { SoundPreference, SoundPreferenceStore } from "../audio/preference";
 import type { AudioPlayer } from "../audio/sound";
 import { Speaker } from "../audio/speaker";
 import type { Viewer } from "../client/viewer";
 import type { AudioBlockStore } from "../playout/audio-store";
 
-/** What the button shows. */
+/** State that the sound button shows. */
 export interface SoundState {
-  /** Whether the motion has sound. */
-  readonly there: boolean;
-  /** Whether it is heard. */
-  readonly heard: boolean;
+  /** True if the motion has sound. */
+  readonly available: boolean;
+  /** True if it can be heard now. */
+  readonly audible: boolean;
   readonly volume: number;
 }
 
-/** What browsers take for a person's wish that a page may be heard. */
+/** Events that browsers accept as the user activation that audio playback requires. */
 const USER_ACTIVATION_EVENTS = ["pointerdown", "pointerup", "click", "keydown"] as const;
 
 export class SoundController {
@@ -22,13 +22,13 @@ export class SoundController {
   #preference: SoundPreference;
   #speaker: Speaker | null = null;
   #player: AudioPlayer | null = null;
-  /** What the player plays, or will when it is there. */
+  /** Sound of the current motion; null if it has none. */
   #audioStore: AudioBlockStore | null = null;
-  /** A gesture that let the sound be heard asked for it by that: the command it carries is done. */
+  /** Set while the gesture that resumed the sound is handled: its own command must not switch the sound off again. */
   #resumedByGesture = false;
   readonly #abortController = new AbortController();
 
-  /** `changed` is told what to show; a press within `button` is no gesture, as it says what it wants itself. */
+  /** Gestures within `button` do not resume the sound, since the button toggles it itself. */
   constructor(
     private readonly onChange: (state: SoundState) => void,
     button: Element,
@@ -48,12 +48,12 @@ export class SoundController {
     }
   }
 
-  /** What the sound is put out through, null before there is any. */
+  /** Audio output; null until sound was first wanted. */
   get speaker(): Speaker | null {
     return this.#speaker;
   }
 
-  /** What is watched from now on; null is silent. */
+  /** Play the sound of this viewer's motions; null stops the sound. */
   setViewer(viewer: Viewer | null): void {
     this.#viewer = viewer;
     viewer?.addEventListener("figure", () => void this.#updatePlayer());
@@ -62,18 +62,18 @@ export class SoundController {
     void this.#updatePlayer();
   }
 
-  /** Heard or not, as a press of the button says. */
+  /** Switch the sound on or off. */
   toggle(): void {
     if (this.#resumedByGesture || !this.#audioStore) return;
     this.setPreference({ ...this.#preference, on: !this.#speaker?.heard });
   }
 
-  /** How loud, 0 to 1; who moves it wants to hear it. */
+  /** Set the volume, 0 to 1, and switch the sound on. */
   set volume(volume: number) {
     this.setPreference({ on: true, volume });
   }
 
-  /** Whether it is wanted, and how loud: from now on, and remembered. */
+  /** Apply and save whether sound is wanted, and its volume. */
   setPreference(preference: SoundPreference): void {
     this.#preference = preference;
     this.preferenceStore.save(preference);
@@ -81,7 +81,7 @@ export class SoundController {
     void this.#updatePlayer();
   }
 
-  /** Ends it for good. */
+  /** Stop the sound and free the audio device. */
   close(): void {
     this.#abortController.abort();
     this.setViewer(null);
@@ -90,7 +90,7 @@ export class SoundController {
 
   #applyPreference(speaker: Speaker): void {
     speaker.volume = this.#preference.volume;
-    // a device that may be heard runs from its making on
+    // An audio device that the browser allows runs as soon as it is created, so it may have to be suspended.
     if (this.#preference.on && this.#audioStore) speaker.resume();
     else speaker.suspend();
   }
@@ -103,7 +103,7 @@ export class SoundController {
     setTimeout(() => (this.#resumedByGesture = false));
   }
 
-  /** Plays the motion that the viewer shows, if it has sound and that is wanted. */
+  /** Replace the player if the motion changed; create one if the motion has sound and sound is wanted. */
   async #updatePlayer(): Promise<void> {
     const viewer = this.#viewer;
     const store = viewer?.audio ?? null;
@@ -117,11 +117,11 @@ export class SoundController {
     this.#publishState();
     if (!viewer || !store || !this.#preference.on || this.#player) return;
     try {
-      // now: there are browsers that let be heard only what begins within the gesture
+      // Before any await: some browsers only allow audio that is started within the gesture.
       const speaker = this.#speaker ?? this.#openSpeaker();
       const { AudioPlayer, findDecoder } = await import("../audio/sound");
       const decoder = await findDecoder(store.track.channels);
-      // another motion may have come on meanwhile, or it may be asked for twice
+      // Meanwhile the motion may have changed, or a concurrent call may have created the player.
       if (store !== this.#audioStore || this.#player) return;
       const player = new AudioPlayer(
         speaker.context,
@@ -138,7 +138,7 @@ export class SoundController {
       viewer.leader = (now) => player.leadAt(now);
     } catch (error) {
       this.#speaker?.suspend();
-      console.warn("the sound of this motion cannot be heard here.", error);
+      console.warn("The sound of this motion cannot be played.", error);
     }
     this.#publishState();
   }
@@ -152,8 +152,8 @@ export class SoundController {
 
   #publishState(): void {
     this.onChange({
-      there: this.#audioStore !== null,
-      heard: this.#speaker?.heard ?? false,
+      available: this.#audioStore !== null,
+      audible: this.#speaker?.heard ?? false,
       volume: this.#preference.volume,
     });
   }

@@ -1,6 +1,6 @@
-/** Everything that stands on three.js, in one piece: the page is painted before it has come. */
-export { createGamepadInput as createGamepad } from "../input/gamepad";
+/** Bundle of everything that depends on three.js, loaded after the page was painted. */
+export { createGamepadInput } from "../input/gamepad";
 export { listenToKeyboard } from "../input/keyboard";
 export { listenToMouse } from "../input/mouse";
-export { createPuppetModel as puppetModel, renderFacePng as facePicture } from "../stage/puppet/puppet-model";
-export { StageController as Performing } from "./stage-controller";
+export { createPuppetModel, renderFacePng } from "../stage/puppet/puppet-model";
+export { StageController } from "./stage-controller";

@@ -1,5 +1,4 @@
-/** What is on the stage, frame by frame: the dance of the room, who holds its strings, and one's own hands by pointer and keys. */
-
+/** Stage of a playback: draws poses and strings every frame, and connects pointer and key inputs to the limbs. */
 import { CommandDispatcher, type PageActions } from "../input/command-dispatcher";
 import { LimbController } from "../input/limb-controller";
 import type { Mapping } from "../input/mapping";
@@ -16,20 +15,20 @@ import type { Playback } from "./playback";
 
 export interface StageControllerOptions {
   getMapping: () => Mapping;
-  /** What keys and pad do beside taking limbs. */
+  /** Actions of keys and gamepad other than claiming and moving limbs. */
   actions: PageActions;
-  /** Told whenever what is held here changes. */
+  /** Called whenever the set of limbs that this page holds changes. */
   onClaimsChange: () => void;
-  /** The canvas's, where they are open already. */
+  /** Graphics of the canvas, if they were opened already. */
   graphics?: Graphics;
 }
 
-/** The rings of who is turned to light up for so long, milliseconds. */
+/** Time for which the rings of a newly selected performer are highlighted. */
 const RING_HIGHLIGHT_MS = 900;
 
-/** What one frame showed. */
+/** Content of one frame. */
 export interface FrameState {
-  /** The first performer's, null before there is any. */
+  /** Pose of the first performer; null before the first block arrived. */
   pose: Pose | null;
   limbs: readonly LimbState[];
 }
@@ -42,30 +41,30 @@ export class StageController {
   readonly commands: CommandDispatcher;
   #playback: Playback | null = null;
   #lastDrawMs = 0;
-  /** The performer that was turned to, whose rings light up until then. */
-  #ringHighlight = { to: 0, until: 0 };
+  /** Last selected performer, and the time in milliseconds until which its rings are highlighted. */
+  #ringHighlight = { performer: 0, until: 0 };
 
-  /** Draws on `canvas`; `holding` is about its hands from now on. Throws where the browser has no WebGL 2. */
+  /** Draw on `canvas`, and connect its inputs to `limbController`. Throws if the browser has no WebGL 2. */
   constructor(
     canvas: HTMLCanvasElement,
     private readonly limbController: ClaimController,
-    { getMapping: mapping, actions, onClaimsChange: changed, graphics }: StageControllerOptions,
+    { getMapping, actions, onClaimsChange, graphics }: StageControllerOptions,
   ) {
     this.stage = new Stage(canvas, graphics);
     this.hands = new LimbController(this.stage);
-    this.hands.onChange = changed;
-    const free = (limb: number) => limbController.isFree(limb);
-    const { selectedPerformer: chosen } = limbController;
+    this.hands.onChange = onClaimsChange;
+    const isFree = (limb: number) => limbController.isFree(limb);
+    const { selectedPerformer: selection } = limbController;
     this.velocity = new VelocityInputs(this.hands, {
       claim: (limb) => limbController.claim(limb, "velocity"),
-      isFree: free,
-      selection: chosen,
+      isFree,
+      selection,
     });
     this.pointer = createPointerInput(canvas, this.stage, this.hands, {
-      canClaim: free,
+      canClaim: isFree,
       onRefused: (limb) => limbController.onClaimRefused(limb),
-      onClaimed: (limb) => chosen.select(performerOfLimb(limb)),
-      smoothing: () => mapping().pointerSmoothing,
+      onClaimed: (limb) => selection.select(performerOfLimb(limb)),
+      smoothing: () => getMapping().pointerSmoothing,
       depthInput: (limb) => this.velocity.depthInput(limb),
     });
     this.commands = new CommandDispatcher(this.hands, this.velocity, actions);
@@ -76,54 +75,62 @@ export class StageController {
     };
   }
 
-  /** The room it is about from now on: its dancers come on, if any are there already. With none the last ones stand still. */
+  /** Show another playback. With null, the last performers stay on the stage and stand still. */
   setPlayback(playback: Playback | null): void {
     this.#playback = playback;
     this.hands.puppeteer = playback?.puppeteer ?? null;
     this.updatePerformers();
   }
 
-  /** The room's dancers come on, as far as they are known. */
+  /** Show the performers of the playback, as far as their skeletons were received. */
   updatePerformers(): void {
     const { performers = [], figure, front } = this.#playback?.viewer ?? {};
-    // one that cannot be read keeps its place, and is never seen
+    // A performer whose track cannot be decoded keeps its index, and is never drawn.
     if (figure)
       this.stage.setFigures(
-        performers.map((one) => one?.figure ?? figure),
+        performers.map((performer) => performer?.figure ?? figure),
         front,
       );
   }
 
-  /** Moves everything on to local `now`, milliseconds, and draws it; `focused` is a limb whose control has the focus. */
+  /** Draw the frame of local time `now` in milliseconds. `focusedLimb` is the limb whose control has the focus. */
   draw(now: number, focusedLimb: number | null = null): FrameState {
-    const { limbController: holding, hands, pointer, stage, velocity } = this;
+    const { limbController, hands, pointer, stage, velocity } = this;
     const viewer = this.#playback?.viewer;
     const seconds = (now - this.#lastDrawMs) / 1000;
     this.#lastDrawMs = now;
     pointer.update(now);
     velocity.update(now);
     const poses = viewer?.performers.map((_, performer) => viewer.poseAt(now, performer)) ?? [];
-    const limbs = holding.limbStates();
-    const { selectedPerformer: chosen } = holding;
-    if (chosen.performer !== this.#ringHighlight.to)
-      this.#ringHighlight = { to: chosen.performer, until: chosen.count > 1 ? now + RING_HIGHLIGHT_MS : 0 };
+    const limbs = limbController.limbStates();
+    const { selectedPerformer: selection } = limbController;
+    if (selection.performer !== this.#ringHighlight.performer)
+      this.#ringHighlight = {
+        performer: selection.performer,
+        until: selection.count > 1 ? now + RING_HIGHLIGHT_MS : 0,
+      };
     const states = limbs.map(({ holder, selected }, limb): StringState => {
-      const own = performerOfLimb(limb) === chosen.performer;
+      const isSelected = performerOfLimb(limb) === selection.performer;
       return {
         puppeteer: holder?.colour ?? null,
         isHighlighted:
-          pointer.hoveredLimb === limb || focusedLimb === limb || selected || (own && now < this.#ringHighlight.until),
+          pointer.hoveredLimb === limb ||
+          focusedLimb === limb ||
+          selected ||
+          (isSelected && now < this.#ringHighlight.until),
         pullTarget: hands.pullTarget(limb),
-        isDimmed: !own,
+        isDimmed: !isSelected,
       };
     });
-    // under a finger that pulls the picture stays where it is
-    if (!pointer.isDragging) stage.selectedPerformer = holding.viewOnly ? null : chosen.performer;
+    // The camera must not move under a finger that drags a limb.
+    if (!pointer.isDragging) stage.selectedPerformer = limbController.viewOnly ? null : selection.performer;
     stage.draw(poses, states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.presentationTime(now));
     return { pose: poses[0] ?? null, limbs };
   }
 
-  /** Lets go what was pressed, as nobody would let it up: the page is hidden. */
+  /**
+   * Release all pressed keys and buttons. Called when the page goes into the background and receives no key-up events.
+   */
   releaseInputs(): void {
     this.commands.releaseAll();
     this.velocity.update(performance.now());

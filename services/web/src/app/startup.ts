@@ -1,47 +1,48 @@
 /**
- * The puppet comes first. Until it is there only the seal is to be seen, and the page's fonts, its sound and whatever else can wait do,
- * as all come over the same line, and a machine that draws in software paints one after the other. Neither waits for a dance that
- * does not come, nor the page for a stage that is long on its way.
+ * Order of the page's start: the puppet first. Fonts, sound and other work wait for the first frame, since they share
+ * its connection and, with software rendering, its processor. Timeouts bound the wait if no motion or no stage
+ * arrives.
  */
 
-/** The page shows itself if the stage is not ready after so long, milliseconds: it is on its way over a slow line. */
+/** Time after which the page is shown without its stage, which is still loading over a slow connection. */
 const STAGE_TIMEOUT_MS = 2_500;
-/** From when the stage is ready nothing waits longer than this, milliseconds. */
+/** Longest wait for the first frame after the stage is ready. */
 const FIRST_FRAME_TIMEOUT_MS = 2_000;
 
 export class StartupSequence {
-  /** What waits; null once nothing does. */
+  /** Callbacks that wait for the first frame; null after it. */
   #callbacks: (() => void)[] | null = [];
   #stageReady = false;
 
   /**
-   * Begins at once. `root` tells the style sheet of it in `data-arriving`: `veiled` while only the seal is to be seen, as
-   * the page's own markup begins with, then empty.
+   * Start at once. The attribute `data-arriving` of `root` carries the state for the style sheet: `veiled` (as in the
+   * page's markup) while only the seal is shown, empty while the page is shown without the stage, absent when
+   * finished.
    */
   constructor(private readonly root: HTMLElement) {
     root.dataset["arriving"] = "veiled";
     setTimeout(() => this.#revealPage(), STAGE_TIMEOUT_MS);
   }
 
-  /** Done when the puppet is there: at once if it is. */
+  /** Call `callback` after the first frame, at once if it was drawn already. */
   runWhenFinished(callback: () => void): void {
     if (this.#callbacks) this.#callbacks.push(callback);
     else callback();
   }
 
-  /** The stage is ready, and the puppet as good as there. */
+  /** Report that the stage is loaded. The first frame is expected soon. */
   onStageReady(): void {
     this.#stageReady = true;
     setTimeout(() => this.finish(), FIRST_FRAME_TIMEOUT_MS);
   }
 
-  /** The puppet is there, or never will be. */
+  /** Reveal the page and run all waiting callbacks: the first frame was drawn, or there will be none. */
   finish(): void {
-    const waiting = this.#callbacks;
-    if (!waiting) return;
+    const callbacks = this.#callbacks;
+    if (!callbacks) return;
     this.#callbacks = null;
     delete this.root.dataset["arriving"];
-    for (const done of waiting) done();
+    for (const callback of callbacks) callback();
   }
 
   #revealPage(): void {

@@ -5,19 +5,24 @@
  * (`marionette/steering.py`). Times are local milliseconds and come in as arguments.
  */
 
-import { clampThigh, MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD } from "../marionette/leg";
+import {
+  MAX_HAND_SPEED,
+  MAX_LEG_SPEED,
+  MAX_TARGET_DURATION_US,
+  MAX_THIGH_ANGLE_RAD,
+  MIN_THIGH_ANGLE_RAD,
+} from "../marionette/constants";
+import { clampThigh } from "../marionette/leg";
 import { limbWithinPerformer } from "../wire/limbs";
 
-/** Full speed of a hand, arm lengths a second along each axis. */
-export const MAX_HAND_SPEED = 1;
-/** Full speed of a leg, radians a second. */
-export const MAX_LEG_SPEED = 2;
+export { MAX_HAND_SPEED, MAX_LEG_SPEED };
+
 /** How far a hand is pulled from its shoulder, arm lengths. */
 export const MAX_TARGET_REACH = 1;
 /** The angles a thigh is pulled to, radians forwards from straight down. */
 export const THIGH_RANGE: readonly [number, number] = [MIN_THIGH_ANGLE_RAD, MAX_THIGH_ANGLE_RAD];
 /** A target is gone to in this many milliseconds at most. */
-const MAX_TARGET_DURATION_MS = 33;
+const MAX_TARGET_DURATION_MS = MAX_TARGET_DURATION_US / 1000;
 
 export class LimbTarget {
   /** Whether the limb is, or is being, held. */

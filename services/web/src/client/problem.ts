@@ -44,7 +44,7 @@ export class ProblemError extends Error {
       0,
       translate("No answer"),
       translate("the server cannot be reached"),
-      translate("look at the line, then try again"),
+      translate("check your connection, then try again"),
       null,
       null,
       speech,

@@ -21,8 +21,8 @@ const UNAUTHORIZED_CLOSE_CODE = 4401;
 
 /** Plain words for closes that bring none of their own. */
 const CLOSE_REASONS: Readonly<Record<number, PlainMessageKey>> = {
-  1000: "the server has ended it",
-  1006: "the line was lost",
+  1000: "ended by the server",
+  1006: "the connection was lost",
   1011: "the server failed",
   1012: "the server restarts",
   1013: "the server is too busy",

@@ -25,7 +25,7 @@ export async function diagnoseUnreachable(
   if (origin.startsWith("https:") && server.startsWith("http:") && !LOCAL_HOST.test(new URL(server).hostname)) {
     return {
       title: translate("The stage cannot be shown here"),
-      text: translate("This page came over https, and browsers let it speak with no server that has none."),
+      text: translate("This page uses https, so browsers do not let it connect to a server without https."),
       isFinal: true,
     };
   }
@@ -33,16 +33,19 @@ export async function diagnoseUnreachable(
     const text =
       origin === "null"
         ? translate(
-            "This page was opened from a file. The stage's server lets such pages in only if BUNRAKU_ORIGINS has null in it.",
+            "This page was opened from a file. The stage's server allows such pages only if BUNRAKU_ORIGINS contains null.",
           )
-        : translate("The stage's server does not know this site. Its host can let it in: BUNRAKU_ORIGINS={origin}", {
-            origin,
-          });
+        : translate(
+            "The stage's server does not allow this site. Its operator can allow it: BUNRAKU_ORIGINS={origin}",
+            {
+              origin,
+            },
+          );
     return { title: translate("The stage cannot be shown here"), text, isFinal: true };
   }
   return {
     title: translate("The stage does not answer"),
-    text: translate("Its server cannot be reached now. It is tried again and again."),
+    text: translate("The server cannot be reached now. Retrying automatically."),
     isFinal: false,
   };
 }

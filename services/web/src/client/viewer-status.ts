@@ -5,13 +5,13 @@ import { type PlainMessageKey, pageTranslator } from "../i18n/translator";
 import type { Choice } from "../wire/messages";
 
 const CHOICE_REASONS: Readonly<Record<string, PlainMessageKey>> = {
-  best: "the best there is",
-  line: "as much as the line carries",
-  hands: "so that pulled limbs come in time",
-  machine: "as drawing takes this machine long",
-  buffer: "until more is ready ahead",
-  start: "more is tried once this goes well",
-  hidden: "as nobody looks at this tab",
+  best: "the best available",
+  line: "as much as the connection allows",
+  hands: "so that controlled limbs arrive in time",
+  machine: "since drawing is slow on this device",
+  buffer: "until more is buffered",
+  start: "raised once this level is stable",
+  hidden: "since this tab is in the background",
   pinned: "pinned by the address",
 };
 

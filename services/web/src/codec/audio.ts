@@ -1,8 +1,8 @@
 /**
- * Audio beside the motion: Opus packets in the motion's own blocks (`proto/SPEC.md`, Track `audio` and Audio block).
+ * Audio track: Opus packets in the blocks of a motion (`proto/SPEC.md`, Track `audio` and Audio block).
  *
- * Every packet holds `PACKET` samples, and packet p sounds from sample `PACKET` p - pre-skip on; sample 0 is the motion's first
- * frame. A packet lies in the block in which it starts. Nothing here decodes a packet.
+ * A packet contains `PACKET_SAMPLES` samples; packet p starts at sample `PACKET_SAMPLES` * p - pre-skip, and sample 0
+ * is the motion's first frame. A packet is in the block in which it starts. This module does not decode Opus.
  */
 
 import { DamagedBlock } from "./errors";
@@ -10,7 +10,7 @@ import { Timing, type TrackDescription } from "./timing";
 
 export const AUDIO_CODEC = "bunraku.audio/1";
 
-/** Samples a second, of every track: Opus's own. */
+/** Sample rate of all tracks, which is Opus's own. */
 export const SAMPLE_RATE = 48_000;
 
 /** Samples of a packet: 60 ms. */
@@ -19,31 +19,31 @@ export const PACKET_SAMPLES = 2_880;
 const MAX_BLOCK_BYTES = 65_536;
 const MAX_PRE_SKIP_SAMPLES = 2 * PACKET_SAMPLES;
 const MAX_LEVELS = 16;
-// what four bytes number
+// packet numbers are LEB128 of at most four bytes
 const MAX_PACKETS = 2 ** 28;
-// a track is shorter than 2^48 microseconds
+// a duration is less than 2^48 microseconds
 const MAX_SAMPLES = 0.048 * 2 ** 48;
 
 const SILK_FRAME_MS = [10, 20, 40, 60];
 const CELT_FRAME_MS = [2.5, 5, 10, 20];
 
-/** One Opus packet: its number in the track, and its bytes (a view of the block's). */
+/** One Opus packet and its number in the track. Its bytes are a view of the block's. */
 export interface AudioPacket {
   readonly number: number;
   readonly data: Uint8Array;
 }
 
-/** Constants of an audio track, as in the Description; its blocks are the motion's. */
+/** Constants of an audio track, whose blocks are those of the motion. */
 export class AudioTrack extends Timing {
-  /** Packets of each rate. */
+  /** Number of packets at each bitrate level. */
   readonly packetCount: number;
 
   /**
    * @param motion frames and blocks of the motion
-   * @param channels what to decode to, 1 or 2
-   * @param preSkip samples that come out of a decoder before the first
-   * @param samples sound in all, after which there is silence
-   * @param kbps of each rate, from the lowest to the highest
+   * @param channels channels of the decoder output, 1 or 2
+   * @param preSkip first samples of the decoder output, which are not played
+   * @param samples following samples, which are played
+   * @param kbps bitrate of each level, lowest first
    */
   constructor(
     motion: Timing,
@@ -56,41 +56,45 @@ export class AudioTrack extends Timing {
     this.packetCount = Math.ceil((samples + preSkip) / PACKET_SAMPLES);
   }
 
-  /** The sample with which packet `number` starts, at motion time 0 sample 0; of packet 0 it is negative. */
+  /** Returns the sample with which packet `number` starts, relative to motion time 0. Packet 0 is negative. */
   firstSample(number: number): number {
     return PACKET_SAMPLES * number - this.preSkip;
   }
 
-  /** Motion time at which packet `number` starts, microseconds, not always a whole number; of packet 0 it is negative. */
+  /**
+   * Returns the motion time of the start of packet `number`, microseconds, not always an integer. Packet 0 is negative.
+   */
   packetStartUs(number: number): number {
     return (this.firstSample(number) * 1e6) / SAMPLE_RATE;
   }
 
-  /** The packet whose sound is heard at motion time `positionUs`, microseconds; there may be none of that number any more. */
+  /** Returns the number of the packet at a motion time in microseconds, possibly beyond the last packet. */
   packetAt(positionUs: number): number {
     return Math.floor(((positionUs * SAMPLE_RATE) / 1e6 + this.preSkip) / PACKET_SAMPLES);
   }
 
   /**
-   * The track that a Description's map of type `audio` tells of, beside a motion of the timing `motion`.
+   * Returns the track of a Description's map of type `audio`, for a motion.
    *
-   * @throws DamagedBlock where it tells of none that can be played here
+   * @throws DamagedBlock if it is invalid or of another codec
    */
   static fromDescription(description: TrackDescription, motion: Timing): AudioTrack {
     const { codec, channels, pre_skip: preSkip, samples, rates } = description;
     if (codec !== AUDIO_CODEC)
-      throw new DamagedBlock(`audio is of codec ${String(codec)}; this client reads ${AUDIO_CODEC}`);
-    const whole = (value: unknown, least: number, most: number) =>
-      Number.isInteger(value) && Number(value) >= least && Number(value) <= most;
-    if (!whole(channels, 1, 2)) throw new DamagedBlock("audio needs channels, 1 or 2");
-    if (!whole(preSkip, 0, MAX_PRE_SKIP_SAMPLES))
-      throw new DamagedBlock(`audio needs pre_skip, 0..${MAX_PRE_SKIP_SAMPLES} samples`);
-    if (!whole(samples, 1, MAX_SAMPLES)) throw new DamagedBlock("audio needs samples, one at least");
+      throw new DamagedBlock(`Unsupported audio codec ${String(codec)}, expected ${AUDIO_CODEC}.`);
+    const isInRange = (value: unknown, min: number, max: number) =>
+      Number.isInteger(value) && Number(value) >= min && Number(value) <= max;
+    if (!isInRange(channels, 1, 2)) throw new DamagedBlock("Invalid audio track: channels must be 1 or 2.");
+    if (!isInRange(preSkip, 0, MAX_PRE_SKIP_SAMPLES))
+      throw new DamagedBlock(`Invalid audio track: pre_skip must be 0..${MAX_PRE_SKIP_SAMPLES}.`);
+    if (!isInRange(samples, 1, MAX_SAMPLES))
+      throw new DamagedBlock("Invalid audio track: samples must be at least 1 and less than 2^48 microseconds.");
     if (!Array.isArray(rates) || rates.length < 1 || rates.length > MAX_LEVELS) {
-      throw new DamagedBlock(`audio needs rates, 1..${MAX_LEVELS} of them`);
+      throw new DamagedBlock(`Invalid audio track: rates must have 1..${MAX_LEVELS} entries.`);
     }
-    const kbps = rates.map((rate: { kbps?: unknown } | null, nth) => {
-      if (!Number.isFinite(rate?.kbps)) throw new DamagedBlock(`rate ${nth} of audio needs kbps, a number`);
+    const kbps = rates.map((rate: { kbps?: unknown } | null, level) => {
+      if (!Number.isFinite(rate?.kbps))
+        throw new DamagedBlock(`Invalid audio track: rate ${level} must have kbps, a number.`);
       return Number(rate!.kbps);
     });
     return new AudioTrack(motion, Number(channels), Number(preSkip), Number(samples), kbps);
@@ -98,47 +102,52 @@ export class AudioTrack extends Timing {
 }
 
 /**
- * The packets of one block, in order; none where it has no bytes.
+ * Returns the packets of one block, in order.
  *
- * @throws DamagedBlock on what cannot be a block
+ * @throws DamagedBlock
  */
 export function unpackAudioBlock(data: Uint8Array): AudioPacket[] {
   if (data.length > MAX_BLOCK_BYTES)
-    throw new DamagedBlock(`an audio block has at most ${MAX_BLOCK_BYTES} bytes, not ${data.length}`);
+    throw new DamagedBlock(`Invalid audio block: ${data.length} bytes, at most ${MAX_BLOCK_BYTES} are allowed.`);
   const packets: AudioPacket[] = [];
   if (data.length === 0) return packets;
-  let at = 0;
-  const read = (): number => {
-    for (let value = 0, shift = 0; shift < 28 && at < data.length; shift += 7) {
-      const byte = data[at++];
+  let offset = 0;
+  const readLeb128 = (): number => {
+    for (let value = 0, shift = 0; shift < 28 && offset < data.length; shift += 7) {
+      const byte = data[offset++];
       value |= (byte & 127) << shift;
       if (byte < 128) return value;
     }
-    throw new DamagedBlock("a number in an audio block has 1 to 4 bytes");
+    throw new DamagedBlock("Invalid audio block: an integer must have 1 to 4 bytes.");
   };
-  let number = read();
-  for (; at < data.length; number++) {
-    const size = read();
-    const packet = data.subarray(at, at + size);
-    if (size === 0 || packet.length < size) {
-      throw new DamagedBlock(`packet ${number} of an audio block has ${packet.length} of its ${size} bytes`);
+  let number = readLeb128();
+  for (; offset < data.length; number++) {
+    const length = readLeb128();
+    const packet = data.subarray(offset, offset + length);
+    if (length === 0 || packet.length < length) {
+      throw new DamagedBlock(`Invalid audio block: packet ${number} has ${packet.length} of ${length} bytes.`);
     }
     const ms = packetDurationMs(packet);
-    if (ms !== 60) throw new DamagedBlock(`packet ${number} of an audio block lasts ${ms} ms, not 60`);
+    if (ms !== 60) throw new DamagedBlock(`Invalid audio block: packet ${number} lasts ${ms} ms, not 60.`);
     packets.push({ number, data: packet });
-    at += size;
+    offset += length;
   }
   if (packets.length === 0 || number > MAX_PACKETS) {
-    throw new DamagedBlock("an audio block has packets, numbered below 2^28, or no bytes at all");
+    throw new DamagedBlock("Invalid audio block: expected packets with numbers below 2^28, or no bytes at all.");
   }
   return packets;
 }
 
-/** How long an Opus packet sounds, by its first bytes (RFC 6716, section 3.1). */
+/** Returns the duration of an Opus packet from its first bytes (RFC 6716, section 3.1). */
 export function packetDurationMs(packet: Uint8Array): number {
-  const kind = packet[0] >> 3;
+  const configuration = packet[0] >> 3;
   const code = packet[0] & 3;
-  const frame = kind < 12 ? SILK_FRAME_MS[kind & 3] : kind < 16 ? SILK_FRAME_MS[kind & 1] : CELT_FRAME_MS[kind & 3];
+  const frame =
+    configuration < 12
+      ? SILK_FRAME_MS[configuration & 3]
+      : configuration < 16
+        ? SILK_FRAME_MS[configuration & 1]
+        : CELT_FRAME_MS[configuration & 3];
   if (code < 3) return code === 0 ? frame : 2 * frame;
   return packet.length > 1 ? frame * (packet[1] & 63) : 0;
 }

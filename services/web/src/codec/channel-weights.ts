@@ -1,6 +1,7 @@
 /**
- * What a channel's values are multiplied with before they are quantised, from the dancer alone (`proto/SPEC.md`, Weights): how
- * far a small turn moves what hangs on the joint, on axes that mean the same on every skeleton.
+ * Weights of the channels: how far a small rotation of each joint moves the body (`proto/SPEC.md`, Weights). A
+ * channel's values are multiplied with its weight before they are quantised. Weights depend on the skeleton description
+ * alone.
  */
 
 import { CHANNEL_COUNT, type Figure, JOINT_COUNT, JOINTS, PARENTS, TIP_JOINTS } from "../motion/skeleton";
@@ -9,19 +10,19 @@ import { codingAxes, multiplyMatrices } from "./coding-axes";
 const LEVER_EXPONENT = 0.45;
 const TWIST_INERTIA_M2 = 0.06 ** 2;
 
-/** How much finer than its lever says a channel is coded (19). */
+/** Precision of the channels (19) relative to what the lever arms give. */
 const CHANNEL_PRECISION = new Float64Array(CHANNEL_COUNT).fill(1);
 CHANNEL_PRECISION.set([1.15, 0.88, 0.88]);
 for (const name of ["l_midtarsal", "r_midtarsal"]) CHANNEL_PRECISION[JOINTS.indexOf(name) + 1] = 0.87;
 for (const name of ["skullbase", "l_wrist", "r_wrist"]) CHANNEL_PRECISION[JOINTS.indexOf(name) + 1] = 0.9;
 
-/** The weight of each channel and its inverse: matrices [channel 19][3][3]. */
+/** Weight of each channel and its inverse: matrices [channel 19][3][3]. */
 export interface ChannelWeights {
   readonly weights: Float64Array;
   readonly inverseWeights: Float64Array;
 }
 
-/** The weights of the channels of a figure whose rotations are told from `reference` (72). */
+/** Returns the channel weights of a figure whose rotations are relative to `reference` (72). */
 export function channelWeights(figure: Figure, reference: Float64Array): ChannelWeights {
   const squares = Array.from({ length: JOINT_COUNT }, () =>
     Float64Array.of(TWIST_INERTIA_M2, 0, 0, 0, TWIST_INERTIA_M2, 0, 0, 0, TWIST_INERTIA_M2),
@@ -44,22 +45,22 @@ export function channelWeights(figure: Figure, reference: Float64Array): Channel
   }
   const axes = codingAxes(figure, reference);
   squares.forEach((square, joint) => {
-    const care = CHANNEL_PRECISION[joint + 1];
+    const precision = CHANNEL_PRECISION[joint + 1];
     const { values, vectors } = eigenDecomposition(square);
     const symmetric = (power: number) =>
       composeFromEigen(
         vectors,
-        values.map((value) => (Math.sqrt(value) * care) ** power),
+        values.map((value) => (Math.sqrt(value) * precision) ** power),
       );
     const own = axes.subarray(joint * 9, joint * 9 + 9);
     weights.set(multiplyMatrices(own, symmetric(1)), (joint + 1) * 9);
-    // a rotation's inverse is its transpose
+    // the inverse of a rotation is its transpose
     inverses.set(multiplyMatrices(symmetric(-1), transpose(own)), (joint + 1) * 9);
   });
   return { weights, inverseWeights: inverses };
 }
 
-/** The symmetric matrix of eigenvectors (columns) and eigenvalues. */
+/** Returns the symmetric matrix with these eigenvectors (columns) and eigenvalues. */
 function composeFromEigen(vectors: Float64Array, values: Float64Array): Float64Array {
   return multiplyMatrices(
     vectors.map((part, i) => part * values[i % 3]),
@@ -81,13 +82,13 @@ function addLever(square: Float64Array, arms: Float64Array, joint: number, count
 }
 
 /**
- * Eigenvalues (3) and eigenvectors (columns of [3][3]) of a symmetric matrix [3][3], by Jacobi's rotations (Golub and Van Loan,
- * Matrix Computations, 8.5).
+ * Returns the eigenvalues (3) and eigenvectors (columns of [3][3]) of a symmetric matrix [3][3], by Jacobi rotations
+ * (Golub and Van Loan, Matrix Computations, 8.5).
  */
 function eigenDecomposition(symmetric: Float64Array): { values: Float64Array; vectors: Float64Array } {
   const a = symmetric.slice(),
     vectors = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1);
-  // each sweep squares what is left beside the diagonal: six are more than doubles can show
+  // a sweep squares the off-diagonal elements: six reach the precision of doubles
   for (let sweep = 0; sweep < 12; sweep++) {
     for (const [p, q] of [
       [0, 1],
@@ -107,20 +108,20 @@ function eigenDecomposition(symmetric: Float64Array): { values: Float64Array; ve
   return { values: Float64Array.of(a[0], a[4], a[8]), vectors };
 }
 
-/** Turns lines `p` and `q` of a matrix: rows with a `stride` of 3 and numbers 1 apart, columns the other way. */
+/** Rotates rows `p` and `q` of a matrix (`stride` 3, `step` 1) or its columns (`stride` 1, `step` 3). */
 function applyGivensRotation(
   m: Float64Array,
   p: number,
   q: number,
   stride: number,
-  apart: number,
+  step: number,
   cosine: number,
   sine: number,
 ): void {
   for (let i = 0; i < 3; i++) {
-    const x = m[p * stride + i * apart],
-      y = m[q * stride + i * apart];
-    m[p * stride + i * apart] = cosine * x - sine * y;
-    m[q * stride + i * apart] = sine * x + cosine * y;
+    const x = m[p * stride + i * step],
+      y = m[q * stride + i * step];
+    m[p * stride + i * step] = cosine * x - sine * y;
+    m[q * stride + i * step] = sine * x + cosine * y;
   }
 }

@@ -1,4 +1,4 @@
-/** The axes that rotations are coded on, which mean the same on every skeleton (`proto/SPEC.md`, Weights). */
+/** Axes in which rotations are coded, which have the same meaning on every skeleton (`proto/SPEC.md`, Axes). */
 
 import { multiply, rotate, toMatrix } from "../motion/rotation";
 import { type Figure, JOINT_COUNT, JOINTS, PARENTS, TIP_JOINTS } from "../motion/skeleton";
@@ -8,38 +8,40 @@ const UPWARD_JOINTS = ["sacroiliac", "vl5", "skullbase"].map((name) => JOINTS.in
 const HINGE_JOINTS = ["l_", "r_"].flatMap((side) =>
   ["knee", "ankle", "midtarsal", "elbow", "wrist"].map((name) => JOINTS.indexOf(side + name)),
 );
-/** Metres below which a bone has no direction; not on any figure's grid. */
+/** Length below which a bone has no direction; no bone on a grid has exactly this length. */
 const MIN_BONE_LENGTH_M = 0.00095;
 
 /**
- * Rotation matrices [joint 18][3][3] from a joint's own frame to the axes that it is coded on, of a figure whose rotations are
- * told from `reference` (72): of a joint with one bone its hinge, the bone, and what is across both; of the others the dancer's
- * left, up and forward as the references have it.
+ * Returns the rotation matrices [joint 18][3][3] from each joint's own frame to the axes in which it is coded. A joint
+ * with one bone has its hinge, the bone, and their normal as axes. Other joints have the left, up and forward direction
+ * of the figure in its reference pose (72).
  */
 export function codingAxes(figure: Figure, reference: Float64Array): Float64Array {
-  const standing = reference.slice();
-  const onto = new Float64Array(JOINT_COUNT * 9);
+  const world = reference.slice();
+  const axes = new Float64Array(JOINT_COUNT * 9);
   for (let joint = 0; joint < JOINT_COUNT; joint++) {
-    if (joint > 0) multiply(standing, joint * 4, standing, PARENTS[joint] * 4, reference, joint * 4);
-    toMatrix(onto, joint * 9, standing, joint * 4);
+    if (joint > 0) multiply(world, joint * 4, world, PARENTS[joint] * 4, reference, joint * 4);
+    toMatrix(axes, joint * 9, world, joint * 4);
   }
-  const upright = onto.slice();
+  const orientation = axes.slice();
   for (let joint = 0; joint < JOINT_COUNT; joint++) {
     const arms = PARENTS.flatMap((parent, child) =>
       parent === joint ? [figure.offsets.subarray(child * 3, child * 3 + 3)] : [],
     );
     if (TIP_JOINTS.includes(joint)) arms.push(figure.tips.subarray(joint * 3, joint * 3 + 3));
-    const own = onto.subarray(joint * 9, joint * 9 + 9);
+    const own = axes.subarray(joint * 9, joint * 9 + 9);
     const bone = arms.length === 1 ? unitDirection(own, arms[0]) : null;
     if (!bone) continue;
     const offset = figure.offsets.subarray(joint * 3, joint * 3 + 3);
-    const before = HINGE_JOINTS.includes(joint) ? unitDirection(upright.subarray(PARENTS[joint] * 9), offset) : null;
-    own.set(multiplyMatrices(boneAxes(bone, UPWARD_JOINTS.includes(joint), before), own));
+    const parentBone = HINGE_JOINTS.includes(joint)
+      ? unitDirection(orientation.subarray(PARENTS[joint] * 9), offset)
+      : null;
+    own.set(multiplyMatrices(boneAxes(bone, UPWARD_JOINTS.includes(joint), parentBone), own));
   }
-  return onto;
+  return axes;
 }
 
-/** Product of two matrices [3][3]. */
+/** Returns the product of two matrices [3][3]. */
 export function multiplyMatrices(a: Float64Array, b: Float64Array): Float64Array {
   return Float64Array.from({ length: 9 }, (_, i) => {
     const row = i - (i % 3),
@@ -48,20 +50,21 @@ export function multiplyMatrices(a: Float64Array, b: Float64Array): Float64Array
   });
 }
 
-/** The unit vector of `arm` turned by the matrix `onto`; null where it is too short. */
+/** Returns the unit vector of `arm` multiplied by `matrix`, or null if it is too short. */
 function unitDirection(matrix: Float64Array, arm: Float64Array): Float64Array | null {
   const turned = Float64Array.from([0, 3, 6], (row) => dot(matrix, row, arm, 0));
   return unit(turned, 0, turned, 0, MIN_BONE_LENGTH_M) ? turned : null;
 }
 
 /**
- * Axes (rows) with the second along a bone: those of a bone that hangs (stands, if `upward`) carried along the shortest way,
- * turned about the bone to the hinge between it and the bone `before` where they are bent.
+ * Returns axes (rows) of which the second points along `bone`. They are the world axes of a bone that points straight
+ * down (`isUpward`: up), carried by the shortest rotation. If the bone and its parent form an angle, the axes turn
+ * about the bone until the first is the hinge between the two.
  */
 function boneAxes(bone: Float64Array, isUpward: boolean, parentBone: Float64Array | null): Float64Array {
   const axes = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1);
   const up = isUpward ? 1 : -1;
-  // almost opposite: there is no one shortest way
+  // almost opposite: the shortest rotation is ambiguous
   const sign = up * bone[1] > -0.8 ? 1 : -1;
   const turn = new Float64Array(4),
     hinge = new Float64Array(3);

@@ -1,13 +1,14 @@
 /**
- * From what is decoded already to the scale of the next coefficient (`proto/SPEC.md`, Levels, Features, Prior). Everything is
- * in integers, to the same bits as the Python room `codec/contexts.py`; all sums fit in 32 bits.
+ * Context model: predicts the scale of the next coefficient from those already decoded (`proto/SPEC.md`, Levels,
+ * Features, Prior). All arithmetic is in integers that fit in 32 bits, with the same results as
+ * `codec/_kernels/context_model.py`.
  */
 
 import { CHANNEL_COUNT, JOINTS, PARENTS } from "../motion/skeleton";
 import { magnitudeLevels } from "./magnitude-level";
 import { CHANNEL_AXES, FEATURE_COUNT, HIDDEN_UNITS, type Prior, SHARED_FEATURES, SUM_COUNT } from "./prior";
 
-/** Scales are kept within these, in 1/256 octave. */
+/** Limits of a predicted scale, log2 in 1/256. */
 export const MIN_SCALE = -7 * 256;
 export const MAX_SCALE = 14 * 256;
 
@@ -17,19 +18,19 @@ export const FREQUENCY_CLASS_OF = Uint8Array.from(
   (_, k) => [1, 2, 3, 5, 9, 16].filter((first) => k >= first).length,
 );
 
-// a channel that is missing reads zeros here
+// a missing channel reads as zeros
 const NO_CHANNEL = CHANNEL_COUNT;
 
 const PARENT = [NO_CHANNEL, 0, ...PARENTS.slice(1).map((joint) => joint + 1)];
 const MIRROR = [
   NO_CHANNEL,
   NO_CHANNEL,
-  ...JOINTS.slice(1).map((name, before) =>
-    name.startsWith("r_") ? JOINTS.indexOf(`l${name.slice(1)}`) + 1 : before + 1,
+  ...JOINTS.slice(1).map((name, previous) =>
+    name.startsWith("r_") ? JOINTS.indexOf(`l${name.slice(1)}`) + 1 : previous + 1,
   ),
 ];
 
-/** Of each channel its parent's channel, its mirror's and its grandparent's, 19 for none: only channels before it count. */
+/** Parent's, mirror's and grandparent's channel of each channel, 19 for none. Only earlier channels count. */
 export const RELATIVE_CHANNELS = {
   parent: Uint8Array.from(PARENT),
   mirror: Uint8Array.from(MIRROR),
@@ -39,23 +40,24 @@ const { parent: PARENT_OF, mirror: MIRROR_OF, grandparent: GRANDPARENT_OF } = RE
 
 const ZERO_SUMS = new Float64Array(SUM_COUNT);
 
-// zeros on both sides of the frequencies
+// zeros before and after the frequencies
 const PADDING_BEFORE = 3;
 const PADDING_TOTAL = 8;
 
 /**
- * Levels of what is decoded of one block. For each channel, `share` each frequency, take the `scale` of each axis and say what
- * came of it to `see`; then `seeFrequency`, and after the last `seeChannel`.
+ * Magnitude levels of the coefficients of one block that are already decoded. For each frequency of a channel, call
+ * `computeSharedSums`, then `predictScale` and `updateMagnitude` for each axis, then `finishFrequency`; after the last
+ * frequency, `finishChannel`.
  */
 export class ContextModel {
   private readonly width: number;
-  /** Of each coefficient: [channel, and one for none][axis 3][`width`]. */
+  /** Level of each coefficient: [channel, and one for none][axis 3][`width`]. */
   private readonly axisLevels: Int32Array;
-  /** Means of the three axes: [channel, and one for none][`width`]. */
+  /** Means over the three axes: [channel, and one for none][`width`]. */
   private readonly meanLevels: Int32Array;
-  /** Sums of the means over the channels that are done. */
+  /** Sums of the means over the finished channels. */
   private readonly levelTotals: Int32Array;
-  /** Sum of the means of this channel up to the frequency. */
+  /** Sum of this channel's means below the frequency. */
   private runningSum = 0;
   private readonly features = new Float64Array(FEATURE_COUNT);
   private readonly sharedSums = new Float64Array(SUM_COUNT);
@@ -64,8 +66,8 @@ export class ContextModel {
 
   /**
    * @param count frequencies of the block
-   * @param step its step index
-   * @param durationLevel the level of its duration
+   * @param step step index of the block
+   * @param durationLevel level of its duration
    */
   constructor(
     private readonly prior: Prior,
@@ -79,7 +81,7 @@ export class ContextModel {
     this.levelTotals = new Int32Array(this.width);
   }
 
-  /** Sums up what the three axes of frequency `k` share. */
+  /** Computes the features and sums that the three axes of frequency `k` share. */
   computeSharedSums(channel: number, k: number): void {
     const { features: f, meanLevels: means, levelTotals: totals, width, sharedSums: shared } = this;
     const at = k + PADDING_BEFORE;
@@ -126,7 +128,7 @@ export class ContextModel {
     );
   }
 
-  /** The expected size of one coefficient, log2 in 1/256, after `share` of its frequency. */
+  /** Returns the predicted scale of one coefficient, log2 in 1/256, after `computeSharedSums` of its frequency. */
   predictScale(channel: number, axis: number, k: number): number {
     const { features: f, axisLevels: axes, width, sharedSums: shared, sums } = this;
     const { weights, biases, out } = this.prior;
@@ -138,7 +140,7 @@ export class ContextModel {
     f[24] = axes[own - 1];
     f[25] = axes[own - 2];
     f[26] = axes[own - 3];
-    // axes that are not yet decoded are still zero
+    // axes that are not decoded yet are zero
     f[27] = axes[first];
     f[28] = axes[first + width];
     f[29] = axes[parent];
@@ -157,21 +159,21 @@ export class ContextModel {
       weights,
       z * FEATURE_COUNT * SUM_COUNT,
     );
-    let result = sums[0] >> 8;
+    let scale = sums[0] >> 8;
     for (let unit = 0; unit < HIDDEN_UNITS; unit++) {
       const x = sums[1 + unit] >> 8;
-      if (x > 0) result += Math.imul(x < 32767 ? x : 32767, out[z * HIDDEN_UNITS + unit]) >> 12;
+      if (x > 0) scale += Math.imul(x < 32767 ? x : 32767, out[z * HIDDEN_UNITS + unit]) >> 12;
     }
-    return result < MIN_SCALE ? MIN_SCALE : result > MAX_SCALE ? MAX_SCALE : result;
+    return scale < MIN_SCALE ? MIN_SCALE : scale > MAX_SCALE ? MAX_SCALE : scale;
   }
 
-  /** Notes the size of a coefficient. */
+  /** Stores the level of a coefficient. */
   updateMagnitude(channel: number, axis: number, k: number, magnitude: number): void {
     this.axisLevels[(channel * 3 + axis) * this.width + k + PADDING_BEFORE] =
       this.magnitudeLevels[magnitude < 4095 ? magnitude : 4095];
   }
 
-  /** Notes that the three axes of a frequency are decoded. */
+  /** Updates the mean of a frequency after its three axes. */
   finishFrequency(channel: number, k: number): void {
     const { axisLevels: axes, width } = this;
     const at = channel * 3 * width + k + PADDING_BEFORE;
@@ -180,7 +182,7 @@ export class ContextModel {
     this.runningSum += mean;
   }
 
-  /** Notes that a channel is decoded. */
+  /** Adds the means of a finished channel to the totals. */
   finishChannel(channel: number): void {
     const { meanLevels: means, levelTotals: totals, width } = this;
     for (let at = 0; at < width; at++) totals[at] += means[channel * width + at];
@@ -188,9 +190,9 @@ export class ContextModel {
 }
 
 /**
- * The nine sums, into `out`: `start`, the biases from `bias` on, and features `from` .. `to` - 1 weighted with [feature][sum] from
- * `base` on. They are named one by one because they are to stay in registers: most of a decoder's time is spent here. They
- * are whole numbers in doubles, which multiply and add at least as fast, and there are more registers for them.
+ * Computes the nine sums: `start`, plus the biases from index `bias`, plus the features `from` .. `to` - 1 times the
+ * weights [feature][sum] from index `base`. A decoder spends most of its time here, so each sum is a variable that
+ * stays in a register. The sums are integers in doubles, which are at least as fast and have more registers.
  */
 function accumulateSums(
   out: Float64Array,
@@ -237,8 +239,8 @@ function accumulateSums(
 }
 
 /**
- * Context of the sign of the coefficient at `at` of `q`, whose frequency is `k`: a movement that a block cuts off leaves every
- * second frequency with one sign.
+ * Returns the context of the sign of the coefficient at `offset`, frequency `k`, from those two and four frequencies
+ * below. If a block cuts a movement off, every second frequency has the same sign.
  */
 export function signContext(q: Float64Array, offset: number, k: number): number {
   const near = k > 2 ? q[offset - 2] : 0;

@@ -1,4 +1,4 @@
-/** A block that cannot be decoded: damaged, hostile, or of another format. The message says why. */
+/** Invalid bytes or description: damaged, hostile, or of another codec. The message gives the reason. */
 export class DamagedBlock extends Error {
   override readonly name = "DamagedBlock";
 }

@@ -1,4 +1,4 @@
-/** A motion block to the pose at any instant (`proto/SPEC.md`, Motion block, format 2). */
+/** Decoder of motion blocks: bytes to poses at any instant (`proto/SPEC.md`, Motion block). */
 
 import { fromRotationVector, multiply } from "../motion/rotation";
 import { CHANNEL_COUNT, JOINT_COUNT, type Pose } from "../motion/skeleton";
@@ -7,7 +7,7 @@ import type { MotionTrack } from "./motion-track";
 import { loadShippedPrior, type Prior } from "./prior";
 import { cosineBasis } from "./transform";
 
-/** Quantiser step of index 0 for a block of 30 frames, metres; sixteen indices make it twice as large. */
+/** Quantiser step of index 0 for a block of 30 frames, metres. It doubles every 16 indices. */
 const BASE_STEP_M = 2 ** -16;
 
 const cosines = new Float64Array(MAX_BLOCK_FRAMES);
@@ -17,7 +17,7 @@ const rotationVectors = new Float64Array(JOINT_COUNT * 3);
 export class MotionBlock {
   /**
    * @param frames frames of the block
-   * @param count frequencies of each track
+   * @param count frequencies of each axis
    * @param values coefficients [channel 19][axis 3][count], metres, then radians
    * @param reference rotations (72) that the rotation vectors are relative to
    */
@@ -28,7 +28,7 @@ export class MotionBlock {
     readonly reference: Float64Array,
   ) {}
 
-  /** The pose at `t`, in frames from the block's first, any real in [-1/2, frames - 1/2], written into `out`. */
+  /** Writes the pose at `t`, in frames from the block's first, any real in [-1/2, frames - 1/2], into `out`. */
   poseAt(t: number, out: Pose): void {
     const { count, values, reference } = this;
     cosineBasis(cosines, this.frames, count, t);
@@ -46,23 +46,24 @@ export class MotionBlock {
   }
 }
 
-/** Quantiser step at step index `index` of the weighted coefficients of a block of `frames` frames, metres. */
+/** Returns the quantiser step at a step index for a block of `frames` frames, metres. */
 export function stepSize(index: number, frames: number): number {
   return BASE_STEP_M * 2 ** (index / 16) * Math.sqrt(frames / 30);
 }
 
-/** The value of a quantised coefficient, in steps: a little below the middle, where values are denser. */
+/**
+ * Returns the value of a quantised coefficient in steps, a little below the middle: smaller values are more frequent.
+ */
 export function reconstruct(q: number): number {
   if (q === 0) return 0;
-  const less = q === 1 || q === -1 ? 0.06 : 0.03;
-  return q > 0 ? q - less : q + less;
+  const bias = q === 1 || q === -1 ? 0.06 : 0.03;
+  return q > 0 ? q - bias : q + bias;
 }
 
 /**
- * Decodes one block of `track`, with the shipped prior unless another is given: nothing but the prior that it was encoded with
- * decodes a block.
+ * Decodes one block of `track`. `prior` must be the one with which the block was encoded.
  *
- * @throws DamagedBlock on what cannot be one
+ * @throws DamagedBlock
  */
 export function decodeMotionBlock(
   track: MotionTrack,
@@ -71,8 +72,8 @@ export function decodeMotionBlock(
 ): MotionBlock {
   const { frames, step, heading, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps);
   const size = stepSize(step, frames);
-  const { inverseWeights: inverses } = track.weights;
-  // in place: of each frequency the three axes are read before they are written
+  const { inverseWeights } = track.weights;
+  // in place: the three axes of a frequency are read before they are written
   for (let channel = 0; channel < CHANNEL_COUNT; channel++) {
     const w = channel * 9;
     for (let k = 0; k < count; k++) {
@@ -80,9 +81,9 @@ export function decodeMotionBlock(
       const x = reconstruct(q[at]) * size;
       const y = reconstruct(q[at + count]) * size;
       const z = reconstruct(q[at + 2 * count]) * size;
-      q[at] = inverses[w] * x + inverses[w + 1] * y + inverses[w + 2] * z;
-      q[at + count] = inverses[w + 3] * x + inverses[w + 4] * y + inverses[w + 5] * z;
-      q[at + 2 * count] = inverses[w + 6] * x + inverses[w + 7] * y + inverses[w + 8] * z;
+      q[at] = inverseWeights[w] * x + inverseWeights[w + 1] * y + inverseWeights[w + 2] * z;
+      q[at + count] = inverseWeights[w + 3] * x + inverseWeights[w + 4] * y + inverseWeights[w + 5] * z;
+      q[at + 2 * count] = inverseWeights[w + 6] * x + inverseWeights[w + 7] * y + inverseWeights[w + 8] * z;
     }
   }
   return new MotionBlock(frames, count, q, track.referenceRotations(heading));

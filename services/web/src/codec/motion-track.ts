@@ -1,4 +1,4 @@
-/** What the blocks of one motion have in common: sent once, in the Description (`proto/SPEC.md`, Track `motion`). */
+/** Motion track: what the blocks of a motion share, sent once in the Description (`proto/SPEC.md`, Track `motion`). */
 
 import { type Placement, STAGE_CENTRE } from "../motion/placement";
 import { multiply } from "../motion/rotation";
@@ -11,25 +11,25 @@ import { type BitrateLevel, parseLadder, parseTiming, Timing, type TrackDescript
 
 export const MOTION_CODEC = "bunraku.motion/2";
 
-/** Headings of a block's root in a whole turn about y. */
+/** Headings of a block's root in a full turn about y. */
 export const HEADING_COUNT = 64;
 
-/** Metres from the middle of the stage along x and z. */
+/** Limit of the distance from the centre of the stage along x and z, metres. */
 const MAX_PLACEMENT_M = 100;
 
-/** Constants of a motion's blocks, as in the Description. */
+/** Timing and skeleton of a motion, and the weights of its channels. */
 export class MotionTrack extends Timing {
   readonly weights: ChannelWeights;
 
   /**
    * @param fps frames per second
    * @param frames frames of the whole motion
-   * @param blockFrames frames of every block but the first and perhaps the last
+   * @param blockFrames frames of all blocks but the first; the last may be shorter
    * @param firstFrames frames of the first block
-   * @param skeleton limb lengths, and what rotations are told from
-   * @param ladder what each rate costs and keeps, from the lowest to the highest
-   * @param front where the dance faces over its length before it is turned by `place`, radians about y from z towards x
-   * @param placement where it stands
+   * @param skeleton bone lengths and reference pose
+   * @param ladder bitrate levels, lowest first
+   * @param front mean direction that the motion faces before `placement`, radians about y from z towards x
+   * @param placement place on the stage
    */
   constructor(
     fps: number,
@@ -45,12 +45,12 @@ export class MotionTrack extends Timing {
     this.weights = channelWeights(skeleton.figure, skeleton.reference);
   }
 
-  /** The dancer's, as it is decoded. */
+  /** Figure of the skeleton, as it is decoded. */
   get figure(): Figure {
     return this.skeleton.figure;
   }
 
-  /** What a block of this `heading` tells rotations from (72). */
+  /** Returns the quaternions (72) that the rotations of a block with this heading are relative to. */
   referenceRotations(heading: number): Float64Array {
     const rotations = this.skeleton.reference.slice();
     const turn = new Float64Array(4);
@@ -60,24 +60,25 @@ export class MotionTrack extends Timing {
   }
 
   /**
-   * The track that a Description's map of type `motion` tells of.
+   * Returns the track of a Description's map of type `motion`.
    *
-   * @throws DamagedBlock where it tells of none that can be played here
+   * @throws DamagedBlock if it is invalid or of another codec
    */
   static fromDescription(description: TrackDescription): MotionTrack {
     const { codec, dancer, front } = description;
     if (codec !== MOTION_CODEC)
-      throw new DamagedBlock(`motion is of codec ${String(codec)}; this client reads ${MOTION_CODEC}`);
+      throw new DamagedBlock(`Unsupported motion codec ${String(codec)}, expected ${MOTION_CODEC}.`);
     const { fps, frames, blockFrames, firstFrames } = parseTiming(description, "motion");
-    if (!(dancer instanceof Uint8Array)) throw new DamagedBlock("motion needs a dancer, bytes");
-    const rates = parseLadder(description, "motion");
+    if (!(dancer instanceof Uint8Array))
+      throw new DamagedBlock("Invalid motion track: dancer (the skeleton description) must be bytes.");
+    const ladder = parseLadder(description, "motion");
     return new MotionTrack(
       fps,
       frames,
       blockFrames,
       firstFrames,
       unpackSkeletonDescription(dancer),
-      rates,
+      ladder,
       Number.isFinite(front) ? Number(front) : 0,
       parsePlacement(description.place),
     );
@@ -85,16 +86,16 @@ export class MotionTrack extends Timing {
 }
 
 /**
- * Where the dancer of a track dances, from its map's `place`.
+ * Returns the placement in a map's `place`.
  *
  * @throws DamagedBlock
  */
 function parsePlacement(place: unknown): Placement {
   if (place === undefined) return STAGE_CENTRE;
   if (!Array.isArray(place) || place.length !== 3 || !place.every(Number.isFinite))
-    throw new DamagedBlock("motion needs a place of three numbers");
+    throw new DamagedBlock("Invalid motion track: place must have three numbers.");
   const [x, z, turn] = place as [number, number, number];
   if (Math.abs(x) > MAX_PLACEMENT_M || Math.abs(z) > MAX_PLACEMENT_M)
-    throw new DamagedBlock(`motion needs a place within ${MAX_PLACEMENT_M} metres`);
+    throw new DamagedBlock(`Invalid motion track: place must be within ${MAX_PLACEMENT_M} metres of the centre.`);
   return { x, z, turn };
 }

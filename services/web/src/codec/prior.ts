@@ -1,34 +1,34 @@
 /**
- * What the coder expects of human motion before it has seen any (`proto/SPEC.md`, Prior): integers, the same as the Python
- * room's, from the same file, laid out in the order in which they are read.
+ * Prior of the context model: fixed integers, trained on human motion (`proto/SPEC.md`, Prior). They come from the same
+ * file as in Python, and are stored in the order in which the decoder reads them.
  */
 
 import shippedValues from "../../../../proto/prior.json";
 import { CHANNEL_COUNT } from "../motion/skeleton";
 
-/** Features of a frequency that its three axes share; `FEATURES` - `SHARED` more are each axis's own. */
+/** Features of a frequency that its three axes share; the others belong to each axis. */
 export const SHARED_FEATURES = 24;
 export const FEATURE_COUNT = 32;
 export const HIDDEN_UNITS = 8;
-/** Sums of a coefficient: the linear one, then one for each hidden unit. */
+/** Sums of a coefficient: the linear one, then one per hidden unit. */
 export const SUM_COUNT = 1 + HIDDEN_UNITS;
 export const FREQUENCY_CLASSES = 7;
-/** Scales of a table of hazards: 2^-7 .. 2^4.75 in quarter octaves. */
+/** Rows of a hazard table: scales from 2^-7 to 2^4.75 in quarter octaves. */
 export const HAZARD_ROWS = 48;
-/** Of each class the table of hazards: its sizes are spread alike. */
+/** Hazard table of each frequency class. Classes with similar distributions of magnitudes share a table. */
 export const HAZARD_TABLE_OF: readonly number[] = [0, 0, 0, 1, 1, 2, 2];
 const HAZARD_TABLES = 3;
-/** Decisions "larger than this?" before an escape. */
+/** Decisions "magnitude greater than v?" before an escape. */
 export const UNARY_DECISIONS = 18;
 /** Sign contexts of a class. */
 export const SIGN_CONTEXTS = 15;
 export const CHANNEL_AXES = 3 * CHANNEL_COUNT;
 
-/** The network from features to a scale, the hazards of each scale and the signs' odds: probabilities of a 1 in 1/32768. */
+/** Network from features to a scale, hazard tables and sign probabilities; probabilities of a 1 in 1/32768. */
 export interface Prior {
-  /** What a feature adds to each sum: [class][feature][sum]. */
+  /** Weights of the features in each sum: [class][feature][sum]. */
   readonly weights: Float64Array;
-  /** What each sum starts at: [class][axis of a channel][sum]. */
+  /** Initial values of the sums: [class][channel axis][sum]. */
   readonly biases: Float64Array;
   /** [class][hidden unit] */
   readonly out: Int32Array;
@@ -49,29 +49,29 @@ const SHAPES = {
   sign: [FREQUENCY_CLASSES, SIGN_CONTEXTS],
 } as const;
 
-/** A prior as it stands in JSON: rows of integers by name. */
+/** A prior in JSON: rows of integers by name. */
 export type PriorValues = Readonly<Record<keyof typeof SHAPES, readonly (readonly number[])[]>>;
 
-/** The prior of `values`; throws where a shape is wrong. */
+/** Returns the prior of JSON values. Throws an Error for a wrong shape. */
 export function parsePrior(values: PriorValues): Prior {
   for (const [name, [rows, columns]] of Object.entries(SHAPES)) {
     const array = values[name as keyof PriorValues];
     if (array.length !== rows || array.some((row) => row.length !== columns)) {
-      throw new Error(`a prior's ${name} has ${rows} rows of ${columns} numbers`);
+      throw new Error(`Invalid prior: ${name} must have ${rows} rows of ${columns} numbers.`);
     }
   }
   const { linear, bias, hidden, hidden_bias: hiddenBias, hidden_class: hiddenClass, out, hazard, sign } = values;
   const weights = new Float64Array(FREQUENCY_CLASSES * FEATURE_COUNT * SUM_COUNT);
   const biases = new Float64Array(FREQUENCY_CLASSES * CHANNEL_AXES * SUM_COUNT);
   const outs = new Int32Array(FREQUENCY_CLASSES * HIDDEN_UNITS);
-  for (let z = 0, weight = 0, start = 0; z < FREQUENCY_CLASSES; z++) {
+  for (let z = 0, weight = 0, initial = 0; z < FREQUENCY_CLASSES; z++) {
     for (let i = 0; i < FEATURE_COUNT; i++) {
       weights[weight++] = linear[z][i];
       for (let unit = 0; unit < HIDDEN_UNITS; unit++) weights[weight++] = hidden[unit][i];
     }
     for (let i = 0; i < CHANNEL_AXES; i++) {
-      biases[start++] = bias[z][i];
-      for (let unit = 0; unit < HIDDEN_UNITS; unit++) biases[start++] = hiddenBias[unit][i] + hiddenClass[unit][z];
+      biases[initial++] = bias[z][i];
+      for (let unit = 0; unit < HIDDEN_UNITS; unit++) biases[initial++] = hiddenBias[unit][i] + hiddenClass[unit][z];
     }
     for (let unit = 0; unit < HIDDEN_UNITS; unit++) outs[z * HIDDEN_UNITS + unit] = out[unit][z];
   }
@@ -80,7 +80,7 @@ export function parsePrior(values: PriorValues): Prior {
 
 let shippedPriorCache: Prior | null = null;
 
-/** The prior that every stream of `bunraku.motion/2` is coded with. */
+/** Returns the prior with which every stream of `bunraku.motion/2` is coded. */
 export function loadShippedPrior(): Prior {
   return (shippedPriorCache ??= parsePrior(shippedValues));
 }

@@ -1,16 +1,18 @@
-/** When the blocks of a track are, the same of a motion and of the scene about it (`proto/SPEC.md`, Description). */
+/** Division of a track into blocks over time, the same for motion, scene and audio (`proto/SPEC.md`, Description). */
 
 import { MAX_BLOCK_FRAMES } from "./coefficients";
 import { DamagedBlock } from "./errors";
 
-// instants are whole microseconds, a track is shorter than 2^48 of them
+// instants are integer microseconds, and a duration is less than 2^48 of them
 const MAX_FPS = 100_000;
 const MAX_DURATION_US = 2 ** 48;
-// a day of 1 s blocks; and as many rates as a Data Packet can number
+// a day of blocks of 1 s; a Data message has four bits for the level
 const MAX_BLOCKS = 86_400;
 const MAX_LEVELS = 16;
 
-/** One encoding of a track: kbit/s of blocks over the duration, mean error in mm (SPEC.md says of what), and what none exceeds. */
+/**
+ * One encoding of a track: bitrate over its duration, mean error and error bound in mm (`proto/SPEC.md`, Description).
+ */
 export interface BitrateLevel {
   kbps: number;
   mean: number;
@@ -25,7 +27,7 @@ export class Timing {
   /**
    * @param fps frames per second
    * @param frames frames of the whole track
-   * @param blockFrames frames of every block but the first and perhaps the last
+   * @param blockFrames frames of all blocks but the first; the last may be shorter
    * @param firstFrames frames of the first block
    */
   constructor(
@@ -37,29 +39,29 @@ export class Timing {
     this.blockCount = 1 + Math.ceil((frames - firstFrames) / blockFrames);
   }
 
-  /** Length in microseconds. */
+  /** Duration in microseconds. */
   get durationUs(): number {
     return Math.round((this.frames * 1e6) / this.fps);
   }
 
-  /** Frame of the motion with which block `index` starts. */
+  /** Returns the frame of the motion with which block `index` starts. */
   firstFrame(index: number): number {
     return index > 0 ? this.firstFrames + (index - 1) * this.blockFrames : 0;
   }
 
-  /** Frames of block `index`. */
+  /** Returns the number of frames of block `index`. */
   framesIn(index: number): number {
     return index > 0 ? Math.min(this.blockFrames, this.frames - this.firstFrame(index)) : this.firstFrames;
   }
 
-  /** Motion time of the first frame of block `index`, microseconds. */
+  /** Returns the motion time of the first frame of block `index`, microseconds. */
   startUs(index: number): number {
     return Math.round((this.firstFrame(index) * 1e6) / this.fps);
   }
 
-  /** Index of the block that holds the instant `positionUs`, kept within the motion. */
+  /** Returns the index of the block at a motion time, limited to the blocks of the track. */
   blockAt(positionUs: number): number {
-    // a block's start is rounded to the microsecond
+    // a start is rounded to the microsecond and may be slightly before its frame
     const frame = ((positionUs + 1) * this.fps) / 1e6;
     const index = frame >= this.firstFrames ? Math.floor((frame - this.firstFrames) / this.blockFrames) + 1 : 0;
     return Math.min(index, this.blockCount - 1);
@@ -70,42 +72,45 @@ export class Timing {
 export type TrackDescription = Readonly<Record<string, unknown>>;
 
 /**
- * The timing that the map of a track tells of; `what` names it in messages.
+ * Returns the timing in a Description's map of a track.
  *
- * @throws DamagedBlock where it tells of none that can be played here
+ * @param trackName name of the track in error messages
+ * @throws DamagedBlock
  */
 export function parseTiming(description: TrackDescription, trackName: string): Timing {
   const { fps, frames, block_frames: blockFrames, first_frames: firstFrames } = description;
-  const whole = (value: unknown, most: number) =>
-    Number.isInteger(value) && Number(value) >= 1 && Number(value) <= most;
+  const isCount = (value: unknown, limit: number) =>
+    Number.isInteger(value) && Number(value) >= 1 && Number(value) <= limit;
   if (!(Number.isFinite(fps) && Number(fps) > 0 && Number(fps) <= MAX_FPS)) {
-    throw new DamagedBlock(`${trackName} needs fps, a number above zero and at most ${MAX_FPS}`);
+    throw new DamagedBlock(`Invalid ${trackName} track: fps must be above zero and at most ${MAX_FPS}.`);
   }
-  if (!whole(blockFrames, MAX_BLOCK_FRAMES))
-    throw new DamagedBlock(`${trackName} needs block_frames, 1..${MAX_BLOCK_FRAMES}`);
-  if (!whole(frames, Number(blockFrames) * MAX_BLOCKS))
-    throw new DamagedBlock(`${trackName} needs frames, at least one`);
+  if (!isCount(blockFrames, MAX_BLOCK_FRAMES))
+    throw new DamagedBlock(`Invalid ${trackName} track: block_frames must be 1..${MAX_BLOCK_FRAMES}.`);
+  if (!isCount(frames, Number(blockFrames) * MAX_BLOCKS))
+    throw new DamagedBlock(`Invalid ${trackName} track: frames must be 1..${MAX_BLOCKS} times block_frames.`);
   if ((Number(frames) * 1e6) / Number(fps) >= MAX_DURATION_US)
-    throw new DamagedBlock(`${trackName} needs to last less than 2^48 microseconds`);
-  if (!whole(firstFrames, Math.min(Number(frames), MAX_BLOCK_FRAMES))) {
-    throw new DamagedBlock(`${trackName} needs first_frames, 1..${MAX_BLOCK_FRAMES} and no more than its frames`);
+    throw new DamagedBlock(`Invalid ${trackName} track: its duration must be less than 2^48 microseconds.`);
+  if (!isCount(firstFrames, Math.min(Number(frames), MAX_BLOCK_FRAMES))) {
+    throw new DamagedBlock(
+      `Invalid ${trackName} track: first_frames must be 1..${MAX_BLOCK_FRAMES} and at most frames.`,
+    );
   }
   return new Timing(Number(fps), Number(frames), Number(blockFrames), Number(firstFrames));
 }
 
 /**
- * What each rate of a track costs and keeps, from the lowest to the highest.
+ * Returns the bitrate levels in a Description's map of a track, lowest first.
  *
  * @throws DamagedBlock
  */
 export function parseLadder({ rates }: TrackDescription, trackName: string): BitrateLevel[] {
   if (!Array.isArray(rates) || rates.length < 1 || rates.length > MAX_LEVELS) {
-    throw new DamagedBlock(`${trackName} needs rates, 1..${MAX_LEVELS} of them`);
+    throw new DamagedBlock(`Invalid ${trackName} track: rates must have 1..${MAX_LEVELS} entries.`);
   }
-  return rates.map((rate: Partial<BitrateLevel> | null, nth): BitrateLevel => {
+  return rates.map((rate: Partial<BitrateLevel> | null, level): BitrateLevel => {
     const { kbps, mean, max } = rate ?? {};
     if (![kbps, mean, max].every(Number.isFinite))
-      throw new DamagedBlock(`rate ${nth} needs kbps, mean and max, numbers`);
+      throw new DamagedBlock(`Invalid ${trackName} track: rate ${level} must have kbps, mean and max, numbers.`);
     return { kbps: kbps!, mean: mean!, max: max! };
   });
 }

@@ -1,9 +1,9 @@
 /**
- * Cosine coefficients to the value of a track at any instant: the orthonormal DCT-II over the n frames of a block, x(t) =
+ * Cosine transform of channel values over time: the orthonormal DCT-II over the n frames of a block, x(t) =
  * sum_k s_k X_k cos(pi (t + 1/2) k / n), s_0 = sqrt(1/n), s_k = sqrt(2/n) (`proto/SPEC.md`, Transform).
  */
 
-/** The first `count` cosines, scaled, of a block of `frames` frames at instant `t` in frames, into `out`. */
+/** Writes the first `count` cosines of a block of `frames` frames at `instant`, in frames, into `out`. */
 export function cosineBasis(out: Float64Array, frames: number, count: number, instant: number): void {
   const angle = (Math.PI / frames) * (instant + 0.5);
   const scale = Math.sqrt(2 / frames);

@@ -1,5 +1,4 @@
-/** One stage at work: from when its element comes into a document until it has left it. The element's wiring. */
-
+/** Controller of one `<bunraku-stage>`, from the insertion of the element into a document until its removal. */
 import { ClaimController } from "../app/claim-controller";
 import { findOrCreateSession, Playback } from "../app/playback";
 import { SoundController } from "../app/sound-controller";
@@ -13,12 +12,11 @@ import { ElementRenderer } from "./renderer";
 import { parseStageAddress, type StageAddress } from "./stage-address";
 import { createElementView, type ElementView } from "./view";
 
-/** What its element is told: the name of an event, and its detail. */
+/** Dispatch an event on the element. */
 export type EmitEvent = (event: "ready" | "welcome" | "presence" | "closed" | "error", detail?: unknown) => void;
 
-/** A server that is away is asked again after this, milliseconds. */
+/** Interval between attempts to reach a server that is unavailable. */
 const RETRY_INTERVAL_MS = 4_000;
-/** The status of one that says so itself. */
 const HTTP_SERVICE_UNAVAILABLE = 503;
 
 export class ElementController {
@@ -28,20 +26,19 @@ export class ElementController {
   readonly #view: ElementView;
   readonly #limbController: ClaimController;
   #controls = false;
-  /** Whether there is sound to be heard. */
+  /** True if the motion has sound. */
   #hasSound = false;
   #closed = false;
   #graphicsFailed = false;
   #shownError: string | null = null;
   #retryTimer: ReturnType<typeof setTimeout> | undefined;
-  /** Counts what was asked for: what comes too late is not shown. */
+  /** Number of calls of `show`. Results of earlier calls are discarded. */
   #requestCount = 0;
 
-  /** In `root`; all that it says it says in `speech`. `memory` knows whether sound is wanted. */
   constructor(
     private readonly root: ShadowRoot,
     private readonly translator: Translator,
-    memory: SoundPreferenceStore,
+    soundPreference: SoundPreferenceStore,
     private readonly emit: EmitEvent,
   ) {
     this.#view = createElementView(
@@ -57,13 +54,13 @@ export class ElementController {
       },
       translator,
     );
-    const { toast, limbRequests: asks } = this.#view;
+    const { toast, limbRequests } = this.#view;
     this.#limbController = new ClaimController(
       {
-        limbRequests: asks,
+        limbRequests,
         toast,
         strings: {
-          render: (limbs, ready, chosen) => this.#view.renderLimbs(limbs, this.#canClaimLimbs, ready, chosen),
+          render: (limbs, ready, selected) => this.#view.renderLimbs(limbs, this.#canClaimLimbs, ready, selected),
           notice: (text) => toast(text),
         },
       },
@@ -72,13 +69,13 @@ export class ElementController {
     );
     this.#limbController.viewOnly = true;
     this.soundController = new SoundController(
-      ({ there, heard }) => {
-        this.#view.setSound(there, heard);
-        this.#hasSound = there;
+      ({ available, audible }) => {
+        this.#view.setSound(available, audible);
+        this.#hasSound = available;
         this.#updateBar();
       },
       this.#view.soundButton,
-      memory,
+      soundPreference,
     );
     this.renderer = new ElementRenderer(this.#view, this.#limbController);
     this.renderer.onFirstPose = () => this.emit("ready");
@@ -89,7 +86,7 @@ export class ElementController {
     return this.playback?.viewer.timeline?.playing ?? false;
   }
 
-  /** Plays or pauses: a session for everyone, where that is allowed. */
+  /** Play or pause; a session for all its viewers, if this page may. */
   setPlaying(playing: boolean): void {
     this.playback?.edit({ playing });
   }
@@ -98,28 +95,31 @@ export class ElementController {
     this.playback?.seek(seconds, performance.now());
   }
 
-  /** Shows what `src` names (null: nothing), with controls or only to be watched. */
+  /** Show the stage at the address `src` (null for none), with or without controls. */
   async show(src: string | null, controls: boolean): Promise<void> {
-    const asked = ++this.#requestCount;
+    const request = ++this.#requestCount;
     this.#controls = controls;
     this.#closePlayback();
     this.renderer.controls = controls;
-    // without graphics nothing is asked for
+    // Without graphics no request is made.
     if (this.#graphicsFailed) return;
     this.#clearError();
     if (src === null) return;
-    const source = parseStageAddress(src, document.baseURI);
+    const address = parseStageAddress(src, document.baseURI);
     const { translate } = this.translator;
-    if (!source)
+    if (!address)
       return this.#showError(
-        translate("No stage is here"),
-        translate("{address} is no address of a stage.", { address: JSON.stringify(src) }),
+        translate("No stage here"),
+        translate("{address} is not the address of a stage. Check the src attribute.", {
+          address: JSON.stringify(src),
+        }),
       );
-    const own = source.server === location.origin ? tabToken() : null;
-    await this.#openAddress(source, new Access(source.server, source.token ?? own, this.translator), asked);
+    const pageToken = address.server === location.origin ? tabToken() : null;
+    const access = new Access(address.server, address.token ?? pageToken, this.translator);
+    await this.#openAddress(address, access, request);
   }
 
-  /** Ends it for good: its sockets, its listening and its graphics. */
+  /** Close connections, sound and graphics. */
   close(): void {
     this.#closed = true;
     this.#closePlayback();
@@ -128,77 +128,74 @@ export class ElementController {
     this.#view.remove();
   }
 
-  /** Whether limbs can be taken from here. */
+  /** True if this element may claim limbs. */
   get #canClaimLimbs(): boolean {
     return this.#controls && this.playback?.kind === "sessions" && this.playback.access.allows("control");
   }
 
-  /** Enters what a source names, and tries again while its server is away. */
-  async #openAddress(source: StageAddress, access: Access, asked: number): Promise<void> {
+  /** Open the session or motion at an address; retry while its server is unavailable. */
+  async #openAddress(address: StageAddress, access: Access, request: number): Promise<void> {
     const { translate } = this.translator;
     try {
-      const id = source.id ?? (await findOrCreateSession(Promise.resolve(null), access))?.id ?? null;
-      if (asked !== this.#requestCount || this.#closed) return;
+      const id = address.id ?? (await findOrCreateSession(Promise.resolve(null), access))?.id ?? null;
+      if (request !== this.#requestCount || this.#closed) return;
       if (id === null)
-        this.#showError(
-          translate("The stage is empty"),
-          translate("Nobody dances here now. Come again when somebody does."),
-        );
-      else this.#openPlayback(source, id, access);
+        this.#showError(translate("The stage is empty"), translate("No performance is running now. Come back later."));
+      else this.#openPlayback(address, id, access);
     } catch (error) {
-      if (asked !== this.#requestCount || this.#closed) return;
+      if (request !== this.#requestCount || this.#closed) return;
       if (!(error instanceof ProblemError)) throw error;
-      const final =
+      const isFinal =
         error.status === 0
-          ? await this.#reportUnreachable(source.server, asked)
+          ? await this.#reportUnreachable(address.server, request)
           : error.status !== HTTP_SERVICE_UNAVAILABLE;
       if (error.status !== 0) this.#showProblem(error);
-      if (final || asked !== this.#requestCount || this.#closed) return;
-      this.#retryTimer = setTimeout(() => void this.#openAddress(source, access, asked), RETRY_INTERVAL_MS);
+      if (isFinal || request !== this.#requestCount || this.#closed) return;
+      this.#retryTimer = setTimeout(() => void this.#openAddress(address, access, request), RETRY_INTERVAL_MS);
     }
   }
 
-  #openPlayback({ kind: place, query, server }: StageAddress, id: string, access: Access): void {
-    const asked = this.#requestCount;
+  #openPlayback({ kind, query, server }: StageAddress, id: string, access: Access): void {
+    const request = this.#requestCount;
     const { translate } = this.translator;
-    const failed = (error: unknown) => this.#view.toast(error instanceof ProblemError ? error.message : String(error));
-    const room = new Playback(id, resolveDisplayName(query, Math.random()), failed, {
-      kind: place,
+    const onEditError = (error: unknown) =>
+      this.#view.toast(error instanceof ProblemError ? error.message : String(error));
+    const playback = new Playback(id, resolveDisplayName(query, Math.random()), onEditError, {
+      kind,
       access,
       viewOnly: !this.#controls,
     });
-    this.playback = room;
-    const { viewer, puppeteer } = room;
+    this.playback = playback;
+    const { viewer, puppeteer } = playback;
     let denied = false;
     let opened = false;
     access.onUnauthorized((problem) => {
       denied = true;
-      if (this.playback === room) this.#showProblem(problem);
+      if (this.playback === playback) this.#showProblem(problem);
     });
     this.#limbController.viewOnly = !this.#canClaimLimbs;
-    this.#limbController.setPlayback(room);
-    this.renderer.setPlayback(room);
+    this.#limbController.setPlayback(playback);
+    this.renderer.setPlayback(playback);
     this.soundController.setViewer(viewer);
     (this.root.host as HTMLElement).toggleAttribute("data-hands", this.#canClaimLimbs);
-    const during = (target: EventTarget, event: string, then: (event: Event) => void) =>
-      target.addEventListener(event, (told) => {
-        if (this.playback === room) then(told);
+    const on = (target: EventTarget, type: string, listener: (event: Event) => void) =>
+      target.addEventListener(type, (event) => {
+        if (this.playback === playback) listener(event);
       });
-    for (const news of ["figure", "tracks"])
-      during(viewer, news, () => this.renderer.stageController?.updatePerformers());
-    during(viewer, "timeline", () => this.#updateBar());
-    during(viewer, "presence", () => this.emit("presence", viewer.presence));
-    during(puppeteer, "welcome", () => this.emit("welcome", { id: puppeteer.id, colour: puppeteer.colour }));
-    during(viewer, "open", () => {
-      // asked for less motion, a dance of one's own waits
-      if (this.renderer.still && !opened && place === "motions") room.edit({ playing: false });
+    for (const type of ["figure", "tracks"]) on(viewer, type, () => this.renderer.stageController?.updatePerformers());
+    on(viewer, "timeline", () => this.#updateBar());
+    on(viewer, "presence", () => this.emit("presence", viewer.presence));
+    on(puppeteer, "welcome", () => this.emit("welcome", { id: puppeteer.id, colour: puppeteer.colour }));
+    on(viewer, "open", () => {
+      // With reduced motion, a motion that only this element shows starts paused.
+      if (this.renderer.still && !opened && kind === "motions") playback.edit({ playing: false });
       opened = true;
       this.#limbController.connected = true;
       this.#limbController.render();
       this.#view.toast.showDisconnected(null);
       this.#clearError();
     });
-    during(viewer, "closed", (event) => {
+    on(viewer, "closed", (event) => {
       const reason = String((event as CustomEvent<string>).detail);
       const wasConnected = this.#limbController.connected;
       this.#limbController.connected = false;
@@ -207,58 +204,55 @@ export class ElementController {
       if (viewer.isClosed || denied) this.#view.toast.showDisconnected(null);
       if (denied) return;
       if (viewer.isClosed)
-        this.#view.notice(translate(place === "motions" ? "The dance has ended" : "The session has ended"), reason);
-      else if (!opened) void this.#reportUnreachable(server, asked);
-      else if (wasConnected) this.#view.toast.showDisconnected(translate("The line was lost: {reason}", { reason }));
+        this.#view.notice(translate(kind === "motions" ? "The dance has ended" : "The session has ended"), reason);
+      else if (!opened) void this.#reportUnreachable(server, request);
+      else if (wasConnected)
+        this.#view.toast.showDisconnected(translate("Connection lost, reconnecting: {reason}", { reason }));
     });
     this.#updateBar();
     this.#limbController.render();
   }
 
   #closePlayback(): void {
-    const { playback: room } = this;
+    const { playback } = this;
     clearTimeout(this.#retryTimer);
     this.playback = null;
     this.renderer.setPlayback(null);
     this.soundController.setViewer(null);
     this.#limbController.connected = false;
-    room?.close();
+    playback?.close();
     (this.root.host as HTMLElement).removeAttribute("data-hands");
     this.#view.toast.showDisconnected(null);
     this.#view.setBar(false, null);
   }
 
-  /** Says why no word comes from a server, and gives up, and returns true, where none will. */
-  async #reportUnreachable(server: string, asked: number): Promise<boolean> {
+  /** Show why a server cannot be reached. Returns true, and gives up, if retrying is useless. */
+  async #reportUnreachable(server: string, request: number): Promise<boolean> {
     const { translate } = this.translator;
-    const why = await diagnoseUnreachable(server, location.origin, this.translator);
-    // it can be reached, but what was asked of it cannot be had
-    const {
-      title,
-      text,
-      isFinal: final,
-    } = why ?? {
+    const diagnosis = await diagnoseUnreachable(server, location.origin, this.translator);
+    // Without a diagnosis the server can be reached, but not the session or motion.
+    const { title, text, isFinal } = diagnosis ?? {
       title: translate("The stage does not answer"),
-      text: translate("Its server cannot show it now. It is tried again and again."),
+      text: translate("The server cannot show it now. Retrying automatically."),
       isFinal: false,
     };
-    if (asked !== this.#requestCount || this.#closed || this.#limbController.connected) return false;
-    if (final) this.#closePlayback();
+    if (request !== this.#requestCount || this.#closed || this.#limbController.connected) return false;
+    if (isFinal) this.#closePlayback();
     this.#showError(title, text);
-    return final;
+    return isFinal;
   }
 
   #showProblem({ title, detail, hint }: ProblemError): void {
     this.#showError(title, hint ? this.translator.translate("{detail}; {hint}.", { detail, hint }) : detail);
   }
 
-  /** Says what is in the way: once, however often it is met. */
+  /** Show an error and dispatch it as an event, unless it is shown already. */
   #showError(title: string, text: string): void {
-    const said = this.translator.translate("{title}: {detail}", { title, detail: text });
-    if (said === this.#shownError) return;
-    this.#shownError = said;
+    const message = this.translator.translate("{title}: {detail}", { title, detail: text });
+    if (message === this.#shownError) return;
+    this.#shownError = message;
     this.#view.notice(title, text);
-    this.emit("error", said);
+    this.emit("error", message);
   }
 
   #clearError(): void {
@@ -267,16 +261,16 @@ export class ElementController {
   }
 
   #updateBar(): void {
-    const { playback: room } = this;
-    const editable = room?.isEditable ?? false;
+    const { playback } = this;
+    const isEditable = playback?.isEditable ?? false;
     this.#view.setBar(
-      this.#controls && room !== null && (editable || this.#canClaimLimbs || this.#hasSound),
-      editable ? this.playing : null,
+      this.#controls && playback !== null && (isEditable || this.#canClaimLimbs || this.#hasSound),
+      isEditable ? this.playing : null,
     );
   }
 
   async #startRenderer(): Promise<void> {
-    const missing = await this.renderer.start({
+    const failure = await this.renderer.start({
       next_dancer: () => this.#limbController.selectNextPerformer(),
       ask: () => this.#limbController.requestLimb(),
       give: () => this.#limbController.handOver(),
@@ -285,15 +279,15 @@ export class ElementController {
       back: () => this.playback?.seekByBlocks(-1, performance.now()),
       forward: () => this.playback?.seekByBlocks(1, performance.now()),
     });
-    if (!missing) return;
+    if (!failure) return;
     this.#graphicsFailed = true;
     this.#requestCount++;
     this.#closePlayback();
     const { translate } = this.translator;
-    if (missing === "not loaded")
+    if (failure === "not loaded")
       this.#showError(
         translate("The stage does not answer"),
-        translate("What draws it could not be loaded. Load this page again."),
+        translate("The renderer could not be loaded. Check your connection, then reload this page."),
       );
     else
       this.#showError(

@@ -1,4 +1,4 @@
-/** The script of `<bunraku-stage>`: makes the element known to the page, once. */
+/** Script that registers `<bunraku-stage>`, once per page. */
 import { BunrakuStage } from "./stage-element";
 
 if (!customElements.get("bunraku-stage")) customElements.define("bunraku-stage", BunrakuStage);

@@ -1,4 +1,4 @@
-/** The picture of a showing: what its room shows, drawn in the size of its element while that is in sight. */
+/** Rendering of an embedded stage, in the size of its element and while the element is visible. */
 import type { ClaimController } from "../app/claim-controller";
 import type { Playback } from "../app/playback";
 import type { StageController } from "../app/stage-controller";
@@ -8,12 +8,12 @@ import { loadMapping } from "../input/mapping-store";
 import type { Theme } from "../stage/scenery/look";
 import type { ElementView } from "./view";
 
-/** Narrower than this share of its height, a picture is framed as a phone's. */
+/** Pictures narrower than this ratio of width to height are framed as on a phone. */
 const PORTRAIT_MAX_ASPECT_RATIO = 0.7;
-/** In a picture lower than this the bar stands at its side, pixels (`element.css`). */
+/** In pictures lower than this the bar stands at the side (`element.css`). */
 const SIDE_BAR_MAX_HEIGHT_PX = 380;
 
-/** What keys do beside taking limbs; what else they do is the page's. */
+/** Key actions that the element supports, other than claiming and moving limbs. */
 export type ElementKeyActions = Pick<
   PageActions,
   "next_dancer" | "ask" | "give" | "play" | "back" | "forward" | "sound"
@@ -21,9 +21,9 @@ export type ElementKeyActions = Pick<
 
 export class ElementRenderer {
   stageController: StageController | null = null;
-  /** The limb whose button has the focus. */
+  /** Limb whose button has the focus. */
   focusedLimb: number | null = null;
-  /** Told of the first pose of a room. */
+  /** Called when the first pose of a playback was drawn. */
   onFirstPose: () => void = () => undefined;
   readonly mapping: Mapping = loadMapping();
   #playback: Playback | null = null;
@@ -55,33 +55,32 @@ export class ElementRenderer {
     return this.#still;
   }
 
-  /** Whether the bar is there, for which the picture makes room, and keys are heard. */
+  /** True if the element has controls: the picture then leaves space for the bar, and keys are handled. */
   set controls(controls: boolean) {
     this.#controls = controls;
     this.#resize();
   }
 
-  /** The room to draw from now on; null leaves the last picture. */
+  /** Draw another playback; null leaves the last picture. */
   setPlayback(playback: Playback | null): void {
     this.#playback = playback;
     this.#firstPoseReported = false;
     this.stageController?.setPlayback(playback);
   }
 
-  /** Loads what draws and begins; what is in the way where that cannot be. */
+  /** Load the renderer and start drawing. Returns the reason if that is not possible. */
   async start(keyActions: ElementKeyActions): Promise<"not loaded" | "no graphics" | null> {
-    const theatre = await import("../app/stage-chunk").catch(() => null);
+    const chunk = await import("../app/stage-chunk").catch(() => null);
     if (this.#closed) return null;
-    if (!theatre) return "not loaded";
-    const { listenToKeyboard, listenToMouse, Performing } = theatre;
+    if (!chunk) return "not loaded";
     const { canvas, frame } = this.view;
-    const nothing = () => undefined;
-    const idle = Object.fromEntries(ACTIONS.map((action) => [action, nothing])) as PageActions;
+    const ignore = () => undefined;
+    const ignoreAll = Object.fromEntries(ACTIONS.map((action) => [action, ignore])) as PageActions;
     const camera = () =>
       this.stageController?.stage.followMotionCamera(!this.stageController.stage.followsMotionCamera);
-    const actions: PageActions = { ...idle, camera, ...keyActions };
+    const actions: PageActions = { ...ignoreAll, camera, ...keyActions };
     try {
-      this.stageController = new Performing(canvas, this.limbController, {
+      this.stageController = new chunk.StageController(canvas, this.limbController, {
         getMapping: () => this.mapping,
         actions,
         onClaimsChange: () => this.limbController.render(),
@@ -92,25 +91,29 @@ export class ElementRenderer {
     const { stage, commands, velocity } = this.stageController;
     stage.reducedMotion = this.#still;
     stage.setTheme(this.#theme);
-    const keys = () => (this.#controls ? this.mapping : { ...this.mapping, bindings: {} });
-    listenToKeyboard(frame, commands, velocity, keys, { showKeys: nothing, onEscape: nothing });
-    listenToMouse(canvas, frame, commands, keys);
-    // a finger on a ring pulls it; elsewhere it turns over the page
+    const getMapping = () => (this.#controls ? this.mapping : { ...this.mapping, bindings: {} });
+    chunk.listenToKeyboard(frame, commands, velocity, getMapping, { showKeys: ignore, onEscape: ignore });
+    chunk.listenToMouse(canvas, frame, commands, getMapping);
+    // A finger on a ring drags the limb; elsewhere it scrolls the page.
     canvas.addEventListener("touchstart", (event) => "pulling" in canvas.dataset && event.preventDefault(), {
       passive: false,
     });
     document.addEventListener("visibilitychange", this.#onVisibilityChange);
-    const sizes = new ResizeObserver(() => this.#resize());
-    const sight = new IntersectionObserver((entries) => (this.#isVisible = entries.at(-1)?.isIntersecting ?? true));
-    this.#observers.push(sizes, sight);
-    for (const observer of [sizes, sight]) observer.observe(frame);
+    const resizeObserver = new ResizeObserver(() => this.#resize());
+    const visibilityObserver = new IntersectionObserver(
+      (entries) => (this.#isVisible = entries.at(-1)?.isIntersecting ?? true),
+    );
+    for (const observer of [resizeObserver, visibilityObserver]) {
+      this.#observers.push(observer);
+      observer.observe(frame);
+    }
     this.#resize();
     if (this.#playback) this.stageController.setPlayback(this.#playback);
     this.#animationFrame = requestAnimationFrame(() => this.#draw());
     return null;
   }
 
-  /** Ends it for good, and gives the graphics back. */
+  /** Stop drawing and free the graphics. */
   close(): void {
     this.#closed = true;
     cancelAnimationFrame(this.#animationFrame);
@@ -127,7 +130,7 @@ export class ElementRenderer {
   #resize(): void {
     const { clientWidth: width, clientHeight: height } = this.view.frame;
     if (width === 0 || height === 0) return;
-    // a bar below stands where the page's does
+    // A bar at the bottom covers the same area as the page's transport.
     const framing =
       width < PORTRAIT_MAX_ASPECT_RATIO * height
         ? "phone"
@@ -139,11 +142,11 @@ export class ElementRenderer {
 
   #draw(): void {
     this.#animationFrame = requestAnimationFrame(() => this.#draw());
-    const { stageController: performing } = this;
-    if (!performing || !this.#isVisible) return;
+    const { stageController } = this;
+    if (!stageController || !this.#isVisible) return;
     const now = performance.now();
-    const { pose, limbs } = performing.draw(now, this.focusedLimb);
-    const { stage } = performing;
+    const { pose, limbs } = stageController.draw(now, this.focusedLimb);
+    const { stage } = stageController;
     this.view.nameTags.render(
       limbs,
       pose ? limbs.map((_, limb) => stage.barBox(limb)) : [],

@@ -1,33 +1,33 @@
-/** What the address in `src` names: a server, what is to be seen there, and the token by which one comes in. Pure. */
-
+/** Parsing of the `src` attribute: server, session or motion, and access token. Pure. */
 import type { PlaybackKind } from "../app/playback";
 import { parseUrlToken } from "../client/access";
 
 export interface StageAddress {
-  /** The server's origin, `http(s)://host`. */
+  /** Origin of the server, `http(s)://host`. */
   server: string;
   kind: PlaybackKind;
-  /** Of the session or the motion; null for the session that is on. */
+  /** Id of the session or motion; null for the running session. */
   id: string | null;
   token: string | null;
-  /** What else the address says, such as `name`. */
+  /** Query of the address, for further options such as `name`. */
   query: URLSearchParams;
 }
 
 const STREAM_PATH = /^\/v1\/(sessions|motions)\/([^/]+)(?:\/(?:stream|control))?\/?$/;
 
 /**
- * Reads the address of a page, session or motion of a server, with `base` for one that says no host: `https://stage.example/`,
- * `...?session=ID`, `...?motion=ID`, `.../v1/sessions/ID`, each also with `#share=...` or `#token=...`. Null where it is no such address.
+ * Parse the address of a page, session or motion: `https://stage.example/`, `...?session=ID`, `...?motion=ID` or
+ * `.../v1/sessions/ID`, each optionally with `#share=...` or `#token=...`. A relative address is resolved against
+ * `base`. Returns null for any other address.
  */
 export function parseStageAddress(src: string, base: string): StageAddress | null {
   if (!URL.canParse(src, base)) return null;
   const { protocol, origin, pathname, searchParams: query, hash } = new URL(src, base);
   if (protocol !== "http:" && protocol !== "https:") return null;
-  const source = { server: origin, token: parseUrlToken(hash), query };
-  const [, place, id] = STREAM_PATH.exec(pathname) ?? [];
-  if (id) return { ...source, kind: place as PlaybackKind, id: decodeURIComponent(id) };
+  const common = { server: origin, token: parseUrlToken(hash), query };
+  const [, kind, id] = STREAM_PATH.exec(pathname) ?? [];
+  if (id) return { ...common, kind: kind as PlaybackKind, id: decodeURIComponent(id) };
   const [session, motion] = [query.get("session"), query.get("motion")];
-  if (!session && motion) return { ...source, kind: "motions", id: motion };
-  return { ...source, kind: "sessions", id: session || null };
+  if (!session && motion) return { ...common, kind: "motions", id: motion };
+  return { ...common, kind: "sessions", id: session || null };
 }

@@ -8,22 +8,22 @@ import type { Stage } from "../stage/stage";
 import type { Presence } from "../ui/limb-state";
 import { ElementController } from "./controller";
 
-/** Night or day, or as the system wishes. */
+/** Theme of the element; `auto` follows the system's preference. */
 export type ThemePreference = "night" | "day" | "auto";
 
-/** What its listeners are told, by the name of the event. */
+/** Events of the element. */
 export interface BunrakuStageEvents {
-  /** The first pose is on the stage. */
+  /** The first pose was drawn. */
   ready: CustomEvent<void>;
-  /** The session takes this page for a puppeteer; again each time the line comes back. */
+  /** The session accepted this page as a puppeteer. Sent again after each reconnection. */
   welcome: CustomEvent<{ id: string; colour: number }>;
-  /** Who is here and who holds what. */
+  /** Viewers, puppeteers and holders of limbs changed. */
   presence: CustomEvent<Presence>;
-  /** The line is gone; unless `final`, it comes back by itself. */
+  /** The connection was closed; unless `final`, it is restored automatically. */
   closed: CustomEvent<{ reason: string; final: boolean }>;
-  /** What is in the way, in plain words, which the element shows too. */
+  /** Text of an error that the element shows. */
   error: CustomEvent<string>;
-  /** `muted` or `volume` is another, whoever changed it. */
+  /** `muted` or `volume` changed. */
   volumechange: Event;
 }
 
@@ -31,17 +31,24 @@ const ElementBase: typeof HTMLElement =
   typeof HTMLElement === "undefined" ? (class {} as typeof HTMLElement) : HTMLElement;
 
 /**
- * Attributes, each of which may change at any time: `src` (a page, session or motion of a server, with `#share=...` where it asks for a link), `theme`
- * (`night`, `day`, or `auto`), `controls` (limbs can be taken, and the dance paused; else it is only watched), `still` (less motion; `prefers-reduced-motion` does the same),
- * `muted` (put there or taken away it is followed; left out it is muted at first all the same), `volume`, and `lang`, its own or that of what it stands in: it speaks Japanese or English.
+ * Custom element that shows a stage. Its attributes may change at any time:
+ *
+ * - `src`: address of a page, session or motion of a server, with `#share=...` if the server requires a link.
+ * - `theme`: `night`, `day` or `auto`.
+ * - `controls`: limbs can be claimed and the motion can be paused; otherwise viewing only.
+ * - `still`: less motion, as with `prefers-reduced-motion`.
+ * - `muted`: setting or removing it switches the sound off or on. The element is muted at first in any case.
+ * - `volume`: 0 to 1.
+ * - `lang`: Japanese for `ja`, else English; inherited from the nearest ancestor.
  */
+// biome-ignore lint/suspicious/noUnsafeDeclarationMerging: the interface below only adds types to addEventListener
 export class BunrakuStage extends ElementBase {
   static readonly observedAttributes = ["src", "theme", "controls", "still", "muted", "volume", "lang"] as const;
 
   #controller: ElementController | null = null;
-  /** What it speaks, or will once it has the words; null while it is in no document. */
+  /** Current language, or the one that is being loaded; null while the element is in no document. */
   #language: Language | null = null;
-  /** Counts its beginnings: words that come too late are not spoken. */
+  /** Number of starts and stops, to discard translations that were loaded for an earlier one. */
   #startCount = 0;
   readonly #lightScheme = globalThis.matchMedia?.("(prefers-color-scheme: light)");
   readonly #reducedMotion = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)");
@@ -50,7 +57,7 @@ export class BunrakuStage extends ElementBase {
   #showQueued = false;
   #muted = true;
 
-  /** The address of what is shown, as the attribute has it. */
+  /** Value of the attribute `src`. */
   get src(): string {
     return this.getAttribute("src") ?? "";
   }
@@ -85,8 +92,8 @@ export class BunrakuStage extends ElementBase {
   }
 
   /**
-   * Whether its sound is off, as it always is at first. Its button for sound changes it, or a handler of the visitor's press in the page about it; switched on
-   * without such, it is heard from the visitor's next press anywhere in the page, as browsers will have it.
+   * Whether the sound is off, as it is at first. Browsers only allow sound after a gesture of the user: set this to
+   * false in a handler of one, or it takes effect at the next gesture anywhere in the page.
    */
   get muted(): boolean {
     return this.#muted;
@@ -98,27 +105,28 @@ export class BunrakuStage extends ElementBase {
     this.#applySoundPreference();
   }
 
-  /** How loud, 0 to 1, as it is heard: 1 if nothing else is said. Throws `IndexSizeError` for another number, as `<video>` does. */
+  /** Volume, 0 to 1; 1 by default. Setting any other number throws `IndexSizeError`, as `<video>` does. */
   get volume(): number {
     return parseVolume(this.getAttribute("volume"));
   }
 
   set volume(volume: number) {
-    if (!(volume >= 0 && volume <= 1)) throw new DOMException(`${volume} is no volume: it is 0 to 1`, "IndexSizeError");
+    if (!(volume >= 0 && volume <= 1))
+      throw new DOMException(`The volume ${volume} is outside the range 0 to 1.`, "IndexSizeError");
     this.setAttribute("volume", String(volume));
   }
 
-  /** What comes over the line; null while there is none. It changes with `src`. */
+  /** Viewer of the current session or motion, replaced when `src` changes; null while there is none. */
   get viewer(): Viewer | null {
     return this.#controller?.playback?.viewer ?? null;
   }
 
-  /** One's own hands; null while there is no line. */
+  /** Puppeteer of this page; null while there is no session or motion. */
   get puppeteer(): Puppeteer | null {
     return this.#controller?.playback?.puppeteer ?? null;
   }
 
-  /** What draws; null before it is there, and where the browser cannot. */
+  /** Renderer; null until it was loaded, and if the browser has no WebGL 2. */
   get stage(): Stage | null {
     return this.#controller?.renderer.stageController?.stage ?? null;
   }
@@ -127,33 +135,33 @@ export class BunrakuStage extends ElementBase {
     return this.#controller?.playing ?? false;
   }
 
-  /** Seconds in the dance. */
+  /** Position in the motion, in seconds. */
   get position(): number {
     return this.#controller?.playback?.position(performance.now()) ?? 0;
   }
 
-  /** Seconds; 0 before it is known. */
+  /** Duration of the motion in seconds; 0 until it is known. */
   get duration(): number {
     return this.viewer?.duration ?? 0;
   }
 
-  /** Plays; a session for everyone who watches it, where the link allows that. */
+  /** Play; a session for all its viewers, if the link allows that. */
   play(): void {
     this.#controller?.setPlaying(true);
   }
 
-  /** Pauses, likewise. */
+  /** Pause; a session for all its viewers, if the link allows that. */
   pause(): void {
     this.#controller?.setPlaying(false);
   }
 
-  /** Goes to a time of the dance, in seconds; likewise. */
+  /** Seek to a time in seconds; a session for all its viewers, if the link allows that. */
   seek(seconds: number): void {
     this.#controller?.seek(seconds);
   }
 
   connectedCallback(): void {
-    // whatever it stands in may come to speak another
+    // The language of an ancestor may change.
     this.#languageObserver ??= new MutationObserver(() => void this.#start());
     this.#languageObserver.observe(document, { subtree: true, attributeFilter: ["lang"] });
     void this.#start();
@@ -167,47 +175,49 @@ export class BunrakuStage extends ElementBase {
     });
   }
 
-  /** Moved by `moveBefore`: nothing is to be done. */
+  /**
+   * Handle a move by `moveBefore`: its presence keeps the browser from calling disconnected and connected callbacks.
+   */
   connectedMoveCallback(): void {}
 
   attributeChangedCallback(
     name: (typeof BunrakuStage.observedAttributes)[number],
     before: string | null,
-    now: string | null,
+    after: string | null,
   ): void {
     if (name === "lang") {
       if (this.#language) void this.#start();
       return;
     }
     if (name === "muted") {
-      this.muted = now !== null;
+      this.muted = after !== null;
       return;
     }
     if (name === "volume") {
-      if (parseVolume(before) !== parseVolume(now)) this.#applySoundPreference();
+      if (parseVolume(before) !== parseVolume(after)) this.#applySoundPreference();
       return;
     }
-    if (!this.#controller || before === now) return;
+    if (!this.#controller || before === after) return;
     if (name === "theme" || name === "still") this.#applyAppearance();
-    else if (name === "src" || (before === null) !== (now === null)) this.#scheduleShow();
+    else if (name === "src" || (before === null) !== (after === null)) this.#scheduleShow();
   }
 
-  /** Begins in the language of where it stands; what speaks that already, as it was but moved, goes on. */
+  /** Start in the language of the element's position in the document, or continue if that language is used already. */
   async #start(): Promise<void> {
-    // by the nearest `lang`, or what the document came with
+    // `:lang()` uses the nearest `lang` attribute, else the document's Content-Language.
     const language = this.matches(":lang(ja)") ? "ja" : "en";
     if (language === this.#language) return;
     this.#stop();
     this.#language = language;
-    const beginning = this.#startCount;
-    const speech = language === "ja" ? await loadJapaneseTranslator() : new Translator();
-    if (beginning !== this.#startCount) return;
+    const start = this.#startCount;
+    const translator = language === "ja" ? await loadJapaneseTranslator() : new Translator();
+    if (start !== this.#startCount) return;
     const root = this.shadowRoot ?? this.attachShadow({ mode: "open" });
-    const memory = {
+    const soundPreference = {
       load: () => ({ on: !this.#muted, volume: this.volume }),
       save: ({ on }: SoundPreference) => void (this.muted = !on),
     };
-    this.#controller = new ElementController(root, speech, memory, (event, detail) =>
+    this.#controller = new ElementController(root, translator, soundPreference, (event, detail) =>
       this.dispatchEvent(new CustomEvent(event, { detail })),
     );
     this.#lightScheme.addEventListener("change", this.#onAppearanceChange);
@@ -227,11 +237,11 @@ export class BunrakuStage extends ElementBase {
 
   #applySoundPreference(): void {
     this.#controller?.soundController.setPreference({ on: !this.#muted, volume: this.volume });
-    // what is there from the beginning is no change
+    // Initial values are no change.
     if (this.#language) this.dispatchEvent(new Event("volumechange"));
   }
 
-  /** Once for several attributes that change together. */
+  /** Show the stage anew, once for several attributes that change together. */
   #scheduleShow(): void {
     if (this.#showQueued) return;
     this.#showQueued = true;
@@ -251,7 +261,7 @@ export class BunrakuStage extends ElementBase {
   }
 }
 
-/** The volume that an attribute says; what is none says 1. */
+/** Parse the attribute `volume`; 1 if it is absent or invalid. */
 function parseVolume(attribute: string | null): number {
   const volume = parseFloat(attribute ?? "");
   return volume >= 0 && volume <= 1 ? volume : 1;

@@ -1,5 +1,4 @@
-/** What stands in the element's shadow: the canvas, words, names over strings, and with controls a bar of buttons. */
-
+/** Shadow tree of the element: canvas, notice, messages, name tags, and with controls a bar of buttons. */
 import type { Translator } from "../i18n/translator";
 import tokens from "../style/tokens.css?inline";
 import { element, setAttribute } from "../ui/dom";
@@ -11,9 +10,9 @@ import { createNameTags, type NameTags } from "../ui/strings/name-tag";
 import { createNextPerformerButton } from "../ui/strings/performer-chooser";
 import { createSoundButton } from "../ui/transport/sound-control";
 import { limbNumber } from "../wire/limbs";
-import own from "./element.css?inline";
+import elementStyles from "./element.css?inline";
 
-/** Names keep so far from the element's upper edge, pixels. */
+/** Upper limit of name tags. */
 const TAG_TOP_MARGIN_PX = 8;
 
 export interface ElementViewActions {
@@ -27,41 +26,44 @@ export interface ElementViewActions {
 }
 
 export interface ElementView {
-  /** What has the keys: the canvas, the buttons, and what of them is clicked. */
+  /** Container that receives key events: canvas, buttons and everything inside them. */
   readonly frame: HTMLElement;
   readonly canvas: HTMLCanvasElement;
   readonly nameTags: NameTags;
   readonly limbRequests: LimbRequests;
   readonly toast: ToastController;
-  /** Its button for sound. */
   readonly soundButton: HTMLElement;
-  /** Words in place of the dance; null for none. */
+  /** Show a notice instead of the motion; null hides it. */
   notice(title: string | null, text?: string): void;
-  /** The bar: whether it is there; whether play may be pressed, and would pause; limbs, if they can be taken. */
+  /** Show or hide the bar. `playing` is the state of the play button, null to hide that button. */
   setBar(shown: boolean, playing: boolean | null): void;
-  /** The button for sound: whether there is any, and it is heard. */
-  setSound(there: boolean, heard: boolean): void;
-  renderLimbs(limbs: readonly LimbState[], hands: boolean, ready: boolean, chosen?: number): void;
+  /** Show whether the motion has sound, and whether it can be heard. */
+  setSound(available: boolean, audible: boolean): void;
+  /** Show the limbs of the `selected` performer. `canClaim` shows their buttons, `ready` enables them. */
+  renderLimbs(limbs: readonly LimbState[], canClaim: boolean, ready: boolean, selected?: number): void;
   remove(): void;
 }
 
-/** The page's day, with the quotes that a build may leave out. */
+/** Selector of the light theme in the page's style sheet. Minification may remove the quotes. */
 const LIGHT_THEME_SELECTOR = /:root\[data-theme=["']?day["']?\]/g;
 
 let styleSheet: CSSStyleSheet | null = null;
 
-/** One sheet for all elements. A sheet that is made so stands under any content security policy. */
+/**
+ * Return the style sheet that all elements share. Constructed style sheets are allowed under any content security
+ * policy.
+ */
 function sharedStyleSheet(): CSSStyleSheet {
   if (!styleSheet) {
     styleSheet = new CSSStyleSheet();
     styleSheet.replaceSync(
-      tokens.replace(LIGHT_THEME_SELECTOR, ':host([data-shown="day"])').replaceAll(":root", ":host") + own,
+      tokens.replace(LIGHT_THEME_SELECTOR, ':host([data-shown="day"])').replaceAll(":root", ":host") + elementStyles,
     );
   }
   return styleSheet;
 }
 
-/** All that it says it says in `speech`. */
+/** Create the element's content in `root`, with texts from `translator`. */
 export function createElementView(root: ShadowRoot, actions: ElementViewActions, translator: Translator): ElementView {
   const { translate } = translator;
   root.adoptedStyleSheets = [sharedStyleSheet()];
@@ -76,11 +78,11 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
     element("div", { class: "vignette" }),
   );
   root.append(frame);
-  const tags = createNameTags(frame, actions.ask, TAG_TOP_MARGIN_PX, undefined, translator);
+  const nameTags = createNameTags(frame, actions.ask, { top: TAG_TOP_MARGIN_PX, translator });
   const notice = element("div", { class: "notice", part: "notice", role: "status", hidden: true });
   const messages = element("div", { class: "messages" });
   frame.append(notice, messages);
-  const asks = createLimbRequests(messages, actions.give, translator);
+  const limbRequests = createLimbRequests(messages, actions.give, translator);
   const toast = createToast(messages);
   const play = element(
     "button",
@@ -89,21 +91,21 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
   );
   const sound = createSoundButton(actions.sound, translator);
   sound.element.hidden = true;
-  /** Whose limbs the buttons take. */
+  /** Performer whose limbs the buttons claim. */
   let performer = 0;
   const discs = LIMB_ORDER.map((limb) => {
-    const light = () => actions.focus(limbNumber(performer, limb));
-    const focus = {
-      onFocus: light,
+    const focus = () => actions.focus(limbNumber(performer, limb));
+    const focusEvents = {
+      onFocus: focus,
       onBlur: () => actions.focus(null),
-      onPointerenter: light,
+      onPointerenter: focus,
       onPointerleave: () => actions.focus(null),
     };
     return {
       limb,
       disc: element(
         "button",
-        { type: "button", hidden: true, onClick: () => actions.toggle(limbNumber(performer, limb)), ...focus },
+        { type: "button", hidden: true, onClick: () => actions.toggle(limbNumber(performer, limb)), ...focusEvents },
         limbIcon(limb),
       ),
     };
@@ -116,13 +118,13 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
     ...buttons,
   );
   frame.append(bar);
-  const counted = () => bar.style.setProperty("--count", String(buttons.filter((one) => !one.hidden).length));
+  const updateCount = () => bar.style.setProperty("--count", String(buttons.filter((button) => !button.hidden).length));
   let shownPlaying: boolean | null = false;
   return {
     frame,
     canvas,
-    nameTags: tags,
-    limbRequests: asks,
+    nameTags,
+    limbRequests,
     toast,
     soundButton: sound.element,
     notice(title, text = "") {
@@ -132,26 +134,26 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
     setBar(shown, playing) {
       bar.hidden = !shown;
       play.hidden = playing === null;
-      counted();
+      updateCount();
       if (playing === shownPlaying || playing === null) return;
       shownPlaying = playing;
       play.replaceChildren(icon(playing ? "pause" : "play"));
       play.setAttribute("aria-label", translate(playing ? "Pause" : "Play"));
     },
-    setSound(there, heard) {
-      sound.element.hidden = !there;
-      sound.render(heard);
-      counted();
+    setSound(available, audible) {
+      sound.element.hidden = !available;
+      sound.render(audible);
+      updateCount();
     },
-    renderLimbs(limbs, hands, ready, chosen = 0) {
-      performer = chosen;
-      next.render(hands ? limbs : [], chosen);
+    renderLimbs(limbs, canClaim, ready, selected = 0) {
+      performer = selected;
+      next.render(canClaim ? limbs : [], selected);
       for (const { limb, disc } of discs) {
-        const own = limbNumber(chosen, limb);
-        const { holder } = limbs[own];
-        const name = limbName(own, performerCount(limbs), translator);
-        const capital = name.charAt(0).toUpperCase() + name.slice(1);
-        disc.hidden = !hands;
+        const number = limbNumber(selected, limb);
+        const { holder } = limbs[number];
+        const name = limbName(number, performerCount(limbs), translator);
+        const capitalName = name.charAt(0).toUpperCase() + name.slice(1);
+        disc.hidden = !canClaim;
         disc.disabled = !ready;
         setAttribute(disc, "data-mine", holder?.mine ?? false);
         disc.setAttribute(
@@ -160,13 +162,13 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
             ? translate("Take the {limb}", { limb: name })
             : holder.mine
               ? translate("Release the {limb}, held by you", { limb: name })
-              : translate("{limb}, held by {name}", { limb: capital, name: holder.name }),
+              : translate("{limb}, held by {name}", { limb: capitalName, name: holder.name }),
         );
-        disc.title = capital + translate(", key {key}", { key: limbKey(limb) });
+        disc.title = capitalName + translate(", key {key}", { key: limbKey(limb) });
         if (holder) disc.style.setProperty("--colour", `var(--holder-${holder.colour})`);
         else disc.style.removeProperty("--colour");
       }
-      counted();
+      updateCount();
     },
     remove() {
       frame.remove();

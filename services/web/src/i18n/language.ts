@@ -1,24 +1,27 @@
-/** Which language the page speaks: the address's (`?lang=`), else the one chosen before, else the first of the browser's that it knows. */
+/** Choice of the page's language: the address (`?lang=`), else the stored choice, else the browser's preferences. */
 import { browserStorage } from "../storage/web-storage";
 import { type Language, type LocaleMessages, pageLanguage, setPageLanguage, Translator } from "./translator";
 
 const STORAGE_KEY = "bunraku.language";
 const LANGUAGES: readonly Language[] = ["en", "ja"];
 
-/** The language by what is asked for in the address, what was kept, and what the browser prefers, best first. */
+/**
+ * Return the first supported language among the requested, the stored and the preferred ones; English if there is
+ * none.
+ */
 export function selectLanguage(
   requested: string | null,
   stored: string | null,
   preferred: readonly string[],
 ): Language {
   for (const tag of [requested, stored, ...preferred]) {
-    const known = LANGUAGES.find((one) => one === tag?.toLowerCase().split("-")[0]);
-    if (known) return known;
+    const supported = LANGUAGES.find((language) => language === tag?.toLowerCase().split("-")[0]);
+    if (supported) return supported;
   }
   return "en";
 }
 
-/** Learns the language of the page and speaks it: before anything is said. English where the other cannot be fetched. */
+/** Load the page's language. Call this before any text is shown. Falls back to English if Japanese cannot be loaded. */
 export async function loadPageLanguage(query: URLSearchParams): Promise<Language> {
   const japanese =
     selectLanguage(query.get("lang"), browserStorage.get(STORAGE_KEY), navigator.languages) === "ja" &&
@@ -27,7 +30,7 @@ export async function loadPageLanguage(query: URLSearchParams): Promise<Language
   return pageLanguage();
 }
 
-/** How Japanese is spoken by what is no page of its own. English where the words cannot be fetched. */
+/** Return a Japanese translator for an embedded element; an English one if the translations cannot be loaded. */
 export async function loadJapaneseTranslator(): Promise<Translator> {
   const japanese = await loadJapaneseMessages();
   return japanese ? new Translator("ja", japanese) : new Translator();
@@ -35,20 +38,23 @@ export async function loadJapaneseTranslator(): Promise<Translator> {
 
 async function loadJapaneseMessages(): Promise<LocaleMessages | null> {
   try {
-    const { JAPANESE_PAGE_MESSAGES: JAPANESE, JAPANESE_SERVER_MESSAGES: HEARD } = await import("./japanese");
-    return { page: JAPANESE, server: HEARD };
+    const { JAPANESE_PAGE_MESSAGES, JAPANESE_SERVER_MESSAGES } = await import("./japanese");
+    return { page: JAPANESE_PAGE_MESSAGES, server: JAPANESE_SERVER_MESSAGES };
   } catch (error) {
-    console.warn("the Japanese words cannot be fetched.", error);
+    console.warn("Japanese translations could not be loaded; using English.", error);
     return null;
   }
 }
 
-/** The one that the page does not setPageLanguage. */
+/** Return the language that the page does not use now. */
 export function otherLanguage(): Language {
   return pageLanguage() === "en" ? "ja" : "en";
 }
 
-/** Chooses the other language, to be spoken from the next loading on. Returns the address to load: it says the language where that cannot be kept. */
+/**
+ * Store the other language as the user's choice, and return the address to load. The address contains the language if
+ * the browser cannot store it.
+ */
 export function switchLanguage(address: string): string {
   const url = new URL(address);
   const other = otherLanguage();

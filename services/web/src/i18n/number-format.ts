@@ -1,7 +1,7 @@
 /** Numbers in the page's language. Pure. */
 import { pageLanguage } from "./translator";
 
-/** With so many digits after the point, neither more nor fewer. */
+/** Format a number with exactly this many decimal places. */
 export function formatDecimal(value: number, digits: number): string {
   return new Intl.NumberFormat(pageLanguage(), {
     minimumFractionDigits: digits,
@@ -11,7 +11,7 @@ export function formatDecimal(value: number, digits: number): string {
   }).format(value);
 }
 
-/** A share, 0 to 1, in whole hundredths. */
+/** Format a fraction, 0 to 1, as whole percent. */
 export function formatPercent(fraction: number): string {
   return new Intl.NumberFormat(pageLanguage(), { style: "percent" }).format(fraction);
 }

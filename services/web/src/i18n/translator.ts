@@ -1,26 +1,26 @@
 /**
- * What is said to people, in a language. English is the key and the default; another language's words are learnt before the page is made, so nothing is
- * said while modules load: tables hold the English, and `say` is called where they are shown. The page has one speech, an element in another site's page its
- * own each. Pure.
+ * Translation of texts. The English text is the key and the default. Translations are loaded before the page is built,
+ * so modules must not translate while they load: tables hold English texts, which are translated where they are shown.
+ * The page has one translator, each embedded element has its own. Pure.
  */
 import type { JAPANESE_PAGE_MESSAGES } from "./japanese";
 
 export type Language = "en" | "ja";
 
-/** A text that the page has. A `{name}` in it stands for a value. */
+/** English text of the page. A `{name}` in it is a placeholder for a value. */
 export type MessageKey = keyof typeof JAPANESE_PAGE_MESSAGES;
 
-/** The names of a text's values. */
+/** Names of a text's placeholders. */
 type PlaceholderNames<Text> = Text extends `${string}{${infer Name}}${infer Rest}`
   ? Name | PlaceholderNames<Rest>
   : never;
 
-/** A text without values, as tables have it. */
+/** English text without placeholders. */
 export type PlainMessageKey = {
   [Text in MessageKey]: [PlaceholderNames<Text>] extends [never] ? Text : never;
 }[MessageKey];
 
-/** The words of a language other than English, by the English: `said` by the page, and `heard` from the server. */
+/** Translations by English text: texts of the page, and texts that the server sends. */
 export interface LocaleMessages {
   readonly page: Readonly<Record<string, string>>;
   readonly server: Readonly<Record<string, string>>;
@@ -28,72 +28,72 @@ export interface LocaleMessages {
 
 const NO_MESSAGES: LocaleMessages = { page: {}, server: {} };
 
-/** How one language is spoken. What it says with may be called without it: `const { say } = speech`. */
+/** Translator to one language. Its functions may be detached: `const { translate } = translator`. */
 export class Translator {
   #language: Language = "en";
   #messages = NO_MESSAGES;
 
-  constructor(language: Language = "en", words = NO_MESSAGES) {
-    this.setLanguage(language, words);
+  constructor(language: Language = "en", messages = NO_MESSAGES) {
+    this.setLanguage(language, messages);
   }
 
-  /** The language, also for `lang` and `Intl`. */
+  /** Language tag, also for `lang` attributes and `Intl`. */
   get language(): Language {
     return this.#language;
   }
 
-  /** Speaks a language from now on. */
   setLanguage(language: Language, messages = NO_MESSAGES): void {
     [this.#language, this.#messages] = [language, messages];
   }
 
-  /** A text in this language. */
+  /** Translate a text and fill in its values. */
   readonly translate = <Text extends MessageKey>(
     english: Text,
     ...values: [PlaceholderNames<Text>] extends [never] ? [] : [Record<PlaceholderNames<Text>, string | number>]
   ): string => interpolate(this.#messages.page[english] ?? english, values[0] ?? {}).join("");
 
-  /** A text around things that are none, in their order: elements within a sentence. */
-  readonly translateToParts = <Text extends MessageKey, Things extends Record<PlaceholderNames<Text>, unknown>>(
+  /** Translate a text whose values are not strings, such as elements; return its parts in order. */
+  readonly translateToParts = <Text extends MessageKey, Values extends Record<PlaceholderNames<Text>, unknown>>(
     english: Text,
-    values: Things,
-  ): (string | Things[keyof Things])[] =>
-    interpolate(this.#messages.page[english] ?? english, values as Record<string, Things[keyof Things]>);
+    values: Values,
+  ): (string | Values[keyof Values])[] =>
+    interpolate(this.#messages.page[english] ?? english, values as Record<string, Values[keyof Values]>);
 
-  /** Things one after another, as in a sentence. */
-  readonly joinList = (things: readonly string[]): string => things.join(this.translate(", "));
+  /** Join items to a list within a sentence. */
+  readonly joinList = (items: readonly string[]): string => items.join(this.translate(", "));
 
-  /** What the server says, in this language where that has words for it; else as it came. */
+  /** Translate a text that the server sent, if there is a translation; values in it are translated too. */
   readonly translateServerText = (text: string): string => {
-    const { server: heard } = this.#messages;
-    const exact = heard[text];
+    const { server } = this.#messages;
+    const exact = server[text];
     if (exact !== undefined) return exact;
-    for (const [english, own] of Object.entries(heard)) {
+    for (const [english, translated] of Object.entries(server)) {
       if (!english.includes("{")) continue;
       const values = templatePattern(english).exec(text)?.groups;
       if (values)
         return interpolate(
-          own,
-          Object.fromEntries(Object.entries(values).map(([name, value]) => [name, heard[value] ?? value])),
+          translated,
+          Object.fromEntries(Object.entries(values).map(([name, value]) => [name, server[value] ?? value])),
         ).join("");
     }
     return text;
   };
 }
 
-/** The page's own. */
+/** Translator of the page. */
 export const pageTranslator = new Translator();
 
-/** As `Speech` has them, for the page. */
+/** Functions of the page's translator. */
 export const { translate, translateToParts, joinList, translateServerText } = pageTranslator;
 export const pageLanguage = (): Language => pageTranslator.language;
-export const setPageLanguage: Translator["setLanguage"] = (now, words) => pageTranslator.setLanguage(now, words);
+export const setPageLanguage: Translator["setLanguage"] = (language, messages) =>
+  pageTranslator.setLanguage(language, messages);
 
-function interpolate<Thing>(text: string, values: Readonly<Record<string, Thing>>): (string | Thing)[] {
+function interpolate<Value>(text: string, values: Readonly<Record<string, Value>>): (string | Value)[] {
   return text.split(/\{(\w+)\}/).map((part, i) => (i % 2 === 0 ? part : values[part]));
 }
 
-/** What a text with values looks like once they are in it. */
+/** Return a pattern that matches a text with its placeholders filled in, with one named group per placeholder. */
 function templatePattern(english: string): RegExp {
   const pattern = english
     .split(/\{(\w+)\}/)

@@ -1,6 +1,8 @@
+const OBJECT_STORE = "files";
+
 /**
- * Files that the browser keeps, by key, in a database of its own. Where that is forbidden or full nothing is kept or found, and
- * nothing fails: a file then lasts as long as the page.
+ * Files stored in the browser by key, in a dedicated IndexedDB database. If storage is forbidden or full, nothing is
+ * stored or found and no method throws.
  */
 export class FileStore {
   #database: Promise<IDBDatabase | null> | null = null;
@@ -8,11 +10,11 @@ export class FileStore {
   constructor(private readonly name: string) {}
 
   async get(key: string): Promise<File | null> {
-    const found = await this.#runRequest("readonly", (files) => files.get(key));
-    return found instanceof File ? found : null;
+    const file = await this.#runRequest("readonly", (files) => files.get(key));
+    return file instanceof File ? file : null;
   }
 
-  /** Whether it is kept now. */
+  /** Store a file. Returns whether it was stored. */
   async put(key: string, file: File): Promise<boolean> {
     return (await this.#runRequest("readwrite", (files) => files.put(file, key))) !== null;
   }
@@ -21,39 +23,37 @@ export class FileStore {
     await this.#runRequest("readwrite", (files) => files.delete(key));
   }
 
-  /** What a request gives once its transaction is through; null where it fails. */
+  /** Run a request and return its result after the transaction completed; null if it failed. */
   async #runRequest<T>(
     mode: IDBTransactionMode,
     createRequest: (files: IDBObjectStore) => IDBRequest<T>,
   ): Promise<T | null> {
     const database = await (this.#database ??= this.#openDatabase());
     if (!database) return null;
-    return new Promise((done) => {
+    return new Promise((resolve) => {
       try {
         const transaction = database.transaction(OBJECT_STORE, mode);
         const request = createRequest(transaction.objectStore(OBJECT_STORE));
-        transaction.oncomplete = () => done(request.result);
-        transaction.onerror = transaction.onabort = () => done(null);
+        transaction.oncomplete = () => resolve(request.result);
+        transaction.onerror = transaction.onabort = () => resolve(null);
       } catch {
-        // the database was closed, or the file cannot be stored
-        done(null);
+        // The database was closed, or the file cannot be stored.
+        resolve(null);
       }
     });
   }
 
   #openDatabase(): Promise<IDBDatabase | null> {
-    return new Promise((done) => {
+    return new Promise((resolve) => {
       try {
         const request = indexedDB.open(this.name, 1);
         request.onupgradeneeded = () => request.result.createObjectStore(OBJECT_STORE);
-        request.onsuccess = () => done(request.result);
-        request.onerror = request.onblocked = () => done(null);
+        request.onsuccess = () => resolve(request.result);
+        request.onerror = request.onblocked = () => resolve(null);
       } catch {
-        // forbidden
-        done(null);
+        // Access to IndexedDB is forbidden.
+        resolve(null);
       }
     });
   }
 }
-
-const OBJECT_STORE = "files";

@@ -1,9 +1,9 @@
 /**
- * Texts that the browser keeps, by key. Where storage is forbidden, full or holds what is no JSON nothing is kept or
- * found, and nothing fails: a choice then lasts as long as the page.
+ * Texts and JSON values in the browser's storage. If storage is forbidden or full, or holds invalid JSON, nothing is
+ * stored or found and no method throws.
  */
 export class WebStorage {
-  /** `open` is asked each time: where storage is forbidden, naming it throws already. */
+  /** `open` is called at each access: if storage is forbidden, the mere access to the global throws. */
   constructor(private readonly open: () => Storage) {}
 
   get(key: string): string | null {
@@ -14,7 +14,7 @@ export class WebStorage {
     }
   }
 
-  /** The value under a key that `putJson` wrote, or anybody: null where none can be read. */
+  /** Return the JSON value of a key; null if there is none or it is invalid. The value's type is not checked. */
   getJson(key: string): unknown {
     try {
       return JSON.parse(this.get(key) ?? "null");
@@ -27,7 +27,7 @@ export class WebStorage {
     try {
       this.open().setItem(key, text);
     } catch {
-      // forbidden or full
+      // Storage is forbidden or full.
     }
   }
 
@@ -39,13 +39,13 @@ export class WebStorage {
     try {
       this.open().removeItem(key);
     } catch {
-      // forbidden
+      // Storage is forbidden.
     }
   }
 }
 
-/** Kept until the person clears it, for all tabs. */
+/** Storage for all tabs, kept until the user clears it. */
 export const browserStorage = new WebStorage(() => localStorage);
 
-/** Kept for this tab, also when it is loaded again. */
+/** Storage for this tab, kept while it reloads. */
 export const tabStorage = new WebStorage(() => sessionStorage);

@@ -1,4 +1,4 @@
-/** The name others see beside one's colour: from the address (`?name=`), else the one kept, else one of these. */
+/** Display name of this page's user, as other users see it. */
 import { browserStorage } from "../storage/web-storage";
 
 const DEFAULT_NAMES = [
@@ -18,6 +18,10 @@ const DEFAULT_NAMES = [
 const STORAGE_KEY = "bunraku.name";
 const MAX_NAME_LENGTH = 40;
 
+/**
+ * Return the name in the address (`?name=`), else the stored one, else a default picked by `random` (0 to 1). Stores
+ * it.
+ */
 export function resolveDisplayName(query: URLSearchParams, random: number): string {
   const name =
     query.get("name")?.trim().slice(0, MAX_NAME_LENGTH) ||

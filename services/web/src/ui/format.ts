@@ -1,18 +1,18 @@
-/** Numbers and names as people read them. */
+/** Formatting of numbers, durations and names for display. */
 
 import type { UploadProgress } from "../client/api";
 import { formatDecimal } from "../i18n/number-format";
 import { joinList, translate } from "../i18n/translator";
 
-/** What turns the direction of writing, until it is ended. */
+/** Unicode controls that change the direction of text. */
 const BIDI_CONTROLS = /[\u202a-\u202e\u2066-\u2069]/;
 
-/** A name that others gave, within other words: what turns in it turns nothing beside it. */
+/** Isolate a user's text, so that direction controls in it do not affect the surrounding text. */
 export function isolateBidi(name: string): string {
   return BIDI_CONTROLS.test(name) ? `\u2068${name}\u2069` : name;
 }
 
-/** Seconds as m:ss, or h:mm:ss. */
+/** Format seconds as m:ss, or h:mm:ss. */
 export function formatDuration(seconds: number): string {
   const whole = Math.max(0, Math.floor(Number.isFinite(seconds) ? seconds : 0));
   const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
@@ -20,12 +20,12 @@ export function formatDuration(seconds: number): string {
   return h > 0 ? `${h}:${String(m).padStart(2, "0")}:${tail}` : `${m}:${tail}`;
 }
 
-/** Bytes as kB or MB with one decimal, powers of 1000. */
+/** Format bytes as kB or MB, with powers of 1000. */
 export function formatBytes(bytes: number): string {
   return bytes < 1e6 ? `${formatDecimal(bytes / 1e3, bytes < 1e4 ? 1 : 0)} kB` : `${formatDecimal(bytes / 1e6, 1)} MB`;
 }
 
-/** What an upload's last row says: how far it is, and how long it will take at the speed so far. */
+/** Describe an upload's progress: bytes sent, and the remaining time at the mean speed so far. */
 export function formatUploadProgress(loaded: number, total: number, seconds: number): string {
   const share = translate("{part} of {whole}", { part: formatBytes(loaded), whole: formatBytes(total) });
   if (loaded >= total) return joinList([share, translate("reading the dance")]);
@@ -36,13 +36,13 @@ export function formatUploadProgress(loaded: number, total: number, seconds: num
   ]);
 }
 
-/** What the server does with an upload, in words. */
+/** Name the stage of the server's work on an upload. */
 export function formatIngestStage(stage: UploadProgress["stage"]): string {
   return translate(
     (
       {
         sending: "sending",
-        waiting: "waiting for its turn",
+        waiting: "queued",
         reading: "reading the dance",
         encoding: "encoding the dance",
       } as const
@@ -50,20 +50,20 @@ export function formatIngestStage(stage: UploadProgress["stage"]): string {
   );
 }
 
-/** A number with a sensible count of digits: 3.45, 12.3, 184. */
+/** Format a number with three significant digits where they matter: 3.45, 12.3, 184. */
 export function formatFigure(value: number): string {
   if (!Number.isFinite(value)) return "-";
-  const size = Math.abs(value);
-  return formatDecimal(value, size < 10 ? 2 : size < 100 ? 1 : 0);
+  const magnitude = Math.abs(value);
+  return formatDecimal(value, magnitude < 10 ? 2 : magnitude < 100 ? 1 : 0);
 }
 
-/** First letter of a name, for an avatar. */
+/** Return the first letter of a name, in upper case. */
 export function initialOf(name: string): string {
   const [first] = name.trim();
   return (first ?? "?").toLocaleUpperCase();
 }
 
-/** A file name without its ending, with spaces for underscores: the piece's name where it has no other. */
+/** Derive a motion's name from its file name: without the extension, and with spaces instead of underscores. */
 export function motionNameFromFile(filename: string): string {
   const bare = filename
     .replace(/\.[^.]+$/, "")

@@ -1,5 +1,4 @@
-/** Seal, wordmark and piece; who is here, the link to share, keys, theme. */
-
+/** Page header: wordmark, motion name, viewers, and the buttons for sharing, keys, language and theme. */
 import { formatDecimal } from "../i18n/number-format";
 import { joinList, pageLanguage, translate } from "../i18n/translator";
 import type { Theme } from "../stage/scenery/look";
@@ -8,7 +7,7 @@ import { initialOf, isolateBidi } from "./format";
 import { icon } from "./icon";
 import type { Presence } from "./limb-state";
 
-/** The other language's own name, and as few letters of it as can be known by. */
+/** Name of the other language in that language, and its short label on the button. */
 const OTHER_LANGUAGE = {
   en: { lang: "ja", name: "日本語", letter: "あ" },
   ja: { lang: "en", name: "English", letter: "EN" },
@@ -18,7 +17,7 @@ export interface Header {
   setMotionName(name: string): void;
   renderPeople(presence: Presence | null, self: string | null): void;
   setTheme(theme: Theme): void;
-  /** What of it stands before the picture. */
+  /** Elements of the header that cover the picture. */
   readonly parts: readonly HTMLElement[];
 }
 
@@ -26,14 +25,19 @@ export function createHeader(
   root: HTMLElement,
   actions: { share(): void; keys(): void; language(): void; theme(): void },
 ): Header {
-  const piece = element("span", { class: "brand-piece" });
+  const motionName = element("span", { class: "brand-piece" });
   const brand = element(
     "a",
     { class: "brand", href: location.pathname, title: translate("Home") },
     element("span", { class: "seal" }),
   );
   brand.append(
-    element("span", {}, element("b", { class: "brand-name" }, element("span", { class: "sr-only" }, "Bunraku")), piece),
+    element(
+      "span",
+      {},
+      element("b", { class: "brand-name" }, element("span", { class: "sr-only" }, "Bunraku")),
+      motionName,
+    ),
   );
   const count = element("span", { class: "people-count" });
   const avatars = element("span", { class: "avatars" });
@@ -54,42 +58,42 @@ export function createHeader(
     },
     icon("pad"),
   );
-  const own = OTHER_LANGUAGE[pageLanguage()];
-  const other = element(
+  const otherLanguage = OTHER_LANGUAGE[pageLanguage()];
+  const language = element(
     "button",
     {
       class: "round-button language",
       type: "button",
-      lang: own.lang,
-      "aria-label": own.name,
-      title: own.name,
+      lang: otherLanguage.lang,
+      "aria-label": otherLanguage.name,
+      title: otherLanguage.name,
       onClick: actions.language,
     },
-    own.letter,
+    otherLanguage.letter,
   );
   const theme = element("button", { class: "round-button", type: "button", onClick: actions.theme }, icon("theme"));
-  const right = element("div", { class: "header-right" }, people, share, keys, other, theme);
+  const right = element("div", { class: "header-right" }, people, share, keys, language, theme);
   root.append(element("header", { class: "header" }, brand, right));
   return {
     parts: [brand, right],
     setMotionName(name) {
-      setText(piece, name);
+      setText(motionName, name);
       document.title = name ? `${isolateBidi(name)} - Bunraku` : "Bunraku";
     },
     renderPeople(presence, self) {
       people.hidden = !presence || (presence.viewers < 1 && presence.puppeteers.length === 0);
       if (!presence) return;
-      const here = Math.max(presence.viewers, presence.puppeteers.length);
-      setText(count, translate("{count} here", { count: formatDecimal(here, 0) }));
-      const names = presence.puppeteers.map((one) => (one.id === self ? translate("you") : one.name));
+      const viewers = Math.max(presence.viewers, presence.puppeteers.length);
+      setText(count, translate("{count} here", { count: formatDecimal(viewers, 0) }));
+      const names = presence.puppeteers.map(({ id, name }) => (id === self ? translate("you") : name));
       people.setAttribute(
         "aria-label",
         names.length
           ? translate("{count} watching; at the strings: {names}", {
-              count: formatDecimal(here, 0),
+              count: formatDecimal(viewers, 0),
               names: joinList(names),
             })
-          : translate("{count} watching", { count: formatDecimal(here, 0) }),
+          : translate("{count} watching", { count: formatDecimal(viewers, 0) }),
       );
       avatars.replaceChildren(
         ...presence.puppeteers.slice(0, 5).map((one) =>
@@ -104,8 +108,8 @@ export function createHeader(
         ),
       );
     },
-    setTheme(now) {
-      theme.setAttribute("aria-label", translate(now === "night" ? "Light theme" : "Dark theme"));
+    setTheme(current) {
+      theme.setAttribute("aria-label", translate(current === "night" ? "Light theme" : "Dark theme"));
     },
   };
 }

@@ -1,23 +1,32 @@
-/** Line icons on a 20 px grid, and the four limbs on a 24 px one. */
+/** Line icons on a 20 px grid, and icons of the four limbs on a 24 px grid. */
 import { shape } from "./dom";
 
 const PATHS = {
-  link: "M8.5 11.5a2.8 2.8 0 0 0 4 0l2.8-2.8a2.8 2.8 0 0 0-4-4L10 6M11.5 8.5a2.8 2.8 0 0 0-4 0l-2.8 2.8a2.8 2.8 0 0 0 4 4L10 14",
-  pad: "M6 6h8c2.2 0 3.5 2 3.9 4.9.3 2.3-.2 3.6-1.6 3.6-1.6 0-2.2-2.2-3.7-2.2H7.4c-1.5 0-2.1 2.2-3.7 2.2-1.4 0-1.9-1.300-1.6-3.6C2.500 8 3.800 6 6 6zM6.300 8v2.400M5.100 9.200h2.400M13.200 8.600h.01M14.800 10h.01",
+  link:
+    "M8.5 11.5a2.8 2.8 0 0 0 4 0l2.8-2.8a2.8 2.8 0 0 0-4-4L10 6M11.5 8.5a2.8 2.8 0 0 0-4 0l-2.8 2.8" +
+    "a2.8 2.8 0 0 0 4 4L10 14",
+  pad:
+    "M6 6h8c2.2 0 3.5 2 3.9 4.9.3 2.3-.2 3.6-1.6 3.6-1.6 0-2.2-2.2-3.7-2.2H7.4" +
+    "c-1.5 0-2.1 2.2-3.7 2.2-1.4 0-1.9-1.300-1.6-3.6C2.500 8 3.800 6 6 6zM6.300 8v2.400M5.100 9.200h2.400" +
+    "M13.200 8.600h.01M14.800 10h.01",
   close: "M5.500 5.500l9 9M14.500 5.500l-9 9",
   upload: "M10 13V4.500M6.500 8L10 4.500L13.500 8M4 13.500v2h12v-2",
   pause: "M7 5v10M13 5v10",
   play: "M7 4.800v10.400l8-5.200z",
-  loop: "M4 9.500a4 4 0 0 1 4-4h7M12.800 3.200l2.300 2.300l-2.300 2.300M16 10.500a4 4 0 0 1-4 4H5M7.200 12.200l-2.300 2.300l2.300 2.300",
+  loop:
+    "M4 9.500a4 4 0 0 1 4-4h7M12.800 3.200l2.300 2.300l-2.300 2.300M16 10.500a4 4 0 0 1-4 4H5M7.200 12.200" +
+    "l-2.300 2.300l2.300 2.300",
   download: "M10 4.500V13M6.500 9.500L10 13L13.500 9.500M4 13.500v2h12v-2",
   picture: "M3.500 4.500h13v11h-13zM5 14l3.500-4l2.500 2.700l1.800-1.700L15.500 14M12.800 7.500h.01",
   camera: "M3 6.500h8.500v7H3zM11.500 9l5-2.500v7l-5-2.500",
   sound:
-    "M3.500 8v4h3l4 3.500v-11L6.500 8zM13.200 7.600a3.400 3.400 0 0 1 0 4.800M15.400 5.400a6.500 6.500 0 0 1 0 9.200",
+    "M3.500 8v4h3l4 3.500v-11L6.500 8zM13.200 7.600a3.400 3.400 0 0 1 0 4.800M15.400 5.400" +
+    "a6.500 6.500 0 0 1 0 9.200",
   silent: "M3.500 8v4h3l4 3.500v-11L6.500 8zM13.500 8l4 4M17.500 8l-4 4",
   library: "M4 4.500v11M7.500 4.500v11M11 4.800l3.800 10.500",
   strings:
-    "M3.500 4.500h13M10 2.500v4M5 4.500v9.500M15 4.500v9.500M10 6.500v5.500M4 15.500a1 1 0 1 0 2 0a1 1 0 1 0-2 0M14 15.500a1 1 0 1 0 2 0a1 1 0 1 0-2 0M9 13.500a1 1 0 1 0 2 0a1 1 0 1 0-2 0",
+    "M3.500 4.500h13M10 2.500v4M5 4.500v9.500M15 4.500v9.500M10 6.500v5.500M4 15.500a1 1 0 1 0 2 0" +
+    "a1 1 0 1 0-2 0M14 15.500a1 1 0 1 0 2 0a1 1 0 1 0-2 0M9 13.500a1 1 0 1 0 2 0a1 1 0 1 0-2 0",
   line: "M2.500 11h3l2-5l3.500 9l2.500-6l1 2h3",
   keep: "M6 3.500h8v13l-4-3.300l-4 3.300z",
   left: "M12.500 4.500L7 10l5.500 5.500",
@@ -43,7 +52,7 @@ export function icon(name: IconName): SVGSVGElement {
   return svg;
 }
 
-/** Strokes of a small dancer seen from the audience: the figure's left is on the right. */
+/** Strokes of a small dancer, seen from the audience: the figure's left limbs are on the right. */
 const BODY = "M12 6.500v7.500";
 const RAISED_LIMBS = [
   "M12 8.500L17.500 5",
@@ -59,7 +68,7 @@ const RAISED_LIMB_TIPS = [
   [7.4, 16.6],
 ];
 
-/** The dancer with one limb picked out: 0 left hand, 1 right hand, 2 left leg, 3 right leg. */
+/** Draw the dancer with one limb highlighted: 0 left hand, 1 right hand, 2 left leg, 3 right leg. */
 export function limbIcon(limb: number): SVGSVGElement {
   const svg = shape("svg", { class: "icon", viewBox: "0 0 24 24", "aria-hidden": "true" });
   const rest = [BODY, ...RESTING_LIMBS.filter((_, other) => other !== limb)].join("");
@@ -78,7 +87,7 @@ export function limbIcon(limb: number): SVGSVGElement {
   return svg;
 }
 
-/** A small dancing figure of its own for a motion, its limbs from the motion's id. */
+/** Draw a small dancing figure for a motion. The pose is derived from the motion's id. */
 export function motionGlyph(id: string): SVGSVGElement {
   let seed = 7;
   for (const letter of id) seed = (seed * 31 + (letter.codePointAt(0) ?? 0)) % 65521;

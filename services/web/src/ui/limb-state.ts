@@ -1,4 +1,4 @@
-/** What the page shows of a session, in the words of the contract. */
+/** State of limbs as the page shows it, derived from the session's presence messages. */
 import type { Viewer } from "../client/viewer";
 import { type PlainMessageKey, pageTranslator } from "../i18n/translator";
 import { LIMBS } from "../motion/skeleton";
@@ -8,8 +8,9 @@ export type Presence = NonNullable<Viewer["presence"]>;
 export type Timeline = NonNullable<Viewer["timeline"]>;
 export type ViewerStatistics = ReturnType<Viewer["statistics"]>;
 
-/** Limbs as people read them, to be said: the puppet's right first, in the order of keys 1 to 4. */
+/** Limbs of one performer in the order of keys 1 to 4: the puppet's right side first. */
 export const LIMB_ORDER: readonly number[] = [1, 0, 3, 2];
+/** Names of limbs, by number; translate them before display. */
 export const LIMB_NAMES = [
   "Left hand",
   "Right hand",
@@ -17,22 +18,22 @@ export const LIMB_NAMES = [
   "Right leg",
 ] as const satisfies readonly PlainMessageKey[];
 
-/** The key (1 to 4) that takes a limb. */
+/** Return the key (1 to 4) that claims a limb. */
 export function limbKey(limb: number): number {
   return LIMB_ORDER.indexOf(limbWithinPerformer(limb)) + 1;
 }
 
-/** How many performers these are the limbs of. */
+/** Return the number of performers that a list of all their limbs belongs to. */
 export function performerCount(limbs: readonly unknown[]): number {
   return limbs.length / LIMBS.length;
 }
 
-/** Limbs as people read them, one performer's after another's. */
+/** Return the limbs of all performers, one performer after another, each in key order. */
 export function limbsInKeyOrder(performers: number): number[] {
   return Array.from({ length: performers }, (_, k) => LIMB_ORDER.map((part) => limbNumber(k, part))).flat();
 }
 
-/** A limb within a sentence, of one of so many performers: "left hand", or where there are several "left hand of dancer 2". */
+/** Name a limb within a sentence: "left hand", or with several performers "left hand of dancer 2". */
 export function limbName(limb: number, performers = 1, { translate } = pageTranslator): string {
   const name = translate(LIMB_NAMES[limbWithinPerformer(limb)]).toLowerCase();
   return performers > 1
@@ -40,34 +41,34 @@ export function limbName(limb: number, performers = 1, { translate } = pageTrans
     : name;
 }
 
-/** Who holds a limb, as the page tells it. */
+/** Holder of a limb. */
 export interface LimbHolder {
   id: string;
-  /** "You" for oneself. */
+  /** "You" for this page's own user. */
   name: string;
   colour: number;
   mine: boolean;
 }
 
-/** One who asks for a limb that another holds. */
+/** User who asks for a limb that another user holds. */
 export interface LimbRequester {
   id: string;
   name: string;
   colour: number;
 }
 
-/** What the page shows of a limb. */
+/** State of one limb. */
 export interface LimbState {
   holder: LimbHolder | null;
-  /** Others who ask for it, first come first. */
+  /** Other users who ask for it, in the order of their requests. */
   requesters: readonly LimbRequester[];
-  /** Whether it is asked for from here. */
+  /** True if this page asks for it. */
   requestedByMe: boolean;
-  /** Whether keys and buttons of "the held string" move it. */
+  /** True if the keys and buttons of "the held string" move it. */
   selected: boolean;
 }
 
-/** Those who ask for each of the limbs of so many performers, without oneself. */
+/** Return the requesters of each limb of `performers` performers, except `self`. */
 export function limbRequesters(
   presence: Presence | null,
   self: string | null,
@@ -78,13 +79,16 @@ export function limbRequesters(
     (presence?.asks[limb] ?? [])
       .filter((id) => id !== self)
       .map((id) => {
-        const person = presence?.puppeteers.find((one) => one.id === id);
+        const person = presence?.puppeteers.find((puppeteer) => puppeteer.id === id);
         return { id, name: person?.name || translate("Someone"), colour: person?.colour ?? 0 };
       }),
   );
 }
 
-/** Holders of the limbs of so many performers, null where free. The session may tell of fewer or more while the dance is changed. */
+/**
+ * Return the holder of each limb of `performers` performers, null for a free limb. While the motion changes,
+ * `presence` may contain fewer or more limbs than that.
+ */
 export function limbHolders(
   presence: Presence | null,
   self: string | null,
@@ -94,7 +98,7 @@ export function limbHolders(
   return Array.from({ length: limbNumber(performers, 0) }, (_, limb) => {
     const id = presence?.limbs[limb];
     if (!id) return null;
-    const person = presence?.puppeteers.find((one) => one.id === id);
+    const person = presence?.puppeteers.find((puppeteer) => puppeteer.id === id);
     const mine = id === self;
     return {
       id,

@@ -1,26 +1,26 @@
-/** Where parts of the page stand before the picture. */
+/** Screen areas where parts of the page cover the picture. */
 import type { ScreenBox } from "../stage/camera/screen-box";
 
 export interface OccupiedArea {
-  /** The boxes of all that are shown, CSS pixels. */
+  /** Boxes of all visible parts, in CSS pixels. */
   readonly boxes: readonly ScreenBox[];
-  /** One of them has another place, though not another size. */
+  /** Measure again at the next access: a part moved without changing its size. */
   invalidate(): void;
 }
 
-/** The boxes of `parts` are asked for only when one of them or the window has changed: each time the page is laid out for it. */
+/** Measure `parts`, but only after one of them or the window changed: each measurement forces a layout. */
 export function createOccupiedArea(parts: readonly Element[]): OccupiedArea {
   let boxes: ScreenBox[] | null = null;
-  const moved = () => (boxes = null);
-  const sizes = new ResizeObserver(moved);
+  const invalidate = () => (boxes = null);
+  const sizes = new ResizeObserver(invalidate);
   for (const part of parts) sizes.observe(part);
-  addEventListener("resize", moved);
+  addEventListener("resize", invalidate);
   return {
     get boxes() {
       return (boxes ??= parts
         .map((part) => part.getBoundingClientRect())
         .filter(({ width, height }) => width > 0 && height > 0));
     },
-    invalidate: moved,
+    invalidate,
   };
 }

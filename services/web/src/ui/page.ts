@@ -1,11 +1,11 @@
-/** Everything of the page that is not the stage, put together: one call of `render...` per kind of news. */
-
+/** User interface of the page around the stage: header, panels, transport, name tags and messages. */
 import { translate } from "../i18n/translator";
 import type { Mapping } from "../input/mapping";
 import { createHeader, type Header } from "./header";
 import type { AvatarActions } from "./library/avatar-chooser";
 import type { RequestDownload } from "./library/download-menu";
-import { acceptDrops, createLibraryPanel, type LibraryPanel, type MotionItem } from "./library/library-panel";
+import { acceptDrops, createLibraryPanel, type LibraryPanel } from "./library/library-panel";
+import type { MotionItem } from "./library/motion-item";
 import { createLinkPanel, type LinkPanel } from "./link/link-panel";
 import { createLazyMappingDialog } from "./mapping/lazy-mapping-dialog";
 import type { MappingDialog } from "./mapping/mapping-dialog";
@@ -22,26 +22,26 @@ import { createTransport, type PanelName, type Transport } from "./transport/tra
 
 export interface UserActions extends StringsActions, SoundActions, AvatarActions {
   share(): void;
-  /** Speaks the other language. */
+  /** Switch to the other language. */
   language(): void;
   theme(): void;
   play(): void;
   loop(): void;
   seek(seconds: number): void;
-  /** Follows the show's camera, or no longer. */
+  /** Follow the motion's camera, or stop following it. */
   camera(): void;
-  /** Keeps the performance as a new motion; left out, it cannot be kept here. */
+  /** Record the performance as a new motion. Omitted if this page may not. */
   keep?(): Promise<void>;
-  /** Saves a picture of the stage. */
+  /** Save a picture of the stage. */
   picture(): void;
   files(files: readonly File[]): void;
   choose(id: string): void;
-  download(piece: MotionItem, ...file: Parameters<RequestDownload>): void;
-  remove(piece: MotionItem): void;
-  /** Adds who dances in it to those on the stage; left out, that cannot be done here. */
-  add?(piece: MotionItem): void;
+  download(motion: MotionItem, ...request: Parameters<RequestDownload>): void;
+  remove(motion: MotionItem): void;
+  /** Add the motion's performers to those on the stage. Omitted if this page may not. */
+  add?(motion: MotionItem): void;
   mapping(mapping: Mapping): void;
-  /** A panel opened or shut: the stage may have to be framed anew. */
+  /** Called when a panel opened, closed or changed its size: the stage may need another framing. */
   reframe(): void;
 }
 
@@ -60,33 +60,34 @@ export interface Page {
   readonly notice: ShowNotice;
 }
 
+/** Create the user interface in `root`. */
 export function createPage(root: HTMLElement, actions: UserActions): Page {
-  const tags = createNameTags(root, actions.ask, undefined, () => occupied.boxes);
-  const { element: noticed, notice } = createNotice(root);
-  const keys = createLazyMappingDialog(root, actions.mapping, () =>
-    toast(translate("The list of keys could not be fetched; try again when the line is back")),
+  const nameTags = createNameTags(root, actions.ask, { getObstacles: () => occupied.boxes });
+  const { element: noticeElement, notice } = createNotice(root);
+  const mappingDialog = createLazyMappingDialog(root, actions.mapping, () =>
+    toast(translate("The key settings could not be loaded. Check your connection, then try again")),
   );
   const header = createHeader(root, {
     share: actions.share,
     language: actions.language,
     theme: actions.theme,
-    keys: () => keys.show(),
+    keys: () => mappingDialog.show(),
   });
-  const messages = createMessageArea(root, noticed, () => occupied.invalidate());
-  const asks = createLimbRequests(messages.element, actions.give);
-  const toast = createToast(messages.element);
+  const messageArea = createMessageArea(root, noticeElement, () => occupied.invalidate());
+  const limbRequests = createLimbRequests(messageArea.element, actions.give);
+  const toast = createToast(messageArea.element);
   const library = createLibraryPanel(root, { ...actions, close: () => panels.close("library") });
   const strings = createStringsPanel(root, {
     ...actions,
     close: () => panels.close("strings"),
-    keys: () => keys.show(),
+    keys: () => mappingDialog.show(),
   });
-  const line = createLinkPanel(root, () => panels.close("line"));
+  const link = createLinkPanel(root, () => panels.close("line"));
   const transport = createTransport(root, { ...actions, panel: (name) => panels.toggle(name) });
   const elements = new Map<PanelName, HTMLElement>([
     ["library", library.panel.element],
     ["strings", strings.panel.element],
-    ["line", line.panel.element],
+    ["line", link.panel.element],
   ]);
   const panels = createPanels(
     elements,
@@ -102,7 +103,7 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     ...transport.parts,
     strings.dock,
     ...elements.values(),
-    messages.element,
+    messageArea.element,
   ]);
   PHONE.addEventListener("change", () => {
     while (panels.closeLast());
@@ -114,12 +115,12 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     transport,
     library,
     strings,
-    link: line,
-    mappingDialog: keys,
-    nameTags: tags,
-    limbRequests: asks,
+    link,
+    mappingDialog,
+    nameTags,
+    limbRequests,
     panels,
-    messageArea: messages,
+    messageArea,
     toast,
     notice,
   };

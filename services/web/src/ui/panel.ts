@@ -1,14 +1,13 @@
-/** Opens and shuts the library, strings and line panels; on a phone one at a time, as a sheet. */
-
+/** Panels for library, strings and connection. On a phone they are sheets, of which one is open at a time. */
 import { translate } from "../i18n/translator";
 import { element } from "./dom";
 import { icon } from "./icon";
 import type { PanelName } from "./transport/transport";
 
-/** A phone on its side: the window is so low that panels stand at its right, before all else. */
+/** Phone in landscape: the window is so low that panels cover its right side. */
 const LANDSCAPE_PHONE_QUERY = "(max-height: 460px) and (orientation: landscape)";
 export const LANDSCAPE_PHONE = matchMedia(LANDSCAPE_PHONE_QUERY);
-/** Panels are sheets, one at a time. */
+/** Windows in which panels are sheets. */
 export const PHONE = matchMedia(`(max-width: 720px), ${LANDSCAPE_PHONE_QUERY}`);
 
 export interface Panel {
@@ -16,10 +15,10 @@ export interface Panel {
   readonly body: HTMLElement;
 }
 
-/** A panel with its title, as it is said, and close button. */
+/** Create a hidden panel with a title, already translated, and a close button. */
 export function createPanel(root: HTMLElement, kind: string, title: string, onClose: () => void): Panel {
   const body = element("div");
-  const shut = element(
+  const closeButton = element(
     "button",
     {
       class: "round-button",
@@ -32,7 +31,7 @@ export function createPanel(root: HTMLElement, kind: string, title: string, onCl
   const panel = element(
     "aside",
     { class: `panel ${kind}`, "aria-label": title, hidden: true },
-    element("div", { class: "panel-head" }, element("h2", {}, title), shut),
+    element("div", { class: "panel-head" }, element("h2", {}, title), closeButton),
     body,
   );
   root.append(panel);
@@ -44,24 +43,27 @@ export interface Panels {
   toggle(name: PanelName): void;
   open(name: PanelName): void;
   close(name: PanelName): void;
-  /** Shuts the panel opened last; false when none is open. */
+  /** Close the panel that was opened last. Returns false if none is open. */
   closeLast(): boolean;
-  /** Some panel covers the lower part of a phone, or the right of one on its side. */
+  /** True if a sheet covers the lower part of a phone, or its right side in landscape. */
   readonly isSheetOpen: boolean;
-  /** Pixels of a desktop, or of a phone on its side, that panels or the dock in their place take to the left and to the right. */
+  /** Width in pixels that panels, or the dock, cover at the left and right of a desktop or a landscape phone. */
   readonly sideInsets: readonly [left: number, right: number];
-  /** Pixels of a phone that a sheet takes from below. */
+  /** Height in pixels that a sheet covers at the bottom of a portrait phone. */
   readonly bottomInset: number;
 }
 
-/** What a panel takes with its margin, and the dock with its own and some of the names beside it, pixels (art direction, section 6). */
+/** Widths of a panel and of the dock with their margins; the dock with part of its names (art direction, section 6). */
 const PANEL_WIDTH_PX = 356;
 const DOCK_WIDTH_PX = 96;
-/** The same of a phone on its side, where a sheet is no wider than a share of the window (`style/sideways.css`). */
+/** Widths on a landscape phone, where a sheet has a maximum share of the window's width (`style/sideways.css`). */
 const [SHEET_MAX_WIDTH_PX, SHEET_MAX_WIDTH_SHARE] = [340, 0.56];
 const LANDSCAPE_DOCK_WIDTH_PX = 112;
 
-/** `changed` is told of every panel that opens or shuts, and `grown` where one has another size. The button that opened a panel gets the focus back. */
+/**
+ * Manage which panels are open. `onToggle` is called for every panel that opens or closes, `onResize` when one changes
+ * its size. Closing a panel returns the focus to the element that opened it.
+ */
 export function createPanels(
   panels: ReadonlyMap<PanelName, HTMLElement>,
   onToggle: (name: PanelName, open: boolean) => void,
@@ -70,21 +72,21 @@ export function createPanels(
   const sizes = new ResizeObserver(onResize);
   for (const panel of panels.values()) sizes.observe(panel);
   const order: PanelName[] = [];
-  const returns = new Map<PanelName, HTMLElement>();
+  const openers = new Map<PanelName, HTMLElement>();
   const set = (name: PanelName, open: boolean) => {
     const panel = panels.get(name);
     if (!panel || panel.hidden !== open) return;
-    const before = document.activeElement;
-    const within = panel.contains(before);
+    const focused = document.activeElement;
+    const hadFocus = panel.contains(focused);
     panel.hidden = !open;
-    order.splice(0, order.length, ...order.filter((one) => one !== name));
+    order.splice(0, order.length, ...order.filter((other) => other !== name));
     if (open) {
       if (PHONE.matches) for (const other of [...order]) set(other, false);
       order.push(name);
-      if (before instanceof HTMLElement && before !== document.body) returns.set(name, before);
+      if (focused instanceof HTMLElement && focused !== document.body) openers.set(name, focused);
     }
     document.body.classList.toggle("sheet-open", PHONE.matches && order.length > 0);
-    if (!open && within) returns.get(name)?.focus();
+    if (!open && hadFocus) openers.get(name)?.focus();
     onToggle(name, open);
   };
   return {
@@ -113,9 +115,9 @@ export function createPanels(
           0,
           order.length > 0 ? Math.min(SHEET_MAX_WIDTH_PX, SHEET_MAX_WIDTH_SHARE * innerWidth) : LANDSCAPE_DOCK_WIDTH_PX,
         ] as const;
-      const taken = (...names: PanelName[]) =>
+      const insetOf = (...names: PanelName[]) =>
         names.some((name) => order.includes(name)) ? PANEL_WIDTH_PX : DOCK_WIDTH_PX;
-      return [taken("library"), taken("strings", "line")] as const;
+      return [insetOf("library"), insetOf("strings", "line")] as const;
     },
   };
 }

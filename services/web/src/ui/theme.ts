@@ -1,4 +1,4 @@
-/** Night or day: the system's wish, until the toggle says otherwise; remembered. */
+/** Colour theme, night or day: the system's preference until the user toggles it. The choice is stored. */
 import type { Theme } from "../stage/scenery/look";
 import { browserStorage } from "../storage/web-storage";
 
@@ -9,7 +9,7 @@ export interface ThemeChoice {
   toggle(): void;
 }
 
-/** Applies the theme to the document, now and whenever it changes; `changed` is called each time, also at once. */
+/** Apply the theme to the document, now and whenever it changes. `onChange` is called each time, also at once. */
 export function createTheme(onChange: (theme: Theme) => void): ThemeChoice {
   const system = matchMedia("(prefers-color-scheme: light)");
   let chosen = storedTheme();

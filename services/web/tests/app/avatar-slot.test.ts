@@ -5,26 +5,26 @@ import type { AvatarState } from "../../src/ui/library/avatar-chooser";
 import { createFigureFile, type FigureOptions } from "../avatar/figure-files";
 import { createStandardFigure } from "../stage/puppet/figures";
 
-/** A browser's page, files and choices as far as casting needs them, and all that was told. */
-class Visit {
+/** Fakes of page, file store and preferences, which record all calls. */
+class FakeBrowser {
   readonly files = new Map<string, File>();
-  readonly choices = new Map<string, string>();
-  /** Keys of the files that were looked for. */
-  readonly sought: string[] = [];
-  full = false;
-  /** Of each performer. */
-  readonly told: AvatarState[] = [];
+  readonly preferences = new Map<string, string>();
+  /** Keys of the files that were read. */
+  readonly readKeys: string[] = [];
+  storageFull = false;
+  /** State shown for each performer. */
+  readonly states: AvatarState[] = [];
   readonly toasts: string[] = [];
   readonly problems: string[][] = [];
-  /** Who is to dance from then on, and in whose place. */
-  readonly dancing: (PerformerFactory | null)[] = [];
-  readonly places: number[] = [];
+  /** Factories that were set on the stage, and the performers that they were set for. */
+  readonly factories: (PerformerFactory | null)[] = [];
+  readonly performers: number[] = [];
 
-  /** The page is opened; with the stage there already, or not yet. */
-  open(staged = true): AvatarSlot {
-    const casting = new AvatarSlot(this.options);
-    if (staged) casting.stage = this.stage;
-    return casting;
+  /** Open the page, with or without the stage. */
+  open(withStage = true): AvatarSlot {
+    const slot = new AvatarSlot(this.options);
+    if (withStage) slot.stage = this.stage;
+    return slot;
   }
 
   get options(): AvatarSlotOptions {
@@ -32,179 +32,190 @@ class Visit {
     return {
       page: {
         library: {
-          danceAs: { element, render: (performer, state) => (this.told[performer] = state), dancers: () => undefined },
-          problem: (...told) => void this.problems.push(told.map(String)),
+          danceAs: {
+            element,
+            render: (performer, state) => (this.states[performer] = state),
+            dancers: () => undefined,
+          },
+          problem: (...problem) => void this.problems.push(problem.map(String)),
         },
         toast: (message) => void this.toasts.push(message),
       },
       files: {
-        get: async (key) => (this.sought.push(key), this.files.get(key) ?? null),
-        put: async (key, file) => !this.full && this.files.set(key, file) !== undefined,
+        get: async (key) => (this.readKeys.push(key), this.files.get(key) ?? null),
+        put: async (key, file) => !this.storageFull && this.files.set(key, file) !== undefined,
         remove: async (key) => void this.files.delete(key),
       },
       preferences: {
-        get: (key) => this.choices.get(key) ?? null,
-        put: (key, text) => void this.choices.set(key, text),
-        remove: (key) => void this.choices.delete(key),
+        get: (key) => this.preferences.get(key) ?? null,
+        put: (key, text) => void this.preferences.set(key, text),
+        remove: (key) => void this.preferences.delete(key),
       },
     };
   }
 
-  /** What the first one's place shows. */
+  /** State shown for the first performer. */
   get shown(): AvatarState | null {
-    return this.told[0] ?? null;
+    return this.states[0] ?? null;
   }
 
   readonly stage = {
-    setPerformerFactory: (make: PerformerFactory | null, performer = 0) => {
-      this.dancing.push(make);
-      this.places.push(performer);
+    setPerformerFactory: (factory: PerformerFactory | null, performer = 0) => {
+      this.factories.push(factory);
+      this.performers.push(performer);
     },
   };
 }
 
 const file = (options: FigureOptions = {}, name = "sato.v2.glb") => new File([createFigureFile(options)], name);
 
-describe("who dances", () => {
-  test("is what is brought, told by its name, and the puppet again when it is chosen", async () => {
-    const visit = new Visit();
-    const casting = visit.open();
-    expect(visit.shown).toEqual({ name: null, dancing: false, reading: null });
-    const taken = casting.load(file());
-    expect(visit.shown?.loadingFile).toBe("sato.v2.glb");
-    await taken;
-    expect(visit.shown).toEqual({ name: "sato.v2", dancing: true, reading: null });
-    expect(visit.toasts.at(-1)).toBe("sato.v2 dances here; everyone else sees the puppet");
-    const performer = visit.dancing.at(-1)?.(createStandardFigure());
+describe("avatar of one performer", () => {
+  test("loaded avatar is shown by name; the puppet can be chosen again", async () => {
+    const browser = new FakeBrowser();
+    const slot = browser.open();
+    expect(browser.shown).toEqual({ name: null, active: false, loadingFile: null });
+    const loaded = slot.load(file());
+    expect(browser.shown?.loadingFile).toBe("sato.v2.glb");
+    await loaded;
+    expect(browser.shown).toEqual({ name: "sato.v2", active: true, loadingFile: null });
+    expect(browser.toasts.at(-1)).toBe("sato.v2 dances here; everyone else sees the puppet");
+    const performer = browser.factories.at(-1)?.(createStandardFigure());
     expect(performer?.group.getObjectByName("leftHand")).toBeDefined();
-    casting.setActive(false);
-    expect([visit.dancing.at(-1), visit.shown?.active, visit.shown?.name]).toEqual([null, false, "sato.v2"]);
-    casting.setActive(true);
-    expect([visit.dancing.at(-1)?.(createStandardFigure()).figure, visit.shown?.active]).toEqual([
+    slot.setActive(false);
+    expect([browser.factories.at(-1), browser.shown?.active, browser.shown?.name]).toEqual([null, false, "sato.v2"]);
+    slot.setActive(true);
+    expect([browser.factories.at(-1)?.(createStandardFigure()).figure, browser.shown?.active]).toEqual([
       createStandardFigure(),
       true,
     ]);
   });
 
-  test("is the avatar of the last visit, or the puppet if that was chosen, also when the stage comes late", async () => {
-    const visit = new Visit();
-    await visit.open().load(file({ vrm: 1 }));
-    const again = visit.open(false);
+  test("choice of the last browser is restored, even before the stage is ready", async () => {
+    const browser = new FakeBrowser();
+    await browser.open().load(file({ vrm: 1 }));
+    const again = browser.open(false);
     await again.restore();
-    again.stage = visit.stage;
-    expect([visit.shown?.name, visit.shown?.active, visit.dancing.at(-1) !== null]).toEqual(["Boxes", true, true]);
+    again.stage = browser.stage;
+    expect([browser.shown?.name, browser.shown?.active, browser.factories.at(-1) !== null]).toEqual([
+      "Boxes",
+      true,
+      true,
+    ]);
     again.setActive(false);
-    const third = visit.open();
-    visit.dancing.length = 0;
+    const third = browser.open();
+    browser.factories.length = 0;
     await third.restore();
-    expect([visit.shown?.name, visit.shown?.active, visit.dancing]).toEqual(["Boxes", false, [null]]);
-    expect(visit.problems).toEqual([]);
+    expect([browser.shown?.name, browser.shown?.active, browser.factories]).toEqual(["Boxes", false, [null]]);
+    expect(browser.problems).toEqual([]);
   });
 
-  test("is the puppet once the avatar is removed, at the next visit too", async () => {
-    const visit = new Visit();
-    const casting = visit.open();
-    await casting.load(file());
-    await casting.remove();
-    expect([visit.shown, visit.dancing.at(-1), visit.files.size, visit.choices.size]).toEqual([
-      { name: null, dancing: false, reading: null },
+  test("removed avatar is not restored at the next browser", async () => {
+    const browser = new FakeBrowser();
+    const slot = browser.open();
+    await slot.load(file());
+    await slot.remove();
+    expect([browser.shown, browser.factories.at(-1), browser.files.size, browser.preferences.size]).toEqual([
+      { name: null, active: false, loadingFile: null },
       null,
       0,
       0,
     ]);
-    await visit.open().restore();
-    expect(visit.shown?.name).toBe(null);
+    await browser.open().restore();
+    expect(browser.shown?.name).toBe(null);
   });
 
-  test("of two that are brought at once is the later", async () => {
-    const visit = new Visit();
-    const casting = visit.open();
-    await Promise.all([casting.load(file({}, "first.glb")), casting.load(file({}, "second.glb"))]);
-    expect([visit.shown?.name, visit.files.get("avatar")?.name]).toEqual(["second", "second.glb"]);
+  test("of two files loaded at once the later one is used", async () => {
+    const browser = new FakeBrowser();
+    const slot = browser.open();
+    await Promise.all([slot.load(file({}, "first.glb")), slot.load(file({}, "second.glb"))]);
+    expect([browser.shown?.name, browser.files.get("avatar")?.name]).toEqual(["second", "second.glb"]);
   });
 });
 
-describe("of several dancers", () => {
-  const NOBODY: AvatarState = { name: null, active: false, loadingFile: null };
+describe("avatars of several performers", () => {
+  const PUPPET: AvatarState = { name: null, active: false, loadingFile: null };
 
-  test("the chosen one's place is taken, and the others' stay whose they were", async () => {
-    const visit = new Visit();
-    const chosen = { performer: 1 };
-    const castings = new AvatarSlots(visit.options, chosen);
-    castings.stage = visit.stage;
-    expect(visit.told).toEqual([NOBODY, NOBODY, NOBODY, NOBODY]);
-    await castings.selected.load(file({}, "second.glb"));
-    expect(visit.told.map(({ name }) => name)).toEqual([null, "second", null, null]);
-    expect([visit.dancing.at(-1) !== null, new Set(visit.places)]).toEqual([true, new Set([1])]);
-    chosen.performer = 0;
-    await castings.selected.load(file({}, "first.glb"));
-    expect([visit.told.map(({ name }) => name), visit.places.at(-1)]).toEqual([["first", "second", null, null], 0]);
-    castings.selected.setActive(false);
-    expect([visit.told.map(({ active: dancing }) => dancing), visit.dancing.at(-1), visit.places.at(-1)]).toEqual([
+  test("file applies to the selected performer only", async () => {
+    const browser = new FakeBrowser();
+    const selection = { performer: 1 };
+    const slots = new AvatarSlots(browser.options, selection);
+    slots.stage = browser.stage;
+    expect(browser.states).toEqual([PUPPET, PUPPET, PUPPET, PUPPET]);
+    await slots.selected.load(file({}, "second.glb"));
+    expect(browser.states.map(({ name }) => name)).toEqual([null, "second", null, null]);
+    expect([browser.factories.at(-1) !== null, new Set(browser.performers)]).toEqual([true, new Set([1])]);
+    selection.performer = 0;
+    await slots.selected.load(file({}, "first.glb"));
+    expect([browser.states.map(({ name }) => name), browser.performers.at(-1)]).toEqual([
+      ["first", "second", null, null],
+      0,
+    ]);
+    slots.selected.setActive(false);
+    expect([browser.states.map(({ active }) => active), browser.factories.at(-1), browser.performers.at(-1)]).toEqual([
       [false, true, false, false],
       null,
       0,
     ]);
-    await castings.selected.remove();
-    expect([visit.told.map(({ name }) => name), [...visit.files.keys()]]).toEqual([
+    await slots.selected.remove();
+    expect([browser.states.map(({ name }) => name), [...browser.files.keys()]]).toEqual([
       [null, "second", null, null],
       ["avatar.2"],
     ]);
   });
 
-  test("each one's avatar of the last visit is read once that dancer is there, and only then", async () => {
-    const visit = new Visit();
-    const chosen = { performer: 0 };
-    const before = new AvatarSlots(visit.options, chosen);
+  test("stored avatar is read once its performer is on the stage", async () => {
+    const browser = new FakeBrowser();
+    const selection = { performer: 0 };
+    const before = new AvatarSlots(browser.options, selection);
     await before.selected.load(file({}, "first.glb"));
-    chosen.performer = 2;
+    selection.performer = 2;
     await before.selected.load(file({}, "third.glb"));
-    const castings = new AvatarSlots(visit.options, chosen);
-    castings.restore(1);
-    castings.stage = visit.stage;
-    await expect.poll(() => visit.told[0].name).toBe("first");
-    castings.restore(2);
-    expect(visit.told[2]).toEqual(NOBODY);
-    castings.restore(3);
-    await expect.poll(() => visit.told[2]).toEqual({ name: "third", dancing: true, reading: null });
-    expect(visit.places.at(-1)).toBe(2);
+    const slots = new AvatarSlots(browser.options, selection);
+    slots.restore(1);
+    slots.stage = browser.stage;
+    await expect.poll(() => browser.states[0].name).toBe("first");
+    slots.restore(2);
+    expect(browser.states[2]).toEqual(PUPPET);
+    slots.restore(3);
+    await expect.poll(() => browser.states[2]).toEqual({ name: "third", active: true, loadingFile: null });
+    expect(browser.performers.at(-1)).toBe(2);
   });
 
-  test("what cannot be read of the last visit is told once, though the dancer comes again", async () => {
-    const visit = new Visit();
-    visit.files.set("avatar.2", new File(["solid cube"], "cube.glb"));
-    visit.choices.set("bunraku.avatar.2", "yes");
-    const castings = new AvatarSlots(visit.options, { performer: 0 });
-    castings.restore(2);
-    await expect.poll(() => visit.problems.length).toBe(1);
-    castings.restore(1);
-    castings.restore(2);
-    expect(visit.sought).toEqual(["avatar.2"]);
+  test("stored file that cannot be read is reported once", async () => {
+    const browser = new FakeBrowser();
+    browser.files.set("avatar.2", new File(["solid cube"], "cube.glb"));
+    browser.preferences.set("bunraku.avatar.2", "yes");
+    const slots = new AvatarSlots(browser.options, { performer: 0 });
+    slots.restore(2);
+    await expect.poll(() => browser.problems.length).toBe(1);
+    slots.restore(1);
+    slots.restore(2);
+    expect(browser.readKeys).toEqual(["avatar.2"]);
   });
 });
 
-describe("what cannot be", () => {
-  test("a file that cannot dance says why, and who danced dances on", async () => {
-    const visit = new Visit();
-    const casting = visit.open();
-    await casting.load(file());
-    await casting.load(file({ without: ["leftHand"] }, "handless.glb"));
-    await casting.load(new File(["solid cube"], "cube.glb"));
-    expect(visit.problems.map(([name, title, detail]) => [name, title, detail])).toEqual([
-      ["handless.glb", "It is no humanoid that can dance", "these bones were not found: left hand"],
-      ["cube.glb", "It is no GLB", "it does not begin as binary glTF does"],
+describe("errors", () => {
+  test("unusable file is reported and leaves the current avatar", async () => {
+    const browser = new FakeBrowser();
+    const slot = browser.open();
+    await slot.load(file());
+    await slot.load(file({ without: ["leftHand"] }, "handless.glb"));
+    await slot.load(new File(["solid cube"], "cube.glb"));
+    expect(browser.problems.map(([name, title, detail]) => [name, title, detail])).toEqual([
+      ["handless.glb", "No usable humanoid", "missing bones: left hand"],
+      ["cube.glb", "Not a GLB file", "it does not start like binary glTF"],
     ]);
-    expect([visit.shown, visit.files.get("avatar")?.name]).toEqual([
-      { name: "sato.v2", dancing: true, reading: null },
+    expect([browser.shown, browser.files.get("avatar")?.name]).toEqual([
+      { name: "sato.v2", active: true, loadingFile: null },
       "sato.v2.glb",
     ]);
   });
 
-  test("where nothing can be kept it is said so, and it dances", async () => {
-    const visit = new Visit();
-    visit.full = true;
-    await visit.open().load(file());
-    expect(visit.shown?.active).toBe(true);
-    expect(visit.toasts.at(-1)).toContain("for this visit only");
+  test("avatar that cannot be stored is shown, with a message", async () => {
+    const browser = new FakeBrowser();
+    browser.storageFull = true;
+    await browser.open().load(file());
+    expect(browser.shown?.active).toBe(true);
+    expect(browser.toasts.at(-1)).toContain("for this visit only");
   });
 });

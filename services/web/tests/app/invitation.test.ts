@@ -2,49 +2,49 @@ import { Vector3 } from "three";
 import { expect, test } from "vitest";
 import { Invitation } from "../../src/app/invitation";
 
-function begin(kept: Record<string, string> = {}) {
-  const told: ({ x: number; y: number } | null)[] = [];
-  const store = {
-    get: (key: string) => kept[key] ?? null,
-    put: (key: string, text: string) => void (kept[key] = text),
+function createInvitation(stored: Record<string, string> = {}) {
+  const shown: ({ x: number; y: number } | null)[] = [];
+  const storage = {
+    get: (key: string) => stored[key] ?? null,
+    put: (key: string, text: string) => void (stored[key] = text),
   };
-  const inviting = new Invitation({ invite: (place) => void told.push(place) }, store);
+  const invitation = new Invitation({ invite: (point) => void shown.push(point) }, storage);
   const stage = {
     hand: new Vector3(1, 2, 3) as Vector3 | null,
     nearerHand: () => stage.hand,
     toScreen: ({ x, y }: Vector3) => ({ x: 100 * x, y: 100 * y }),
   };
-  return { inviting, stage, told, kept };
+  return { invitation, stage, shown, stored };
 }
 
-test("an invitation stands by the nearer hand for six seconds, and then never again", () => {
-  const { inviting, stage, told, kept } = begin();
-  inviting.update(50_000, stage);
-  inviting.update(56_000, stage);
-  expect(told).toEqual([
+test("invitation is shown beside the nearer hand for six seconds, once", () => {
+  const { invitation, stage, shown, stored } = createInvitation();
+  invitation.update(50_000, stage);
+  invitation.update(56_000, stage);
+  expect(shown).toEqual([
     { x: 100, y: 200 },
     { x: 100, y: 200 },
   ]);
-  inviting.update(56_001, stage);
-  inviting.update(56_020, stage);
-  expect(told.slice(2)).toEqual([null]);
-  const next = begin(kept);
-  next.inviting.update(0, next.stage);
-  expect(next.told).toEqual([]);
+  invitation.update(56_001, stage);
+  invitation.update(56_020, stage);
+  expect(shown.slice(2)).toEqual([null]);
+  const next = createInvitation(stored);
+  next.invitation.update(0, next.stage);
+  expect(next.shown).toEqual([]);
 });
 
-test("it is over once a limb was taken, also before it was seen", () => {
-  const { inviting, stage, told, kept } = begin();
-  inviting.finish();
-  inviting.finish();
-  inviting.update(0, stage);
-  expect(told).toEqual([null]);
-  expect(Object.values(kept)).toEqual(["yes"]);
+test("invitation ends when a limb is claimed, even before it was shown", () => {
+  const { invitation, stage, shown, stored } = createInvitation();
+  invitation.finish();
+  invitation.finish();
+  invitation.update(0, stage);
+  expect(shown).toEqual([null]);
+  expect(Object.values(stored)).toEqual(["yes"]);
 });
 
-test("while there is no hand to be seen it stands nowhere", () => {
-  const { inviting, stage, told } = begin();
+test("invitation is hidden without a visible hand", () => {
+  const { invitation, stage, shown } = createInvitation();
   stage.hand = null;
-  inviting.update(0, stage);
-  expect(told).toEqual([null]);
+  invitation.update(0, stage);
+  expect(shown).toEqual([null]);
 });

@@ -29,42 +29,42 @@ afterEach(() => {
   vi.unstubAllGlobals();
 });
 
-/** What is watched, standing at 12.5 s, and its line. */
-function watched(id: string, place: PlaybackKind): { room: Playback; line: FakeWebSocket } {
-  const viewer = new Viewer({ url: `ws://stage/v1/${place}/${id}/stream`, now: () => 0, solver: null });
+/** Open a playback at position 12.5 s; return it with its connection. */
+function openPlayback(id: string, kind: PlaybackKind): { playback: Playback; socket: FakeWebSocket } {
+  const viewer = new Viewer({ url: `ws://stage/v1/${kind}/${id}/stream`, now: () => 0, solver: null });
   opened.push(viewer);
-  const line = FakeWebSocket.last;
-  line.accept();
-  return { room: { id, place, viewer, position: () => 12.5 } as unknown as Playback, line };
+  const socket = FakeWebSocket.last;
+  socket.accept();
+  return { playback: { id, kind, viewer, position: () => 12.5 } as unknown as Playback, socket };
 }
 
-test("a motion watched alone goes on where it was left, once", () => {
-  const before = watched("m", "motions");
-  before.line.receive(TIMELINE);
-  savePosition(before.room, 0);
-  const after = watched("m", "motions");
-  restorePosition(after.room);
-  expect(after.line.messagesOf("Edit")).toEqual([]);
-  after.line.receive({ ...TIMELINE, playing: true, loop: false });
-  after.line.receive({ ...TIMELINE, epoch: 2, position: 12_500_000 });
-  expect(after.line.messagesOf("Edit")).toEqual([{ name: "Edit", playing: false, position: 12_500_000, loop: true }]);
-  const later = watched("m", "motions");
-  restorePosition(later.room);
-  later.line.receive(TIMELINE);
-  expect(later.line.messagesOf("Edit")).toEqual([]);
+test("motion resumes at its saved position once", () => {
+  const before = openPlayback("m", "motions");
+  before.socket.receive(TIMELINE);
+  savePosition(before.playback, 0);
+  const after = openPlayback("m", "motions");
+  restorePosition(after.playback);
+  expect(after.socket.messagesOf("Edit")).toEqual([]);
+  after.socket.receive({ ...TIMELINE, playing: true, loop: false });
+  after.socket.receive({ ...TIMELINE, epoch: 2, position: 12_500_000 });
+  expect(after.socket.messagesOf("Edit")).toEqual([{ name: "Edit", playing: false, position: 12_500_000, loop: true }]);
+  const later = openPlayback("m", "motions");
+  restorePosition(later.playback);
+  later.socket.receive(TIMELINE);
+  expect(later.socket.messagesOf("Edit")).toEqual([]);
 });
 
-test("another motion begins at its beginning, and a session is where everyone is", () => {
-  for (const [place, next] of [
+test("other motions and sessions ignore the saved position", () => {
+  for (const [kind, next] of [
     ["motions", "other"],
     ["sessions", "m"],
   ] as const) {
-    const before = watched("m", place);
-    before.line.receive(TIMELINE);
-    savePosition(before.room, 0);
-    const after = watched(next, place);
-    restorePosition(after.room);
-    after.line.receive(TIMELINE);
-    expect(after.line.messagesOf("Edit"), place).toEqual([]);
+    const before = openPlayback("m", kind);
+    before.socket.receive(TIMELINE);
+    savePosition(before.playback, 0);
+    const after = openPlayback(next, kind);
+    restorePosition(after.playback);
+    after.socket.receive(TIMELINE);
+    expect(after.socket.messagesOf("Edit"), kind).toEqual([]);
   }
 });

@@ -3,33 +3,33 @@ import { copyShareLink } from "../../src/app/share-link";
 
 afterEach(() => void vi.unstubAllGlobals());
 
-/** What is copied and what is told where the page is at `href` and the clipboard takes what it is given, or refuses it. */
-async function shared(
+/** Copy a link from a page at `href`; return the texts copied to the clipboard and the messages shown. */
+async function copyFrom(
   href: string,
   session: string | null,
-  takes: boolean,
-): Promise<{ copied: string[]; told: string[] }> {
-  const [copied, told]: [string[], string[]] = [[], []];
+  clipboardAllowed: boolean,
+): Promise<{ copied: string[]; messages: string[] }> {
+  const [copied, messages]: [string[], string[]] = [[], []];
   const writeText = (text: string) =>
-    takes ? Promise.resolve(void copied.push(text)) : Promise.reject(new Error("not allowed"));
+    clipboardAllowed ? Promise.resolve(void copied.push(text)) : Promise.reject(new Error("not allowed"));
   vi.stubGlobal("location", new URL(href));
   vi.stubGlobal("navigator", { clipboard: { writeText } });
-  await copyShareLink(session, (message) => told.push(message));
-  return { copied, told };
+  await copyShareLink(session, (message) => messages.push(message));
+  return { copied, messages };
 }
 
-test("the link is the page's address with its session and nothing else of the query", async () => {
-  const { copied, told } = await shared("http://stage.example/?name=Aiko&lang=ja", "a b", true);
+test("link contains the session and nothing else of the page's query", async () => {
+  const { copied, messages } = await copyFrom("http://stage.example/?name=Aiko&lang=ja", "a b", true);
   expect(copied).toEqual(["http://stage.example/?session=a%20b"]);
-  expect(told).toEqual(["Link copied"]);
+  expect(messages).toEqual(["Link copied"]);
 });
 
-test("without a session it is the page's address", async () => {
-  expect((await shared("http://stage.example/?motion=m", null, true)).copied).toEqual(["http://stage.example/"]);
+test("link without a session is the page's address", async () => {
+  expect((await copyFrom("http://stage.example/?motion=m", null, true)).copied).toEqual(["http://stage.example/"]);
 });
 
-test("where nothing may be copied the link is told", async () => {
-  const { copied, told } = await shared("http://stage.example/", "s", false);
+test("link is shown if the clipboard is not available", async () => {
+  const { copied, messages } = await copyFrom("http://stage.example/", "s", false);
   expect(copied).toEqual([]);
-  expect(told).toEqual(["Copy this link: http://stage.example/?session=s"]);
+  expect(messages).toEqual(["Copy this link: http://stage.example/?session=s"]);
 });

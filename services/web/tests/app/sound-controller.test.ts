@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 import { SoundController, type SoundState } from "../../src/app/sound-controller";
-import { browserSoundPreference, type SoundPreference } from "../../src/audio/preference";
+import { browserSoundPreference, type SoundPreference, type SoundPreferenceStore } from "../../src/audio/preference";
 import type { Viewer } from "../../src/client/viewer";
 import { stubStorage } from "../storage/storage-stub";
 
@@ -8,18 +8,18 @@ const { players, speakers } = vi.hoisted(() => ({
   players: [] as { store: unknown; retimed: number; closed: boolean }[],
   speakers: [] as { allowed: boolean; heard: boolean; closed: boolean; volume: number; changed: () => void }[],
 }));
-/** When a decoder is found. */
-let found: Promise<unknown>;
+/** Resolves when the decoder was found. */
+let decoder: Promise<unknown>;
 
-/** What is heard through: the browser's audio, and the player that is tested by itself. */
+// The browser's audio output and the player are replaced; the player has its own tests.
 vi.mock("../../src/audio/sound", () => ({
-  findDecoder: () => found,
+  findDecoder: () => decoder,
   AudioPlayer: class {
     closed = false;
     retimed = 0;
     readonly store: unknown;
-    constructor(_context: unknown, _output: unknown, played: { store: unknown }) {
-      this.store = played.store;
+    constructor(_context: unknown, _output: unknown, source: { store: unknown }) {
+      this.store = source.store;
       players.push(this);
     }
     leadAt = (now: number) => ({ time: now, run: players.length });
@@ -52,20 +52,24 @@ vi.mock("../../src/audio/speaker", () => ({
   },
 }));
 
-class Watched extends EventTarget {
-  sound: { track: { channels: number } } | null = null;
-  lead: ((now: number) => unknown) | null = null;
-  /** Another motion comes on, with sound or without. */
-  show(sound: boolean): Promise<unknown> {
-    this.sound = sound ? { track: { channels: 2 } } : null;
+class FakeViewer extends EventTarget {
+  audio: { track: { channels: number } } | null = null;
+  leader: ((now: number) => unknown) | null = null;
+  /** Switch to another motion, with or without sound. */
+  showMotion(hasSound: boolean): Promise<unknown> {
+    this.audio = hasSound ? { track: { channels: 2 } } : null;
     this.dispatchEvent(new Event("figure"));
-    return new Promise((done) => setTimeout(done));
+    return nextTask();
   }
 }
 
+function nextTask(): Promise<unknown> {
+  return new Promise((resolve) => setTimeout(resolve));
+}
+
 let page: EventTarget;
-let viewer: Watched;
-let listening: SoundController;
+let viewer: FakeViewer;
+let controller: SoundController;
 let states: SoundState[];
 const button = {} as Element;
 
@@ -75,160 +79,160 @@ beforeEach(() => {
   vi.stubGlobal("addEventListener", page.addEventListener.bind(page));
   vi.stubGlobal("KeyboardEvent", class {});
   stubStorage("localStorage");
-  found = Promise.resolve(() => undefined);
+  decoder = Promise.resolve(() => undefined);
   states = [];
-  start();
+  createController();
 });
 afterEach(() => void vi.unstubAllGlobals());
 
-function start(memory = browserSoundPreference): void {
-  viewer = new Watched();
-  listening = new SoundController((state) => states.push(state), button, memory);
-  listening.setViewer(viewer as unknown as Viewer);
+function createController(preferenceStore: SoundPreferenceStore = browserSoundPreference): void {
+  viewer = new FakeViewer();
+  controller = new SoundController((state) => states.push(state), button, preferenceStore);
+  controller.setViewer(viewer as unknown as Viewer);
 }
 
-/** A gesture of the person, which the browser lets the page be heard after. */
-function gesture(): void {
+/** Dispatch a user gesture, after which the browser allows sound. */
+function dispatchGesture(): void {
   if (speakers[0]) speakers[0].allowed = true;
   page.dispatchEvent(new Event("keydown"));
 }
 
-test("without sound nothing is fetched and nothing shown", async () => {
-  await viewer.show(false);
-  gesture();
-  expect([players.length, speakers.length, viewer.lead]).toEqual([0, 0, null]);
-  expect(states.every(({ there }) => !there)).toBe(true);
+test("motion without sound loads nothing and hides the button", async () => {
+  await viewer.showMotion(false);
+  dispatchGesture();
+  expect([players.length, speakers.length, viewer.leader]).toEqual([0, 0, null]);
+  expect(states.every(({ available }) => !available)).toBe(true);
 });
 
-describe("with sound", () => {
-  beforeEach(() => viewer.show(true));
+describe("motion with sound", () => {
+  beforeEach(() => viewer.showMotion(true));
 
-  test("it is there, and heard from the first gesture on; the stage follows it, and edits reach it", async () => {
-    expect(states.at(-1)).toEqual({ there: true, heard: false, volume: 0.8 });
-    gesture();
-    expect(states.at(-1)).toEqual({ there: true, heard: true, volume: 0.8 });
-    expect(viewer.lead?.(5)).toEqual({ time: 5, run: 1 });
+  test("first gesture starts the sound, which then leads the stage's clock", async () => {
+    expect(states.at(-1)).toEqual({ available: true, audible: false, volume: 0.8 });
+    dispatchGesture();
+    expect(states.at(-1)).toEqual({ available: true, audible: true, volume: 0.8 });
+    expect(viewer.leader?.(5)).toEqual({ time: 5, run: 1 });
     viewer.dispatchEvent(new Event("timeline"));
     expect(players[0].retimed).toBe(1);
   });
 
-  test("a first key that means sound on does not switch it off again; the next one does, and that is remembered", async () => {
-    gesture();
-    listening.toggle();
+  test("first sound key does not switch the sound off; the second does, and is stored", async () => {
+    dispatchGesture();
+    controller.toggle();
     expect(speakers[0].heard).toBe(true);
-    await new Promise((done) => setTimeout(done));
-    gesture();
-    listening.toggle();
-    expect(states.at(-1)?.heard).toBe(false);
-    gesture();
-    expect(states.at(-1)?.heard).toBe(false);
-    start();
-    await viewer.show(true);
-    gesture();
-    // nothing is opened that is not wanted
+    await nextTask();
+    dispatchGesture();
+    controller.toggle();
+    expect(states.at(-1)?.audible).toBe(false);
+    dispatchGesture();
+    expect(states.at(-1)?.audible).toBe(false);
+    createController();
+    await viewer.showMotion(true);
+    dispatchGesture();
+    // no audio device is opened for unwanted sound
     expect(speakers).toHaveLength(1);
-    listening.toggle();
+    controller.toggle();
     speakers[1].allowed = true;
     page.dispatchEvent(new Event("click"));
     expect(speakers[1].heard).toBe(true);
   });
 
-  test("a press of its button is no such gesture: it says what it wants itself", () => {
+  test("press of the sound button does not count as a gesture", () => {
     speakers[0].allowed = true;
     page.dispatchEvent(Object.assign(new Event("click"), { composedPath: () => [button, page] }));
     expect(speakers[0].heard).toBe(false);
-    listening.toggle();
+    controller.toggle();
     expect(speakers[0].heard).toBe(true);
-    listening.toggle();
+    controller.toggle();
     expect(speakers[0].heard).toBe(false);
   });
 
-  test("how loud is told at once, and who tells it wants to hear", () => {
+  test("setting the volume applies at once and switches the sound on", () => {
     speakers[0].allowed = true;
-    listening.toggle();
-    listening.toggle();
+    controller.toggle();
+    controller.toggle();
     expect(speakers[0].heard).toBe(false);
-    listening.volume = 0.25;
+    controller.volume = 0.25;
     expect([speakers[0].volume, speakers[0].heard, states.at(-1)]).toEqual([
       0.25,
       true,
-      { there: true, heard: true, volume: 0.25 },
+      { available: true, audible: true, volume: 0.25 },
     ]);
   });
 
-  test("another motion's takes its place, on the same device; one without is silence", async () => {
-    gesture();
-    await viewer.show(true);
+  test("next motion's sound uses the same device; a silent motion stops it", async () => {
+    dispatchGesture();
+    await viewer.showMotion(true);
     expect(players.map(({ closed }) => closed)).toEqual([true, false]);
     expect(speakers).toHaveLength(1);
-    await viewer.show(false);
+    await viewer.showMotion(false);
     expect(players.map(({ closed }) => closed)).toEqual([true, true]);
-    expect([viewer.lead, speakers[0].heard, states.at(-1)?.there]).toEqual([null, false, false]);
-    await viewer.show(true);
+    expect([viewer.leader, speakers[0].heard, states.at(-1)?.available]).toEqual([null, false, false]);
+    await viewer.showMotion(true);
     expect(speakers[0].heard).toBe(true);
   });
 
-  test("of two that come on at once the later is played", async () => {
-    void viewer.show(true);
-    await viewer.show(true);
-    expect(players.filter(({ closed }) => !closed).map(({ store }) => store)).toEqual([viewer.sound]);
+  test("of two motions at once only the later one is played", async () => {
+    void viewer.showMotion(true);
+    await viewer.showMotion(true);
+    expect(players.filter(({ closed }) => !closed).map(({ store }) => store)).toEqual([viewer.audio]);
   });
 });
 
-describe("where it is not wanted at first", () => {
-  let remembered: SoundPreference;
+describe("sound switched off by preference", () => {
+  let stored: SoundPreference;
 
   beforeEach(() => {
-    remembered = { on: false, volume: 0.5 };
-    start({ load: () => remembered, save: (preference) => void (remembered = preference) });
-    return viewer.show(true);
+    stored = { on: false, volume: 0.5 };
+    createController({ load: () => stored, save: (preference) => void (stored = preference) });
+    return viewer.showMotion(true);
   });
 
-  test("nothing is opened or heard, whatever is pressed", () => {
-    gesture();
-    expect([players.length, speakers.length, viewer.lead, states.at(-1)]).toEqual([
+  test("gesture opens no device and plays nothing", () => {
+    dispatchGesture();
+    expect([players.length, speakers.length, viewer.leader, states.at(-1)]).toEqual([
       0,
       0,
       null,
-      { there: true, heard: false, volume: 0.5 },
+      { available: true, audible: false, volume: 0.5 },
     ]);
   });
 
-  test("the device is opened within the gesture that asks for it, though what plays comes later", async () => {
-    listening.toggle();
-    expect([speakers.length, players.length, remembered.on]).toEqual([1, 0, true]);
-    gesture();
-    await new Promise((done) => setTimeout(done));
+  test("device is opened within the gesture, before the player is loaded", async () => {
+    controller.toggle();
+    expect([speakers.length, players.length, stored.on]).toEqual([1, 0, true]);
+    dispatchGesture();
+    await nextTask();
     expect([players.length, speakers[0].heard, speakers[0].volume]).toEqual([1, true, 0.5]);
-    listening.setPreference({ on: true, volume: 1 });
-    listening.setPreference({ on: true, volume: 0.25 });
+    controller.setPreference({ on: true, volume: 1 });
+    controller.setPreference({ on: true, volume: 0.25 });
     expect([speakers.length, players.length, speakers[0].volume]).toEqual([1, 1, 0.25]);
   });
 
-  test("asked for twice before it is there, it is played once", async () => {
-    listening.setPreference({ on: true, volume: 1 });
-    listening.setPreference({ on: true, volume: 0.5 });
-    await new Promise((done) => setTimeout(done));
+  test("switching on twice while loading creates one player", async () => {
+    controller.setPreference({ on: true, volume: 1 });
+    controller.setPreference({ on: true, volume: 0.5 });
+    await nextTask();
     expect([speakers.length, players.length]).toEqual([1, 1]);
   });
 
-  test("what could not be loaded is not said to be heard", async () => {
-    const warned = vi.spyOn(console, "warn").mockImplementation(() => undefined);
-    found = Promise.reject(new Error("no line"));
-    listening.toggle();
-    gesture();
-    await new Promise((done) => setTimeout(done));
-    expect([players.length, speakers[0].heard, warned.mock.calls.length]).toEqual([0, false, 1]);
-    warned.mockRestore();
+  test("sound that cannot be loaded is not shown as audible", async () => {
+    const warn = vi.spyOn(console, "warn").mockImplementation(() => undefined);
+    decoder = Promise.reject(new Error("not loaded"));
+    controller.toggle();
+    dispatchGesture();
+    await nextTask();
+    expect([players.length, speakers[0].heard, warn.mock.calls.length]).toEqual([0, false, 1]);
+    warn.mockRestore();
   });
 
-  test("closed it is silent, gives the device back, and hears no gesture", async () => {
-    listening.toggle();
-    gesture();
-    await new Promise((done) => setTimeout(done));
-    listening.close();
-    gesture();
-    expect([players[0].closed, speakers[0].heard, speakers[0].closed, states.at(-1)?.there]).toEqual([
+  test("close stops the sound, frees the device and ignores gestures", async () => {
+    controller.toggle();
+    dispatchGesture();
+    await nextTask();
+    controller.close();
+    dispatchGesture();
+    expect([players[0].closed, speakers[0].heard, speakers[0].closed, states.at(-1)?.available]).toEqual([
       true,
       false,
       true,

@@ -4,48 +4,48 @@ import { StartupSequence } from "../../src/app/startup";
 beforeEach(() => void vi.useFakeTimers());
 afterEach(() => void vi.useRealTimers());
 
-function begin(): { arriving: StartupSequence; told: string[]; veil: () => string | undefined } {
+function createStartup(): { startup: StartupSequence; calls: string[]; state: () => string | undefined } {
   const root = { dataset: {} as DOMStringMap } as HTMLElement;
-  const arriving = new StartupSequence(root);
-  const told: string[] = [];
-  arriving.runWhenFinished(() => void told.push("sound"));
-  return { arriving, told, veil: () => root.dataset["arriving"] };
+  const startup = new StartupSequence(root);
+  const calls: string[] = [];
+  startup.runWhenFinished(() => void calls.push("sound"));
+  return { startup, calls, state: () => root.dataset["arriving"] };
 }
 
-test("a page whose stage is ready at once shows itself with the puppet, and what waited is done then, once", () => {
-  const { arriving, told, veil } = begin();
-  expect(veil()).toBe("veiled");
-  arriving.onStageReady();
+test("first frame reveals the page and runs waiting callbacks once", () => {
+  const { startup, calls, state } = createStartup();
+  expect(state()).toBe("veiled");
+  startup.onStageReady();
   vi.advanceTimersByTime(1_000);
-  expect([veil(), told]).toEqual(["veiled", []]);
-  arriving.finish();
-  expect([veil(), told]).toEqual([undefined, ["sound"]]);
-  arriving.finish();
+  expect([state(), calls]).toEqual(["veiled", []]);
+  startup.finish();
+  expect([state(), calls]).toEqual([undefined, ["sound"]]);
+  startup.finish();
   vi.advanceTimersByTime(10_000);
-  expect([veil(), told]).toEqual([undefined, ["sound"]]);
+  expect([state(), calls]).toEqual([undefined, ["sound"]]);
 });
 
-test("a page whose stage is on its way over a slow line shows itself, and all else waits on", () => {
-  const { arriving, told, veil } = begin();
+test("slow stage reveals the page, and callbacks keep waiting for the first frame", () => {
+  const { startup, calls, state } = createStartup();
   vi.advanceTimersByTime(2_500);
-  expect([veil(), told]).toEqual(["", []]);
+  expect([state(), calls]).toEqual(["", []]);
   vi.advanceTimersByTime(60_000);
-  expect([veil(), told]).toEqual(["", []]);
-  arriving.onStageReady();
-  arriving.finish();
-  expect([veil(), told]).toEqual([undefined, ["sound"]]);
+  expect([state(), calls]).toEqual(["", []]);
+  startup.onStageReady();
+  startup.finish();
+  expect([state(), calls]).toEqual([undefined, ["sound"]]);
 });
 
-test("nothing waits for long where nobody dances", () => {
-  const { arriving, told, veil } = begin();
-  arriving.onStageReady();
+test("callbacks run after a timeout if no motion arrives", () => {
+  const { startup, calls, state } = createStartup();
+  startup.onStageReady();
   vi.advanceTimersByTime(2_000);
-  expect([veil(), told]).toEqual([undefined, ["sound"]]);
+  expect([state(), calls]).toEqual([undefined, ["sound"]]);
 });
 
-test("once the puppet is there nothing has to wait", () => {
-  const { arriving, told } = begin();
-  arriving.finish();
-  arriving.runWhenFinished(() => void told.push("later"));
-  expect(told).toEqual(["sound", "later"]);
+test("callbacks run at once after the first frame", () => {
+  const { startup, calls } = createStartup();
+  startup.finish();
+  startup.runWhenFinished(() => void calls.push("later"));
+  expect(calls).toEqual(["sound", "later"]);
 });

@@ -35,7 +35,7 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
       expect(await page.getByRole("button", { name, exact: true }).isVisible(), name).toBe(false);
     }
     expect(await page.getByRole("navigation", { name: "Take a string" }).isVisible()).toBe(false);
-    expect(await page.getByRole("button", { name: "Line" }).isVisible()).toBe(true);
+    expect(await page.getByRole("button", { name: "Connection" }).isVisible()).toBe(true);
     await expect.poll(() => page.locator(".brand-piece").innerText()).not.toBe("");
     // neither key nor hand takes a string
     await page.keyboard.press("Digit2");

@@ -34,7 +34,7 @@ export async function forEachState(page: Page, look: (state: string) => Promise<
     await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
     await waitForDraw(page);
     await look(`${colorScheme}, nothing open`);
-    for (const panel of ["Library", "Strings", "Line"]) {
+    for (const panel of ["Library", "Strings", "Connection"]) {
       await page.getByRole("button", { name: panel, exact: true }).click();
       await page.getByRole("complementary", { name: panel }).waitFor();
       await waitForDraw(page);
@@ -43,10 +43,10 @@ export async function forEachState(page: Page, look: (state: string) => Promise<
     }
     await page.keyboard.press("Shift+Slash");
     await page.getByRole("dialog", { name: "Keys and gamepad" }).waitFor();
-    await page.getByText("The 14 inputs, each by itself").click();
+    await page.getByText("The 14 inputs, one by one").click();
     await waitForDraw(page);
     await look(`${colorScheme}, keys`);
-    await page.getByText("The 14 inputs, each by itself").click();
+    await page.getByText("The 14 inputs, one by one").click();
     await page.keyboard.press("Escape");
     await page.getByRole("dialog").waitFor({ state: "hidden" });
   }

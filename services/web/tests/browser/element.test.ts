@@ -270,7 +270,7 @@ describeInBrowser(
         before: errors,
       });
       await said(page, 0).getByText("A link is needed").waitFor();
-      await said(page, 1).getByText("No stage is here").waitFor();
+      await said(page, 1).getByText("No stage here").waitFor();
       await said(page, 2).getByText("The stage does not answer").waitFor();
       expect(await page.evaluate(() => (window as unknown as { errors: string[] }).errors.length)).toBe(3);
 
@@ -278,7 +278,7 @@ describeInBrowser(
       const late = await open(small(`${own.url}/#token=${token}`), site.origin, {
         before: (page) => page.route("**/v1/sessions", (request) => request.abort()),
       });
-      await said(late).getByText("It is tried again").waitFor();
+      await said(late).getByText("Retrying automatically").waitFor();
       await late.unroute("**/v1/sessions");
       await waitForStages(late);
       await said(late).waitFor({ state: "hidden" });

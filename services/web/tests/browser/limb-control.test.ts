@@ -39,18 +39,18 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
     await page.keyboard.press("KeyU");
     expect(await source(page)).toBe(null);
     await page.keyboard.press("Shift+Slash");
-    await page.getByText("The 14 inputs, each by itself").click();
+    await page.getByText("The 14 inputs, one by one").click();
     await page.getByRole("button", { name: "Bind a key or button: left hand up" }).click();
     await page.keyboard.press("KeyU");
-    await page.getByRole("button", { name: "U: left hand up. Take away" }).waitFor();
+    await page.getByRole("button", { name: "U: left hand up. Remove" }).waitFor();
     // A second meaning is shown at both ends.
-    await page.getByRole("button", { name: "Bind a key or button: line", exact: true }).click();
+    await page.getByRole("button", { name: "Bind a key or button: connection", exact: true }).click();
     await page.keyboard.press("KeyU");
     expect(await page.locator(".clash:not([hidden])").allInnerTexts()).toEqual([
       "U also: left hand up",
-      "U also: line",
+      "U also: connection",
     ]);
-    await page.getByRole("button", { name: "U: line. Take away" }).click();
+    await page.getByRole("button", { name: "U: connection. Remove" }).click();
     expect(await page.locator(".clash:not([hidden])").count()).toBe(0);
     // Escape ends waiting for a key, and only then the page of keys.
     await page.getByRole("button", { name: "Bind a key or button: keep" }).click();
@@ -104,7 +104,7 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
     await page.mouse.down();
     await page.waitForFunction(moved, { from: between, least: 0.05 });
     const before = lines.length;
-    await waitForToast(page, "The line was lost", async () =>
+    await waitForToast(page, "Connection lost, reconnecting", async () =>
       lines.at(-1)?.close({ code: 1012, reason: "cut by the test" }),
     );
     await expect.poll(() => lines.length).toBeGreaterThan(before);
@@ -138,12 +138,12 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
 
     await page.keyboard.press("Shift+Slash");
     await page.getByText("A pad is connected").waitFor();
-    await page.getByText("The 14 inputs, each by itself").click();
+    await page.getByText("The 14 inputs, one by one").click();
     await page.getByRole("button", { name: "Bind a key or button: right leg up" }).click();
     await pad(page, {}); // What is down as the listening begins does not count.
     await pad(page, { button: [1, 1] });
     await pad(page, { button: [1, 0] });
-    await page.getByRole("button", { name: "B: right leg up. Take away" }).waitFor();
+    await page.getByRole("button", { name: "B: right leg up. Remove" }).waitFor();
     await page.keyboard.press("Escape");
     await pad(page, { button: [1, 1] });
     await waitForHold(page, RIGHT_LEG);
@@ -162,7 +162,7 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
     await asked.waitFor();
     await mateo.keyboard.press("KeyS");
     // Withdrawn and asked again, from the card.
-    await mateo.getByRole("button", { name: "Ask no longer for left hand" }).click();
+    await mateo.getByRole("button", { name: "Withdraw the request for left hand" }).click();
     await asked.waitFor({ state: "detached" });
     await mateo.getByRole("button", { name: "Ask for left hand" }).click();
     await asked.waitFor();

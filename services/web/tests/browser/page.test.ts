@@ -93,9 +93,9 @@ describeInBrowser("the page", {}, ({ open }) => {
     await page.waitForFunction((followed) => window.bunraku.stage.followsMotionCamera === !followed, followed);
     await page.getByRole("button", { name: "Show's camera", pressed: !followed }).waitFor();
     await page.keyboard.press("KeyN");
-    await page.getByRole("complementary", { name: "Line" }).getByText("kbit/s").waitFor();
+    await page.getByRole("complementary", { name: "Connection" }).getByText("kbit/s").waitFor();
     await page.keyboard.press("Escape");
-    await page.getByRole("complementary", { name: "Line" }).waitFor({ state: "hidden" });
+    await page.getByRole("complementary", { name: "Connection" }).waitFor({ state: "hidden" });
 
     await tapKey(page, "Digit2");
     await page.getByRole("button", { name: "Release the left hand" }).waitFor();

@@ -49,7 +49,7 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
     }, NEAR);
     const begun = await whereabouts(page);
     await page.context().setOffline(true);
-    await waitForToast(page, "The line was lost", async () => {
+    await waitForToast(page, "Connection lost, reconnecting", async () => {
       for (const line of lines) await line.close({ code: 1012, reason: "cut by the test" });
     });
     await page.locator('.health[data-state="lost"]').waitFor();
@@ -62,13 +62,13 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
       return on - viewer.duration * Math.floor(on / viewer.duration) > 1;
     }, cut.position);
     // what is said for a moment comes and goes beside it
-    await waitForToast(page, "Reach for a string that another holds", () => page.keyboard.press("KeyR"));
-    await page.getByText("Reach for a string that another holds").waitFor({ state: "detached" });
-    expect(await page.getByText("The line was lost").isVisible()).toBe(true);
+    await waitForToast(page, "Reach for a string that someone else holds", () => page.keyboard.press("KeyR"));
+    await page.getByText("Reach for a string that someone else holds").waitFor({ state: "detached" });
+    expect(await page.getByText("Connection lost, reconnecting").isVisible()).toBe(true);
     const known = lines.length;
     await page.context().setOffline(false);
     await page.locator('.health[data-state="good"]').waitFor();
-    await page.getByText("The line was lost").waitFor({ state: "detached" });
+    await page.getByText("Connection lost, reconnecting").waitFor({ state: "detached" });
     expect(lines.length).toBeGreaterThan(known);
     await waitForWelcome(page);
     await expect.poll(() => page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(true);

@@ -87,7 +87,7 @@ describeInBrowser("the room on the page", { demo: true, timeout: 300_000 }, ({ o
       await waitForFirstPose(page);
       await waitForWelcome(page);
       expect(await targets(page), `${width} x ${height}`).toEqual([]);
-      for (const name of ["Library", "Strings", "Line"]) {
+      for (const name of ["Library", "Strings", "Connection"]) {
         await page.getByRole("button", { name, exact: true }).tap();
         const panel = page.getByRole("complementary", { name });
         await expect.poll(async () => (await panel.boundingBox())?.x).toBeLessThan(width - 300);

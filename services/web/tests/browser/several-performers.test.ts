@@ -105,7 +105,7 @@ describeInBrowser("several performers", { demo: true, origins: site.origin }, (o
     await add(page, "Sanbasō, First Steps × 2");
     await waitForPerformers(page, 4);
     await add(page, "Sanbasō, First Steps");
-    await page.getByText("There is no more room on the stage").waitFor();
+    await page.getByText("The stage is full").waitFor();
 
     const session = new URL(page.url()).searchParams.get("session") ?? "";
     site.html = `<!doctype html><title>Elsewhere</title><script type="module" src="${own.url}/embed/bunraku-stage.js"></script><bunraku-stage src="${own.url}/?session=${session}&name=Mateo" controls style="width: 420px"></bunraku-stage>`;

@@ -39,7 +39,7 @@ describeInBrowser("arriving", { demo: true }, ({ open }) => {
 
   test("a page whose stage cannot be loaded says so, and is there all the same", async () => {
     const page = await open("", { before: (page) => page.route("**/stage-chunk-*.js", (route) => route.abort()) });
-    await page.getByText("What draws it could not be loaded").waitFor();
+    await page.getByText("The renderer could not be loaded").waitFor();
     expect(await page.getByRole("button", { name: "Library" }).isVisible()).toBe(true);
     await page.locator(".people-count").waitFor();
   });

@@ -91,7 +91,7 @@ test("says why: the server's problem, else the close's reason, else plain words"
   expect(closed.map(([reason]) => reason)).toEqual([
     "Too slow: 40 messages waited",
     "out of disk",
-    "the line was lost",
+    "the connection was lost",
   ]);
 });
 
@@ -159,7 +159,7 @@ test("a line that does not come about is tried beside too, again and again, one 
   vi.advanceTimersByTime(12_000);
   expect(FakeWebSocket.opened.map(({ readyState }) => readyState)).toEqual([0, 3, 3, 0]);
   FakeWebSocket.opened[0].endWith(1006);
-  expect(closed).toEqual([["the line was lost", false]]);
+  expect(closed).toEqual([["the connection was lost", false]]);
   expect(FakeWebSocket.last.readyState).toBe(3);
   vi.advanceTimersByTime(250);
   expect(FakeWebSocket.opened).toHaveLength(5);

@@ -17,7 +17,7 @@ describe("the panel's reason", () => {
     expect(describeStatus({ ...OPEN_STATUS, choice, damagedCount: 2 })).toBe("2 messages could not be read");
     expect(describeStatus({ ...OPEN_STATUS, choice, hasPose: false })).toBe("waiting for the first block");
     expect(describeStatus({ ...OPEN_STATUS, choice, isStalled: true })).toBe("waiting for a block");
-    expect(describeStatus({ ...OPEN_STATUS, choice })).toBe("the best there is");
+    expect(describeStatus({ ...OPEN_STATUS, choice })).toBe("the best available");
   });
 
   test("every word of the contract has words for a person, and a narrow line its figure", () => {

@@ -321,7 +321,7 @@ describe("when the line is lost", () => {
     viewer.addEventListener("closed", (event) => reasons.push((event as CustomEvent<string>).detail));
     FakeWebSocket.last.receive(data(0, 1, best));
     FakeWebSocket.last.endWith(1006);
-    expect(viewer.statistics().reason).toBe("the line was lost");
+    expect(viewer.statistics().reason).toBe("the connection was lost");
     advanceTime(250);
     expect(viewer.positionAt(now)).toBeCloseTo(0.25, 9);
     expect(viewer.poseAt(now)).not.toBeNull();
@@ -329,7 +329,7 @@ describe("when the line is lost", () => {
     FakeWebSocket.last.receive(header(), description(), timeline({ epoch: 1, position: 100_000 }));
     expect([...viewer.blocks]).toEqual([1, -1, -1]);
     expect(viewer.positionAt(now)).toBeCloseTo(0.35, 9);
-    expect(reasons).toEqual(["the line was lost"]);
+    expect(reasons).toEqual(["the connection was lost"]);
     expect(viewer.isClosed).toBe(false);
   });
 
@@ -424,15 +424,15 @@ describe("what cannot be played", () => {
 
   test.each([
     ["no motion", [{ type: "audio" }], "the stream has no motion in it"],
-    ["another codec", [{ ...goldenDescription(), codec: "bunraku.motion/9" }], "motion is of codec bunraku.motion/9"],
-    ["no frames", [{ ...goldenDescription(), frames: 0 }], "motion needs frames"],
+    ["another codec", [{ ...goldenDescription(), codec: "bunraku.motion/9" }], "Unsupported motion codec bunraku.motion/9"],
+    ["no frames", [{ ...goldenDescription(), frames: 0 }], "motion track: frames must"],
     [
       "a dancer cut short",
       [{ ...goldenDescription(), dancer: new Uint8Array(0) }],
-      "a dancer has 1..1024 bytes, not 0",
+      "Invalid skeleton description: 0 bytes",
     ],
-    ["no rates", [{ ...goldenDescription(), rates: [] }], "motion needs rates"],
-    ["a rate of nothing", [{ ...goldenDescription(), rates: [null] }], "rate 0 needs kbps"],
+    ["no rates", [{ ...goldenDescription(), rates: [] }], "motion track: rates must"],
+    ["a rate of nothing", [{ ...goldenDescription(), rates: [null] }], "rate 0 must have kbps"],
   ])("%s ends it and says why", (_, tracks, why) => {
     viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
     FakeWebSocket.last.accept();

@@ -1,4 +1,4 @@
-/** Figures and references of any shape, for tests by property. */
+/** Arbitrary figures and references for property tests. */
 
 import * as fc from "fast-check";
 import { fromRotationVector } from "../../src/motion/rotation";
@@ -11,7 +11,7 @@ const arbitraryLengths = fc
 
 export const arbitraryFigure = fc.record({ offsets: arbitraryLengths, tips: arbitraryLengths });
 
-/** A rotation for each joint (72). */
+/** One rotation per joint (72). */
 export const arbitraryReference = fc
   .array(fc.double({ min: -2, max: 2, noNaN: true }), { minLength: 54, maxLength: 54 })
   .map((vectors) => {
@@ -23,5 +23,5 @@ export const arbitraryReference = fc
     return rotations;
   });
 
-/** No joint turned (72). */
+/** Identity rotations (72). */
 export const REST_ROTATIONS = restPose().rotations;

@@ -12,7 +12,7 @@ import { parseTiming } from "../../src/codec/timing";
 import { decodeBase64, loadVectors } from "../golden-vectors";
 
 interface AudioVectors {
-  /** The timing of the motion that each track is beside. */
+  /** Timing of the motion of each track. */
   motions: Record<string, unknown>[];
   tracks: Record<string, unknown>[];
   valid: { track: number; index: number; block: string; packets: { number: number; sample: number; data: string }[] }[];
@@ -21,7 +21,7 @@ interface AudioVectors {
 
 const golden = loadVectors<AudioVectors>("audio");
 const motions = golden.motions.map((map) => parseTiming(map, "motion"));
-const tracks = golden.tracks.map((map, nth) => AudioTrack.fromDescription(map, motions[nth]));
+const tracks = golden.tracks.map((map, index) => AudioTrack.fromDescription(map, motions[index]));
 
 describe("golden blocks", () => {
   test.each(golden.valid)("block $index of track $track", (vector) => {
@@ -41,9 +41,9 @@ describe("golden blocks", () => {
     expect(() => unpackAudioBlock(decodeBase64(block))).toThrow(DamagedBlock);
   });
 
-  test("hold all packets of a track, one after the other", () => {
-    tracks.forEach((track, nth) => {
-      const blocks = golden.valid.filter((vector) => vector.track === nth);
+  test("contain all packets of a track in order", () => {
+    tracks.forEach((track, trackIndex) => {
+      const blocks = golden.valid.filter((vector) => vector.track === trackIndex);
       expect(blocks.map(({ index }) => index)).toEqual([...Array(track.blockCount).keys()]);
       const numbers = blocks.flatMap(({ block }) => unpackAudioBlock(decodeBase64(block))).map(({ number }) => number);
       expect(numbers).toEqual([...Array(track.packetCount).keys()]);
@@ -54,12 +54,12 @@ describe("golden blocks", () => {
   });
 });
 
-test("what is no block is refused, and what is one is 60 ms packets", () => {
+test("damaged block is refused or contains packets of 60 ms", () => {
   const blocks = golden.valid.map(({ block }) => decodeBase64(block)).filter(({ length }) => length > 0);
   const change = fc.tuple(fc.nat(), fc.nat(255));
-  let read = 0,
+  let accepted = 0,
     refused = 0;
-  const survives = (data: Uint8Array): void => {
+  const expectPacketsOrRefusal = (data: Uint8Array): void => {
     let packets: AudioPacket[];
     try {
       packets = unpackAudioBlock(data);
@@ -68,7 +68,7 @@ test("what is no block is refused, and what is one is 60 ms packets", () => {
       refused++;
       return;
     }
-    read++;
+    accepted++;
     for (const packet of packets) expect(packetDurationMs(packet.data)).toBe(60);
     expect(packets.reduce((sum, packet) => sum + packet.data.length, 0)).toBeLessThanOrEqual(data.length);
   };
@@ -78,21 +78,21 @@ test("what is no block is refused, and what is one is 60 ms packets", () => {
       fc.array(change, { minLength: 1, maxLength: 3 }),
       fc.double({ min: 0, max: 1, noNaN: true }),
       fc.uint8Array({ maxLength: 40 }),
-      (whole, changes, part, any) => {
-        const damaged = whole.slice();
-        for (const [where, value] of changes) damaged[where % damaged.length] = value;
-        survives(damaged);
-        survives(whole.subarray(0, Math.floor(part * whole.length)));
-        survives(any);
+      (valid, changes, part, random) => {
+        const damaged = valid.slice();
+        for (const [position, value] of changes) damaged[position % damaged.length] = value;
+        expectPacketsOrRefusal(damaged);
+        expectPacketsOrRefusal(valid.subarray(0, Math.floor(part * valid.length)));
+        expectPacketsOrRefusal(random);
       },
     ),
     { numRuns: 500 },
   );
-  expect(read).toBeGreaterThan(50);
+  expect(accepted).toBeGreaterThan(50);
   expect(refused).toBeGreaterThan(50);
 });
 
-describe("a description that cannot be played is refused with what it lacks", () => {
+describe("invalid description is refused with a reason", () => {
   test.each([
     [{ codec: "opus" }, "codec opus"],
     [{ channels: 3 }, "channels"],
@@ -105,9 +105,9 @@ describe("a description that cannot be played is refused with what it lacks", ()
     [{ rates: [] }, "rates"],
     [{ rates: [{ kbps: 8 }, null] }, "rate 1"],
     [{ rates: [{ kbps: "8" }] }, "rate 0"],
-  ])("%o", (change, what) => {
-    const read = () => AudioTrack.fromDescription({ ...golden.tracks[0], ...change }, motions[0]);
-    expect(read).toThrow(DamagedBlock);
-    expect(read).toThrow(what);
+  ])("%o", (change, message) => {
+    const parse = () => AudioTrack.fromDescription({ ...golden.tracks[0], ...change }, motions[0]);
+    expect(parse).toThrow(DamagedBlock);
+    expect(parse).toThrow(message);
   });
 });

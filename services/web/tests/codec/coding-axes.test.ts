@@ -7,27 +7,27 @@ import { arbitraryFigure, arbitraryReference, REST_ROTATIONS } from "./arbitrary
 
 const axesOf = (axes: Float64Array, name: string) =>
   axes.subarray(JOINTS.indexOf(name) * 9, JOINTS.indexOf(name) * 9 + 9);
-const expectClose = (got: ArrayLike<number>, wanted: readonly number[], by = 9) =>
-  wanted.forEach((value, i) => expect(got[i]).toBeCloseTo(value, by));
+const expectClose = (actual: ArrayLike<number>, expected: readonly number[], digits = 9) =>
+  expected.forEach((value, i) => expect(actual[i]).toBeCloseTo(value, digits));
 
 function applyMatrix(m: Float64Array, v: ArrayLike<number>): number[] {
   return [0, 3, 6].map((row) => m[row] * v[0] + m[row + 1] * v[1] + m[row + 2] * v[2]);
 }
 
-/** Without size, but for the lengths named: a joint's offset, or with " tip" its tip. */
-function createFigure(named: Record<string, readonly [number, number, number]>): Figure {
-  const made = { offsets: new Float64Array(54), tips: new Float64Array(54) };
-  for (const [name, arm] of Object.entries(named)) {
+/** Returns a figure with only the given bones: offsets of joints, or tips if the name ends with " tip". */
+function createFigure(bones: Record<string, readonly [number, number, number]>): Figure {
+  const figure = { offsets: new Float64Array(54), tips: new Float64Array(54) };
+  for (const [name, arm] of Object.entries(bones)) {
     const joint = JOINTS.indexOf(name.replace(" tip", ""));
-    (name.endsWith(" tip") ? made.tips : made.offsets).set(arm, joint * 3);
+    (name.endsWith(" tip") ? figure.tips : figure.offsets).set(arm, joint * 3);
   }
-  return made;
+  return figure;
 }
 
-test("are right-handed and square to each other for any figure and any references", () => {
+test("axes are right-handed and orthogonal for any figure and reference", () => {
   fc.assert(
-    fc.property(arbitraryFigure, arbitraryReference, (dancer, reference) => {
-      const axes = codingAxes(dancer, reference);
+    fc.property(arbitraryFigure, arbitraryReference, (figure, reference) => {
+      const axes = codingAxes(figure, reference);
       for (let joint = 0; joint < 18; joint++) {
         const m = axes.subarray(joint * 9, joint * 9 + 9);
         const transposed = Float64Array.from([0, 3, 6, 1, 4, 7, 2, 5, 8], (i) => m[i]);
@@ -39,19 +39,19 @@ test("are right-handed and square to each other for any figure and any reference
   );
 });
 
-test("have a joint's only bone along the second: up where it stands, down where it hangs", () => {
-  const single = (joint: number, dancer: Figure) => {
+test("second axis points along the only bone, up or down", () => {
+  const onlyBone = (joint: number, figure: Figure) => {
     const children = PARENTS.flatMap((parent, child) => (parent === joint ? [child] : []));
     if (children.length > 1) return null;
-    const arms = children.length === 1 ? dancer.offsets.subarray(children[0] * 3) : dancer.tips.subarray(joint * 3);
+    const arms = children.length === 1 ? figure.offsets.subarray(children[0] * 3) : figure.tips.subarray(joint * 3);
     const length = Math.hypot(arms[0], arms[1], arms[2]);
     return length > 1e-3 ? { arm: arms, length } : null;
   };
   fc.assert(
-    fc.property(arbitraryFigure, arbitraryReference, (dancer, reference) => {
-      const axes = codingAxes(dancer, reference);
+    fc.property(arbitraryFigure, arbitraryReference, (figure, reference) => {
+      const axes = codingAxes(figure, reference);
       JOINTS.forEach((name, joint) => {
-        const bone = single(joint, dancer);
+        const bone = onlyBone(joint, figure);
         if (bone)
           expectClose(applyMatrix(axesOf(axes, name), bone.arm), [
             0,
@@ -63,11 +63,11 @@ test("have a joint's only bone along the second: up where it stands, down where 
   );
 });
 
-test("of a joint with several bones or with none are the dancer's as the references have them", () => {
+test("joint with several bones or none has the axes of the reference pose", () => {
   fc.assert(
     fc.property(arbitraryReference, (reference) => {
-      const standing = reference.slice(),
-        wanted = new Float64Array(9);
+      const world = reference.slice(),
+        expected = new Float64Array(9);
       const axes = codingAxes(
         createFigure({
           sacroiliac: [0, 0.3, 0.4],
@@ -82,33 +82,33 @@ test("of a joint with several bones or with none are the dancer's as the referen
         const joint = JOINTS.indexOf(name);
         const chain = [];
         for (let j = joint; j >= 0; j = PARENTS[j]) chain.unshift(j);
-        standing.set([1, 0, 0, 0], joint * 4);
-        for (const j of chain) multiply(standing, joint * 4, standing, joint * 4, reference, j * 4);
-        toMatrix(wanted, 0, standing, joint * 4);
-        expectClose(axesOf(axes, name), [...wanted]);
+        world.set([1, 0, 0, 0], joint * 4);
+        for (const j of chain) multiply(world, joint * 4, world, joint * 4, reference, j * 4);
+        toMatrix(expected, 0, world, joint * 4);
+        expectClose(axesOf(axes, name), [...expected]);
       }
     }),
   );
 });
 
-test("mean the same whatever the frames of the skeleton's joints", () => {
-  // each joint's own frame turned: what hangs on it and its children's rotations are told in the new one
+test("axes do not depend on the frames of the joints", () => {
+  // rotate the frame of each joint, and express its bones and its children's rotations in the new frame
   fc.assert(
-    fc.property(arbitraryFigure, arbitraryReference, arbitraryReference, (dancer, reference, frames) => {
+    fc.property(arbitraryFigure, arbitraryReference, arbitraryReference, (figure, reference, frames) => {
       const inverse = frames.map((part, i) => (i % 4 === 0 ? part : -part));
-      const other = { offsets: dancer.offsets.slice(), tips: dancer.tips.slice() },
-        told = reference.slice();
+      const other = { offsets: figure.offsets.slice(), tips: figure.tips.slice() },
+        otherReference = reference.slice();
       const m = new Float64Array(9);
       for (let joint = 0; joint < 18; joint++) {
         toMatrix(m, 0, inverse, joint * 4);
-        other.tips.set(applyMatrix(m, dancer.tips.subarray(joint * 3)), joint * 3);
-        multiply(told, joint * 4, told, joint * 4, frames, joint * 4);
+        other.tips.set(applyMatrix(m, figure.tips.subarray(joint * 3)), joint * 3);
+        multiply(otherReference, joint * 4, otherReference, joint * 4, frames, joint * 4);
         if (joint === 0) continue;
         toMatrix(m, 0, inverse, PARENTS[joint] * 4);
-        other.offsets.set(applyMatrix(m, dancer.offsets.subarray(joint * 3)), joint * 3);
-        multiply(told, joint * 4, inverse, PARENTS[joint] * 4, told, joint * 4);
+        other.offsets.set(applyMatrix(m, figure.offsets.subarray(joint * 3)), joint * 3);
+        multiply(otherReference, joint * 4, inverse, PARENTS[joint] * 4, otherReference, joint * 4);
       }
-      const [one, two] = [codingAxes(dancer, reference), codingAxes(other, told)];
+      const [one, two] = [codingAxes(figure, reference), codingAxes(other, otherReference)];
       for (let joint = 0; joint < 18; joint++) {
         toMatrix(m, 0, frames, joint * 4);
         expectClose(
@@ -121,8 +121,8 @@ test("mean the same whatever the frames of the skeleton's joints", () => {
   );
 });
 
-test("a bone that is almost opposite turns over about its side", () => {
-  // straight up instead of down: left stays left, and forward is back
+test("bone opposite to its rest direction turns over sideways", () => {
+  // straight up instead of down: left stays left, forward becomes backward
   expectClose(
     axesOf(codingAxes(createFigure({ l_knee: [0, 0.4, 0] }), REST_ROTATIONS), "l_hip"),
     [1, 0, 0, 0, -1, 0, 0, 0, -1],
@@ -133,7 +133,7 @@ test("a bone that is almost opposite turns over about its side", () => {
   );
 });
 
-test("a bent joint's first axis is its hinge, to the side that it had; a straight one's is not", () => {
+test("first axis of a bent joint is its hinge, that of a straight one is not", () => {
   const bent = (angle: number) => {
     const reference = REST_ROTATIONS.slice(),
       knee = JOINTS.indexOf("l_knee");
@@ -145,11 +145,11 @@ test("a bent joint's first axis is its hinge, to the side that it had; a straigh
   };
   for (const angle of [0.5, -0.5, 1.2, -1.2]) {
     const { axes, reference } = bent(angle);
-    const standing = new Float64Array(9);
-    toMatrix(standing, 0, reference, JOINTS.indexOf("l_knee") * 4);
-    // the first row, back in the dancer's axes, is the axis of the bend
-    expectClose(applyMatrix(standing, axes), [0.8, 0, 0.6]);
+    const orientation = new Float64Array(9);
+    toMatrix(orientation, 0, reference, JOINTS.indexOf("l_knee") * 4);
+    // the first row, in the figure's axes, is the axis of the bend
+    expectClose(applyMatrix(orientation, axes), [0.8, 0, 0.6]);
   }
-  // bent by less than a sine of 0.2, the shank's axes are the straight ones carried along: the bend undone
+  // below a sine of 0.2, the shank has the axes of a straight leg, rotated with it
   expectClose(bent(0.15).axes, [1, 0, 0, 0, 1, 0, 0, 0, 1]);
 });

@@ -22,40 +22,40 @@ import {
 } from "../../src/codec/prior";
 import { JOINTS } from "../../src/motion/skeleton";
 
-/** A channel's name: its joint's, or the root's position. */
+/** Returns the joint of a channel, or that it is the root's position. */
 const channelName = (channel: number) => (channel === 0 ? "position" : channel === 19 ? "none" : JOINTS[channel - 1]);
 
-test("relatives are those of the body", () => {
-  const of = (channel: number) =>
-    [RELATIVE_CHANNELS.parent, RELATIVE_CHANNELS.mirror, RELATIVE_CHANNELS.grandparent].map((which) =>
-      channelName(which[channel]),
+test("relative channels follow the skeleton", () => {
+  const relativesOf = (channel: number) =>
+    [RELATIVE_CHANNELS.parent, RELATIVE_CHANNELS.mirror, RELATIVE_CHANNELS.grandparent].map((relation) =>
+      channelName(relation[channel]),
     );
-  expect(of(0)).toEqual(["none", "none", "none"]);
-  expect(of(1)).toEqual(["position", "none", "none"]);
-  expect(of(2)).toEqual(["humanoid_root", "humanoid_root", "position"]);
-  expect(of(JOINTS.indexOf("r_knee") + 1)).toEqual(["r_hip", "l_knee", "sacroiliac"]);
-  expect(of(JOINTS.indexOf("l_elbow") + 1)).toEqual(["l_shoulder", "l_shoulder", "vl5"]);
+  expect(relativesOf(0)).toEqual(["none", "none", "none"]);
+  expect(relativesOf(1)).toEqual(["position", "none", "none"]);
+  expect(relativesOf(2)).toEqual(["humanoid_root", "humanoid_root", "position"]);
+  expect(relativesOf(JOINTS.indexOf("r_knee") + 1)).toEqual(["r_hip", "l_knee", "sacroiliac"]);
+  expect(relativesOf(JOINTS.indexOf("l_elbow") + 1)).toEqual(["l_shoulder", "l_shoulder", "vl5"]);
   for (const relatives of Object.values(RELATIVE_CHANNELS)) {
     relatives.forEach((relative, channel) => expect(relative < channel || relative === 19).toBe(true));
   }
 });
 
-test("classes of frequencies", () => {
+test("frequency classes", () => {
   expect([0, 1, 2, 3, 4, 5, 8, 9, 15, 16, 512].map((k) => FREQUENCY_CLASS_OF[k])).toEqual([
     0, 1, 2, 3, 3, 4, 4, 5, 5, 6, 6,
   ]);
 });
 
-/** The scale by the words of the contract, from all sizes and how many of them are decoded. */
+/** Returns the scale as the specification defines it, from all magnitudes. */
 function referenceScale(
   prior: PriorValues,
-  size: (c: number, a: number, k: number) => number,
-  at: [number, number, number],
+  magnitude: (c: number, a: number, k: number) => number,
+  coefficient: [number, number, number],
   count: number,
   step: number,
-  length: number,
+  durationLevel: number,
 ): number {
-  const [c, a, k] = at;
+  const [c, a, k] = coefficient;
   const decoded = (channel: number, axis: number, f: number) =>
     channel < 19 &&
     channel >= 0 &&
@@ -63,8 +63,8 @@ function referenceScale(
     f < count &&
     (channel < c || (channel === c && (f < k || (f === k && axis < a))));
   const L = (channel: number, axis: number, f: number) =>
-    decoded(channel, axis, f) ? magnitudeLevel(size(channel, axis, f)) : 0;
-  // the mean of a frequency counts once its three axes are decoded
+    decoded(channel, axis, f) ? magnitudeLevel(magnitude(channel, axis, f)) : 0;
+  // the mean of a frequency counts when its three axes are decoded
   const M = (channel: number, f: number) =>
     decoded(channel, 2, f) ? Math.floor((L(channel, 0, f) + L(channel, 1, f) + L(channel, 2, f)) / 3) : 0;
   const sum = (n: number, term: (i: number) => number) =>
@@ -72,7 +72,7 @@ function referenceScale(
   const T = (f: number) => sum(c, (channel) => M(channel, f));
   const [p, m, g] = [RELATIVE_CHANNELS.parent[c], RELATIVE_CHANNELS.mirror[c], RELATIVE_CHANNELS.grandparent[c]];
   const d = Math.max(c, 1);
-  const kin = (r: number) => [
+  const relativeFeatures = (r: number) => [
     M(r, k),
     M(r, k - 1),
     M(r, k + 1),
@@ -82,8 +82,8 @@ function referenceScale(
     M(c, k - 1),
     M(c, k - 2),
     M(c, k - 3),
-    ...kin(p),
-    ...kin(m),
+    ...relativeFeatures(p),
+    ...relativeFeatures(m),
     M(g, k),
     Math.floor((M(g, k + 1) + M(g, k + 2)) / 2),
     Math.floor(T(k) / d),
@@ -96,7 +96,7 @@ function referenceScale(
     Math.min(count - k, 63),
     magnitudeLevel(k),
     step,
-    length,
+    durationLevel,
     L(c, a, k - 1),
     L(c, a, k - 2),
     L(c, a, k - 3),
@@ -117,11 +117,11 @@ function referenceScale(
   return Math.min(Math.max(e, -1792), 3584);
 }
 
-const row = (length: number, most: number) =>
-  fc.array(fc.integer({ min: -most, max: most }), { minLength: length, maxLength: length });
-const rows = (count: number, length: number, most: number) =>
-  fc.array(row(length, most), { minLength: count, maxLength: count });
-const anyPrior: fc.Arbitrary<PriorValues> = fc.record({
+const row = (length: number, limit: number) =>
+  fc.array(fc.integer({ min: -limit, max: limit }), { minLength: length, maxLength: length });
+const rows = (count: number, length: number, limit: number) =>
+  fc.array(row(length, limit), { minLength: count, maxLength: count });
+const arbitraryPrior: fc.Arbitrary<PriorValues> = fc.record({
   linear: rows(FREQUENCY_CLASSES, FEATURE_COUNT, 1500),
   bias: rows(FREQUENCY_CLASSES, CHANNEL_AXES, 300_000),
   hidden: rows(HIDDEN_UNITS, FEATURE_COUNT, 3000),
@@ -132,33 +132,33 @@ const anyPrior: fc.Arbitrary<PriorValues> = fc.record({
   sign: rows(FREQUENCY_CLASSES, SIGN_CONTEXTS, 1),
 });
 
-test("the scale is the definition's for any prior and any sizes", () => {
-  const sizes = fc.infiniteStream(fc.oneof(fc.constant(0), fc.nat(3), fc.nat(100_000)));
+test("scale equals its definition for any prior and magnitudes", () => {
+  const magnitudes = fc.infiniteStream(fc.oneof(fc.constant(0), fc.nat(3), fc.nat(100_000)));
   fc.assert(
     fc.property(
-      anyPrior,
-      sizes,
+      arbitraryPrior,
+      magnitudes,
       fc.integer({ min: 1, max: 22 }),
       fc.nat(255),
       fc.nat(192),
-      (values, stream, count, step, length) => {
+      (values, stream, count, step, durationLevel) => {
         const drawn = Array.from({ length: CHANNEL_AXES * count }, () => stream.next().value as number);
-        const size = (c: number, a: number, k: number) => drawn[(c * 3 + a) * count + k];
-        const contexts = new ContextModel(parsePrior(values), count, step, length);
-        let seen = 0;
+        const magnitude = (c: number, a: number, k: number) => drawn[(c * 3 + a) * count + k];
+        const context = new ContextModel(parsePrior(values), count, step, durationLevel);
+        let index = 0;
         for (let channel = 0; channel < 19; channel++) {
           for (let k = 0; k < count; k++) {
-            contexts.computeSharedSums(channel, k);
+            context.computeSharedSums(channel, k);
             for (let axis = 0; axis < 3; axis++) {
-              const scale = contexts.predictScale(channel, axis, k);
-              // the definition is slow: every seventh coefficient
-              if (seen++ % 7 === 0)
-                expect(scale).toBe(referenceScale(values, size, [channel, axis, k], count, step, length));
-              contexts.updateMagnitude(channel, axis, k, size(channel, axis, k));
+              const scale = context.predictScale(channel, axis, k);
+              // the definition is slow, so check every seventh coefficient
+              if (index++ % 7 === 0)
+                expect(scale).toBe(referenceScale(values, magnitude, [channel, axis, k], count, step, durationLevel));
+              context.updateMagnitude(channel, axis, k, magnitude(channel, axis, k));
             }
-            contexts.finishFrequency(channel, k);
+            context.finishFrequency(channel, k);
           }
-          contexts.finishChannel(channel);
+          context.finishChannel(channel);
         }
       },
     ),
@@ -166,7 +166,7 @@ test("the scale is the definition's for any prior and any sizes", () => {
   );
 });
 
-test("a scale keeps within its ends", () => {
+test("scale is within its limits", () => {
   const flat = (count: number, length: number, value = 0) =>
     Array.from({ length: count }, () => new Array<number>(length).fill(value));
   const values = {
@@ -178,34 +178,34 @@ test("a scale keeps within its ends", () => {
     hazard: flat(3 * HAZARD_ROWS, UNARY_DECISIONS),
     sign: flat(FREQUENCY_CLASSES, SIGN_CONTEXTS),
   };
-  for (const [bias, wanted] of [
+  for (const [bias, expected] of [
     [1 << 28, MAX_SCALE],
     [-(1 << 28), MIN_SCALE],
     [-1, -1],
     [511, 1],
   ]) {
-    const contexts = new ContextModel(
+    const context = new ContextModel(
       parsePrior({ ...values, bias: flat(FREQUENCY_CLASSES, CHANNEL_AXES, bias) }),
       1,
       0,
       0,
     );
-    contexts.computeSharedSums(0, 0);
-    expect(contexts.predictScale(0, 0, 0)).toBe(wanted);
+    context.computeSharedSums(0, 0);
+    expect(context.predictScale(0, 0, 0)).toBe(expected);
   }
 });
 
-test("a sign's context is of the second and fourth frequency before, never of the first", () => {
+test("sign context depends on two and four frequencies below, never on the lowest", () => {
   const q = Float64Array.of(0, 9, 9, -7, 1, 0, 2 ** 31);
   const contexts = [0, 1, 2, 3, 4, 5, 6].map((k) => signContext(q, k, k));
-  const context = (near: number, far: number) => 3 * (near + 2) + far + 1;
+  const contextOf = (near: number, far: number) => 3 * (near + 2) + far + 1;
   expect(contexts).toEqual([
-    context(0, 0),
-    context(0, 0),
-    context(0, 0),
-    context(2, 0),
-    context(2, 0),
-    context(-2, 1),
-    context(1, 1),
+    contextOf(0, 0),
+    contextOf(0, 0),
+    contextOf(0, 0),
+    contextOf(2, 0),
+    contextOf(2, 0),
+    contextOf(-2, 1),
+    contextOf(1, 1),
   ]);
 });

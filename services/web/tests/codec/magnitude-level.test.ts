@@ -1,23 +1,23 @@
 import { expect, test } from "vitest";
 import { magnitudeLevel, magnitudeLevels } from "../../src/codec/magnitude-level";
 
-test("every level is the largest L whose 2 L is no more than the bits of (size + 1)^32", () => {
+test("level L is the largest with 2 L at most the bits of (magnitude + 1)^32", () => {
   const table = magnitudeLevels();
   expect(table.length).toBe(4096);
-  for (let size = 0; size < 4096; size++) {
-    const power = BigInt(size + 1) ** 32n,
-      twice = 2n * BigInt(table[size]);
-    // a number has at least n bits where it is 2^(n - 1) or more
+  for (let magnitude = 0; magnitude < 4096; magnitude++) {
+    const power = BigInt(magnitude + 1) ** 32n,
+      twice = 2n * BigInt(table[magnitude]);
+    // a number has at least n bits if it is at least 2^(n - 1)
     expect(twice === 0n || power >= 1n << (twice - 1n)).toBe(true);
     expect(power < 1n << (twice + 1n)).toBe(true);
   }
 });
 
-test("16 log2 to the nearest", () => {
-  for (const size of [0, 1, 2, 3, 7, 100, 4095])
-    expect(magnitudeLevel(size)).toBe(Math.round(16 * Math.log2(1 + size)));
+test("level is 16 log2(1 + magnitude), rounded", () => {
+  for (const magnitude of [0, 1, 2, 3, 7, 100, 4095])
+    expect(magnitudeLevel(magnitude)).toBe(Math.round(16 * Math.log2(1 + magnitude)));
 });
 
-test("sizes past the table have its last level", () => {
+test("magnitudes above 4095 have the level of 4095", () => {
   expect([magnitudeLevel(4095), magnitudeLevel(4096), magnitudeLevel(2 ** 40)]).toEqual([192, 192, 192]);
 });

@@ -9,7 +9,7 @@ import { decodeBase64, loadVectors } from "../golden-vectors";
 import { HostileInputCounts } from "../hostile-input";
 
 const golden = loadVectors<BlockVectors>("blocks");
-const tracks = golden.tracks.map((_, which) => goldenTrack(which));
+const tracks = golden.tracks.map((_, index) => goldenTrack(index));
 
 describe("golden blocks", () => {
   test.each(golden.valid)("step $step: poses to 1e-9", (vector) => {
@@ -18,7 +18,7 @@ describe("golden blocks", () => {
     const pose = restPose();
     for (const { instant, root, rotations } of vector.poses) {
       block.poseAt(instant, pose);
-      // of values as large as whole kilometres, in parts of them
+      // relative error for values of kilometres
       root.forEach((value, i) =>
         expect(Math.abs(pose.root[i] - value)).toBeLessThan(1e-9 * Math.max(1, Math.abs(value))),
       );
@@ -31,7 +31,7 @@ describe("golden blocks", () => {
   });
 });
 
-test("sixteen step indices double the step, and a block of 120 frames has twice that of 30", () => {
+test("step size doubles every 16 indices, and with four times the frames", () => {
   expect([stepSize(0, 30), stepSize(16, 30), stepSize(160, 30), stepSize(0, 120)]).toEqual([
     2 ** -16,
     2 ** -15,
@@ -40,13 +40,13 @@ test("sixteen step indices double the step, and a block of 120 frames has twice 
   ]);
 });
 
-test("values lie a little towards zero", () => {
+test("reconstruction is biased towards zero", () => {
   expect([0, 1, -1, 2, -2, 9].map(reconstruct)).toEqual([0, 0.94, -0.94, 1.97, -1.97, 8.97]);
 });
 
 const outcome = new HostileInputCounts(DamagedBlock);
 
-/** Decodes `data` and takes a pose; only `DamagedBlock` may come of it, and never more than a megabyte. */
+/** Decodes `data` and evaluates a pose. Only `DamagedBlock` may be thrown, and at most a megabyte allocated. */
 function expectNoCrash(track: MotionTrack, data: Uint8Array): void {
   outcome.run(() => {
     const block = decodeMotionBlock(track, data);
@@ -57,32 +57,32 @@ function expectNoCrash(track: MotionTrack, data: Uint8Array): void {
   });
 }
 
-describe("what is no block decodes to finite poses or is refused", { timeout: 60_000 }, () => {
-  const blocks = golden.valid.map((vector) => ({ track: tracks[vector.track], whole: decodeBase64(vector.block) }));
+describe("damaged block decodes to finite poses or is refused", { timeout: 60_000 }, () => {
+  const blocks = golden.valid.map((vector) => ({ track: tracks[vector.track], valid: decodeBase64(vector.block) }));
   const anyBlock = fc.constantFrom(...blocks);
 
-  test("blocks cut short", () => {
+  test("truncated blocks", () => {
     fc.assert(
-      fc.property(anyBlock, fc.double({ min: 0, max: 1, noNaN: true }), ({ track, whole }, part) => {
-        expectNoCrash(track, whole.subarray(0, Math.floor(part * whole.length)));
+      fc.property(anyBlock, fc.double({ min: 0, max: 1, noNaN: true }), ({ track, valid }, part) => {
+        expectNoCrash(track, valid.subarray(0, Math.floor(part * valid.length)));
       }),
       { numRuns: 1000 },
     );
   });
 
-  test("blocks with bytes changed", () => {
+  test("blocks with changed bytes", () => {
     const change = fc.tuple(fc.nat(), fc.nat(255));
     fc.assert(
-      fc.property(anyBlock, fc.array(change, { minLength: 1, maxLength: 8 }), ({ track, whole }, changes) => {
-        const damaged = whole.slice();
-        for (const [where, value] of changes) damaged[where % damaged.length] = value;
+      fc.property(anyBlock, fc.array(change, { minLength: 1, maxLength: 8 }), ({ track, valid }, changes) => {
+        const damaged = valid.slice();
+        for (const [position, value] of changes) damaged[position % damaged.length] = value;
         expectNoCrash(track, damaged);
       }),
       { numRuns: 2000 },
     );
   });
 
-  test("any bytes", () => {
+  test("random bytes", () => {
     fc.assert(
       fc.property(fc.constantFrom(...tracks), fc.uint8Array({ maxLength: 600 }), (track, data) =>
         expectNoCrash(track, data),
@@ -91,7 +91,7 @@ describe("what is no block decodes to finite poses or is refused", { timeout: 60
     );
   });
 
-  test("a whole length of noise, and one of the longest blocks", () => {
+  test("blocks of the maximum length", () => {
     const noise = new Uint8Array(65_536).map((_, i) => (i * 2_654_435_761) >>> 11);
     for (let first = 0; first < 256; first++) {
       noise[0] = first;
@@ -101,6 +101,6 @@ describe("what is no block decodes to finite poses or is refused", { timeout: 60
   });
 });
 
-test("a block past the limit is refused before it is read", () => {
-  expect(() => decodeMotionBlock(tracks[0], new Uint8Array(65_537).fill(1))).toThrow("at most 65536 bytes");
+test("too long block is refused", () => {
+  expect(() => decodeMotionBlock(tracks[0], new Uint8Array(65_537).fill(1))).toThrow("at most 65536");
 });

@@ -6,11 +6,11 @@ import { fromRotationVector, multiply, rotate } from "../../src/motion/rotation"
 import { goldenDescription, goldenTrack } from "../golden-motion";
 import { HostileInputCounts } from "../hostile-input";
 
-test("blocks are found by time, whatever the rounding and the length of the first", () => {
-  const { skeleton: dancer } = goldenTrack();
+test("blocks are found by time at any frame rate and first length", () => {
+  const { skeleton } = goldenTrack();
   for (const fps of [24, 29.97, 30, 59.94, 60, 119.88, 120]) {
     for (const first of [1, 6, Math.round(fps), Math.round(fps * 3), Math.round(fps * 9.5)]) {
-      const track = new MotionTrack(fps, Math.round(fps * 9.5), Math.round(fps), first, dancer);
+      const track = new MotionTrack(fps, Math.round(fps * 9.5), Math.round(fps), first, skeleton);
       for (let index = 0; index < track.blockCount; index++) {
         expect(track.blockAt(track.startUs(index))).toBe(index);
         if (index > 0) expect(track.blockAt(track.startUs(index) - 1e3)).toBe(index - 1);
@@ -20,40 +20,40 @@ test("blocks are found by time, whatever the rounding and the length of the firs
       expect(track.blockAt(1e12)).toBe(track.blockCount - 1);
       const frames = Array.from({ length: track.blockCount }, (_, index) => track.framesIn(index));
       expect(Math.min(...frames)).toBeGreaterThan(0);
-      expect(frames.reduce((sum, each) => sum + each)).toBe(track.frames);
+      expect(frames.reduce((sum, count) => sum + count)).toBe(track.frames);
     }
   }
 });
 
-test("a heading turns the root's reference about y by sixty-fourths, and no other", () => {
+test("heading rotates only the root's reference, by 1/64 of a turn about y", () => {
   const track = goldenTrack(1);
   const { reference } = track.skeleton;
   expect([...track.referenceRotations(0)]).toEqual([...reference]);
   for (const heading of [-32, -7, 16, 31]) {
-    const turned = track.referenceRotations(heading);
-    expect([...turned.subarray(4)]).toEqual([...reference.subarray(4)]);
+    const rotated = track.referenceRotations(heading);
+    expect([...rotated.subarray(4)]).toEqual([...reference.subarray(4)]);
     const turn = new Float64Array(4),
-      wanted = new Float64Array(4);
+      expected = new Float64Array(4);
     fromRotationVector(turn, 0, 0, (heading * Math.PI) / 32, 0);
-    multiply(wanted, 0, turn, 0, reference, 0);
-    wanted.forEach((value, i) => expect(turned[i]).toBeCloseTo(value, 12));
+    multiply(expected, 0, turn, 0, reference, 0);
+    expected.forEach((value, i) => expect(rotated[i]).toBeCloseTo(value, 12));
   }
-  // a quarter of a whole turn brings what pointed along z along x
+  // a quarter turn moves the z axis to the x axis
   const [before, after] = [new Float64Array(3), new Float64Array(3)];
   rotate(before, 0, reference, 0, Float64Array.of(0, 0, 1), 0);
   rotate(after, 0, track.referenceRotations(16), 0, Float64Array.of(0, 0, 1), 0);
   [before[2], before[1], -before[0]].forEach((value, i) => expect(after[i]).toBeCloseTo(value, 12));
 });
 
-test("the golden tracks' blocks", () => {
-  const lengths = [0, 1, 2].map((which) => {
-    const track = goldenTrack(which);
+test("blocks of the golden tracks", () => {
+  const lengths = [0, 1, 2].map((index) => {
+    const track = goldenTrack(index);
     return Array.from({ length: track.blockCount }, (_, index) => track.framesIn(index));
   });
   expect(lengths).toEqual([[30, 30, 18], [6, 30, 30], [20]]);
 });
 
-describe("a description that cannot be played is refused with what it lacks", () => {
+describe("invalid description is refused with a reason", () => {
   test.each([
     [{ codec: "bunraku.motion/1" }, "codec bunraku.motion/1"],
     [{ fps: 0 }, "fps"],
@@ -70,33 +70,33 @@ describe("a description that cannot be played is refused with what it lacks", ()
     [{ frames: 2.5 }, "frames"],
     [{ dancer: "text" }, "dancer"],
     [{ dancer: new Uint8Array(0) }, "bytes"],
-    [{ dancer: new Uint8Array(103).fill(15) }, "2^-15 radians"],
-    [{ dancer: new Uint8Array(103).fill(0x82) }, "grid is 8"],
+    [{ dancer: new Uint8Array(103).fill(15) }, "15 reference bits"],
+    [{ dancer: new Uint8Array(103).fill(0x82) }, "grid 8"],
     [{ rates: Array(17).fill({ kbps: 1, mean: 1, max: 1 }) }, "rates"],
     [{ rates: [{ kbps: 1, mean: 1 }] }, "rate 0"],
-    [{ place: null }, "place of three numbers"],
-    [{ place: [0, 0] }, "place of three numbers"],
-    [{ place: [0, 0, 0, 0] }, "place of three numbers"],
-    [{ place: [0, NaN, 0] }, "place of three numbers"],
-    [{ place: [0, 0, Infinity] }, "place of three numbers"],
-    [{ place: [0, "1", 0] }, "place of three numbers"],
-    [{ place: { x: 0, z: 0, turn: 0 } }, "place of three numbers"],
+    [{ place: null }, "place must have three numbers"],
+    [{ place: [0, 0] }, "place must have three numbers"],
+    [{ place: [0, 0, 0, 0] }, "place must have three numbers"],
+    [{ place: [0, NaN, 0] }, "place must have three numbers"],
+    [{ place: [0, 0, Infinity] }, "place must have three numbers"],
+    [{ place: [0, "1", 0] }, "place must have three numbers"],
+    [{ place: { x: 0, z: 0, turn: 0 } }, "place must have three numbers"],
     [{ place: [100.001, 0, 0] }, "within 100 metres"],
     [{ place: [0, -101, 0] }, "within 100 metres"],
-  ])("%o", (change, what) => {
-    const read = () => MotionTrack.fromDescription({ ...goldenDescription(), ...change });
-    expect(read).toThrow(DamagedBlock);
-    expect(read).toThrow(what);
+  ])("%o", (change, message) => {
+    const parse = () => MotionTrack.fromDescription({ ...goldenDescription(), ...change });
+    expect(parse).toThrow(DamagedBlock);
+    expect(parse).toThrow(message);
   });
 });
 
-test("where its dancer dances is read; left out it is the middle", () => {
-  const place = (given: unknown) => MotionTrack.fromDescription({ ...goldenDescription(), place: given }).placement;
-  expect(place([-100, 1.5, -2])).toEqual({ x: -100, z: 1.5, turn: -2 });
+test("placement is parsed, and is the centre of the stage by default", () => {
+  const placementOf = (place: unknown) => MotionTrack.fromDescription({ ...goldenDescription(), place }).placement;
+  expect(placementOf([-100, 1.5, -2])).toEqual({ x: -100, z: 1.5, turn: -2 });
   expect(goldenTrack().placement).toEqual({ x: 0, z: 0, turn: 0 });
 });
 
-test("a description with anything in it is of a track whose every block has its place, or refused", () => {
+test("arbitrary description gives a valid track or is refused", () => {
   const value = fc.oneof(
     fc.anything(),
     fc.double(),

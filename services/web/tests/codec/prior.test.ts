@@ -14,20 +14,20 @@ import {
   UNARY_DECISIONS,
 } from "../../src/codec/prior";
 
-test("every number of the shipped prior stands where it is read", () => {
+test("integers of the shipped prior are stored in reading order", () => {
   const { weights, biases, out, hazard, sign } = loadShippedPrior();
   for (let z = 0; z < FREQUENCY_CLASSES; z++) {
     for (let i = 0; i < FEATURE_COUNT; i++) {
-      const at = (z * FEATURE_COUNT + i) * SUM_COUNT;
-      expect([...weights.subarray(at, at + SUM_COUNT)]).toEqual([
+      const offset = (z * FEATURE_COUNT + i) * SUM_COUNT;
+      expect([...weights.subarray(offset, offset + SUM_COUNT)]).toEqual([
         values.linear[z][i],
         ...values.hidden.map((unit) => unit[i]),
       ]);
     }
     for (let i = 0; i < CHANNEL_AXES; i++) {
-      const at = (z * CHANNEL_AXES + i) * SUM_COUNT;
+      const offset = (z * CHANNEL_AXES + i) * SUM_COUNT;
       const units = values.hidden_bias.map((unit, j) => unit[i] + values.hidden_class[j][z]);
-      expect([...biases.subarray(at, at + SUM_COUNT)]).toEqual([values.bias[z][i], ...units]);
+      expect([...biases.subarray(offset, offset + SUM_COUNT)]).toEqual([values.bias[z][i], ...units]);
     }
     expect([...out.subarray(z * HIDDEN_UNITS, (z + 1) * HIDDEN_UNITS)]).toEqual(values.out.map((unit) => unit[z]));
   }
@@ -40,22 +40,22 @@ test("every number of the shipped prior stands where it is read", () => {
   expect(HAZARD_TABLE_OF.length).toBe(FREQUENCY_CLASSES);
 });
 
-test("no sum of the shipped prior can pass 32 bits, whatever the features", () => {
+test("sums of the shipped prior cannot overflow 32 bits", () => {
   const { weights, biases, out } = loadShippedPrior();
   const largestFeature = 255;
   for (let z = 0; z < FREQUENCY_CLASSES; z++) {
     for (let sum = 0; sum < SUM_COUNT; sum++) {
-      let most = 0;
+      let largest = 0;
       for (let i = 0; i < FEATURE_COUNT; i++)
-        most += largestFeature * Math.abs(weights[(z * FEATURE_COUNT + i) * SUM_COUNT + sum]);
+        largest += largestFeature * Math.abs(weights[(z * FEATURE_COUNT + i) * SUM_COUNT + sum]);
       for (let i = 0; i < CHANNEL_AXES; i++)
-        expect(most + Math.abs(biases[(z * CHANNEL_AXES + i) * SUM_COUNT + sum])).toBeLessThan(2 ** 31);
+        expect(largest + Math.abs(biases[(z * CHANNEL_AXES + i) * SUM_COUNT + sum])).toBeLessThan(2 ** 31);
     }
   }
   for (const weight of out) expect(Math.abs(weight) * 32767).toBeLessThan(2 ** 31);
 });
 
-test("all its probabilities are above none and below all", () => {
+test("probabilities of the shipped prior are between 0 and 1", () => {
   const { hazard, sign } = loadShippedPrior();
   for (const probability of [...hazard, ...sign]) {
     expect(probability).toBeGreaterThan(0);
@@ -63,9 +63,9 @@ test("all its probabilities are above none and below all", () => {
   }
 });
 
-test("a prior of another shape is refused by name", () => {
+test("prior of a wrong shape is refused", () => {
   expect(() => parsePrior({ ...values, hazard: values.hazard.slice(1) })).toThrow(
-    "a prior's hazard has 144 rows of 18 numbers",
+    "hazard must have 144 rows of 18 numbers",
   );
   expect(() => parsePrior({ ...values, sign: values.sign.map((row) => row.slice(1)) })).toThrow("sign");
 });

@@ -1,7 +1,4 @@
-/**
- * The range encoder of the contract, in whole numbers of any size: the stream is the lowest number of its last interval, as a
- * fraction.
- */
+/** Encodes bits as the specification defines, in big integers: the stream is the lowest number of the last interval. */
 export function encodeBits(bits: readonly { bit: number; probability: number }[]): Uint8Array<ArrayBuffer> {
   let low = 0n,
     range = 0xffffffffn,
@@ -13,7 +10,7 @@ export function encodeBits(bits: readonly { bit: number; probability: number }[]
     for (; range < 1n << 24n; bytes++) [low, range] = [low << 8n, range << 8n];
   }
   const out = new Uint8Array(bytes);
-  for (let at = bytes - 1; at >= 0; at--, low >>= 8n) out[at] = Number(low & 255n);
+  for (let i = bytes - 1; i >= 0; i--, low >>= 8n) out[i] = Number(low & 255n);
   let end = bytes;
   while (end > 0 && out[end - 1] === 0) end--;
   return out.subarray(0, end);

@@ -16,7 +16,7 @@ interface SceneVectors {
     q: number[];
     values: { instant: number; numbers: number[] }[];
   }[];
-  /** Of the first track. */
+  /** Blocks of the first track. */
   invalid: { why: string; block: string }[];
 }
 
@@ -24,7 +24,7 @@ const golden = loadVectors<SceneVectors>("scene");
 const tracks = golden.tracks.map((track) => SceneTrack.fromDescription(track));
 
 describe("golden blocks", () => {
-  test.each(golden.valid)("of track $track, $frames frames at step $step", (vector) => {
+  test.each(golden.valid)("block of track $track, $frames frames at step $step", (vector) => {
     const track = tracks[vector.track];
     const { frames, step, heading, q } = decodeCoefficients(
       loadShippedPrior(),
@@ -48,7 +48,7 @@ describe("golden blocks", () => {
     expect(() => decodeSceneBlock(tracks[0], decodeBase64(block))).toThrow(DamagedBlock);
   });
 
-  test("are of cameras and lights, moving and still", () => {
+  test("include cameras and lights, moving and still", () => {
     expect(tracks.map(({ kind, blockCount: blocks }) => [kind, blocks])).toEqual([
       ["camera", 3],
       ["light", 6],
@@ -58,13 +58,13 @@ describe("golden blocks", () => {
   });
 });
 
-test("what is no block decodes to finite numbers or is refused", () => {
-  const blocks = golden.valid.map((vector) => ({ track: tracks[vector.track], whole: decodeBase64(vector.block) }));
+test("damaged block decodes to finite values or is refused", () => {
+  const blocks = golden.valid.map((vector) => ({ track: tracks[vector.track], valid: decodeBase64(vector.block) }));
   const change = fc.tuple(fc.nat(), fc.nat(255));
   const out = new Float64Array(SCENE_VALUE_COUNT);
   let decoded = 0,
     refused = 0;
-  const survives = (track: SceneTrack, data: Uint8Array): void => {
+  const expectFiniteOrRefused = (track: SceneTrack, data: Uint8Array): void => {
     try {
       const block = decodeSceneBlock(track, data);
       block.valuesAt(block.frames / 2, out);
@@ -82,12 +82,12 @@ test("what is no block decodes to finite numbers or is refused", () => {
       fc.array(change, { minLength: 1, maxLength: 8 }),
       fc.double({ min: 0, max: 1, noNaN: true }),
       fc.uint8Array({ maxLength: 400 }),
-      ({ track, whole }, changes, part, any) => {
-        const damaged = whole.slice();
-        for (const [where, value] of changes) damaged[where % damaged.length] = value;
-        survives(track, damaged);
-        survives(track, whole.subarray(0, Math.floor(part * whole.length)));
-        survives(track, any);
+      ({ track, valid }, changes, part, random) => {
+        const damaged = valid.slice();
+        for (const [position, value] of changes) damaged[position % damaged.length] = value;
+        expectFiniteOrRefused(track, damaged);
+        expectFiniteOrRefused(track, valid.subarray(0, Math.floor(part * valid.length)));
+        expectFiniteOrRefused(track, random);
       },
     ),
     { numRuns: 1000 },
@@ -95,11 +95,11 @@ test("what is no block decodes to finite numbers or is refused", () => {
   console.log(`${decoded} damaged scene blocks decoded, ${refused} refused`);
 });
 
-describe("a description that cannot be played is refused with what it lacks", () => {
+describe("invalid description is refused with a reason", () => {
   test.each([
-    [{ type: "motion" }, "a camera or a light"],
+    [{ type: "motion" }, "camera or light"],
     [{ codec: "bunraku.motion/2" }, "bunraku.motion/2"],
-    [{ fps: 0 }, "light needs fps"],
+    [{ fps: 0 }, "light track: fps"],
     [{ first_frames: 0 }, "first_frames"],
     [{ full: 0 }, "full"],
     [{ full: "800" }, "full"],
@@ -108,11 +108,11 @@ describe("a description that cannot be played is refused with what it lacks", ()
     [{ reference: [0, 0, 0, 0, 0, 0, NaN] }, "reference"],
     [{ reference: [0, 0, 0, 0, 0, 0, "1"] }, "reference"],
     [{ reference: null }, "reference"],
-    [{ rates: [] }, "light needs rates"],
+    [{ rates: [] }, "light track: rates"],
     [{ rates: [{ kbps: 1, mean: 1 }] }, "rate 0"],
-  ])("%o", (change, what) => {
-    const read = () => SceneTrack.fromDescription({ ...golden.tracks[1], ...change });
-    expect(read).toThrow(DamagedBlock);
-    expect(read).toThrow(what);
+  ])("%o", (change, message) => {
+    const parse = () => SceneTrack.fromDescription({ ...golden.tracks[1], ...change });
+    expect(parse).toThrow(DamagedBlock);
+    expect(parse).toThrow(message);
   });
 });

@@ -3,7 +3,7 @@ import { describe, expect, test } from "vitest";
 import { DamagedBlock } from "../../src/codec/errors";
 import { parseLadder, parseTiming, Timing } from "../../src/codec/timing";
 
-test("blocks tile any track and are found by time", () => {
+test("blocks cover the track and are found by time", () => {
   fc.assert(
     fc.property(
       fc.double({ min: 1, max: 240, noNaN: true }),
@@ -27,7 +27,7 @@ test("blocks tile any track and are found by time", () => {
   );
 });
 
-const described = {
+const description = {
   fps: 29.97,
   frames: 90,
   block_frames: 30,
@@ -35,27 +35,27 @@ const described = {
   rates: [{ kbps: 1, mean: 2, max: 3, more: 4 }],
 };
 
-test("a track's timing and rates are read", () => {
-  expect(parseTiming(described, "light")).toEqual(new Timing(29.97, 90, 30, 15));
-  expect(parseLadder(described, "light")).toEqual([{ kbps: 1, mean: 2, max: 3 }]);
+test("timing and bitrate levels are parsed", () => {
+  expect(parseTiming(description, "light")).toEqual(new Timing(29.97, 90, 30, 15));
+  expect(parseLadder(description, "light")).toEqual([{ kbps: 1, mean: 2, max: 3 }]);
 });
 
-describe("what is no timing is refused, with the track's name", () => {
+describe("invalid timing or ladder is refused with the name of the track", () => {
   test.each([
-    [{ fps: Infinity }, "light needs fps"],
-    [{ fps: "30" }, "light needs fps"],
-    [{ block_frames: 513 }, "light needs block_frames"],
-    [{ frames: 0 }, "light needs frames"],
-    [{ frames: 1e12 }, "light needs frames"],
-    [{ first_frames: 91 }, "light needs first_frames"],
-    [{ rates: null }, "light needs rates"],
+    [{ fps: Infinity }, "light track: fps"],
+    [{ fps: "30" }, "light track: fps"],
+    [{ block_frames: 513 }, "light track: block_frames"],
+    [{ frames: 0 }, "light track: frames"],
+    [{ frames: 1e12 }, "light track: frames"],
+    [{ first_frames: 91 }, "light track: first_frames"],
+    [{ rates: null }, "light track: rates"],
     [{ rates: [null] }, "rate 0"],
-  ])("%o", (change, what) => {
-    const read = () => [
-      parseTiming({ ...described, ...change }, "light"),
-      parseLadder({ ...described, ...change }, "light"),
+  ])("%o", (change, message) => {
+    const parse = () => [
+      parseTiming({ ...description, ...change }, "light"),
+      parseLadder({ ...description, ...change }, "light"),
     ];
-    expect(read).toThrow(DamagedBlock);
-    expect(read).toThrow(what);
+    expect(parse).toThrow(DamagedBlock);
+    expect(parse).toThrow(message);
   });
 });

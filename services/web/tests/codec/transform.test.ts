@@ -2,7 +2,7 @@ import * as fc from "fast-check";
 import { expect, test } from "vitest";
 import { cosineBasis } from "../../src/codec/transform";
 
-test("the cosines are orthonormal over the frames", () => {
+test("cosines are orthonormal over the frames", () => {
   fc.assert(
     fc.property(fc.integer({ min: 1, max: 60 }), fc.nat(59), fc.nat(59), (frames, i, j) => {
       const [a, b] = [i % frames, j % frames];
@@ -17,7 +17,7 @@ test("the cosines are orthonormal over the frames", () => {
   );
 });
 
-test("is the definition's at any instant, to the longest block", () => {
+test("cosines equal their definition at any instant", () => {
   const row = new Float64Array(1000);
   for (const t of [-0.5, 0, 17.3, 999.5]) {
     cosineBasis(row, 1000, 1000, t);

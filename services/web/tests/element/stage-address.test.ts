@@ -13,22 +13,22 @@ test.each([
   ["https://stage.example/v1/motions/a%20b/#share=a.b.c", "https://stage.example", "motions", "a b", "a.b.c"],
   ["/?session=s1", "https://site.example", "sessions", "s1", null],
   ["https://stage.example/?session=", "https://stage.example", "sessions", null, null],
-])("%s names a stage", (src, server, place, id, token) => {
-  const source = parseStageAddress(src, HERE);
-  expect(source && { ...source, query: undefined }).toEqual({ server, place, id, token, query: undefined });
+])("address %s is parsed", (src, server, kind, id, token) => {
+  const address = parseStageAddress(src, HERE);
+  expect(address && { ...address, query: undefined }).toEqual({ server, kind, id, token, query: undefined });
 });
 
-test("what else the address says is kept", () => {
+test("further query parameters are available", () => {
   expect(parseStageAddress("https://stage.example/?session=s1&name=Aiko", HERE)?.query.get("name")).toBe("Aiko");
 });
 
 test.each(["http://", "javascript:alert(1)", "file:///stage", "ws://stage.example/v1/sessions/s1/stream"])(
-  "%s names none",
+  "address %s is rejected",
   (src) => {
     expect(parseStageAddress(src, HERE)).toBeNull();
   },
 );
 
-test("a page from a file says where its stage is", () => {
+test("relative address in a page from a file is rejected", () => {
   expect(parseStageAddress("/?session=s1", "file:///home/page.html")).toBeNull();
 });

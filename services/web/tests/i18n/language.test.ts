@@ -9,10 +9,10 @@ import {
 import { pageLanguage, setPageLanguage, translate } from "../../src/i18n/translator";
 import { forbidStorage, stubStorage } from "../storage/storage-stub";
 
-let kept: Map<string, string>;
+let stored: Map<string, string>;
 
 beforeEach(() => {
-  kept = stubStorage("localStorage");
+  stored = stubStorage("localStorage");
   vi.stubGlobal("navigator", { languages: ["fr-CA", "ja-JP", "en"] });
 });
 afterEach(() => {
@@ -20,8 +20,8 @@ afterEach(() => {
   setPageLanguage("en");
 });
 
-describe("the language", () => {
-  test("is the address's, else the one kept, else the first that the browser prefers and the page knows", () => {
+describe("language", () => {
+  test("is the address's, else the stored one, else a preferred one", () => {
     expect(selectLanguage("en", "ja", ["ja"])).toBe("en");
     expect(selectLanguage("ja-JP", "en", ["en"])).toBe("ja");
     expect(selectLanguage(null, "ja", ["en"])).toBe("ja");
@@ -30,34 +30,34 @@ describe("the language", () => {
     expect(selectLanguage(null, null, [])).toBe("en");
   });
 
-  test("is learnt before it is spoken", async () => {
+  test("is loaded before texts are translated", async () => {
     expect(await loadPageLanguage(new URLSearchParams())).toBe("ja");
     expect([pageLanguage(), translate("Strings")]).toEqual(["ja", "糸"]);
   });
 
-  test("is English without anything to learn", async () => {
+  test("is English without loading translations", async () => {
     expect(await loadPageLanguage(new URLSearchParams("lang=en"))).toBe("en");
     expect(translate("Strings")).toBe("Strings");
   });
 });
 
-test("Japanese can be spoken beside the page's language", async () => {
-  const { language: other, translate: sayInJapanese } = await loadJapaneseTranslator();
-  expect([other, sayInJapanese("Strings")]).toEqual(["ja", "糸"]);
+test("Japanese translator is independent of the page's language", async () => {
+  const { language, translate: translateToJapanese } = await loadJapaneseTranslator();
+  expect([language, translateToJapanese("Strings")]).toEqual(["ja", "糸"]);
   expect([pageLanguage(), translate("Strings")]).toEqual(["en", "Strings"]);
 });
 
-describe("the other language", () => {
-  test("is kept, and leaves the address, whose session stays", async () => {
+describe("other language", () => {
+  test("is stored, and removed from the address", async () => {
     expect(otherLanguage()).toBe("ja");
     expect(switchLanguage("https://stage/?session=a&lang=en")).toBe("https://stage/?session=a");
-    expect(kept.get("bunraku.language")).toBe("ja");
+    expect(stored.get("bunraku.language")).toBe("ja");
     await loadPageLanguage(new URLSearchParams());
     expect([otherLanguage(), switchLanguage("https://stage/?session=a")]).toEqual(["en", "https://stage/?session=a"]);
-    expect(kept.get("bunraku.language")).toBe("en");
+    expect(stored.get("bunraku.language")).toBe("en");
   });
 
-  test("goes into the address where it cannot be kept", () => {
+  test("is put into the address if it cannot be stored", () => {
     forbidStorage("localStorage");
     expect(switchLanguage("https://stage/?session=a")).toBe("https://stage/?session=a&lang=ja");
   });

@@ -15,7 +15,7 @@ import {
 afterEach(() => setPageLanguage("en"));
 
 describe("English", () => {
-  test("is spoken where nothing else is learnt, with values in their places", () => {
+  test("is the default, with values filled in", () => {
     expect([pageLanguage(), translate("Drop a dance here"), translate("{count} here", { count: 5 })]).toEqual([
       "en",
       "Drop a dance here",
@@ -25,13 +25,13 @@ describe("English", () => {
     expect(joinList(["a", "b"])).toBe("a, b");
   });
 
-  test("of the server is shown as it comes", () => {
+  test("of the server is not changed", () => {
     expect(translateServerText("No such session")).toBe("No such session");
   });
 });
 
 describe("Japanese", () => {
-  test("puts the values where its own sentence has them", () => {
+  test("has values where the Japanese sentence needs them", () => {
     setPageLanguage("ja", { page: JAPANESE_PAGE_MESSAGES, server: JAPANESE_SERVER_MESSAGES });
     expect(pageLanguage()).toBe("ja");
     expect(translate("Give the {limb} to {name}", { name: "Aiko", limb: translate("Left hand") })).toBe(
@@ -47,7 +47,7 @@ describe("Japanese", () => {
     ]);
   });
 
-  test("is there for what is heard from the server, also with values in it; the rest is shown as it comes", () => {
+  test("translates known server texts with their values; others are unchanged", () => {
     setPageLanguage("ja", { page: JAPANESE_PAGE_MESSAGES, server: JAPANESE_SERVER_MESSAGES });
     expect(translateServerText("No such session")).toBe("その舞台は見つかりません");
     expect(translateServerText("a file may have 64000000 bytes")).toBe("上限は64000000バイトです");
@@ -59,13 +59,13 @@ describe("Japanese", () => {
   });
 });
 
-test("two speeches are spoken beside each other, and beside the page's", () => {
+test("translators are independent of each other and of the page's", () => {
   const japanese = new Translator("ja", { page: JAPANESE_PAGE_MESSAGES, server: JAPANESE_SERVER_MESSAGES });
-  const { translate: sayInJapanese, translateServerText: heardInJapanese } = japanese;
+  const { translate: toJapanese, translateServerText: serverTextToJapanese } = japanese;
   expect([
     japanese.language,
-    sayInJapanese("Strings"),
-    heardInJapanese("No such session"),
+    toJapanese("Strings"),
+    serverTextToJapanese("No such session"),
     japanese.joinList(["a", "b"]),
   ]).toEqual(["ja", "糸", "その舞台は見つかりません", "a、b"]);
   expect([
@@ -76,7 +76,7 @@ test("two speeches are spoken beside each other, and beside the page's", () => {
   ]).toEqual(["Strings", "Strings", "en", "No such session"]);
 });
 
-test("numbers have the language's form", () => {
+test("numbers are formatted in the page's language", () => {
   for (const language of ["en", "ja"] as const) {
     setPageLanguage(language);
     expect([

@@ -39,13 +39,13 @@ describe("several performers", () => {
     expect(tracks.performers[1]).toBeNull();
     expect([1, 2].map((track) => tracks.store(track))).toEqual([null, tracks.performers[2]]);
     expect(warned.mock.calls[0][0]).toContain(
-      "the motion at 1 of this stream is left out: motion needs a place within 100 metres",
+      "the motion at 1 of this stream is left out: Invalid motion track: place must be within 100 metres",
     );
   });
 
   test("of whom the first cannot be read are no show", () => {
     expect(() => new TrackSet([{ ...goldenDescription(), place: [0] }, goldenDescription(1)])).toThrow(
-      "motion needs a place",
+      "motion track: place must",
     );
   });
 

@@ -1,20 +1,20 @@
-/** A browser's storage for tests that run without one; `vi.unstubAllGlobals` takes it away. */
+/** Stubs of the browser's storage; `vi.unstubAllGlobals` removes them. */
 import { vi } from "vitest";
 
 type Name = "localStorage" | "sessionStorage";
 
-/** Storage that keeps what is put in the map that is returned. */
+/** Replace a storage by one that stores its texts in the returned map. */
 export function stubStorage(name: Name): Map<string, string> {
-  const kept = new Map<string, string>();
+  const stored = new Map<string, string>();
   vi.stubGlobal(name, {
-    getItem: (key: string) => kept.get(key) ?? null,
-    setItem: (key: string, value: string) => void kept.set(key, value),
-    removeItem: (key: string) => void kept.delete(key),
+    getItem: (key: string) => stored.get(key) ?? null,
+    setItem: (key: string, value: string) => void stored.set(key, value),
+    removeItem: (key: string) => void stored.delete(key),
   });
-  return kept;
+  return stored;
 }
 
-/** Storage whose every use is refused. */
+/** Replace a storage by one whose methods throw SecurityError. */
 export function forbidStorage(name: Name): void {
   const forbidden = () => {
     throw new DOMException("The operation is insecure.", "SecurityError");

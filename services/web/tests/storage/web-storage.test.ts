@@ -7,29 +7,29 @@ afterEach(() => void vi.unstubAllGlobals());
 test.each([
   ["localStorage", browserStorage],
   ["sessionStorage", tabStorage],
-] as const)("what is put in %s is found, until it is removed", (name, store) => {
-  const kept = stubStorage(name);
+] as const)("text in %s is found until it is removed", (name, store) => {
+  const stored = stubStorage(name);
   expect(store.get("a")).toBeNull();
   store.put("a", "one");
   store.put("a", "two");
-  expect([store.get("a"), ...kept]).toEqual(["two", ["a", "two"]]);
+  expect([store.get("a"), ...stored]).toEqual(["two", ["a", "two"]]);
   store.remove("a");
-  expect([store.get("a"), kept.size]).toEqual([null, 0]);
+  expect([store.get("a"), stored.size]).toEqual([null, 0]);
 });
 
-test.each([{ on: true }, [1, null], "text", 0, null])("a value comes back as it was: %j", (value) => {
+test.each([{ on: true }, [1, null], "text", 0, null])("JSON value is returned unchanged: %j", (value) => {
   stubStorage("localStorage");
   browserStorage.putJson("a", value);
   expect(browserStorage.getJson("a")).toEqual(value);
 });
 
-test.each([undefined, "", "{", "text"])("what is no JSON is no value: %j", (content) => {
-  const kept = stubStorage("localStorage");
-  if (content !== undefined) kept.set("a", content);
+test.each([undefined, "", "{", "text"])("invalid JSON is read as null: %j", (content) => {
+  const stored = stubStorage("localStorage");
+  if (content !== undefined) stored.set("a", content);
   expect(browserStorage.getJson("a")).toBeNull();
 });
 
-test("where its use is refused nothing is found, and nothing fails", () => {
+test("forbidden storage finds nothing and throws nothing", () => {
   forbidStorage("localStorage");
   browserStorage.put("a", "one");
   browserStorage.putJson("a", 1);
@@ -37,7 +37,7 @@ test("where its use is refused nothing is found, and nothing fails", () => {
   expect([browserStorage.get("a"), browserStorage.getJson("a")]).toEqual([null, null]);
 });
 
-test("where there is not even a storage to name, neither", () => {
+test("missing storage finds nothing and throws nothing", () => {
   const store = new WebStorage(() => {
     throw new DOMException("Access is denied for this document.", "SecurityError");
   });

@@ -8,7 +8,7 @@ import {
   performerCount,
 } from "../../src/ui/limb-state";
 
-test("holders by limb: oneself is You, strangers have their name and colour; and those who ask, without oneself", () => {
+test("holders and requesters of limbs have names and colours", () => {
   const presence = {
     name: "Presence" as const,
     viewers: 2,
@@ -36,7 +36,7 @@ test("holders by limb: oneself is You, strangers have their name and colour; and
     [],
   ]);
   expect(limbRequesters(null, "b")).toEqual([[], [], [], []]);
-  // while the dance is changed, what is told is of more or fewer limbs than there are
+  // while the motion changes, the message may contain more or fewer limbs
   expect(
     limbHolders(presence, "b", 2)
       .slice(2)
@@ -46,12 +46,12 @@ test("holders by limb: oneself is You, strangers have their name and colour; and
   expect(limbHolders({ ...presence, limbs: [...presence.limbs, "a"] }, "b")).toHaveLength(4);
 });
 
-test("keys 1 to 4 are right hand, left hand, right leg, left leg", () => {
+test("keys 1 to 4 are right hand, left hand, right leg and left leg", () => {
   expect([1, 0, 3, 2].map(limbKey)).toEqual([1, 2, 3, 4]);
   expect([5, 4, 7, 6].map(limbKey)).toEqual([1, 2, 3, 4]);
 });
 
-test("limbs are named, of several dancers each with its own, and stand in the order of the keys", () => {
+test("limb names include the performer if there are several", () => {
   expect([limbName(0), limbName(0, 2), limbName(7, 2)]).toEqual([
     "left hand",
     "left hand of dancer 1",

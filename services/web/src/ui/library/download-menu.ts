@@ -1,11 +1,11 @@
-/** Downloading a dance: a button beside it that discloses which kinds of files there are, and of several dancers whose. */
+/** Download menu of a motion: a button that opens a list of file types, and with several performers of whose motion. */
 import type { ExportFormat } from "../../export/export-file";
 import { joinList, type PlainMessageKey, translate } from "../../i18n/translator";
 import { element } from "../dom";
 import { icon } from "../icon";
-import type { MotionItem } from "./library-panel";
+import type { MotionItem } from "./motion-item";
 
-/** A kind of file, as people read it. */
+/** File type offered for download. */
 interface FileType {
   format: ExportFormat;
   label: string;
@@ -21,25 +21,25 @@ const BVH: FileType = {
 };
 const GLB: FileType = { format: "glb", label: "GLB", shortName: "puppet", description: "the puppet and its dance" };
 const VRMA: FileType = { format: "vrma", label: "VRMA", shortName: "avatars", description: "motion for VRM avatars" };
-/** Of several dancers, all in their places; the other kinds are of one figure each. */
+/** GLB file of several performers, all in their positions. The other types contain one performer each. */
 const GLB_OF_ALL: FileType = { ...GLB, shortName: "all the puppets", description: "all the puppets and their dances" };
 
-/** Told of the kind of file that is chosen, and of the performers who are to be in it. */
+/** Callback for the chosen file type and the performers that the file shall contain. */
 export type RequestDownload = (format: ExportFormat, performers: readonly number[]) => void;
 
 export interface DownloadMenu {
   readonly button: HTMLElement;
   readonly choices: HTMLElement;
-  /** Shows the choices and goes to the first of them. */
+  /** Show the choices and focus the first one. */
   open(): void;
 }
 
-/** The downloads of a dance, disclosed or not; `told` when that changes. Escape shuts them. */
+/** Create the menu. `onToggle` is called when it opens or closes; Escape closes it. */
 export function createDownloadMenu(
   { name, performers }: MotionItem,
   initiallyOpen: boolean,
-  onToggle: (disclosed: boolean) => void,
-  choose: RequestDownload,
+  onToggle: (open: boolean) => void,
+  onChoose: RequestDownload,
 ): DownloadMenu {
   const button = element(
     "button",
@@ -51,56 +51,60 @@ export function createDownloadMenu(
     role: "group",
     "aria-label": translate("Download {name} as", { name }),
   });
-  const offer = ({ format, label, shortName: what, description: words }: FileType, whose: readonly number[]) => {
-    const text = [element("b", {}, label), element("small", {}, translate(what))];
+  const createChoice = ({ format, label, shortName, description }: FileType, chosen: readonly number[]) => {
+    const text = [element("b", {}, label), element("small", {}, translate(shortName))];
     return element(
       "button",
-      { type: "button", "aria-label": joinList([label, translate(words)]), onClick: () => choose(format, whose) },
+      {
+        type: "button",
+        "aria-label": joinList([label, translate(description)]),
+        onClick: () => onChoose(format, chosen),
+      },
       ...text,
     );
   };
   const all = Array.from({ length: performers }, (_, performer) => performer);
   if (performers === 1) {
-    choices.append(...[BVH, GLB, VRMA].map((kind) => offer(kind, all)));
+    choices.append(...[BVH, GLB, VRMA].map((type) => createChoice(type, all)));
   } else {
-    const each = all.map((performer) => {
-      const dancer = translate("Dancer {number}", { number: performer + 1 });
-      const own = [BVH, VRMA].map((kind) => offer(kind, [performer]));
+    const groups = all.map((performer) => {
+      const name = translate("Dancer {number}", { number: performer + 1 });
+      const buttons = [BVH, VRMA].map((type) => createChoice(type, [performer]));
       return element(
         "div",
-        { role: "group", "aria-label": dancer },
-        element("span", { "aria-hidden": "true" }, dancer),
-        ...own,
+        { role: "group", "aria-label": name },
+        element("span", { "aria-hidden": "true" }, name),
+        ...buttons,
       );
     });
-    choices.append(offer(GLB_OF_ALL, all), ...each);
+    choices.append(createChoice(GLB_OF_ALL, all), ...groups);
   }
   let open = initiallyOpen;
-  const show = () => {
+  const render = () => {
     choices.hidden = !open;
     button.setAttribute("aria-expanded", String(open));
   };
-  const set = (on: boolean) => {
-    open = on;
-    show();
-    onToggle(on);
+  const setOpen = (value: boolean) => {
+    open = value;
+    render();
+    onToggle(value);
   };
-  const escape = (event: KeyboardEvent) => {
+  const closeOnEscape = (event: KeyboardEvent) => {
     if (event.key !== "Escape" || !open) return;
-    // the library stays open
+    // The library panel must stay open.
     event.stopPropagation();
-    set(false);
+    setOpen(false);
     button.focus();
   };
-  button.addEventListener("click", () => set(!open));
-  button.addEventListener("keydown", escape);
-  choices.addEventListener("keydown", escape);
-  show();
+  button.addEventListener("click", () => setOpen(!open));
+  button.addEventListener("keydown", closeOnEscape);
+  choices.addEventListener("keydown", closeOnEscape);
+  render();
   return {
     button,
     choices,
     open() {
-      set(true);
+      setOpen(true);
       choices.querySelector("button")?.focus();
     },
   };

@@ -1,7 +1,7 @@
-/** A file handed to the person, as the browser keeps downloads. */
+/** Saving of generated files through the browser's downloads. */
 import { element } from "../dom";
 
-/** The browser has long begun to read it by then. Milliseconds. */
+/** Time after which the object URL is freed. The browser has started to read it long before. */
 const URL_LIFETIME_MS = 60_000;
 
 export function saveFile(content: Blob, name: string): void {

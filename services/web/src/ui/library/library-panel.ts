@@ -1,4 +1,4 @@
-/** The library drawer: drop zone, uploads with true progress, problems in plain words, and the list of dances. */
+/** Library panel: drop zone, progress of uploads and downloads, errors, list of motions, and avatar section. */
 import type { UploadProgress } from "../../client/api";
 import { formatPercent } from "../../i18n/number-format";
 import { joinList, translate, translateToParts } from "../../i18n/translator";
@@ -8,27 +8,18 @@ import { type IconName, icon, motionGlyph } from "../icon";
 import { createPanel, type Panel } from "../panel";
 import { type AvatarActions, type AvatarChooser, createAvatarChooser } from "./avatar-chooser";
 import { createDownloadMenu, type DownloadMenu, type RequestDownload } from "./download-menu";
-
-export interface MotionItem {
-  id: string;
-  name: string;
-  /** What kind of recording: "40 Hz, 1.2 mm". */
-  detail: string;
-  seconds: number;
-  /** How many dance in it. */
-  performers: number;
-}
+import type { MotionItem } from "./motion-item";
 
 export interface UploadRow {
-  /** Bytes sent and in all, after so many seconds. */
+  /** Show the bytes sent, of `total`, after `seconds` seconds. */
   showSent(loaded: number, total: number, seconds: number): void;
-  /** What the server does with it, and the share done. */
+  /** Show the stage of the server's work, and its fraction done. */
   showIngest(stage: UploadProgress["stage"], fraction: number): void;
   remove(): void;
 }
 
 export interface DownloadRow {
-  /** What is done, and the share of the whole. */
+  /** Show the current step, and the fraction of the whole. */
   showProgress(text: string, fraction: number): void;
   remove(): void;
 }
@@ -36,21 +27,22 @@ export interface DownloadRow {
 export interface LibraryPanel {
   readonly panel: Panel;
   readonly danceAs: AvatarChooser;
-  renderMotions(pieces: readonly MotionItem[], current: string | null): void;
+  renderMotions(motions: readonly MotionItem[], current: string | null): void;
   addUpload(name: string, cancel: () => void): UploadRow;
   addDownload(name: string, cancel: () => void): DownloadRow;
-  /** Shows what a dance of the list may be downloaded as. */
+  /** Open the download menu of a motion. */
   showDownloads(id: string): void;
+  /** Show an error about the file or motion `name`, in place of the last one. */
   problem(name: string, title: string, detail: string, hint: string | null): void;
 }
 
 export interface LibraryActions extends AvatarActions {
   files(files: readonly File[]): void;
   choose(id: string): void;
-  remove(piece: MotionItem): void;
-  /** Adds who dances in it to those on the stage; left out, that cannot be done here. */
-  add?(piece: MotionItem): void;
-  download(piece: MotionItem, ...file: Parameters<RequestDownload>): void;
+  remove(motion: MotionItem): void;
+  /** Add the motion's performers to those on the stage. Omitted if this page may not. */
+  add?(motion: MotionItem): void;
+  download(motion: MotionItem, ...request: Parameters<RequestDownload>): void;
   close(): void;
 }
 
@@ -61,7 +53,7 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
   const picker = element("input", { type: "file", accept: ACCEPTED_FILE_TYPES, multiple: true, hidden: true });
   picker.addEventListener("change", () => {
     actions.files([...(picker.files ?? [])]);
-    picker.value = ""; // The same file may be chosen again.
+    picker.value = ""; // so that choosing the same file again is a change
   });
   const drop = element(
     "button",
@@ -70,79 +62,52 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
     element("b", {}, translate("Drop a dance here")),
   );
   drop.append(element("span", {}, translate("motion .bvh, up to 64 MB, or press to choose")));
-  const doing = element("div", { role: "group", "aria-label": translate("Uploads and downloads") });
-  const said = element("div", { role: "alert" });
+  const transfers = element("div", { role: "group", "aria-label": translate("Uploads and downloads") });
+  const alert = element("div", { role: "alert" });
   const list = element("ul", { class: "motions" });
   const empty = element(
     "p",
     { class: "empty", hidden: true },
     translate("No dances yet. Drop a motion capture file anywhere on this page and the puppet dances it."),
   );
-  /** The dance whose downloads are disclosed. */
-  let disclosed: string | null = null;
-  const downloads = new Map<string, DownloadMenu>();
+  /** Motion whose download menu is open. */
+  let openMenu: string | null = null;
+  const menus = new Map<string, DownloadMenu>();
   const danceAs = createAvatarChooser(actions);
-  panel.body.append(drop, picker, doing, said, list, empty, danceAs.element);
+  panel.body.append(drop, picker, transfers, alert, list, empty, danceAs.element);
   return {
     panel,
     danceAs,
-    renderMotions(pieces, current) {
-      empty.hidden = pieces.length > 0;
-      downloads.clear();
+    renderMotions(motions, current) {
+      empty.hidden = motions.length > 0;
+      menus.clear();
       list.replaceChildren(
-        ...pieces.map((piece) => {
-          const choose = element("button", {
-            class: "motion",
-            type: "button",
-            onClick: () => actions.choose(piece.id),
-          });
-          setAttribute(choose, "aria-current", piece.id === current ? "true" : null);
-          const glyph = element("span", { class: "motion-glyph" });
-          glyph.append(motionGlyph(piece.id));
-          const text = element(
-            "span",
-            { class: "motion-text" },
-            element("b", {}, piece.name),
-            element("small", {}, piece.detail),
+        ...motions.map((motion) => {
+          const menu = createDownloadMenu(
+            motion,
+            motion.id === openMenu,
+            (open) => (openMenu = open ? motion.id : null),
+            (...request) => actions.download(motion, ...request),
           );
-          choose.append(glyph, text, element("span", { class: "motion-length" }, formatDuration(piece.seconds)));
-          const told = (open: boolean) => (disclosed = open ? piece.id : null);
-          const one = createDownloadMenu(piece, piece.id === disclosed, told, (...file) =>
-            actions.download(piece, ...file),
-          );
-          downloads.set(piece.id, one);
-          const remove = createToolButton(
-            "bin",
-            "motion-remove",
-            translate("Remove {name}", { name: piece.name }),
-            () => actions.remove(piece),
-          );
-          const tools = element("div", { class: "motion-tools" }, one.button, remove);
-          // beside whom it is to dance
-          if (actions.add && current !== null)
-            tools.prepend(
-              createToolButton("add", "motion-add", translate("Add {name} to the stage", { name: piece.name }), () =>
-                actions.add?.(piece),
-              ),
-            );
-          return element("li", {}, choose, tools, one.choices);
+          menus.set(motion.id, menu);
+          return createMotionRow(motion, current, menu, actions);
         }),
       );
     },
     addUpload(name, cancel) {
-      const { show, remove } = createProgressRow(doing, "upload", name, cancel);
+      const { show, remove } = createProgressRow(transfers, "upload", name, cancel);
       return {
         showSent: (loaded, total, seconds) =>
           show(total > 0 ? loaded / total : 0, formatUploadProgress(loaded, total, seconds)),
-        showIngest: (stage, done) => show(done, formatIngestStage(stage)),
+        showIngest: (stage, fraction) => show(fraction, formatIngestStage(stage)),
         remove,
       };
     },
     addDownload(name, cancel) {
-      const { show, remove } = createProgressRow(doing, "download", name, cancel);
-      return { showProgress: (words, done) => show(done, words), remove };
+      const { show, remove } = createProgressRow(transfers, "download", name, cancel);
+      return { showProgress: (text, fraction) => show(fraction, text), remove };
     },
-    showDownloads: (id) => downloads.get(id)?.open(),
+    showDownloads: (id) => menus.get(id)?.open(),
     problem(name, title, detail, hint) {
       const box = element(
         "div",
@@ -154,29 +119,61 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
       box.append(
         element("button", { class: "text-button", type: "button", onClick: () => box.remove() }, translate("Dismiss")),
       );
-      said.replaceChildren(box);
+      alert.replaceChildren(box);
     },
   };
 }
 
-function createToolButton(drawn: IconName, kind: string, name: string, act: () => void): HTMLElement {
+/** Create the list entry of a motion; `current` is the motion on the stage. */
+function createMotionRow(
+  motion: MotionItem,
+  current: string | null,
+  menu: DownloadMenu,
+  actions: LibraryActions,
+): HTMLElement {
+  const choose = element("button", { class: "motion", type: "button", onClick: () => actions.choose(motion.id) });
+  setAttribute(choose, "aria-current", motion.id === current ? "true" : null);
+  const glyph = element("span", { class: "motion-glyph" });
+  glyph.append(motionGlyph(motion.id));
+  const text = element(
+    "span",
+    { class: "motion-text" },
+    element("b", {}, motion.name),
+    element("small", {}, motion.detail),
+  );
+  choose.append(glyph, text, element("span", { class: "motion-length" }, formatDuration(motion.seconds)));
+  const { name } = motion;
+  const remove = createToolButton("bin", "motion-remove", translate("Remove {name}", { name }), () =>
+    actions.remove(motion),
+  );
+  const tools = element("div", { class: "motion-tools" }, menu.button, remove);
+  if (actions.add && current !== null)
+    tools.prepend(
+      createToolButton("add", "motion-add", translate("Add {name} to the stage", { name }), () =>
+        actions.add?.(motion),
+      ),
+    );
+  return element("li", {}, choose, tools, menu.choices);
+}
+
+function createToolButton(iconName: IconName, kind: string, name: string, onClick: () => void): HTMLElement {
   return element(
     "button",
-    { class: `round-button ${kind}`, type: "button", "aria-label": name, title: name, onClick: act },
-    icon(drawn),
+    { class: `round-button ${kind}`, type: "button", "aria-label": name, title: name, onClick },
+    icon(iconName),
   );
 }
 
-/** A row of `list` for what is under way, with the share done and what will be cancelled. */
+/** Append a progress row to `list`, with a button that calls `cancel`. */
 function createProgressRow(
   list: HTMLElement,
   kind: "upload" | "download",
   name: string,
   cancel: () => void,
-): { show(done: number, words: string): void; remove(): void } {
-  const share = element("span", {}, formatPercent(0));
+): { show(fraction: number, text: string): void; remove(): void } {
+  const percentage = element("span", {}, formatPercent(0));
   const fill = element("i", { style: "width: 0" });
-  const [label, stopping] =
+  const [label, cancelLabel] =
     kind === "upload"
       ? [translate("Upload of {name}", { name }), translate("Cancel the upload of {name}", { name })]
       : [translate("Download of {name}", { name }), translate("Cancel the download of {name}", { name })];
@@ -188,31 +185,31 @@ function createProgressRow(
   const state = element("span", {}, translate("waiting"));
   const stop = element(
     "button",
-    { class: "text-button", type: "button", "aria-label": stopping, onClick: cancel },
+    { class: "text-button", type: "button", "aria-label": cancelLabel, onClick: cancel },
     translate("Cancel"),
   );
   const row = element(
     "div",
     { class: "upload" },
-    element("div", { class: "upload-row" }, element("span", { class: "upload-name" }, name), share),
+    element("div", { class: "upload-row" }, element("span", { class: "upload-name" }, name), percentage),
     bar,
   );
   row.append(element("div", { class: "upload-row" }, state, stop));
   list.append(row);
   return {
-    show(done, words) {
-      const hundredths = Math.floor(done * 100);
-      setText(share, formatPercent(hundredths / 100));
-      setText(state, words);
-      fill.style.width = `${hundredths}%`;
-      bar.setAttribute("aria-valuenow", String(hundredths));
-      bar.setAttribute("aria-valuetext", joinList([words, formatPercent(hundredths / 100)]));
+    show(fraction, text) {
+      const percent = Math.floor(fraction * 100);
+      setText(percentage, formatPercent(percent / 100));
+      setText(state, text);
+      fill.style.width = `${percent}%`;
+      bar.setAttribute("aria-valuenow", String(percent));
+      bar.setAttribute("aria-valuetext", joinList([text, formatPercent(percent / 100)]));
     },
     remove: () => row.remove(),
   };
 }
 
-/** Files dropped anywhere on the page; a gold frame shows that they may be. */
+/** Accept files dropped anywhere on the page. A gold frame is shown while files are dragged over it. */
 export function acceptDrops(root: HTMLElement, onFiles: (files: readonly File[]) => void): void {
   const frame = element(
     "div",

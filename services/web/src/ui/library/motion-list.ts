@@ -1,10 +1,10 @@
-/** The library's motions as the page names them. */
+/** Motions of the library. */
 import { deleteMotion, listMotions, type Motion } from "../../client/api";
 import { joinList, translate } from "../../i18n/translator";
 import { formatFigure, motionNameFromFile } from "../format";
-import type { MotionItem } from "./library-panel";
+import type { MotionItem } from "./motion-item";
 
-/** Pages of the list that are read; beyond them the newest are enough to choose from. */
+/** Maximum number of pages that are fetched. The newest motions come first. */
 const MAX_PAGES = 5;
 
 export function toMotionItem(motion: Motion): MotionItem {
@@ -17,14 +17,14 @@ export function toMotionItem(motion: Motion): MotionItem {
   };
 }
 
-/** "BVH, 120 Hz, 2 dancers, with music". */
+/** Describe a motion in a few words: "BVH, 120 Hz, 2 dancers, with music". */
 function describeMotion({ filename, fps, tracks, performers = 1 }: Motion): string {
-  const ending = /\.([^.]+)$/.exec(filename)?.[1];
+  const extension = /\.([^.]+)$/.exec(filename)?.[1];
   const music = tracks?.includes("audio") ? translate("with music") : null;
   const dancers = performers > 1 ? translate("{count} dancers", { count: performers }) : null;
   return joinList(
-    [ending?.toUpperCase(), `${Number.isInteger(fps) ? fps : formatFigure(fps)} Hz`, dancers, music].filter(
-      (word) => word != null,
+    [extension?.toUpperCase(), `${Number.isInteger(fps) ? fps : formatFigure(fps)} Hz`, dancers, music].filter(
+      (part) => part != null,
     ),
   );
 }
@@ -32,25 +32,25 @@ function describeMotion({ filename, fps, tracks, performers = 1 }: Motion): stri
 export class MotionList {
   items: MotionItem[] = [];
 
-  /** Reads the list again. Throws ProblemError. */
+  /** Fetch the list. Rejects with ProblemError. */
   async refresh(): Promise<void> {
-    const found: MotionItem[] = [];
+    const motions: MotionItem[] = [];
     let cursor: string | undefined;
     for (let page = 0; page < MAX_PAGES; page++) {
       const { items, next } = await listMotions(cursor);
-      found.push(...items.map(toMotionItem));
+      motions.push(...items.map(toMotionItem));
       if (next === null) break;
       cursor = next;
     }
-    this.items = found;
+    this.items = motions;
   }
 
   async remove(id: string): Promise<void> {
     await deleteMotion(id);
-    this.items = this.items.filter((piece) => piece.id !== id);
+    this.items = this.items.filter((motion) => motion.id !== id);
   }
 
   find(id: string | null): MotionItem | null {
-    return this.items.find((piece) => piece.id === id) ?? null;
+    return this.items.find((motion) => motion.id === id) ?? null;
   }
 }

@@ -1,9 +1,8 @@
-/** A minute of one quantity as a small line or area. The path is pure; the element shows it. */
-
+/** Small line or area plot of one quantity over the last minute. */
 import { translate } from "../../i18n/translator";
 import { element, setAttribute, setText, shape } from "../dom";
 
-/** Keeps the newest `length` samples; NaN marks a gap. */
+/** Newest `length` samples of a quantity; NaN marks a gap. */
 export class SampleHistory {
   readonly values: number[] = [];
   readonly #capacity: number;
@@ -21,14 +20,14 @@ export class SampleHistory {
 export const PLOT_WIDTH = 100;
 export const PLOT_HEIGHT = 34;
 
-/** The height at the top of a plot: over every value, rounded up to 1, 2 or 5 times a power of ten, and never below `least`. */
+/** Return the upper end of a scale: the maximum rounded up to 1, 2 or 5 times a power of ten, at least `minTop`. */
 export function niceScaleMax(values: readonly number[], minTop: number): number {
-  const most = values.reduce((high, value) => (value > high ? value : high), minTop);
-  const power = 10 ** Math.floor(Math.log10(most));
-  return [1, 2, 5, 10].map((step) => step * power).find((top) => top >= most * 0.999) ?? 10 * power;
+  const max = values.reduce((high, value) => (value > high ? value : high), minTop);
+  const power = 10 ** Math.floor(Math.log10(max));
+  return [1, 2, 5, 10].map((step) => step * power).find((top) => top >= max * 0.999) ?? 10 * power;
 }
 
-/** SVG path of the newest samples, the last at the right edge of `slots` places; gaps are left open. */
+/** Return the SVG path of the samples, the last at the right edge of `slots` positions. Gaps stay open. */
 export function tracePath(values: readonly number[], slots: number, top: number): string {
   let path = "";
   let drawing = false;
@@ -45,7 +44,7 @@ export function tracePath(values: readonly number[], slots: number, top: number)
   return path;
 }
 
-/** As `tracePath`, each unbroken run closed down to the base line. */
+/** Return the path of `tracePath` with each unbroken run closed along the base line. */
 export function areaPath(values: readonly number[], slots: number, top: number): string {
   return tracePath(values, slots, top)
     .split("M")
@@ -62,7 +61,7 @@ export interface PlotOptions {
   label: string;
   /** CSS colour. */
   color: string;
-  /** Smallest height of the scale. */
+  /** Smallest upper end of the scale. */
   minTop: number;
   filled?: boolean;
 }
@@ -72,7 +71,7 @@ export interface Plot {
   render(history: SampleHistory, slots: number, value: string, note: string, goal?: number): void;
 }
 
-export function createPlot({ label, color: ink, minTop: least, filled = false }: PlotOptions): Plot {
+export function createPlot({ label, color, minTop, filled = false }: PlotOptions): Plot {
   const value = element("div", { class: "plot-value" });
   const note = element("div", { class: "plot-note" });
   const goalLine = shape("path", { class: "goal" });
@@ -81,22 +80,22 @@ export function createPlot({ label, color: ink, minTop: least, filled = false }:
     viewBox: `0 0 ${PLOT_WIDTH} ${PLOT_HEIGHT}`,
     preserveAspectRatio: "none",
     role: "img",
-    "aria-label": translate("{label}, nothing yet", { label }),
+    "aria-label": translate("{label}, no data yet", { label }),
   });
   svg.append(goalLine, trace, shape("path", { class: "base", d: `M0 ${PLOT_HEIGHT + 0.5}H${PLOT_WIDTH}` }));
   const plot = element(
     "div",
-    { class: "plot", style: `--ink: ${ink}` },
+    { class: "plot", style: `--ink: ${color}` },
     element("div", { class: "plot-label" }, label),
     value,
   );
   plot.append(svg, note);
   return {
     element: plot,
-    render(history, slots, shown, remark, goal) {
-      setText(value, shown);
-      setText(note, remark);
-      const top = niceScaleMax(history.values.filter(Number.isFinite), Math.max(least, goal ?? 0));
+    render(history, slots, valueText, noteText, goal) {
+      setText(value, valueText);
+      setText(note, noteText);
+      const top = niceScaleMax(history.values.filter(Number.isFinite), Math.max(minTop, goal ?? 0));
       trace.setAttribute("d", (filled ? areaPath : tracePath)(history.values, slots, top));
       setAttribute(
         goalLine,
@@ -111,7 +110,7 @@ export function createPlot({ label, color: ink, minTop: least, filled = false }:
       );
       svg.setAttribute(
         "aria-label",
-        translate("{label} over the last minute, now {shown}, scale to {top}", { label, shown, top }),
+        translate("{label} over the last minute, now {value}, scale to {top}", { label, value: valueText, top }),
       );
     },
   };

@@ -1,5 +1,4 @@
-/** Commands as people read them. Pure. */
-
+/** Names of commands for display. Pure. */
 import { joinList, type PlainMessageKey, translate } from "../../i18n/translator";
 import { DIGITAL_INPUTS, effectOf, isLimbInput, SELECTED_LIMB_INPUTS } from "../../input/digital-input";
 import { type Action, type Command, limbOfCommand } from "../../input/mapping";
@@ -12,27 +11,27 @@ const DIRECTIONS = [
 ] as const;
 const ACTION_NAMES: Readonly<Record<Exclude<Action, `take_${string}`>, PlainMessageKey>> = {
   next_dancer: "next dancer",
-  ask: "ask for the string that another holds",
-  give: "give the string that is asked for",
+  ask: "ask for a string that someone else holds",
+  give: "give a requested string",
   play: "play or pause",
   back: "seek back by one block",
   forward: "seek forward by one block",
-  camera: "the show's camera, or your own seat",
+  camera: "the show's camera or your own view",
   sound: "sound on or off",
   keep: "keep this as a new dance",
   picture: "save a picture of the stage",
   library: "library",
   strings: "strings",
-  line: "line",
+  line: "connection",
 };
 
-/** "right", "nearer": which way an input goes, to be said. */
+/** Return the direction of an input, "right" or "nearer"; translate it before display. */
 export function directionName(input: Parameters<typeof effectOf>[0]): (typeof DIRECTIONS)[number][number] {
   const { axis, sign } = effectOf(input);
   return DIRECTIONS[axis][sign > 0 ? 1 : 0];
 }
 
-/** "take or let go the left hand", "left leg up", "play or pause". */
+/** Name a command: "take or release the left hand", "left leg up", "play or pause". */
 export function commandName(command: Command): string {
   if (isLimbInput(command)) {
     const { limb } = effectOf(command);
@@ -44,26 +43,27 @@ export function commandName(command: Command): string {
   const limb = limbOfCommand(command);
   return limb === null
     ? translate(ACTION_NAMES[command as keyof typeof ACTION_NAMES])
-    : translate("take or let go the {limb}", { limb: translate(LIMB_NAMES[limb]).toLowerCase() });
+    : translate("take or release the {limb}", { limb: translate(LIMB_NAMES[limb]).toLowerCase() });
 }
 
 /**
- * Commands in a few words, for a part of the drawn gamepad: a limb that all of its ways move by its name alone; of `own`, the limb named beside it, only the
- * ways.
+ * Summarise the commands of one part of the gamepad drawing. A limb that several of them move is named once; for the
+ * limb `ownLimb`, whose name stands beside the part, only directions are named.
  */
 export function summarizeCommands(commands: readonly Command[], ownLimb: number | null = null): string {
-  const words = commands.map((command) => {
+  const names = commands.map((command) => {
     if (!isLimbInput(command)) return commandName(command);
     const { limb } = effectOf(command);
-    const ways = commands.filter((other) => isLimbInput(other) && effectOf(other).limb === limb);
-    if (ways.length > 1) return limb === null ? translate("held string") : translate(LIMB_NAMES[limb]).toLowerCase();
+    const sameLimb = commands.filter((other) => isLimbInput(other) && effectOf(other).limb === limb);
+    if (sameLimb.length > 1)
+      return limb === null ? translate("held string") : translate(LIMB_NAMES[limb]).toLowerCase();
     return limb === ownLimb && limb !== null ? translate(directionName(command)) : commandName(command);
   });
-  const text = joinList([...new Set(words)]);
+  const text = joinList([...new Set(names)]);
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
-/** The commands in the order of the list of keys, in three groups. */
+/** All commands in the order of the mapping editor, in three groups. */
 export const COMMAND_GROUPS: readonly (readonly Command[])[] = [
   [
     "take_right_hand",

@@ -1,5 +1,4 @@
-/** Controls as people read them. Pure. Letters go by their place on a keyboard as printed in the USA. */
-
+/** Names of keys, buttons and axes for display. Letters name positions on a US keyboard. Pure. */
 import { pageTranslator, type Translator } from "../../i18n/translator";
 import type { Control } from "../../input/mapping";
 
@@ -41,7 +40,7 @@ const BUTTON_NAMES = [
   "→",
   "Home",
 ];
-/** The first and the last of the cross. */
+/** First and last button of the directional pad. */
 const DPAD_BUTTON_RANGE = [12, 15];
 const MOUSE_BUTTON_NAMES = ["Middle button", "Right button", "Back button", "Forward button"] as const;
 const STICK_NAMES = ["Left stick {way}", "Right stick {way}"] as const;
@@ -50,11 +49,11 @@ const STICK_ARROWS = [
   ["↑", "↓"],
 ];
 
-/** "W", "Num 1", "R2", "L1 + Left stick ↑". */
+/** Name a control: "W", "Num 1", "R2", "L1 + Left stick ↑". */
 export function controlName(control: Control, translator = pageTranslator): string {
   return control
     .split(" ")
-    .map((one) => singleControlName(one, translator))
+    .map((part) => singleControlName(part, translator))
     .join(" + ");
 }
 

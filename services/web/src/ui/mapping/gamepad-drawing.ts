@@ -1,12 +1,11 @@
-/** A gamepad of the standard layout from above, what each part does under a mapping, and what is pressed of it. */
-
+/** Drawing of a standard gamepad, labelled with the commands of its parts, with pressed parts highlighted. */
 import { joinList, type PlainMessageKey, translate } from "../../i18n/translator";
 import { PRESS_THRESHOLD } from "../../input/gamepad-state";
 import type { Command, Control, Mapping } from "../../input/mapping";
 import { setAttribute, setText, shape } from "../dom";
 import { summarizeCommands } from "./command-name";
 
-/** Buttons of the standard layout by their place. */
+/** Button indices of the standard layout (W3C Gamepad, "Remapping"). */
 const BUTTON = {
   a: 0,
   b: 1,
@@ -24,9 +23,9 @@ const BUTTON = {
 
 export interface GamepadDrawing {
   readonly element: SVGSVGElement;
-  /** Names the parts by what they do. */
+  /** Label the parts with their commands. */
   setMapping(mapping: Mapping): void;
-  /** Lights what is pressed. */
+  /** Highlight the parts that are pressed. */
   highlightPressed(
     pad: { axes: readonly number[]; buttons: readonly { value: number }[] } | null,
     deadZone: number,
@@ -43,13 +42,15 @@ export function createGamepadDrawing(): GamepadDrawing {
     return part;
   };
   const text = (x: number, y: number, kind = "") => {
-    const made = shape("text", { x, y, class: kind });
-    svg.append(made);
-    return made;
+    const label = shape("text", { x, y, class: kind });
+    svg.append(label);
+    return label;
   };
   draw("path", {
     class: "shell",
-    d: "M150 106h212c58 0 80 38 90 104c8 54-3 88-37 88c-36 0-46-54-84-54H181c-38 0-48 54-84 54c-34 0-45-34-37-88c10-66 32-104 90-104z",
+    d:
+      "M150 106h212c58 0 80 38 90 104c8 54-3 88-37 88c-36 0-46-54-84-54H181" +
+      "c-38 0-48 54-84 54c-34 0-45-34-37-88c10-66 32-104 90-104z",
   });
   draw("path", { class: "shoulder", d: "M126 101c5-13 20-20 52-21" }, BUTTON.left1);
   draw("path", { class: "shoulder", d: "M386 101c-5-13-20-20-52-21" }, BUTTON.right1);
@@ -86,61 +87,36 @@ export function createGamepadDrawing(): GamepadDrawing {
   return {
     element: svg,
     setMapping(mapping) {
-      const of = (...controls: Control[]): Command[] => controls.flatMap((control) => mapping.bindings[control] ?? []);
-      const stick = (side: number) =>
-        [0, 1].flatMap((axis) => ["+", "-"].map((sign) => `axis:${side * 2 + axis}${sign}`));
-      [0, 1].forEach((side) => {
-        setText(labels.sticks[side], summarizeCommands(of(...stick(side))));
-        const trigger = `button:${BUTTON.left2 + side}`;
-        const name = side === 0 ? "L" : "R";
-        const does = summarizeCommands(of(trigger), side);
-        setText(labels.triggers[side], does ? `${name}2 ${does.toLowerCase()}` : "");
-        const held = `button:${BUTTON.left1 + side} `;
-        const chords = summarizeCommands(
-          of(...Object.keys(mapping.bindings).filter((control) => control.startsWith(held))),
-          side,
-        );
-        const alone = summarizeCommands(of(held.trim()));
+      const commandsOf = (...controls: Control[]): Command[] =>
+        controls.flatMap((control) => mapping.bindings[control] ?? []);
+      for (const side of [0, 1]) {
+        const axes = [side * 2, side * 2 + 1].flatMap((axis) => [`axis:${axis}+`, `axis:${axis}-`]);
+        setText(labels.sticks[side], summarizeCommands(commandsOf(...axes)));
+        const trigger = summarizeCommands(commandsOf(`button:${BUTTON.left2 + side}`), side);
+        const sideName = side === 0 ? "L" : "R";
+        setText(labels.triggers[side], trigger ? `${sideName}2 ${trigger.toLowerCase()}` : "");
+        const shoulder = `button:${BUTTON.left1 + side}`;
+        const chords = Object.keys(mapping.bindings).filter((control) => control.startsWith(`${shoulder} `));
+        const held = summarizeCommands(commandsOf(...chords), side);
+        const alone = summarizeCommands(commandsOf(shoulder));
         setText(
           labels.chords[side],
-          chords
-            ? translate("hold {button}: {commands}", { button: `${name}1`, commands: chords.toLowerCase() })
+          held
+            ? translate("hold {button}: {commands}", { button: `${sideName}1`, commands: held.toLowerCase() })
             : alone
-              ? `${name}1 ${alone.toLowerCase()}`
+              ? `${sideName}1 ${alone.toLowerCase()}`
               : "",
         );
+      }
+      const buttonTexts = LABELLED_BUTTONS.flatMap(([name, index]) => {
+        const commands = commandsOf(`button:${index}`);
+        return commands.length > 0 ? [`${name} ${joinList(commands.map(shortCommandName))}`] : [];
       });
-      const rest = [
-        ["A", 0],
-        ["B", 1],
-        ["X", 2],
-        ["Y", 3],
-        ["←", 14],
-        ["→", 15],
-        ["↑", 12],
-        ["↓", 13],
-      ] as const;
-      const short: Readonly<Record<string, PlainMessageKey>> = {
-        play: "play",
-        back: "seek back",
-        forward: "forward",
-        ask: "ask",
-        give: "give",
-        keep: "keep",
-      };
-      const told = rest.flatMap(([name, index]) => {
-        const commands = of(`button:${index}`);
-        return commands.length > 0
-          ? [
-              `${name} ${joinList(commands.map((command) => (short[command] ? translate(short[command]) : summarizeCommands([command]).toLowerCase())))}`,
-            ]
-          : [];
-      });
-      setText(labels.rest, told.join("   "));
-      const all = [...labels.sticks, ...labels.triggers, ...labels.chords, labels.rest]
+      setText(labels.rest, buttonTexts.join("   "));
+      const parts = [...labels.sticks, ...labels.triggers, ...labels.chords, labels.rest]
         .map(({ textContent }) => textContent)
         .filter(Boolean);
-      svg.setAttribute("aria-label", translate("Gamepad: {parts}", { parts: all.join(translate("; ")) }));
+      svg.setAttribute("aria-label", translate("Gamepad: {parts}", { parts: parts.join(translate("; ")) }));
     },
     highlightPressed(pad, deadZone) {
       for (const [index, part] of buttons)
@@ -152,4 +128,29 @@ export function createGamepadDrawing(): GamepadDrawing {
       });
     },
   };
+}
+
+/** Buttons whose commands are listed below the drawing. */
+const LABELLED_BUTTONS = [
+  ["A", BUTTON.a],
+  ["B", BUTTON.b],
+  ["X", BUTTON.x],
+  ["Y", BUTTON.y],
+  ["←", BUTTON.left],
+  ["→", BUTTON.right],
+  ["↑", BUTTON.up],
+  ["↓", BUTTON.down],
+] as const;
+const SHORT_NAMES: Readonly<Record<string, PlainMessageKey>> = {
+  play: "play",
+  back: "seek back",
+  forward: "forward",
+  ask: "ask",
+  give: "give",
+  keep: "keep",
+};
+
+function shortCommandName(command: Command): string {
+  const short = SHORT_NAMES[command];
+  return short ? translate(short) : summarizeCommands([command]).toLowerCase();
 }

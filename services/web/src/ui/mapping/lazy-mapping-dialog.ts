@@ -1,40 +1,40 @@
-/** The page of keys and gamepad, fetched when it is first opened. */
+/** Dialog of keys and gamepad whose code is loaded when it is first opened. */
 import { DEFAULT_MAPPING, type Mapping } from "../../input/mapping";
 import type { MappingDialog } from "./mapping-dialog";
 
-/** `failed` is told when it cannot be fetched. */
+/** Create the dialog. `onLoadError` is called if its code cannot be loaded. */
 export function createLazyMappingDialog(
   root: HTMLElement,
   onChange: (mapping: Mapping) => void,
   onLoadError: () => void,
 ): MappingDialog {
-  let modal: MappingDialog | null = null;
-  let coming: Promise<void> | null = null;
+  let dialog: MappingDialog | null = null;
+  let loading: Promise<void> | null = null;
   let mapping = DEFAULT_MAPPING;
-  const fetch = async () => {
-    const { createMappingDialog: createKeysModal } = await import("./mapping-dialog");
-    modal = createKeysModal(root, onChange);
-    modal.setMapping(mapping);
-    modal.show();
+  const load = async () => {
+    const { createMappingDialog } = await import("./mapping-dialog");
+    dialog = createMappingDialog(root, onChange);
+    dialog.setMapping(mapping);
+    dialog.show();
   };
   return {
     show() {
-      if (modal) modal.show();
+      if (dialog) dialog.show();
       else
-        coming ??= fetch()
+        loading ??= load()
           .catch(onLoadError)
-          .finally(() => (coming = null));
+          .finally(() => (loading = null));
     },
     get isOpen() {
-      return modal?.isOpen ?? false;
+      return dialog?.isOpen ?? false;
     },
     get isCapturing() {
-      return modal?.isCapturing ?? false;
+      return dialog?.isCapturing ?? false;
     },
-    updateGamepad: (now) => modal?.updateGamepad(now),
-    setMapping(now) {
-      mapping = now;
-      modal?.setMapping(now);
+    updateGamepad: (pad) => dialog?.updateGamepad(pad),
+    setMapping(current) {
+      mapping = current;
+      dialog?.setMapping(current);
     },
   };
 }

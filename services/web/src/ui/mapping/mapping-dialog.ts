@@ -1,5 +1,4 @@
-/** Keys and gamepad: what does what and how to change it, a drawing of the pad that lights up as it is used, and how much is smoothed. */
-
+/** Dialog of keys and gamepad: an editor of the mapping, a drawing of the gamepad, and sliders for smoothing. */
 import { formatPercent } from "../../i18n/number-format";
 import { translate } from "../../i18n/translator";
 import { pressedControls } from "../../input/gamepad-state";
@@ -12,9 +11,9 @@ import { createMappingEditor } from "./mapping-editor";
 export interface MappingDialog {
   show(): void;
   readonly isOpen: boolean;
-  /** A key or button is awaited, to be bound: it shall do nothing else. */
+  /** True if the next key or button is bound to a command, and must have no other effect. */
   readonly isCapturing: boolean;
-  /** Lights what is pressed; null when no pad is there. Once a frame while it is open. */
+  /** Highlight the pressed parts; null without a gamepad. Call this every frame while the dialog is open. */
   updateGamepad(
     pad: { id: string; axes: readonly number[]; buttons: readonly { pressed: boolean; value: number }[] } | null,
   ): void;
@@ -22,12 +21,12 @@ export interface MappingDialog {
 }
 
 const SLIDERS = [
-  { name: "deadZone", label: "Dead zone of the sticks", most: MAX_DEAD_ZONE },
-  { name: "stickSmoothing", label: "Smoothing of the sticks", most: 1 },
-  { name: "pointerSmoothing", label: "Smoothing of mouse and touch", most: 1 },
+  { name: "deadZone", label: "Dead zone of the sticks", max: MAX_DEAD_ZONE },
+  { name: "stickSmoothing", label: "Smoothing of the sticks", max: 1 },
+  { name: "pointerSmoothing", label: "Smoothing of mouse and touch", max: 1 },
 ] as const;
 
-/** `change` is told the new mapping whenever it is edited, and shall bring it back by `mapping`. */
+/** Create the dialog. `onChange` receives each edited mapping, and must return it through `setMapping`. */
 export function createMappingDialog(root: HTMLElement, onChange: (mapping: Mapping) => void): MappingDialog {
   let mapping = DEFAULT_MAPPING;
   const dialog = element("dialog", { class: "modal", "aria-label": translate("Keys and gamepad") });
@@ -39,14 +38,14 @@ export function createMappingDialog(root: HTMLElement, onChange: (mapping: Mappi
   const drawing = createGamepadDrawing();
   const editor = createMappingEditor(onChange);
   const state = element("p", { class: "pad-state" });
-  const sliders = SLIDERS.map(({ name, label: english, most }) => {
+  const sliders = SLIDERS.map(({ name, label: english, max }) => {
     const label = translate(english);
     const value = element("span", { class: "value", "aria-hidden": "true" });
     const input = element("input", {
       type: "range",
       "aria-label": label,
       min: 0,
-      max: most,
+      max,
       step: 0.01,
       onInput: () => onChange({ ...mapping, [name]: Number(input.value) }),
     });
@@ -55,7 +54,7 @@ export function createMappingDialog(root: HTMLElement, onChange: (mapping: Mappi
   const reset = element(
     "button",
     { class: "text-button", type: "button", onClick: () => onChange(DEFAULT_MAPPING) },
-    translate("Back to the default"),
+    translate("Reset to defaults"),
   );
   const left = element("div", { class: "pad" });
   left.append(drawing.element, state, ...sliders.map(({ row }) => row), reset);
@@ -95,27 +94,27 @@ export function createMappingDialog(root: HTMLElement, onChange: (mapping: Mappi
     get isCapturing() {
       return editor.isCapturing;
     },
-    updateGamepad(now) {
+    updateGamepad(pad) {
       setText(
         state,
-        now
-          ? translate("{pad} is connected", { pad: now.id.replace(/\s*\(.*\)$/, "") })
+        pad
+          ? translate("{pad} is connected", { pad: pad.id.replace(/\s*\(.*\)$/, "") })
           : translate("Press any button of a gamepad to connect it"),
       );
-      drawing.highlightPressed(now, mapping.deadZone);
-      editor.captureGamepad(now ? pressedControls(now, mapping.deadZone) : new Map());
+      drawing.highlightPressed(pad, mapping.deadZone);
+      editor.captureGamepad(pad ? pressedControls(pad, mapping.deadZone) : new Map());
     },
-    setMapping(now) {
-      mapping = now;
-      editor.render(now);
-      drawing.setMapping(now);
+    setMapping(current) {
+      mapping = current;
+      editor.render(current);
+      drawing.setMapping(current);
       for (const { name, value, input } of sliders) {
-        input.value = String(now[name]);
-        const told = now[name] > 0 ? formatPercent(now[name]) : translate("off");
-        setText(value, told);
-        input.setAttribute("aria-valuetext", told);
+        input.value = String(current[name]);
+        const text = current[name] > 0 ? formatPercent(current[name]) : translate("off");
+        setText(value, text);
+        input.setAttribute("aria-valuetext", text);
       }
-      reset.disabled = now === DEFAULT_MAPPING;
+      reset.disabled = current === DEFAULT_MAPPING;
     },
   };
 }

@@ -1,5 +1,4 @@
-/** The list of what can be done and the controls that do it: each can be taken away, and another bound by pressing it. */
-
+/** Editor of the mapping: lists commands with their controls, removes controls, and binds new ones by pressing them. */
 import { joinList, translate, translateToParts } from "../../i18n/translator";
 import { GamepadCapture } from "../../input/gamepad-capture";
 import {
@@ -21,20 +20,19 @@ import { controlName } from "./control-name";
 
 export interface MappingEditor {
   readonly element: HTMLElement;
-  /** A press is awaited, to be bound. */
+  /** True if the next press is bound to a command. */
   readonly isCapturing: boolean;
   render(mapping: Mapping): void;
-  /** Controls of the gamepad that are pressed, 0 to 1; once a frame. */
+  /** Handle the pressed controls of the gamepad, 0 to 1. Call this every frame. */
   captureGamepad(pressed: ReadonlyMap<Control, number>): void;
-  /** A key while a press is awaited; true where it was taken. */
+  /** Handle a key while capturing. Returns whether it was used. */
   captureKey(event: KeyboardEvent): boolean;
-  /** A further button of the mouse, or its wheel, while a press is awaited; true where it was taken. */
+  /** Handle a mouse button other than the first, or the wheel, while capturing. Returns whether it was used. */
   captureMouse(event: MouseEvent): boolean;
-  /** Awaits nothing any more. */
   cancelCapture(): void;
 }
 
-/** Keys that move the focus, or mean nothing alone. */
+/** Keys that move the focus, or have no meaning alone. */
 const RESERVED_KEYS = new Set([
   "Escape",
   "Tab",
@@ -50,42 +48,42 @@ const RESERVED_KEYS = new Set([
 
 export function createMappingEditor(onChange: (mapping: Mapping) => void): MappingEditor {
   let mapping = DEFAULT_MAPPING;
-  let awaited: { command: Command; capture: GamepadCapture } | null = null;
+  let capturing: { command: Command; capture: GamepadCapture } | null = null;
   const live = element("p", { class: "sr-only", role: "status", "aria-live": "polite" });
   const rows = new Map<Command, { chips: HTMLElement; clash: HTMLElement; add: HTMLButtonElement }>();
 
-  const stop = () => {
-    const last = awaited;
-    awaited = null;
+  const cancel = () => {
+    const last = capturing;
+    capturing = null;
     if (last) render(last.command);
   };
   const start = (command: Command) => {
-    const same = awaited?.command === command;
-    stop();
-    if (same) return;
-    awaited = { command, capture: new GamepadCapture() };
+    const isSame = capturing?.command === command;
+    cancel();
+    if (isSame) return;
+    capturing = { command, capture: new GamepadCapture() };
     setText(
       live,
-      translate("Press a key or a button of the gamepad for: {command}. Escape for none.", {
+      translate("Press a key or gamepad button for: {command}. Escape cancels.", {
         command: commandName(command),
       }),
     );
     render(command);
   };
-  const found = (control: Control) => {
-    if (!awaited) return;
-    const { command } = awaited;
-    awaited = null;
-    const also = conflictsOf(bind(mapping, control, command), control, command);
-    const bound = { control: controlName(control), command: commandName(command) };
+  const bindControl = (control: Control) => {
+    if (!capturing) return;
+    const { command } = capturing;
+    capturing = null;
+    const conflicts = conflictsOf(bind(mapping, control, command), control, command);
+    const names = { control: controlName(control), command: commandName(command) };
     setText(
       live,
-      also.length > 0
-        ? translate("{control}: {command}. It does this too: {others}", {
-            ...bound,
-            others: joinList(also.map(commandName)),
+      conflicts.length > 0
+        ? translate("{control}: {command}. Also bound to: {others}", {
+            ...names,
+            others: joinList(conflicts.map(commandName)),
           })
-        : translate("{control}: {command}", bound),
+        : translate("{control}: {command}", names),
     );
     onChange(bind(mapping, control, command));
     rows.get(command)?.add.focus();
@@ -107,11 +105,11 @@ export function createMappingEditor(onChange: (mapping: Mapping) => void): Mappi
           {
             class: "chip",
             type: "button",
-            "aria-label": translate("{control}: {command}. Take away", {
+            "aria-label": translate("{control}: {command}. Remove", {
               control: name,
               command: commandName(command),
             }),
-            title: translate("Take away"),
+            title: translate("Remove"),
             onClick: () => remove(control, command),
           },
           name,
@@ -123,16 +121,16 @@ export function createMappingEditor(onChange: (mapping: Mapping) => void): Mappi
     );
     setText(row.clash, clashes.join(translate("; ")));
     row.clash.hidden = clashes.length === 0;
-    const waiting = awaited?.command === command;
-    setAttribute(row.add, "aria-pressed", waiting);
-    row.add.replaceChildren(waiting ? translate("press a key") : icon("add"));
+    const isCapturing = capturing?.command === command;
+    setAttribute(row.add, "aria-pressed", isCapturing);
+    row.add.replaceChildren(isCapturing ? translate("press a key") : icon("add"));
   };
   const remove = (control: Control, command: Command) => {
     onChange(unbind(mapping, control, command));
     rows.get(command)?.add.focus();
   };
-  const list = (commands: readonly Command[]) => {
-    const made = element("ul", { class: "bindings" });
+  const createList = (commands: readonly Command[]) => {
+    const list = element("ul", { class: "bindings" });
     for (const command of commands) {
       const [chips, clash] = [element("span", { class: "chips" }), element("small", { class: "clash" })];
       const add = element("button", {
@@ -142,15 +140,15 @@ export function createMappingEditor(onChange: (mapping: Mapping) => void): Mappi
         onClick: () => start(command),
       });
       rows.set(command, { chips, clash, add });
-      made.append(element("li", {}, element("span", { class: "what" }, commandName(command), clash), chips, add));
+      list.append(element("li", {}, element("span", { class: "what" }, commandName(command), clash), chips, add));
     }
-    return made;
+    return list;
   };
-  const [strings, stage, each] = COMMAND_GROUPS.map(list);
+  const [strings, stage, inputs] = COMMAND_GROUPS.map(createList);
   const fixed = element(
     "p",
     { class: "fixed-keys" },
-    ...translateToParts("{escape} lets go and closes, {question} opens this page.", {
+    ...translateToParts("{escape} releases and closes, {question} opens this page.", {
       escape: element("kbd", {}, "Esc"),
       question: element("kbd", {}, "?"),
     }),
@@ -158,41 +156,39 @@ export function createMappingEditor(onChange: (mapping: Mapping) => void): Mappi
   const more = element(
     "details",
     {},
-    element("summary", {}, translate("The 14 inputs, each by itself")),
+    element("summary", {}, translate("The 14 inputs, one by one")),
     element(
       "p",
       { class: "muted" },
-      translate(
-        "A hand has six, a leg its angle: as buttons, up and down. Right, up and nearer are yours, not the puppet's.",
-      ),
+      translate("Each hand has six inputs, each leg two: up and down. Right, up and nearer are as you see the stage."),
     ),
-    each,
+    inputs,
   );
   return {
     element: element("div", { class: "editor" }, strings, stage, fixed, more, live),
     get isCapturing() {
-      return awaited !== null;
+      return capturing !== null;
     },
-    render(now) {
-      mapping = now;
+    render(current) {
+      mapping = current;
       for (const command of rows.keys()) render(command);
     },
     captureGamepad(pressed) {
-      const control = awaited?.capture.update(pressed);
-      if (control) found(control);
+      const control = capturing?.capture.update(pressed);
+      if (control) bindControl(control);
     },
     captureKey(event) {
-      if (!awaited) return false;
-      if (event.code === "Escape") stop();
+      if (!capturing) return false;
+      if (event.code === "Escape") cancel();
       else if (event.code === "" || RESERVED_KEYS.has(event.code)) return event.code !== "Tab";
-      else if (!event.repeat) found(event.code);
+      else if (!event.repeat) bindControl(event.code);
       return true;
     },
     captureMouse(event) {
-      const control = awaited && controlOfEvent(event);
-      if (control) found(control);
+      const control = capturing && controlOfEvent(event);
+      if (control) bindControl(control);
       return Boolean(control);
     },
-    cancelCapture: stop,
+    cancelCapture: cancel,
   };
 }

@@ -1,15 +1,14 @@
-/** What is said for as long as its cause lasts, in a live region: each cause takes away its own words, and no other's. */
-
-/** Says something about a cause from now on, in place of what was said about it; null: the cause is gone. */
-export type SetMessage<Cause extends string> = (about: Cause, said: HTMLElement | null) => void;
+/** Live region with one message per cause. Each message is shown for as long as its cause lasts. */
+/** Set the message of a cause, in place of its last one; null removes it. */
+export type SetMessage<Cause extends string> = (cause: Cause, message: HTMLElement | null) => void;
 
 export function createLiveRegion<Cause extends string>(root: HTMLElement): SetMessage<Cause> {
-  const standing = new Map<Cause, HTMLElement>();
-  return (about, said) => {
-    standing.get(about)?.remove();
-    standing.delete(about);
-    if (!said) return;
-    standing.set(about, said);
-    root.append(said);
+  const messages = new Map<Cause, HTMLElement>();
+  return (cause, message) => {
+    messages.get(cause)?.remove();
+    messages.delete(cause);
+    if (!message) return;
+    messages.set(cause, message);
+    root.append(message);
   };
 }

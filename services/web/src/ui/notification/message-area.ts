@@ -1,73 +1,75 @@
-/** Where what is said stands: at the head of the page, and at its foot where a face is there. */
+/** Position of messages: at the top of the page, or at the bottom while a performer's face is at the top. */
 import { overlaps, type ScreenBox } from "../../stage/camera/screen-box";
 import { element, setAttribute } from "../dom";
 
 export interface MessageArea {
   readonly element: HTMLElement;
-  /** Keeps clear of the faces of those who dance, CSS pixels: told of every frame. */
+  /** Keep clear of the performers' faces, given as CSS pixel boxes. Call this every frame. */
   avoidFaces(faces: readonly ScreenBox[]): void;
 }
 
-/** Pixels to a face, that will move. */
+/** Distance that a new message keeps from a face, since faces move. */
 const FACE_MARGIN_PX = 20;
 
-/** `moved` is told when they have another place. While somebody dances the `notice` stands among them, else in the middle of the stage. */
+/**
+ * Create the message area. `onMove` is called when it changes its position. `notice` is shown in it while faces are on
+ * the stage, else in the middle of the stage.
+ */
 export function createMessageArea(root: HTMLElement, notice: HTMLElement, onMove: () => void): MessageArea {
   const messages = element("div", { class: "messages" });
   root.append(messages);
-  /** The boxes at the head and at the foot; null while nothing is said. */
-  let places: readonly [head: ScreenBox, foot: ScreenBox] | null = null;
+  /** Boxes of the messages at the top and at the bottom; null while there are none. */
+  let positions: readonly [top: ScreenBox, bottom: ScreenBox] | null = null;
   let faces: readonly ScreenBox[] = [];
-  let low = false;
-  const put = (to: boolean) => {
-    low = to;
-    setAttribute(messages, "data-low", low);
+  let atBottom = false;
+  const moveTo = (bottom: boolean) => {
+    atBottom = bottom;
+    setAttribute(messages, "data-low", atBottom);
     onMove();
   };
   const measure = () => {
-    const first = places === null;
+    const isNew = positions === null;
     if (messages.offsetHeight === 0) {
-      places = null;
-      if (low) put(false);
+      positions = null;
+      if (atBottom) moveTo(false);
       return;
     }
-    const box = (at: boolean) => {
-      setAttribute(messages, "data-low", at);
+    const measureAt = (bottom: boolean) => {
+      setAttribute(messages, "data-low", bottom);
       return messages.getBoundingClientRect();
     };
-    places = [box(false), box(true)];
-    setAttribute(messages, "data-low", low);
-    choose(first);
+    positions = [measureAt(false), measureAt(true)];
+    setAttribute(messages, "data-low", atBottom);
+    choose(isNew);
   };
-  const choose = (first = false) => {
-    if (places && belongsAtBottom(low, places, faces, first) !== low) put(!low);
+  const choose = (isNew = false) => {
+    if (positions && belongsAtBottom(atBottom, positions, faces, isNew) !== atBottom) moveTo(!atBottom);
   };
   new ResizeObserver(measure).observe(messages);
   addEventListener("resize", measure);
   return {
     element: messages,
-    avoidFaces(now) {
-      faces = now;
-      const home = now.length > 0 ? messages : root;
-      if (notice.parentElement !== home) home.append(notice);
+    avoidFaces(current) {
+      faces = current;
+      const parent = current.length > 0 ? messages : root;
+      if (notice.parentElement !== parent) parent.append(notice);
       choose();
     },
   };
 }
 
 /**
- * Whether messages stand at the foot rather than the head, given the boxes that they have there and whether they do now. They stay unless they cover a face and
- * would not on the other side; what is said `first` wants room to the faces as well, which move.
+ * Return whether messages belong at the bottom rather than the top. They stay where they are unless they cover a face
+ * there and would not on the other side. New messages also keep a margin to faces, since faces move.
  */
 export function belongsAtBottom(
   atBottom: boolean,
-  [head, foot]: readonly [head: ScreenBox, foot: ScreenBox],
+  [top, bottom]: readonly [top: ScreenBox, bottom: ScreenBox],
   faces: readonly ScreenBox[],
   isNew = false,
 ): boolean {
-  const [here, there] = atBottom ? [foot, head] : [head, foot];
-  const covers = (box: ScreenBox, room: number) => faces.some((face) => overlaps(box, face, room));
-  const better =
-    (covers(here, 0) && !covers(there, 0)) || (isNew && covers(here, FACE_MARGIN_PX) && !covers(there, FACE_MARGIN_PX));
-  return better ? !atBottom : atBottom;
+  const [current, other] = atBottom ? [bottom, top] : [top, bottom];
+  const covers = (box: ScreenBox, margin: number) => faces.some((face) => overlaps(box, face, margin));
+  const shouldMove = (margin: number) => covers(current, margin) && !covers(other, margin);
+  return shouldMove(0) || (isNew && shouldMove(FACE_MARGIN_PX)) ? !atBottom : atBottom;
 }

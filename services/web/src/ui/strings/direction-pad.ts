@@ -1,5 +1,4 @@
-/** Press-and-hold arrows that move one limb of the chosen performer: laid out as the keys Q W E, A S D are; of a leg only up and down. */
-
+/** Press-and-hold buttons that move a limb of the selected performer, laid out like the keys Q W E, A S D. */
 import { translate } from "../../i18n/translator";
 import { DIGITAL_INPUTS, type DigitalInput, effectOf } from "../../input/digital-input";
 import { element } from "../dom";
@@ -7,24 +6,24 @@ import { icon } from "../icon";
 import { LIMB_NAMES } from "../limb-state";
 import { directionName } from "../mapping/command-name";
 
-/** As they stand, three in a row. */
+/** Directions in layout order, three per row. A leg has only up and down. */
 const DIRECTIONS = ["nearer", "up", "further", "left", "down", "right"];
-/** How long an activation that is no press lasts (a screen reader's, a voice's), milliseconds. */
+/** Length of a press that was caused by assistive technology and therefore cannot be held. */
 const CLICK_PRESS_MS = 250;
 
 export interface DirectionPad {
   readonly element: HTMLElement;
-  setVisible(shown: boolean): void;
+  setVisible(visible: boolean): void;
 }
 
-/** `press(input, down)` is told when a button goes down and comes up. */
+/** Create the buttons of a limb. `onPress` is called when one goes down (`down` is true) and when it comes up. */
 export function createDirectionPad(limb: number, onPress: (input: DigitalInput, down: boolean) => void): DirectionPad {
   const down = new Set<DigitalInput>();
-  const set = (input: DigitalInput, to: boolean) => {
-    if (down.has(input) === to) return;
-    if (to) down.add(input);
+  const setDown = (input: DigitalInput, isDown: boolean) => {
+    if (down.has(input) === isDown) return;
+    if (isDown) down.add(input);
     else down.delete(input);
-    onPress(input, to);
+    onPress(input, isDown);
   };
   const pad = element("div", {
     class: "move-pad",
@@ -33,14 +32,15 @@ export function createDirectionPad(limb: number, onPress: (input: DigitalInput, 
     "data-leg": limb >= 2,
     hidden: true,
   });
-  const inputs = DIGITAL_INPUTS.filter((one) => effectOf(one).limb === limb);
-  for (const way of DIRECTIONS)
-    for (const input of inputs) if (directionName(input) === way) pad.append(createDirectionButton(input, set));
+  const inputs = DIGITAL_INPUTS.filter((input) => effectOf(input).limb === limb);
+  for (const direction of DIRECTIONS)
+    for (const input of inputs)
+      if (directionName(input) === direction) pad.append(createDirectionButton(input, setDown));
   return {
     element: pad,
-    setVisible(shown) {
-      pad.hidden = !shown;
-      if (!shown) for (const input of [...down]) set(input, false);
+    setVisible(visible) {
+      pad.hidden = !visible;
+      if (!visible) for (const input of [...down]) setDown(input, false);
     },
   };
 }
@@ -49,40 +49,40 @@ function createDirectionButton(
   input: DigitalInput,
   onPress: (input: DigitalInput, down: boolean) => void,
 ): HTMLButtonElement {
-  const way = directionName(input);
-  const said = translate(way);
-  const name = said.charAt(0).toUpperCase() + said.slice(1);
-  const made = element("button", { class: "move", type: "button", "aria-label": name });
-  made.append(way === "nearer" || way === "further" ? name : icon(way));
+  const direction = directionName(input);
+  const text = translate(direction);
+  const name = text.charAt(0).toUpperCase() + text.slice(1);
+  const button = element("button", { class: "move", type: "button", "aria-label": name });
+  button.append(direction === "nearer" || direction === "further" ? name : icon(direction));
   let pressed = false;
-  const change = (to: boolean) => {
-    pressed = to;
-    if (to) made.dataset.on = "";
-    else delete made.dataset.on;
-    onPress(input, to);
+  const setPressed = (isPressed: boolean) => {
+    pressed = isPressed;
+    if (isPressed) button.dataset.on = "";
+    else delete button.dataset.on;
+    onPress(input, isPressed);
   };
-  made.addEventListener("pointerdown", (event) => {
+  button.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
-    made.setPointerCapture(event.pointerId);
-    change(true);
+    button.setPointerCapture(event.pointerId);
+    setPressed(true);
   });
-  for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"])
-    made.addEventListener(end, () => change(false));
+  for (const type of ["pointerup", "pointercancel", "lostpointercapture", "blur"])
+    button.addEventListener(type, () => setPressed(false));
   const isPress = ({ key }: KeyboardEvent) => key === " " || key === "Enter";
-  made.addEventListener("keydown", (event) => {
+  button.addEventListener("keydown", (event) => {
     if (!isPress(event)) return;
     event.preventDefault();
-    if (!event.repeat) change(true);
+    if (!event.repeat) setPressed(true);
   });
-  made.addEventListener("keyup", (event) => {
-    if (isPress(event)) change(false);
+  button.addEventListener("keyup", (event) => {
+    if (isPress(event)) setPressed(false);
   });
-  // no pointer and no key: whatever activated it cannot hold it
-  made.addEventListener("click", (event) => {
+  // A click without a pointer or a key comes from assistive technology, which cannot hold the button.
+  button.addEventListener("click", (event) => {
     if (event.detail !== 0 || pressed) return;
-    change(true);
-    setTimeout(() => change(false), CLICK_PRESS_MS);
+    setPressed(true);
+    setTimeout(() => setPressed(false), CLICK_PRESS_MS);
   });
-  made.addEventListener("contextmenu", (event) => event.preventDefault());
-  return made;
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+  return button;
 }

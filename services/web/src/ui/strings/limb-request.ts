@@ -1,11 +1,10 @@
-/** What others ask of one's own limbs, standing until it is given, withdrawn or lapsed. Read out politely; nothing is taken by force. */
-
+/** Requests of other users for limbs that this page holds, shown until they are granted, withdrawn or expired. */
 import { pageTranslator } from "../../i18n/translator";
 import { element } from "../dom";
 import { type LimbState, limbName, limbsInKeyOrder, performerCount } from "../limb-state";
 
 export interface LimbRequests {
-  /** `key` gives the first of them. */
+  /** Show the requests. `keyHint` names the key that grants the first one. */
   render(limbs: readonly LimbState[], keyHint: string | null): void;
 }
 
@@ -19,39 +18,39 @@ export function createLimbRequests(
   root.append(live);
   let shown = "";
   return {
-    render(limbs, key) {
+    render(limbs, keyHint) {
       const performers = performerCount(limbs);
-      const asked = limbsInKeyOrder(performers).filter(
+      const requested = limbsInKeyOrder(performers).filter(
         (limb) => limbs[limb].holder?.mine && limbs[limb].requesters.length > 0,
       );
-      const now = JSON.stringify([asked.map((limb) => [limb, limbs[limb].requesters[0]]), key, performers]);
-      if (now === shown) return;
-      shown = now;
-      const within = live.contains(document.activeElement);
+      const content = JSON.stringify([requested.map((limb) => [limb, limbs[limb].requesters[0]]), keyHint, performers]);
+      if (content === shown) return;
+      shown = content;
+      const hadFocus = live.contains(document.activeElement);
       live.replaceChildren(
-        ...asked.map((limb, i) => {
+        ...requested.map((limb, i) => {
           const { name, colour } = limbs[limb].requesters[0];
-          const named = { limb: limbName(limb, performers, translator), name };
+          const names = { limb: limbName(limb, performers, translator), name };
           const button = element(
             "button",
             {
               class: "toast-action",
               type: "button",
-              "aria-label": translate("Give the {limb} to {name}", named),
+              "aria-label": translate("Give the {limb} to {name}", names),
               onClick: () => onGive(limb),
             },
             translate("Give"),
           );
-          if (key && i === 0) button.append(element("kbd", { class: "key-hint" }, key));
+          if (keyHint && i === 0) button.append(element("kbd", { class: "key-hint" }, keyHint));
           return element(
             "div",
             { class: "toast ask", style: `--colour: var(--holder-${colour})` },
-            translate("{name} asks for the {limb}", named),
+            translate("{name} asks for the {limb}", names),
             button,
           );
         }),
       );
-      if (within) live.querySelector("button")?.focus();
+      if (hadFocus) live.querySelector("button")?.focus();
     },
   };
 }

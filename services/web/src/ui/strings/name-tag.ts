@@ -1,6 +1,5 @@
-/** Names over the strings, with "Ask" where another holds one, and once the invitation by the nearer hand. */
-
-import { pageTranslator } from "../../i18n/translator";
+/** Name tags of limb holders on the stage, each with an "Ask" button, and the invitation beside a hand. */
+import { pageTranslator, type Translator } from "../../i18n/translator";
 import { LIMBS } from "../../motion/skeleton";
 import type { ScreenBox } from "../../stage/camera/screen-box";
 import { MAX_LIMBS, performerOfLimb } from "../../wire/limbs";
@@ -16,49 +15,56 @@ export interface ScreenPoint {
 
 export interface NameTags {
   /**
-   * Puts each holder's tag by its bar on the screen at `now`, milliseconds, where it covers nothing; bars are CSS pixels, null hides the tag. `faces` are kept free
-   * too. One's own and those of the `chosen` performer have the first choice.
+   * Place each holder's tag beside the bar of its string, where it covers no other tag, bar or face. Boxes are in CSS
+   * pixels, a bar of null hides its tag, and `now` is in milliseconds. Tags of this page's user are placed first, then
+   * those of the `selected` performer.
    */
   render(
     limbs: readonly LimbState[],
     bars: readonly (ScreenBox | null)[],
     faces: readonly ScreenBox[],
     now: number,
-    chosen?: number,
+    selected?: number,
   ): void;
-  /** Puts the invitation beside a place, clear of what the last tags were; null takes it away. */
-  invite(place: ScreenPoint | null): void;
+  /** Show the invitation beside a point, clear of the tags; null hides it. */
+  invite(point: ScreenPoint | null): void;
 }
 
-/** Tags begin below this, in the middle of the header. */
+/** Upper limit of tags on the page: the middle of the header. */
 const TOP_MARGIN_PX = 32;
-/** How a tag is written, from the whole to the shortest: name, limb and "Ask"; the name alone; its initial. */
+/** Forms of a tag from the longest to the shortest: name, limb and "Ask"; the name alone; its initial. */
 const TAG_FORMS = ["whole", "name", "initial"] as const;
-/** From a hand to the invitation, pixels. */
+/** Distance between the hand and the invitation. */
 const INVITATION_DISTANCE_PX = 26;
 
+export interface NameTagOptions {
+  /** Upper limit of tags, in CSS pixels. */
+  top?: number;
+  /** Return the boxes of other elements that cover the picture. */
+  getObstacles?: () => readonly ScreenBox[];
+  translator?: Translator;
+}
+
 /**
- * `ask(limb)` is told of a press on a tag's "Ask"; the same can be done in the card of strings, so the tags are for the eye and the pointer alone. They keep
- * within their layer, which is over the whole picture, and below `top`, CSS pixels. `beside` are boxes of what else stands before the picture.
+ * Create the layer of tags over the whole picture. `onRequest` is called for a press on "Ask". Tags are hidden from
+ * assistive technology: the strings panel offers the same.
  */
 export function createNameTags(
   root: ParentNode & Node,
   onRequest: (limb: number) => void,
-  top = TOP_MARGIN_PX,
-  getObstacles: () => readonly ScreenBox[] = () => [],
-  translator = pageTranslator,
+  { top = TOP_MARGIN_PX, getObstacles = () => [], translator = pageTranslator }: NameTagOptions = {},
 ): NameTags {
   const { translate } = translator;
   const layer = element("div", { class: "tags", "aria-hidden": "true" });
   root.append(layer);
-  // told, not asked for: every frame the page would be laid out for it. None while a sheet is before them
+  // Observed instead of measured, since measuring would force a layout every frame. Zero while a sheet hides the layer.
   let [width, height] = [0, 0];
-  let laid: (LabelPlacement | null)[] = [];
+  let placements: (LabelPlacement | null)[] = [];
   new ResizeObserver(([{ contentRect }]) => {
     if (contentRect.width === 0) return;
-    // in another picture all stand anew, and may be written otherwise
-    [width, height, laid] = [contentRect.width, contentRect.height, []];
-    for (const one of tags) one.says = "";
+    // Another size may use other fonts: place and measure all tags anew.
+    [width, height, placements] = [contentRect.width, contentRect.height, []];
+    for (const tag of tags) tag.content = "";
   }).observe(layer);
   const tags = Array.from({ length: MAX_LIMBS }, (_, i) => {
     const [name, letter, limb] = [element("b"), element("i"), element("span")];
@@ -67,74 +73,68 @@ export function createNameTags(
       { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => onRequest(i) },
       translate("Ask"),
     );
-    const tag = element("div", { class: "tag", hidden: true }, letter, name, limb, button);
-    layer.append(tag);
-    return { name, letter, limb, button, tag, says: "", sizes: [] as Size[] };
+    const root = element("div", { class: "tag", hidden: true }, letter, name, limb, button);
+    layer.append(root);
+    return { name, letter, limb, button, root, content: "", sizes: [] as Size[] };
   });
-  /** What is not to be covered. */
-  let kept: readonly ScreenBox[] = [];
+  /** Boxes that tags must not cover. */
+  let obstacles: readonly ScreenBox[] = [];
   const invitation = element("div", { class: "tag invitation", hidden: true }, translate("Take a hand"));
   layer.append(invitation);
-  let invited: { size: Size; side: number } | null = null;
+  let invitationState: { size: Size; side: number } | null = null;
   return {
-    render(limbs, bars, faces, now, chosen = 0) {
+    render(limbs, bars, faces, now, selected = 0) {
       setAttribute(layer, "data-several", limbs.length > LIMBS.length);
-      const labels = tags.map((one, i) => {
-        const { holder = null, requestedByMe: asked = false } = limbs[i] ?? {};
+      const labels = tags.map((tag, i) => {
+        const { holder = null, requestedByMe = false } = limbs[i] ?? {};
         const bar = bars[i];
         if (!holder || !bar) return null;
-        const { tag, name, letter, limb, button } = one;
-        // written, and its sizes asked for, which lays the page out, only where what it says is new
-        const says = `${limbs.length}\n${holder.name}\n${holder.colour}\n${asked}\n${holder.mine}`;
-        if (one.says !== says || one.sizes.some((size) => size.width === 0)) {
+        const { root, name, letter, limb, button } = tag;
+        // Measuring forces a layout, so it is only done when the content changed.
+        const content = `${limbs.length}\n${holder.name}\n${holder.colour}\n${requestedByMe}\n${holder.mine}`;
+        if (tag.content !== content || tag.sizes.some((size) => size.width === 0)) {
           setText(name, holder.name);
           setText(letter, initialOf(holder.name));
-          // whose limb it is the string shows that it hangs by
-          setText(limb, asked ? translate("asked") : limbName(i, 1, translator));
-          button.hidden = holder.mine || asked;
-          tag.style.setProperty("--colour", `var(--holder-${holder.colour})`);
-          tag.hidden = false;
-          one.sizes = TAG_FORMS.map((written) => {
-            tag.dataset.written = written;
-            return { width: tag.offsetWidth, height: tag.offsetHeight };
+          // The performer is not named: the string shows it.
+          setText(limb, requestedByMe ? translate("asked") : limbName(i, 1, translator));
+          button.hidden = holder.mine || requestedByMe;
+          root.style.setProperty("--colour", `var(--holder-${holder.colour})`);
+          root.hidden = false;
+          tag.sizes = TAG_FORMS.map((form) => {
+            root.dataset.written = form;
+            return { width: root.offsetWidth, height: root.offsetHeight };
           });
-          one.says = says;
+          tag.content = content;
         }
-        return { bar, sizes: one.sizes, rank: holder.mine ? 0 : performerOfLimb(i) === chosen ? 1 : 2 };
+        return { bar, sizes: tag.sizes, rank: holder.mine ? 0 : performerOfLimb(i) === selected ? 1 : 2 };
       });
-      kept = invited || labels.some(Boolean) ? [...faces, ...getObstacles()] : [];
-      laid = layOutLabels(labels, kept, laid, { width, height, top }, now);
-      tags.forEach(({ tag }, i) => {
-        const { box = null, size = 0 } = laid[i] ?? {};
-        if (tag.hidden !== !box) tag.hidden = !box;
+      obstacles = invitationState || labels.some(Boolean) ? [...faces, ...getObstacles()] : [];
+      placements = layOutLabels(labels, obstacles, placements, { width, height, top }, now);
+      tags.forEach(({ root }, i) => {
+        const { box = null, size = 0 } = placements[i] ?? {};
+        if (root.hidden !== !box) root.hidden = !box;
         if (!box) return;
-        if (tag.dataset.written !== TAG_FORMS[size]) tag.dataset.written = TAG_FORMS[size];
-        tag.style.transform = `translate(${box.left.toFixed(1)}px, ${box.top.toFixed(1)}px)`;
+        if (root.dataset.written !== TAG_FORMS[size]) root.dataset.written = TAG_FORMS[size];
+        root.style.transform = `translate(${box.left.toFixed(1)}px, ${box.top.toFixed(1)}px)`;
       });
     },
-    invite(place) {
-      if (!place) {
+    invite(point) {
+      if (!point) {
         invitation.hidden = true;
-        invited = null;
+        invitationState = null;
         return;
       }
-      if (!invited || invited.size.width === 0) {
+      if (!invitationState || invitationState.size.width === 0) {
         invitation.hidden = false;
-        invited = { size: { width: invitation.offsetWidth, height: invitation.offsetHeight }, side: 0 };
+        invitationState = { size: { width: invitation.offsetWidth, height: invitation.offsetHeight }, side: 0 };
       }
-      const taken = [...kept, ...laid.flatMap((one) => one?.box ?? [])];
-      const found = placeBeside(
-        place,
-        INVITATION_DISTANCE_PX,
-        invited.size,
-        taken,
-        { width, height, top },
-        invited.side,
-      );
-      if (invitation.hidden !== !found) invitation.hidden = !found;
-      if (!found) return;
-      invited.side = found.side;
-      invitation.style.transform = `translate(${found.box.left.toFixed(1)}px, ${found.box.top.toFixed(1)}px)`;
+      const taken = [...obstacles, ...placements.flatMap((placement) => placement?.box ?? [])];
+      const { size, side } = invitationState;
+      const placed = placeBeside(point, INVITATION_DISTANCE_PX, size, taken, { width, height, top }, side);
+      if (invitation.hidden !== !placed) invitation.hidden = !placed;
+      if (!placed) return;
+      invitationState.side = placed.side;
+      invitation.style.transform = `translate(${placed.box.left.toFixed(1)}px, ${placed.box.top.toFixed(1)}px)`;
     },
   };
 }

@@ -1,5 +1,4 @@
-/** Who holds which limb: the card of four rows, and the dock of four discs that stands in while the card is shut. */
-
+/** Strings panel: one row per limb with its holder, and the dock of four round buttons that replaces a closed panel. */
 import { translate, translateToParts } from "../../i18n/translator";
 import type { DigitalInput } from "../../input/digital-input";
 import { limbNumber } from "../../wire/limbs";
@@ -18,15 +17,14 @@ import { createPanel, type Panel } from "../panel";
 import { createDirectionPad } from "./direction-pad";
 import { createNextPerformerButton, createPerformerChooser } from "./performer-chooser";
 
-/** A notice stands so long, milliseconds. */
 const NOTICE_DURATION_MS = 5_000;
 
 export interface StringsPanel {
   readonly panel: Panel;
-  /** Shows the limbs of the `chosen` performer of all whose limbs these are; without `ready` nothing can be taken. */
-  render(limbs: readonly LimbState[], ready: boolean, chosen?: number): void;
+  /** Show the limbs of the `selected` performer, of all performers' limbs. Unless `ready`, no limb can be claimed. */
+  render(limbs: readonly LimbState[], ready: boolean, selected?: number): void;
   readonly dock: HTMLElement;
-  /** A quiet line about an input that was not taken as it came. */
+  /** Show a short message about an input that was not applied as sent. */
   notice(text: string): void;
 }
 
@@ -37,42 +35,44 @@ export interface StringsActions {
   give(limb: number): void;
   select(limb: number): void;
   focus(limb: number | null): void;
-  /** Chooses a performer, or the next one. */
+  /** Select a performer. */
   dancer(performer: number): void;
   nextDancer(): void;
-  /** A button of the page goes down or comes up. */
+  /** Report that a button for an input went down or came up. */
   press(input: DigitalInput, down: boolean): void;
 }
 
+/** Action of a limb's button. */
 type LimbAction = "toggle" | "ask" | "withdraw" | "give";
 
+/** Create panel and dock in `root`. */
 export function createStringsPanel(
   root: HTMLElement,
   actions: StringsActions & { close(): void; keys(): void },
 ): StringsPanel {
   const panel = createPanel(root, "strings", translate("Strings"), actions.close);
-  /** Whose limbs the rows show, of how many. */
+  /** Selected performer, and the number of performers. */
   let [performer, performers] = [0, 1];
-  const own = (part: number) => limbNumber(performer, part);
-  const lights = (part: number) => ({
-    onFocus: () => actions.focus(own(part)),
+  const limbOf = (part: number) => limbNumber(performer, part);
+  const focusEvents = (part: number) => ({
+    onFocus: () => actions.focus(limbOf(part)),
     onBlur: () => actions.focus(null),
-    onPointerenter: () => actions.focus(own(part)),
+    onPointerenter: () => actions.focus(limbOf(part)),
     onPointerleave: () => actions.focus(null),
   });
   const rows = LIMB_ORDER.map((limb) => {
     const state = element("small");
     const glyph = element(
       "button",
-      { class: "limb-glyph", type: "button", disabled: true, onClick: () => actions.select(own(limb)) },
+      { class: "limb-glyph", type: "button", disabled: true, onClick: () => actions.select(limbOf(limb)) },
       limbIcon(limb),
     );
-    let doing: LimbAction = "toggle";
-    const action = element("button", {
+    let action: LimbAction = "toggle";
+    const button = element("button", {
       class: "limb-action",
       type: "button",
-      onClick: () => actions[doing](own(limb)),
-      ...lights(limb),
+      onClick: () => actions[action](limbOf(limb)),
+      ...focusEvents(limb),
     });
     const pad = createDirectionPad(limb, actions.press);
     const row = element(
@@ -80,32 +80,32 @@ export function createStringsPanel(
       {},
       glyph,
       element("span", {}, element("b", {}, translate(LIMB_NAMES[limb])), state),
-      action,
+      button,
       pad.element,
     );
     const render = (limbState: LimbState, ready: boolean) => {
-      const { holder, requesters: askers, requestedByMe: asked, selected } = limbState;
+      const { holder, selected } = limbState;
+      const mine = holder?.mine ?? false;
       setAttribute(row, "style", holderStyle(holder));
-      const name = { limb: limbName(own(limb), performers) };
+      const name = { limb: limbName(limbOf(limb), performers) };
       setText(state, limbStatus(limbState));
       if (!holder)
         state.append(element("span", { class: "key-hint" }, translate(", key {key}", { key: limbKey(limb) })));
-      doing = !holder ? "toggle" : holder.mine ? (askers.length > 0 ? "give" : "toggle") : asked ? "withdraw" : "ask";
-      const word =
-        doing === "toggle"
+      action = limbAction(limbState);
+      const label =
+        action === "toggle"
           ? holder
             ? "Release"
             : "Take"
-          : ({ give: "Give", ask: "Ask", withdraw: "Withdraw" } as const)[doing];
-      setText(action, translate(word));
-      action.setAttribute("aria-label", translate(ACTION_LABELS[word], name));
+          : ({ give: "Give", ask: "Ask", withdraw: "Withdraw" } as const)[action];
+      setText(button, translate(label));
+      button.setAttribute("aria-label", translate(ACTION_LABELS[label], name));
       glyph.setAttribute("aria-label", translate("Move the {limb}", name));
-      action.disabled = !ready;
-      setAttribute(action, "data-mine", holder?.mine ?? false);
-      const mine = holder?.mine ?? false;
+      button.disabled = !ready;
+      setAttribute(button, "data-mine", mine);
       glyph.disabled = !mine || !ready;
       setAttribute(glyph, "aria-pressed", mine ? String(selected) : null);
-      // also while the line is away: what is held is asked for again, and who presses goes on
+      // Also while disconnected: the limb is claimed again on reconnection, and a button that is held keeps working.
       pad.setVisible(mine && selected);
     };
     return { limb, row, render };
@@ -114,7 +114,7 @@ export function createStringsPanel(
     const name = element("span", { hidden: true });
     const disc = element(
       "button",
-      { type: "button", onClick: () => actions.toggle(own(limb)), ...lights(limb) },
+      { type: "button", onClick: () => actions.toggle(limbOf(limb)), ...focusEvents(limb) },
       limbIcon(limb),
       name,
     );
@@ -129,7 +129,7 @@ export function createStringsPanel(
     }),
   );
   const notice = element("p", { class: "strings-notice", role: "status", "aria-live": "polite" });
-  // on a phone the header has no room for it
+  // A phone's header has no room for this button.
   const keys = element(
     "button",
     { class: "text-button", type: "button", onClick: actions.keys },
@@ -151,37 +151,37 @@ export function createStringsPanel(
     ...discs.map(({ disc }) => disc),
   );
   root.append(dock);
-  let fading: ReturnType<typeof setTimeout> | undefined;
+  let noticeTimer: ReturnType<typeof setTimeout> | undefined;
   return {
     panel,
     dock,
     notice(text) {
-      clearTimeout(fading);
+      clearTimeout(noticeTimer);
       setText(notice, text);
       hint.hidden = true;
-      fading = setTimeout(() => {
+      noticeTimer = setTimeout(() => {
         setText(notice, "");
         hint.hidden = false;
       }, NOTICE_DURATION_MS);
     },
-    render(limbs, ready, chosen = 0) {
-      [performer, performers] = [chosen, performerCount(limbs)];
-      for (const part of [chooser, next]) part.render(limbs, chosen);
-      for (const { limb, render } of rows) render(limbs[own(limb)], ready);
+    render(limbs, ready, selected = 0) {
+      [performer, performers] = [selected, performerCount(limbs)];
+      for (const part of [chooser, next]) part.render(limbs, selected);
+      for (const { limb, render } of rows) render(limbs[limbOf(limb)], ready);
       for (const { limb, disc, name } of discs) {
-        const { holder, requestedByMe: asked } = limbs[own(limb)];
-        const named = limbName(own(limb), performers);
-        const capital = named.charAt(0).toUpperCase() + named.slice(1);
+        const { holder, requestedByMe } = limbs[limbOf(limb)];
+        const lowerName = limbName(limbOf(limb), performers);
+        const capitalName = lowerName.charAt(0).toUpperCase() + lowerName.slice(1);
         setAttribute(disc, "style", holderStyle(holder));
         setAttribute(disc, "data-mine", holder?.mine ?? false);
         disc.setAttribute(
           "aria-label",
           !holder
-            ? translate("Take the {limb}", { limb: named })
+            ? translate("Take the {limb}", { limb: lowerName })
             : holder.mine
-              ? translate("Release the {limb}, held by you", { limb: named })
-              : translate(asked ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", {
-                  limb: capital,
+              ? translate("Release the {limb}, held by you", { limb: lowerName })
+              : translate(requestedByMe ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", {
+                  limb: capitalName,
                   name: holder.name,
                 }),
         );
@@ -198,16 +198,24 @@ const ACTION_LABELS = {
   Release: "Release {limb}",
   Give: "Give {limb}",
   Ask: "Ask for {limb}",
-  Withdraw: "Ask no longer for {limb}",
+  Withdraw: "Withdraw the request for {limb}",
 } as const;
 
 function holderStyle(holder: LimbHolder | null): string | null {
   return holder ? `--colour: var(--holder-${holder.colour})` : null;
 }
 
-function limbStatus({ holder, requesters: askers, requestedByMe: asked }: LimbState): string {
+function limbAction({ holder, requesters, requestedByMe }: LimbState): LimbAction {
+  if (!holder) return "toggle";
+  if (holder.mine) return requesters.length > 0 ? "give" : "toggle";
+  return requestedByMe ? "withdraw" : "ask";
+}
+
+function limbStatus({ holder, requesters, requestedByMe }: LimbState): string {
   if (!holder) return translate("Free");
   if (holder.mine)
-    return askers.length > 0 ? translate("{name} asks for it", { name: askers[0].name }) : translate("You hold this");
-  return translate(asked ? "You ask {name} for it" : "{name} holds this", { name: holder.name });
+    return requesters.length > 0
+      ? translate("{name} asks for it", { name: requesters[0].name })
+      : translate("You hold this");
+  return translate(requestedByMe ? "You ask {name} for it" : "{name} holds this", { name: holder.name });
 }

@@ -1,4 +1,7 @@
-/** Where names stand: by their bars, and never over another name, a bar or what else is to be seen. Where there is little room they are shorter. Pure; CSS pixels, y down. */
+/**
+ * Layout of name tags: each stands beside the bar of its string and covers no other tag, bar or obstacle. Tags get
+ * shorter where space is scarce. Pure; CSS pixels, y down.
+ */
 import { overlaps, type ScreenBox } from "../../stage/camera/screen-box";
 
 export interface Size {
@@ -6,42 +9,45 @@ export interface Size {
   height: number;
 }
 
-/** A name, and the bar that it belongs to. */
+/** Tag to be placed beside a bar. */
 export interface TagLabel {
   bar: ScreenBox;
-  /** As it may be written, from the whole to the shortest. */
+  /** Sizes of its forms, from the longest to the shortest. */
   sizes: readonly Size[];
-  /** Names of a lower rank have the first choice. */
+  /** Tags of a lower rank are placed first. */
   rank: number;
 }
 
-/** Where names may stand: below `top`, and within. */
+/** Area for tags: the picture below `top`. */
 export interface LabelViewport extends Size {
   top: number;
 }
 
-/** How a name stands: told again for the next frame it stays so as long as it can. */
+/**
+ * Placement of a tag. Passed to the layout of the next frame, so that tags stay where they are for as long as
+ * possible.
+ */
 export interface LabelPlacement {
-  /** Null where there is no room even for the shortest. */
+  /** Null if there is no space even for the shortest form. */
   box: ScreenBox | null;
-  /** Which of its sizes it is written in, and which of the places by its bar it has. */
+  /** Index of its form, and of its position beside the bar. */
   size: number;
   place: number;
-  /** Since when it could stand better; null while it cannot. Milliseconds. */
+  /** Time in milliseconds since which a better placement is possible; null if none is. */
   upgradableSinceMs: number | null;
 }
 
-/** From a bar to its name, and to one that is written shortest. */
+/** Distance between a bar and its tag, and its tag in the shortest form. */
 const TAG_GAP_PX = 12;
 const SHORTEST_TAG_GAP_PX = 4;
-/** From a name to what is beside it, as it comes there. */
+/** Distance that a tag keeps from obstacles when it is placed. */
 const OBSTACLE_MARGIN_PX = 4;
-/** A name stands better again only where there is so much more room, and has been for so long, milliseconds. */
+/** A tag is upgraded only if this much space around the better placement has been free for this long. */
 const UPGRADE_MARGIN_PX = 10;
 const UPGRADE_DELAY_MS = 800;
-/** From the picture's sides. */
+/** Distance from the left and right edges of the picture. */
 const VIEWPORT_MARGIN_PX = 8;
-/** The size that all have before any is written in the first. */
+/** Form that all tags get before any tag gets the longest one. */
 const FIRST_PASS_SIZE = 1;
 
 interface CandidatePosition {
@@ -51,9 +57,10 @@ interface CandidatePosition {
 }
 
 /**
- * How `labels` stand at `now`, milliseconds, null for null. `keep` are boxes that nothing may cover beside the bars, `before` what this told of the frame before. A new name
- * is as long as there is room for; later, one makes room for those of a lower rank at once, and is longer again only after a while. All keep the shortest before
- * one has more.
+ * Place `labels` at time `now` in milliseconds; the result is null where the label is null. Tags cover neither bars
+ * nor `obstacles`. `previous` is the result of the last frame. A new tag gets the longest form that fits. Later it
+ * makes way for tags of a lower rank at once, and gets longer again only after a delay. Every tag gets its shortest
+ * form before any gets a longer one.
  */
 export function layOutLabels(
   labels: readonly (TagLabel | null)[],
@@ -62,37 +69,46 @@ export function layOutLabels(
   viewport: LabelViewport,
   now: number,
 ): (LabelPlacement | null)[] {
-  const there = labels.flatMap((label, nth) =>
-    label ? { nth, label, last: previous[nth] ?? null, spots: candidatePositions(label, viewport) } : [],
+  const entries = labels.flatMap((label, index) =>
+    label ? { index, label, last: previous[index] ?? null, candidates: candidatePositions(label, viewport) } : [],
   );
-  there.sort((a, b) => a.label.rank - b.label.rank);
-  const fixed = [...obstacles, ...there.map(({ label }) => label.bar)];
-  const laid = labels.map((): LabelPlacement | null => null);
-  const stood = there.map(({ nth, label, last, spots }, turn) => {
-    const taken = [...fixed, ...there.slice(0, turn).flatMap((one) => laid[one.nth]?.box ?? [])];
-    const least = there.slice(turn + 1).flatMap((one) => reservedBoxes(one.spots, one.label, one.last));
-    const standing = placeLabel(spots, label, last, taken, least);
-    laid[nth] = upgradePlacement(
-      standing,
-      standing.upgradableSinceMs,
-      spots,
+  entries.sort((a, b) => a.label.rank - b.label.rank);
+  const fixed = [...obstacles, ...entries.map(({ label }) => label.bar)];
+  const placements = labels.map((): LabelPlacement | null => null);
+  // First pass, by rank: up to the form FIRST_PASS_SIZE, leaving space for the shortest form of the following tags.
+  const firstPass = entries.map(({ index, label, last, candidates }, order) => {
+    const taken = [...fixed, ...entries.slice(0, order).flatMap((entry) => placements[entry.index]?.box ?? [])];
+    const reserved = entries
+      .slice(order + 1)
+      .flatMap((entry) => reservedBoxes(entry.candidates, entry.label, entry.last));
+    const placement = placeLabel(candidates, label, last, taken, reserved);
+    placements[index] = upgradePlacement(
+      placement,
+      placement.upgradableSinceMs,
+      candidates,
       last,
-      [...taken, ...least],
-      Math.min(FIRST_PASS_SIZE, standing.size),
+      [...taken, ...reserved],
+      Math.min(FIRST_PASS_SIZE, placement.size),
       now,
     );
-    return standing;
+    return placement;
   });
-  there.forEach(({ nth, last, spots }, turn) => {
-    const standing = laid[nth] as LabelPlacement;
-    if (standing.upgradableSinceMs !== null || standing.size === 0) return;
-    const taken = [...fixed, ...there.flatMap((one) => (one.nth === nth ? [] : (laid[one.nth]?.box ?? [])))];
-    laid[nth] = upgradePlacement(standing, stood[turn].upgradableSinceMs, spots, last, taken, 0, now);
+  // Second pass: the longest form where space is left.
+  entries.forEach(({ index, last, candidates }, order) => {
+    const placement = placements[index] as LabelPlacement;
+    if (placement.upgradableSinceMs !== null || placement.size === 0) return;
+    const others = entries.filter((entry) => entry.index !== index);
+    const taken = [...fixed, ...others.flatMap((entry) => placements[entry.index]?.box ?? [])];
+    const since = firstPass[order].upgradableSinceMs;
+    placements[index] = upgradePlacement(placement, since, candidates, last, taken, 0, now);
   });
-  return laid;
+  return placements;
 }
 
-/** The box of a thing of this size beside a place, `away` from it and free of `taken`: at the `side` where it was, else right, left, above or below. Null where it has no room. */
+/**
+ * Return a box of the given size at a `distance` from a point, clear of `obstacles`: on `previousSide` if possible,
+ * else right, left, above or below the point (sides 0 to 3). Returns null if no side has space.
+ */
 export function placeBeside(
   { x, y }: { x: number; y: number },
   distance: number,
@@ -107,15 +123,18 @@ export function placeBeside(
     [x - width / 2, y - distance - height],
     [x - width / 2, y + distance],
   ] as const;
-  const sides = corners.map(([left, top], nth) => ({
-    side: nth,
+  const sides = corners.map(([left, top], side) => ({
+    side,
     box: { left, top, right: left + width, bottom: top + height },
   }));
   const free = sides.filter(({ box }) => isInsideViewport(box, viewport) && isFree(box, obstacles));
-  return free.find((one) => one.side === previousSide) ?? free[0] ?? null;
+  return free.find(({ side }) => side === previousSide) ?? free[0] ?? null;
 }
 
-/** As it stood, else as long elsewhere, else shorter; a new one at its shortest. Free of what others need at `least`, where that can be. */
+/**
+ * Place a tag as in the previous frame, else in the same form elsewhere, else in a shorter form. A new tag gets its
+ * shortest form. Boxes that are `reserved` for other tags are avoided if possible.
+ */
 function placeLabel(
   candidates: readonly CandidatePosition[],
   { sizes }: TagLabel,
@@ -123,13 +142,13 @@ function placeLabel(
   obstacles: readonly ScreenBox[],
   reserved: readonly ScreenBox[],
 ): LabelPlacement {
-  const gone: LabelPlacement = {
+  const hidden: LabelPlacement = {
     box: null,
     size: sizes.length - 1,
     place: 0,
     upgradableSinceMs: previous?.upgradableSinceMs ?? null,
   };
-  if (previous && !previous.box) return gone;
+  if (previous && !previous.box) return hidden;
   const same = previous && candidates.find(({ size, place }) => size === previous.size && place === previous.place);
   if (previous && same && isFree(same.box, obstacles))
     return { ...same, upgradableSinceMs: previous.upgradableSinceMs };
@@ -137,10 +156,13 @@ function placeLabel(
   const found =
     others.find(({ box }) => isFree(box, [...obstacles, ...reserved], OBSTACLE_MARGIN_PX)) ??
     others.find(({ box }) => isFree(box, obstacles));
-  return { ...gone, ...found, upgradableSinceMs: null };
+  return { ...hidden, ...found, upgradableSinceMs: null };
 }
 
-/** The first spot before the one it has, and not longer than the size `most`, once there has been room since `since` for long enough: for a new one at once. */
+/**
+ * Move a tag to the first better candidate that is not longer than the form `largestSize`, once it has been possible
+ * since `since` for UPGRADE_DELAY_MS. A new tag is upgraded at once.
+ */
 function upgradePlacement(
   current: LabelPlacement,
   since: number | null,
@@ -151,12 +173,12 @@ function upgradePlacement(
   now: number,
 ): LabelPlacement {
   const { box, size, place } = current;
-  const found = candidates.find((spot) => {
-    const before = !box || spot.size < size || (spot.size === size && spot.place < place);
+  const found = candidates.find((candidate) => {
+    const isBetter = !box || candidate.size < size || (candidate.size === size && candidate.place < place);
     return (
-      before &&
-      spot.size >= largestSize &&
-      isFree(spot.box, obstacles, previous ? UPGRADE_MARGIN_PX : OBSTACLE_MARGIN_PX)
+      isBetter &&
+      candidate.size >= largestSize &&
+      isFree(candidate.box, obstacles, previous ? UPGRADE_MARGIN_PX : OBSTACLE_MARGIN_PX)
     );
   });
   if (!found) return { ...current, upgradableSinceMs: null };
@@ -166,34 +188,36 @@ function upgradePlacement(
     : { ...found, upgradableSinceMs: null };
 }
 
-/** What a name needs at least: its shortest, where it stands. */
+/** Return the box that a tag needs at least: its shortest form at its position. */
 function reservedBoxes(
   candidates: readonly CandidatePosition[],
   { sizes }: TagLabel,
   previous: LabelPlacement | null,
 ): ScreenBox[] {
   const place = previous?.place ?? 0;
-  return candidates.flatMap((spot) => (spot.size === sizes.length - 1 && spot.place === place ? spot.box : []));
+  return candidates.flatMap((candidate) =>
+    candidate.size === sizes.length - 1 && candidate.place === place ? candidate.box : [],
+  );
 }
 
-/** The places for each of its sizes that are within the picture, the best first. */
+/** Return the positions of all forms that are inside the picture, the best first. */
 function candidatePositions({ bar, sizes }: TagLabel, viewport: LabelViewport): CandidatePosition[] {
-  const seen = bar.right > 0 && bar.left < viewport.width && bar.bottom > 0 && bar.top < viewport.height;
-  if (!seen) return [];
-  return sizes.flatMap((written, size) => {
+  const isVisible = bar.right > 0 && bar.left < viewport.width && bar.bottom > 0 && bar.top < viewport.height;
+  if (!isVisible) return [];
+  return sizes.flatMap((formSize, size) => {
     const gap = size > 0 && size === sizes.length - 1 ? SHORTEST_TAG_GAP_PX : TAG_GAP_PX;
-    const spots = anchorBoxes(bar, written, gap, viewport.width).map((box, place) => ({ box, size, place }));
-    return spots.filter(({ box }) => isInsideViewport(box, viewport));
+    const candidates = anchorBoxes(bar, formSize, gap, viewport.width).map((box, place) => ({ box, size, place }));
+    return candidates.filter(({ box }) => isInsideViewport(box, viewport));
   });
 }
 
-/** Above the bar, above it to either side, beside it, and once more above all that. */
+/** Return boxes above the bar, above it to either side, beside it, and one row higher. */
 function anchorBoxes(bar: ScreenBox, { width, height }: Size, gap: number, viewportWidth: number): ScreenBox[] {
   const middle = (bar.left + bar.right - width) / 2;
   const above = bar.top - gap - height;
   const level = (bar.top + bar.bottom - height) / 2;
   const higher = above - height - gap / 2;
-  const places = [
+  const corners = [
     [middle, above],
     [bar.right - width, above],
     [bar.left, above],
@@ -203,7 +227,7 @@ function anchorBoxes(bar: ScreenBox, { width, height }: Size, gap: number, viewp
     [bar.right - width, higher],
     [bar.left, higher],
   ] as const;
-  return places.map(([x, y]) => {
+  return corners.map(([x, y]) => {
     const left = Math.max(VIEWPORT_MARGIN_PX, Math.min(viewportWidth - VIEWPORT_MARGIN_PX - width, x));
     return { left, top: y, right: left + width, bottom: y + height };
   });
@@ -215,7 +239,7 @@ function isInsideViewport(box: ScreenBox, { width, height, top }: LabelViewport)
   );
 }
 
-/** Whether a box, and as much about it as `margin`, covers none of these. */
+/** Return whether a box keeps at least `margin` from all obstacles. */
 function isFree(box: ScreenBox, obstacles: readonly ScreenBox[], margin = 0): boolean {
   return !obstacles.some((other) => overlaps(box, other, margin));
 }

@@ -1,46 +1,46 @@
-/** "Keep this": the performance on the stage, with what was pulled, becomes a dance of its own. */
+/** Recording of the performance on the stage, including controlled limbs, as a new motion ("Keep this"). */
 import type { Motion } from "../../client/api";
 import { ProblemError } from "../../client/problem";
 import { translate } from "../../i18n/translator";
 import type { ShowToast } from "../notification/toast";
 
-/** Keeps a session's performance as a new motion of a name. Rejects with ProblemError. */
+/** Record a session's performance as a new motion of this name. Rejects with ProblemError. */
 export type RecordSession = (session: string, name: string) => Promise<Motion>;
 
 export interface RecordingOptions {
   record: RecordSession;
   toast: ShowToast;
-  /** The session on the stage, and the name of its dance; null where there is none. */
-  session(): { id: string; piece: string } | null;
-  /** The name of the one who keeps it. */
+  /** Return the session on the stage and the name of its motion; null if there is no session. */
+  session(): { id: string; motionName: string } | null;
+  /** Name of the user who records. */
   puppeteer: string;
-  /** The new motion is in the library. */
+  /** Called when the server has stored the new motion. */
   onRecorded(motion: Motion): Promise<void>;
   play(id: string): void;
-  /** Shows what the new motion may be downloaded as. */
+  /** Show the download menu of the new motion. */
   showDownloads(id: string): void;
 }
 
-/** What the page's control calls: settled when it is done, or given up and the person told why. */
+/** Create the action of the button. Its promise resolves when the recording is stored, or has failed with a toast. */
 export function createRecordAction({
-  record: keep,
+  record,
   toast,
   session,
   puppeteer,
-  onRecorded: kept,
-  play: choose,
-  showDownloads: download,
+  onRecorded,
+  play,
+  showDownloads,
 }: RecordingOptions): () => Promise<void> {
   return async () => {
-    const now = session();
-    if (!now) return;
+    const current = session();
+    if (!current) return;
     try {
-      const motion = await keep(now.id, recordingName(now.piece, puppeteer));
-      await kept(motion);
+      const motion = await record(current.id, recordingName(current.motionName, puppeteer));
+      await onRecorded(motion);
       toast(
         translate("Kept: {name}", { name: motion.name }),
-        { label: translate("Dance it"), run: () => choose(motion.id) },
-        { label: translate("Download"), run: () => download(motion.id) },
+        { label: translate("Dance it"), run: () => play(motion.id) },
+        { label: translate("Download"), run: () => showDownloads(motion.id) },
       );
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
@@ -49,14 +49,14 @@ export function createRecordAction({
   };
 }
 
-/** Those that `keptName` gives, in each language. */
+/** Endings that `recordingName` appends, in each language. */
 const RECORDING_NAME_SUFFIXES = [/, as .+ pulled it$/, /（.+の操演）$/];
 
-/** "Sanbaso, as Aiko pulled it"; what was pulled once more keeps one such ending. */
+/** Name a recording: "Sanbaso, as Aiko pulled it". A recording of a recording gets one ending only. */
 export function recordingName(motionName: string, puppeteer: string): string {
   return translate("{piece}, as {puppeteer} pulled it", {
     piece:
-      RECORDING_NAME_SUFFIXES.reduce((name, ending) => name.replace(ending, ""), motionName) || translate("A dance"),
+      RECORDING_NAME_SUFFIXES.reduce((name, suffix) => name.replace(suffix, ""), motionName) || translate("A dance"),
     puppeteer,
   });
 }

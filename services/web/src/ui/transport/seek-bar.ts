@@ -1,5 +1,4 @@
-/** The seek bar: a slider with one cell a block, coloured and raised by quality. */
-
+/** Seek bar: a slider with one cell per block, whose colour and height show the block's quality. */
 import { joinList, translate } from "../../i18n/translator";
 import { element, setAttribute, setText } from "../dom";
 import { formatDuration } from "../format";
@@ -14,7 +13,7 @@ export interface SeekBar {
   setPosition(seconds: number, duration: number): void;
 }
 
-/** `onSeek` gets seconds, also while dragging; arrow keys go by one block. */
+/** Create the bar. `onSeek` receives seconds, also while dragging; arrow keys move by one block. */
 export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
   const head = element("span", { class: "seek-head", hidden: true });
   const hint = element("span", { class: "seek-hint", hidden: true });
@@ -27,15 +26,15 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
   });
   let cells: SeekCell[] = [];
   let marks: HTMLElement[] = [];
-  let held: ArrayLike<number> = [];
-  let [at, length] = [0, 0];
-  let shownAs = "";
+  let blockLevels: ArrayLike<number> = [];
+  let [position, length] = [0, 0];
+  let shownQualities = "";
 
   const secondsAt = (event: PointerEvent) => {
     const box = bar.getBoundingClientRect();
     return Math.min(1, Math.max(0, (event.clientX - box.left) / box.width)) * length;
   };
-  const point = (event: PointerEvent) => {
+  const showHint = (event: PointerEvent) => {
     if (length <= 0) return;
     const seconds = secondsAt(event);
     const cell = cells.find(({ start, end }) => seconds / length >= start && seconds / length < end);
@@ -43,7 +42,7 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
       hint,
       joinList([
         formatDuration(seconds),
-        translate(cell && cell.quality >= 0 ? QUALITY_NAMES[cell.quality] : "not here yet"),
+        translate(cell && cell.quality >= 0 ? QUALITY_NAMES[cell.quality] : "not loaded yet"),
       ]),
     );
     hint.style.left = `${(seconds / length) * 100}%`;
@@ -55,40 +54,40 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
     onSeek(secondsAt(event));
   });
   bar.addEventListener("pointermove", (event) => {
-    point(event);
+    showHint(event);
     if (bar.hasPointerCapture(event.pointerId)) onSeek(secondsAt(event));
   });
   bar.addEventListener("pointerleave", () => (hint.hidden = true));
   bar.addEventListener("keydown", (event) => {
-    const block = held.length > 0 ? length / held.length : 1;
-    const to: Record<string, number> = {
-      ArrowLeft: at - block,
-      ArrowDown: at - block,
-      ArrowRight: at + block,
-      ArrowUp: at + block,
-      PageDown: at - 10 * block,
-      PageUp: at + 10 * block,
+    const block = blockLevels.length > 0 ? length / blockLevels.length : 1;
+    const targets: Record<string, number> = {
+      ArrowLeft: position - block,
+      ArrowDown: position - block,
+      ArrowRight: position + block,
+      ArrowUp: position + block,
+      PageDown: position - 10 * block,
+      PageUp: position + 10 * block,
       Home: 0,
       End: length,
     };
-    if (!(event.key in to) || length <= 0) return;
+    if (!(event.key in targets) || length <= 0) return;
     event.preventDefault();
     event.stopPropagation();
-    onSeek(Math.min(length, Math.max(0, to[event.key])));
+    onSeek(Math.min(length, Math.max(0, targets[event.key])));
   });
 
   const markPlayed = () => {
-    const place = length > 0 ? at / length : 0;
-    cells.forEach((cell, i) => marks[i].classList.toggle("played", cell.quality >= 0 && cell.start < place));
+    const fraction = length > 0 ? position / length : 0;
+    cells.forEach((cell, i) => marks[i].classList.toggle("played", cell.quality >= 0 && cell.start < fraction));
   };
   return {
     element: bar,
-    setBlocks(blocks, rates) {
-      held = blocks;
-      cells = seekCells(blocks, rates, innerWidth <= 720 ? MAX_CELLS.phone : MAX_CELLS.desktop);
-      const now = cells.map((cell) => cell.quality).join();
-      if (now === shownAs) return;
-      shownAs = now;
+    setBlocks(blocks, levelCount) {
+      blockLevels = blocks;
+      cells = seekCells(blocks, levelCount, innerWidth <= 720 ? MAX_CELLS.phone : MAX_CELLS.desktop);
+      const qualities = cells.map((cell) => cell.quality).join();
+      if (qualities === shownQualities) return;
+      shownQualities = qualities;
       marks = cells.map(({ quality }) =>
         quality < 0
           ? element("i", { class: "missing" })
@@ -98,15 +97,15 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
       markPlayed();
     },
     setPosition(seconds, duration) {
-      const moved = Math.floor(seconds * 4) !== Math.floor(at * 4) || duration !== length;
-      [at, length] = [seconds, duration];
+      const moved = Math.floor(seconds * 4) !== Math.floor(position * 4) || duration !== length;
+      [position, length] = [seconds, duration];
       head.hidden = duration <= 0;
       head.style.left = `${duration > 0 ? (seconds / duration) * 100 : 0}%`;
       if (!moved) return;
       markPlayed();
       setAttribute(bar, "aria-valuemax", Math.round(duration));
       setAttribute(bar, "aria-valuenow", Math.round(seconds));
-      const buffered = formatDuration(bufferedTo(held, seconds, duration));
+      const buffered = formatDuration(bufferedTo(blockLevels, seconds, duration));
       setAttribute(
         bar,
         "aria-valuetext",

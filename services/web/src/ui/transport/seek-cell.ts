@@ -1,6 +1,6 @@
-/** The seek bar's cells: blocks of a motion, merged where there are too many to show. Pure. */
+/** Cells of the seek bar: blocks of a motion, merged if there are too many to show. Pure. */
 
-/** One cell: `quality` 0 (lowest rate) to 3 (best), or -1 while any of its blocks is missing. Fractions of the duration. */
+/** Cell with `quality` 0 (lowest) to 3 (best), or -1 if one of its blocks is missing. Start and end as fractions. */
 export interface SeekCell {
   quality: number;
   start: number;
@@ -8,8 +8,8 @@ export interface SeekCell {
 }
 
 /**
- * Cells for blocks that hold the given rate each (-1 missing), at most `most` of them. A merged cell shows its poorest
- * block, so that a gap is never hidden.
+ * Return at most `maxCells` cells for blocks of the given bitrate levels (-1 for a missing block). A merged cell has
+ * the quality of its worst block, so that no gap is hidden.
  */
 export function seekCells(blocks: ArrayLike<number>, levelCount: number, maxCells: number): SeekCell[] {
   const count = Math.min(blocks.length, maxCells);
@@ -23,13 +23,13 @@ export function seekCells(blocks: ArrayLike<number>, levelCount: number, maxCell
   return cells;
 }
 
-/** A rate's place among the rates as one of the four qualities shown; -1 stays -1. */
+/** Map a bitrate level to one of the four qualities shown; -1 stays -1. */
 export function qualityOf(level: number, levelCount: number): number {
   if (level < 0) return -1;
   return levelCount <= 1 ? 3 : Math.round((level / (levelCount - 1)) * 3);
 }
 
-/** Seconds up to which every block from the one at `position` on is here. */
+/** Return the time in seconds up to which all blocks from `position` on are loaded. */
 export function bufferedTo(blocks: ArrayLike<number>, position: number, duration: number): number {
   if (blocks.length === 0 || !(duration > 0)) return 0;
   const length = duration / blocks.length;

@@ -1,30 +1,29 @@
-/** The sound's button and how loud it is; shown only where the dance has sound. */
-
+/** Sound button and volume slider, shown only for a motion with sound. */
 import { pageTranslator, translate } from "../../i18n/translator";
 import { element, setAttribute } from "../dom";
 import { icon } from "../icon";
 
-/** Steps of the slider, from silent to full. */
+/** Steps of the slider from silent to full volume. */
 const VOLUME_STEPS = 20;
 
 export interface SoundActions {
-  /** Lets the sound be heard, or no longer. */
+  /** Switch the sound on or off. */
   sound(): void;
-  /** How loud, 0 to 1. */
+  /** Set the volume, 0 to 1. */
   volume(volume: number): void;
 }
 
 export interface SoundControl {
   readonly element: HTMLElement;
-  render(state: { readonly there: boolean; readonly heard: boolean; readonly volume: number }): void;
+  render(state: { readonly available: boolean; readonly audible: boolean; readonly volume: number }): void;
 }
 
 export interface SoundButton {
   readonly element: HTMLButtonElement;
-  render(heard: boolean): void;
+  render(audible: boolean): void;
 }
 
-/** The button alone; `press` is told of a press. */
+/** Create the button without the slider. */
 export function createSoundButton(onPress: () => void, { translate } = pageTranslator): SoundButton {
   const button = element(
     "button",
@@ -40,12 +39,12 @@ export function createSoundButton(onPress: () => void, { translate } = pageTrans
   let shown: boolean | null = null;
   return {
     element: button,
-    render(heard) {
-      if (heard === shown) return;
-      shown = heard;
-      button.title = translate(heard ? "Sound off" : "Sound on");
-      setAttribute(button, "aria-pressed", String(heard));
-      button.replaceChildren(icon(heard ? "sound" : "silent"));
+    render(audible) {
+      if (audible === shown) return;
+      shown = audible;
+      button.title = translate(audible ? "Sound off" : "Sound on");
+      setAttribute(button, "aria-pressed", String(audible));
+      button.replaceChildren(icon(audible ? "sound" : "silent"));
     },
   };
 }
@@ -63,10 +62,10 @@ export function createSoundControl(actions: SoundActions): SoundControl {
   const control = element("span", { class: "sound", hidden: true }, button.element, volume);
   return {
     element: control,
-    render({ there, heard, volume: loud }) {
-      control.hidden = !there;
-      volume.value = String(Math.round(loud * VOLUME_STEPS));
-      button.render(heard);
+    render({ available, audible, volume: value }) {
+      control.hidden = !available;
+      volume.value = String(Math.round(value * VOLUME_STEPS));
+      button.render(audible);
     },
   };
 }

@@ -1,5 +1,4 @@
-/** Play, seek, loop, sound, picture, keep, and the three panels' buttons. */
-
+/** Transport bar: play, seek, loop, camera, sound, picture, recording, and the buttons of the three panels. */
 import { type PlainMessageKey, translate } from "../../i18n/translator";
 import { element, setAttribute, setText } from "../dom";
 import { formatDuration } from "../format";
@@ -11,7 +10,7 @@ export type PanelName = "library" | "strings" | "line";
 export type LinkHealth = "good" | "poor" | "lost" | "none";
 
 export interface Transport {
-  /** What of it stands before the picture: on a phone some of its buttons are beside it. */
+  /** Elements that cover the picture. On a phone some buttons stand outside the bar. */
   readonly parts: readonly HTMLElement[];
   readonly sound: SoundControl;
   setTimeline(playing: boolean, loop: boolean, ready: boolean): void;
@@ -19,16 +18,16 @@ export interface Transport {
   setBlocks(blocks: ArrayLike<number>, levelCount: number): void;
   setExpanded(panel: PanelName, open: boolean): void;
   setHealth(health: LinkHealth): void;
-  /** Keeps what is on the stage, as its button does. */
+  /** Record the performance, as the button does. */
   record(): void;
-  /** Whether the dance has a camera of its own, the show's, and whether that is followed. */
+  /** Show whether the motion has a camera, and whether the view follows it. */
   setCamera(available: boolean, followed: boolean): void;
 }
 
 const PANELS: readonly { name: PanelName; label: PlainMessageKey; icon: IconName }[] = [
   { name: "library", label: "Library", icon: "library" },
   { name: "strings", label: "Strings", icon: "strings" },
-  { name: "line", label: "Line", icon: "line" },
+  { name: "line", label: "Connection", icon: "line" },
 ];
 const RECORD_LABEL = "Keep this";
 const RECORDING_LABEL = "Keeping";
@@ -44,11 +43,14 @@ export interface TransportActions extends SoundActions {
   loop(): void;
   seek(seconds: number): void;
   panel(panel: PanelName): void;
-  /** Follows the show's camera, or no longer. */
+  /** Follow the motion's camera, or stop following it. */
   camera(): void;
-  /** Saves a picture of the stage. */
+  /** Save a picture of the stage. */
   picture(): void;
-  /** Keeps the performance as a new motion; done, or given up and told why, when it resolves. Left out, it cannot be kept here. */
+  /**
+   * Record the performance as a new motion; resolves on success and on a reported failure. Omitted if this page may
+   * not.
+   */
   keep?(): Promise<void>;
 }
 
@@ -58,7 +60,7 @@ export function createTransport(root: HTMLElement, actions: TransportActions): T
     { class: "play", type: "button", disabled: true, onClick: actions.play },
     icon("play"),
   );
-  const [now, end] = [element("span"), element("span")];
+  const [positionText, durationText] = [element("span"), element("span")];
   const seek = createSeekBar(actions.seek);
   const loop = element(
     "button",
@@ -87,8 +89,8 @@ export function createTransport(root: HTMLElement, actions: TransportActions): T
     icon("picture"),
   );
   const sound = createSoundControl(actions);
-  const keepName = element("span", {}, translate(RECORD_LABEL));
-  const keep = element(
+  const recordLabel = element("span", {}, translate(RECORD_LABEL));
+  const recordButton = element(
     "button",
     {
       class: "pill keep",
@@ -96,28 +98,28 @@ export function createTransport(root: HTMLElement, actions: TransportActions): T
       "aria-label": translate(RECORD_LABEL),
       disabled: true,
       hidden: !actions.keep,
-      onClick: () => void keepNow(),
+      onClick: () => void record(),
     },
     icon("keep"),
-    keepName,
+    recordLabel,
   );
   let ready = false;
-  let keeping = false;
-  const showKeep = () => {
-    keep.disabled = !ready;
-    setAttribute(keep, "aria-busy", keeping);
-    setText(keepName, translate(keeping ? RECORDING_LABEL : RECORD_LABEL));
-    keep.setAttribute("aria-label", translate(keeping ? RECORDING_LABEL : RECORD_LABEL));
+  let recording = false;
+  const renderRecordButton = () => {
+    recordButton.disabled = !ready;
+    setAttribute(recordButton, "aria-busy", recording);
+    setText(recordLabel, translate(recording ? RECORDING_LABEL : RECORD_LABEL));
+    recordButton.setAttribute("aria-label", translate(recording ? RECORDING_LABEL : RECORD_LABEL));
   };
-  const keepNow = async () => {
-    if (!ready || keeping || !actions.keep) return;
-    keeping = true;
-    showKeep();
+  const record = async () => {
+    if (!ready || recording || !actions.keep) return;
+    recording = true;
+    renderRecordButton();
     try {
       await actions.keep();
     } finally {
-      keeping = false;
-      showKeep();
+      recording = false;
+      renderRecordButton();
     }
   };
   const dot = element("span", { class: "health", role: "img" });
@@ -144,21 +146,26 @@ export function createTransport(root: HTMLElement, actions: TransportActions): T
     camera,
     sound.element,
     picture,
-    keep,
+    recordButton,
     element("span", { class: "tools-rule" }),
     ...pills.values(),
   );
-  const area = element("div", { class: "seek-area" }, element("div", { class: "times" }, now, end), seek.element);
+  const area = element(
+    "div",
+    { class: "seek-area" },
+    element("div", { class: "times" }, positionText, durationText),
+    seek.element,
+  );
   const bar = element("section", { class: "transport", "aria-label": translate("Transport") }, play, area, tools);
   root.append(bar);
   let shown = "";
   return {
     parts: [bar, camera, picture, sound.element],
     sound,
-    setTimeline(playing, looping, known) {
-      ready = known;
+    setTimeline(playing, looping, isReady) {
+      ready = isReady;
       play.disabled = !ready;
-      showKeep();
+      renderRecordButton();
       const state = translate(playing ? "Pause" : "Play");
       setAttribute(loop, "aria-pressed", String(looping));
       if (shown === state) return;
@@ -167,17 +174,17 @@ export function createTransport(root: HTMLElement, actions: TransportActions): T
       play.replaceChildren(icon(playing ? "pause" : "play"));
     },
     setPosition(seconds, duration) {
-      setText(now, formatDuration(seconds));
-      setText(end, formatDuration(duration));
+      setText(positionText, formatDuration(seconds));
+      setText(durationText, formatDuration(duration));
       seek.setPosition(seconds, duration);
     },
     setBlocks: seek.setBlocks,
     setExpanded(panel, open) {
       pills.get(panel)?.setAttribute("aria-expanded", String(open));
     },
-    record: () => void keepNow(),
-    setCamera(there, followed) {
-      if (camera.hidden === there) camera.hidden = !there;
+    record: () => void record(),
+    setCamera(available, followed) {
+      if (camera.hidden === available) camera.hidden = !available;
       if (camera.ariaPressed !== String(followed)) camera.ariaPressed = String(followed);
     },
     setHealth(health) {

@@ -11,7 +11,7 @@ const motion: Motion = {
   fps: 59.94,
 };
 
-test("a motion is told by its name, or its file's, and in a few words what it is", () => {
+test("motion item has a name and a short description", () => {
   expect(toMotionItem(motion)).toEqual({
     id: "m1",
     name: "old steps",

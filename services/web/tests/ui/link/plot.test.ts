@@ -5,13 +5,13 @@ import { areaPath, niceScaleMax, PLOT_HEIGHT, PLOT_WIDTH, SampleHistory, tracePa
 const samples = fc.array(fc.double({ min: 0, max: 1e6, noNaN: true }), { minLength: 1, maxLength: 120 });
 
 describe("plots", () => {
-  test("a history forgets its oldest", () => {
+  test("history drops its oldest sample", () => {
     const history = new SampleHistory(3);
     for (const value of [1, 2, 3, 4]) history.push(value);
     expect(history.values).toEqual([2, 3, 4]);
   });
 
-  test("the scale is round and holds every value", () => {
+  test("scale is a round number above every value", () => {
     fc.assert(
       fc.property(samples, (values) => {
         const top = niceScaleMax(values, 1);
@@ -21,7 +21,7 @@ describe("plots", () => {
     );
   });
 
-  test("the newest sample stands at the right edge and all within the frame", () => {
+  test("newest sample is at the right edge and all are inside the frame", () => {
     fc.assert(
       fc.property(samples, (values) => {
         const points = tracePath(values, 120, niceScaleMax(values, 1))
@@ -37,7 +37,7 @@ describe("plots", () => {
     );
   });
 
-  test("gaps stay open, in lines and areas", () => {
+  test("gaps stay open in lines and areas", () => {
     const values = [1, 1, Number.NaN, 1, 1];
     expect(tracePath(values, 5, 1).match(/M/g)).toHaveLength(2);
     expect(areaPath(values, 5, 1).match(/Z/g)).toHaveLength(2);

@@ -4,7 +4,7 @@ import { ACTIONS, DEFAULT_MAPPING } from "../../../src/input/mapping";
 import { COMMAND_GROUPS, commandName, summarizeCommands } from "../../../src/ui/mapping/command-name";
 import { controlName } from "../../../src/ui/mapping/control-name";
 
-test("controls are named as they are printed", () => {
+test("controls are named as printed on them", () => {
   const names = [
     "KeyW",
     "Digit1",
@@ -44,7 +44,7 @@ test("controls are named as they are printed", () => {
 });
 
 describe("commands", () => {
-  test("are named, each in its own words, and stand in the list once", () => {
+  test("each has a unique name and is listed once", () => {
     const all = [...DIGITAL_INPUTS, ...SELECTED_LIMB_INPUTS, ...ACTIONS];
     expect(new Set(all.map(commandName)).size).toBe(all.length);
     expect(new Set(COMMAND_GROUPS.flat())).toEqual(new Set(all));
@@ -53,16 +53,16 @@ describe("commands", () => {
       "left hand further",
       "right leg up",
       "pull the held string right",
-      "take or let go the left leg",
+      "take or release the left leg",
     ]);
   });
 
-  test("are told in a few words on the drawn gamepad", () => {
-    const of = (...controls: string[]) => controls.flatMap((control) => DEFAULT_MAPPING.bindings[control]);
-    expect(summarizeCommands(of("axis:0+", "axis:0-", "axis:1+", "axis:1-"))).toBe("Left hand");
-    expect(summarizeCommands(of("button:6"), 0)).toBe("Nearer");
-    expect(summarizeCommands(of("button:7"), 0)).toBe("Right hand nearer");
-    expect(summarizeCommands(of("button:4 button:6", "button:4 axis:1-", "button:4 axis:1+"), 0)).toBe(
+  test("are summarised on the gamepad drawing", () => {
+    const commandsOf = (...controls: string[]) => controls.flatMap((control) => DEFAULT_MAPPING.bindings[control]);
+    expect(summarizeCommands(commandsOf("axis:0+", "axis:0-", "axis:1+", "axis:1-"))).toBe("Left hand");
+    expect(summarizeCommands(commandsOf("button:6"), 0)).toBe("Nearer");
+    expect(summarizeCommands(commandsOf("button:7"), 0)).toBe("Right hand nearer");
+    expect(summarizeCommands(commandsOf("button:4 button:6", "button:4 axis:1-", "button:4 axis:1+"), 0)).toBe(
       "Further, left leg",
     );
     expect(summarizeCommands(["play"])).toBe("Play or pause");

@@ -5,30 +5,31 @@ import { belongsAtBottom } from "../../../src/ui/notification/message-area";
 const box = (top: number, bottom: number): ScreenBox => ({ left: 300, top, right: 700, bottom });
 const face = (y: number): ScreenBox => ({ left: 480, top: y - 30, right: 520, bottom: y + 30 });
 
-const PLACES = [box(80, 120), box(450, 490)] as const;
+const POSITIONS = [box(80, 120), box(450, 490)] as const;
 
 describe("messages", () => {
-  test("stand at the head where no face is", () => {
-    expect(belongsAtBottom(false, PLACES, [])).toBe(false);
-    expect(belongsAtBottom(false, PLACES, [face(200)], true)).toBe(false);
+  test("are at the top if no face is there", () => {
+    expect(belongsAtBottom(false, POSITIONS, [])).toBe(false);
+    expect(belongsAtBottom(false, POSITIONS, [face(200)], true)).toBe(false);
   });
 
-  test("stand at the foot where they would cover one at the head, or come near it as they begin", () => {
-    expect(belongsAtBottom(false, PLACES, [face(130)])).toBe(true);
-    expect(belongsAtBottom(false, PLACES, [face(160)], true)).toBe(true);
-    expect(belongsAtBottom(false, PLACES, [face(160)])).toBe(false);
+  test("are at the bottom if they would cover a face, or start near one", () => {
+    expect(belongsAtBottom(false, POSITIONS, [face(130)])).toBe(true);
+    expect(belongsAtBottom(false, POSITIONS, [face(160)], true)).toBe(true);
+    expect(belongsAtBottom(false, POSITIONS, [face(160)])).toBe(false);
   });
 
-  test("do not go back while they are there, unless a face comes", () => {
-    expect(belongsAtBottom(true, PLACES, [face(300)])).toBe(true);
-    expect(belongsAtBottom(true, PLACES, [face(430)])).toBe(false);
+  test("stay at the bottom unless a face comes there", () => {
+    expect(belongsAtBottom(true, POSITIONS, [face(300)])).toBe(true);
+    expect(belongsAtBottom(true, POSITIONS, [face(430)])).toBe(false);
   });
 
-  test("stay where neither place is free", () => {
-    for (const low of [false, true]) expect(belongsAtBottom(low, PLACES, [face(100), face(470)], true)).toBe(low);
+  test("stay where they are if neither position is free", () => {
+    for (const atBottom of [false, true])
+      expect(belongsAtBottom(atBottom, POSITIONS, [face(100), face(470)], true)).toBe(atBottom);
   });
 
-  test("pass a face by that is beside them", () => {
-    expect(belongsAtBottom(false, PLACES, [{ left: 750, top: 90, right: 790, bottom: 150 }], true)).toBe(false);
+  test("ignore a face beside them", () => {
+    expect(belongsAtBottom(false, POSITIONS, [{ left: 750, top: 90, right: 790, bottom: 150 }], true)).toBe(false);
   });
 });

@@ -15,7 +15,7 @@ const SIZES = [
   { width: 70, height: 26 },
   { width: 22, height: 22 },
 ];
-/** As it is written: whole, the name alone, its initial. */
+/** Forms of a tag: whole, the name alone, its initial. */
 const [WHOLE, NAME, INITIAL] = [0, 1, 2];
 
 function bar(x: number, y: number): ScreenBox {
@@ -28,57 +28,65 @@ function label(x: number, y: number, rank = 0, sizes = SIZES): TagLabel {
 
 const lay = (
   labels: readonly (TagLabel | null)[],
-  keep: readonly ScreenBox[] = [],
-  before: readonly (LabelPlacement | null)[] = [],
+  obstacles: readonly ScreenBox[] = [],
+  previous: readonly (LabelPlacement | null)[] = [],
   now = 0,
   picture = PICTURE,
-) => layOutLabels(labels, keep, before, picture, now);
-const sizesOf = (laid: readonly (LabelPlacement | null)[]) => laid.map((one) => one && (one.box ? one.size : null));
+) => layOutLabels(labels, obstacles, previous, picture, now);
+const sizesOf = (placements: readonly (LabelPlacement | null)[]) =>
+  placements.map((one) => one && (one.box ? one.size : null));
 
-/** What of these boxes is not in the picture, or covers another, a bar or what is kept. */
-function wrong(
-  laid: readonly (LabelPlacement | null)[],
+/** Return the boxes that are outside the picture, or cover another tag, a bar or an obstacle. */
+function misplacedBoxes(
+  placements: readonly (LabelPlacement | null)[],
   labels: readonly (TagLabel | null)[],
-  keep: readonly ScreenBox[],
+  obstacles: readonly ScreenBox[],
   { width, height, top }: LabelViewport,
 ): ScreenBox[] {
-  const boxes = laid.flatMap((one) => one?.box ?? []);
+  const boxes = placements.flatMap((one) => one?.box ?? []);
   const bars = labels.flatMap((one) => one?.bar ?? []);
-  return boxes.filter((box, nth) => {
+  return boxes.filter((box, index) => {
     const within = box.left >= 0 && box.right <= width && box.top >= top && box.bottom <= height;
-    return !within || [...keep, ...bars, ...boxes.filter((_, k) => k !== nth)].some((other) => overlaps(box, other));
+    return (
+      !within || [...obstacles, ...bars, ...boxes.filter((_, k) => k !== index)].some((other) => overlaps(box, other))
+    );
   });
 }
 
-describe("names by their bars", () => {
-  test("stand above them, in the middle, as a whole", () => {
-    const [laid] = lay([label(700, 300)]);
-    expect(laid).toEqual({ size: WHOLE, place: 0, since: null, box: { left: 630, right: 770, top: 252, bottom: 278 } });
+describe("tags beside their bars", () => {
+  test("are centred above them, in the longest form", () => {
+    const [placements] = lay([label(700, 300)]);
+    expect(placements).toEqual({
+      size: WHOLE,
+      place: 0,
+      upgradableSinceMs: null,
+      box: { left: 630, right: 770, top: 252, bottom: 278 },
+    });
   });
 
-  test("are none where there is no bar, or that is out of the picture", () => {
+  test("are hidden without a bar, or with a bar outside the picture", () => {
     expect(lay([null, null])).toEqual([null, null]);
     expect(lay([label(-60, 300), label(700, 930)]).map((one) => one?.box)).toEqual([null, null]);
   });
 
-  test("keep in the picture", () => {
+  test("stay inside the picture", () => {
     const [left, right] = lay([label(20, 300), label(1430, 300)]);
     expect(left?.box?.left).toBe(8);
     expect(right?.box?.right).toBe(PICTURE.width - 8);
   });
 
-  test("go beside their bar where the header is above it", () => {
-    const [laid] = lay([label(700, 80)]);
-    expect(laid?.box?.top).toBeGreaterThanOrEqual(PICTURE.top);
-    expect(overlaps(laid!.box!, bar(700, 80))).toBe(false);
+  test("are beside the bar if the header is above it", () => {
+    const [placements] = lay([label(700, 80)]);
+    expect(placements?.box?.top).toBeGreaterThanOrEqual(PICTURE.top);
+    expect(overlaps(placements!.box!, bar(700, 80))).toBe(false);
   });
 
-  test("are not at all where there is no room even for the shortest", () => {
+  test("are hidden without space for the shortest form", () => {
     const everywhere = { left: 0, top: 0, right: PICTURE.width, bottom: PICTURE.height };
     expect(lay([label(700, 300)], [everywhere])[0]?.box).toBe(null);
   });
 
-  test("of four on a wide stage are whole, as each makes room for the others", () => {
+  test("of four strings have the longest form on a wide stage", () => {
     expect(sizesOf(lay([label(620, 200), label(730, 200), label(840, 200), label(700, 240)]))).toEqual([
       WHOLE,
       WHOLE,
@@ -88,8 +96,11 @@ describe("names by their bars", () => {
   });
 });
 
-describe("names of many", () => {
-  /** A window, what stands before it, and as many as sixteen bars, of names long and short, in three ranks, that have moved on from frame to frame. */
+describe("many tags", () => {
+  /**
+   * Window, obstacles, and up to sixteen bars with tags of different lengths and ranks, which move from frame to
+   * frame.
+   */
   const scenes = fc.record({
     width: fc.integer({ min: 320, max: 1600 }),
     height: fc.integer({ min: 320, max: 1000 }),
@@ -118,11 +129,11 @@ describe("names of many", () => {
     ),
   });
 
-  test("cover neither one another nor a bar, a face or what else is kept, and are within the window: wherever bars hang, and go on to", () => {
+  test("never cover tags, bars, faces or obstacles, nor leave the window", () => {
     fc.assert(
       fc.property(scenes, ({ width, height, header, strings, faces, moves }) => {
         const picture = { width, height, top: 32 };
-        const keep = [
+        const obstacles = [
           { left: 16, top: 14, right: width * 0.4, bottom: header },
           { left: 0, top: height - 80, right: width, bottom: height },
           ...faces.map(({ x, y, size }) => ({
@@ -132,40 +143,40 @@ describe("names of many", () => {
             bottom: y * height + size,
           })),
         ];
-        let laid: (LabelPlacement | null)[] = [];
+        let placements: (LabelPlacement | null)[] = [];
         let [dx, dy, now] = [0, 0, 0];
         for (const [x, y, later] of [[0, 0, 0], ...moves]) {
           [dx, dy, now] = [dx + x, dy + y, now + later];
-          const labels = strings.map(({ x, y, long, rank, held }, nth) =>
-            held || nth % 2 === 0
-              ? label(x * width + (nth % 2 === 0 ? dx : -dx), y * height + dy, rank, [
+          const labels = strings.map(({ x, y, long, rank, held }, index) =>
+            held || index % 2 === 0
+              ? label(x * width + (index % 2 === 0 ? dx : -dx), y * height + dy, rank, [
                   { width: long + 60, height: 28 },
                   { width: long, height: 28 },
                   SIZES[INITIAL],
                 ])
               : null,
           );
-          laid = lay(labels, keep, laid, now, picture);
-          expect(laid.map((one) => one !== null)).toEqual(labels.map((one) => one !== null));
-          expect(wrong(laid, labels, keep, picture)).toEqual([]);
+          placements = lay(labels, obstacles, placements, now, picture);
+          expect(placements.map((one) => one !== null)).toEqual(labels.map((one) => one !== null));
+          expect(misplacedBoxes(placements, labels, obstacles, picture)).toEqual([]);
         }
       }),
       { numRuns: 300 },
     );
   });
 
-  test("are laid well within a frame", () => {
-    const crowd = Array.from({ length: 16 }, (_, nth) => label(700 + nth, 300, nth % 3));
-    const began = performance.now();
-    expect(wrong(lay(crowd), crowd, [], PICTURE)).toEqual([]);
-    expect(performance.now() - began).toBeLessThan(500);
+  test("are placements out in less than a frame", () => {
+    const crowd = Array.from({ length: 16 }, (_, index) => label(700 + index, 300, index % 3));
+    const startMs = performance.now();
+    expect(misplacedBoxes(lay(crowd), crowd, [], PICTURE)).toEqual([]);
+    expect(performance.now() - startMs).toBeLessThan(500);
   });
 
-  test("all have their initial before another is longer, and one's own are the longest", () => {
-    // as wide as a phone, bars side by side
+  test("all get an initial first, and own tags are the longest", () => {
+    // phone width, bars side by side
     const picture = { width: 390, height: 844, top: 32 };
-    const labels = Array.from({ length: 8 }, (_, nth) =>
-      label(30 + 47 * nth, 200 - (nth % 2) * 30, nth === 5 ? 0 : 2),
+    const labels = Array.from({ length: 8 }, (_, index) =>
+      label(30 + 47 * index, 200 - (index % 2) * 30, index === 5 ? 0 : 2),
     ).map((one) => ({ ...one, bar: { ...one.bar, left: one.bar.left + 20, right: one.bar.right - 20 } }));
     const sizes = sizesOf(lay(labels, [], [], 0, picture));
     expect(sizes).not.toContain(null);
@@ -173,32 +184,32 @@ describe("names of many", () => {
     expect(sizes.filter((size) => size === INITIAL).length).toBeGreaterThan(0);
   });
 
-  test("that stand together without change stay as they are from frame to frame", () => {
-    const labels = Array.from({ length: 12 }, (_, nth) =>
-      label(100 + 90 * (nth % 6), 200 + 60 * Math.floor(nth / 6), nth % 3),
+  test("without changes stay where they are", () => {
+    const labels = Array.from({ length: 12 }, (_, index) =>
+      label(100 + 90 * (index % 6), 200 + 60 * Math.floor(index / 6), index % 3),
     );
-    let laid = lay(labels);
+    let placements = lay(labels);
     for (let now = 16; now < 3_000; now += 16) {
-      const next = lay(labels, [], laid, now);
-      // what can stand better does so once
-      if (now > 1_000) expect(next.map((one) => one?.box)).toEqual(laid.map((one) => one?.box));
-      laid = next;
+      const next = lay(labels, [], placements, now);
+      // tags that can be upgraded are upgraded once
+      if (now > 1_000) expect(next.map((one) => one?.box)).toEqual(placements.map((one) => one?.box));
+      placements = next;
     }
   });
 });
 
-describe("a name that was shortened", () => {
+describe("shortened tag", () => {
   const crowded = [label(700, 300), label(700, 340, 2, [SIZES[WHOLE], SIZES[NAME]])];
   const walls = (away: number) => [
     { left: 0, top: 0, right: 700 - away, bottom: 900 },
     { left: 700 + away, top: 0, right: 1440, bottom: 900 },
   ];
 
-  test("stays short until there was room to spare for a while", () => {
+  test("stays short until spare space was free for a while", () => {
     const one = [label(700, 300)];
     const short = lay(one, walls(60));
     expect(sizesOf(short)).toEqual([NAME]);
-    // just enough room is not enough
+    // space without the upgrade margin is not enough
     const little = lay(one, walls(75), short, 100);
     expect(sizesOf(little)).toEqual([NAME]);
     expect(little[0]?.upgradableSinceMs).toBe(null);
@@ -206,12 +217,12 @@ describe("a name that was shortened", () => {
     expect(sizesOf(room)).toEqual([NAME]);
     expect(sizesOf(lay(one, walls(90), room, 900))).toEqual([NAME]);
     expect(sizesOf(lay(one, walls(90), room, 1_001))).toEqual([WHOLE]);
-    // gone in between, it counts from anew
+    // an interruption restarts the delay
     const gone = lay(one, walls(75), room, 900);
     expect(sizesOf(lay(one, walls(90), gone, 1_001))).toEqual([NAME]);
   });
 
-  test("is shortened at once where something comes in the way", () => {
+  test("is shortened at once if an obstacle appears", () => {
     const one = [label(700, 300)];
     const whole = lay(one);
     expect(sizesOf(lay(one, walls(60), whole, 1))).toEqual([NAME]);
@@ -219,15 +230,15 @@ describe("a name that was shortened", () => {
     expect(sizesOf(lay(one, walls(30), whole, 1))).toEqual([INITIAL]);
   });
 
-  test("makes room for one of a lower rank, which keeps its own", () => {
-    const before = lay(crowded);
+  test("makes way for a tag of a lower rank", () => {
+    const previous = lay(crowded);
     const now = [label(700, 310, 2), label(700, 340, 0, crowded[1].sizes as typeof SIZES)];
-    const laid = lay(now, walls(80), before, 16);
-    expect(wrong(laid, now, walls(80), PICTURE)).toEqual([]);
-    expect(laid[1]?.size).toBeLessThanOrEqual(laid[0]?.box ? laid[0].size : INITIAL);
+    const placements = lay(now, walls(80), previous, 16);
+    expect(misplacedBoxes(placements, now, walls(80), PICTURE)).toEqual([]);
+    expect(placements[1]?.size).toBeLessThanOrEqual(placements[0]?.box ? placements[0].size : INITIAL);
   });
 
-  test("stays beside its bar, where it went, until there was room above for a while", () => {
+  test("stays beside its bar until the space above was free for a while", () => {
     const above = { left: 600, top: 240, right: 800, bottom: 280 };
     const aside = lay([label(700, 300)], [above]);
     expect([aside[0]?.size, aside[0]?.place]).toEqual([WHOLE, 3]);
@@ -237,11 +248,11 @@ describe("a name that was shortened", () => {
   });
 });
 
-describe("the invitation", () => {
+describe("invitation", () => {
   const size = { width: 110, height: 28 };
   const at = { x: 700, y: 400 };
 
-  test("stands to the right of a hand, and stays on the side where it was", () => {
+  test("is to the right of a hand, and stays on its side", () => {
     expect(placeBeside(at, 26, size, [], PICTURE, 0)).toEqual({
       side: 0,
       box: { left: 726, right: 836, top: 386, bottom: 414 },
@@ -249,7 +260,7 @@ describe("the invitation", () => {
     expect(placeBeside(at, 26, size, [], PICTURE, 1)?.box.right).toBe(674);
   });
 
-  test("goes where it covers nothing, and is not where it would", () => {
+  test("avoids obstacles, and is hidden without space", () => {
     const right = { left: 740, top: 300, right: 900, bottom: 500 };
     expect(placeBeside(at, 26, size, [right], PICTURE, 0)?.side).toBe(1);
     expect(placeBeside({ x: 1380, y: 400 }, 26, size, [], PICTURE, 0)?.side).toBe(1);

@@ -6,50 +6,54 @@ import { createRecordAction, type RecordSession, recordingName } from "../../../
 
 const MOTION = { id: "m2", name: "Kept dance" } as unknown as Motion;
 
-function page(keep: RecordSession, session: { id: string; piece: string } | null = { id: "s1", piece: "Sanbaso" }) {
-  const told: string[] = [];
+type SessionOnStage = { id: string; motionName: string } | null;
+
+function createAction(record: RecordSession, session: SessionOnStage = { id: "s1", motionName: "Sanbaso" }) {
+  const calls: string[] = [];
   const actions: ToastAction[] = [];
   const run = createRecordAction({
-    record: keep,
+    record,
     puppeteer: "Aiko",
-    toast: (message, ...offered) => {
-      told.push(message);
-      actions.push(...offered);
+    toast: (message, ...toastActions) => {
+      calls.push(message);
+      actions.push(...toastActions);
     },
     session: () => session,
-    onRecorded: async ({ id }) => void told.push(`kept ${id}`),
-    play: (id) => told.push(`choose ${id}`),
-    showDownloads: (id) => told.push(`download ${id}`),
+    onRecorded: async ({ id }) => void calls.push(`recorded ${id}`),
+    play: (id) => calls.push(`play ${id}`),
+    showDownloads: (id) => calls.push(`download ${id}`),
   });
-  return { run, told, actions };
+  return { run, calls, actions };
 }
 
-describe("keep this", () => {
-  test("keeps the session under a name of its own, and offers the new dance", async () => {
-    const asked: unknown[] = [];
-    const { run, told, actions } = page(async (...of) => (asked.push(of), MOTION));
+describe("record action", () => {
+  test("records the session under a new name, and offers the new motion", async () => {
+    const requests: unknown[] = [];
+    const { run, calls, actions } = createAction(async (...request) => (requests.push(request), MOTION));
     await run();
-    expect(asked).toEqual([["s1", "Sanbaso, as Aiko pulled it"]]);
-    expect(told).toEqual(["kept m2", "Kept: Kept dance"]);
+    expect(requests).toEqual([["s1", "Sanbaso, as Aiko pulled it"]]);
+    expect(calls).toEqual(["recorded m2", "Kept: Kept dance"]);
     for (const { run: act } of actions) act();
-    expect(told.slice(2)).toEqual(["choose m2", "download m2"]);
+    expect(calls.slice(2)).toEqual(["play m2", "download m2"]);
   });
 
-  test("says what the server would not do", async () => {
-    const { run, told } = page(() => Promise.reject(new ProblemError(409, "Nothing to keep", "nobody has pulled yet")));
+  test("shows the server's rejection", async () => {
+    const { run, calls } = createAction(() =>
+      Promise.reject(new ProblemError(409, "Nothing to keep", "nobody has pulled yet")),
+    );
     await run();
-    expect(told).toEqual(["Nothing to keep: nobody has pulled yet"]);
+    expect(calls).toEqual(["Nothing to keep: nobody has pulled yet"]);
   });
 
-  test("does nothing without a session, and hides no other error", async () => {
-    const { run, told } = page(async () => MOTION, null);
+  test("does nothing without a session, and rethrows other errors", async () => {
+    const { run, calls } = createAction(async () => MOTION, null);
     await run();
-    expect(told).toEqual([]);
-    await expect(page(() => Promise.reject(new TypeError("ours"))).run()).rejects.toThrow("ours");
+    expect(calls).toEqual([]);
+    await expect(createAction(() => Promise.reject(new TypeError("ours"))).run()).rejects.toThrow("ours");
   });
 });
 
-test("what is kept of what was kept is named after the dance once", () => {
+test("recording of a recording has one name suffix", () => {
   expect(recordingName(recordingName("Sanbaso", "Aiko"), "Mateo")).toBe("Sanbaso, as Mateo pulled it");
   expect(recordingName("", "Mateo")).toBe("A dance, as Mateo pulled it");
 });

@@ -1,0 +1,45 @@
+"""ASGI app that serves the built web page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.responses import PlainTextResponse, Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Scope
+
+PAGE_HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; "
+    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; media-src 'self' data: blob:; "
+    "worker-src 'self' blob:; "
+    "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+"""The page runs only files of this server, cannot be framed, and sends no referrer."""
+IMMUTABLE_PREFIXES = ("assets/", "embed/parts/")
+"""Folders whose file names contain a hash of the content."""
+CROSS_ORIGIN_PREFIX = "embed/"
+"""Folder of the scripts that pages of every site may load. The scripts are public; their API requests are not."""
+
+
+class PageFiles(StaticFiles):
+    """Static files of the page. Files with a hash in their name are cached for ever, others are revalidated."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers["Cache-Control"] = (
+            "public, max-age=31536000, immutable" if path.startswith(IMMUTABLE_PREFIXES) else "no-cache"
+        )
+        response.headers.update(PAGE_HEADERS)
+        if path.startswith(CROSS_ORIGIN_PREFIX):
+            response.headers["Access-Control-Allow-Origin"] = "*"
+        return response
+
+
+def create_page_app(folder: Path) -> ASGIApp:
+    """Return an app that serves the page in `folder`, or a 503 with instructions if the page is not built."""
+    if not (folder / "index.html").is_file():
+        return PlainTextResponse("The page is not built: run `make setup`. The API is at /v1/docs.\n", 503)
+    return GZipMiddleware(PageFiles(directory=folder, html=True), minimum_size=1000)

@@ -1,0 +1,40 @@
+/** Motion list of the library, and its display in the library panel and the header. */
+import type { MotionItem } from "../ui/library/motion-item";
+import { MotionList } from "../ui/library/motion-list";
+import type { Page } from "../ui/page";
+import type { Playback } from "./playback";
+
+export class LibraryController {
+  readonly motions = new MotionList();
+
+  constructor(
+    private readonly page: Pick<Page, "library" | "header">,
+    private readonly getPlayback: () => Playback | null,
+  ) {}
+
+  /** The motion on the stage; null if there is none, or if the list does not contain it. */
+  get currentItem(): MotionItem | null {
+    return this.motions.find(this.#currentMotion);
+  }
+
+  get #currentMotion(): string | null {
+    return this.getPlayback()?.viewer.motion ?? null;
+  }
+
+  /** Fetch the list and display it. Rejects with ProblemError. */
+  async refresh(): Promise<void> {
+    await this.motions.refresh();
+    this.render();
+  }
+
+  /** Delete a motion from the library. Rejects with ProblemError. */
+  async remove(id: string): Promise<void> {
+    await this.motions.remove(id);
+    this.render();
+  }
+
+  render(): void {
+    this.page.library.renderMotions(this.motions.items, this.#currentMotion);
+    this.page.header.setMotionName(this.currentItem?.name ?? "");
+  }
+}

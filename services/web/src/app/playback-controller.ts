@@ -1,0 +1,217 @@
+/** Playback of the page: enter a session or a motion, show its state, and replace it by another. */
+import { may, whenDenied } from "../client/access";
+import { createSession } from "../client/api";
+import { ProblemError } from "../client/problem";
+import { translate } from "../i18n/translator";
+import { showProblem } from "../ui/library/upload";
+import type { Page } from "../ui/page";
+import { PHONE } from "../ui/panel";
+import type { AvatarSlots } from "./avatar-slot";
+import type { ClaimController } from "./claim-controller";
+import type { LibraryController } from "./library-controller";
+import { findOrCreateSession, Playback, type PlaybackKind } from "./playback";
+import { restorePosition } from "./saved-position";
+import type { SoundController } from "./sound-controller";
+import type { StageHost } from "./stage-host";
+import type { StartupSequence } from "./startup";
+
+export interface PlaybackControllerOptions {
+  page: Page;
+  startup: StartupSequence;
+  /** Matches if the user prefers less motion: a session without viewers then starts paused. */
+  reducedMotion: MediaQueryList;
+  /** Query of the page's address, which may name a session or a motion. */
+  query: URLSearchParams;
+  displayName: string;
+  library: LibraryController;
+  limbController: ClaimController;
+  soundController: SoundController;
+  avatarSlots: AvatarSlots;
+  stageHost: Pick<StageHost, "setPlayback" | "updatePerformers">;
+  /** Called after another session or motion was entered. */
+  onOpen(): void;
+}
+
+export class PlaybackController {
+  #current: Playback | null = null;
+  #accessDenied = false;
+
+  constructor(private readonly options: PlaybackControllerOptions) {
+    whenDenied(({ title, detail, hint }) => {
+      this.#accessDenied = true;
+      const text = hint ? translate("{detail}; {hint}.", { detail, hint }) : detail;
+      options.page.notice("access", title, text);
+    });
+  }
+
+  /** The session or motion on the stage; null before one was entered. */
+  get current(): Playback | null {
+    return this.#current;
+  }
+
+  togglePlaying(): void {
+    const timeline = this.#current?.viewer.timeline;
+    if (timeline) this.#current?.edit({ playing: !timeline.playing });
+  }
+
+  toggleLoop(): void {
+    this.#current?.edit({ loop: !this.#current.viewer.timeline?.loop });
+  }
+
+  /** Enter the session or motion that the address names, else the running session, else a new one. */
+  async start(): Promise<void> {
+    const { library, page, query, reducedMotion, startup } = this.options;
+    try {
+      // The stage does not wait for the library: the list is fetched at the same time.
+      const listed = library.refresh();
+      const newest = listed.then(() => library.motions.items[0]?.id ?? null);
+      // Failures are handled where these promises are awaited below.
+      for (const promise of [listed, newest]) promise.catch(() => undefined);
+      const sessionId = query.get("session");
+      const motionId = sessionId ? null : query.get("motion");
+      if (sessionId) this.#open(sessionId);
+      else if (motionId) restorePosition(this.#open(motionId, "motions"));
+      else {
+        const session = await findOrCreateSession(newest);
+        const playback = session && this.#open(session.id);
+        if (playback && reducedMotion.matches && session.viewers === 0) playback.edit({ playing: false });
+      }
+      await listed;
+      if (!this.#current) this.#showEmptyStage();
+    } catch (error) {
+      startup.finish();
+      if (!(error instanceof ProblemError)) throw error;
+      if (this.#accessDenied) return;
+      const { title, detail, hint } = error;
+      page.notice("dance", title, translate("{detail}. {hint}", { detail, hint: hint ?? "" }));
+    }
+  }
+
+  /** Put a motion on the stage: in the session, for all its viewers, or in a new session if there is none. */
+  async playMotion(id: string): Promise<void> {
+    const { library, page, reducedMotion } = this.options;
+    if (!may("control")) return;
+    try {
+      if (this.#current) {
+        this.#current.edit({ motion: id, position: 0 });
+      } else {
+        const session = await createSession(id);
+        const playback = this.#open(session.id);
+        if (reducedMotion.matches) playback.edit({ playing: false });
+      }
+      if (PHONE.matches) page.panels.close("library");
+    } catch (error) {
+      showProblem(page.library, library.motions.find(id)?.name ?? translate("This dance"), error);
+    }
+  }
+
+  /** Put an uploaded motion on the stage, even if the list cannot be fetched now. */
+  async playUploadedMotion(id: string): Promise<void> {
+    await this.options.library.refresh().catch(() => undefined);
+    await this.playMotion(id);
+  }
+
+  /** Enter a session or motion, and leave the current one. */
+  #open(id: string, kind: PlaybackKind = "sessions"): Playback {
+    const { displayName, library, limbController, page, soundController, stageHost, startup } = this.options;
+    this.#current?.close();
+    const playback = new Playback(
+      id,
+      displayName,
+      (error) => page.toast(error instanceof ProblemError ? translate("{title}: {detail}", error) : String(error)),
+      { kind },
+    );
+    this.#current = playback;
+    document.documentElement.toggleAttribute("data-own", kind === "motions");
+    limbController.setPlayback(playback);
+    stageHost.setPlayback(playback);
+    startup.runWhenFinished(() => this.#current === playback && soundController.setViewer(playback.viewer));
+    const url = new URL(location.href);
+    url.searchParams.set(kind === "motions" ? "motion" : "session", id);
+    history.replaceState(null, "", url);
+    page.notice("dance", null);
+    page.toast.showDisconnected(null);
+    this.#bindMotion(playback);
+    this.#bindTransport(playback);
+    this.#bindPresence(playback);
+    this.#bindConnection(playback);
+    library.render();
+    this.options.onOpen();
+    return playback;
+  }
+
+  /** Show the performers and the name of the motion whenever they change. */
+  #bindMotion({ viewer }: Playback): void {
+    const { avatarSlots, library, stageHost } = this.options;
+    const updatePerformers = () => {
+      stageHost.updatePerformers();
+      avatarSlots.restore(viewer.performers.length);
+    };
+    viewer.addEventListener("figure", () => {
+      updatePerformers();
+      if (!library.motions.find(viewer.motion)) void library.refresh().catch(() => undefined);
+      library.render();
+    });
+    viewer.addEventListener("tracks", updatePerformers);
+  }
+
+  #bindTransport({ viewer }: Playback): void {
+    const { transport } = this.options.page;
+    const renderTimeline = () => {
+      const { timeline } = viewer;
+      transport.setTimeline(timeline?.playing ?? false, timeline?.loop ?? false, timeline !== null);
+    };
+    viewer.addEventListener("timeline", renderTimeline);
+    viewer.addEventListener("blocks", () => transport.setBlocks(viewer.blocks, viewer.ladder.length));
+    renderTimeline();
+  }
+
+  #bindPresence(playback: Playback): void {
+    const { page, startup } = this.options;
+    const { viewer, puppeteer } = playback;
+    const render = () =>
+      startup.runWhenFinished(
+        () => this.#current === playback && page.header.renderPeople(viewer.presence, puppeteer.id),
+      );
+    viewer.addEventListener("presence", render);
+    puppeteer.addEventListener("welcome", render);
+  }
+
+  #bindConnection({ viewer, kind }: Playback): void {
+    const { limbController, page } = this.options;
+    viewer.addEventListener("open", () => {
+      limbController.connected = true;
+      page.notice("dance", null);
+      page.toast.showDisconnected(null);
+      limbController.render();
+    });
+    viewer.addEventListener("closed", (event) => {
+      const wasConnected = limbController.connected;
+      limbController.connected = false;
+      limbController.render();
+      const reason = String((event as CustomEvent<string>).detail);
+      if (viewer.isClosed || this.#accessDenied) page.toast.showDisconnected(null);
+      if (this.#accessDenied) return;
+      if (viewer.isClosed)
+        page.notice("dance", translate(kind === "motions" ? "The dance has ended" : "The session has ended"), reason);
+      else if (wasConnected)
+        page.toast.showDisconnected(translate("Connection lost, reconnecting: {reason}", { reason }));
+    });
+  }
+
+  #showEmptyStage(): void {
+    const { page, startup } = this.options;
+    startup.finish();
+    const title = translate("The stage is empty");
+    if (!may("ingest")) {
+      page.notice("dance", title, translate("No performance is running now. Come back later."));
+      return;
+    }
+    page.notice(
+      "dance",
+      title,
+      translate("Drop a motion capture file anywhere on this page, or open the library, and the puppet dances it."),
+    );
+    page.panels.open("library");
+  }
+}

@@ -1,0 +1,153 @@
+/** Actions of the page's controls and of its keys, as functions of the application's parts. */
+import { may } from "../client/access";
+import { type CameraKeyframe, recordSession } from "../client/api";
+import { switchLanguage } from "../i18n/language";
+import { translate } from "../i18n/translator";
+import type { PageActions } from "../input/command-dispatcher";
+import type { Mapping } from "../input/mapping";
+import { isolateBidi } from "../ui/format";
+import { isAvatarFile } from "../ui/library/avatar-chooser";
+import { showProblem, uploadAll } from "../ui/library/upload";
+import type { Page, UserActions } from "../ui/page";
+import type { ThemeChoice } from "../ui/theme";
+import { createRecordAction } from "../ui/transport/recording";
+import type { AvatarSlots } from "./avatar-slot";
+import { addMotionToStage } from "./cast";
+import type { ClaimController } from "./claim-controller";
+import type { Exporter } from "./exporter";
+import type { LibraryController } from "./library-controller";
+import type { PlaybackController } from "./playback-controller";
+import { savePosition } from "./saved-position";
+import { copyShareLink } from "./share-link";
+import type { SoundController } from "./sound-controller";
+import type { StageHost } from "./stage-host";
+
+/** Parts of the application that actions use. An action reads them when it runs: the page is built before them. */
+export interface AppParts {
+  readonly displayName: string;
+  readonly page: Page;
+  readonly limbController: ClaimController;
+  readonly avatarSlots: AvatarSlots;
+  readonly soundController: SoundController;
+  readonly library: LibraryController;
+  readonly stageHost: StageHost;
+  readonly playback: PlaybackController;
+  readonly exporter: Exporter;
+  readonly theme: ThemeChoice;
+  setMapping(mapping: Mapping): void;
+}
+
+/** Return the actions of the page's buttons, menus and panels, as far as the role of this page allows them. */
+export function createUserActions(app: AppParts): UserActions {
+  return {
+    share: () => void copyShareLink(app.playback.current?.id ?? null, app.page.toast),
+    language: () => {
+      if (app.playback.current) savePosition(app.playback.current, performance.now());
+      history.replaceState(history.state, "", switchLanguage(location.href));
+      location.reload();
+    },
+    theme: () => app.theme.toggle(),
+    play: () => app.playback.togglePlaying(),
+    loop: () => app.playback.toggleLoop(),
+    seek: (seconds) => app.playback.current?.seek(seconds, performance.now()),
+    camera: () => app.stageHost.toggleCamera(),
+    sound: () => app.soundController.toggle(),
+    volume: (volume) => (app.soundController.volume = volume),
+    files: (files) => openFiles(app, files),
+    avatar: (file) => void app.avatarSlots.selected.load(file),
+    danceAs: (avatar) => app.avatarSlots.selected.setActive(avatar),
+    removeAvatar: () => void app.avatarSlots.selected.remove(),
+    choose: (id) => void app.playback.playMotion(id),
+    picture: () => savePicture(app),
+    download: (...request) => void app.exporter.downloadMotion(...request),
+    remove: (motion) => {
+      if (!confirm(translate('Remove "{name}" from the library?', { name: isolateBidi(motion.name) }))) return;
+      app.library.remove(motion.id).catch((error: unknown) => showProblem(app.page.library, motion.name, error));
+    },
+    toggle: (limb) => app.limbController.toggleClaim(limb),
+    ask: (limb) => app.limbController.requestLimb(limb),
+    withdraw: (limb) => app.limbController.withdrawRequest(limb),
+    give: (limb) => app.limbController.handOver(limb),
+    select: (limb) => app.stageHost.controller?.velocity.hold(limb),
+    press: (input, down) => {
+      const commands = app.stageHost.controller?.commands;
+      if (down) commands?.press(`page ${input}`, [input], 1, performance.now());
+      else commands?.release(`page ${input}`, performance.now());
+    },
+    mapping: (mapping) => app.setMapping(mapping),
+    focus: (limb) => (app.stageHost.focusedLimb = limb),
+    dancer: (performer) => app.limbController.selectedPerformer.select(performer),
+    nextDancer: () => app.limbController.selectNextPerformer(),
+    reframe: () => app.stageHost.resize(),
+    ...(may("ingest") ? { keep: createPageRecordAction(app) } : {}),
+    ...(may("ingest") && may("control")
+      ? {
+          add: (motion) => {
+            const { current } = app.playback;
+            if (!current) return;
+            void addMotionToStage(motion, current, app.library.motions, app.page.library).then(() =>
+              app.library.render(),
+            );
+          },
+        }
+      : {}),
+  };
+}
+
+/** Return the actions of keys, mouse buttons and gamepad, other than claiming and moving limbs. */
+export function createKeyActions(app: AppParts): PageActions {
+  return {
+    next_dancer: () => app.limbController.selectNextPerformer(),
+    ask: () => app.limbController.requestLimb(),
+    give: () => app.limbController.handOver(),
+    play: () => app.playback.togglePlaying(),
+    back: () => app.playback.current?.seekByBlocks(-1, performance.now()),
+    forward: () => app.playback.current?.seekByBlocks(1, performance.now()),
+    camera: () => app.stageHost.toggleCamera(),
+    sound: () => app.soundController.toggle(),
+    keep: () => app.page.transport.record(),
+    picture: () => savePicture(app),
+    library: () => app.page.panels.toggle("library"),
+    strings: () => app.page.panels.toggle("strings"),
+    line: () => app.page.panels.toggle("line"),
+  };
+}
+
+/** Load the last avatar file of these, and upload all motion files if this page may. */
+function openFiles({ page, avatarSlots, playback }: AppParts, files: readonly File[]): void {
+  const avatar = files.findLast(isAvatarFile);
+  if (avatar) void avatarSlots.selected.load(avatar);
+  const motions = may("ingest") ? files.filter((file) => !isAvatarFile(file)) : [];
+  if (avatar || motions.length > 0) page.panels.open("library");
+  void uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
+}
+
+function savePicture({ exporter, library }: AppParts): void {
+  void exporter.savePicture(library.currentItem?.name ?? "");
+}
+
+function createPageRecordAction(app: AppParts): () => Promise<void> {
+  return createRecordAction({
+    record: (session, name) => recordSession(session, { name, camera: recordedCameraKeyframes(app) }),
+    toast: (message, ...actions) => app.page.toast(message, ...actions),
+    session: () => {
+      const { current } = app.playback;
+      return current && { id: current.id, motionName: app.library.currentItem?.name ?? "" };
+    },
+    puppeteer: app.displayName,
+    onRecorded: () => app.library.refresh(),
+    play: (motion) => void app.playback.playMotion(motion),
+    showDownloads: (motion) => {
+      app.page.panels.open("library");
+      app.page.library.showDownloads(motion);
+    },
+  });
+}
+
+/** Return the camera's movement during the last loop of the motion; empty if the camera was not moved. */
+function recordedCameraKeyframes({ playback: { current }, stageHost: { stage } }: AppParts): CameraKeyframe[] {
+  const clock = current?.viewer.clockTime(performance.now()) ?? null;
+  return current && clock !== null
+    ? (stage?.cameraRecorder.movedKeyframes(clock - current.viewer.duration * 1e6) ?? [])
+    : [];
+}
