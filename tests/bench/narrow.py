@@ -97,14 +97,14 @@ async def measure_audio(bench: BenchContext) -> Figures:
             await asyncio.sleep(0.7)
         await asyncio.gather(*watching)
         for name, viewer, far in zip(LINKS, viewers, fars, strict=True):
-            late_samples = [
+            had_sound = [
                 available
                 for (at, _, _), available in zip(viewer.shown, viewer.audio_available, strict=True)
                 if at > viewer.started_us + 30e6
             ]
             figures[f"audio_first_pose_ms_{name}"] = round_finite(viewer.statistics.first_pose_ms or float("inf"))
             figures[f"audio_stalls_{name}"] = viewer.statistics.gaps
-            figures[f"audio_share_{name}"] = round(float(np.mean(late_samples)), 3)
+            figures[f"audio_share_{name}"] = round(float(np.mean(had_sound)), 3)
             figures[f"audio_rate_{name}"] = viewer.statistics.audio_rate
             figures[f"audio_shown_kbps_{name}"] = round(viewer.statistics.shown_kbps, 2)
             figures[f"audio_line_kbps_{name}"] = round(far.received_bytes * 8e-3 / 60.0, 2)
@@ -125,10 +125,10 @@ async def measure_proxied(bench: BenchContext) -> Figures:
                     bench.true_clock_offset_us,
                 )
                 await viewer.watch_and_measure(seconds)
-                late_samples = [ms for at, ms, _ in viewer.overlay_arrivals if at - viewer.started_us > settle * 1e6]
-                figures["proxied_p50_ms_28k8"] = round(percentile(late_samples, 50))
-                figures["proxied_p95_ms_28k8"] = round(percentile(late_samples, 95))
-                figures["proxied_fps_28k8"] = round(len(late_samples) / (seconds - settle), 1)
+                overlay_ages = [ms for at, ms, _ in viewer.overlay_arrivals if at - viewer.started_us > settle * 1e6]
+                figures["proxied_p50_ms_28k8"] = round(percentile(overlay_ages, 50))
+                figures["proxied_p95_ms_28k8"] = round(percentile(overlay_ages, 95))
+                figures["proxied_fps_28k8"] = round(len(overlay_ages) / (seconds - settle), 1)
                 figures["proxied_stalls_28k8"] = viewer.statistics.gaps
                 figures["proxied_line_used_28k8"] = round(far.received_bytes * 8 / 28_800 / seconds, 3)
 
@@ -146,7 +146,7 @@ async def measure_rate_steps(bench: BenchContext) -> Figures:
             viewer = bench.create_viewer(far, f"/v1/sessions/{session}/stream?tracks=motion")
             await viewer.watch_and_measure(26.0)
 
-        def late_samples(begin: float, end: float) -> list[float]:
+        def overlay_ages(begin: float, end: float) -> list[float]:
             return [ms for at, ms, _ in viewer.overlay_arrivals if begin * 1e6 <= at - begun < end * 1e6]
 
         def rate(begin: float, end: float) -> float:
@@ -155,8 +155,8 @@ async def measure_rate_steps(bench: BenchContext) -> Figures:
             )
 
         figures["steps_stalls"] = viewer.statistics.gaps
-        figures["steps_peak_ms"] = round(max(late_samples(4, 26)))
-        figures["steps_after_1500_ms"] = round(percentile(late_samples(11.5, 18), 95))
+        figures["steps_peak_ms"] = round(max(overlay_ages(4, 26)))
+        figures["steps_after_1500_ms"] = round(percentile(overlay_ages(11.5, 18), 95))
         figures["steps_fps_56k"] = round(rate(4, 10), 1)
         figures["steps_fps_14k4"] = round(rate(11.5, 18), 1)
         figures["steps_fps_back"] = round(rate(20, 26), 1)
@@ -200,14 +200,14 @@ async def measure_live(bench: BenchContext) -> Figures:
                     count(),
                 )
         begun = ours.overlay_arrivals[0][0] + settle * 1e6
-        case_viewers = [(ms, frames) for at, ms, frames in ours.overlay_arrivals if at > begun]
-        lateness = [ms for ms, _ in case_viewers]
+        arrivals = [(ms, frames) for at, ms, frames in ours.overlay_arrivals if at > begun]
+        lateness = [ms for ms, _ in arrivals]
         naive_ages = [ms for at, ms, _ in naive.overlay_arrivals if at > begun]
         span = (ours.overlay_arrivals[-1][0] - begun) / 1e6
         figures["live_p50_ms_28k8"] = round(percentile(lateness, 50))
         figures["live_p95_ms_28k8"] = round(percentile(lateness, 95))
-        figures["live_fps_28k8"] = round(sum(frames for _, frames in case_viewers) / span, 1)
-        figures["live_messages_28k8"] = round(len(case_viewers) / span, 1)
+        figures["live_fps_28k8"] = round(sum(frames for _, frames in arrivals) / span, 1)
+        figures["live_messages_28k8"] = round(len(arrivals) / span, 1)
         figures["live_line_used_28k8"] = round(transferred * 8 / (seconds - settle - 1.0) / link.bitrate, 3)
         figures["live_stalls_28k8"] = ours.statistics.gaps
         figures["live_shown_kbps_28k8"] = round(ours.statistics.shown_kbps, 2)
@@ -234,24 +234,24 @@ async def measure_join(bench: BenchContext) -> Figures:
             reference_viewer = MeasuringViewer(f"ws://127.0.0.1:{SERVER_PORT}{path}", None, bench.true_clock_offset_us)
             watching = asyncio.create_task(reference_viewer.watch_and_measure(8.0))
             await asyncio.sleep(4.0)
-            late_samples = bench.create_viewer(far, path)
+            joining_viewer = bench.create_viewer(far, path)
             differences_mm: list[float] = []
 
             def compare_poses(at: int, pose: Pose) -> None:
                 other = reference_viewer.pose_at(at)
-                if other is not None and late_samples.track is not None:
-                    ours, reference = (
-                        joint_and_tip_positions(late_samples.track.figure, *one) for one in (pose, other)
+                if other is not None and joining_viewer.track is not None:
+                    own_points, reference_points = (
+                        joint_and_tip_positions(joining_viewer.track.figure, *one) for one in (pose, other)
                     )
-                    differences_mm.append(float(np.linalg.norm(ours - reference, axis=-1).max()) * 1e3)
+                    differences_mm.append(float(np.linalg.norm(own_points - reference_points, axis=-1).max()) * 1e3)
 
-            await late_samples.watch(4.0, compare_poses)
+            await joining_viewer.watch(4.0, compare_poses)
             await watching
             now = time.monotonic_ns() // 1000
-            figures["join_first_pose_ms_64k"] = round_finite(late_samples.statistics.first_pose_ms or float("inf"))
+            figures["join_first_pose_ms_64k"] = round_finite(joining_viewer.statistics.first_pose_ms or float("inf"))
             figures["join_apart_mm_p95"] = round(percentile(differences_mm[60:], 95), 1)
             figures["join_clock_apart_ms"] = round(
-                abs(late_samples.clock.at(now) - reference_viewer.clock.at(now)) / 1e3, 2
+                abs(joining_viewer.clock.at(now) - reference_viewer.clock.at(now)) / 1e3, 2
             )
 
     await bench.run_controlled(work)

@@ -216,12 +216,12 @@ def _run_links(module: Any, links: list[EmulatedLink], devices: list[tuple[int, 
 
     `counters` receives the bytes delivered to each far end and to the near end."""
     os.nice(-15)
-    first_number = time.monotonic()
+    started = time.monotonic()
     directions: dict[int, Any] = {}
     outages: dict[int, tuple[float, float]] = {}
     for link, (near, far) in zip(links, devices, strict=True):
         link_arguments = Namespace(rate=link.bitrate, step=link.bitrate_steps, trace=link.trace, scale=link.trace_scale)
-        rate_at = module.rates(link_arguments, first_number)
+        rate_at = module.rates(link_arguments, started)
         for source, sink in ((near, far), (far, near)):
             directions[source] = module.Direction(sink, rate_at, link.delay_ms / 1e3, link.queue_bytes, 0.0)
             outages[source] = link.outage_s
@@ -240,5 +240,5 @@ def _run_links(module: Any, links: list[EmulatedLink], devices: list[tuple[int, 
                     packet = os.read(fd, 65536)
                 except BlockingIOError:
                     break
-                if not begin <= now - first_number < end:
+                if not begin <= now - started < end:
                     directions[fd].put(packet, now)

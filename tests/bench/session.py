@@ -164,9 +164,9 @@ def _position_at(frames: list[tuple[int, int, Vector]], dues: list[int], shown: 
             return frames[after][2]
     if after == 0 or after == len(frames):
         return frames[max(after - 1, 0)][2]
-    (_, begin, run), (_, end, other) = frames[after - 1], frames[after]
+    (_, begin, earlier), (_, end, later) = frames[after - 1], frames[after]
     share = (shown - begin) / (end - begin)
-    return vector.add(run, vector.scale(vector.subtract(other, run), share))
+    return vector.add(earlier, vector.scale(vector.subtract(later, earlier), share))
 
 
 def wait_until_idle(pid: int) -> None:

@@ -125,9 +125,9 @@ def measure_elbow_steps(rig: ArmRig, path: HandPath) -> tuple[float, float, floa
 class HandoverSmoothness(NamedTuple):
     """One claim and release of a hand.
 
-    Accelerations are maxima: of the hand while it is controlled (`taking`) and while it returns, and of the motion's own
-    hand meanwhile (`dancing`). Times are from the grant until the hand is within a hundredth of its target, and from the
-    release until it follows the motion, milliseconds.
+    Accelerations are maxima: of the hand while it is controlled (`taking`) and while it returns, and of the motion's
+    own hand meanwhile (`dancing`). Times are from the grant until the hand is within a hundredth of its target, and
+    from the release until it follows the motion, milliseconds.
     """
 
     taking: float
