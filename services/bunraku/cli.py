@@ -356,7 +356,7 @@ def warm() -> None:
     from bunraku.ingest.jobs import motion  # noqa: F401 - importing it compiles the kernels of an upload
     from bunraku.session import limb_solver
 
-    limb_solver.warm_up_solver()
+    limb_solver.load_compiled_solver()
 
 
 def _parse_motion_address(address: str) -> tuple[str | None, str]:

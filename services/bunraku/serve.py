@@ -249,7 +249,8 @@ async def _warm_up(context: ServiceContext, apps: Mapping[str, FastAPI]) -> None
         await asyncio.to_thread(apps["stream"].state.multicast_sender.load)
     if "session" in apps:
         await asyncio.to_thread(motion_decoder.warm_up)
-        await asyncio.to_thread(limb_solver.warm_up_solver)
+        solver = await asyncio.to_thread(limb_solver.load_compiled_solver)
+        apps["session"].state.sessions.use_solver(solver)
     # the objects loaded so far are permanent: exclude them from collections
     gc.freeze()
     gc.set_threshold(*GC_THRESHOLDS)

@@ -1,8 +1,7 @@
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
-import { leanThree } from "./lean-three.ts";
 
-/** The stage's chunk, and those it imports, are fetched beside the page's script, and not only once that runs. */
+/** Adds `modulepreload` links for the stage's chunk and its imports: they load in parallel with the page's script. */
 const preloadStage: Plugin = {
   name: "preload-stage",
   transformIndexHtml: {
@@ -20,35 +19,30 @@ const preloadStage: Plugin = {
   },
 };
 
-/** Milliseconds. */
-const PATIENCE = 90_000;
+/** Time limit of a test, a hook and a polled expectation, in milliseconds. It only ends tests that hang. */
+const TEST_TIMEOUT_MS = 90_000;
 
 export default defineConfig({
-  plugins: [preloadStage, leanThree],
+  plugins: [preloadStage],
   build: {
     outDir: "../bunraku/page",
     emptyOutDir: true,
     target: "es2023",
     assetsInlineLimit: 0,
-    // what is needed at first stays in one chunk, though main.ts waits for its words
-    // what three.js is made lean by takes longest, and is meant to
-    rolldownOptions: {
-      output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } },
-      checks: { bundlerTimings: false },
-    },
-    // three.js is one chunk, loaded while the page is already there
+    // The initial modules stay in one chunk, although main.ts awaits its translations.
+    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } } },
+    // three.js is one chunk of about 600 kB that loads after the page has been drawn.
     chunkSizeWarningLimit: 700,
   },
-  // the prior and the constants are part of the contract
+  // The prior and the constants are imported from proto/.
   server: {
     fs: { allow: [".", "../../proto"] },
     proxy: { "/v1": { target: "http://127.0.0.1:8000", ws: true } },
   },
   test: {
-    // bounds for what hangs: how long the rest takes is the machine's affair
-    testTimeout: PATIENCE,
-    hookTimeout: PATIENCE,
-    expect: { poll: { timeout: PATIENCE } },
+    testTimeout: TEST_TIMEOUT_MS,
+    hookTimeout: TEST_TIMEOUT_MS,
+    expect: { poll: { timeout: TEST_TIMEOUT_MS } },
     environment: "node",
     projects: [
       {
@@ -61,7 +55,7 @@ export default defineConfig({
           sequence: { groupOrder: 0 },
         },
       },
-      // one file at a time: browsers that draw in software starve each other
+      // One file at a time: browsers that render in software compete for the processor.
       {
         extends: true,
         test: {

@@ -1,16 +1,14 @@
-/** What other sites' pages load, at addresses that stay, and the page of examples: built after the page, into the same folder. */
+/** Build of the embeddable scripts (at stable URLs) and the examples page, into the folder of the page and after it. */
 import { defineConfig } from "vite";
-import { leanThree } from "./lean-three.ts";
 
-/** Entries at `embed/NAME.js`. What they load is named by its content, so that it may be kept for ever. */
+/** Entry points, served as `embed/NAME.js`. Their chunks have a content hash in their names and are cached forever. */
 const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/package.ts" };
 
-/** What draws, and what is for the examples alone. */
-const LATER = /\/node_modules\/three\/|\/src\/(stage\/|package\.ts|ui\/theme\.ts)|\/examples[./]/;
+/** Modules for rendering and for the examples page, which the element does not need at startup. */
+const DEFERRED = /\/node_modules\/three\/|\/src\/(stage\/|package\.ts|ui\/theme\.ts)|\/examples[./]/;
 
 export default defineConfig({
-  plugins: [leanThree],
-  // whatever site loads it, its parts are beside it
+  // Relative URLs: the scripts find their chunks whichever site loads them.
   base: "./",
   build: {
     outDir: "../bunraku/page",
@@ -21,15 +19,13 @@ export default defineConfig({
     modulePreload: false,
     chunkSizeWarningLimit: 700,
     rolldownOptions: {
-      // what three.js is made lean by takes longest, and is meant to
-      checks: { bundlerTimings: false },
       input: { ...ENTRIES, examples: "examples/index.html" },
       preserveEntrySignatures: "strict",
       output: {
         entryFileNames: ({ name }) => (name in ENTRIES ? "embed/[name].js" : "assets/[name]-[hash].js"),
         chunkFileNames: "embed/parts/[name]-[hash].js",
-        // what the element begins with stays in one piece, though what it fetches later has parts of it too
-        codeSplitting: { groups: [{ name: "stage-element", tags: ["$initial"], test: (id) => !LATER.test(id) }] },
+        // The element's initial modules stay in one chunk, although deferred chunks share some of them.
+        codeSplitting: { groups: [{ name: "stage-element", tags: ["$initial"], test: (id) => !DEFERRED.test(id) }] },
       },
     },
   },

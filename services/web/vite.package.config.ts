@@ -1,10 +1,10 @@
-/** The package for those who build pages of their own: `npm run build:package` makes it in `dist`, ready for `npm pack`. */
+/** Build of the npm package for custom pages: `npm run build:package` writes it to `dist`, ready for `npm pack`. */
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { defineConfig, type Plugin } from "vite";
 import own from "./package.json" with { type: "json" };
 
-/** Where `tsc` has put the types, before this. */
+/** Type declarations written by `tsc` before this build. */
 const DECLARATIONS = "node_modules/.declarations/web/src";
 const ENTRIES = { bunraku: "src/package.ts", "bunraku-stage": "src/element/define.ts" };
 
@@ -13,10 +13,8 @@ const { dependencies, devDependencies, engines, version } = own;
 const manifest = {
   name: "bunraku",
   version,
-  description:
-    "A streamed dancing puppet whose hands and legs the people watching take: the element, the viewer, the puppeteer and the stage.",
-  // nobody but the owner has been given leave yet
-  license: "UNLICENSED",
+  description: "A streamed puppet whose hands and legs the audience controls: element, viewer, puppeteer and stage.",
+  license: "Apache-2.0",
   type: "module",
   engines,
   exports: {
@@ -26,13 +24,13 @@ const manifest = {
   },
   types: "./types/package.d.ts",
   sideEffects: ["./bunraku-stage.js"],
-  // a page that draws with three.js itself has it once
+  // A peer dependency, so that a page that uses three.js itself loads it once.
   peerDependencies: { three: dependencies.three, "@types/three": devDependencies["@types/three"] },
   peerDependenciesMeta: { "@types/three": { optional: true } },
 };
 
-/** Types name each other without an ending; with one every resolution finds them. */
-function withEndings(declaration: string): string {
+/** Add file extensions to relative imports, so that every module resolution finds the declarations. */
+function addExtensions(declaration: string): string {
   return declaration.replace(/(from |import\()"(\.{1,2}\/[^"]+)"/g, '$1"$2.js"');
 }
 
@@ -42,10 +40,11 @@ const pack: Plugin = {
     const emit = (fileName: string, source: string) => this.emitFile({ type: "asset", fileName, source });
     for (const file of readdirSync(DECLARATIONS, { recursive: true, encoding: "utf8" })) {
       if (file.endsWith(".d.ts"))
-        emit(join("types", file), withEndings(readFileSync(join(DECLARATIONS, file), "utf8")));
+        emit(join("types", file), addExtensions(readFileSync(join(DECLARATIONS, file), "utf8")));
     }
     emit("package.json", `${JSON.stringify(manifest, null, 2)}\n`);
     emit("README.md", readFileSync("PACKAGE.md", "utf8"));
+    for (const name of ["LICENSE", "NOTICE"]) emit(name, readFileSync(join("../..", name), "utf8"));
   },
 };
 

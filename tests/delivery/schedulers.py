@@ -1,4 +1,4 @@
-"""What the tests of pacing send: a motion of twelve seconds, and scenes beside it."""
+"""Schedulers for tests: a motion of twelve seconds, with cameras and lights."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from tests.vectors.blocks import random_motion
 TRACK: MotionTrack = plan_motion_track(random_motion(12.0, 30.0, 4))
 SECOND_US = 1_000_000
 CAMERA = plan_timing(60.0, 720)
-"""As long as the motion, in blocks of the same seconds."""
+"""Camera of the same duration as the motion, in blocks of the same length."""
 ONE_MINUTE = plan_timing(30.0, 30 * 60)
-"""A minute."""
+"""Motion of one minute."""
 
 
 def motion_scheduler(level_count: int = 4) -> BlockScheduler:
@@ -20,6 +20,6 @@ def motion_scheduler(level_count: int = 4) -> BlockScheduler:
 
 
 def motion_and_scene_scheduler(*timings: Timing, level_count: int = 4) -> BlockScheduler:
-    """Of a motion, and scenes of three rates beside it."""
-    scenes = [ScheduledTrack(number, timing, 3, False) for number, timing in enumerate(timings, 1)]
+    """Return a scheduler of the motion, and of cameras or lights with three levels."""
+    scenes = [ScheduledTrack(index, timing, 3, False) for index, timing in enumerate(timings, 1)]
     return BlockScheduler([ScheduledTrack(0, TRACK, level_count, True), *scenes])

@@ -13,12 +13,12 @@ from bunraku.delivery.resume import MAX_BLOCKS, ResumeState
     st.lists(st.integers(-1, 15), max_size=MAX_BLOCKS),
     st.none() | st.integers(0, 16),
 )
-def test_it_is_read_as_it_was_said(motion: str, first: int, rates: list[int], tracks: int | None) -> None:
-    held = ResumeState(motion, first, tuple(rates), tracks)
-    assert ResumeState.parse(held.to_query()) == held
+def test_query_round_trip(motion: str, first: int, levels: list[int], track_count: int | None) -> None:
+    resume_state = ResumeState(motion, first, tuple(levels), track_count)
+    assert ResumeState.parse(resume_state.to_query()) == resume_state
 
 
-def test_of_many_blocks_the_first_are_told() -> None:
+def test_only_first_blocks_are_listed() -> None:
     assert ResumeState("m", 7, [2] * 100).to_query() == "m.7." + "2" * MAX_BLOCKS
     (other,) = ResumeState.parse(ResumeState("m", 7, (), 2, [(9, [2] * 100)]).to_query()).other_performers
     assert other == (9, (2,) * MAX_BLOCKS)
@@ -36,21 +36,23 @@ def test_of_many_blocks_the_first_are_told() -> None:
         max_size=3,
     ),
 )
-def test_all_performers_are_read_as_they_were_said(
-    rates: list[int], tracks: int, others: list[tuple[int, list[int]]]
+def test_query_round_trip_of_all_performers(
+    levels: list[int], track_count: int, others: list[tuple[int, list[int]]]
 ) -> None:
-    held = ResumeState("m", 4, tuple(rates), tracks, tuple((first, tuple(told)) for first, told in others))
-    assert ResumeState.parse(held.to_query()) == held
-    assert held.performers == [(4, tuple(rates)), *held.other_performers]
-    assert len(held.to_query()) <= 400
+    resume_state = ResumeState(
+        "m", 4, tuple(levels), track_count, tuple((first, tuple(held_levels)) for first, held_levels in others)
+    )
+    assert ResumeState.parse(resume_state.to_query()) == resume_state
+    assert resume_state.performers == [(4, tuple(levels)), *resume_state.other_performers]
+    assert len(resume_state.to_query()) <= 400
 
 
-def test_of_other_performers_runs_are_told_in_short_and_the_first_as_it_always_was() -> None:
+def test_run_lengths_are_used_for_other_performers_only() -> None:
     runs = [2] * 30 + [0] + [-1] * 2 + [10] * 3
     assert ResumeState("m", 7, [2] * 6, 3, [(41, runs), (0, ())]).to_query() == "m.7.222222.3.41.2z2n0-gah.0."
 
 
-def test_what_others_hold_is_not_said_without_the_number_of_tracks() -> None:
+def test_other_performers_are_omitted_without_track_count() -> None:
     assert ResumeState("m", 7, (2,), None, [(7, (2,))]).to_query() == "m.7.2"
 
 
@@ -68,6 +70,6 @@ def test_what_others_hold_is_not_said_without_the_number_of_tracks() -> None:
         ),
     ],
 )
-def test_anything_else_is_refused_in_words(text: str) -> None:
+def test_malformed_query_is_rejected_with_format(text: str) -> None:
     with pytest.raises(ValueError, match=r"have=MOTION\.FIRST\.RATES"):
         ResumeState.parse(text)

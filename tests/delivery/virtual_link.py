@@ -1,5 +1,8 @@
-"""A line in virtual time for tests: a transmitter with a rate, a fixed delay, and a receiver that acknowledges as TCP
-does: once there are more than 536 bytes, or after 60 ms. Times are microseconds, rates bytes a second."""
+"""Simulated link in virtual time.
+
+A transmitter with a throughput, a fixed delay, and a receiver that acknowledges as TCP does: after 536 bytes, or after
+60 ms. Times are microseconds, throughputs bytes/s on the wire.
+"""
 
 from __future__ import annotations
 
@@ -9,21 +12,21 @@ from collections.abc import Callable
 from bunraku.delivery.congestion import bytes_on_wire
 
 DELAYED_ACK_US = 60_000
-"""A receiver waits so long for more before it acknowledges."""
+"""Delay of an acknowledgement, microseconds."""
 ACK_BYTES = 536
-"""As many bytes are acknowledged at once."""
+"""Bytes after which the receiver acknowledges without a delay."""
 
 
 class VirtualLink:
-    """One way of a line, and the acknowledgements that come back."""
+    """One direction of a link, and the acknowledgements of the other."""
 
     def __init__(self, throughput_at: Callable[[int], float], delay: int) -> None:
-        """`rate_at` tells the rate at an instant, bytes of the line a second; `delay` is one way."""
-        self._rate_at = throughput_at
+        """`throughput_at` returns the throughput at an instant; `delay` is the one-way delay."""
+        self._throughput_at = throughput_at
         self._delay = delay
         self._idle_at = 0.0
         self._written = 0
-        # of each packet: when it arrives, and bytes written up to its end
+        # arrival time and end of each packet, in bytes written
         self._arriving: deque[tuple[float, int]] = deque()
         self._returning_acks: deque[tuple[float, int]] = deque()
         self._unacked: list[tuple[float, int]] = []
@@ -32,9 +35,9 @@ class VirtualLink:
         self.sent_bytes = 0
 
     def write(self, at: int, size: int) -> float:
-        """A message of `size` bytes goes; when it arrives."""
+        """Send a message of `size` bytes; return its arrival time."""
         start = max(float(at), self._idle_at)
-        self._idle_at = start + bytes_on_wire(size) / self._rate_at(int(start)) * 1e6
+        self._idle_at = start + bytes_on_wire(size) / self._throughput_at(int(start)) * 1e6
         self._written += size
         self.sent_bytes += bytes_on_wire(size)
         arrives = self._idle_at + self._delay
@@ -42,13 +45,13 @@ class VirtualLink:
         return arrives
 
     def unacked_bytes(self, at: int) -> int:
-        """Bytes written that are not acknowledged at `at`, as the sender's system knows it."""
+        """Return the bytes that are not acknowledged at `at`, as the sender's kernel knows them."""
         while self._arriving and self._arriving[0][0] <= at:
-            came, end = self._arriving.popleft()
-            self._fire_ack_timer(came)
-            self._unacked.append((came, end))
+            arrived, end = self._arriving.popleft()
+            self._fire_ack_timer(arrived)
+            self._unacked.append((arrived, end))
             if end - self._receiver_acked > ACK_BYTES:
-                self._send_ack(came, end)
+                self._send_ack(arrived, end)
         self._fire_ack_timer(at)
         while self._returning_acks and self._returning_acks[0][0] <= at:
             self._sender_acked = self._returning_acks.popleft()[1]

@@ -13,8 +13,8 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
 
-from bunraku.http import request_id
 from bunraku.http.access_log import ROUTE_SCOPE_KEY, AccessLogMiddleware
+from bunraku.runtime import request_id
 from bunraku.runtime.metrics import Metrics
 from tests.metrics import MetricSamples
 

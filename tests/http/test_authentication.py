@@ -9,8 +9,8 @@ import pytest
 
 from bunraku.http.access_control import FULL_ACCESS, Access, Role
 from bunraku.http.authentication import Authenticator
-from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.storage.catalogue import Catalogue
 from bunraku.websocket.subprotocol import UNAUTHORIZED, CloseConnection

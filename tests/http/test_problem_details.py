@@ -4,8 +4,8 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from bunraku.http import problem_details
-from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.problem import ProblemError
 
 
 def client() -> TestClient:

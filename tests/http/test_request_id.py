@@ -4,9 +4,10 @@ import asyncio
 
 import pytest
 
-from bunraku.http import problem_details, request_id
-from bunraku.http.problem_details import ProblemError
+from bunraku.http import problem_details
 from bunraku.messaging.bus import MemoryBus
+from bunraku.runtime import request_id
+from bunraku.runtime.problem import ProblemError
 
 
 @pytest.mark.parametrize("value", ["a1b2c3d4", "A" * 64, "3f2a4c1e-8b7d-4e6f-9a01-23456789abcd", "under_score"])

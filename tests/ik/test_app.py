@@ -10,7 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from bunraku.ik.app import create_app
-from bunraku.marionette import arm_batch, bend_table, figures, leg
+from bunraku.marionette import arm_batch, bend_table, constants, figures
 from bunraku.marionette.proportions import Proportions
 
 IDENTITY = "396-352-252-560-320-120"
@@ -38,7 +38,7 @@ def test_the_table_is_immutable_and_known_by_its_content(client: TestClient) -> 
 
 
 @pytest.mark.parametrize("wrapped", ["{}", "W/{}", '"other", {}', "*"])
-def test_a_client_that_has_it_is_told_so(client: TestClient, wrapped: str) -> None:
+def test_matching_etag_gives_304(client: TestClient, wrapped: str) -> None:
     etag = client.get(TABLE).headers["etag"]
     answer = client.get(TABLE, headers={"If-None-Match": wrapped.format(etag)})
     assert answer.status_code == 304
@@ -102,7 +102,10 @@ def test_a_batch_in_either_form(client: TestClient, said: str, heard: str) -> No
     for name, angle in zip(("t0", "t1", "t2"), wanted.angles(), strict=True):
         np.testing.assert_array_equal(got["arms"][name], angle)
     np.testing.assert_allclose(got["arms"]["tip"], asked["targets"], atol=1e-12)
-    assert got["legs"] == {"hip": [0.7, -0.2, leg.MAX_THIGH_ANGLE_RAD], "knee": [0.7, 0.0, leg.MAX_THIGH_ANGLE_RAD]}
+    assert got["legs"] == {
+        "hip": [0.7, -0.2, constants.MAX_THIGH_ANGLE_RAD],
+        "knee": [0.7, 0.0, constants.MAX_THIGH_ANGLE_RAD],
+    }
 
 
 def test_the_answer_is_in_the_requests_form_unless_another_is_accepted(client: TestClient) -> None:

@@ -6,10 +6,10 @@ import msgpack
 import numpy as np
 import pytest
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.ik import batch
 from bunraku.marionette import bend_table
 from bunraku.marionette.proportions import Proportions
+from bunraku.runtime.problem import ProblemError
 
 IDENTITY = "396-352-252-560-320-120"
 

@@ -11,26 +11,26 @@ CAMERA = {"time": 0, "position": [0, 1, 4], "gaze": [0, 1, 0], "fov": 0.5}
 LIGHT = {"time": 0, "position": [0, 3, 4], "colour": [1, 1, 1], "intensity": 90}
 
 
-def test_what_is_left_out_is_not_asked_for() -> None:
+def test_omitted_parts_are_none() -> None:
     assert Staging().camera is None
     assert Staging(lights=[]).lights == []
 
 
 @pytest.mark.parametrize(
-    ("asked", "field"),
+    ("staging", "field"),
     [
         ({"camera": [{**CAMERA, "time": 5}, CAMERA]}, "camera[1].time"),
         ({"lights": [[LIGHT], [LIGHT, LIGHT]]}, "lights[1][1].time"),
     ],
 )
-def test_keyframes_come_in_order_of_time(asked: dict[str, Any], field: str) -> None:
+def test_unordered_keyframes_are_rejected(staging: dict[str, Any], field: str) -> None:
     with pytest.raises(KeyframeOrderError, match="not after the one before") as raised:
-        check_keyframe_order(Staging.model_validate(asked))
+        check_keyframe_order(Staging.model_validate(staging))
     assert raised.value.field == field
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "staging",
     [
         {"camera": []},
         {"camera": [{**CAMERA, "fov": 4.0}]},
@@ -46,6 +46,6 @@ def test_keyframes_come_in_order_of_time(asked: dict[str, Any], field: str) -> N
         {"sound": []},
     ],
 )
-def test_what_is_no_keyframe_is_refused(asked: dict[str, Any]) -> None:
+def test_invalid_keyframe_is_rejected(staging: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
-        Staging.model_validate(asked)
+        Staging.model_validate(staging)

@@ -7,7 +7,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from bunraku.ingest.motion import MAX_ACTIVE_UPLOADS
+from bunraku.ingest.admission import MAX_ACTIVE_OPERATIONS
 from bunraku.ingest.progress import UploadProgress
 from tests.servers import make_bvh_clip, run_server
 
@@ -15,24 +15,24 @@ from tests.servers import make_bvh_clip, run_server
 async def poll_progress(
     http: httpx2.AsyncClient, upload: str, until: str | None, posting: asyncio.Task[Any]
 ) -> list[Any]:
-    """What the server says of an upload, once after the other, up to a stage or to the end of `posting`."""
-    said: list[Any] = []
-    while not posting.done() and (until is None or not said or said[-1]["stage"] != until):
-        answer = await http.get(f"/v1/uploads/{upload}")
-        if answer.status_code == 200:
-            assert answer.headers["cache-control"] == "no-store"
-            said.append(answer.json())
+    """Return the reported progress of an upload, up to a stage or to the end of `posting`."""
+    reports: list[Any] = []
+    while not posting.done() and (until is None or not reports or reports[-1]["stage"] != until):
+        response = await http.get(f"/v1/uploads/{upload}")
+        if response.status_code == 200:
+            assert response.headers["cache-control"] == "no-store"
+            reports.append(response.json())
         else:
-            assert answer.status_code == 404
-    return said
+            assert response.status_code == 404
+    return reports
 
 
 def post(http: httpx2.AsyncClient, upload: str, data: bytes) -> asyncio.Task[httpx2.Response]:
-    asked = {"filename": "clip.bvh", "upload": upload}
-    return asyncio.create_task(http.post("/v1/motions", params=asked, content=data))
+    query = {"filename": "clip.bvh", "upload": upload}
+    return asyncio.create_task(http.post("/v1/motions", params=query, content=data))
 
 
-def test_a_stage_begins_at_nothing() -> None:
+def test_stage_starts_with_share_zero() -> None:
     progress = UploadProgress()
     assert (progress.stage, progress.share) == ("receiving", 0.0)
     progress.advance_to("encoding", 0.5)
@@ -40,24 +40,24 @@ def test_a_stage_begins_at_nothing() -> None:
     assert (progress.stage, progress.share) == ("waiting", 0.0)
 
 
-async def test_shares_rise_while_an_upload_is_encoded_and_end_with_it(server: str) -> None:
+async def test_shares_rise_while_an_upload_is_encoded(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=120) as http:
         posting = post(http, "upload-one", make_bvh_clip(12.0, 900))
-        said = await poll_progress(http, "upload-one", None, posting)
+        reports = await poll_progress(http, "upload-one", None, posting)
         assert (await posting).status_code == 201
         assert (await http.get("/v1/uploads/upload-one")).status_code == 404
-        again = post(http, "upload-one", make_bvh_clip(12.0, 900))
-        assert (await again).status_code == 200
-    stages = [each["stage"] for each in said]
+        repeated = post(http, "upload-one", make_bvh_clip(12.0, 900))
+        assert (await repeated).status_code == 200
+    stages = [report["stage"] for report in reports]
     order = ["receiving", "waiting", "reading", "encoding"]
     assert stages == sorted(stages, key=order.index)
-    shares = [each["share"] for each in said if each["stage"] == "encoding"]
+    shares = [report["share"] for report in reports if report["stage"] == "encoding"]
     assert shares == sorted(shares)
     assert len(set(shares)) > 5
     assert 0 <= shares[0] < 0.5 < shares[-1] <= 1
 
 
-async def test_who_goes_away_takes_the_upload_along(tmp_path: Path) -> None:
+async def test_disconnect_cancels_the_upload(tmp_path: Path) -> None:
     with run_server(tmp_path) as url:
         async with httpx2.AsyncClient(base_url=url, timeout=120) as http:
             posting = post(http, "upload-two", make_bvh_clip(60.0, 901))
@@ -69,19 +69,19 @@ async def test_who_goes_away_takes_the_upload_along(tmp_path: Path) -> None:
             while (await http.get("/v1/uploads/upload-two")).status_code == 200:
                 pass
             assert (await http.get("/v1/motions")).json()["items"] == []
-            # and its place is free
-            answers = [
+            # all slots are free again
+            responses = [
                 await post(http, f"upload-{number:02}", make_bvh_clip(0.2, 902))
-                for number in range(MAX_ACTIVE_UPLOADS + 1)
+                for number in range(MAX_ACTIVE_OPERATIONS + 1)
             ]
-            assert {answer.status_code for answer in answers} == {200, 201}
+            assert {response.status_code for response in responses} == {200, 201}
 
 
 @pytest.mark.parametrize("name", ["short", "x" * 65, "with%20blank", "né-à-mesure"])
-async def test_names_are_plain(server: str, name: str) -> None:
+async def test_invalid_upload_name_is_rejected(server: str, name: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
-        asked = await http.get(f"/v1/uploads/{name}")
-        assert asked.status_code == 422
-        assert asked.json()["field"] == "upload"
+        requested = await http.get(f"/v1/uploads/{name}")
+        assert requested.status_code == 422
+        assert requested.json()["field"] == "upload"
         posted = await post(http, name, make_bvh_clip(0.2))
         assert posted.status_code == 422

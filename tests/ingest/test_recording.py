@@ -10,16 +10,17 @@ from typing import Any
 import msgpack
 import pytest
 
-from bunraku.http.problem_details import ProblemError
-from bunraku.ingest import recording
 from bunraku.ingest.app import create_app
-from bunraku.ingest.motion import UploadOperation
-from bunraku.ingest.recording import RECORDING_SUBJECT, parse_recording_request
+from bunraku.ingest.motion import MotionOperation
+from bunraku.ingest.recording import RECORDING_SUBJECT, RecordingOperation, parse_recording_request
+from bunraku.ingest.source_file import SourceFile
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.marionette.input_log import InputLog
 from bunraku.messaging.bus import NoResponse
 from bunraku.messaging.recording_request import MAX_RECORDING_S
 from bunraku.playout import timeline
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from tests.servers import make_bvh_clip
 
@@ -28,7 +29,7 @@ SECOND_US = 1_000_000
 
 
 @pytest.fixture
-async def backing(tmp_path: Path) -> AsyncIterator[ServiceContext]:
+async def context(tmp_path: Path) -> AsyncIterator[ServiceContext]:
     async with open_context(Settings(data=tmp_path / "data")) as opened:
         app = create_app(opened)
         async with app.router.lifespan_context(app):
@@ -36,60 +37,62 @@ async def backing(tmp_path: Path) -> AsyncIterator[ServiceContext]:
 
 
 @pytest.fixture
-async def dance(backing: ServiceContext, tmp_path: Path) -> str:
-    """A dance of 2 s in the library, with a log \"log\" of a session that played it."""
+async def motion_id(context: ServiceContext, tmp_path: Path) -> str:
+    """Store a motion of 2 s and the log `log` of a session that played it."""
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(2.0, 51))
-    entry, _ = await UploadOperation(backing).ingest_file("dance", source, "Swan.bvh")
+    entry, _ = await MotionOperation(context, WorkerSlots()).ingest_file("dance", SourceFile(source, "Swan.bvh"))
     log = InputLog()
     log.add_timeline(timeline.start(entry.id, 2 * SECOND_US, START_CLOCK_US))
-    await backing.motion_store.put_log("log", log.pack())
+    await context.motion_store.put_log("log", log.pack())
     return entry.id
 
 
-def make_request(**change: Any) -> bytes:
+def make_request(**changes: Any) -> bytes:
     values = {
         "log": "log",
         "name": None,
         "begin": START_CLOCK_US,
         "end": START_CLOCK_US + SECOND_US,
         "camera": [],
-    } | change
+    } | changes
     packed: bytes = msgpack.packb(values)
     return packed
 
 
-async def send_request(backing: ServiceContext, message: bytes) -> dict[str, Any]:
+async def send_request(context: ServiceContext, message: bytes) -> dict[str, Any]:
     name = f"order-{secrets.token_hex(4)}"
-    await backing.motion_store.put_log(name, message)
-    said: dict[str, Any] = msgpack.unpackb(await backing.bus.request(RECORDING_SUBJECT, name.encode(), timeout_s=60))
-    return said
+    await context.motion_store.put_log(name, message)
+    response: dict[str, Any] = msgpack.unpackb(
+        await context.bus.request(RECORDING_SUBJECT, name.encode(), timeout_s=60)
+    )
+    return response
 
 
-async def test_a_session_becomes_a_motion_of_the_library(backing: ServiceContext, dance: str) -> None:
+async def test_session_is_recorded_as_a_motion(context: ServiceContext, motion_id: str) -> None:
     camera = [[float(START_CLOCK_US), 0.0, 1.2, 4.0, 0.0, 1.0, 0.0, 0.5]]
-    motion = (await send_request(backing, make_request(camera=camera)))["motion"]
-    entry = await backing.catalogue.get_motion(motion["id"])
-    stored = await backing.motion_store.get(motion["id"])
-    known = await backing.catalogue.get_motion(dance)
+    motion = (await send_request(context, make_request(camera=camera)))["motion"]
+    entry = await context.catalogue.get_motion(motion["id"])
+    stored = await context.motion_store.get(motion["id"])
+    known = await context.catalogue.get_motion(motion_id)
     assert entry is not None
     assert stored is not None
     assert known is not None
     assert motion["name"] == "Swan, kept"
-    assert motion["source"] == f"kept from a session of Swan ({dance})"
+    assert motion["source"] == f"kept from a session of Swan ({motion_id})"
     assert (motion["duration"], motion["frames"], motion["fps"]) == (1.0, 60, 60)
     assert motion["tracks"] == ["motion", "camera"]
     assert motion["joints"] == known.description["joints"]
     assert [len(track[0]) for track in stored.packets] == [2, 2]
-    named = (await send_request(backing, make_request(name=" My duet ")))["motion"]
+    named = (await send_request(context, make_request(name=" My duet ")))["motion"]
     assert named["name"] == "My duet"
     assert named["id"] != motion["id"]
-    page, _ = await backing.catalogue.list_motions(9)
-    assert [e.id for e in page] == [named["id"], motion["id"], dance]
+    page, _ = await context.catalogue.list_motions(9)
+    assert [e.id for e in page] == [named["id"], motion["id"], motion_id]
 
 
 @pytest.mark.parametrize(
-    ("change", "status", "field"),
+    ("changes", "status", "field"),
     [
         ({"log": "another"}, 404, "log"),
         ({"log": "../motions/dance"}, 404, "log"),
@@ -98,66 +101,66 @@ async def test_a_session_becomes_a_motion_of_the_library(backing: ServiceContext
         ({"camera": [[float(START_CLOCK_US), 0, 1, 4, 0, 1, 0, 9.0]]}, 422, "camera"),
     ],
 )
-async def test_what_cannot_be_kept_is_a_problem_and_nothing_is_stored(
-    backing: ServiceContext, dance: str, change: dict[str, Any], status: int, field: str
+async def test_impossible_recording_is_a_problem_and_not_stored(
+    context: ServiceContext, motion_id: str, changes: dict[str, Any], status: int, field: str
 ) -> None:
-    problem = (await send_request(backing, make_request(**change)))["problem"]
+    problem = (await send_request(context, make_request(**changes)))["problem"]
     assert (problem["status"], problem["field"]) == (status, field)
     assert problem["title"]
     assert problem["detail"]
-    assert [e.id for e in (await backing.catalogue.list_motions(9))[0]] == [dance]
+    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [motion_id]
 
 
-async def test_a_log_that_cannot_be_read_is_a_problem(backing: ServiceContext, dance: str) -> None:
-    await backing.motion_store.put_log("log", b"\xc1")
-    problem = (await send_request(backing, make_request()))["problem"]
+async def test_unreadable_log_is_a_problem(context: ServiceContext, motion_id: str) -> None:
+    await context.motion_store.put_log("log", b"\xc1")
+    problem = (await send_request(context, make_request()))["problem"]
     assert problem["status"] == 422
     assert problem["title"] == "Unreadable log"
-    assert [e.id for e in (await backing.catalogue.list_motions(9))[0]] == [dance]
+    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [motion_id]
 
 
-async def test_a_dance_that_was_removed_cannot_be_kept(backing: ServiceContext, dance: str) -> None:
-    await backing.motion_store.remove(dance)
-    assert (await send_request(backing, make_request()))["problem"]["title"] == "Cannot be replayed"
+async def test_removed_motion_is_a_problem(context: ServiceContext, motion_id: str) -> None:
+    await context.motion_store.remove(motion_id)
+    assert (await send_request(context, make_request()))["problem"]["title"] == "Cannot be replayed"
 
 
-@pytest.mark.usefixtures("dance")
-async def test_more_than_may_wait_are_told_to_come_again(
-    backing: ServiceContext, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.usefixtures("motion_id")
+async def test_recording_beyond_the_limit_gets_503(
+    context: ServiceContext,
 ) -> None:
-    monkeypatch.setattr(recording, "MAX_ACTIVE_RECORDINGS", 1)
-    one, other = await asyncio.gather(send_request(backing, make_request()), send_request(backing, make_request()))
-    kept, told = (one, other) if "motion" in one else (other, one)
-    assert "motion" in kept
-    assert told["problem"]["status"] == 503
-    assert "motion" in await send_request(backing, make_request())
+    operation = RecordingOperation(context, WorkerSlots(), max_active=1)
+    await context.motion_store.put_log("order", make_request())
+    responses = await asyncio.gather(*(operation.handle_message(b"order") for _ in range(2)))
+    rejected, recorded = sorted(map(msgpack.unpackb, responses), key=lambda response: "motion" in response)
+    assert "motion" in recorded
+    assert rejected["problem"]["status"] == 503
+    assert "motion" in msgpack.unpackb(await operation.handle_message(b"order"))
 
 
-async def test_one_that_takes_too_long_is_ended(
-    backing: ServiceContext, dance: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(recording, "RECORDING_TIMEOUT_S", 0.001)
-    problem = (await send_request(backing, make_request()))["problem"]
+async def test_slow_recording_is_cancelled(context: ServiceContext, motion_id: str) -> None:
+    operation = RecordingOperation(context, WorkerSlots(), timeout_s=0.001)
+    await context.motion_store.put_log("order", make_request())
+    problem = msgpack.unpackb(await operation.handle_message(b"order"))["problem"]
     assert (problem["status"], problem["title"]) == (503, "Busy")
-    assert [e.id for e in (await backing.catalogue.list_motions(9))[0]] == [dance]
+    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [motion_id]
 
 
-async def test_one_who_no_longer_waits_leaves_nothing_behind(backing: ServiceContext, dance: str) -> None:
-    await backing.motion_store.put_log("order", make_request())
+async def test_abandoned_request_leaves_no_process(context: ServiceContext, motion_id: str) -> None:
+    await context.motion_store.put_log("order", make_request())
     with pytest.raises(NoResponse):
-        await backing.bus.request(RECORDING_SUBJECT, b"order", timeout_s=0.1)
+        await context.bus.request(RECORDING_SUBJECT, b"order", timeout_s=0.1)
     assert not multiprocessing.active_children()
-    assert [e.id for e in (await backing.catalogue.list_motions(9))[0]] == [dance]
-    assert "motion" in await send_request(backing, make_request())
+    assert [e.id for e in (await context.catalogue.list_motions(9))[0]] == [motion_id]
+    assert "motion" in await send_request(context, make_request())
 
 
 @pytest.mark.parametrize("name", [b"none", b"../log", b"\xff", b""])
-async def test_an_order_that_is_not_there_is_said_so(backing: ServiceContext, name: bytes) -> None:
-    problem = msgpack.unpackb(await backing.bus.request(RECORDING_SUBJECT, name))["problem"]
+async def test_missing_recording_request_is_a_problem(context: ServiceContext, name: bytes) -> None:
+    problem = msgpack.unpackb(await context.bus.request(RECORDING_SUBJECT, name))["problem"]
     assert (problem["status"], problem["title"]) == (404, "No such order")
 
 
-async def test_nobody_answers_when_the_service_has_ended(tmp_path: Path) -> None:
+async def test_stopped_service_does_not_respond(tmp_path: Path) -> None:
     async with open_context(Settings(data=tmp_path)) as opened:
         app = create_app(opened)
         async with app.router.lifespan_context(app):
@@ -166,20 +169,26 @@ async def test_nobody_answers_when_the_service_has_ended(tmp_path: Path) -> None
             await opened.bus.request(RECORDING_SUBJECT, make_request())
 
 
-GOOD: dict[str, Any] = {"log": "l", "name": "Mine", "begin": 1_000_000, "end": 3_000_000, "camera": [[1, *range(7)]]}
+VALID_REQUEST: dict[str, Any] = {
+    "log": "l",
+    "name": "Mine",
+    "begin": 1_000_000,
+    "end": 3_000_000,
+    "camera": [[1, *range(7)]],
+}
 
 
-def test_an_order_is_read_as_it_was_sent() -> None:
-    order = parse_recording_request(msgpack.packb(GOOD | {"later": "more"}))
-    assert (order.log, order.name, order.begin, order.end) == ("l", "Mine", 1_000_000, 3_000_000)
-    assert order.camera == [[1, 0, 1, 2, 3, 4, 5, 6]]
-    assert order.frame_count == 120
-    short = parse_recording_request(msgpack.packb({key: GOOD[key] for key in ("log", "begin", "end")}))
-    assert (short.name, short.camera) == (None, [])
+def test_recording_request_is_parsed() -> None:
+    request = parse_recording_request(msgpack.packb(VALID_REQUEST | {"later": "more"}))
+    assert (request.log, request.name, request.begin, request.end) == ("l", "Mine", 1_000_000, 3_000_000)
+    assert request.camera == [[1, 0, 1, 2, 3, 4, 5, 6]]
+    assert request.frame_count == 120
+    minimal = parse_recording_request(msgpack.packb({key: VALID_REQUEST[key] for key in ("log", "begin", "end")}))
+    assert (minimal.name, minimal.camera) == (None, [])
 
 
 @pytest.mark.parametrize(
-    ("change", "field"),
+    ("changes", "field"),
     [
         ({"log": None}, "log"),
         ({"begin": -1}, "begin"),
@@ -193,14 +202,14 @@ def test_an_order_is_read_as_it_was_sent() -> None:
         ({"camera": [[2, *range(7)], [2, *range(7)]]}, "camera"),
     ],
 )
-def test_what_is_wrong_is_said_with_its_field(change: dict[str, Any], field: str) -> None:
-    with pytest.raises(ProblemError) as refused:
-        parse_recording_request(msgpack.packb(GOOD | change))
-    assert refused.value.status == 422
-    assert refused.value.extra["field"] == field
+def test_invalid_request_names_its_field(changes: dict[str, Any], field: str) -> None:
+    with pytest.raises(ProblemError) as raised:
+        parse_recording_request(msgpack.packb(VALID_REQUEST | changes))
+    assert raised.value.status == 422
+    assert raised.value.extra["field"] == field
 
 
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x01", b"\x81\x01", msgpack.packb([1])])
-def test_what_is_no_order_is_refused(data: bytes) -> None:
+def test_malformed_request_is_rejected(data: bytes) -> None:
     with pytest.raises(ProblemError):
         parse_recording_request(data)

@@ -14,23 +14,23 @@ LIGHT = [{"time": 0, "position": [-2, 4, 4], "colour": [1, 0.8, 0.5], "intensity
 
 
 async def post_motion(http: httpx2.AsyncClient, seed: int) -> str:
-    answer = await http.post("/v1/motions", params={"filename": "dance.bvh"}, content=make_bvh_clip(2.0, seed))
-    assert answer.status_code in (200, 201), answer.text
-    return str(answer.json()["id"])
+    response = await http.post("/v1/motions", params={"filename": "dance.bvh"}, content=make_bvh_clip(2.0, seed))
+    assert response.status_code in (200, 201), response.text
+    return str(response.json()["id"])
 
 
-async def test_keyframes_make_another_motion_and_leave_the_first_as_it_is(server: str) -> None:
+async def test_scene_is_added_in_a_new_motion(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
         motion = await post_motion(http, 71)
         before = (await http.get(f"/v1/motions/{motion}")).json()
-        answer = await http.post(f"/v1/motions/{motion}/scene", json={"camera": CAMERA, "lights": [LIGHT, LIGHT]})
-        assert answer.status_code == 201, answer.text
-        new = answer.json()
-        assert answer.headers["location"] == f"/v1/motions/{new['id']}"
+        response = await http.post(f"/v1/motions/{motion}/scene", json={"camera": CAMERA, "lights": [LIGHT, LIGHT]})
+        assert response.status_code == 201, response.text
+        new = response.json()
+        assert response.headers["location"] == f"/v1/motions/{new['id']}"
         assert (new["tracks"], new["made_from"]) == (["motion", "camera", "light", "light"], motion)
         assert (await http.get(f"/v1/motions/{motion}")).json() == before
-        again = await http.post(f"/v1/motions/{motion}/scene", json={"camera": CAMERA, "lights": [LIGHT, LIGHT]})
-        assert (again.status_code, again.json()) == (200, new)
+        repeated = await http.post(f"/v1/motions/{motion}/scene", json={"camera": CAMERA, "lights": [LIGHT, LIGHT]})
+        assert (repeated.status_code, repeated.json()) == (200, new)
         description = unpack((await http.get(f"/v1/motions/{new['id']}/description")).content)
         assert isinstance(description, Description)
         assert description.motion == new["id"]
@@ -39,18 +39,18 @@ async def test_keyframes_make_another_motion_and_leave_the_first_as_it_is(server
         assert block.status_code == 200
 
 
-async def test_what_is_wrong_is_said_with_its_field(server: str) -> None:
+async def test_invalid_request_names_its_field(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
         motion = await post_motion(http, 72)
-        for asked, field in (
+        for body, field in (
             ({"camera": [CAMERA[1], CAMERA[0]]}, "camera[1].time"),
             ({"lights": [[{**LIGHT[0], "intensity": -1}]]}, "lights[0][0].intensity"),
             ({}, "camera"),
         ):
-            answer = await http.post(f"/v1/motions/{motion}/scene", json=asked)
-            assert answer.status_code == 422, answer.text
-            assert answer.headers["content-type"] == "application/problem+json"
-            assert answer.json()["field"] == field
+            response = await http.post(f"/v1/motions/{motion}/scene", json=body)
+            assert response.status_code == 422, response.text
+            assert response.headers["content-type"] == "application/problem+json"
+            assert response.json()["field"] == field
         assert (await http.post("/v1/motions/nothing/scene", json={"camera": CAMERA})).status_code == 404
 
 

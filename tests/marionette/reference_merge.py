@@ -9,20 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from bunraku.marionette import vector
+from bunraku.marionette.constants import MAX_HAND_SPEED, MAX_LEG_SPEED, MAX_TARGET_DURATION_US
 from bunraku.marionette.controlled_limb import ControlledHand, ControlledLeg
 from bunraku.marionette.handover import Handover
-from bunraku.marionette.limb_rig import JointRotations, Limb, Pose
-from bunraku.marionette.limb_target import (
-    HAND_SPEED,
-    HOLD_TIMEOUT_US,
-    LEG_SPEED,
-    MAX_REORDERED_INPUTS,
-    MAX_TARGET_DURATION_US,
-    clamp_to_reach,
-)
+from bunraku.marionette.limb_rig import Limb, Pose
+from bunraku.marionette.limb_target import HOLD_TIMEOUT_US, MAX_REORDERED_INPUTS, clamp_to_reach
 from bunraku.marionette.ownership import INPUT_TIMEOUT_US
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import JointRotations, Vector
 from bunraku.motion.skeleton import Figure
 
 
@@ -91,7 +85,7 @@ class LimbHold:
             if one.kind == 1:
                 goal, way = clamp_to_reach(limb.is_hand, one.values), min(then - before, MAX_TARGET_DURATION_US)
             else:
-                full = HAND_SPEED if limb.is_hand else LEG_SPEED
+                full = MAX_HAND_SPEED if limb.is_hand else MAX_LEG_SPEED
                 x, y, z = (min(max(part, -1.0), 1.0) * full for part in one.values)
                 goal, speed = None, (x, y, z) if limb.is_hand else (x, 0.0, 0.0)
         return along(max(self.active_us(clock), at))

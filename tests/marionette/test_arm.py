@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.marionette import arm, bend_table
-from bunraku.marionette.proportions import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD, Proportions
+from bunraku.marionette.constants import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD
+from bunraku.marionette.proportions import Proportions
 from tests.marionette.fixtures import ARM_PROPORTIONS
 
 

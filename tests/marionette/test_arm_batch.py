@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from bunraku.marionette import arm_batch, bend_table
 from bunraku.marionette.arm import Arm, BendTable, wrist_bend_limits
-from bunraku.marionette.proportions import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD, Proportions
+from bunraku.marionette.constants import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD
+from bunraku.marionette.proportions import Proportions
 from tests.marionette.fixtures import ARM_PROPORTIONS, random_tips
 
 places = st.tuples(*[st.floats(-1.5, 1.5)] * 3)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bunraku.marionette import arm, bend_table
-from bunraku.marionette.planar_arm import TABLE_SIDE
-from bunraku.marionette.proportions import MAX_TIP_DISTANCE, Proportions, ProportionsError
+from bunraku.marionette.constants import MAX_TIP_DISTANCE, TABLE_SIDE
+from bunraku.marionette.proportions import Proportions, ProportionsError
 from tests.marionette.fixtures import ARM_PROPORTIONS
 
 
@@ -47,7 +47,7 @@ def test_bytes_round_trip_and_fit_the_papers_size() -> None:
 
 
 def test_bad_bytes_are_refused() -> None:
-    with pytest.raises(ValueError, match="8192 bytes"):
+    with pytest.raises(ValueError, match="expected 8192"):
         bend_table.parse_bend_table(b"\0" * 8191)
     with pytest.raises(ValueError, match=r"0\.\.1"):
         bend_table.parse_bend_table(np.full((64, 64), np.nan, "<f2").tobytes())

@@ -4,11 +4,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import vector
 from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.elbow import elevation, vertical_normal
-from bunraku.marionette.limb_rig import ArmRig, JointRotations, Limb
-from bunraku.marionette.vector import IDENTITY
+from bunraku.marionette.limb_rig import ArmRig, Limb
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import elevation, vertical_normal
+from bunraku.marionette.solver.vector import IDENTITY, JointRotations
 from bunraku.motion.skeleton import standard_figure
 from tests.marionette.fixtures import random_motion
 

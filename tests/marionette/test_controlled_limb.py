@@ -4,12 +4,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bunraku.marionette import shoulder as limit
-from bunraku.marionette import vector
-from bunraku.marionette.controlled_limb import MAX_REACH, MIN_REACH, ControlledHand, ControlledLeg
-from bunraku.marionette.handover import HAND_ACCELERATION, Handover
+from bunraku.marionette.constants import HAND_ACCELERATION, MAX_REACH, MIN_REACH
+from bunraku.marionette.controlled_limb import ControlledHand, ControlledLeg
+from bunraku.marionette.handover import Handover
 from bunraku.marionette.limb_rig import Limb
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import shoulder as limit
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import Vector
 from bunraku.motion.skeleton import standard_figure
 from tests.bench import smoothness
 from tests.marionette.fixtures import random_motion

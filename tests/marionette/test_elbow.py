@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bunraku.marionette import shoulder as limit
-from bunraku.marionette import vector
-from bunraku.marionette.controlled_limb import MAX_REACH, MIN_REACH
-from bunraku.marionette.elbow import Elbow, elevation, lift_angle, vertical_normal
+from bunraku.marionette.constants import MAX_REACH, MIN_REACH
+from bunraku.marionette.elbow import Elbow
 from bunraku.marionette.limb_rig import ArmRig, Limb
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import shoulder as limit
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import elevation, lift_angle, vertical_normal
+from bunraku.marionette.solver.vector import Vector
 from bunraku.motion.skeleton import standard_figure
 from tests.bench.smoothness import measure_elbow_steps, slow_paths
 
@@ -106,7 +107,7 @@ def test_small_measures(tip: Vector) -> None:
 def test_it_follows_once_it_has_begun() -> None:
     elbow = Elbow(RIG.arm, RIG.shoulder)
     assert not elbow.has_begun
-    with pytest.raises(RuntimeError, match="begun"):
+    with pytest.raises(RuntimeError, match="begin"):
         elbow.step(UP, 0.5, UP, FRAME_S)
     elbow.begin(UP, (1.0, 0.0, 0.0), 0.2)
     known = [elbow.has_begun]

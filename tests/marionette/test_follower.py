@@ -5,9 +5,10 @@ from math import cos, sin
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import vector
-from bunraku.marionette.follower import MAX_LIMB_SPEED, SHOULDER_CLEARANCE, ZERO_VELOCITY, Follower
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.constants import MAX_LIMB_SPEED, SHOULDER_CLEARANCE
+from bunraku.marionette.follower import Follower
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import ZERO, Vector
 
 FRAME_S = 1.0 / 60.0
 MAX_ACCELERATION = 75.0
@@ -44,7 +45,7 @@ def test_it_arrives_and_does_not_run_past(start: Vector, wanted: Vector) -> None
 
 
 def test_a_quarter_of_an_arm_takes_an_eighth_of_a_second() -> None:
-    follower = Follower(ZERO_VELOCITY)
+    follower = Follower(ZERO)
     frames = 0
     while vector.length(vector.subtract(follower.position, (0.25, 0.0, 0.0))) > 0.01:
         follower.step((0.25, 0.0, 0.0), FRAME_S, MAX_ACCELERATION)
@@ -94,4 +95,4 @@ def test_it_stays_within_the_shell(wanted: Vector, inner: float, outer: float) -
 
 def test_no_time_moves_nothing() -> None:
     follower = Follower((0.1, 0.2, 0.3), (1.0, 0.0, 0.0))
-    assert follower.step(ZERO_VELOCITY, 0.0, MAX_ACCELERATION) == (0.1, 0.2, 0.3)
+    assert follower.step(ZERO, 0.0, MAX_ACCELERATION) == (0.1, 0.2, 0.3)

@@ -6,9 +6,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import handover, vector
-from bunraku.marionette.handover import RETURN_DURATION_S, DirectionAlignment, Handover, JointBlend, return_acceleration
-from bunraku.marionette.vector import IDENTITY, Vector
+from bunraku.marionette import handover
+from bunraku.marionette.constants import RETURN_DURATION_S
+from bunraku.marionette.handover import DirectionAlignment, Handover, JointBlend, return_acceleration
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import IDENTITY, Vector
 
 parts = st.floats(-1.0, 1.0)
 hands = st.tuples(parts, parts, parts).filter(lambda v: vector.length(v) > 0.05)

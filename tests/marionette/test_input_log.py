@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from bunraku.marionette import input_log as logs
-from bunraku.marionette.input_log import MAGIC, CorruptInputLog, InputLog, LoggedMarionettes
+from bunraku.marionette.input_log import MAGIC, CorruptInputLog, InputLog
 from bunraku.marionette.marionettes import Marionettes, OverlayJoints
 from bunraku.marionette.ownership import LimbGrant, LimbInput
 from bunraku.motion.rotation import Array
@@ -29,36 +29,38 @@ def overlay_bytes(overlay: OverlayJoints) -> bytes | None:
 
 def record_control(log: InputLog, frames: int, begin: int = 0) -> dict[int, bytes | None]:
     """Two passages of pulling, by two people, one of whom asks, and what was shown."""
-    puppet = LoggedMarionettes(Marionettes([FIGURE]), "one", log)
+    puppet = Marionettes([FIGURE], recorder=log)
     shown: dict[int, bytes | None] = {}
     grant: LimbGrant | None = None
     for frame in range(begin, begin + frames):
         now = frame * FRAME_INTERVAL_US
         phase = (frame - begin) % 120
         if phase == 2:
-            answer = puppet.claim(0, "ada", now)
+            answer = puppet.ownership.claim(0, "ada", now)
             assert isinstance(answer, LimbGrant)
             grant = answer
             for before in (frame - 2, frame - 1):
                 puppet.observe_poses([POSES[before % 400]], before * FRAME_INTERVAL_US, before * FRAME_INTERVAL_US)
-            puppet.ask(0, "bo", True, now + 1)
+            puppet.ownership.ask(0, "bo", True, now + 1)
         if grant and 2 < phase < 30:
             values = (0.01 * phase, 0.2, 0.4)
-            puppet.apply_input("ada", LimbInput(0, phase % 2, grant.epoch, phase, now - 3_600_000_000, values), now)
+            puppet.ownership.apply_input(
+                "ada", LimbInput(0, phase % 2, grant.epoch, phase, now - 3_600_000_000, values), now
+            )
         if grant and phase == 30:
-            puppet.release(0, "ada", grant.epoch, now)
-            assert puppet.grant_free_limbs(now)[0][0][0] == "bo"
+            puppet.ownership.release(0, "ada", grant.epoch, now)
+            assert puppet.ownership.grant_free_limbs(now)[0][0][0] == "bo"
         if 30 < phase < 50:
-            puppet.keep_alive("bo", [0], now)
+            puppet.ownership.keep_alive("bo", [0], now)
         if phase == 50:
-            puppet.leave("bo", now)
-        puppet.expire(now)
+            puppet.ownership.leave("bo", now)
+        puppet.ownership.expire(now)
         shown[now] = overlay_bytes(puppet.compute_overlay([POSES[frame % 400]], now, now))
     return shown
 
 
 def test_a_log_replays_to_the_last_bit() -> None:
-    log = InputLog()
+    log = InputLog("one")
     shown = record_control(log, 260)
     again = InputLog.unpack(log.pack())
     replayed = dict(again.replay(lambda _: [FIGURE], poses_at))
@@ -71,7 +73,7 @@ def test_a_log_replays_to_the_last_bit() -> None:
 
 
 def test_passages_that_were_over_are_left_out_and_change_nothing() -> None:
-    log = InputLog()
+    log = InputLog("one")
     record_control(log, 400)
     whole = list(log.replay(lambda _: [FIGURE], poses_at))
     begins = (2 * FRAME_INTERVAL_US, 122 * FRAME_INTERVAL_US, 242 * FRAME_INTERVAL_US)
@@ -88,7 +90,7 @@ def test_passages_that_were_over_are_left_out_and_change_nothing() -> None:
 
 def test_a_log_is_bounded_and_what_is_left_still_replays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(logs, "MAX_LOG_BYTES", 8_000)
-    log = InputLog()
+    log = InputLog("one")
     shown = record_control(log, 1_000)
     assert len(log.pack()) < 9_000
     replayed = dict(log.replay(lambda _: [FIGURE], poses_at))
@@ -101,7 +103,7 @@ def test_a_log_is_bounded_and_what_is_left_still_replays(monkeypatch: pytest.Mon
 
 def test_a_passage_that_is_too_long_replays_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(logs, "MAX_LOG_BYTES", 200)
-    log = InputLog()
+    log = InputLog("one")
     shown = record_control(log, 40)
     assert all(not over for _, over in log.replay(lambda _: [FIGURE], poses_at))
     assert log.complete_from_us == max(shown) + 1
@@ -111,9 +113,9 @@ def test_a_passage_that_is_too_long_replays_to_nothing(monkeypatch: pytest.Monke
 
 
 def test_the_dancer_may_change_while_limbs_are_held() -> None:
-    log = InputLog()
-    puppet = LoggedMarionettes(Marionettes([FIGURE]), "one", log)
-    puppet.claim(2, "ada", 0)
+    log = InputLog("one")
+    puppet = Marionettes([FIGURE], recorder=log)
+    puppet.ownership.claim(2, "ada", 0)
     puppet.compute_overlay([POSES[0]], 0, 0)
     puppet.set_figures([FIGURE], "two", FRAME_INTERVAL_US)
     last = puppet.compute_overlay([POSES[1]], FRAME_INTERVAL_US, FRAME_INTERVAL_US)
@@ -130,15 +132,15 @@ def test_the_dancer_may_change_while_limbs_are_held() -> None:
 
 
 def test_performers_may_come_and_go_while_limbs_are_held() -> None:
-    log = InputLog()
-    troupe = LoggedMarionettes(Marionettes([FIGURE]), "one", log)
+    log = InputLog("one")
+    troupe = Marionettes([FIGURE], recorder=log)
     figures = {"one": [FIGURE], "three": [FIGURE] * 3, "two": [FIGURE] * 2}
     shown: dict[int, dict[int, bytes]] = {}
     for frame, motion in enumerate(("one", "three", "three", "two", "three", "three")):
         now = frame * FRAME_INTERVAL_US
         troupe.set_figures(figures[motion], motion, now)
         for limb in (0, 7, 11):
-            troupe.claim(limb, "ada", now)
+            troupe.ownership.claim(limb, "ada", now)
         laid = troupe.compute_overlay([POSES[frame + 9 * nth] for nth in range(len(figures[motion]))], now, now)
         shown[now] = {limb: np.array(joints).tobytes() for limb, joints in laid.items()}
     assert [list(limbs) for limbs in shown.values()] == [[0], *[[0, 7, 11]] * 2, [0, 7], *[[0, 7, 11]] * 2]
@@ -150,7 +152,7 @@ def test_performers_may_come_and_go_while_limbs_are_held() -> None:
 
 
 def test_timelines_are_kept_and_name_the_motions() -> None:
-    log = InputLog()
+    log = InputLog("one")
     for epoch, motion in enumerate(("one", "two", "one")):
         log.add_timeline(TimelineState(epoch, motion, 5 * epoch, 0, True, True, 10**6))
     again = InputLog.unpack(log.pack())
@@ -188,8 +190,8 @@ def test_records_that_are_cut_or_name_nobody_are_refused(names: list[str], recor
 
 def test_a_leg_that_the_dance_has_taken_over_the_top_replays_as_it_was_shown() -> None:
     """What a limb has been through before a passage is not in the log."""
-    log = InputLog()
-    puppet = LoggedMarionettes(Marionettes([FIGURE]), "one", log)
+    log = InputLog("one")
+    puppet = Marionettes([FIGURE], recorder=log)
     hip = JOINTS.index("l_hip")
 
     def turned(frame: int) -> Array:
@@ -204,15 +206,15 @@ def test_a_leg_that_the_dance_has_taken_over_the_top_replays_as_it_was_shown() -
         for frame in range(begin, end):
             now = frame * FRAME_INTERVAL_US
             if frame == begin + 1:
-                grant = puppet.claim(2, "ada", now)
+                grant = puppet.ownership.claim(2, "ada", now)
                 assert isinstance(grant, LimbGrant)
                 epoch = grant.epoch
                 for before in (frame - 2, frame - 1):
                     puppet.observe_poses([turned(before)], before * FRAME_INTERVAL_US, before * FRAME_INTERVAL_US)
             if begin + 1 < frame < begin + 100:
-                puppet.apply_input("ada", LimbInput(2, 0, epoch, frame, now, (0.3, 0.0, 0.0)), now)
+                puppet.ownership.apply_input("ada", LimbInput(2, 0, epoch, frame, now, (0.3, 0.0, 0.0)), now)
             if frame == begin + 100:
-                puppet.release(2, "ada", epoch, now)
+                puppet.ownership.release(2, "ada", epoch, now)
             shown[now] = overlay_bytes(puppet.compute_overlay([turned(frame)], now, now))
     replayed = InputLog.unpack(log.pack()).replay(lambda _: [FIGURE], lambda due: [turned(due // FRAME_INTERVAL_US)])
     again = {due: overlay_bytes(over) for due, over in replayed}

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import leg, vector
-from bunraku.marionette.limb_rig import JointRotations, LegRig, Limb
-from bunraku.marionette.vector import Vector
+from bunraku.marionette import constants, leg
+from bunraku.marionette.limb_rig import LegRig, Limb
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import JointRotations, Vector
 from bunraku.motion.skeleton import standard_figure
 from tests.marionette.fixtures import random_motion
 
@@ -24,7 +25,7 @@ angles = st.floats(-10.0, 10.0)
 @given(angles)
 def test_the_knee_bends_one_way_and_lets_the_shank_hang(theta: float) -> None:
     hip, knee = leg.solve_legs(np.array([theta]))
-    assert leg.MIN_THIGH_ANGLE_RAD <= hip[0] <= leg.MAX_THIGH_ANGLE_RAD
+    assert constants.MIN_THIGH_ANGLE_RAD <= hip[0] <= constants.MAX_THIGH_ANGLE_RAD
     assert hip[0] == leg.clamp_thigh(theta)
     assert knee[0] == leg.knee_bend(leg.clamp_thigh(theta)) >= 0.0
     # the shank's own angle from straight down

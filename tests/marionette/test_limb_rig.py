@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import leg, vector
+from bunraku.marionette import constants
 from bunraku.marionette.limb_rig import ArmRig, LegRig, Limb
 from bunraku.marionette.proportions import ProportionsError
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.vector import Vector
 from bunraku.motion import rotation, skeleton
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, Figure, standard_figure
@@ -98,7 +99,7 @@ def test_a_hand_held_out_ahead_has_its_palm_down_and_its_elbow_bent_forwards() -
     assert palm[1] < 0.0
 
 
-@given(legs, poses, st.floats(leg.MIN_THIGH_ANGLE_RAD, leg.MAX_THIGH_ANGLE_RAD))
+@given(legs, poses, st.floats(constants.MIN_THIGH_ANGLE_RAD, constants.MAX_THIGH_ANGLE_RAD))
 def test_the_thigh_lifts_in_the_plane_the_hips_face_and_the_shank_hangs(limb: Limb, pose: Array, theta: float) -> None:
     rig = LEGS[limb]
     position, orientation = posed(pose, limb, rig.solve(theta, pose.tolist()))
@@ -144,5 +145,5 @@ def test_a_thigh_lifted_over_the_top_stays_at_its_limit_and_is_not_thrown_back()
         pose[rig.joint_indices[0]] = rotation.from_coordinate_axis(0, np.array(-lifted))
         own = rig.thigh_angle(pose.tolist(), own)
         seen.append(own)
-    assert max(seen) == leg.MAX_THIGH_ANGLE_RAD == seen[-1]
+    assert max(seen) == constants.MAX_THIGH_ANGLE_RAD == seen[-1]
     assert np.abs(np.diff(seen)).max() < 0.05

@@ -6,16 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import vector
-from bunraku.marionette.leg import MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD
-from bunraku.marionette.limb_target import (
-    HOLD_TIMEOUT_US,
-    MAX_REORDERED_INPUTS,
-    MAX_TARGET_DURATION_US,
-    InputKind,
-    LateInput,
-    LimbTarget,
-)
+from bunraku.marionette.constants import MAX_TARGET_DURATION_US, MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD
+from bunraku.marionette.limb_target import HOLD_TIMEOUT_US, MAX_REORDERED_INPUTS, InputKind, LateInput, LimbTarget
+from bunraku.marionette.solver import vector
 
 START = (0.1, -0.5, 0.2)
 ZERO_VELOCITY = (0.0, 0.0, 0.0)

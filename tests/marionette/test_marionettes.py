@@ -18,20 +18,20 @@ def expect_grant(answer: LimbGrant | LimbRefusal) -> LimbGrant:
     return answer
 
 
-def test_each_puppet_is_as_if_it_were_alone() -> None:
+def test_marionettes_of_a_stage_are_independent() -> None:
     troupe, alone = Marionettes([FIGURE] * 3), [Marionette(FIGURE) for _ in range(3)]
     pulled = {0: (0, 1), 5: (1, 1), 10: (2, 1)}
     # a hand of the first, the other hand of the second, a leg of the third: limb l of performer k is 4 k + l
     limbs = {number: divmod(number, 4) for number in pulled}
     for number, (nth, limb) in limbs.items():
-        assert expect_grant(troupe.claim(number, "ada", 0)) == LimbGrant(number, 1)
-        expect_grant(alone[nth].claim(limb, "ada", 0))
+        assert expect_grant(troupe.ownership.claim(number, "ada", 0)) == LimbGrant(number, 1)
+        expect_grant(alone[nth].ownership.claim(limb, "ada", 0))
     for frame in range(90):
         now = frame * FRAME_INTERVAL_US
         for number, (nth, limb) in limbs.items():
             values = (0.5, 0.01 * frame, 0.3)
-            said = troupe.apply_input("ada", LimbInput(number, 1, 1, frame, now, values), now)
-            assert said == alone[nth].apply_input("ada", LimbInput(limb, 1, 1, frame, now, values), now)
+            said = troupe.ownership.apply_input("ada", LimbInput(number, 1, 1, frame, now, values), now)
+            assert said == alone[nth].ownership.apply_input("ada", LimbInput(limb, 1, 1, frame, now, values), now)
         laid = troupe.compute_overlay([poses[frame] for poses in POSES], now)
         assert set(laid) == set(pulled)
         for number, (nth, _) in limbs.items():
@@ -42,41 +42,41 @@ def test_each_puppet_is_as_if_it_were_alone() -> None:
 
 def test_limbs_of_all_are_held_asked_for_and_lost_by_their_number() -> None:
     troupe = Marionettes([FIGURE] * 2)
-    assert troupe.claim(8, "ada", 0) == LimbRefusal(8, None, "unknown")
-    expect_grant(troupe.claim(6, "ada", 0))
-    assert troupe.claim(6, "bo", 0) == LimbRefusal(6, "ada", "held")
-    assert troupe.ask(6, "bo", True, 0)
-    assert not troupe.ask(9, "bo", True, 0)
-    assert troupe.holders() == (None,) * 6 + ("ada", None)
-    assert troupe.asks()[6] == ("bo",)
-    assert troupe.apply_input("bo", LimbInput(6, 0, 1, 1, 0, (0.0, 0.0, 0.0)), 0) is InputOutcome.NOT_OWNER
-    assert troupe.apply_input("bo", LimbInput(12, 0, 1, 1, 0, (0.0, 0.0, 0.0)), 0) is InputOutcome.NOT_OWNER
-    troupe.keep_alive("ada", [6, 12], 400_000)
-    assert troupe.expire(600_000) == []
-    assert troupe.expire(900_000) == [(6, "ada")]
-    assert troupe.grant_free_limbs(900_000) == ([("bo", LimbGrant(6, 2))], True)
-    assert not troupe.release(6, "bo", 1, 900_000)
-    assert not troupe.release(12, "bo", 1, 900_000)
-    assert troupe.leave("bo", 900_000) == (6,)
-    assert troupe.holders() == (None,) * 8
+    assert troupe.ownership.claim(8, "ada", 0) == LimbRefusal(8, None, "unknown")
+    expect_grant(troupe.ownership.claim(6, "ada", 0))
+    assert troupe.ownership.claim(6, "bo", 0) == LimbRefusal(6, "ada", "held")
+    assert troupe.ownership.ask(6, "bo", True, 0)
+    assert not troupe.ownership.ask(9, "bo", True, 0)
+    assert troupe.ownership.holders() == (None,) * 6 + ("ada", None)
+    assert troupe.ownership.asks()[6] == ("bo",)
+    assert troupe.ownership.apply_input("bo", LimbInput(6, 0, 1, 1, 0, (0.0, 0.0, 0.0)), 0) is InputOutcome.NOT_OWNER
+    assert troupe.ownership.apply_input("bo", LimbInput(12, 0, 1, 1, 0, (0.0, 0.0, 0.0)), 0) is InputOutcome.NOT_OWNER
+    troupe.ownership.keep_alive("ada", [6, 12], 400_000)
+    assert troupe.ownership.expire(600_000) == []
+    assert troupe.ownership.expire(900_000) == [(6, "ada")]
+    assert troupe.ownership.grant_free_limbs(900_000) == ([("bo", LimbGrant(6, 2))], True)
+    assert not troupe.ownership.release(6, "bo", 1, 900_000)
+    assert not troupe.ownership.release(12, "bo", 1, 900_000)
+    assert troupe.ownership.leave("bo", 900_000) == (6,)
+    assert troupe.ownership.holders() == (None,) * 8
 
 
-def test_who_goes_takes_their_limbs_with_them_and_an_epoch_never_comes_again() -> None:
+def test_limbs_of_removed_performers_are_lost_and_epochs_never_repeat() -> None:
     troupe = Marionettes([FIGURE] * 2)
-    expect_grant(troupe.claim(1, "ada", 0))
-    assert expect_grant(troupe.claim(5, "bo", 0)).epoch == 1
+    expect_grant(troupe.ownership.claim(1, "ada", 0))
+    assert expect_grant(troupe.ownership.claim(5, "bo", 0)).epoch == 1
     assert troupe.set_figures([FIGURE]) == [(5, "bo")]
-    assert troupe.holders() == (None, "ada", None, None)
-    assert troupe.claim(5, "bo", 0) == LimbRefusal(5, None, "unknown")
+    assert troupe.ownership.holders() == (None, "ada", None, None)
+    assert troupe.ownership.claim(5, "bo", 0) == LimbRefusal(5, None, "unknown")
     assert troupe.set_figures([FIGURE] * 4) == []
-    assert troupe.holders()[1] == "ada"
-    assert expect_grant(troupe.claim(5, "bo", 0)).epoch == 2
-    assert Marionettes([FIGURE] * 3, troupe.epochs).epochs == troupe.epochs
-    assert len(troupe.epochs) == 16
+    assert troupe.ownership.holders()[1] == "ada"
+    assert expect_grant(troupe.ownership.claim(5, "bo", 0)).epoch == 2
+    assert Marionettes([FIGURE] * 3, troupe.ownership.epochs).ownership.epochs == troupe.ownership.epochs
+    assert len(troupe.ownership.epochs) == 16
 
 
 @pytest.mark.parametrize("count", [0, 5])
-def test_a_stage_has_one_to_four(count: int) -> None:
+def test_stage_has_one_to_four_performers(count: int) -> None:
     troupe = Marionettes([FIGURE])
     with pytest.raises(ValueError, match="1 to 4"):
         troupe.set_figures([FIGURE] * count)

@@ -19,7 +19,7 @@ FRAME_INTERVAL_US = 16_667
 
 
 def claim_epoch(puppet: Marionette, limb: int, who: str, now: int) -> int:
-    answer = puppet.claim(limb, who, now)
+    answer = puppet.ownership.claim(limb, who, now)
     assert isinstance(answer, LimbGrant)
     return answer.epoch
 
@@ -46,7 +46,9 @@ def test_only_the_pulled_limbs_joints_change(pulled: set[Limb], seed: int) -> No
     poses = random_motion(40, seed)
     puppet = Marionette(FIGURE)
     for limb in pulled:
-        puppet.apply_input("ada", LimbInput(limb, 1, claim_epoch(puppet, limb, "ada", 0), 1, 0, (0.4, 0.1, 0.3)), 0)
+        puppet.ownership.apply_input(
+            "ada", LimbInput(limb, 1, claim_epoch(puppet, limb, "ada", 0), 1, 0, (0.4, 0.1, 0.3)), 0
+        )
     theirs = sorted(joint for limb in pulled for joint in limb.joint_indices)
     others = [joint for joint in range(18) if joint not in theirs]
     for i, pose in enumerate(poses):
@@ -63,8 +65,8 @@ def test_a_held_hand_is_where_it_is_put_and_a_leg_too() -> None:
     puppet = Marionette(FIGURE)
     hand, leg = claim_epoch(puppet, 1, "ada", 0), claim_epoch(puppet, 2, "bo", 0)
     target = (-0.5, 0.2, 0.4)
-    puppet.apply_input("ada", LimbInput(1, 1, hand, 1, 0, target), 0)
-    puppet.apply_input("bo", LimbInput(2, 1, leg, 1, 0, (0.9, 0.0, 0.0)), 0)
+    puppet.ownership.apply_input("ada", LimbInput(1, 1, hand, 1, 0, target), 0)
+    puppet.ownership.apply_input("bo", LimbInput(2, 1, leg, 1, 0, (0.9, 0.0, 0.0)), 0)
     for i in range(29):
         puppet.compute_overlay(poses[i], i * FRAME_INTERVAL_US)
     merged = apply_overlay(poses[29], puppet.compute_overlay(poses[29], 29 * FRAME_INTERVAL_US)).tolist()
@@ -97,9 +99,9 @@ def run_claim_and_release(seed: int, hold: int, gap: int) -> tuple[Array, Array]
             for limb, epoch in epochs.items():
                 x, y, z = speed.tolist()
                 given = LimbInput(limb, 0, epoch, sequence, now, (x, y, z))
-                assert puppet.apply_input("ada", given, now) is InputOutcome.ACCEPTED
+                assert puppet.ownership.apply_input("ada", given, now) is InputOutcome.ACCEPTED
         if phase == hold:
-            puppet.leave("ada", now)
+            puppet.ownership.leave("ada", now)
         merged.append(apply_overlay(pose, puppet.compute_overlay(pose, now)))
     turned = joint_steps(np.array(merged))
     for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
@@ -142,10 +144,10 @@ def test_a_jump_of_the_target_does_not_throw_the_limb() -> None:
         for limb, epoch in epochs.items():
             if i % 15 == 0:
                 x, y, z = random.uniform(-1.5, 1.5, 3).tolist()
-                puppet.apply_input(
+                puppet.ownership.apply_input(
                     "ada", LimbInput(limb, 1, epoch, i + 1, i * FRAME_INTERVAL_US, (x, y, z)), i * FRAME_INTERVAL_US
                 )
-        puppet.keep_alive("ada", list(Limb), i * FRAME_INTERVAL_US)
+        puppet.ownership.keep_alive("ada", list(Limb), i * FRAME_INTERVAL_US)
         merged.append(apply_overlay(pose, puppet.compute_overlay(pose, i * FRAME_INTERVAL_US)))
     assert float(joint_steps(np.array(merged)).max()) < 60.0
 
@@ -154,14 +156,14 @@ def test_a_silent_puppeteer_holds_still_then_loses_the_limb_which_goes_back_to_t
     pose = random_motion(1, seed=3)[0]
     puppet = Marionette(FIGURE)
     epoch = claim_epoch(puppet, 0, "ada", 0)
-    puppet.apply_input("ada", LimbInput(0, 0, epoch, 1, 0, (0.5, 0.5, 0.5)), 0)
+    puppet.ownership.apply_input("ada", LimbInput(0, 0, epoch, 1, 0, (0.5, 0.5, 0.5)), 0)
     shown: list[JointOverlay | None] = []
     lost = []
     for i in range(70):
-        lost += puppet.expire(i * FRAME_INTERVAL_US)
+        lost += puppet.ownership.expire(i * FRAME_INTERVAL_US)
         shown.append(puppet.compute_overlay(pose, i * FRAME_INTERVAL_US))
     assert lost == [(Limb.LEFT_HAND, "ada")]
-    assert puppet.holders() == (None, None, None, None)
+    assert puppet.ownership.holders() == (None, None, None, None)
     rig = ArmRig(FIGURE, Limb.LEFT_HAND)
     places = [rig.tip_target(rig.pose_joints(apply_overlay(pose, overlay).tolist())) for overlay in shown]
     np.testing.assert_allclose(places[29], places[18], atol=1e-3)
@@ -169,7 +171,7 @@ def test_a_silent_puppeteer_holds_still_then_loses_the_limb_which_goes_back_to_t
     back = [i for i, overlay in enumerate(shown) if overlay is None]
     assert 500_000 + 350_000 - FRAME_INTERVAL_US <= back[0] * FRAME_INTERVAL_US <= 500_000 + 400_000
     assert (
-        puppet.apply_input("ada", LimbInput(0, 1, epoch, 2, 0, (0.0, 0.0, 0.0)), 60 * FRAME_INTERVAL_US)
+        puppet.ownership.apply_input("ada", LimbInput(0, 1, epoch, 2, 0, (0.0, 0.0, 0.0)), 60 * FRAME_INTERVAL_US)
         is InputOutcome.NOT_OWNER
     )
 
@@ -182,7 +184,7 @@ def test_the_same_inputs_give_the_same_dance_again() -> None:
         epoch = claim_epoch(puppet, 0, "ada", 0)
         out = []
         for i, pose in enumerate(poses):
-            puppet.apply_input(
+            puppet.ownership.apply_input(
                 "ada",
                 LimbInput(0, i % 2, epoch, i + 1, i * FRAME_INTERVAL_US, (0.3, 0.01 * i, 0.2)),
                 i * FRAME_INTERVAL_US,
@@ -197,13 +199,13 @@ def test_another_dancer_stays_in_the_hands_the_limbs_are_in() -> None:
     pose = random_motion(1, seed=6)[0]
     puppet = Marionette(FIGURE)
     epoch = claim_epoch(puppet, 0, "ada", 0)
-    puppet.apply_input("ada", LimbInput(0, 1, epoch, 1, 0, (0.4, 0.2, 0.3)), 0)
+    puppet.ownership.apply_input("ada", LimbInput(0, 1, epoch, 1, 0, (0.4, 0.2, 0.3)), 0)
     puppet.compute_overlay(pose, 0)
     longer = Figure(FIGURE.offsets * 1.1, FIGURE.tips * 1.4)
     puppet.set_figure(longer)
-    assert puppet.holders() == ("ada", None, None, None)
+    assert puppet.ownership.holders() == ("ada", None, None, None)
     for i in range(1, 40):
-        puppet.keep_alive("ada", [0], i * FRAME_INTERVAL_US)
+        puppet.ownership.keep_alive("ada", [0], i * FRAME_INTERVAL_US)
         merged = apply_overlay(pose, puppet.compute_overlay(pose, i * FRAME_INTERVAL_US))
     rig = ArmRig(longer, Limb.LEFT_HAND)
     np.testing.assert_allclose(rig.tip_target(rig.pose_joints(merged.tolist())), (0.4, 0.2, 0.3), atol=1e-9)
@@ -221,8 +223,10 @@ def test_a_puppet_is_lively_while_a_limb_goes_over_or_fast() -> None:
     for i in range(60):
         if i in (1, 40):
             target = (0.4, 0.2 if i == 1 else -0.4, 0.4)
-            puppet.apply_input("ada", LimbInput(0, 1, epoch, i, i * FRAME_INTERVAL_US, target), i * FRAME_INTERVAL_US)
-        puppet.keep_alive("ada", [0], i * FRAME_INTERVAL_US)
+            puppet.ownership.apply_input(
+                "ada", LimbInput(0, 1, epoch, i, i * FRAME_INTERVAL_US, target), i * FRAME_INTERVAL_US
+            )
+        puppet.ownership.keep_alive("ada", [0], i * FRAME_INTERVAL_US)
         puppet.compute_overlay(pose, i * FRAME_INTERVAL_US)
         seen.append(puppet.needs_full_rate)
     assert seen[2]

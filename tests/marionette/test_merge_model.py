@@ -84,7 +84,7 @@ def test_the_merged_motion_is_that_of_an_in_order_model(seed: int, skew: int, wi
         for who, limb in zip(people, wished, strict=True):
             if who not in epochs and frame % 20 == 0:
                 # both at once, and perhaps the same limb
-                answer, expected = puppet.claim(limb, who, now), model.claim(limb, who, now)
+                answer, expected = puppet.ownership.claim(limb, who, now), model.claim(limb, who, now)
                 assert (answer.epoch if isinstance(answer, LimbGrant) else None) == expected
                 if expected is not None:
                     epochs[who] = limb, expected
@@ -95,18 +95,18 @@ def test_the_merged_motion_is_that_of_an_in_order_model(seed: int, skew: int, wi
                 x, y, z = np.round(random.uniform(-0.9, 0.9, 3), 3).tolist()
                 lines[who].send(now, limb, epoch, kind, (x, y, z))
                 if random.random() < 0.01:
-                    puppet.release(limb, who, epoch, now)
+                    puppet.ownership.release(limb, who, epoch, now)
                     model.release(limb, who, epoch)
                     del epochs[who]
         for who, line in lines.items():
             for one, epoch, limb in line.receive(now + FRAME_INTERVAL_US):
                 given_ = LimbInput(limb, one.kind, epoch, one.sequence, one.sampled_us, one.values)
-                puppet.apply_input(who, given_, one.received_us)
+                puppet.ownership.apply_input(who, given_, one.received_us)
                 model.apply_input(limb, who, epoch, one)
                 FAULT_COUNTS["steps"] += 1
         after = now + FRAME_INTERVAL_US
-        for limb, who in puppet.expire(after):
-            if epochs.get(who, (None,))[0] == limb:
+        for lost, who in puppet.ownership.expire(after):
+            if epochs.get(who, (None,))[0] == lost:
                 del epochs[who]
         model.expire(after)
         overlay = puppet.compute_overlay(POSES[frame], after)

@@ -39,7 +39,7 @@ class OwnershipMachine(RuleBasedStateMachine):
         due = {limb for limb in self.held if self.now - self.heard[limb] >= INPUT_TIMEOUT_US}
         assert {limb for limb, _ in lost} == due
         for limb, who in lost:
-            assert self.held.pop(limb)[0] == who
+            assert self.held.pop(Limb(limb))[0] == who
 
     @rule(limb=limbs, who=people)
     def claim(self, limb: Limb, who: str) -> None:
@@ -131,7 +131,7 @@ def test_an_unknown_kind_is_refused() -> None:
         ownership.apply_input("ada", LimbInput(0, 2, granted.epoch, 1, 0, (0.0, 0.0, 0.0)), 0)
 
 
-def test_who_asked_first_gets_a_limb_that_becomes_free() -> None:
+def test_first_who_asked_is_granted_a_free_limb() -> None:
     ownership = Ownership()
     granted = ownership.claim(0, "ada", 0)
     assert isinstance(granted, LimbGrant)

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette.proportions import WINTER_LENGTHS, WINTER_MASSES, Proportions, ProportionsError
+from bunraku.marionette.constants import ARM_LENGTH_RATIOS, ARM_MASS_RATIOS
+from bunraku.marionette.proportions import Proportions, ProportionsError
 
 links = st.floats(0.15, 0.6)
 masses = st.floats(0.002, 0.1)
@@ -64,8 +65,8 @@ def test_refusals_name_the_field(identity: str, field: str) -> None:
 @given(st.tuples(links, links, links))
 def test_a_link_weighs_by_its_own_length(lengths: tuple[float, float, float]) -> None:
     arm = Proportions.from_links(lengths)
-    reference = Proportions.from_links(WINTER_LENGTHS, WINTER_MASSES)
-    assert Proportions.from_links(WINTER_LENGTHS) == reference
+    reference = Proportions.from_links(ARM_LENGTH_RATIOS, ARM_MASS_RATIOS)
+    assert Proportions.from_links(ARM_LENGTH_RATIOS) == reference
     heaviness = [mass / length for mass, length in zip(arm.masses, arm.lengths, strict=True)]
     usual = [mass / length for mass, length in zip(reference.masses, reference.lengths, strict=True)]
     for one, other in zip(heaviness, usual, strict=True):
@@ -85,5 +86,5 @@ def test_a_name_is_in_thousandths_where_they_say_the_same() -> None:
 def test_an_arm_without_a_hand_is_refused() -> None:
     with pytest.raises(ProportionsError, match="L2"):
         Proportions.from_links((0.3, 0.3, 0.0))
-    with pytest.raises(ProportionsError, match="above zero"):
+    with pytest.raises(ProportionsError, match="sum to zero"):
         Proportions.from_links((0.0, 0.0, 0.0))

@@ -6,10 +6,12 @@ from math import acos, pi
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.marionette import vector
-from bunraku.marionette.limb_rig import ArmRig, JointRotations, Limb
-from bunraku.marionette.twist import MAX_TWIST_SPEED_RAD_S, NO_TWIST_LAG, TwistLimiter
-from bunraku.marionette.vector import IDENTITY, Quaternion
+from bunraku.marionette.constants import MAX_TWIST_SPEED_RAD_S
+from bunraku.marionette.limb_rig import ArmRig, Limb
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.twist_step import NO_TWIST_LAG
+from bunraku.marionette.solver.vector import IDENTITY, JointRotations, Quaternion
+from bunraku.marionette.twist import TwistLimiter
 from bunraku.motion.skeleton import standard_figure
 
 FRAME_S = 1.0 / 60.0

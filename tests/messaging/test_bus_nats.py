@@ -1,4 +1,4 @@
-"""The bus when its server is away, stands still, refuses, or cannot keep up."""
+"""NATS bus with a server that crashes, is suspended, rejects logins or cannot keep up."""
 
 from __future__ import annotations
 
@@ -16,32 +16,31 @@ from bunraku.messaging.bus import NoResponse
 from bunraku.messaging.bus_nats import NatsBus
 from bunraku.messaging.nats_connection import NatsServer, parse_servers
 from bunraku.runtime.availability import BackendUnavailable
-from tests.messaging.test_bus import MessageRecorder, flush_buses
+from tests.messaging.message_recorder import MessageRecorder, flush_buses
 from tests.processes import ServerProcess, nats_url_of, run_nats_server
 
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[ServerProcess]:
-    with run_nats_server(tmp_path) as owned:
-        yield owned
+    with run_nats_server(tmp_path) as process:
+        yield process
 
 
 @asynccontextmanager
-async def connect_buses(*urls: str, wait: float = 20) -> AsyncIterator[list[NatsBus]]:
+async def connect_buses(*urls: str, connect_timeout_s: float = 20) -> AsyncIterator[list[NatsBus]]:
     buses = [NatsBus(url) for url in urls]
     try:
         for bus in buses:
-            await bus.open(wait)
+            await bus.open(connect_timeout_s)
         yield buses
     finally:
         for bus in buses:
             await bus.close()
 
 
-async def wait_until(holds: Callable[[], bool]) -> None:
-    """Until something holds that nobody tells of."""
+async def wait_until(condition: Callable[[], bool]) -> None:
     async with asyncio.timeout(30):
-        while not holds():  # noqa: ASYNC110
+        while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.01)
 
 
@@ -49,44 +48,44 @@ async def echo(data: bytes) -> bytes:
     return data
 
 
-async def test_after_a_server_was_killed_all_goes_on_with_its_next_start(server: ServerProcess) -> None:
+async def test_subscriptions_are_restored_after_a_server_crash(server: ServerProcess) -> None:
     async with connect_buses(nats_url_of(server), nats_url_of(server)) as (one, two):
-        heard, back = MessageRecorder(), asyncio.Event()
-        one.subscribe("a", heard)
+        recorder, reconnected = MessageRecorder(), asyncio.Event()
+        one.subscribe("a", recorder)
         one.serve("echo", echo)
-        one.on_reconnect(back.set)
+        one.on_reconnect(reconnected.set)
         await flush_buses(one, two)
         two.publish("a", b"before")
-        await heard.wait_for(b"before")
-        asking = asyncio.create_task(two.request("nobody.reads", b"", 3600))
+        await recorder.wait_for(b"before")
+        pending = asyncio.create_task(two.request("no.responder", b"", 3600))
         server.kill()
         await wait_until(lambda: not one.is_connected and not two.is_connected)
         with pytest.raises((BackendUnavailable, NoResponse)):
-            await asking
+            await pending
         with pytest.raises(BackendUnavailable, match="bus"):
             await two.request("echo", b"1")
         for _ in range(1000):
             two.publish("a", b"lost")
-        while_away = MessageRecorder()
-        one.subscribe("b", while_away)
-        ended = one.subscribe("c", heard)
-        ended.unsubscribe()
-        assert not back.is_set()
+        late_recorder = MessageRecorder()
+        one.subscribe("b", late_recorder)
+        subscription = one.subscribe("c", recorder)
+        subscription.unsubscribe()
+        assert not reconnected.is_set()
         server.start()
         async with asyncio.timeout(30):
-            await back.wait()
+            await reconnected.wait()
         await wait_until(lambda: two.is_connected)
         assert await two.request("echo", b"2") == b"2"
         for subject in ("c", "a", "b"):
             two.publish(subject, b"after")
-        assert await heard.wait_for(b"after") == [b"before", b"after"]
-        assert await while_away.wait_for(b"after") == [b"after"]
+        assert await recorder.wait_for(b"after") == [b"before", b"after"]
+        assert await late_recorder.wait_for(b"after") == [b"after"]
 
 
-async def test_a_stream_through_a_restart_has_a_gap_and_no_message_twice(server: ServerProcess) -> None:
+async def test_restart_loses_messages_but_duplicates_none(server: ServerProcess) -> None:
     async with connect_buses(nats_url_of(server), nats_url_of(server)) as (one, two):
-        heard = MessageRecorder()
-        one.subscribe("a", heard)
+        recorder = MessageRecorder()
+        one.subscribe("a", recorder)
         await flush_buses(one)
 
         async def stream() -> None:
@@ -97,22 +96,22 @@ async def test_a_stream_through_a_restart_has_a_gap_and_no_message_twice(server:
                 await asyncio.sleep(0)
 
         streaming = asyncio.create_task(stream())
-        await wait_until(lambda: len(heard.messages) > 100)
+        await wait_until(lambda: len(recorder.messages) > 100)
         server.kill()
         server.start()
         await wait_until(lambda: one.is_connected and two.is_connected)
-        before = len(heard.messages)
-        await wait_until(lambda: len(heard.messages) > before + 100)
+        before = len(recorder.messages)
+        await wait_until(lambda: len(recorder.messages) > before + 100)
         streaming.cancel()
-        assert heard.messages == sorted(set(heard.messages))
+        assert recorder.messages == sorted(set(recorder.messages))
 
 
-@pytest.mark.parametrize("beats", [nats_connection.MAX_MISSED_HEARTBEATS, 1_000])
-async def test_a_server_that_stands_still_is_away_until_it_goes_on(
-    server: ServerProcess, beats: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("max_missed", [nats_connection.MAX_MISSED_HEARTBEATS, 1_000])
+async def test_suspended_server_is_unavailable_until_resumed(
+    server: ServerProcess, max_missed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # found out by its beats, or by a question over which nothing at all came
-    monkeypatch.setattr(nats_connection, "MAX_MISSED_HEARTBEATS", beats)
+    # detected by missed heartbeats, or by a request during which nothing arrived
+    monkeypatch.setattr(nats_connection, "MAX_MISSED_HEARTBEATS", max_missed)
     async with connect_buses(nats_url_of(server)) as (bus,):
         bus.serve("echo", echo)
         await flush_buses(bus)
@@ -125,74 +124,74 @@ async def test_a_server_that_stands_still_is_away_until_it_goes_on(
         assert await bus.request("echo", b"2") == b"2"
 
 
-async def test_what_a_server_does_not_take_is_lost_and_not_kept(server: ServerProcess) -> None:
+async def test_messages_beyond_the_send_buffer_are_dropped(server: ServerProcess) -> None:
     async with connect_buses(nats_url_of(server)) as (bus,):
         server.pause()
-        link = bus._connection
-        assert link is not None
+        connection = bus._connection
+        assert connection is not None
         tracemalloc.start()
         try:
             while bus.is_connected:
                 for number in range(1000):
                     bus.publish("a", b"%d" % number + bytes(10_000))
-                assert link.unsent_bytes <= nats_connection.MAX_UNSENT_BYTES + 20_000
+                assert connection.unsent_bytes <= nats_connection.MAX_UNSENT_BYTES + 20_000
                 await asyncio.sleep(0)
-            _, most = tracemalloc.get_traced_memory()
+            _, peak_bytes = tracemalloc.get_traced_memory()
         finally:
             tracemalloc.stop()
-        assert most < 3 * nats_connection.MAX_UNSENT_BYTES
-        # it closes while the server stands
+        assert peak_bytes < 3 * nats_connection.MAX_UNSENT_BYTES
+        # the bus closes while the server is suspended
 
 
-async def test_a_flood_comes_in_order_with_what_was_too_much_left_out(server: ServerProcess) -> None:
+async def test_burst_arrives_in_order_with_excess_dropped(server: ServerProcess) -> None:
     async with connect_buses(nats_url_of(server), nats_url_of(server)) as (one, two):
-        heard = MessageRecorder()
-        one.subscribe("a", heard)
+        recorder = MessageRecorder()
+        one.subscribe("a", recorder)
         await flush_buses(one)
-        # nothing is read meanwhile: the server has what the sockets hold, and the rest waits
+        # the event loop reads nothing meanwhile: sockets and send buffer hold the messages
         for number in range(100_000):
             two.publish("a", b"%08d" % number + bytes(200))
         await wait_until(lambda: two._connection is not None and not two._connection.unsent_bytes)
         two.publish("a", b"last")
-        messages = await heard.wait_for(b"last")
+        messages = await recorder.wait_for(b"last")
         assert 1000 < len(messages) <= 100_001
         assert messages[:-1] == sorted(set(messages[:-1]))
 
 
-async def test_it_opens_without_a_server_and_connects_when_there_is_one(server: ServerProcess) -> None:
+async def test_bus_opens_without_a_server_and_connects_later(server: ServerProcess) -> None:
     server.stop()
-    async with connect_buses(nats_url_of(server), wait=0.01) as (bus,):
-        back = asyncio.Event()
-        bus.on_reconnect(back.set)
+    async with connect_buses(nats_url_of(server), connect_timeout_s=0.01) as (bus,):
+        reconnected = asyncio.Event()
+        bus.on_reconnect(reconnected.set)
         bus.serve("echo", echo)
         with pytest.raises(BackendUnavailable):
             await bus.request("echo", b"0")
         server.start()
         async with asyncio.timeout(30):
-            await back.wait()
+            await reconnected.wait()
         assert await bus.request("echo", b"1") == b"1"
 
 
-async def test_who_no_longer_wants_to_know_is_not_told(server: ServerProcess) -> None:
+async def test_ended_reconnect_handler_is_not_called(server: ServerProcess) -> None:
     async with connect_buses(nats_url_of(server)) as (bus,):
-        told: list[str] = []
-        bus.on_reconnect(lambda: told.append("kept"))
-        ended = bus.on_reconnect(lambda: told.append("ended"))
+        calls: list[str] = []
+        bus.on_reconnect(lambda: calls.append("kept"))
+        subscription = bus.on_reconnect(lambda: calls.append("ended"))
 
         def broken() -> None:
             raise RuntimeError("a broken handler")
 
         bus.on_reconnect(broken)
-        bus.on_reconnect(lambda: told.append("last"))
-        ended.unsubscribe()
+        bus.on_reconnect(lambda: calls.append("last"))
+        subscription.unsubscribe()
         server.kill()
         await wait_until(lambda: not bus.is_connected)
         server.start()
-        await wait_until(lambda: "last" in told)
-        assert told == ["kept", "last"]
+        await wait_until(lambda: "last" in calls)
+        assert calls == ["kept", "last"]
 
 
-async def test_any_server_of_several_will_do(server: ServerProcess, tmp_path: Path) -> None:
+async def test_bus_fails_over_to_another_server(server: ServerProcess, tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     with run_nats_server(tmp_path / "other") as other:
         server.stop()
@@ -207,9 +206,9 @@ async def test_any_server_of_several_will_do(server: ServerProcess, tmp_path: Pa
             assert await bus.request("echo", b"2") == b"2"
 
 
-async def test_a_server_that_refused_is_tried_again(tmp_path: Path) -> None:
+async def test_rejected_login_is_tried_again(tmp_path: Path) -> None:
     with run_nats_server(tmp_path, "--auth", "secret") as server:
-        async with connect_buses(nats_url_of(server), wait=0.5) as (bus,):
+        async with connect_buses(nats_url_of(server), connect_timeout_s=0.5) as (bus,):
             assert not bus.is_connected
             server.stop()
             server.command = server.command[:-2]
@@ -223,10 +222,10 @@ async def test_a_server_that_refused_is_tried_again(tmp_path: Path) -> None:
             assert bus.is_connected
 
 
-async def test_what_is_too_large_is_said_and_nothing_else_suffers(server: ServerProcess) -> None:
+async def test_oversized_message_is_dropped_alone(server: ServerProcess) -> None:
     async with connect_buses(nats_url_of(server)) as (bus,):
-        heard = MessageRecorder()
-        bus.subscribe("a", heard)
+        recorder = MessageRecorder()
+        bus.subscribe("a", recorder)
         bus.serve("echo", echo)
         await flush_buses(bus)
         with pytest.raises(ValueError, match="1048576"):
@@ -239,26 +238,26 @@ async def test_what_is_too_large_is_said_and_nothing_else_suffers(server: Server
         await wait_until(lambda: bus.is_connected)
         bus.publish("a", bytes(1001))
         bus.publish("a", b"small")
-        assert await heard.wait_for(b"small") == [b"small"]
+        assert await recorder.wait_for(b"small") == [b"small"]
 
 
-async def test_each_question_goes_to_one_of_several(server: ServerProcess) -> None:
+async def test_each_request_goes_to_one_of_several_responders(server: ServerProcess) -> None:
     async with connect_buses(*[nats_url_of(server)] * 3) as (one, two, three):
-        asked: list[bytes] = []
+        received: list[bytes] = []
 
         async def note(data: bytes) -> bytes:
-            asked.append(data)
+            received.append(data)
             return data
 
         one.serve("note", note)
         two.serve("note", note)
         await flush_buses(one, two)
-        questions = [b"%d" % number for number in range(40)]
-        assert await asyncio.gather(*(three.request("note", question) for question in questions)) == questions
-        assert sorted(asked) == sorted(questions)
+        requests = [b"%d" % number for number in range(40)]
+        assert await asyncio.gather(*(three.request("note", request) for request in requests)) == requests
+        assert sorted(received) == sorted(requests)
 
 
-async def test_it_closes_at_any_time(server: ServerProcess) -> None:
+async def test_bus_closes_in_any_state(server: ServerProcess) -> None:
     bus = NatsBus(nats_url_of(server))
     await bus.close()
     bus = NatsBus(nats_url_of(server))
@@ -268,24 +267,24 @@ async def test_it_closes_at_any_time(server: ServerProcess) -> None:
     await opening
     async with connect_buses(nats_url_of(server)) as (bus,):
         bus.serve("never", lambda _: asyncio.get_running_loop().create_future())
-        asking = asyncio.create_task(bus.request("never", timeout_s=3600))
+        pending = asyncio.create_task(bus.request("never", timeout_s=3600))
         await wait_until(lambda: bool(bus._response_tasks))
         await bus.close()
         with pytest.raises(BackendUnavailable):
-            await asking
+            await pending
 
 
-def test_it_is_the_same_on_the_loop_that_the_services_have(server: ServerProcess) -> None:
+def test_bus_works_on_uvloop(server: ServerProcess) -> None:
     async def scenario() -> None:
         async with connect_buses(nats_url_of(server), nats_url_of(server)) as (one, two):
-            heard = MessageRecorder()
-            one.subscribe("a", heard)
+            recorder = MessageRecorder()
+            one.subscribe("a", recorder)
             one.serve("echo", echo)
             await flush_buses(one)
             expected = [b"%d" % number for number in range(5000)]
             for message in expected:
                 two.publish("a", message)
-            assert await heard.wait_for(expected[-1]) == expected
+            assert await recorder.wait_for(expected[-1]) == expected
             assert await two.request("echo", b"1") == b"1"
             server.pause()
             while two.is_connected:
@@ -298,12 +297,12 @@ def test_it_is_the_same_on_the_loop_that_the_services_have(server: ServerProcess
             server.start()
             await wait_until(lambda: one.is_connected and two.is_connected)
             two.publish("a", b"after")
-            await heard.wait_for(b"after")
+            await recorder.wait_for(b"after")
 
     uvloop.run(scenario())
 
 
-def test_addresses() -> None:
+def test_server_addresses_are_parsed() -> None:
     servers = parse_servers("nats://a:1,b,nats://[::1]:2,token@c,me:w%40rd@d:3")
     assert servers == [
         NatsServer("a", 1, {}),

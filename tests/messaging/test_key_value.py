@@ -1,4 +1,4 @@
-"""What holds of every register: within one process, and over a real nats-server."""
+"""Behaviour common to all key-value stores: within one process, and over a real nats-server."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from bunraku.messaging.key_value_nats import NatsKeyValueStore
 
 
 @pytest.fixture(params=["memory", "nats"])
-async def registers(request: pytest.FixtureRequest) -> AsyncIterator[tuple[KeyValueStore, KeyValueStore]]:
-    """The register as two replicas see it."""
+async def stores(request: pytest.FixtureRequest) -> AsyncIterator[tuple[KeyValueStore, KeyValueStore]]:
+    """Return the store as two replicas use it."""
     if request.param == "memory":
-        register = MemoryKeyValueStore()
-        yield register, register
+        store = MemoryKeyValueStore()
+        yield store, store
         return
     url = request.getfixturevalue("nats_url")
     buses = NatsBus(url), NatsBus(url)
@@ -32,20 +32,20 @@ async def registers(request: pytest.FixtureRequest) -> AsyncIterator[tuple[KeyVa
         await bus.close()
 
 
-async def test_who_has_not_seen_the_newest_changes_nothing(registers: tuple[KeyValueStore, KeyValueStore]) -> None:
-    one, two = registers
+async def test_write_with_an_old_revision_conflicts(stores: tuple[KeyValueStore, KeyValueStore]) -> None:
+    one, two = stores
     assert await one.get("sessions.a") is None
     first = await one.put("sessions.a", b"1", 0)
     with pytest.raises(RevisionConflict):
         await two.put("sessions.a", b"2", 0)
     second = await two.put("sessions.a", b"2", first)
     assert second > first
-    for late in (one.put("sessions.a", b"3", first), one.remove("sessions.a", first)):
+    for outdated in (one.put("sessions.a", b"3", first), one.remove("sessions.a", first)):
         with pytest.raises(RevisionConflict):
-            await late
-    found = await one.get("sessions.a")
-    assert found is not None
-    assert (found.value, found.revision) == (b"2", second)
+            await outdated
+    entry = await one.get("sessions.a")
+    assert entry is not None
+    assert (entry.value, entry.revision) == (b"2", second)
     third = await two.put("sessions.a", b"4")
     await one.remove("sessions.a", third)
     assert await two.get("sessions.a") is None
@@ -56,26 +56,26 @@ async def test_who_has_not_seen_the_newest_changes_nothing(registers: tuple[KeyV
     assert empty.value == b""
 
 
-async def test_keys_are_found_by_their_first_words(registers: tuple[KeyValueStore, KeyValueStore]) -> None:
-    one, two = registers
+async def test_keys_are_listed_by_prefix(stores: tuple[KeyValueStore, KeyValueStore]) -> None:
+    one, two = stores
     assert await two.list_prefix("sessions") == {}
-    for key in ("sessions.b-_1", "replicas.b", "sessions.a", "sessions.gone", "sessionsc.a"):
+    for key in ("sessions.b-_1", "replicas.b", "sessions.a", "sessions.removed", "sessionsc.a"):
         await one.put(key, key.encode())
     await two.put("sessions.b-_1", b"new")
-    await one.remove("sessions.gone")
-    found = await two.list_prefix("sessions")
-    assert {key: registered.value for key, registered in found.items()} == {
+    await one.remove("sessions.removed")
+    entries = await two.list_prefix("sessions")
+    assert {key: entry.value for key, entry in entries.items()} == {
         "sessions.b-_1": b"new",
         "sessions.a": b"sessions.a",
     }
-    assert found["sessions.a"] == await one.get("sessions.a")
+    assert entries["sessions.a"] == await one.get("sessions.a")
 
 
-async def test_of_many_who_want_a_key_one_has_it(registers: tuple[KeyValueStore, KeyValueStore]) -> None:
-    one, two = registers
-    revision = await one.put("sessions.a", b"nobody")
-    tried = await asyncio.gather(
-        *(register.put("sessions.a", b"x", revision) for register in (one, two) * 10), return_exceptions=True
+async def test_one_of_concurrent_writes_succeeds(stores: tuple[KeyValueStore, KeyValueStore]) -> None:
+    one, two = stores
+    revision = await one.put("sessions.a", b"0")
+    outcomes = await asyncio.gather(
+        *(store.put("sessions.a", b"x", revision) for store in (one, two) * 10), return_exceptions=True
     )
-    assert sum(isinstance(outcome, int) for outcome in tried) == 1
-    assert sum(isinstance(outcome, RevisionConflict) for outcome in tried) == 19
+    assert sum(isinstance(outcome, int) for outcome in outcomes) == 1
+    assert sum(isinstance(outcome, RevisionConflict) for outcome in outcomes) == 19

@@ -20,7 +20,7 @@ from tests.vectors.audio import random_packets
 LONG = plan_timing(30.0, 300, first_seconds=0.5)
 
 
-def filled(timing: Timing, share: float = 1.0, missing: int = -1) -> tuple[AudioBlockStore, list[bytes]]:
+def filled_store(timing: Timing, share: float = 1.0, missing: int = -1) -> tuple[AudioBlockStore, list[bytes]]:
     track = create_audio_track(timing, 2, 120, max(1, round(max_samples(timing) * share)))
     sent = random_packets(track.packet_count, 30, 3)
     store = AudioBlockStore(track)
@@ -34,11 +34,9 @@ def filled(timing: Timing, share: float = 1.0, missing: int = -1) -> tuple[Audio
     st.floats(0.05, 1.0),
     st.floats(0, 1, exclude_max=True),
 )
-def test_from_any_instant_on_there_is_the_packet_that_is_heard_and_all_after_it(
-    timing: Timing, share: float, where: float
-) -> None:
-    store, sent = filled(timing, share)
-    position = int(where * timing.duration_us)
+def test_packets_from_position_are_complete(timing: Timing, share: float, share_of_duration: float) -> None:
+    store, sent = filled_store(timing, share)
+    position = int(share_of_duration * timing.duration_us)
     found = store.packets_from(position)
     sample = position * SAMPLE_RATE // 1_000_000
     if sample >= store.track.samples:
@@ -50,8 +48,8 @@ def test_from_any_instant_on_there_is_the_packet_that_is_heard_and_all_after_it(
     assert [packet.data for packet in found] == sent[found[0].number :]
 
 
-def test_what_is_missing_ends_it_and_what_is_ahead_is_told_in_time() -> None:
-    store, _ = filled(LONG, missing=3)
+def test_missing_block_ends_packets_and_buffered_time() -> None:
+    store, _ = filled_store(LONG, missing=3)
     found = store.packets_from(600_000)
     assert store.track.block_of_packet(found[-1].number) == 2
     assert store.track.block_of_packet(found[-1].number + 1) == 3
@@ -61,8 +59,8 @@ def test_what_is_missing_ends_it_and_what_is_ahead_is_told_in_time() -> None:
     assert store.level(3) == -1
 
 
-def test_a_better_rate_takes_the_place_of_a_lower_one() -> None:
-    store, _ = filled(LONG)
+def test_higher_level_replaces_lower_one() -> None:
+    store, _ = filled_store(LONG)
     other = random_packets(1, 30, 8)
     assert not store.put_encoded(0, 0, pack_audio_block(0, other))
     assert store.put_encoded(0, 2, pack_audio_block(0, other))
@@ -70,11 +68,11 @@ def test_a_better_rate_takes_the_place_of_a_lower_one() -> None:
     assert store.level(0) == 2
 
 
-def test_what_is_not_of_this_sound_is_refused() -> None:
-    store, _ = filled(LONG)
-    with pytest.raises(DamagedBlock, match="none of number"):
+def test_blocks_of_another_track_are_rejected() -> None:
+    store, _ = filled_store(LONG)
+    with pytest.raises(DamagedBlock, match="packets only"):
         store.put_encoded(1, 3, pack_audio_block(store.track.packet_count - 1, random_packets(2, 9, 1)))
     with pytest.raises(DamagedBlock):
         store.put_encoded(1, 3, b"\1")
-    with pytest.raises(ValueError, match="not of this motion"):
+    with pytest.raises(ValueError, match="not belong to this track"):
         store.put_encoded(LONG.block_count, 3, b"")

@@ -13,7 +13,7 @@ def exchange_ping(clock: ReferenceClock, sent: int, out: int, back: int, offset:
     clock.add_sample(sent, received, received + 50, sent + out + 50 + back)
 
 
-def test_what_waited_least_each_way_decides() -> None:
+def test_fastest_sample_of_each_direction_determines_offset() -> None:
     clock = ReferenceClock()
     assert not clock.is_synchronised
     for i, (out, back) in enumerate([(400_000, 20_000), (300_000, 200_000), (20_000, 900_000)]):
@@ -22,7 +22,7 @@ def test_what_waited_least_each_way_decides() -> None:
     assert 20_000 <= clock.error_bound < 20_000 + MAX_CLOCK_DRIFT * 3_000_000
 
 
-def test_a_clock_that_was_set_anew_is_believed() -> None:
+def test_stepped_clock_discards_older_samples() -> None:
     clock = ReferenceClock()
     for second in range(4):
         exchange_ping(clock, second * 1_000_000, 20_000, 30_000)
@@ -32,7 +32,7 @@ def test_a_clock_that_was_set_anew_is_believed() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(1_000, 500_000), st.integers(1_000, 500_000)), min_size=1, max_size=20))
-def test_the_error_it_states_is_never_exceeded(trips: list[tuple[int, int]]) -> None:
+def test_error_bound_is_never_exceeded(trips: list[tuple[int, int]]) -> None:
     clock = ReferenceClock()
     for i, (out, back) in enumerate(trips):
         exchange_ping(clock, i * 2_000_000, out, back)
@@ -40,7 +40,7 @@ def test_the_error_it_states_is_never_exceeded(trips: list[tuple[int, int]]) -> 
 
 
 @given(st.lists(st.tuples(st.integers(1_000, 500_000), st.integers(1_000, 500_000)), min_size=2, max_size=30))
-def test_shown_time_runs_on_and_slews(trips: list[tuple[int, int]]) -> None:
+def test_time_in_use_is_monotonic_and_slews(trips: list[tuple[int, int]]) -> None:
     clock = ReferenceClock()
     exchange_ping(clock, 0, *trips[0])
     local = 2_000_000
@@ -54,7 +54,7 @@ def test_shown_time_runs_on_and_slews(trips: list[tuple[int, int]]) -> None:
             before = now
 
 
-def test_drift_of_200_ppm_is_followed() -> None:
+def test_drift_of_200_ppm_is_tracked() -> None:
     clock = ReferenceClock()
     local = 0
     for second in range(0, 120, 2):
@@ -64,7 +64,7 @@ def test_drift_of_200_ppm_is_followed() -> None:
     assert abs(clock.at(local + 100_000) - (local + 100_000 + OFFSET + 118 * 200)) < 5_000
 
 
-def test_impossible_answers_are_ignored() -> None:
+def test_negative_round_trip_is_ignored() -> None:
     clock = ReferenceClock()
     clock.add_sample(1_000, 500_000, 400_000, 2_000)
     clock.add_sample(1_000, 500_000, 502_000, 2_000)
@@ -72,7 +72,7 @@ def test_impossible_answers_are_ignored() -> None:
     assert clock.at(7) == 7
 
 
-def test_a_guess_serves_until_an_answer_comes() -> None:
+def test_estimate_is_used_until_first_sample() -> None:
     clock = ReferenceClock()
     clock.set_estimate(5_000_000, 1_000_000)
     assert clock.at(1_500_000) == 5_500_000
@@ -83,14 +83,14 @@ def test_a_guess_serves_until_an_answer_comes() -> None:
     assert clock.at(2_020_060) == 2_020_060 + OFFSET
 
 
-def test_a_new_connection_forgets_the_answers_and_goes_on_without_a_step() -> None:
+def test_restart_discards_samples_without_step() -> None:
     clock = ReferenceClock()
     exchange_ping(clock, 0, 20_000, 20_000)
     before = clock.at(1_000_000)
     clock.restart()
     assert clock.error_bound == float("inf")
     assert clock.at(1_010_000) == before + 10_000
-    # the first answer is a bad one
+    # the first sample is asymmetric
     exchange_ping(clock, 1_020_000, 20_000, 420_000)
     after = clock.at(1_500_000)
     assert abs(after - before - 500_000) <= 200_000

@@ -1,4 +1,4 @@
-"""The play-out delay: on simulated lines nearly all is there when it is shown, and it never steps."""
+"""Play-out delay on simulated links."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ NOISE = np.random.default_rng(4).random(2_000)
 
 
 def late_share(network_delay: Callable[[int], float], seconds: float, after: float) -> tuple[float, float]:
-    """The part of the messages that came after they were needed on the delayed clock, from second `after` on, where the
-    way of each takes what `way` says; and the delay in the end."""
+    """Return the share of late messages from second `after` on, and the final delay.
+
+    `network_delay` gives the delay of the nth message in microseconds.
+    """
     delay = PlayoutDelay()
     sent = [
         (nth * FRAME_INTERVAL_US, round(nth * FRAME_INTERVAL_US + network_delay(nth)))
@@ -33,12 +35,12 @@ def late_share(network_delay: Callable[[int], float], seconds: float, after: flo
     return sum(late) / len(late), delay.at(round(seconds * 1e6))
 
 
-def test_on_a_quick_line_there_is_none() -> None:
+def test_fast_link_has_no_delay() -> None:
     assert late_share(lambda nth: 2_000 + 3_000 * NOISE[nth], 10, 0) == (0, 0)
 
 
 @pytest.mark.parametrize(
-    "way",
+    "network_delay",
     [
         lambda nth: 90_000 + 0 * nth,
         lambda nth: 40_000 + 80_000 * NOISE[nth],
@@ -47,17 +49,17 @@ def test_on_a_quick_line_there_is_none() -> None:
     ],
     ids=["slow", "jittery", "long tails", "stalls"],
 )
-def test_on_a_bad_line_nearly_all_is_there_when_it_is_shown(way: Callable[[int], float]) -> None:
-    late, delay = late_share(way, 40, 10)
+def test_nearly_all_messages_are_in_time_on_slow_link(network_delay: Callable[[int], float]) -> None:
+    late, delay = late_share(network_delay, 40, 10)
     assert late <= 0.05
     assert 10_000 < delay < 160_000
 
 
-def test_it_goes_when_the_line_gets_well() -> None:
+def test_delay_shrinks_when_link_recovers() -> None:
     assert late_share(lambda nth: 150_000 if nth < 300 else 5_000, 70, 0)[1] < 1_000
 
 
-def test_old_news_sent_to_who_joins_says_nothing() -> None:
+def test_single_old_message_has_no_effect() -> None:
     delay = PlayoutDelay()
     delay.add_lateness(90_000, 0)
     for nth in range(1, 60):
@@ -65,7 +67,7 @@ def test_old_news_sent_to_who_joins_says_nothing() -> None:
         assert delay.at(nth * FRAME_INTERVAL_US) == 0
 
 
-def test_with_nothing_pulled_it_stays() -> None:
+def test_delay_is_constant_without_messages() -> None:
     delay = PlayoutDelay()
     for nth in range(300):
         delay.add_lateness(50_000, nth * FRAME_INTERVAL_US)
@@ -73,7 +75,7 @@ def test_with_nothing_pulled_it_stays() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 200_000), st.integers(-100_000, 900_000)), min_size=30, max_size=200))
-def test_it_never_steps_and_stays_within_its_bounds(messages: list[tuple[int, int]]) -> None:
+def test_delay_slews_and_is_bounded(messages: list[tuple[int, int]]) -> None:
     delay, local, before = PlayoutDelay(), 0, 0.0
     for passed, late in messages:
         local += passed

@@ -12,29 +12,32 @@ MOTION_POSE = rotation.from_rotation_vector(np.random.default_rng(1).uniform(-1,
 CONTROLLED_POSE = rotation.from_rotation_vector(np.random.default_rng(2).uniform(-1, 1, (3, 3)))
 
 
-def turn(a: rotation.Array, b: rotation.Array) -> float:
+def rotation_angle(a: rotation.Array, b: rotation.Array) -> float:
     return float(
         np.linalg.norm(rotation.to_rotation_vector(rotation.multiply(rotation.conjugate(a), b)), axis=-1).max()
     )
 
 
 @given(st.integers(0, 1000))
-def test_joints_survive_their_numbers(seed: int) -> None:
+def test_packed_joints_round_trip(seed: int) -> None:
     vectors = np.random.default_rng(seed).normal(size=(3, 3))
     joints = rotation.from_rotation_vector(vectors)
-    assert turn(unpack_joints(pack_joints(joints.tolist())), joints) < 2e-4
+    assert rotation_angle(unpack_joints(pack_joints(joints.tolist())), joints) < 2e-4
 
 
-def test_nothing_lies_over_before_the_first_nor_long_after_the_last() -> None:
+def test_overlay_applies_from_due_time_until_hold_ends() -> None:
     overlays = OverlayBuffer()
     assert overlays.apply(MOTION_POSE, 5) is MOTION_POSE
     overlays.put(Overlay(0, 1_000, {0: pack_joints(CONTROLLED_POSE.tolist())}))
     assert overlays.apply(MOTION_POSE, 999) is MOTION_POSE
-    assert turn(overlays.apply(MOTION_POSE, 1_000 + OVERLAY_HOLD_US)[list(LIMB_JOINTS[0])], CONTROLLED_POSE) < 2e-4
+    assert (
+        rotation_angle(overlays.apply(MOTION_POSE, 1_000 + OVERLAY_HOLD_US)[list(LIMB_JOINTS[0])], CONTROLLED_POSE)
+        < 2e-4
+    )
     assert overlays.apply(MOTION_POSE, 1_001 + OVERLAY_HOLD_US) is MOTION_POSE
 
 
-def test_only_the_limbs_joints_change_and_the_later_mask_decides() -> None:
+def test_only_joints_of_limbs_in_later_overlay_change() -> None:
     overlays = OverlayBuffer()
     overlays.put(Overlay(0, 0, {}))
     overlays.put(Overlay(1, 100, {2: pack_joints(CONTROLLED_POSE.tolist())}))
@@ -43,7 +46,13 @@ def test_only_the_limbs_joints_change_and_the_later_mask_decides() -> None:
     others = [k for k in range(18) if k not in joints]
     merged = overlays.apply(MOTION_POSE, 50)
     np.testing.assert_array_equal(merged[others], MOTION_POSE[others])
-    assert abs(turn(MOTION_POSE[joints], merged[joints]) - turn(MOTION_POSE[joints], CONTROLLED_POSE) / 2) < 1e-3
+    assert (
+        abs(
+            rotation_angle(MOTION_POSE[joints], merged[joints])
+            - rotation_angle(MOTION_POSE[joints], CONTROLLED_POSE) / 2
+        )
+        < 1e-3
+    )
     np.testing.assert_array_equal(overlays.apply(MOTION_POSE, 150), MOTION_POSE)
 
 
@@ -52,26 +61,28 @@ def test_late_and_repeated_overlays_are_ignored() -> None:
     overlays.put(Overlay(5, 500, {0: pack_joints(CONTROLLED_POSE.tolist())}))
     overlays.put(Overlay(4, 400, {}))
     overlays.put(Overlay(5, 500, {}))
-    assert turn(overlays.apply(MOTION_POSE, 500)[list(LIMB_JOINTS[0])], CONTROLLED_POSE) < 2e-4
+    assert rotation_angle(overlays.apply(MOTION_POSE, 500)[list(LIMB_JOINTS[0])], CONTROLLED_POSE) < 2e-4
 
 
-def test_the_first_after_a_silence_begins_when_it_is_due() -> None:
+def test_overlay_after_gap_applies_when_due() -> None:
     overlays = OverlayBuffer()
     overlays.put(Overlay(0, 0, {}))
     overlays.put(Overlay(1, 10 * OVERLAY_HOLD_US, {0: pack_joints(CONTROLLED_POSE.tolist())}))
     for clock in (1, OVERLAY_HOLD_US, 2 * OVERLAY_HOLD_US, 10 * OVERLAY_HOLD_US - 1):
         np.testing.assert_array_equal(overlays.apply(MOTION_POSE, clock), MOTION_POSE)
-    assert turn(overlays.apply(MOTION_POSE, 10 * OVERLAY_HOLD_US)[list(LIMB_JOINTS[0])], CONTROLLED_POSE) < 2e-4
+    assert (
+        rotation_angle(overlays.apply(MOTION_POSE, 10 * OVERLAY_HOLD_US)[list(LIMB_JOINTS[0])], CONTROLLED_POSE) < 2e-4
+    )
 
 
-def test_limbs_of_another_performer_leave_this_one_as_it_is() -> None:
+def test_limbs_of_other_performers_do_not_change_pose() -> None:
     overlays = OverlayBuffer()
     overlays.put(
         Overlay(0, 0, {2: pack_joints(CONTROLLED_POSE.tolist()), 9: pack_joints(CONTROLLED_POSE[::-1].tolist())})
     )
-    assert turn(overlays.apply(MOTION_POSE, 1)[list(LIMB_JOINTS[2])], CONTROLLED_POSE) < 2e-4
+    assert rotation_angle(overlays.apply(MOTION_POSE, 1)[list(LIMB_JOINTS[2])], CONTROLLED_POSE) < 2e-4
     np.testing.assert_array_equal(overlays.apply(MOTION_POSE, 1, 1), MOTION_POSE)
     third = overlays.apply(MOTION_POSE, 1, 2)
-    assert turn(third[list(LIMB_JOINTS[1])], CONTROLLED_POSE[::-1]) < 2e-4
+    assert rotation_angle(third[list(LIMB_JOINTS[1])], CONTROLLED_POSE[::-1]) < 2e-4
     others = [k for k in range(18) if k not in LIMB_JOINTS[1]]
     np.testing.assert_array_equal(third[others], MOTION_POSE[others])

@@ -9,41 +9,41 @@ import pytest
 from bunraku.runtime.availability import BackendTimeout, BackendUnavailable
 
 
-async def test_answers_and_errors_come_as_they_are() -> None:
-    async def answer() -> int:
+async def test_results_and_errors_are_passed_through() -> None:
+    async def succeed() -> int:
         return 7
 
-    async def refuse() -> int:
+    async def fail() -> int:
         raise KeyError("no")
 
-    patience = BackendTimeout("the test")
-    assert await patience.wait(answer()) == 7
-    assert await patience.wait(answer(), None) == 7
+    timeout = BackendTimeout("the test")
+    assert await timeout.wait(succeed()) == 7
+    assert await timeout.wait(succeed(), None) == 7
     with pytest.raises(KeyError):
-        await patience.wait(refuse())
+        await timeout.wait(fail())
 
 
-async def test_who_waits_in_vain_is_let_go_before_what_they_waited_for_has_ended() -> None:
+async def test_timeout_returns_before_the_call_has_ended() -> None:
     ended = asyncio.Event()
-    go = asyncio.Event()
+    may_end = asyncio.Event()
 
     async def stubborn() -> None:
         try:
             await asyncio.Event().wait()
         finally:
-            await go.wait()
+            await may_end.wait()
             ended.set()
 
-    patience = BackendTimeout("the test")
+    timeout = BackendTimeout("the test")
     with pytest.raises(BackendUnavailable, match="the test"):
-        await patience.wait(stubborn(), 0.31)
+        await timeout.wait(stubborn(), 0.31)
     assert not ended.is_set()
-    go.set()
-    await patience.drain_abandoned()
+    may_end.set()
+    await timeout.drain_abandoned()
     assert ended.is_set()
 
 
-async def test_who_goes_away_takes_the_question_along() -> None:
+async def test_cancelled_wait_cancels_the_call() -> None:
     cancelled = asyncio.Event()
 
     async def never() -> None:
@@ -62,23 +62,23 @@ async def test_who_goes_away_takes_the_question_along() -> None:
         await cancelled.wait()
 
 
-async def test_a_loop_that_stood_still_hears_what_came_meanwhile() -> None:
+async def test_blocked_event_loop_reads_answers_that_arrived() -> None:
     loop = asyncio.get_running_loop()
-    here, there = socket.socketpair()
-    here.setblocking(False)
+    receiver, sender = socket.socketpair()
+    receiver.setblocking(False)
 
-    async def through(tasks: int) -> bytes:
-        # as a driver has it: several wait for each other
-        return await (asyncio.create_task(through(tasks - 1)) if tasks else loop.sock_recv(here, 1))
+    async def receive(nested_tasks: int) -> bytes:
+        # nested tasks, as in a database driver
+        return await (asyncio.create_task(receive(nested_tasks - 1)) if nested_tasks else loop.sock_recv(receiver, 1))
 
-    with here, there:
-        waiting = asyncio.create_task(BackendTimeout("the test").wait(through(4), 0.35))
+    with receiver, sender:
+        waiting = asyncio.create_task(BackendTimeout("the test").wait(receive(4), 0.35))
         for _ in range(8):
             await asyncio.sleep(0)
 
-        def stand_still() -> None:
-            there.send(b"x")
+        def block() -> None:
+            sender.send(b"x")
             time.sleep(0.2)
 
-        loop.call_soon(stand_still)
+        loop.call_soon(block)
         assert await waiting == b"x"

@@ -9,17 +9,16 @@ from typing import Any
 
 import pytest
 
-from bunraku.http import request_id
-from bunraku.runtime import log
+from bunraku.runtime import log, request_id
 
 
 @pytest.fixture(autouse=True)
-def _as_before() -> Iterator[None]:
-    root, ours = logging.getLogger(), logging.getLogger(log.ROOT_LOGGER)
-    before = root.handlers[:], root.level, ours.level
+def _restore_logging() -> Iterator[None]:
+    root, own = logging.getLogger(), logging.getLogger(log.ROOT_LOGGER)
+    before = root.handlers[:], root.level, own.level
     yield
-    root.handlers[:], root.level, ours.level = before
-    ours.setLevel(before[2])
+    root.handlers[:], root.level, own.level = before
+    own.setLevel(before[2])
     root.setLevel(before[1])
     logging.captureWarnings(False)
 
@@ -33,72 +32,72 @@ def parse_log_lines(stream: io.StringIO) -> list[dict[str, Any]]:
     return [json.loads(line) for line in stream.getvalue().splitlines()]
 
 
-def test_a_line_is_one_object_with_what_one_looks_for() -> None:
-    told = io.StringIO()
-    log.configure_logging("json", "", "stream", told)
+def test_json_line_has_process_and_request_fields() -> None:
+    output = io.StringIO()
+    log.configure_logging("json", "", "stream", output)
     with request_id.bind("one-12345"):
         logging.getLogger("bunraku.stream.app").info(
             "a line of %d\nlines", 2, extra={"route": "/v1/motions", "seconds": 0.25}
         )
-    logging.getLogger("uvicorn.error").warning("theirs")
-    ours, theirs = parse_log_lines(told)
-    time = datetime.fromisoformat(ours.pop("time"))
+    logging.getLogger("uvicorn.error").warning("from uvicorn")
+    own, foreign = parse_log_lines(output)
+    time = datetime.fromisoformat(own.pop("time"))
     assert time.tzinfo == UTC
     assert abs((datetime.now(UTC) - time).total_seconds()) < 60
-    assert ours == {
+    assert own == {
         "event": "a line of 2\nlines", "level": "info", "logger": "bunraku.stream.app", "service": "stream",
         "request_id": "one-12345", "route": "/v1/motions", "seconds": 0.25,
     }  # fmt: skip
-    assert (theirs["logger"], theirs["event"], theirs["level"]) == ("uvicorn.error", "theirs", "warning")
-    assert "request_id" not in theirs
+    assert (foreign["logger"], foreign["event"], foreign["level"]) == ("uvicorn.error", "from uvicorn", "warning")
+    assert "request_id" not in foreign
 
 
-def test_what_went_wrong_is_within_the_line_without_the_values_of_names() -> None:
-    told = io.StringIO()
-    log.configure_logging("json", "error", "session", told)
-    hidden = "a ticket" + " of somebody"
+def test_json_traceback_omits_local_variables() -> None:
+    output = io.StringIO()
+    log.configure_logging("json", "error", "session", output)
+    secret = "a ticket" + " of a client"
     try:
-        assert hidden
+        assert secret
         raise KeyError("missing")
     except KeyError:
         logging.getLogger("bunraku.session").exception("it failed")
     logging.getLogger("bunraku.session").warning("below the level")
-    (line,) = parse_log_lines(told)
+    (line,) = parse_log_lines(output)
     assert "KeyError: 'missing'" in line["exception"]
-    assert hidden not in told.getvalue()
+    assert secret not in output.getvalue()
 
 
-@pytest.mark.parametrize(("style", "level", "heard"), [("plain", "", 1), ("json", "", 2), ("json", "debug", 3)])
-def test_others_are_heard_from_warning_on(style: log.LogStyle, level: log.LogLevel, heard: int) -> None:
-    told = io.StringIO()
-    log.configure_logging(style, level, "all", told)
-    for name in ("bunraku.backing", "uvicorn.error", "aiosqlite"):
-        for number in (logging.DEBUG, logging.INFO):
-            logging.getLogger(name).log(number, "said")
-    logging.getLogger("bunraku.backing").warning("said")
-    assert told.getvalue().count("said") == heard
+@pytest.mark.parametrize(("style", "level", "count"), [("plain", "", 1), ("json", "", 2), ("json", "debug", 3)])
+def test_other_libraries_log_from_warning(style: log.LogStyle, level: log.LogLevel, count: int) -> None:
+    output = io.StringIO()
+    log.configure_logging(style, level, "all", output)
+    for name in ("bunraku.messaging", "uvicorn.error", "aiosqlite"):
+        for severity in (logging.DEBUG, logging.INFO):
+            logging.getLogger(name).log(severity, "a message")
+    logging.getLogger("bunraku.messaging").warning("a message")
+    assert output.getvalue().count("a message") == count
 
 
-def test_people_get_a_plain_line_with_colour_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    def said(to: io.StringIO) -> str:
-        log.configure_logging("plain", "", "all", to)
+def test_plain_line_is_coloured_only_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    def log_to(stream: io.StringIO) -> str:
+        log.configure_logging("plain", "", "all", stream)
         with request_id.bind("one-12345"):
-            logging.getLogger("bunraku.backing").warning("the bus is %s", "away", extra={"seconds": 2})
-        return to.getvalue()
+            logging.getLogger("bunraku.messaging").warning("the bus is %s", "down", extra={"seconds": 2})
+        return stream.getvalue()
 
     monkeypatch.delenv("NO_COLOR", raising=False)
-    plain = said(io.StringIO())
-    assert "the bus is away" in plain
+    plain = log_to(io.StringIO())
+    assert "the bus is down" in plain
     assert "request_id=one-12345" in plain
     assert "seconds=2" in plain
     assert "\x1b" not in plain
     assert plain.count("\n") == 1
-    assert "\x1b" in said(Terminal())
+    assert "\x1b" in log_to(Terminal())
     monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b" not in said(Terminal())
+    assert "\x1b" not in log_to(Terminal())
 
 
-def test_each_setting_begins_anew() -> None:
+def test_second_configuration_replaces_the_first() -> None:
     first, second = io.StringIO(), io.StringIO()
     log.configure_logging("json", "", "all", first)
     log.configure_logging("json", "", "all", second)

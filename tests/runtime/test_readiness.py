@@ -1,4 +1,4 @@
-"""What a process says of itself, upon a real nats-server and PostgreSQL that go away and come back."""
+"""Readiness during outages of a real nats-server and PostgreSQL."""
 
 from __future__ import annotations
 
@@ -23,9 +23,11 @@ ALL: tuple[Dependency, ...] = ("bus", "register", "catalogue", "library")
 
 
 @asynccontextmanager
-async def open_client(settings: Settings, *needs: Dependency) -> AsyncIterator[tuple[httpx2.AsyncClient, Readiness]]:
-    async with open_context(settings) as backing:
-        app, state = FastAPI(), Readiness(backing, needs)
+async def open_client(
+    settings: Settings, *dependencies: Dependency
+) -> AsyncIterator[tuple[httpx2.AsyncClient, Readiness]]:
+    async with open_context(settings) as context:
+        app, state = FastAPI(), Readiness(context, dependencies)
         problem_details.install_problem_handlers(app)
         readiness.install_health_routes(app, state)
         transport = httpx2.ASGITransport(app)
@@ -35,28 +37,28 @@ async def open_client(settings: Settings, *needs: Dependency) -> AsyncIterator[t
 
 @pytest.fixture(scope="module")
 def database() -> Iterator[ServerProcess]:
-    with run_postgres() as owned:
-        yield owned
+    with run_postgres() as process:
+        yield process
 
 
 @pytest.fixture(scope="module")
 def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
-    with run_jetstream(tmp_path_factory.mktemp("nats")) as owned:
-        yield owned
+    with run_jetstream(tmp_path_factory.mktemp("nats")) as process:
+        yield process
 
 
 async def list_unavailable(http: httpx2.AsyncClient) -> list[str]:
-    """What is said to be away."""
-    answer = await http.get("/readyz")
-    if answer.status_code == 200:
-        assert answer.json() == {"status": "ready"}
+    """Return the unavailable dependencies."""
+    response = await http.get("/readyz")
+    if response.status_code == 200:
+        assert response.json() == {"status": "ready"}
         return []
-    assert answer.status_code == 503
-    assert answer.headers["content-type"] == "application/problem+json"
-    named: list[str] = answer.json()["away"]
-    assert named
-    assert all(what in answer.json()["detail"] for what in named)
-    return named
+    assert response.status_code == 503
+    assert response.headers["content-type"] == "application/problem+json"
+    unavailable: list[str] = response.json()["away"]
+    assert unavailable
+    assert all(name in response.json()["detail"] for name in unavailable)
+    return unavailable
 
 
 async def wait_until_unavailable(http: httpx2.AsyncClient, expected: set[str]) -> None:
@@ -65,7 +67,7 @@ async def wait_until_unavailable(http: httpx2.AsyncClient, expected: set[str]) -
             await asyncio.sleep(0.05)
 
 
-async def test_what_is_away_is_named_and_what_is_back_is_not(
+async def test_readyz_names_unavailable_backends_until_they_recover(
     tmp_path: Path, database: ServerProcess, broker: ServerProcess
 ) -> None:
     settings = Settings(
@@ -88,17 +90,17 @@ async def test_what_is_away_is_named_and_what_is_back_is_not(
         assert await list_unavailable(http) == ["the library"]
 
 
-async def test_only_what_is_needed_is_asked(tmp_path: Path, database: ServerProcess) -> None:
+async def test_only_dependencies_are_checked(tmp_path: Path, database: ServerProcess) -> None:
     database.kill()
     try:
-        away_for_good = f"postgresql://postgres@127.0.0.1:{database.port}/postgres"
-        async with open_client(Settings(data=tmp_path, catalogue=away_for_good), "bus", "library") as (http, _):
+        unavailable_url = f"postgresql://postgres@127.0.0.1:{database.port}/postgres"
+        async with open_client(Settings(data=tmp_path, catalogue=unavailable_url), "bus", "library") as (http, _):
             assert await list_unavailable(http) == []
     finally:
         database.start()
 
 
-async def test_what_is_still_prepared_is_waited_for(tmp_path: Path) -> None:
+async def test_pending_preparation_is_not_ready(tmp_path: Path) -> None:
     async with open_client(Settings(data=tmp_path)) as (http, state):
         state.pending_preparations.add("the demo's stage")
         assert await list_unavailable(http) == ["the demo's stage"]

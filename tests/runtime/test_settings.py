@@ -11,7 +11,7 @@ from bunraku.runtime.settings import Settings
 from tests.conftest import REPOSITORY
 
 
-def test_defaults_are_in_the_data_folder_and_the_environment_overrides(
+def test_defaults_lie_in_the_data_folder_and_environment_overrides(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = Settings(data=tmp_path)
@@ -21,39 +21,39 @@ def test_defaults_are_in_the_data_folder_and_the_environment_overrides(
     assert Settings(data=tmp_path).library_url() == "s3://bucket/motions"
 
 
-def test_each_is_in_the_documentation_with_its_default() -> None:
+def test_each_setting_is_documented_with_its_default() -> None:
     rows = re.findall(
-        r"^\| (`BUNRAKU_.*?) \| (.*?) \|", (REPOSITORY / "docs" / "settings.md").read_text(), re.MULTILINE
+        r"^\| (`BUNRAKU_.*?) \| (.*?) \|", (REPOSITORY / "docs" / "operations.md").read_text(), re.MULTILINE
     )
-    said: dict[str, str] = {}
+    documented: dict[str, str] = {}
     for names, defaults in rows:
         variables = re.findall(r"`(BUNRAKU_\w+)`", names)
         values = [defaults.strip("`")] if len(variables) == 1 else defaults.split(", ")
-        said.update(zip(variables, values, strict=True))
+        documented.update(zip(variables, values, strict=True))
     fields = {f"BUNRAKU_{name.upper()}": field.default for name, field in Settings.model_fields.items()}
-    assert set(said) == set(fields)
+    assert set(documented) == set(fields)
     for variable, default in fields.items():
         if isinstance(default, int | float):
-            assert float(said[variable]) == default, variable
+            assert float(documented[variable]) == default, variable
         elif str(default):
-            assert said[variable] == str(default), variable
+            assert documented[variable] == str(default), variable
 
 
-def test_as_many_servers_keep_the_register_as_can_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_register_replicas_are_limited_to_five(monkeypatch: pytest.MonkeyPatch) -> None:
     assert Settings().register_replicas == 1
     monkeypatch.setenv("BUNRAKU_REGISTER_REPLICAS", "3")
     assert Settings().register_replicas == 3
-    # JetStream has five at most
-    for wrong in ("0", "6"):
-        monkeypatch.setenv("BUNRAKU_REGISTER_REPLICAS", wrong)
+    # the limit of JetStream
+    for invalid in ("0", "6"):
+        monkeypatch.setenv("BUNRAKU_REGISTER_REPLICAS", invalid)
         with pytest.raises(ValidationError):
             Settings()
 
 
-def test_what_is_told_of_a_process_is_set_by_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_log_and_metrics_settings_ignore_case_and_empty_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = Settings(data=tmp_path)
     assert (settings.metrics, settings.logs, settings.log_level) == ("", "plain", "")
-    # as compose sets what is not given
+    # Compose sets variables without a value to the empty string
     for name in ("METRICS", "LOGS", "LOG_LEVEL"):
         monkeypatch.setenv(f"BUNRAKU_{name}", "")
     settings = Settings(data=tmp_path)
@@ -65,17 +65,17 @@ def test_what_is_told_of_a_process_is_set_by_words(tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "says"),
+    ("name", "value", "message"),
     [
-        ("METRICS", "9100", "metrics are at host:port, 127.0.0.1:9100 say"),
+        ("METRICS", "9100", "expected host:port, for example 127.0.0.1:9100"),
         ("LOGS", "xml", "'plain' or 'json'"),
         ("LOG_LEVEL", "loud", "'warning' or 'error'"),
     ],
 )
-def test_what_is_no_such_word_is_refused_with_what_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, value: str, says: str
+def test_invalid_value_is_rejected_with_the_valid_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, value: str, message: str
 ) -> None:
     monkeypatch.setenv(f"BUNRAKU_{name}", value)
-    with pytest.raises(ValueError, match=says) as refused:
+    with pytest.raises(ValueError, match=message) as raised:
         Settings(data=tmp_path)
-    assert name in describe_setting_error(refused.value)
+    assert name in describe_setting_error(raised.value)

@@ -111,7 +111,7 @@ async def test_a_dance_is_decoded_once_for_all_stages_and_forgotten_with_the_las
         decoded += 1
         return decode_motion_block(track, data)
 
-    monkeypatch.setattr(poses_module, "decode_block", counted)
+    monkeypatch.setattr(poses_module, "decode_motion_block", counted)
     timelines = TimelineHistory()
     timelines.put(timeline.start("one", motion.first_track.duration_us, 0))
     stages = [PoseCache(motion, timelines) for _ in range(5)]
@@ -127,7 +127,7 @@ async def test_a_dance_is_decoded_once_for_all_stages_and_forgotten_with_the_las
     assert shared_block_store(motion.first_track).level(0) == -1
 
 
-async def test_all_who_perform_have_poses_also_where_one_dances_longer_or_shorter_than_the_motion() -> None:
+async def test_tracks_longer_or_shorter_than_the_motion_have_poses() -> None:
     track = MOTIONS["both"].first_track
     for name, other in (("both", "two"), ("longer", "one")):
         motion = MOTIONS[name]

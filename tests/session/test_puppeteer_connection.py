@@ -15,7 +15,7 @@ def test_a_second_of_messages_may_come_at_once_and_then_as_fast_as_time_passes()
     assert sum(one.may_send(now + 10**8) for _ in range(10_000)) == MAX_MESSAGES_PER_S
 
 
-def test_one_who_does_not_listen_is_marked() -> None:
+def test_full_send_queue_marks_the_connection_overrun() -> None:
     one = PuppeteerConnection()
     for _ in range(MAX_QUEUED_MESSAGES):
         one.send(b"x")
@@ -33,7 +33,7 @@ def test_a_message_of_no_bytes_says_that_the_stage_knows_them_no_more() -> None:
     assert (one.is_unknown, list(one.queued)) == (True, [b"x"])
 
 
-def test_what_was_dropped_is_told_of() -> None:
+def test_dropped_input_sends_a_notice() -> None:
     one = PuppeteerConnection()
     for now in (5, 6):
         one.send_notice(2, "rate", now)

@@ -9,8 +9,8 @@ import pytest
 
 from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
-from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import session_manager
 from bunraku.session.puppeteer_connection import PuppeteerConnection

@@ -24,7 +24,7 @@ from bunraku.playout.timeline import position_at
 from bunraku.runtime.clock import clock
 from bunraku.session import puppeteer_roster
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
-from bunraku.session.stage import EDIT_LEAD_US, FRAME_INTERVAL_US, FRAMES_PER_MESSAGE, Stage, make_marionettes
+from bunraku.session.stage import EDIT_LEAD_US, FRAME_INTERVAL_US, FRAMES_PER_MESSAGE, SessionStart, Stage
 from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import (
     Alive,
@@ -93,7 +93,7 @@ async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
     await asyncio.to_thread(motion_decoder.warm_up)
     motion = await stored_motion("one", 5)
     state = timeline.start("one", motion.first_track.duration_us, clock())
-    opened = Stage("s", motion, make_marionettes(motion), bus, state, state.clock)
+    opened = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
     yield opened
     await opened.close()
 
@@ -187,7 +187,7 @@ async def test_colours_are_given_in_order_and_again_when_free(stage: Stage) -> N
     assert join_stage(stage, "new").puppeteer.colour == 2
 
 
-async def test_a_stage_is_full_some_day(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_join_beyond_the_maximum_raises_session_full(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 2)
     join_stage(stage, "a")
     join_stage(stage, "b")
@@ -208,7 +208,7 @@ async def test_presence_counts_viewers_of_all_replicas(bus: MemoryBus) -> None:
     assert counts == [3, 2, 3]
 
 
-async def test_an_asked_limb_goes_to_who_asked_when_it_is_let_go(stage: Stage, bus: MemoryBus) -> None:
+async def test_released_limb_is_granted_to_the_first_who_asked(stage: Stage, bus: MemoryBus) -> None:
     audience = StageMessages(bus)
     aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
     stage.receive(aiko.puppeteer, Claim(1))
@@ -227,12 +227,12 @@ async def test_an_asked_limb_goes_to_who_asked_when_it_is_let_go(stage: Stage, b
 
 
 @pytest.mark.parametrize("said", [Alive([0]), Input(0, Input.TARGET, 1, 5, 0, (0.1, 0.0, 0.0))])
-async def test_who_missed_that_a_limb_was_lost_is_told_again(stage: Stage, said: Alive | Input) -> None:
+async def test_refusal_is_repeated_to_a_puppeteer_of_a_lost_limb(stage: Stage, said: Alive | Input) -> None:
     aiko = join_stage(stage, "Aiko")
     ben = join_stage(stage, "Ben")
     stage.receive(aiko.puppeteer, Claim(0))
     # it is taken from her while nothing can be said
-    stage._marionettes.release(0, aiko.id, last_grant(aiko).epoch, clock())
+    stage._ownership.release(0, aiko.id, last_grant(aiko).epoch, clock())
     for _ in range(5):
         stage.receive(aiko.puppeteer, said)
         stage.receive(ben.puppeteer, said)
@@ -244,7 +244,7 @@ async def test_who_missed_that_a_limb_was_lost_is_told_again(stage: Stage, said:
     assert not [m for m in map(unpack, aiko.received[told:]) if isinstance(m, Refusal)]
 
 
-async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(stage: Stage) -> None:
+async def test_notices_are_sent_once_a_second(stage: Stage) -> None:
     aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
     stage.receive(aiko.puppeteer, Claim(0))
     epoch = last_grant(aiko).epoch
@@ -261,7 +261,7 @@ async def test_inputs_that_are_not_taken_as_they_come_are_told_of_once_a_second(
 async def test_the_limbs_of_all_performers_are_pulled_and_one_message_tells_of_them(bus: MemoryBus) -> None:
     motion, audience = MOTIONS["both"], StageMessages(bus)
     state = timeline.start("both", motion.first_track.duration_us, clock())
-    stage = Stage("s", motion, make_marionettes(motion), bus, state, state.clock)
+    stage = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
     aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
     stage.receive(aiko.puppeteer, Claim(1))
     stage.receive(ben.puppeteer, Claim(6))
@@ -337,7 +337,7 @@ async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -
     assert {due: again.get(due) or {} for due in shown} == shown
 
 
-async def test_a_holder_whom_a_stalled_server_could_not_hear_keeps_the_limb(stage: Stage, bus: MemoryBus) -> None:
+async def test_limb_stays_held_during_a_server_stall(stage: Stage, bus: MemoryBus) -> None:
     audience = StageMessages(bus)
     aiko = join_stage(stage, "Aiko")
     stage.receive(aiko.puppeteer, Claim(0))

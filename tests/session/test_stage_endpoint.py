@@ -9,15 +9,14 @@ import pytest
 
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
-from bunraku.http.problem_details import ProblemError
 from bunraku.playout import timeline
-from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
 from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
-from bunraku.session.stage import Stage, make_marionettes
+from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.wire.messages import Claim
@@ -58,8 +57,8 @@ def owner() -> FakeStageOwner:
 async def door(backing: ServiceContext, owner: FakeStageOwner) -> AsyncIterator[StageEndpoint]:
     stored = await backing.motion_store.get("one")
     assert stored is not None
-    state = timeline.start("one", stored.first_track.duration_us, clock())
-    stage = Stage("s", stored, make_marionettes(stored), backing.bus, state, state.clock)
+    state = timeline.start("one", stored.first_track.duration_us, backing.clock())
+    stage = Stage(SessionStart("s", stored, state, state.clock), backing.bus, backing.clock)
     opened = StageEndpoint(stage, backing, owner, 1)
     yield opened
     await opened.close()
@@ -84,7 +83,7 @@ async def test_an_edit_is_noted_before_it_is_acknowledged(
 
 
 @pytest.mark.usefixtures("door")
-async def test_a_full_stage_says_so(backing: ServiceContext, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_join_of_a_full_stage_gives_503(backing: ServiceContext, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 1)
     await join_stage(backing, "a")
     with pytest.raises(ProblemError, match="1 puppeteers are here") as refused:
@@ -93,7 +92,7 @@ async def test_a_full_stage_says_so(backing: ServiceContext, monkeypatch: pytest
 
 
 @pytest.mark.usefixtures("door")
-async def test_one_whom_the_stage_does_not_know_is_told_so(backing: ServiceContext) -> None:
+async def test_unknown_puppeteer_is_notified(backing: ServiceContext) -> None:
     stage, visitor = StageProxy("s", backing.bus, backing.key_values), PuppeteerConnection()
     backing.bus.subscribe(stage.outgoing_subject(visitor), visitor.send)
     stage.send(visitor, None)
@@ -102,7 +101,7 @@ async def test_one_whom_the_stage_does_not_know_is_told_so(backing: ServiceConte
     assert visitor.is_unknown
 
 
-async def test_those_whose_replica_died_leave_and_the_others_stay(backing: ServiceContext, door: StageEndpoint) -> None:
+async def test_puppeteer_of_a_dead_replica_is_removed(backing: ServiceContext, door: StageEndpoint) -> None:
     stage, dead = await join_stage(backing, "dead")
     _, here = await join_stage(backing, "here")
     stage.send(dead, Claim(0).pack())

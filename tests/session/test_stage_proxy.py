@@ -3,30 +3,30 @@ from __future__ import annotations
 import msgpack
 import pytest
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.messaging.bus import MemoryBus
 from bunraku.messaging.key_value import MemoryKeyValueStore
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage_proxy import StageProxy
 
 
 @pytest.mark.parametrize("session", ["", "*", ">", "a.b", "a b", "../x", "é", "a" * 65, "a\n"])
-async def test_what_cannot_be_a_session_is_not_even_asked_for(monkeypatch: pytest.MonkeyPatch, session: str) -> None:
+async def test_invalid_session_id_sends_no_request(monkeypatch: pytest.MonkeyPatch, session: str) -> None:
     bus, asked = MemoryBus(), []
 
     async def ask(subject: str, *_: object) -> bytes:
         asked.append(subject)
         return b""
 
-    monkeypatch.setattr(bus, "ask", ask)
+    monkeypatch.setattr(bus, "request", ask)
     with pytest.raises(ProblemError) as refused:
         await StageProxy(session, bus, MemoryKeyValueStore()).end()
     assert refused.value.status == 404
     assert asked == []
 
 
-async def test_where_nobody_answers_the_register_tells_whether_to_come_again() -> None:
+async def test_no_response_gives_404_or_503_by_the_session_record() -> None:
     register = MemoryKeyValueStore()
     stage = StageProxy("s", MemoryBus(), register)
     with pytest.raises(ProblemError) as refused:
@@ -38,7 +38,7 @@ async def test_where_nobody_answers_the_register_tells_whether_to_come_again() -
     assert (refused.value.status, refused.value.extra) == (503, {"hint": "try again in a second"})
 
 
-async def test_questions_and_answers_are_plain_values() -> None:
+async def test_requests_and_responses_are_plain_values() -> None:
     bus, asked = MemoryBus(), []
 
     async def answer(question: bytes) -> bytes:
@@ -61,7 +61,7 @@ async def test_questions_and_answers_are_plain_values() -> None:
     assert refused.value.extra == {"field": "x"}
 
 
-async def test_what_a_puppeteer_says_goes_to_the_stage_in_order() -> None:
+async def test_messages_of_a_puppeteer_are_published_in_order() -> None:
     bus, said = MemoryBus(), []
     bus.subscribe("session.s.said", lambda message: said.append(msgpack.unpackb(message)))
     stage, visitor = StageProxy("s", bus, MemoryKeyValueStore()), PuppeteerConnection()

@@ -1,4 +1,4 @@
-"""Servers that the tests of one process share: a bus, and places for new catalogues in SQLite and in PostgreSQL."""
+"""Databases for new catalogues, in SQLite and on a PostgreSQL server shared by the tests of one process."""
 
 from __future__ import annotations
 
@@ -10,21 +10,14 @@ from pathlib import Path
 import asyncpg
 import pytest
 
-from tests.processes import ServerProcess, nats_url_of, run_jetstream, run_postgres
+from tests.processes import ServerProcess, run_postgres
 
 
 @pytest.fixture(scope="session")
 def postgres_server() -> Iterator[ServerProcess]:
-    """A server that the tests of one process share."""
+    """Return a running PostgreSQL server."""
     with run_postgres() as server:
         yield server
-
-
-@pytest.fixture(scope="session")
-def nats_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a nats-server with JetStream."""
-    with run_jetstream(tmp_path_factory.mktemp("nats")) as server:
-        yield nats_url_of(server)
 
 
 async def _create_database(port: int, name: str) -> None:
@@ -34,7 +27,7 @@ async def _create_database(port: int, name: str) -> None:
 
 
 def create_database(server: ServerProcess) -> str:
-    """The address of a new, empty database."""
+    """Create an empty database and return its URL."""
     name = f"c{secrets.token_hex(6)}"
     asyncio.run(_create_database(server.port, name))
     return f"postgresql://postgres@127.0.0.1:{server.port}/{name}"
@@ -42,14 +35,14 @@ def create_database(server: ServerProcess) -> str:
 
 @pytest.fixture
 def postgres_url(postgres_server: ServerProcess) -> str:
-    """The address of a new, empty database in PostgreSQL."""
+    """Return the URL of a new, empty PostgreSQL database."""
     return create_database(postgres_server)
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
 def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """The address of a catalogue that is not there yet."""
+    """Return the URL of a catalogue that does not exist yet."""
     if request.param == "sqlite":
         return f"sqlite:///{tmp_path}/catalogue.sqlite"
-    found: str = request.getfixturevalue("postgres_url")
-    return found
+    url: str = request.getfixturevalue("postgres_url")
+    return url

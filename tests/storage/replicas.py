@@ -1,6 +1,6 @@
-"""Several processes that open a catalogue at the same instant: `python -m tests.storage.replicas URL COUNT`.
+"""Open a catalogue in several processes at the same instant: `python -m tests.storage.replicas URL COUNT`.
 
-Each prints OK, or what went wrong.
+Each process prints OK or its traceback.
 """
 
 from __future__ import annotations
@@ -10,42 +10,42 @@ import os
 import sys
 import traceback
 
-# loaded once, before the processes part
+# imported once, before the forks
 import alembic.command  # noqa: F401
 import asyncpg  # noqa: F401
 
-from bunraku.storage.catalogue import CatalogueEntry
 from bunraku.storage.catalogue_sql import SqlCatalogue
+from bunraku.storage.record import CatalogueEntry
 
 
 async def open_and_write(url: str, number: int) -> None:
-    """Open the catalogue and use it."""
+    """Open the catalogue and add a motion."""
     catalogue = await SqlCatalogue.open(url)
     assert await catalogue.add_motion(CatalogueEntry(f"m{number}", number, {}))
     await catalogue.close()
 
 
 def main() -> None:
-    """Part, wait for the signal, open."""
+    """Fork the processes and start them at the same instant."""
     url, count = sys.argv[1], int(sys.argv[2])
-    reading, writing = os.pipe()
+    read_end, write_end = os.pipe()
     children = []
     for number in range(count):
         child = os.fork()
         if child == 0:
-            os.close(writing)
-            # all go on when the other end is closed
-            os.read(reading, 1)
+            os.close(write_end)
+            # returns in all processes when the other end is closed
+            os.read(read_end, 1)
             try:
                 asyncio.run(open_and_write(url, number))
-                told = "OK"
+                outcome = "OK"
             except BaseException:
-                told = traceback.format_exc().replace("\n", "; ")
-            # at once, so that no other comes between a line and its end
-            os.write(1, f"{told}\n".encode())
+                outcome = traceback.format_exc().replace("\n", "; ")
+            # a single write, so that lines of processes do not mix
+            os.write(1, f"{outcome}\n".encode())
             os._exit(0)
         children.append(child)
-    os.close(writing)
+    os.close(write_end)
     for child in children:
         os.waitpid(child, 0)
 

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.storage.catalogue import Catalogue, CatalogueEntry
+from bunraku.storage.catalogue import Catalogue
+from bunraku.storage.record import CatalogueEntry
 
 
-async def test_it_opens_once_at_its_first_use(url: str) -> None:
+async def test_concurrent_first_uses_open_once(url: str) -> None:
     catalogue = Catalogue(url)
     first, second = await asyncio.gather(catalogue.open(), catalogue.open())
     assert first is second
@@ -20,12 +21,12 @@ async def test_it_opens_once_at_its_first_use(url: str) -> None:
     await catalogue.close()
 
 
-async def test_one_that_was_never_used_closes_too(tmp_path: Path) -> None:
+async def test_unused_catalogue_closes_without_opening(tmp_path: Path) -> None:
     await Catalogue(f"sqlite:///{tmp_path}/c.sqlite").close()
     assert not (tmp_path / "c.sqlite").exists()
 
 
-async def test_after_a_failure_it_tries_again(tmp_path: Path) -> None:
+async def test_failed_open_is_tried_again(tmp_path: Path) -> None:
     catalogue = Catalogue(f"sqlite:///{tmp_path}/missing/c.sqlite")
     with pytest.raises(BackendUnavailable, match="unable to open"):
         await catalogue.get_motion("m1")
@@ -34,6 +35,6 @@ async def test_after_a_failure_it_tries_again(tmp_path: Path) -> None:
     await catalogue.close()
 
 
-def test_a_strange_address_is_refused() -> None:
+def test_unknown_url_scheme_is_rejected() -> None:
     with pytest.raises(ValueError, match="sqlite"):
         Catalogue("mysql://somewhere")

@@ -1,4 +1,4 @@
-"""The catalogue when PostgreSQL is away, stands still, or somebody else writes to SQLite."""
+"""Catalogue while PostgreSQL is down or suspended, or SQLite is locked."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from fastapi import FastAPI
 
 from bunraku.http import problem_details
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.storage.catalogue import Catalogue, CatalogueEntry
+from bunraku.storage.catalogue import Catalogue
+from bunraku.storage.record import CatalogueEntry
 from tests.processes import ServerProcess
 from tests.storage.conftest import create_database
 
@@ -22,7 +23,7 @@ ENTRY = CatalogueEntry("m1", 1, {"name": "a dance"})
 
 @pytest.fixture
 def server(postgres_server: ServerProcess) -> Iterator[ServerProcess]:
-    """The server, and it is there again afterwards."""
+    """Return the shared server, and restart it afterwards."""
     yield postgres_server
     postgres_server.stop()
     postgres_server.start()
@@ -56,12 +57,12 @@ async def wait_until_available(catalogue: Catalogue) -> None:
                 break
             except BackendUnavailable:
                 await asyncio.sleep(0.05)
-    # and every connection of the pool does
+    # so does every connection of the pool
     assert await asyncio.gather(*(catalogue.get_motion("m1") for _ in range(20))) == [ENTRY] * 20
     assert await catalogue.add_motion(CatalogueEntry("m3", 3, {}))
 
 
-async def test_it_works_again_when_a_killed_server_is_back(server: ServerProcess, catalogue: Catalogue) -> None:
+async def test_catalogue_recovers_after_a_server_crash(server: ServerProcess, catalogue: Catalogue) -> None:
     await asyncio.gather(*(catalogue.get_motion("m1") for _ in range(10)))
     server.kill()
     await assert_unavailable(catalogue)
@@ -69,19 +70,19 @@ async def test_it_works_again_when_a_killed_server_is_back(server: ServerProcess
     await wait_until_available(catalogue)
 
 
-async def test_a_server_that_stands_still_is_not_waited_for(server: ServerProcess, catalogue: Catalogue) -> None:
+async def test_suspended_server_is_unavailable_until_resumed(server: ServerProcess, catalogue: Catalogue) -> None:
     await asyncio.gather(*(catalogue.get_motion("m1") for _ in range(3)))
     server.pause()
     try:
         async with asyncio.timeout(30):
-            told = await asyncio.gather(*(catalogue.get_motion("m1") for _ in range(30)), return_exceptions=True)
+            outcomes = await asyncio.gather(*(catalogue.get_motion("m1") for _ in range(30)), return_exceptions=True)
     finally:
         server.resume()
-    assert all(isinstance(error, BackendUnavailable) for error in told)
+    assert all(isinstance(error, BackendUnavailable) for error in outcomes)
     await wait_until_available(catalogue)
 
 
-async def test_it_opens_when_the_server_comes(server: ServerProcess) -> None:
+async def test_catalogue_opens_when_the_server_starts(server: ServerProcess) -> None:
     catalogue = Catalogue(await asyncio.to_thread(create_database, server))
     server.stop()
     await assert_unavailable(catalogue)
@@ -90,14 +91,14 @@ async def test_it_opens_when_the_server_comes(server: ServerProcess) -> None:
     await catalogue.close()
 
 
-async def test_a_database_that_is_not_there_is_said(server: ServerProcess) -> None:
+async def test_missing_database_is_named(server: ServerProcess) -> None:
     catalogue = Catalogue(f"postgresql://postgres@127.0.0.1:{server.port}/nowhere")
     with pytest.raises(BackendUnavailable, match="nowhere"):
         await catalogue.get_motion("m1")
     await catalogue.close()
 
 
-async def test_over_http_it_is_a_503_that_may_be_tried_again(server: ServerProcess, catalogue: Catalogue) -> None:
+async def test_outage_is_a_503_with_retry_after(server: ServerProcess, catalogue: Catalogue) -> None:
     app = FastAPI()
     problem_details.install_problem_handlers(app)
 
@@ -108,16 +109,16 @@ async def test_over_http_it_is_a_503_that_may_be_tried_again(server: ServerProce
     async with httpx2.AsyncClient(transport=httpx2.ASGITransport(app), base_url="http://stage") as http:
         assert (await http.get("/")).json() == 1
         server.kill()
-        answer = await http.get("/")
-        assert answer.status_code == 503
-        assert answer.headers["retry-after"]
-        assert str(server.port) not in answer.text
+        response = await http.get("/")
+        assert response.status_code == 503
+        assert response.headers["retry-after"]
+        assert str(server.port) not in response.text
         server.start()
         await wait_until_available(catalogue)
         assert (await http.get("/")).json() == 2
 
 
-async def test_sqlite_that_others_write_to_for_long_is_unavailable(tmp_path: Path) -> None:
+async def test_locked_sqlite_is_unavailable(tmp_path: Path) -> None:
     catalogue = Catalogue(f"sqlite:///{tmp_path}/c.sqlite?timeout=0.05")
     assert await catalogue.add_motion(ENTRY)
     other = sqlite3.connect(tmp_path / "c.sqlite")

@@ -1,4 +1,4 @@
-"""Objects in a folder and in S3, of which a real server process is asked."""
+"""Objects in a folder and on a real S3 server."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from tests.vectors.blocks import random_motion
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
-    with run_s3_server(tmp_path_factory.mktemp("s3")) as owned:
-        yield owned
+    with run_s3_server(tmp_path_factory.mktemp("s3")) as process:
+        yield process
 
 
 @pytest.fixture
 def s3(server: ServerProcess, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The address of a new bucket."""
+    """Return the URL of a new bucket."""
     endpoint = f"http://127.0.0.1:{server.port}"
     for name, value in {
         "AWS_ENDPOINT_URL": endpoint,
@@ -42,24 +42,24 @@ def s3(server: ServerProcess, monkeypatch: pytest.MonkeyPatch) -> str:
 
 @pytest.fixture(params=["file", "s3"])
 def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    found: str = f"file://{tmp_path}/objects" if request.param == "file" else request.getfixturevalue("s3")
-    return found
+    url: str = f"file://{tmp_path}/objects" if request.param == "file" else request.getfixturevalue("s3")
+    return url
 
 
 @pytest.mark.parametrize("size", [0, 1, 3_000_000])
-async def test_what_was_put_is_there_until_it_is_removed(url: str, size: int) -> None:
+async def test_object_exists_until_it_is_deleted(url: str, size: int) -> None:
     data = secrets.token_bytes(size)
     await ObjectStorage(url).put("some/object", data)
-    again = ObjectStorage(url)
-    assert await again.get("some/object") == data
-    await again.put("some/object", b"other")
-    assert await again.get("some/object") == b"other"
-    await again.delete("some/object")
-    await again.delete("some/object")
-    assert await again.get("some/object") is None
+    reopened = ObjectStorage(url)
+    assert await reopened.get("some/object") == data
+    await reopened.put("some/object", b"other")
+    assert await reopened.get("some/object") == b"other"
+    await reopened.delete("some/object")
+    await reopened.delete("some/object")
+    assert await reopened.get("some/object") is None
 
 
-async def test_a_library_keeps_motions_and_logs(url: str) -> None:
+async def test_motion_store_stores_motions_and_logs(url: str) -> None:
     encoded = encode_motion(random_motion(1.5, 30.0, 8), error_bounds_mm=(30.0,), grade="live")
     await MotionStore.open(url).put("m1", pack_motion("m1", encoded))
     library = MotionStore.open(url)
@@ -85,7 +85,7 @@ async def assert_unavailable(objects: ObjectStorage) -> None:
         await objects.delete("object")
 
 
-async def test_a_server_that_stands_still_is_not_waited_for(server: ServerProcess, s3: str) -> None:
+async def test_suspended_server_is_unavailable_until_resumed(server: ServerProcess, s3: str) -> None:
     objects = ObjectStorage(s3)
     await objects.put("kept", b"data")
     server.pause()
@@ -97,31 +97,31 @@ async def test_a_server_that_stands_still_is_not_waited_for(server: ServerProces
 
 
 @pytest.mark.usefixtures("s3")
-async def test_a_server_that_is_gone_is_unavailable_and_what_is_in_memory_is_there(tmp_path: Path) -> None:
-    with run_s3_server(tmp_path) as other, pytest.MonkeyPatch.context() as patch:
-        endpoint = f"http://127.0.0.1:{other.port}"
+async def test_killed_server_is_unavailable_but_cached_motions_are_served(tmp_path: Path) -> None:
+    with run_s3_server(tmp_path) as other_server, pytest.MonkeyPatch.context() as patch:
+        endpoint = f"http://127.0.0.1:{other_server.port}"
         patch.setenv("AWS_ENDPOINT_URL", endpoint)
         httpx2.put(f"{endpoint}/bucket").raise_for_status()
         objects, library = ObjectStorage("s3://bucket"), MotionStore.open("s3://bucket")
         encoded = encode_motion(random_motion(1.5, 30.0, 8), error_bounds_mm=(30.0,), grade="live")
         await library.put("m1", pack_motion("m1", encoded))
         assert await library.get("m1") is not None
-        other.kill()
+        other_server.kill()
         await assert_unavailable(objects)
         assert await library.get("m1") is not None
-        other.start()
+        other_server.start()
         httpx2.put(f"{endpoint}/bucket").raise_for_status()
         await objects.put("object", b"data")
         assert await objects.get("object") == b"data"
 
 
 @pytest.mark.usefixtures("s3")
-async def test_a_bucket_that_is_not_there_takes_nothing() -> None:
+async def test_missing_bucket_is_unavailable() -> None:
     with pytest.raises(BackendUnavailable, match="nowhere"):
         await ObjectStorage("s3://nowhere").put("object", b"data")
 
 
 @pytest.mark.parametrize("url", ["carrier-pigeon://loft", "s3", ""])
-def test_what_is_no_address_is_refused(url: str) -> None:
+def test_invalid_url_is_rejected(url: str) -> None:
     with pytest.raises(Exception, match=r"(?i)url|scheme"):
         ObjectStorage(url)

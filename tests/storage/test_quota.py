@@ -10,8 +10,8 @@ from sqlalchemy import text
 from sqlalchemy.ext.asyncio import create_async_engine
 
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.storage.catalogue import CatalogueEntry, Quota, QuotaExceeded
 from bunraku.storage.catalogue_sql import SqlCatalogue
+from bunraku.storage.record import CatalogueEntry, Quota, QuotaExceeded
 
 
 def make_entry(name: str, subject: str = "aiko", size: int = 10) -> CatalogueEntry:
@@ -19,26 +19,26 @@ def make_entry(name: str, subject: str = "aiko", size: int = 10) -> CatalogueEnt
 
 
 @pytest.mark.parametrize(
-    ("quota", "why"),
+    ("quota", "message"),
     [
-        (Quota(max_motions=2), "you may keep 2 motions"),
-        (Quota(max_bytes=20), "you may keep 20 bytes"),
-        (Quota(max_total_motions=3), "this server keeps 3 motions"),
-        (Quota(max_total_bytes=30), "this server keeps 30 bytes"),
+        (Quota(max_motions=2), "you may store at most 2 motions"),
+        (Quota(max_bytes=20), "you may store at most 20 bytes"),
+        (Quota(max_total_motions=3), "this server stores at most 3 motions"),
+        (Quota(max_total_bytes=30), "this server stores at most 30 bytes"),
     ],
 )
-async def test_one_too_many_is_refused_and_not_there(url: str, quota: Quota, why: str) -> None:
+async def test_motion_beyond_the_quota_is_not_added(url: str, quota: Quota, message: str) -> None:
     catalogue = await SqlCatalogue.open(url)
     assert await catalogue.add_motion(make_entry("b1", "ben"), quota)
     assert await catalogue.add_motion(make_entry("a1"), quota)
     await catalogue.check_quota("aiko", quota)
     assert await catalogue.add_motion(make_entry("a2"), quota)
-    with pytest.raises(QuotaExceeded, match=why):
+    with pytest.raises(QuotaExceeded, match=message):
         await catalogue.add_motion(make_entry("a3"), quota)
-    with pytest.raises(QuotaExceeded, match=why):
+    with pytest.raises(QuotaExceeded, match=message):
         await catalogue.check_quota("aiko", quota)
     assert await catalogue.get_motion("a3") is None
-    # what is known is no more than it was
+    # a known motion does not count twice
     assert not await catalogue.add_motion(make_entry("a2"), quota)
     assert await catalogue.remove_motion("a1")
     assert await catalogue.add_motion(make_entry("a3"), quota)
@@ -46,11 +46,11 @@ async def test_one_too_many_is_refused_and_not_there(url: str, quota: Quota, why
     await catalogue.close()
 
 
-async def test_of_many_at_once_no_more_get_in_than_may(url: str) -> None:
+async def test_concurrent_adds_do_not_exceed_the_quota(url: str) -> None:
     replicas = [await SqlCatalogue.open(url) for _ in range(3)]
 
     async def add(number: int) -> None:
-        # of so many at once, some are told by a slow database that there was no answer in time, and come again
+        # under this load a slow database may exceed the time limit: try again
         with suppress(QuotaExceeded):
             while True:
                 with suppress(BackendUnavailable):
@@ -63,7 +63,7 @@ async def test_of_many_at_once_no_more_get_in_than_may(url: str) -> None:
         await catalogue.close()
 
 
-async def test_a_replica_of_before_goes_on_beside_this_one(url: str) -> None:
+async def test_rows_of_an_older_replica_are_counted(url: str) -> None:
     catalogue = await SqlCatalogue.open(url)
     engine = create_async_engine(
         url.replace("sqlite:", "sqlite+aiosqlite:").replace("postgresql:", "postgresql+asyncpg:")

@@ -1,4 +1,4 @@
-"""A line for tests: a transport that keeps what is written, and can be without room."""
+"""Transport for tests that keeps the written data and can be made unwritable."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bunraku.wire.messages import Message, unpack
 
 
 class FakeTransport(asyncio.Transport):
-    """What reached the other end, and what waits while there is no room."""
+    """Transport with `sent` and `unsent` data; while it has no capacity, writes stay unsent."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -44,7 +44,7 @@ class FakeTransport(asyncio.Transport):
             self.protocol.pause_writing()
 
     def drain(self) -> None:
-        """There is room again, and what waited is gone."""
+        """Restore the capacity and send the unsent data."""
         self.has_capacity = True
         self.sent, self.unsent = self.sent + self.unsent, b""
         self.protocol.resume_writing()
@@ -60,12 +60,12 @@ class FakeTransport(asyncio.Transport):
 
     @property
     def messages(self) -> list[Message | None]:
-        """The messages that reached the other end."""
+        """Messages that were sent."""
         return [unpack(payload) for opcode, payload in parse_frames(self.sent) if opcode == 2]
 
 
 def parse_frames(data: bytes) -> list[tuple[int, bytes]]:
-    """A server's whole frames: opcode and payload."""
+    """Return opcode and payload of each frame of a server."""
     found, at = [], 0
     while at < len(data):
         size, body = data[at + 1], at + 2

@@ -1,4 +1,4 @@
-"""A flow over a virtual line."""
+"""Flow control over a simulated link."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tests.delivery.virtual_link import VirtualLink
 
 
 class SimulatedSender:
-    """A flow over a virtual line, and its time."""
+    """Flow control over a simulated link, in virtual time."""
 
     def __init__(self, rate: float, delay: int) -> None:
         self.at = 0

@@ -1,4 +1,4 @@
-"""Viewers in step, for tests: what they watch, those they are among, and one whose turns are taken by the test."""
+"""Viewers of a session for tests of synchronised groups; the test runs their ticks."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from bunraku.codec.container import StoredMotion, add_audio_track, pack_motion, 
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.opus import encode_audio
-from bunraku.stream.block_batch import BlockBatchCache
+from bunraku.runtime.clock import clock
+from bunraku.stream.context import StreamContext
 from bunraku.stream.sync_group import SyncGroups
-from bunraku.stream.tick_scheduler import TickScheduler
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.wire.messages import Data, TimelineState
 from tests.stream.fake_transport import FakeTransport
@@ -18,21 +18,28 @@ from tests.vectors.blocks import random_motion
 from tests.vectors.scene import sample_camera
 
 
-def motion_with_camera_and_audio(seconds: float, filmed_seconds: float, heard_seconds: float) -> StoredMotion:
-    """A dance of two rates, with a camera and a sound that are shorter."""
+def motion_with_camera_and_audio(seconds: float, camera_seconds: float, audio_seconds: float) -> StoredMotion:
+    """Return a motion of two levels, with a shorter camera track and audio."""
     encoded = encode_motion(random_motion(seconds, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
-    scene = encode_scene(sample_camera(filmed_seconds, 25.0), error_bounds_mm=(20.0, 4.0))
+    scene = encode_scene(sample_camera(camera_seconds, 25.0), error_bounds_mm=(20.0, 4.0))
     motion = unpack_motion("m", pack_motion("m", encoded, [scene]))
-    noise = np.random.default_rng(2).normal(0, 0.2, (round(heard_seconds * 48_000), 1)).astype(np.float32)
+    noise = np.random.default_rng(2).normal(0, 0.2, (round(audio_seconds * 48_000), 1)).astype(np.float32)
     return unpack_motion("m", add_audio_track("m", motion, encode_audio([noise], motion.first_track, 1))[0])
 
 
-class FakeViewerGroup:
-    """Some who watch a session."""
+class VirtualTime:
+    """Clock that the test sets, and a stream context with it."""
 
     def __init__(self) -> None:
-        self.batches = BlockBatchCache()
-        self.sync_groups = SyncGroups(self.batches)
+        self.start = self.now = clock()
+        self.context = StreamContext.create(lambda: self.now)
+
+
+class FakeViewerGroup:
+    """Viewers of one session."""
+
+    def __init__(self, context: StreamContext) -> None:
+        self.sync_groups = SyncGroups(context)
         self.removed: list[ViewerConnection] = []
 
     def invalidate_writable(self) -> None: ...
@@ -42,14 +49,16 @@ class FakeViewerGroup:
 
 
 class SyncedViewer:
-    """One viewer; without an audience it goes on alone."""
+    """Viewer on an unlimited link; without a group it is served on its own."""
 
-    def __init__(self, motion: StoredMotion, state: TimelineState, audience: FakeViewerGroup | None) -> None:
-        self.viewer, self.transport = ViewerConnection(TickScheduler()), FakeTransport()
-        self.viewer.group = audience
+    def __init__(
+        self, context: StreamContext, motion: StoredMotion, state: TimelineState, group: FakeViewerGroup | None
+    ) -> None:
+        self.viewer, self.transport = ViewerConnection(context), FakeTransport()
+        self.viewer.group = group
         self.viewer.set_timeline(state, motion)
         self.viewer.open(self.transport.open_connection(self.viewer))
 
     def sent_blocks(self) -> list[tuple[int, int, int]]:
-        """Track, index and rate of each block."""
+        """Return track, index and level of each block sent, sorted."""
         return sorted((m.track, m.index, m.rate) for m in self.transport.messages if isinstance(m, Data))

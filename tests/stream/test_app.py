@@ -31,7 +31,8 @@ from tests.servers import make_bvh_clip
 
 
 def socket(server: str, path: str, protocol: str = SUBPROTOCOL) -> connect:
-    return connect(f"ws://{urlsplit(server).netloc}{path}", subprotocols=[protocol], compression=None)  # type: ignore[list-item]
+    address = f"ws://{urlsplit(server).netloc}{path}"
+    return connect(address, subprotocols=[protocol], compression=None)  # type: ignore[list-item]
 
 
 async def message(connection: ClientConnection) -> Message | None:
@@ -53,7 +54,7 @@ async def motion(server: str, clip_file: Path) -> str:
         return str((await client.upload(clip_file))["id"])
 
 
-async def test_the_server_speaks_first_in_the_papers_order(server: str, motion: str) -> None:
+async def test_server_sends_header_description_and_timeline_first(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream") as connection:
         assert connection.subprotocol == SUBPROTOCOL
         kinds = [await message(connection) for _ in range(7)]
@@ -72,20 +73,20 @@ async def test_the_server_speaks_first_in_the_papers_order(server: str, motion: 
     assert track.start_us(1) == 500_000
 
 
-async def test_a_pinned_rate_is_kept_after_the_first_block(server: str, motion: str) -> None:
+async def test_pinned_level_is_kept_after_first_block(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream?rate=1") as connection:
         rates = [data.rate for _ in range(7) if isinstance(data := await message(connection), Data)]
     assert rates == [0, 1, 1, 1]
 
 
-async def test_without_the_motion_track_no_block_comes(server: str, motion: str) -> None:
+async def test_stream_without_motion_track_has_no_blocks(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream?tracks=camera,light") as connection:
         await receive_until(connection, TimelineState)
         await connection.send(Ping(1, 2).pack())
         assert isinstance(await message(connection), Pong)
 
 
-async def test_blocks_over_http_are_the_same_bytes_and_may_be_kept_for_ever(server: str, motion: str) -> None:
+async def test_http_blocks_equal_stream_blocks_and_are_immutable(server: str, motion: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
         block = await http.get(f"/v1/motions/{motion}/blocks/4/1")
         description = await http.get(f"/v1/motions/{motion}/description")
@@ -103,7 +104,7 @@ async def test_blocks_over_http_are_the_same_bytes_and_may_be_kept_for_ever(serv
     assert block.content == received[4]
 
 
-async def test_pings_are_answered_with_the_time(server: str, motion: str) -> None:
+async def test_pong_holds_server_times(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream") as connection:
         await connection.send(Ping(7, 123).pack())
         pong = await receive_until(connection, Pong)
@@ -112,7 +113,7 @@ async def test_pings_are_answered_with_the_time(server: str, motion: str) -> Non
         assert pong.received <= pong.answered
 
 
-async def test_a_viewers_own_timeline_is_edited_by_its_messages(server: str, motion: str) -> None:
+async def test_edit_message_changes_own_timeline(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream?at=1.5") as connection:
         first = await receive_until(connection, TimelineState)
         assert isinstance(first, TimelineState)
@@ -144,7 +145,7 @@ async def test_unknown_messages_are_skipped(server: str, motion: str) -> None:
         ("/v1/motions/{}/stream", SUBPROTOCOL, bytes([64]) + bytes(1024), 1009),
     ],
 )
-async def test_what_is_wrong_is_said_and_the_socket_closed(
+async def test_errors_close_stream_with_code_and_problem(
     server: str, motion: str, path: str, protocol: str, sends: bytes | str | None, code: int
 ) -> None:
     problem = None
@@ -162,7 +163,7 @@ async def test_what_is_wrong_is_said_and_the_socket_closed(
         assert problem.detail
 
 
-async def test_where_a_paused_session_is_sought_to_is_sent_at_once(server: str, tmp_path: Path) -> None:
+async def test_seek_in_paused_session_sends_block_immediately(server: str, tmp_path: Path) -> None:
     source = tmp_path / "long.bvh"
     source.write_bytes(make_bvh_clip(8.0, 31))
     async with Client(server) as client:
@@ -175,28 +176,26 @@ async def test_where_a_paused_session_is_sought_to_is_sent_at_once(server: str, 
     assert found.index >= 5
 
 
-async def test_of_a_stage_that_stands_the_blocks_on_show_of_all_performers_come_at_their_best(
-    server: str, motion: str
-) -> None:
+async def test_paused_stage_gets_visible_blocks_at_best_level(server: str, motion: str) -> None:
     async with Client(server) as client:
         pair = (await client.add_performers(motion, [motion]))["id"]
         session = (await client.open_session(pair, playing=False))["id"]
     async with socket(server, f"/v1/sessions/{session}/stream") as connection:
         found: list[tuple[int, int, int]] = []
-        while not isinstance(said := await message(connection), Choice):
-            if isinstance(said, Data):
-                found.append((said.track, said.index, said.rate))
+        while not isinstance(received := await message(connection), Choice):
+            if isinstance(received, Data):
+                found.append((received.track, received.index, received.rate))
         assert {(0, 0, 0), (1, 0, 0), (0, 0, 4), (1, 0, 4)} <= set(found)
-        # and nothing after them, whatever is looked at again
+        # no block follows, even after further ticks
         for sequence in (1, 2):
             await connection.send(Report(buffer=3_000_000).pack())
             await connection.send(Ping(sequence, 2).pack())
-            while not isinstance(said := await message(connection), Pong):
-                assert not isinstance(said, Data)
+            while not isinstance(received := await message(connection), Pong):
+                assert not isinstance(received, Data)
     assert len(found) == len(set(found))
 
 
-async def test_a_dance_that_is_paused_comes_at_its_best_where_it_stands(server: str, motion: str) -> None:
+async def test_paused_motion_gets_visible_block_at_best_level(server: str, motion: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream") as connection:
         await receive_until(connection, Choice)
         await connection.send(Edit(playing=False, position=100_000).pack())
@@ -206,7 +205,7 @@ async def test_a_dance_that_is_paused_comes_at_its_best_where_it_stands(server: 
 
 
 async def frames_before_upgrade(server: str, address: str) -> tuple[bool, list[tuple[int, int]]]:
-    """Whether what comes back is described, and track and index of the blocks that come, until a Ping is answered."""
+    """Return whether a Description is received before the first Pong, and track and index of the blocks received."""
     described, blocks = False, []
     async with socket(server, address) as connection:
         await receive_until(connection, ChannelHeader)
@@ -218,19 +217,19 @@ async def frames_before_upgrade(server: str, address: str) -> tuple[bool, list[t
     return described, blocks
 
 
-async def test_who_comes_back_is_sent_what_it_does_not_hold_of_any_performer(server: str, motion: str) -> None:
+async def test_resuming_viewer_gets_only_missing_blocks(server: str, motion: str) -> None:
     async with Client(server) as client:
         pair = (await client.add_performers(motion, [motion]))["id"]
-    # all of a dance of 3.4 s is within reach, but what is not there is sent: of the second its last block
+    # a motion of 3.4 s is within reach as a whole, so only the last block of the second performer is missing
     stream = f"/v1/motions/{pair}/stream?tracks=motion"
     assert await frames_before_upgrade(server, f"{stream}&have={pair}.0.4444.2.0.4h-") == (False, [(1, 3)])
     assert await frames_before_upgrade(server, f"{stream}&have={pair}.0.4444.2.0.4i") == (False, [])
-    # clients that tell of the first alone are sent the others whole
+    # a client that lists the first performer only gets all blocks of the others
     assert await frames_before_upgrade(server, f"{stream}&have={pair}.0.4444.2") == (False, [(1, n) for n in range(4)])
 
 
 @pytest.mark.parametrize("have", ["2.1.2G", "2.1.g", "2.1", "2" + ".1.2" * 4, "2.1." + "2z" * 32])
-async def test_what_cannot_be_read_of_what_is_held_is_said(server: str, motion: str, have: str) -> None:
+async def test_malformed_resume_state_is_rejected_with_problem(server: str, motion: str, have: str) -> None:
     async with socket(server, f"/v1/motions/{motion}/stream?have={motion}.0.4444.{have}") as connection:
         problem = await message(connection)
         assert isinstance(problem, Problem)
@@ -241,16 +240,16 @@ async def test_what_cannot_be_read_of_what_is_held_is_said(server: str, motion: 
     assert closed.value.rcvd.code == 1008
 
 
-async def test_more_may_be_said_to_be_held_than_there_is(server: str, motion: str) -> None:
-    most = ".9999999.fzfzfzf" * 3
+async def test_resume_state_may_exceed_motion(server: str, motion: str) -> None:
+    other_performers = ".9999999.fzfzfzf" * 3
     described, blocks = await frames_before_upgrade(
-        server, f"/v1/motions/{motion}/stream?have={motion}.9999999.{'f' * 64}.99{most}"
+        server, f"/v1/motions/{motion}/stream?have={motion}.9999999.{'f' * 64}.99{other_performers}"
     )
     assert (described, blocks) == (False, [])
 
 
 @pytest.mark.parametrize("query", ["rate=99", "rate=-1", "rate=x", "at=x", "have=" + "1" * 500])
-async def test_wrong_queries_do_not_open_a_socket(server: str, motion: str, query: str) -> None:
+async def test_invalid_query_is_rejected_before_upgrade(server: str, motion: str, query: str) -> None:
     with pytest.raises(Exception, match=r"HTTP 4\d\d"):
         async with socket(server, f"/v1/motions/{motion}/stream?{query}") as connection:
             await connection.recv()

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from bunraku.delivery.congestion import bytes_on_wire
-from bunraku.stream.flow_control import UNCONSTRAINED_CHECKS, FlowControl
+from bunraku.stream.flow_control import UNCONSTRAINED_CHECKS, FlowControl, LinkState, PrefetchState
 from bunraku.websocket.link import AckedLink
 from tests.delivery.virtual_link import VirtualLink
 from tests.stream.fake_transport import parse_frames
@@ -11,31 +11,31 @@ SECOND = 1_000_000
 
 
 def count_overlays(sender: SimulatedSender, seconds: int) -> int:
-    """Thirty overlays a second, each written if it may, and told of if need be; how many were."""
+    """Send 30 overlays per second while there is capacity; return how many were written."""
     written = 0
     for _ in range(30 * seconds):
         sender.at += 33_333
-        steady = sender.flow.is_unconstrained
+        is_unchecked = sender.flow.state.skips_overlay_check
         if sender.flow.can_write_overlay():
-            (sender.write_untracked if steady else sender.write)(90)
+            (sender.write_untracked if is_unchecked else sender.write)(90)
             written += 1
     return written
 
 
-def test_on_a_quick_line_all_is_written_and_the_system_is_not_asked() -> None:
+def test_unconstrained_link_is_written_without_system_calls() -> None:
     for delay in (500, 40_000):
         sender = SimulatedSender(1e7, delay)
         assert count_overlays(sender, 10) == 300
-        assert sender.flow.is_unconstrained
+        assert sender.flow.state.skips_overlay_check
         sender.reads = 0
         assert count_overlays(sender, 60) == 1800
         assert sender.reads == 0
         sender.flow.reassess()
-        assert sender.flow.is_unconstrained
+        assert sender.flow.state.skips_overlay_check
         assert 1 <= sender.reads <= 2
 
 
-def test_a_quick_line_that_becomes_narrow_is_found_out_by_a_look_and_a_narrow_one_that_becomes_quick_by_use() -> None:
+def test_state_follows_throughput_of_link() -> None:
     for delay in (500, 40_000):
         sender = SimulatedSender(1e7, delay)
         count_overlays(sender, 10)
@@ -43,14 +43,14 @@ def test_a_quick_line_that_becomes_narrow_is_found_out_by_a_look_and_a_narrow_on
         for _ in range(20):
             count_overlays(sender, 1)
             sender.flow.reassess()
-        found = [(sender.flow.is_unconstrained, sender.flow.is_unlimited)]
+        states = [(sender.flow.state.skips_overlay_check, (sender.flow.state is LinkState.UNLIMITED))]
         sender.reduced_throughput = None
         count_overlays(sender, 30)
-        found.append((sender.flow.is_unconstrained, sender.flow.is_unlimited))
-        assert found == [(False, False), (True, delay == 500)]
+        states.append((sender.flow.state.skips_overlay_check, (sender.flow.state is LinkState.UNLIMITED)))
+        assert states == [(False, False), (True, delay == 500)]
 
 
-def test_blocks_over_a_line_that_is_far_go_on_beside_overlays_that_are_not_told_of() -> None:
+def test_high_rtt_link_sends_blocks_beside_unchecked_overlays() -> None:
     sender = SimulatedSender(1e6, 40_000)
     count_overlays(sender, 10)
     for _ in range(200):
@@ -61,20 +61,20 @@ def test_blocks_over_a_line_that_is_far_go_on_beside_overlays_that_are_not_told_
     assert sender.flow.window.written > 0.9 * (200 * 1_500 + 10 * 30 * 90)
     sender.at += 250_000
     sender.flow.reassess()
-    assert sender.flow.is_unconstrained
+    assert sender.flow.state.skips_overlay_check
 
 
-def test_a_narrow_line_is_noticed_and_not_written_to_unasked() -> None:
+def test_constrained_link_rejects_overlays() -> None:
     sender = SimulatedSender(1_200.0, 150_000)
     assert count_overlays(sender, 4) < 60
     assert not sender.flow.can_write_overlay()
 
 
-def test_of_lines_far_away_the_system_is_asked_to_hold_nothing_back_but_for_loss() -> None:
+def test_high_rtt_link_uses_loss_based_congestion_control() -> None:
     assert [SimulatedSender(1e7, delay).is_loss_based for delay in (500, 40_000)] == [False, True]
 
 
-def test_a_line_of_which_nothing_is_known_always_has_room() -> None:
+def test_unobservable_link_always_has_capacity() -> None:
     flow = FlowControl(None, lambda: 0)
     for _ in range(2 * UNCONSTRAINED_CHECKS):
         assert flow.can_write_overlay()
@@ -84,7 +84,7 @@ def test_a_line_of_which_nothing_is_known_always_has_room() -> None:
     assert not flow.is_unmeasured
 
 
-def test_a_line_that_is_far_away_is_unknown_until_it_answers() -> None:
+def test_high_rtt_link_is_unmeasured_until_acknowledged() -> None:
     assert not SimulatedSender(1e7, 500).flow.is_unmeasured
     sender = SimulatedSender(3_600.0, 75_000)
     states = [(sender.flow.is_unmeasured, sender.flow.is_awaiting_ack)]
@@ -97,9 +97,9 @@ def test_a_line_that_is_far_away_is_unknown_until_it_answers() -> None:
     assert states[-1] == (False, False)
 
 
-def test_blocks_have_a_share_of_a_narrow_line_and_no_more() -> None:
+def test_blocks_get_their_share_of_constrained_link() -> None:
     sender = SimulatedSender(3_600.0, 75_000)
-    sent = taken = 0
+    sent = block_bytes = 0
     for _ in range(60 * 100):
         sender.at += 10_000
         if not sender.flow.has_capacity():
@@ -107,57 +107,57 @@ def test_blocks_have_a_share_of_a_narrow_line_and_no_more() -> None:
         if sender.flow.may_send_block():
             sender.write(600)
             sender.flow.charge_block(600)
-            taken += bytes_on_wire(600)
+            block_bytes += bytes_on_wire(600)
         else:
             sender.write(88)
         sent += 1
-    share = taken / sender.link.sent_bytes
+    share = block_bytes / sender.link.sent_bytes
     assert 0.2 < share < 0.4
     assert sent > 100
 
 
-def test_no_block_that_can_wait_makes_worse_what_waits_as_a_line_becomes_slower() -> None:
+def test_blocks_wait_while_link_is_slowing() -> None:
     sender = SimulatedSender(7_000.0, 75_000)
-    slowed = 10 * 1_000_000
+    slowdown_at = 10 * 1_000_000
     blocks = []
-    while sender.at < slowed + 4_000_000:
+    while sender.at < slowdown_at + 4_000_000:
         sender.at += 10_000
-        if sender.at >= slowed:
+        if sender.at >= slowdown_at:
             sender.reduced_throughput = 1_800.0
         if not sender.flow.has_capacity():
             continue
         if sender.flow.may_send_block():
             sender.write(300)
             sender.flow.charge_block(300)
-            blocks.append(sender.at - slowed)
+            blocks.append(sender.at - slowdown_at)
         else:
             sender.write(88)
-    # until it is noticed, and once its queue is as long as it should be
+    # before the slowdown is detected, and after the queue has shrunk
     after = [at / 1e6 for at in blocks if at >= 0]
     assert not [at for at in after if 0.5 <= at < 1.2]
     assert len([at for at in after if at >= 1.2]) >= 2
 
 
-def test_a_net_has_come_once_all_that_was_written_till_then_is_acknowledged() -> None:
+def test_prefetch_is_delivered_once_acknowledged() -> None:
     sender = SimulatedSender(3_000.0, 75_000)
     sender.write(300)
-    states = [(sender.flow.is_prefetch_delivered, sender.flow.is_awaiting_ack)]
+    states = [(sender.flow.prefetch_state is PrefetchState.DELIVERED, sender.flow.is_awaiting_ack)]
     sender.flow.mark_prefetch_sent()
     sender.write(300)
-    # what is written later does not count
+    # later writes do not extend the prefetch
     sender.flow.mark_prefetch_sent()
     while sender.flow.window.in_flight_bytes:
         sender.at += 1_000
         sender.flow.has_capacity()
-        now = sender.flow.is_prefetch_delivered, sender.flow.is_awaiting_ack
+        now = sender.flow.prefetch_state is PrefetchState.DELIVERED, sender.flow.is_awaiting_ack
         if now != states[-1]:
             states.append(now)
             assert sender.flow.window.in_flight_bytes == bytes_on_wire(300) * now[0]
     assert states == [(False, True), (True, False)]
-    assert FlowControl(None, lambda: 0).is_prefetch_delivered
+    assert FlowControl(None, lambda: 0).prefetch_state is PrefetchState.DELIVERED
 
 
-def test_a_closed_line_has_room_so_that_who_writes_is_told() -> None:
+def test_closed_link_has_capacity_so_that_write_fails() -> None:
     sender = SimulatedSender(1_200.0, 150_000)
     sender.write(5_000)
     assert not sender.flow.has_capacity()
@@ -165,7 +165,7 @@ def test_a_closed_line_has_room_so_that_who_writes_is_told() -> None:
     assert sender.flow.has_capacity()
 
 
-def test_what_was_held_at_the_beginning_goes_once() -> None:
+def test_uncork_releases_data_once() -> None:
     sender = SimulatedSender(1e6, 1_000)
     assert sender.flow.is_corked
     sender.flow.uncork()
@@ -173,7 +173,7 @@ def test_what_was_held_at_the_beginning_goes_once() -> None:
 
 
 class ProxiedSender:
-    """A line behind a proxy: nothing is known of it but what is echoed."""
+    """Flow control of a link behind a proxy, which is measured by probe sender only."""
 
     def __init__(self, rate: float, delay: int) -> None:
         self.at = 10**9
@@ -197,48 +197,60 @@ class ProxiedSender:
             self.flow.has_capacity()
 
 
-def test_behind_a_proxy_a_line_is_far_until_it_answers_soon() -> None:
+def test_proxied_link_is_high_rtt_until_fast_echo() -> None:
     near = ProxiedSender(1e7, 1_000)
-    assert (near.flow.is_high_rtt, near.flow.is_unmeasured, near.flow.is_unlimited) == (True, True, False)
+    assert (near.flow.state.is_high_rtt, near.flow.is_unmeasured, (near.flow.state is LinkState.UNLIMITED)) == (
+        True,
+        True,
+        False,
+    )
     near.write(1_000)
     assert near.flow.is_awaiting_ack
     near.advance_time(5_000)
-    assert (near.flow.is_high_rtt, near.flow.is_unconstrained, near.flow.is_unlimited) == (False, True, True)
-    # nothing is asked of what is written unasked
+    assert (
+        near.flow.state.is_high_rtt,
+        near.flow.state.skips_overlay_check,
+        (near.flow.state is LinkState.UNLIMITED),
+    ) == (False, True, True)
+    # writes without a check have no probe
     assert near.flow.probe(90) == b""
     far = ProxiedSender(1e6, 40_000)
     far.write(1_000)
     far.advance_time(100_000)
-    assert (far.flow.is_high_rtt, far.flow.is_unmeasured, far.flow.is_unlimited) == (True, False, False)
+    assert (far.flow.state.is_high_rtt, far.flow.is_unmeasured, (far.flow.state is LinkState.UNLIMITED)) == (
+        True,
+        False,
+        False,
+    )
 
 
-def test_behind_a_proxy_a_narrow_line_is_not_filled() -> None:
-    echoes = ProxiedSender(3_600.0, 75_000)
-    most, sent = 0.0, 0
+def test_proxied_constrained_link_has_short_queue() -> None:
+    sender = ProxiedSender(3_600.0, 75_000)
+    max_delay, sent = 0.0, 0
     for step in range(40 * 100):
-        echoes.advance_time(10_000)
-        if step % 3 == 0 and echoes.flow.has_capacity():
-            echoes.write(84)
+        sender.advance_time(10_000)
+        if step % 3 == 0 and sender.flow.has_capacity():
+            sender.write(84)
             sent += 1
         if step > 1_000:
-            most = max(most, max((arrives - echoes.at for arrives, _ in echoes.pending_echoes), default=0.0))
-    # one way there and back, and what waits before it
-    assert most < 600_000
-    assert echoes.virtual_link.sent_bytes > 0.8 * 3_600 * 40
+            max_delay = max(max_delay, max((arrives - sender.at for arrives, _ in sender.pending_echoes), default=0.0))
+    # round trip and queue
+    assert max_delay < 600_000
+    assert sender.virtual_link.sent_bytes > 0.8 * 3_600 * 40
     assert sent > 500
-    assert echoes.flow.is_constrained
+    assert sender.flow.is_constrained
 
 
-def test_behind_a_proxy_a_near_line_whose_answers_stay_out_is_quick_no_more() -> None:
+def test_proxied_link_with_late_echo_is_limited() -> None:
     near = ProxiedSender(1e7, 1_000)
     near.write(1_000)
     near.advance_time(5_000)
-    assert near.flow.is_unlimited
-    # a look asks, and this answer stays out
+    assert near.flow.state is LinkState.UNLIMITED
+    # a reassessment sends a probe, whose echo is late
     assert near.flow.probe(0)
     near.at += 50_000
     near.flow.reassess()
-    assert near.flow.is_unconstrained
+    assert near.flow.state.skips_overlay_check
     near.at += 400_000
     near.flow.reassess()
-    assert not near.flow.is_unconstrained
+    assert not near.flow.state.skips_overlay_check

@@ -5,38 +5,34 @@ from bunraku.websocket.frame import encode_frame, frame_payload
 from bunraku.wire.messages import Ping, Pong, unpack
 
 
-def test_what_waits_is_taken_once_and_in_its_order() -> None:
-    pending = SendQueue()
-    assert not pending
+def test_queued_messages_are_taken_once_and_in_order() -> None:
+    queue = SendQueue(lambda: 0)
+    assert not queue
     for name in (b"a", b"b"):
-        assert pending.add_control(encode_frame(name))
-    pending.overlay = encode_frame(b"old")
-    pending.overlay = encode_frame(b"new")
-    assert pending
-    assert pending.take_control() == [encode_frame(b"a"), encode_frame(b"b")]
-    assert pending
-    assert pending.take_overlay() == encode_frame(b"new")
-    assert not pending
-    assert (pending.take_control(), pending.take_overlay(), pending.take_pongs()) == ([], None, [])
+        assert queue.add_control(encode_frame(name))
+    queue.overlay = encode_frame(b"old")
+    queue.overlay = encode_frame(b"new")
+    assert queue
+    assert queue.take_control() == [encode_frame(b"a"), encode_frame(b"b")]
+    assert queue
+    assert queue.take_overlay() == encode_frame(b"new")
+    assert not queue
+    assert (queue.take_control(), queue.take_overlay(), queue.take_pongs()) == ([], None, [])
 
 
-def test_there_is_room_for_so_many_and_again_when_they_are_taken() -> None:
-    pending = SendQueue()
-    assert all(pending.add_control(b"x") for _ in range(MAX_CONTROL_MESSAGES))
-    assert not pending.add_control(b"y")
-    assert pending.take_control() == [b"x"] * MAX_CONTROL_MESSAGES
-    assert pending.add_control(b"y")
+def test_full_queue_rejects_messages_until_taken() -> None:
+    queue = SendQueue(lambda: 0)
+    assert all(queue.add_control(b"x") for _ in range(MAX_CONTROL_MESSAGES))
+    assert not queue.add_control(b"y")
+    assert queue.take_control() == [b"x"] * MAX_CONTROL_MESSAGES
+    assert queue.add_control(b"y")
 
 
-def test_answers_tell_when_the_ping_came_and_when_they_leave() -> None:
-    pending = SendQueue()
+def test_pong_holds_times_of_receipt_and_sending() -> None:
+    queue = SendQueue(lambda: 5_000)
     for number in range(MAX_PENDING_PINGS + 3):
-        pending.add_ping(Ping(number, 7), 1_000 + number)
-    assert pending
-    answers = [unpack(frame_payload(framed)) for framed in pending.take_pongs()]
-    assert len(answers) == MAX_PENDING_PINGS
-    for number, answer in enumerate(answers):
-        assert isinstance(answer, Pong)
-        assert (answer.sequence, answer.sent, answer.received) == (number, 7, 1_000 + number)
-        assert answer.answered > answer.received
-    assert not pending
+        queue.add_ping(Ping(number, 7), 1_000 + number)
+    assert queue
+    pongs = [unpack(frame_payload(framed)) for framed in queue.take_pongs()]
+    assert pongs == [Pong(number, 7, 1_000 + number, 5_000) for number in range(MAX_PENDING_PINGS)]
+    assert not queue

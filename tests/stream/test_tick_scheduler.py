@@ -7,10 +7,10 @@ from bunraku.stream.tick_scheduler import MAX_BATCH, TickScheduler
 
 
 class CountingItem:
-    """Who counts their turns, and asks for the next."""
+    """Item that records its ticks and schedules the next one."""
 
-    def __init__(self, turns: TickScheduler, again: int = 0) -> None:
-        self.scheduler, self.repeats = turns, again
+    def __init__(self, scheduler: TickScheduler, repeats: int = 0) -> None:
+        self.scheduler, self.repeats = scheduler, repeats
         self.times: list[int] = []
         self.done = asyncio.Event()
 
@@ -22,51 +22,51 @@ class CountingItem:
             self.done.set()
 
 
-async def test_turns_come_again_and_again_and_never_early() -> None:
-    turns = TickScheduler()
+async def test_ticks_repeat_and_are_never_early() -> None:
+    scheduler = TickScheduler(clock)
     now = clock()
-    ones = [CountingItem(turns, again=3) for _ in range(3 * MAX_BATCH)]
-    for nth, one in enumerate(ones):
-        turns.schedule(one, now + nth * 300)
+    items = [CountingItem(scheduler, repeats=3) for _ in range(3 * MAX_BATCH)]
+    for nth, item in enumerate(items):
+        scheduler.schedule(item, now + nth * 300)
     async with asyncio.timeout(20):
-        for one in ones:
-            await one.done.wait()
-    assert all(one.times[0] >= now + nth * 300 for nth, one in enumerate(ones))
-    assert all(len(one.times) == 4 for one in ones)
+        for item in items:
+            await item.done.wait()
+    assert all(item.times[0] >= now + nth * 300 for nth, item in enumerate(items))
+    assert all(len(item.times) == 4 for item in items)
 
 
-async def test_a_nearer_turn_sets_the_timer_anew_and_one_removed_has_none() -> None:
-    turns = TickScheduler()
-    far, near, removed = CountingItem(turns), CountingItem(turns), CountingItem(turns)
-    turns.schedule(far, clock() + 3_600_000_000)
-    turns.schedule(removed, clock() + 2_000)
-    turns.schedule(near, clock() + 5_000)
-    turns.cancel(removed)
+async def test_earlier_tick_resets_timer_and_cancelled_item_has_no_tick() -> None:
+    scheduler = TickScheduler(clock)
+    far, near, cancelled = CountingItem(scheduler), CountingItem(scheduler), CountingItem(scheduler)
+    scheduler.schedule(far, clock() + 3_600_000_000)
+    scheduler.schedule(cancelled, clock() + 2_000)
+    scheduler.schedule(near, clock() + 5_000)
+    scheduler.cancel(cancelled)
     async with asyncio.timeout(20):
         await near.done.wait()
-    assert far.times == removed.times == []
+    assert far.times == cancelled.times == []
 
 
-async def test_whoever_else_waits_gets_in_between() -> None:
-    turns = TickScheduler()
+async def test_other_callbacks_run_between_batches() -> None:
+    scheduler = TickScheduler(clock)
     order: list[str] = []
 
-    class Noted(CountingItem):
-        def advance(self) -> None:
+    class RecordingItem(CountingItem):
+        def tick(self) -> None:
             super().tick()
-            order.append("turn")
+            order.append("tick")
 
-    ones = [Noted(turns) for _ in range(2 * MAX_BATCH)]
-    for one in ones:
-        turns.schedule(one, 0)
+    items = [RecordingItem(scheduler) for _ in range(2 * MAX_BATCH)]
+    for item in items:
+        scheduler.schedule(item, 0)
 
-    def note() -> None:
+    def run_other() -> None:
         order.append("other")
-        if not ones[-1].done.is_set():
-            asyncio.get_running_loop().call_soon(note)
+        if not items[-1].done.is_set():
+            asyncio.get_running_loop().call_soon(run_other)
 
-    note()
+    run_other()
     async with asyncio.timeout(20):
-        for one in ones:
-            await one.done.wait()
-    assert "other" in order[order.index("turn") : len(order) - order[::-1].index("turn")]
+        for item in items:
+            await item.done.wait()
+    assert "other" in order[order.index("tick") : len(order) - order[::-1].index("tick")]

@@ -25,7 +25,7 @@ from tests.vectors.scene import sample_camera
 
 @pytest.fixture(scope="module")
 def motion() -> StoredMotion:
-    """A motion with a camera, then noise."""
+    """Return a motion with a camera and audio."""
     encoded = encode_motion(random_motion(2.0, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live")
     filmed = unpack_motion(
         "m", pack_motion("m", encoded, [encode_scene(sample_camera(2.0, 30.0), error_bounds_mm=(20.0, 4.0))])
@@ -34,7 +34,7 @@ def motion() -> StoredMotion:
     return unpack_motion("m", add_audio_track("m", filmed, encode_audio([noise], filmed.first_track, 1))[0])
 
 
-def test_all_channels_are_counted(motion: StoredMotion) -> None:
+def test_channels_of_all_tracks_are_counted(motion: StoredMotion) -> None:
     assert count_channels(motion) == 19 + 3 + 1
 
 
@@ -44,35 +44,36 @@ def described_types(message: bytes) -> list[str]:
     return [track["type"] for track in description.tracks]
 
 
-def test_what_comes_after_the_last_track_that_is_wanted_is_not_described(motion: StoredMotion) -> None:
-    whole = described_types(motion.description)
-    assert sorted(whole) == ["audio", "camera", "motion"]
+def test_tracks_after_last_selected_one_are_not_described(motion: StoredMotion) -> None:
+    complete = described_types(motion.description)
+    assert sorted(complete) == ["audio", "camera", "motion"]
     assert [
-        count_described_tracks(motion, wanted) for wanted in (TRACK_TYPES, whole[:1], whole[1:2], whole[2:], ())
+        count_described_tracks(motion, track_types)
+        for track_types in (TRACK_TYPES, complete[:1], complete[1:2], complete[2:], ())
     ] == [3, 1, 2, 3, 1]
     assert pack_description(motion, 0, 3) == motion.description
-    assert described_types(pack_description(motion, 0, 2)) == whole[:2]
+    assert described_types(pack_description(motion, 0, 2)) == complete[:2]
 
 
-def test_the_rest_says_which_track_it_begins_with(motion: StoredMotion) -> None:
-    whole = described_types(motion.description)
+def test_partial_description_holds_index_of_first_track(motion: StoredMotion) -> None:
+    complete = described_types(motion.description)
     rest = pack_description(motion, 1, 3)
-    assert described_types(rest) == whole[1:]
+    assert described_types(rest) == complete[1:]
     assert len(rest) + len(pack_description(motion, 0, 1)) < len(motion.description) + 40
     found = unpack_message(rest)
     assert isinstance(found, Description)
     assert found.first == 1
 
 
-def test_tracks_keep_their_numbers_and_say_what_they_are(motion: StoredMotion) -> None:
-    whole = described_types(motion.description)
+def test_selected_tracks_keep_their_index_and_type(motion: StoredMotion) -> None:
+    complete = described_types(motion.description)
     found = select_tracks(motion, ("audio", "camera"))
     assert [track.index for track in found] == [1, 2]
-    assert [track.is_audio for track in found] == [kind == "audio" for kind in whole[1:]]
+    assert [track.is_audio for track in found] == [kind == "audio" for kind in complete[1:]]
     assert [track.is_motion for track in select_tracks(motion, TRACK_TYPES)] == [True, False, False]
 
 
-def test_motion_and_sound_share_the_line_where_both_are_wanted(motion: StoredMotion) -> None:
+def test_allocations_cover_selected_motion_and_audio(motion: StoredMotion) -> None:
     assert {step.audio_level for step in build_allocations(motion, ("motion",))} == {-1}
     assert [step.motion_level for step in build_allocations(motion, ("motion",))] == [0, 1]
     both = build_allocations(motion, TRACK_TYPES)
@@ -81,7 +82,7 @@ def test_motion_and_sound_share_the_line_where_both_are_wanted(motion: StoredMot
     assert len(build_allocations(motion, ("audio",))) == both[-1].audio_level + 1
 
 
-def test_rates_of_several_performers_are_chosen_and_paid_for_together(motion: StoredMotion) -> None:
+def test_bitrates_of_performers_are_added(motion: StoredMotion) -> None:
     single = unpack_motion(
         "s", pack_motion("s", encode_motion(random_motion(1.0, 30.0, 4), error_bounds_mm=(20.0,), grade="live"))
     )

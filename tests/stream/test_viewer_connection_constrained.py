@@ -1,4 +1,4 @@
-"""Viewers whose line is narrow, in virtual time: their timers are run by the test."""
+"""Viewers on constrained links in virtual time; the test runs their timers."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from bunraku.codec.container import StoredMotion, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.playout import timeline
 from bunraku.runtime.clock import clock
-from bunraku.stream import viewer_connection
-from bunraku.stream.tick_scheduler import TickScheduler
-from bunraku.stream.viewer_connection import ViewerConnection
+from bunraku.stream.context import StreamContext
+from bunraku.stream.viewer_connection import LOW_RTT_CHECK_INTERVAL_US, ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.link import LinkSample
 from bunraku.wire.messages import Choice, Data, Ping, Pong, TimelineState
@@ -32,7 +31,7 @@ def motion() -> StoredMotion:
 
 
 class ConstrainedTransport(FakeTransport):
-    """A line of so many bytes a second and a way of `delay` microseconds; what was written to it, and when it came."""
+    """Transport over a link of `rate` bytes/s and a one-way delay in microseconds; records writes and arrivals."""
 
     def __init__(self, now: Callable[[], int], rate: float, delay: int) -> None:
         super().__init__()
@@ -63,21 +62,18 @@ class ConstrainedTransport(FakeTransport):
 
 
 class ConstrainedViewer:
-    """A viewer over such a line, and its time."""
+    """Viewer on a constrained link, in virtual time."""
 
-    def __init__(
-        self, motion: StoredMotion, monkeypatch: pytest.MonkeyPatch, rate: float = 3_600.0, delay: int = 75_000
-    ) -> None:
+    def __init__(self, motion: StoredMotion, rate: float = 3_600.0, delay: int = 75_000) -> None:
         self.started_at = self.at = clock()
-        monkeypatch.setattr(viewer_connection, "clock", lambda: self.at)
         self.transport = ConstrainedTransport(lambda: self.at, rate, delay)
-        self.viewer = ViewerConnection(TickScheduler())
+        self.viewer = ViewerConnection(StreamContext.create(lambda: self.at))
         self.state: TimelineState = timeline.start(motion.id, motion.first_track.duration_us, self.at)
         self.viewer.set_timeline(self.state, motion)
         self.viewer.open(self.transport.open_connection(self.viewer), self.transport)
 
     def advance_time(self, microseconds: int) -> None:
-        """Let time pass, with the turns and timers that come meanwhile."""
+        """Advance the time, and run the ticks and timers that are due."""
         end = self.at + microseconds
         while self.at < end:
             self.at += 5_000
@@ -89,102 +85,105 @@ class ConstrainedViewer:
                 self.viewer.tick()
 
     def messages_of_type(self, kind: type) -> list[tuple[int, float, object]]:
-        """When messages of a kind were written and came, and what they are."""
-        found = [(written, came, unpack_message(payload)) for written, came, payload in self.transport.arrivals]
+        """Return write time, arrival time and message, for messages of one type."""
+        found = [(written, arrived, unpack_message(payload)) for written, arrived, payload in self.transport.arrivals]
         return [each for each in found if isinstance(each[2], kind)]
 
 
-async def test_the_first_block_is_small_and_goes_with_what_says_of_it_and_no_more_until_something_comes_back(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+async def test_first_flight_is_small_until_acknowledged(
+    motion: StoredMotion,
 ) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch)
-    blocks = [data for _, _, data in watching.messages_of_type(Data)]
+    simulation = ConstrainedViewer(motion)
+    blocks = [data for _, _, data in simulation.messages_of_type(Data)]
     assert next((data.index, data.rate) for data in blocks if isinstance(data, Data)) == (0, 0)
     assert all(data.rate == 0 for data in blocks if isinstance(data, Data))
-    assert watching.transport.cork_calls == [False]
-    assert len(watching.transport.sent) < 3_000
-    assert watching.viewer._timer is not None
-    watching.viewer.on_close()
+    assert simulation.transport.cork_calls == [False]
+    assert len(simulation.transport.sent) < 3_000
+    assert simulation.viewer._timer is not None
+    simulation.viewer.on_close()
 
 
-async def test_blocks_and_a_net_of_them_come_in_time_and_the_line_is_not_filled(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch)
+async def test_blocks_and_prefetch_arrive_in_time_with_short_queue(motion: StoredMotion) -> None:
+    simulation = ConstrainedViewer(motion)
     for _ in range(300):
-        watching.advance_time(100_000)
-        assert watching.transport.link.unacked_bytes(watching.at) < 6_000
-    blocks = [(came, data) for _, came, data in watching.messages_of_type(Data) if isinstance(data, Data)]
+        simulation.advance_time(100_000)
+        assert simulation.transport.link.unacked_bytes(simulation.at) < 6_000
+    blocks = [(arrived, data) for _, arrived, data in simulation.messages_of_type(Data) if isinstance(data, Data)]
     starts = [motion.first_track.start_us(index) for index in range(motion.first_track.block_count)]
-    for came, data in blocks[1:]:
-        assert came < watching.started_at + starts[data.index] or data.index < 2
+    for arrived, data in blocks[1:]:
+        assert arrived < simulation.started_at + starts[data.index] or data.index < 2
     assert {data.index for _, data in blocks} == set(range(motion.first_track.block_count))
     assert len(blocks) == len({(data.index, data.rate) for _, data in blocks})
-    # the net is far ahead while the dance is at its beginning
-    assert any(starts[data.index] - (came - watching.started_at) > 15_000_000 for came, data in blocks)
-    assert watching.messages_of_type(Choice)
-    watching.viewer.on_close()
+    # the prefetch is far ahead at the beginning of the motion
+    assert any(starts[data.index] - (arrived - simulation.started_at) > 15_000_000 for arrived, data in blocks)
+    assert simulation.messages_of_type(Choice)
+    simulation.viewer.on_close()
 
 
-async def test_each_overlay_that_leaves_is_the_newest_and_comes_soon(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch)
-    watching.advance_time(4_000_000)
-    made: dict[int, int] = {}
+async def test_only_newest_overlays_are_sent_with_low_latency(motion: StoredMotion) -> None:
+    simulation = ConstrainedViewer(motion)
+    simulation.advance_time(4_000_000)
+    sent_at: dict[int, int] = {}
     for number in range(1, 600):
-        watching.advance_time(35_000)
-        watching.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
-        made[number] = watching.at
+        simulation.advance_time(35_000)
+        simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
+        sent_at[number] = simulation.at
     overlays = [
-        (w, came, o) for w, came, o in watching.messages_of_type(Overlay) if isinstance(o, Overlay) and o.sequence > 60
+        (w, arrived, o)
+        for w, arrived, o in simulation.messages_of_type(Overlay)
+        if isinstance(o, Overlay) and o.sequence > 60
     ]
     numbers = [overlay.sequence for _, _, overlay in overlays]
     assert numbers == sorted(set(numbers))
     assert 100 < len(numbers) < 540
-    # what is written was not waited for longer than until the next was there
-    assert all(written - made[o.sequence] <= 40_000 for written, _, o in overlays)
-    late = sorted(came - made[o.sequence] for _, came, o in overlays)
-    assert late[len(late) * 95 // 100] < 400_000
-    # a narrow line gets the last frame alone
+    # an overlay is written before the next one is sent_at
+    assert all(written - sent_at[o.sequence] <= 40_000 for written, _, o in overlays)
+    delays = sorted(arrived - sent_at[o.sequence] for _, arrived, o in overlays)
+    assert delays[len(delays) * 95 // 100] < 400_000
+    # a constrained link gets the last frame only
     assert not overlays[-1][2].earlier
-    assert any(written > watching.started_at + 8_000_000 for written, _, _ in watching.messages_of_type(Data))
-    watching.viewer.on_close()
+    assert any(written > simulation.started_at + 8_000_000 for written, _, _ in simulation.messages_of_type(Data))
+    simulation.viewer.on_close()
 
 
-async def test_while_a_line_turns_out_slower_no_word_on_the_rate_takes_room_from_overlays(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch, 7_000.0)
-    watching.advance_time(4_000_000)
-    number, slowing, told = 0, 0, len(watching.messages_of_type(Choice))
-    while watching.at < watching.started_at + 14_000_000:
-        if watching.at > watching.started_at + 9_000_000:
-            watching.transport.rate = 1_800.0
+async def test_no_choice_is_sent_while_link_is_slowing(motion: StoredMotion) -> None:
+    simulation = ConstrainedViewer(motion, 7_000.0)
+    simulation.advance_time(4_000_000)
+    number, slowing, choice_count = 0, 0, len(simulation.messages_of_type(Choice))
+    while simulation.at < simulation.started_at + 14_000_000:
+        if simulation.at > simulation.started_at + 9_000_000:
+            simulation.transport.rate = 1_800.0
         number += 1
-        if watching.viewer._flow.is_slowing and watching.viewer._delivery is not None:
-            # as if another rate had been chosen
-            watching.viewer._delivery.has_unsent_choice, watching.viewer._delivery._announced_choice = True, None
-        watching.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
+        if simulation.viewer._flow.is_slowing and simulation.viewer._feed.delivery is not None:
+            # as if another level had been selected
+            simulation.viewer._feed.delivery.has_unsent_choice, simulation.viewer._feed.delivery._announced_choice = (
+                True,
+                None,
+            )
+        simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
         for _ in range(7):
-            slower = watching.viewer._flow.is_slowing
-            watching.advance_time(5_000)
-            # what waits is more than should, so the newest overlay has the room
-            assert not (slower and watching.viewer._flow.is_slowing and len(watching.messages_of_type(Choice)) > told)
-            slowing += slower
-            told = len(watching.messages_of_type(Choice))
+            was_slowing = simulation.viewer._flow.is_slowing
+            simulation.advance_time(5_000)
+            # the queue is too long, so the capacity is left to the newest overlay
+            assert not (
+                was_slowing
+                and simulation.viewer._flow.is_slowing
+                and len(simulation.messages_of_type(Choice)) > choice_count
+            )
+            slowing += was_slowing
+            choice_count = len(simulation.messages_of_type(Choice))
     assert slowing > 20
-    assert any(written > watching.started_at + 9_000_000 for written, _, _ in watching.messages_of_type(Choice))
-    watching.viewer.on_close()
+    assert any(written > simulation.started_at + 9_000_000 for written, _, _ in simulation.messages_of_type(Choice))
+    simulation.viewer.on_close()
 
 
-async def test_what_must_arrive_waits_for_no_room(motion: StoredMotion, monkeypatch: pytest.MonkeyPatch) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch)
-    assert not watching.viewer._flow.has_capacity()
-    watching.viewer.on_message(Ping(1, 2).pack())
-    assert watching.messages_of_type(Pong)
-    watching.viewer.on_close()
-    assert watching.viewer._timer is None
+async def test_pong_is_sent_without_capacity(motion: StoredMotion) -> None:
+    simulation = ConstrainedViewer(motion)
+    assert not simulation.viewer._flow.has_capacity()
+    simulation.viewer.on_message(Ping(1, 2).pack())
+    assert simulation.messages_of_type(Pong)
+    simulation.viewer.on_close()
+    assert simulation.viewer._timer is None
 
 
 @pytest.fixture(scope="module")
@@ -196,77 +195,79 @@ def pair() -> StoredMotion:
     return unpack_motion("pair", pack_motion("pair", first, others=[second]))
 
 
-async def test_while_the_stage_stands_what_is_on_show_is_bettered_first_and_once_and_then_the_line_falls_still(
-    pair: StoredMotion, monkeypatch: pytest.MonkeyPatch
+async def test_paused_stage_upgrades_visible_blocks_once_then_idles(
+    pair: StoredMotion,
 ) -> None:
-    watching = ConstrainedViewer(pair, monkeypatch, 1_800.0)
-    watching.advance_time(16_000_000)
-    assert watching.viewer.choice is not None
-    assert watching.viewer.choice[0] < 3
-    before = len(watching.messages_of_type(Data))
-    state = timeline.edit(watching.state, watching.at + 100_000, playing=False)
-    watching.viewer.set_timeline(state, pair)
-    paused = watching.at
-    while watching.at < paused + 30_000_000:
-        watching.advance_time(100_000)
-        # a block at most waits behind another
-        assert watching.transport.link.unacked_bytes(watching.at) < 2 * max(len(block) for block in pair.packets[0][3])
-    data = [(came, message) for _, came, message in watching.messages_of_type(Data) if isinstance(message, Data)]
+    simulation = ConstrainedViewer(pair, 1_800.0)
+    simulation.advance_time(16_000_000)
+    assert simulation.viewer.choice is not None
+    assert simulation.viewer.choice[0] < 3
+    before = len(simulation.messages_of_type(Data))
+    state = timeline.edit(simulation.state, simulation.at + 100_000, playing=False)
+    simulation.viewer.set_timeline(state, pair)
+    paused = simulation.at
+    while simulation.at < paused + 30_000_000:
+        simulation.advance_time(100_000)
+        # at most one block is queued behind another
+        assert simulation.transport.link.unacked_bytes(simulation.at) < 2 * max(
+            len(block) for block in pair.packets[0][3]
+        )
+    data = [
+        (arrived, message) for _, arrived, message in simulation.messages_of_type(Data) if isinstance(message, Data)
+    ]
     on_show = pair.first_track.block_at(state.position)
     first = [(message.track, message.index, message.rate) for _, message in data[before : before + 2]]
     assert first == [(0, on_show, 3), (1, on_show, 3)]
     assert data[before + 1][0] < paused + 3_000_000
     assert len(data) == len({(message.track, message.index, message.rate) for _, message in data})
-    # nothing more is to be sent, and no timer looks for room
-    assert watching.viewer._timer is None
-    written = len(watching.transport.sent)
-    watching.advance_time(5_000_000)
-    assert len(watching.transport.sent) == written
-    watching.viewer.on_close()
+    # nothing is unsent, and no timer is set
+    assert simulation.viewer._timer is None
+    written = len(simulation.transport.sent)
+    simulation.advance_time(5_000_000)
+    assert len(simulation.transport.sent) == written
+    simulation.viewer.on_close()
 
 
-async def test_a_loop_that_is_there_whole_comes_better_than_the_line_carries_as_it_dances(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    dances = [
+async def test_complete_loop_is_upgraded_beyond_link_throughput() -> None:
+    encoded = [
         encode_motion(random_motion(8.0, 30.0, seed), error_bounds_mm=(60.0, 20.0, 8.0, 3.0), grade="live")
         for seed in (9, 8)
     ]
-    loop = unpack_motion("loop", pack_motion("loop", dances[0], others=dances[1:]))
-    watching = ConstrainedViewer(loop, monkeypatch, 1_200.0)
-    watching.advance_time(60_000_000)
-    assert watching.viewer.choice is not None
-    assert watching.viewer.choice[0] < 3
-    data = [message for _, _, message in watching.messages_of_type(Data) if isinstance(message, Data)]
+    loop = unpack_motion("loop", pack_motion("loop", encoded[0], others=encoded[1:]))
+    simulation = ConstrainedViewer(loop, 1_200.0)
+    simulation.advance_time(60_000_000)
+    assert simulation.viewer.choice is not None
+    assert simulation.viewer.choice[0] < 3
+    data = [message for _, _, message in simulation.messages_of_type(Data) if isinstance(message, Data)]
     assert len(data) == len({(message.track, message.index, message.rate) for message in data})
-    there = {(message.track, message.index) for message in data if message.rate == 3}
-    assert there == {(track, index) for track in (0, 1) for index in range(loop.first_track.block_count)}
-    assert watching.viewer._timer is None
-    watching.viewer.on_close()
+    best_blocks = {(message.track, message.index) for message in data if message.rate == 3}
+    assert best_blocks == {(track, index) for track in (0, 1) for index in range(loop.first_track.block_count)}
+    assert simulation.viewer._timer is None
+    simulation.viewer.on_close()
 
 
-async def test_a_quick_line_is_not_asked_for_overlays_and_one_that_becomes_slow_is_no_longer_written_to_unasked(
-    motion: StoredMotion, monkeypatch: pytest.MonkeyPatch
+async def test_unconstrained_link_is_unchecked_until_congested(
+    motion: StoredMotion,
 ) -> None:
-    watching = ConstrainedViewer(motion, monkeypatch, 1e7, 500)
-    before = watching.transport.reads
+    simulation = ConstrainedViewer(motion, 1e7, 500)
+    before = simulation.transport.reads
     for number in range(100):
-        watching.at += 33_000
-        watching.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS).pack()))
-    assert watching.transport.reads == before
-    assert len(watching.messages_of_type(Overlay)) == 100
-    assert watching.viewer.accepts_direct_writes
-    watching.at += viewer_connection.LOW_RTT_CHECK_INTERVAL_US
-    watching.transport.link.write(watching.at, 2_000_000)
-    watching.transport.sent += bytes(2_000_000)
-    watching.viewer.tick()
-    steady = watching.viewer.accepts_direct_writes
-    watching.viewer.send_overlay(encode_frame(Overlay(101, 5, LIMBS).pack()))
-    assert len(watching.messages_of_type(Overlay)) == 100
-    watching.advance_time(1_000_000)
-    assert len(watching.messages_of_type(Overlay)) == 101
+        simulation.at += 33_000
+        simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS).pack()))
+    assert simulation.transport.reads == before
+    assert len(simulation.messages_of_type(Overlay)) == 100
+    assert simulation.viewer.accepts_direct_writes
+    simulation.at += LOW_RTT_CHECK_INTERVAL_US
+    simulation.transport.link.write(simulation.at, 2_000_000)
+    simulation.transport.sent += bytes(2_000_000)
+    simulation.viewer.tick()
+    steady = simulation.viewer.accepts_direct_writes
+    simulation.viewer.send_overlay(encode_frame(Overlay(101, 5, LIMBS).pack()))
+    assert len(simulation.messages_of_type(Overlay)) == 100
+    simulation.advance_time(1_000_000)
+    assert len(simulation.messages_of_type(Overlay)) == 101
     for number in range(102, 600):
-        watching.advance_time(33_000)
-        watching.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS).pack()))
-    assert (steady, watching.viewer.accepts_direct_writes) == (False, True)
-    watching.viewer.on_close()
+        simulation.advance_time(33_000)
+        simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS).pack()))
+    assert (steady, simulation.viewer.accepts_direct_writes) == (False, True)
+    simulation.viewer.on_close()

@@ -1,1 +1,1 @@
-"""Makes the golden vectors of `proto/vectors`, by which both languages are judged."""
+"""Generators of the golden vectors in `proto/vectors` and of the generated parts of the contract."""

@@ -1,7 +1,4 @@
-"""Golden vectors of the marionette: `python -m tests.vectors.arm` rewrites `proto/vectors/arm.json`.
-
-Both languages are judged by them: numbers to 1e-9. Tables are base64 of the served bytes.
-"""
+"""Arm tables, solved arms and legs, and table names (`arm.json`). Tables are base64 of the served bytes."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ EDGE_CASE_TARGETS = [
     [-0.3, -1.4, -0.2],
     [0.0, 0.0, -0.6],
 ]
-"""Straight below and above, at the shoulder, straight ahead, out of reach, too near, behind."""
+"""Below, above, at the shoulder, ahead, out of reach, too near, and behind."""
 
 
 def _rounded_list(values: Any) -> Any:
@@ -73,7 +70,7 @@ def _arm_vectors(identity: str, random: np.random.Generator) -> dict[str, Any]:
 
 
 def _identity_vectors(random: np.random.Generator) -> list[dict[str, Any]]:
-    """What arms of these lengths, with and without masses of their own, are known by."""
+    """Return the table names of arms of random lengths, with and without masses."""
     cases: list[dict[str, Any]] = []
     for nth in range(24):
         a, b, c = np.round(random.uniform([0.2, 0.2, 0.1], [0.4, 0.35, 0.25]) * (1.0 if nth % 3 else 100.0), 6).tolist()
@@ -85,7 +82,7 @@ def _identity_vectors(random: np.random.Generator) -> list[dict[str, Any]]:
 
 
 def _random_poses(random: np.random.Generator) -> Array:
-    """Four poses of random joints (4, 18, 4), the last the rest."""
+    """Return four poses (4, 18, 4) of random joints, the last at rest."""
     vectors = random.uniform(-0.6, 0.6, (4, 18, 3))
     vectors[3] = 0.0
     return rotation.from_rotation_vector(vectors)
@@ -121,7 +118,7 @@ def _limb_vectors(random: np.random.Generator) -> dict[str, Any]:
 
 
 def make_vectors() -> dict[str, Any]:
-    """All vectors, as the file has them."""
+    """Return the content of the file."""
     random = np.random.default_rng(20)
     return {
         "arms": [_arm_vectors(identity, random) for identity in IDENTITIES],
@@ -131,7 +128,7 @@ def make_vectors() -> dict[str, Any]:
 
 
 def write_vectors() -> None:
-    """Write the file anew."""
+    """Write the file."""
     VECTORS_FILE.parent.mkdir(parents=True, exist_ok=True)
     VECTORS_FILE.write_text(json.dumps(make_vectors(), indent=None, separators=(",", ":")).replace('{"', '\n{"') + "\n")
 

@@ -1,4 +1,4 @@
-"""Golden audio blocks, valid and invalid. Their packets have true first bytes and noise for sound."""
+"""Audio blocks, valid and invalid (`audio.json`). Packets have valid first bytes and random contents."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from bunraku.codec.timing import Timing
 from tests.vectors.blocks import to_base64
 
 PACKET_PREFIXES = b"\x18", b"\x58", b"\xff\x83", b"\xfb\x43"
-"""First bytes of packets of 60 ms: SILK of one frame, CELT of three."""
+"""First bytes of packets of 60 ms: one SILK frame, or three CELT frames."""
 TIMINGS = (
     Timing(30.0, 78, 30, 15),
     Timing(59.94, 200, 67, 6),
     Timing(128.0, 40, 3, 1),
 )
-"""Of motions: a short first block; starts between microseconds; blocks shorter than a packet."""
+"""Motions with a short first block, with starts between microseconds, and with blocks shorter than a packet."""
 
 
 def random_packets(count: int, max_bytes: int, seed: int) -> list[bytes]:
-    """Packets of 60 ms and up to `most` bytes."""
+    """Return packets of 60 ms and at most about `max_bytes` bytes."""
     random = np.random.default_rng(seed)
     sizes = random.integers(2, max_bytes, count)
     return [PACKET_PREFIXES[random.integers(len(PACKET_PREFIXES))] + random.bytes(int(size)) for size in sizes]
 
 
 def block_vector(track: AudioTrack, number: int, index: int, data: bytes) -> dict[str, Any]:
-    """A valid block of track `number` and what it holds: of each packet its number, its first sample and its bytes."""
+    """Return a valid block of track `number` with the number, first sample and bytes of each packet."""
     return {
         "track": number,
         "index": index,
@@ -48,7 +48,7 @@ def block_vector(track: AudioTrack, number: int, index: int, data: bytes) -> dic
 
 
 def make_vectors() -> dict[str, Any]:
-    """Tracks beside motions of some timing, blocks of each, and what is no block."""
+    """Return tracks beside motions of several timings, blocks of each, and invalid blocks."""
     tracks = [
         create_audio_track(TIMINGS[0], 2, 120, max_samples(TIMINGS[0])),
         create_audio_track(TIMINGS[1], 1, 312, 100_000),

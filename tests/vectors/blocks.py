@@ -1,4 +1,4 @@
-"""Golden motion blocks, valid and invalid."""
+"""Motion blocks, valid and invalid (`blocks.json`)."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from bunraku.codec.motion_track import MotionTrack, plan_motion_track
 from bunraku.codec.prior import IntArray, load_shipped_prior
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import CHANNEL_COUNT, JOINT_COUNT, Motion, standard_figure
+from tests.vectors.range_encoding import encode_bits
 
 
 def to_base64(data: bytes) -> str:
-    """Bytes in base64."""
+    """Return bytes in base64."""
     return base64.b64encode(data).decode()
 
 
 def random_motion(seconds: float, fps: float, seed: int) -> Motion:
-    """Smooth arbitrary movement of every channel, whole turns of the root included."""
+    """Return smooth movement of every channel, with whole turns of the root."""
     random = np.random.default_rng(seed)
     frames = round(seconds * fps)
     t = np.arange(frames)[:, None, None] / fps
@@ -39,7 +40,7 @@ def random_motion(seconds: float, fps: float, seed: int) -> Motion:
 
 
 def random_coefficients(random: np.random.Generator, count: int, max_magnitude: int) -> IntArray:
-    """Sparse coefficients (19, 3, `count`) of every size from one to `most`."""
+    """Return sparse coefficients (19, 3, `count`) of all magnitudes up to `max_magnitude`."""
     size = np.floor(2.0 ** random.uniform(0, np.log2(max_magnitude + 1), (CHANNEL_COUNT, 3, count))).astype(np.int64)
     here = random.random(size.shape) < random.choice([0.05, 0.5, 0.95], (CHANNEL_COUNT, 1, 1))
     quantised: IntArray = size * here * random.choice([-1, 1], size.shape)
@@ -47,44 +48,36 @@ def random_coefficients(random: np.random.Generator, count: int, max_magnitude: 
 
 
 def encode_header(numbers: list[tuple[int, int]], frames: int | None = None, scene: bool = False) -> bytes:
-    """The head of a block of `frames` frames (None: as usual) that says any `numbers` (value, bits) after them, by
-    the definition of the range coder in whole numbers of any size; a `scene`'s has no bit for its channels. It is the
-    lowest number of its interval, so zeros behind it read as ones for ever."""
-    low, span, size = 0, 0xFFFFFFFF, 4
-    unusual = [] if frames is None else [(16384, bool(frames >> i & 1)) for i in range(9, -1, -1)]
-    bits = [(32440, frames is None), *unusual, *([] if scene else [(512, False)])]
+    """Encode a block header of `frames` frames (None: the nominal number) and any `numbers` (value, bits) after them.
+
+    A `scene` header has no bit for its channels. All bits decoded after the header are ones.
+    """
+    explicit = [] if frames is None else [(16384, bool(frames >> i & 1)) for i in range(9, -1, -1)]
+    bits = [(32440, frames is None), *explicit, *([] if scene else [(512, False)])]
     bits += [(16384, bool(value >> i & 1)) for value, n in numbers for i in range(n - 1, -1, -1)]
-    for probability, bit in bits:
-        bound = (span >> 15) * probability
-        if bit:
-            span = bound
-        else:
-            low, span = low + bound, span - bound
-        while span < 1 << 24:
-            low, span, size = low << 8, span << 8, size + 1
-    return low.to_bytes(size, "big")
+    return encode_bits(bits)
 
 
 def block_vector(track: MotionTrack, number: int, data: bytes) -> dict[str, Any]:
-    """A valid block of track `number` and what it decodes to."""
-    start, q = coefficients.decode_coefficients(load_shipped_prior(), data, track.block_frames, track.fps)
+    """Return a valid block of track `number` with its decoded header, coefficients and poses."""
+    header, q = coefficients.decode_coefficients(load_shipped_prior(), data, track.block_frames, track.fps)
     block, poses = decode_motion_block(track, data), []
-    for instant in (0.0, start.frames / 3 - 0.5, start.frames - 1.0, start.frames - 0.5):
+    for instant in (0.0, header.frames / 3 - 0.5, header.frames - 1.0, header.frames - 0.5):
         root, rotations = block.pose_at(instant)
         poses.append({"instant": instant, "root": root[0].tolist(), "rotations": rotations[0].ravel().tolist()})
     return {
         "track": number,
         "block": to_base64(data),
-        "frames": start.frames,
-        "step": start.step,
-        "heading": start.heading,
+        "frames": header.frames,
+        "step": header.step,
+        "heading": header.heading,
         "q": q.ravel().tolist(),
         "poses": poses,
     }
 
 
 def track_vector(track: MotionTrack) -> dict[str, Any]:
-    """A track's fields as a Description has them, and its weights."""
+    """Return a track's fields in a Description, and the values that follow from its skeleton description."""
     return {
         "fps": track.fps,
         "frames": track.frames,
@@ -99,10 +92,10 @@ def track_vector(track: MotionTrack) -> dict[str, Any]:
 
 
 def make_vectors() -> dict[str, Any]:
-    """Tracks; blocks of several lengths and steps with coefficients and poses; and broken ones with the reason."""
-    motion, swift = random_motion(2.6, 30.0, 7), random_motion(1.1, 59.94, 8)
+    """Return tracks, blocks of several lengths and steps with coefficients and poses, and invalid blocks."""
+    motion, fast_motion = random_motion(2.6, 30.0, 7), random_motion(1.1, 59.94, 8)
     even = replace(plan_motion_track(motion), block_frames=30, first_frames=30)
-    quick = plan_motion_track(swift, 0.5, 0.1, mean_error_mm=2.0)
+    quick = plan_motion_track(fast_motion, 0.5, 0.1, mean_error_mm=2.0)
     stood = np.repeat(motion.rotations[3:4], 20, axis=0)
     statue = Motion(standard_figure(), 24.0, motion.root[:20] * 0, stood)
     still = plan_motion_track(statue)
@@ -113,18 +106,18 @@ def make_vectors() -> dict[str, Any]:
         (0, motion, 0, 190, "mean"),
         (0, motion, 1, 130, "first"),
         (0, motion, 2, 160, "mean"),
-        (1, swift, 0, 60, "first"),
-        (1, swift, 1, 150, "mean"),
-        (1, swift, 2, 110, "mean"),
+        (1, fast_motion, 0, 60, "first"),
+        (1, fast_motion, 1, 150, "mean"),
+        (1, fast_motion, 2, 110, "mean"),
         (2, statue, 0, 120, "mean"),
     )
-    for number, of, index, step, goal in goals:
-        coded = BlockEncoder(tracks[number], of, load_shipped_prior()).encode_block(
+    for number, source, index, step, goal in goals:
+        coded = BlockEncoder(tracks[number], source, load_shipped_prior()).encode_block(
             index, step, MEAN_ERROR_REFINEMENT if goal == "mean" else None
         )
         valid.append(block_vector(tracks[number], number, coded.data))
     random = np.random.default_rng(9)
-    for number, frames, step, heading, count, most in (
+    for number, frames, step, heading, count, max_magnitude in (
         (0, 30, 0, 0, 0, 1),
         (0, 1, 0, 31, 1, 12),
         (1, 2, 255, -32, 2, 3),
@@ -134,7 +127,7 @@ def make_vectors() -> dict[str, Any]:
         (2, 512, 100, -1, 40, 1 << 8),
     ):
         track = tracks[number]
-        q = random_coefficients(random, count, most)
+        q = random_coefficients(random, count, max_magnitude)
         data = coefficients.encode_coefficients(
             load_shipped_prior(), BlockHeader(frames, step, heading), q, track.block_frames, track.fps
         )

@@ -1,4 +1,4 @@
-"""The golden files: name -> text."""
+"""Generated files by path: golden vectors, the AsyncAPI document and the TypeScript message types."""
 
 from __future__ import annotations
 
@@ -8,23 +8,56 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tests.vectors import audio, blocks, controlled_limb, messages, one_euro, scene
+from tests.vectors import (
+    asyncapi,
+    audio,
+    blocks,
+    controlled_limb,
+    messages,
+    one_euro,
+    playback,
+    scene,
+    skeletons,
+    trace,
+    typescript,
+)
 
-VECTORS_FOLDER = Path(__file__).resolve().parents[2] / "proto" / "vectors"
+ROOT = Path(__file__).resolve().parents[2]
+PROTO_FOLDER = ROOT / "proto"
+VECTORS_FOLDER = PROTO_FOLDER / "vectors"
+ASYNCAPI_FILE = PROTO_FOLDER / "asyncapi.json"
+TYPESCRIPT_FILE = ROOT / "services" / "web" / "src" / "wire" / "messages.ts"
 GENERATORS: dict[str, Callable[[], Any]] = {
     "audio.json": audio.make_vectors,
     "blocks.json": blocks.make_vectors,
     "messages.json": messages.make_vectors,
     "one_euro.json": one_euro.make_vectors,
+    "playback.json": playback.make_vectors,
     "pulled.json": controlled_limb.make_vectors,
     "scene.json": scene.make_vectors,
+    "skeletons.json": skeletons.make_vectors,
+    "trace.json": trace.make_vectors,
 }
+_NUMBER_LIST = re.compile(r"\[[-+.\deE,\s]+\]")
 
 
-def render_files() -> dict[str, str]:
-    """Every golden file as text, made anew; a list of numbers stands on one line."""
-    lists = re.compile(r"\[[-+.\deE,\s]+\]")
-    return {
-        name: lists.sub(lambda found: re.sub(r"\s+", "", found[0]), json.dumps(make(), indent=1)) + "\n"
-        for name, make in GENERATORS.items()
-    }
+def render_vectors(name: str) -> str:
+    """Return the text of one vector file; a list of numbers is one line."""
+    text = json.dumps(GENERATORS[name](), indent=1)
+    return _NUMBER_LIST.sub(lambda found: re.sub(r"\s+", "", found[0]), text) + "\n"
+
+
+def render_asyncapi() -> str:
+    """Return the text of the AsyncAPI document."""
+    return json.dumps(asyncapi.make_document(), indent=1) + "\n"
+
+
+def render_typescript() -> str:
+    """Return the text of the TypeScript message types."""
+    return typescript.make_module(asyncapi.make_document())
+
+
+def render_files() -> dict[Path, str]:
+    """Return the text of every generated file except `arm.json`."""
+    files = {VECTORS_FOLDER / name: render_vectors(name) for name in GENERATORS}
+    return files | {ASYNCAPI_FILE: render_asyncapi(), TYPESCRIPT_FILE: render_typescript()}

@@ -1,4 +1,4 @@
-"""Golden messages, valid and invalid."""
+"""Messages: valid, in an older form, tolerated, skipped and invalid (`messages.json`)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,13 @@ import dataclasses
 from typing import Any
 
 import msgpack
+import numpy as np
 
+from bunraku.codec.audio import AUDIO_CODEC
+from bunraku.codec.motion_track import MOTION_CODEC
+from bunraku.codec.scene import SCENE_CODEC
+from bunraku.codec.skeleton_description import SkeletonDescription, snap_to_grid
+from bunraku.motion.skeleton import standard_figure
 from bunraku.wire.messages import (
     Alive,
     Ask,
@@ -36,23 +42,56 @@ from tests.vectors.blocks import to_base64
 NOW_US = 1_774_000_000_123_456
 
 
-def _to_json(value: Any) -> Any:
+def to_json(value: Any) -> Any:
+    """Return a value for JSON; bytes become {"base64": text}."""
     if isinstance(value, bytes):
         return {"base64": to_base64(value)}
     if isinstance(value, dict):
-        return {str(k): _to_json(v) for k, v in value.items()}
+        return {str(k): to_json(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_to_json(v) for v in value]
+        return [to_json(v) for v in value]
     return value
 
 
 def _message_vector(message: Message, data: bytes) -> dict[str, Any]:
     fields = {f.name: getattr(message, f.name) for f in dataclasses.fields(message)}
-    return {"name": type(message).__name__, "type": message.TYPE, "fields": _to_json(fields), "bytes": to_base64(data)}
+    return {"name": type(message).__name__, "type": data[0], "fields": to_json(fields), "bytes": to_base64(data)}
+
+
+def _complete_tracks() -> list[dict[str, Any]]:
+    """Tracks of every type with all their keys."""
+    skeleton = SkeletonDescription(snap_to_grid(standard_figure(), 2), 2, np.zeros((18, 3)), 2)
+    timing = {"fps": 60.0, "frames": 150, "block_frames": 60, "first_frames": 30}
+    rates = [{"kbps": 3.5, "mean": 5.0, "max": 24.0}, {"kbps": 12.25, "mean": 1.0, "max": 6.5}]
+    motion = {
+        "type": "motion",
+        "codec": MOTION_CODEC,
+        "channels": 19,
+        **timing,
+        "rates": rates,
+        "dancer": skeleton.pack(),
+        "front": 0.5,
+    }
+    scene = {"codec": SCENE_CODEC, "channels": 3, **timing, "rates": [{"kbps": 0.5, "mean": 2.0, "max": 10.0}]}
+    reference = [0.5, 1.5, 3.25, 0.0, 1.0, 0.0, -1.0]
+    return [
+        motion,
+        {**motion, "place": [1.5, -0.25, 0.75]},
+        {
+            "type": "audio",
+            "codec": AUDIO_CODEC,
+            "channels": 2,
+            "pre_skip": 120,
+            "samples": 119_000,
+            "rates": [{"kbps": 9.5}, {"kbps": 24.5}],
+        },
+        {"type": "camera", **scene, "full": 1.0, "reference": reference},
+        {"type": "light", **scene, "full": 800.0, "reference": reference},
+    ]
 
 
 def make_vectors() -> dict[str, Any]:
-    """One of every message with its fields, and broken ones with the reason."""
+    """Return examples of every message with their fields, and invalid messages with the reason."""
     examples: list[Message] = [
         ChannelHeader(motion="k3v9q", now=NOW_US, channels=19, software="0.1.0"),
         Description("k3v9q", [{"type": "motion", "fps": 60.0, "figure": bytes(range(138))}]),
@@ -101,6 +140,7 @@ def make_vectors() -> dict[str, Any]:
         Choice(2, "line", 27_400),
         Choice(4, "best"),
         Input(2, Input.VELOCITY, 9, 13, NOW_US, (-1.0, 0.0, 0.0)),
+        Description("k3v9q", _complete_tracks()),
     ]
     target = Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)).pack()
     invalid = {
@@ -120,12 +160,29 @@ def make_vectors() -> dict[str, Any]:
         "data without an index": bytes([3, 0]),
         "data with an index too long": bytes([3, 0, 128, 128, 128, 1]),
         "pong too long": Pong(1, 2, 3, 4).pack() + b"\0",
+        "bytes after the map": Claim(0).pack() + b"\0",
+        "nil in place of a limb": bytes([67]) + msgpack.packb({"limb": None}),
+        "a number in place of a boolean": bytes([71]) + msgpack.packb({"limb": 0, "wanted": 1}),
+        "binary in place of text": bytes([8]) + msgpack.packb({"title": b"a", "detail": "b"}),
+        "fewer lists of asks than limbs": bytes([6])
+        + msgpack.packb({"viewers": 0, "puppeteers": [], "limbs": [None] * 4, "asks": [[]] * 3}),
+    }
+    ping, lowest = Ping(1, 2), Overlay(3, NOW_US, {0: (-32_768,) * 9})
+    several = Overlay(4, NOW_US, {4: (0,) * 9})
+    tolerated: dict[str, tuple[Message, bytes]] = {
+        "reserved bytes that are not zero": (ping, ping.pack()[:1] + b"\1\2\3" + ping.pack()[4:16] + b"\xff" * 16),
+        "reserved bits that are not zero": (several, several.pack()[:1] + b"\x0f" + several.pack()[2:]),
+        "an index in more bytes than needed": (Data(2, 1, 5, b"\1"), bytes([3, 0x21, 0x85, 0x80, 0, 1])),
+        "an overlay number of -32768": (lowest, lowest.pack()),
+        "an unknown key": (Claim(2), bytes([67]) + msgpack.packb({"limb": 2, "later": 1})),
+        "the last of two equal keys": (Claim(2), bytes([67, 0x82]) + b"\xa4limb\x01\xa4limb\x02"),
     }
     alone = Presence(3, [], ["a1", None, None, None])
     older = bytes([6]) + msgpack.packb({"viewers": 3, "puppeteers": [], "limbs": alone.limbs})
     return {
         "valid": [_message_vector(message, message.pack()) for message in examples],
         "older": [{"why": "presence without asks: nobody asks", **_message_vector(alone, older)}],
+        "tolerated": [{"why": why, **_message_vector(message, data)} for why, (message, data) in tolerated.items()],
         "skipped": [to_base64(b"\x3f later"), to_base64(b"\xff")],
         "invalid": [{"why": why, "bytes": to_base64(data)} for why, data in invalid.items()],
     }

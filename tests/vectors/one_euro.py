@@ -1,4 +1,4 @@
-"""Golden numbers of the One-Euro filter: what it gives for samples at irregular, repeated and earlier times."""
+"""Outputs of the One-Euro filter for samples at irregular, repeated and earlier times (`one_euro.json`)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bunraku.client.one_euro import OneEuro
 
 
 def make_vectors() -> list[dict[str, Any]]:
-    """Runs of several settings, of vectors of one, two and three numbers."""
+    """Return runs of several settings, of vectors of one, two and three values."""
     random = np.random.default_rng(12)
     runs = []
     kinds = (((1.0, 0.0, 1.0), 1), ((1.5, 8.0, 1.0), 3), ((0.3, 2.0, 4.0), 2))

@@ -1,4 +1,4 @@
-"""Golden blocks of cameras and lights, valid and invalid."""
+"""Blocks of cameras and lights, valid and invalid (`scene.json`)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.vectors.blocks import encode_header, to_base64
 
 
 def sample_camera(seconds: float, fps: float) -> SceneSamples:
-    """Round the dancer at about three metres, from either side, nearing and zooming."""
+    """Return a camera that moves about the performer at about 3 m and zooms."""
     t = np.arange(round(seconds * fps)) * (2 * np.pi / fps)
     angle, distance = 0.5 * np.sin(t / 11), 3.2 + 0.6 * np.sin(t / 7 + 1)
     position = [distance * np.sin(angle), 1.4 + 0.3 * np.sin(t / 9), distance * np.cos(angle)]
@@ -26,7 +26,7 @@ def sample_camera(seconds: float, fps: float) -> SceneSamples:
 
 
 def sample_light(seconds: float, fps: float) -> SceneSamples:
-    """A lamp that sways, turns from warm to blue and is dimmed to nothing and up again; 800 at its full."""
+    """Return a swaying light that changes colour and is dimmed to zero and back; full intensity 800."""
     t = np.arange(round(seconds * fps)) * (2 * np.pi / fps)
     position = [2 + 0.2 * np.sin(t / 3), 4 + 0.1 * np.cos(t / 3), 1 + 0 * t]
     blue = 0.5 + 0.5 * np.sin(t / 4)
@@ -35,17 +35,17 @@ def sample_light(seconds: float, fps: float) -> SceneSamples:
 
 
 def block_vector(track: SceneTrack, number: int, data: bytes) -> dict[str, Any]:
-    """A valid block of track `number` and what it decodes to."""
-    start, q = coefficients.decode_coefficients(
+    """Return a valid block of track `number` with its decoded header, coefficients and values."""
+    header, q = coefficients.decode_coefficients(
         load_shipped_prior(), data, track.block_frames, track.fps, SCENE_CHANNEL_COUNT
     )
-    instants = (0.0, start.frames / 3 - 0.5, start.frames - 1.0, start.frames - 0.5)
+    instants = (0.0, header.frames / 3 - 0.5, header.frames - 1.0, header.frames - 0.5)
     values = decode_scene_block(track, data).values_at(np.array(instants))
     return {
         "track": number,
         "block": to_base64(data),
-        "frames": start.frames,
-        "step": start.step,
+        "frames": header.frames,
+        "step": header.step,
         "q": q.ravel().tolist(),
         "values": [{"instant": t, "numbers": row.tolist()} for t, row in zip(instants, values, strict=True)],
     }
@@ -61,7 +61,7 @@ def _random_coefficients(random: np.random.Generator, count: int, max_magnitude:
 
 
 def make_vectors() -> dict[str, Any]:
-    """Tracks as in a Description; blocks of several lengths and steps; and broken ones of the first track."""
+    """Return tracks, blocks of several lengths and steps, and invalid blocks of the first track."""
     still = SceneSamples("camera", 24.0, np.repeat(sample_camera(0.1, 24.0).values[:1], 30, axis=0))
     scenes = (
         encode_scene(sample_camera(2.6, 30.0), error_bounds_mm=(20.0, 1.0)),
@@ -76,7 +76,7 @@ def make_vectors() -> dict[str, Any]:
         for data in rate.blocks
     ]
     random = np.random.default_rng(10)
-    for number, frames, step, count, most in (
+    for number, frames, step, count, max_magnitude in (
         (0, 1, 255, 1, 3),
         (0, 30, 7, 30, 1 << 12),
         (1, 30, 60, 30, 1 << 16),
@@ -85,18 +85,20 @@ def make_vectors() -> dict[str, Any]:
         (0, 60, 255, 60, 1 << 19),
     ):
         track = tracks[number]
-        q = _random_coefficients(random, count, most)
+        q = _random_coefficients(random, count, max_magnitude)
         data = coefficients.encode_coefficients(
             load_shipped_prior(), BlockHeader(frames, step, 0), q, track.block_frames, track.fps
         )
         valid.append(block_vector(track, number, data))
-    usual = tracks[0].block_frames
+    nominal = tracks[0].block_frames
     invalid = {
         "no frames": encode_header([(9, 8)], 0, scene=True),
         "too many frames": encode_header([(9, 8), (4, 10)], 513, scene=True),
         "more frequencies than frames": encode_header([(9, 8), (5, 3)], 4, scene=True),
-        "more frequencies than the usual frames": encode_header([(9, 8), (usual + 1, usual.bit_length())], scene=True),
-        "an escape too long": encode_header([(9, 8), (1, usual.bit_length())], scene=True) + bytes(30),
+        "more frequencies than the usual frames": encode_header(
+            [(9, 8), (nominal + 1, nominal.bit_length())], scene=True
+        ),
+        "an escape too long": encode_header([(9, 8), (1, nominal.bit_length())], scene=True) + bytes(30),
         "too large": base64.b64decode(valid[-1]["block"]) + bytes(65_536),
     }
     return {

@@ -12,7 +12,7 @@ from tests.vectors import arm
 
 
 def compare(made: Any, stored: Any, where: str) -> None:
-    """Equal, and numbers to 1e-9: the last digit of a sine is the machine's own."""
+    """Assert equality, of floats to 1e-9."""
     if isinstance(made, dict):
         assert made.keys() == stored.keys(), where
         for name in made:
@@ -28,17 +28,17 @@ def compare(made: Any, stored: Any, where: str) -> None:
         assert made == stored, where
 
 
-def test_making_them_again_gives_the_committed_file() -> None:
+def test_committed_arm_vectors_are_what_the_code_makes() -> None:
     stored = json.loads(arm.VECTORS_FILE.read_text())
     made = arm.make_vectors()
     compare(made, stored, "arm.json")
     for one, other in zip(made["arms"], stored["arms"], strict=True):
         here, there = (bend_table.parse_bend_table(base64.b64decode(vectors["table"])) for vectors in (one, other))
-        # one step of a float16 near 1, should a bisection end on the other side of a rounding
+        # one float16 step near 1: the bisection may end on the other side of a rounding border
         assert float(np.abs(here.astype(np.float64) - there.astype(np.float64)).max()) <= 2.0**-11
 
 
-def test_the_committed_tables_are_what_their_digests_say() -> None:
+def test_committed_tables_have_the_recorded_digests() -> None:
     for vectors in json.loads(arm.VECTORS_FILE.read_text())["arms"]:
         data = base64.b64decode(vectors["table"])
         assert len(data) == bend_table.TABLE_BYTES

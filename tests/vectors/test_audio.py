@@ -1,4 +1,4 @@
-"""The golden audio blocks are read as they stand, and what is broken in them is refused."""
+"""Golden audio blocks are read and written unchanged, and invalid ones are refused."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bunraku.codec.timing import parse_timing
 from tests.vectors.test_golden import committed
 
 
-def test_golden_blocks_are_read_and_written_as_they_stand() -> None:
+def test_golden_audio_blocks_read_and_write_unchanged() -> None:
     ours = committed("audio.json")
     tracks = [
         parse_audio_track(track, parse_timing(motion, "motion"))
@@ -21,16 +21,16 @@ def test_golden_blocks_are_read_and_written_as_they_stand() -> None:
     for valid in ours["valid"]:
         block = base64.b64decode(valid["block"])
         packets = unpack_audio_block(block)
-        told = [
+        decoded = [
             {"number": number, "sample": tracks[valid["track"]].first_sample(number), "data": data}
             for number, data in packets
         ]
-        assert told == [packet | {"data": base64.b64decode(packet["data"])} for packet in valid["packets"]]
+        assert decoded == [packet | {"data": base64.b64decode(packet["data"])} for packet in valid["packets"]]
         assert all(tracks[valid["track"]].block_of_packet(packet.number) == valid["index"] for packet in packets)
         assert pack_audio_block(packets[0].number if packets else 0, [packet.data for packet in packets]) == block
 
 
-def test_broken_blocks_are_refused() -> None:
-    for broken in committed("audio.json")["invalid"]:
+def test_invalid_audio_blocks_are_refused() -> None:
+    for invalid in committed("audio.json")["invalid"]:
         with pytest.raises(DamagedBlock):
-            unpack_audio_block(base64.b64decode(broken["block"]))
+            unpack_audio_block(base64.b64decode(invalid["block"]))

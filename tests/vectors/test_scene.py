@@ -1,4 +1,4 @@
-"""The golden scenes are what the code makes of them, and what is broken in them is refused."""
+"""Golden scene blocks decode as recorded, and invalid ones are refused."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from tests.vectors import scene
 from tests.vectors.test_golden import close, committed
 
 
-def test_golden_scenes_are_what_the_code_makes_of_them() -> None:
-    """As with the motion's blocks, another machine may choose other coefficients, but none reads them otherwise."""
+def test_golden_scene_blocks_decode_as_recorded_and_encode_to_the_same_bytes() -> None:
+    """Check decoded values and re-encoding only, as for motion blocks."""
     made, ours = json.loads(json.dumps(scene.make_vectors())), committed("scene.json")
     for new, old in zip(made["tracks"], ours["tracks"], strict=True):
-        assert close(new | {"rates": []}, old | {"rates": []}), "run `make vectors` and look at the change"
+        assert close(new | {"rates": []}, old | {"rates": []}), "run `make vectors` and review the change"
     assert ours["invalid"] == made["invalid"]
     assert len(ours["valid"]) == len(made["valid"])
     tracks = [parse_scene_track(track) for track in ours["tracks"]]
     for valid in ours["valid"]:
         track, data = tracks[valid["track"]], base64.b64decode(valid["block"])
         assert close(valid, json.loads(json.dumps(scene.block_vector(track, valid["track"], data))))
-        head, q = coefficients.decode_coefficients(
+        header, q = coefficients.decode_coefficients(
             load_shipped_prior(), data, track.block_frames, track.fps, SCENE_CHANNEL_COUNT
         )
-        assert coefficients.encode_coefficients(load_shipped_prior(), head, q, track.block_frames, track.fps) == data
+        assert coefficients.encode_coefficients(load_shipped_prior(), header, q, track.block_frames, track.fps) == data
 
 
-def test_broken_scenes_are_refused() -> None:
+def test_invalid_scene_blocks_are_refused() -> None:
     vectors = committed("scene.json")
     track = parse_scene_track(vectors["tracks"][0])
-    for broken in vectors["invalid"]:
+    for invalid in vectors["invalid"]:
         with pytest.raises(DamagedBlock):
-            decode_scene_block(track, base64.b64decode(broken["block"]))
+            decode_scene_block(track, base64.b64decode(invalid["block"]))

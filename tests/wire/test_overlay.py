@@ -16,18 +16,17 @@ def _random_frames(limbs: set[int], count: int, random: Random) -> list[dict[int
 
 
 @given(st.integers(0, 0xFFFF), TIME, st.sets(LIMB), st.integers(1, 16), st.randoms(use_true_random=False))
-def test_an_overlay_of_any_performers_comes_back_frame_by_frame(
+def test_packed_overlay_unpacks_to_the_same_frames(
     sequence: int, due: int, limbs: set[int], count: int, random: Random
 ) -> None:
     frames = _random_frames(limbs, count, random)
     message = Overlay(sequence, due, frames[-1], tuple(frames[:-1]))
     assert unpack(message.pack()) == message
-    # of the first performer alone it is what it was before there were several
     assert message.pack()[0] == (5 if all(limb < 4 for limb in limbs) else 14)
 
 
 @given(st.integers(0, 0xFFFF), TIME, st.sets(LIMB), st.integers(0, 5), st.randoms(use_true_random=False))
-def test_the_newest_frame_of_an_overlay_is_an_overlay_of_it_alone(
+def test_drop_earlier_frames_keeps_the_last_frame(
     sequence: int, due: int, limbs: set[int], earlier: int, random: Random
 ) -> None:
     frames = _random_frames(limbs, earlier + 1, random)

@@ -9,16 +9,12 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from bunraku.http.access_control import Role, access_of, requires
-from bunraku.http.problem_details import (
-    ProblemError,
-    install_problem_handlers,
-    motion_not_found,
-    session_not_found,
-)
+from bunraku.http.problem_details import install_problem_handlers, motion_not_found, session_not_found
 from bunraku.http.ticket_store import TICKET_LIFETIME_S, TooManyTickets
 from bunraku.http.timestamp import format_timestamp
 from bunraku.runtime.context import ServiceContext
-from bunraku.storage.catalogue import Share
+from bunraku.runtime.problem import ProblemError
+from bunraku.storage.record import Share
 
 DEFAULT_SHARE_LIFETIME_S = 7 * 86_400
 MAX_SHARE_LIFETIME_S = 31 * 86_400

@@ -1,4 +1,4 @@
-"""Which rate a viewer gets, and why: by its line and by its machine, as the paper asks (paper 2)."""
+"""Selection of a viewer's bitrate level, by its link and its machine (paper, section 2)."""
 
 from __future__ import annotations
 
@@ -10,30 +10,38 @@ from bunraku.delivery.congestion import HEADER_BYTES
 from bunraku.wire.messages import Report
 
 LOW_BUFFER_US = 800_000
-"""Less than this ready ahead, microseconds, says that the line does not carry the rate."""
+"""A shorter buffer shows that the link does not sustain the level, microseconds."""
 HIGH_BUFFER_US = SEND_AHEAD_US * 6 // 10
-"""As much as this ready ahead, for `PATIENCE`, says that the line carries more."""
+"""A buffer of this length for `MIN_STABLE_US` shows that the link sustains a higher level, microseconds."""
 MIN_STABLE_US = 3_000_000
 SLOW_FRAME_US = 50_000
 SLOW_DECODE_US = 20_000
 BLOCK_BANDWIDTH_SHARE = 0.8
-"""Of a narrow line that blocks may take."""
+"""Share of a constrained link's throughput that blocks may use."""
 BLOCK_BANDWIDTH_SHARE_WITH_OVERLAYS = 0.1
-"""The same while limbs are pulled: hands that are late are seen sooner than a coarser dance."""
+"""That share while limbs are controlled: late overlays are more visible than a coarser motion."""
 THROUGHPUT_TIME_CONSTANT_US = 3_000_000
-"""What a line carries is its mean over about this time, microseconds,"""
+"""Time constant of the mean throughput, microseconds."""
 SLOWDOWN_RATIO = 0.7
-"""but beside hands one that carries less than this share of it counts as slower at once: they would wait."""
+"""While overlays share the link, a throughput below this share of the mean replaces it at once: overlays would wait."""
 
 
 class BitrateSelector:
-    """The rate of one viewer, from the reports it sends each second and what its line carries; times are clock times in
-    microseconds.
+    """Level of one viewer, from its reports (one per second) and the throughput of its link.
 
-    `rate` is a step of how motion and sound share the line (`sharing`), and `reason` one of `best` (the highest there
-    is), `line` (it carries no more), `hands` (pulled limbs go before a finer dance), `machine` (frames or blocks take
-    the viewer too long), `buffer` (too little was ready ahead), `start` (more is tried once this goes well), `hidden`
-    (a tab that nobody sees), `pinned` (the viewer asked for it).
+    `level` is an index into the allocations (`bunraku.delivery.allocation`). Times are clock times in microseconds.
+    `reason` is one of:
+
+    | reason | meaning |
+    |---|---|
+    | `best` | the highest level |
+    | `line` | the link has no throughput for a higher one |
+    | `hands` | controlled limbs take precedence over a finer motion |
+    | `machine` | frames or blocks take the viewer too long |
+    | `buffer` | the viewer's buffer was too short |
+    | `start` | a higher level is tried once this one is stable |
+    | `hidden` | the page is in the background |
+    | `pinned` | the viewer requested the level |
     """
 
     def __init__(
@@ -44,14 +52,16 @@ class BitrateSelector:
         fallback: int = 0,
         bitrates_kbps: Sequence[float] = (),
     ) -> None:
-        """`first` is the rate to begin with, if not the highest; `safe` the one of who does not look or cannot keep up
-        with more: a line that does not carry it gets less; `costs` are the rates' in kbit/s, lowest first: without them
-        what the line carries says nothing."""
+        """Start at `initial`, or at the highest level.
+
+        `fallback` is the level in the background, and the lowest one for a slow machine; a slow link may get less.
+        `bitrates_kbps` are those of the levels, lowest first; without them the throughput has no effect.
+        """
         self._max_level = level_count - 1
         self._fallback_level = fallback
         self._is_pinned = pinned is not None
-        begun = pinned if pinned is not None else initial if initial is not None else self._max_level
-        self._target_level = min(max(begun, 0), self._max_level)
+        start = pinned if pinned is not None else initial if initial is not None else self._max_level
+        self._target_level = min(max(start, 0), self._max_level)
         self._bitrates_kbps = bitrates_kbps
         self._changed_at: int | None = None
         self._in_background = False
@@ -63,15 +73,15 @@ class BitrateSelector:
 
     @property
     def level(self) -> int:
-        """The rate now."""
+        """Present level."""
         if self._is_pinned:
             return self._target_level
-        rate = min(self._target_level, self._throughput_level)
-        return min(self._fallback_level, rate) if self._in_background else rate
+        level = min(self._target_level, self._throughput_level)
+        return min(self._fallback_level, level) if self._in_background else level
 
     @property
     def reason(self) -> str:
-        """Why, in one word of `Choice`."""
+        """Reason for the level, as sent in a `Choice`."""
         if self._is_pinned:
             return "pinned"
         if self._in_background:
@@ -82,12 +92,14 @@ class BitrateSelector:
 
     @property
     def throughput_bps(self) -> int | None:
-        """What the line carries with all heads, bit/s to the nearest 100, None where it is not narrow."""
+        """Throughput of the link with headers, bit/s rounded to 100; None if the link is unconstrained."""
         return None if self._throughput is None else round(self._throughput * 8 / 100) * 100
 
     def update_throughput(self, throughput: float | None, clock: int, shares_with_overlays: bool) -> None:
-        """A narrow line carries so many bytes a second, heads included; None where it is not narrow. `beside` says that
-        pulled limbs share it."""
+        """Update the level from the link's throughput, bytes/s with headers; None if the link is unconstrained.
+
+        `shares_with_overlays` is True while overlays of controlled limbs are sent.
+        """
         if throughput is None or not self._bitrates_kbps:
             self._throughput, self._throughput_level = None, self._max_level
             return
@@ -98,37 +110,37 @@ class BitrateSelector:
                 -max(clock - self._throughput_at, 0) / THROUGHPUT_TIME_CONSTANT_US
             )
         self._throughput_at, self._shares_with_overlays = clock, shares_with_overlays
-        # a block that is on its way when the line becomes slow keeps all else waiting: no more than it carries now
+        # a block in flight delays all other data when the link becomes slower, so the newest measurement is a bound
         share = min(self._throughput, throughput) * (
             BLOCK_BANDWIDTH_SHARE_WITH_OVERLAYS if shares_with_overlays else BLOCK_BANDWIDTH_SHARE
         )
         best = max((n for n, kbps in enumerate(self._bitrates_kbps) if kbps * 125 + HEADER_BYTES <= share), default=0)
-        # a rate that was left is taken again only when there is some room to spare
+        # a higher level needs a margin, so that the level does not oscillate
         if best <= self._throughput_level or self._bitrates_kbps[best] * 125 + HEADER_BYTES <= share * 0.9:
             self._throughput_level = best
 
     def process_report(self, report: Report, clock: int) -> int:
-        """Take in a viewer's report; the rate from now on."""
+        """Update the level from a viewer's report, and return it."""
         if self._is_pinned:
             return self.level
         if report.hidden != self._in_background:
-            # its own rate is kept for when it is seen again
+            # the target level is kept for when the page is visible again
             self._in_background = report.hidden
             self._changed_at = clock
         if self._in_background:
             return self.level
         if self._changed_at is None:
             self._changed_at = clock
-        settled = clock - self._changed_at
-        struggling = report.frame > SLOW_FRAME_US or report.decode > SLOW_DECODE_US
-        if report.buffer < LOW_BUFFER_US and settled >= 1_000_000:
+        stable_us = clock - self._changed_at
+        is_slow = report.frame > SLOW_FRAME_US or report.decode > SLOW_DECODE_US
+        if report.buffer < LOW_BUFFER_US and stable_us >= 1_000_000:
             self._lowered_reason = "buffer"
             self._change_level(-1, clock)
-        elif struggling and settled >= 1_000_000:
+        elif is_slow and stable_us >= 1_000_000:
             if self.level > self._fallback_level:
                 self._lowered_reason = "machine"
                 self._change_level(-1, clock)
-        elif report.buffer >= HIGH_BUFFER_US and not struggling and settled >= MIN_STABLE_US:
+        elif report.buffer >= HIGH_BUFFER_US and not is_slow and stable_us >= MIN_STABLE_US:
             self._change_level(1, clock)
         return self.level
 

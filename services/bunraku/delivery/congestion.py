@@ -1,11 +1,13 @@
-"""How much a sender may have on its way over a line, so that what is newest does not wait behind what is old.
+"""Congestion window of a sender that keeps the queue of a constrained link short.
 
-A narrow line keeps what it cannot send yet in a queue, and TCP fills it. So a window of unacknowledged bytes is kept
-such that about `QUEUED` bytes wait in the queue: once a round trip it is corrected by what is too much or too
-little in the queue (as in FAST TCP, Wei, Jin, Low and Hegde 2006). Of the round trips of that time the shortest counts,
-as receivers take their time to acknowledge. What the line carries is told by what was acknowledged between two
-answers (the delivery rate of BBR, Cardwell et al. 2016, over the bytes of the line). Bytes are those of the line: every
-message is a packet and pays for its heads. Times are microseconds of any clock that does not run backwards.
+A constrained link queues what it cannot send yet, and TCP fills that queue, so that the newest data waits behind old
+data. This window of unacknowledged bytes keeps about `TARGET_QUEUE_BYTES` in the queue: once per round trip it is
+corrected by the surplus or deficit (as in FAST TCP, Wei, Jin, Low and Hegde 2006). The minimum round-trip time in that
+interval counts, since receivers delay acknowledgements. The throughput is estimated from the bytes acknowledged between
+two acknowledgements (the delivery rate of BBR, Cardwell et al. 2016, over the bytes on the wire).
+
+Sizes are bytes on the wire: every message is a packet with its own headers. Times are microseconds of any clock that
+does not run backwards.
 """
 
 from __future__ import annotations
@@ -14,115 +16,120 @@ from collections import deque
 from typing import NamedTuple
 
 HEADER_BYTES = 54
-"""Bytes of heads that a message costs on the line: IPv4, TCP with time stamps, and a WebSocket frame's."""
+"""Header overhead of a message: IPv4, TCP with time stamps, and a WebSocket frame."""
 MAX_SEGMENT_BYTES = 1_400
-"""Of a longer message each such part is a packet."""
+"""Payload of one packet; a longer message has several."""
 DELAYED_ACK_US = 40_000
-"""A receiver waits so long before it acknowledges, microseconds."""
+"""Delay of a receiver's acknowledgement, microseconds."""
 ACK_LATENESS_MARGIN_US = 20_000
-"""So much later than it should at the latest an acknowledgement may come, microseconds."""
+"""Tolerance for an acknowledgement after its latest expected time, microseconds."""
 MAX_ACK_DELAY_US = 60_000
-"""No acknowledgement waits longer at a receiver than this, microseconds."""
+"""Upper bound of a receiver's acknowledgement delay, microseconds."""
 DRAIN_TIME_FACTOR = 1.03
-"""The line is taken to be so much slower than it seems: what is thought of its queue is then corrected at once."""
+"""Factor on the estimated transmission time: an estimate that is slightly too long is corrected at once."""
 TARGET_QUEUE_BYTES = 220
-"""Bytes that are to wait in the line's queue: a message or two,"""
+"""Target length of the link's queue: one or two messages."""
 MAX_TARGET_QUEUE_US = 40_000
-"""but no more than leave in this time, microseconds,"""
+"""Upper bound of that target, as transmission time in microseconds."""
 MIN_TARGET_QUEUE_BYTES = 75.0
-"""or than this."""
+"""Lower bound of that target."""
 INITIAL_WINDOW_BYTES = 1_600
-"""The window before anything is known: a first block, its Description, and some more."""
+"""Window before any measurement: a first block, its Description, and some more."""
 SMALL_MESSAGE_BYTES = 250
-"""Bytes of a message that is not large."""
+"""Size up to which a message is not counted as large."""
 MIN_WINDOW_GROWTH_BYTES = 60.0
-"""Bytes that a window grows by at least, where it is too small."""
+"""Minimum growth of a window that is too small."""
 MAX_POLL_INTERVAL_US = 40_000
-"""A round trip counts only if its end was looked out for as often as this."""
+"""A round-trip time is used only if acknowledgements were polled at least this often, microseconds."""
 ROUND_TRIP_BYTES = 190
-"""Bytes that go there and back for a message and its acknowledgement."""
+"""Bytes on the wire of a message and its acknowledgement, both directions."""
 MIN_THROUGHPUT_SAMPLE_US = 20_000
-"""What was acknowledged within less time than this says nothing of the line's rate, microseconds."""
+"""Minimum interval of a throughput measurement, microseconds."""
 THROUGHPUT_WEIGHT = 0.3
-"""Of the newest in the mean of the line's rate."""
+"""Weight of the newest measurement in the mean throughput."""
 SLOWDOWN_RATIO = 0.6
-"""A line that seems to carry less than this share of what it did has become slower,"""
+"""A measurement below this share of the mean shows that the link has become slower."""
 SLOWDOWN_WEIGHT = 0.8
-"""and the newest weighs more."""
+"""Weight of such a measurement."""
 SLOWDOWN_PERIOD_US = 400_000
-"""So long after it was last later than thought a line's queue may be too full, microseconds."""
+"""Time after a late acknowledgement for which the queue may be too long, microseconds."""
 THROUGHPUT_KNOWN_US = 2_000_000
-"""So long after its queue was seen filled what a line carries is known."""
+"""Time after a full queue for which the throughput is taken as known, microseconds."""
 PROBE_GAIN = 2.0
-"""A line that was not full is taken to carry so much more."""
+"""Factor on the observed throughput of a link that was not full."""
 CONSTRAINED_PERIOD_US = 10_000_000
-"""So long after its queue was last seen filled a line counts as narrow."""
+"""Time after a full queue for which a link counts as constrained, microseconds."""
 
 
 def bytes_on_wire(size: int) -> int:
-    """Bytes that a message of `size` bytes takes on the line."""
+    """Return the bytes on the wire of a message of `size` bytes."""
     return size + HEADER_BYTES * (1 + max(size - 1, 0) // MAX_SEGMENT_BYTES)
 
 
 class _InFlightMessage(NamedTuple):
-    """A message on its way: its end in bytes written and in bytes of the line, when it was written, the bytes on their
-    way then (of none more than a message has), how much larger it is than a message; what was acknowledged by then, and
-    since when nothing else was; and when the line is through with it, but for `Window._shift`."""
+    """Message that is not acknowledged yet."""
 
     end: int
+    """Bytes written up to its end, without headers."""
     wire_end: int
+    """Bytes on the wire up to its end."""
     written_at: int
     in_flight_bytes: int
+    """Bytes in flight when it was written, without the excess of large messages."""
     excess_bytes: int
+    """Bytes by which it exceeds `SMALL_MESSAGE_BYTES`."""
     acked_bytes: int
+    """Bytes on the wire that were acknowledged when it was written."""
     interval_start: int
+    """Start of the interval over which its delivery rate is measured."""
     drained_at: float
+    """Estimated time at which the link has sent it, before `CongestionWindow._drain_correction`."""
 
 
 class CongestionWindow:
-    """The window of one line: told what was written and how much of it was acknowledged."""
+    """Congestion window of one link, from the times of writes and acknowledgements."""
 
     def __init__(self) -> None:
         self.limit_bytes = float(INITIAL_WINDOW_BYTES)
-        """Bytes that may be on their way."""
+        """Bytes that may be in flight."""
         self.min_rtt_us: int | None = None
-        """The least time from writing to acknowledgement so far."""
+        """Minimum time from write to acknowledgement."""
         self.throughput: float | None = None
-        """Bytes a second that the line carries, or carried at least while it was never full."""
+        """Throughput of the link, bytes/s; a lower bound while its queue was never full."""
         self._max_throughput = 0.0
         self.queue_full_at: int | None = None
-        """When the line's queue was last seen to be filled."""
+        """Time at which the link's queue was last observed to be full."""
         self._slowdown_at: int | None = None
         self._written = 0
         self._wire_written = 0
         self._wire_acked = 0
         self._in_flight: deque[_InFlightMessage] = deque()
         self._acked_at = 0
-        # beyond what a message has, of what is on its way; and when the line is through with it
+        # excess bytes of large messages in flight, and when the link has sent them
         self._excess_in_flight = 0
         self._excess_drained_at = 0.0
-        # when the line is through with all that was written, and by how much that was corrected so far
+        # when the link has sent all that was written, and the sum of corrections of that estimate
         self._drained_at = 0.0
         self._drain_correction = 0.0
         self._polled_at = 0
         self._is_window_limited = False
-        # the present round trip: since when, and the shortest in it
+        # start of the present round trip, and the minimum round-trip time in it
         self._round_started_at = 0
         self._round_min_rtt: int | None = None
 
     @property
     def in_flight_bytes(self) -> int:
-        """Bytes of the line that are not acknowledged yet."""
+        """Bytes on the wire that are not acknowledged yet."""
         return self._wire_written - self._wire_acked
 
     @property
     def target_delay_us(self) -> float:
-        """How much later than they could acknowledgements are to come, microseconds."""
+        """Target delay of acknowledgements over the minimum, microseconds."""
         return DELAYED_ACK_US + self.target_queue_us
 
     @property
     def target_queue_us(self) -> float:
-        """For how long what waits in the line's queue is to be enough, microseconds."""
+        """Target length of the link's queue, as transmission time in microseconds."""
         if not self.throughput:
             return 0.0
         return (
@@ -133,59 +140,63 @@ class CongestionWindow:
 
     @property
     def expected_min_rtt_us(self) -> float:
-        """The least time from writing to acknowledgement at the present rate, microseconds: a line that has become
-        slower takes longer for the same bytes."""
+        """Minimum time from write to acknowledgement at the present throughput, microseconds.
+
+        A link that has become slower takes longer for the same bytes.
+        """
         assert self.min_rtt_us is not None
         if not self.throughput or self.throughput >= self._max_throughput:
             return self.min_rtt_us
         return self.min_rtt_us + ROUND_TRIP_BYTES * (1.0 / self.throughput - 1.0 / self._max_throughput) * 1e6
 
     def record_write(self, at: int, size: int) -> None:
-        """`size` bytes were written at once at `at`."""
+        """Record that `size` bytes were written at once at `at`."""
         self._written += size
-        large = max(bytes_on_wire(size) - SMALL_MESSAGE_BYTES, 0)
+        excess = max(bytes_on_wire(size) - SMALL_MESSAGE_BYTES, 0)
         self._wire_written += bytes_on_wire(size)
-        self._excess_in_flight += large
-        if large and self.throughput:
-            # a line that was never full carries more than it was seen to
-            rate = (
+        self._excess_in_flight += excess
+        if excess and self.throughput:
+            # a link that was never full has more throughput than was observed
+            throughput = (
                 self.throughput
                 if self.queue_full_at is not None and at - self.queue_full_at < THROUGHPUT_KNOWN_US
                 else PROBE_GAIN * self.throughput
             )
-            self._excess_drained_at = max(self._excess_drained_at, at) + bytes_on_wire(size) / rate * 1e6
-        since = max(self._acked_at, self._in_flight[0].written_at) if self._in_flight else at
+            self._excess_drained_at = max(self._excess_drained_at, at) + bytes_on_wire(size) / throughput * 1e6
+        interval_start = max(self._acked_at, self._in_flight[0].written_at) if self._in_flight else at
         if self.throughput:
             self._drained_at = (
                 max(self._drained_at, at) + bytes_on_wire(size) / self.throughput * DRAIN_TIME_FACTOR * 1e6
             )
         self._in_flight.append(
             _InFlightMessage(
-                self._written, self._wire_written, at, self.in_flight_bytes - self._excess_in_flight, large, self._wire_acked, since,
-                self._drained_at - self._drain_correction,
+                self._written, self._wire_written, at, self.in_flight_bytes - self._excess_in_flight, excess,
+                self._wire_acked, interval_start, self._drained_at - self._drain_correction,
             )
         )  # fmt: skip
 
     @property
     def written(self) -> int:
-        """Bytes that were written."""
+        """Bytes that were written, without headers."""
         return self._written
 
     def is_acked(self, written: int) -> bool:
-        """Whether the first `written` bytes are acknowledged."""
+        """Return True if the first `written` bytes are acknowledged."""
         return not self._in_flight or self._in_flight[0].end > written
 
     def record_untracked_write(self, size: int) -> None:
-        """`size` bytes were written besides; they are not counted among those on their way."""
+        """Record `size` bytes that were written without `record_write`; they do not count as in flight."""
         self._written += size
 
     def record_ack(self, at: int, unacked_bytes: int, min_rtt_us: int | None = None) -> None:
-        """At `at`, of all that was written the last `waiting` bytes are not acknowledged yet; `least` is the shortest
-        round trip that the system knows of, if it tells."""
-        done = self._written - max(unacked_bytes, 0)
-        looked, self._polled_at = self._polled_at, at
+        """Record that at `at` all but the last `unacked_bytes` written bytes are acknowledged.
+
+        `min_rtt_us` is the minimum round-trip time measured by the kernel, if it is known.
+        """
+        acked = self._written - max(unacked_bytes, 0)
+        polled_at, self._polled_at = self._polled_at, at
         newest: _InFlightMessage | None = None
-        while self._in_flight and self._in_flight[0].end <= done:
+        while self._in_flight and self._in_flight[0].end <= acked:
             newest = self._in_flight.popleft()
             self._wire_acked = newest.wire_end
             self._excess_in_flight -= newest.excess_bytes
@@ -194,20 +205,23 @@ class CongestionWindow:
         self._acked_at = at
         if not self._excess_in_flight:
             self._excess_drained_at = at
-        took = max(at - newest.written_at, 1)
-        self.min_rtt_us = min(time for time in (self.min_rtt_us, min_rtt_us, took) if time)
+        rtt = max(at - newest.written_at, 1)
+        self.min_rtt_us = min(time for time in (self.min_rtt_us, min_rtt_us, rtt) if time)
         if self.throughput:
             self._correct_drain_time(
                 at,
                 at - (self.min_rtt_us - HEADER_BYTES / self.throughput * 1e6),
                 newest.drained_at + self._drain_correction,
             )
-        if at - max(looked, newest.written_at) <= MAX_POLL_INTERVAL_US:
-            self._update_estimates(at, took, newest)
+        if at - max(polled_at, newest.written_at) <= MAX_POLL_INTERVAL_US:
+            self._update_estimates(at, rtt, newest)
 
     def _correct_drain_time(self, at: int, observed: float, estimated: float) -> None:
-        """At `at` it is known that the line was through with a message at `left` at the latest, and no more than
-        `RECEIVER` before."""
+        """Correct the estimate of when the link has sent a message.
+
+        The acknowledgement at `at` shows that it was sent at `observed` at the latest, and at most `MAX_ACK_DELAY_US`
+        earlier.
+        """
         if estimated < observed - MAX_ACK_DELAY_US:
             self._slowdown_at = at
         if not observed - MAX_ACK_DELAY_US <= estimated <= observed:
@@ -215,7 +229,7 @@ class CongestionWindow:
             self._drained_at += observed - estimated
 
     def _update_estimates(self, at: int, rtt: int, newest: _InFlightMessage) -> None:
-        """What was last acknowledged took so long."""
+        """Update throughput and window from the round-trip time of the newest acknowledged message."""
         rate = (newest.wire_end - newest.acked_bytes) * 1e6 / max(at - newest.interval_start, 1)
         late = rtt - self.expected_min_rtt_us
         if self.throughput is None:
@@ -230,17 +244,17 @@ class CongestionWindow:
         if late > self.target_delay_us:
             self.queue_full_at = at
         if newest.in_flight_bytes <= self.limit_bytes + SMALL_MESSAGE_BYTES and not newest.excess_bytes:
-            # else it was behind something larger than the window
+            # otherwise it waited behind data larger than the window
             self._round_min_rtt = min(self._round_min_rtt or rtt, rtt)
             if late > 2 * self.target_delay_us and not self._excess_in_flight:
-                # the line has become slower
+                # the link has become slower
                 self.limit_bytes = min(
                     self.limit_bytes, self.throughput * (self.expected_min_rtt_us + self.target_delay_us) * 1e-6
                 )
         written = newest.written_at
         if written < self._round_started_at:
             return
-        # a round trip has passed: this was written after the last turn
+        # a round trip has passed: the message was written after the last update of the window
         if self._round_min_rtt is not None:
             queued = self._round_min_rtt - self.expected_min_rtt_us
             if queued > self.target_delay_us:
@@ -253,18 +267,21 @@ class CongestionWindow:
         self._round_started_at, self._round_min_rtt, self._is_window_limited = at, None, False
 
     def has_capacity(self, at: int, extra_queue_us: int = 0) -> bool:
-        """Whether something may be written at `at`: always when nothing is on its way. `ahead` is for how long more may
-        wait in the line's queue, microseconds, so that it never runs dry; once what the line carries is known."""
+        """Return True if data may be written at `at`; always if nothing is in flight.
+
+        `extra_queue_us` is the additional queue that is allowed once the throughput is known, microseconds: it keeps
+        the link from running idle.
+        """
         if not self._in_flight:
             return True
         extra_queue_us = extra_queue_us if self.throughput else 0
         if self.throughput and self.min_rtt_us is not None and self.is_constrained(at):
-            # when its acknowledgement is to come at the latest
+            # latest time of the oldest acknowledgement
             latest = self._in_flight[0].drained_at + self._drain_correction + self.min_rtt_us + MAX_ACK_DELAY_US
             return (
                 at <= latest + ACK_LATENESS_MARGIN_US and self._drained_at - at <= self.target_queue_us + extra_queue_us
             )
-        # the line is through with what is large at a time that is known, once its rate is
+        # the time at which large messages are sent is known once the throughput is
         if (
             self.in_flight_bytes - (self._excess_in_flight if self.throughput else 0)
             >= self.limit_bytes + (self.throughput or 0.0) * extra_queue_us * 1e-6
@@ -273,7 +290,7 @@ class CongestionWindow:
             return False
         if at < self._excess_drained_at - extra_queue_us:
             return False
-        # nothing came back for long: the line has become slower, or stands
+        # without an acknowledgement for long, the link has become slower or stalls
         return (
             self.min_rtt_us is None
             or at - self._in_flight[0].written_at
@@ -281,25 +298,25 @@ class CongestionWindow:
         )
 
     def time_to_drain(self, at: int) -> int:
-        """Microseconds until the line will be through with all that is on its way, as far as is known."""
+        """Return the estimated time until the link has sent everything in flight, microseconds."""
         if not self._in_flight or not self.throughput or self.min_rtt_us is None:
             return 0
-        # what was acknowledged last had left by then, and the line went on with what is first of the rest
-        left = self._acked_at - self.min_rtt_us + HEADER_BYTES / self.throughput * 1e6
+        # the last acknowledged message was sent by then, and the next one followed
+        sent_at = self._acked_at - self.min_rtt_us + HEADER_BYTES / self.throughput * 1e6
         return max(
-            round(max(left, self._in_flight[0].written_at) + self.in_flight_bytes / self.throughput * 1e6) - at, 0
+            round(max(sent_at, self._in_flight[0].written_at) + self.in_flight_bytes / self.throughput * 1e6) - at, 0
         )
 
     def retry_delay(self) -> int:
-        """Microseconds after which there may be room."""
+        """Return the time after which there may be capacity, microseconds."""
         if self.throughput is None or self.throughput <= 0.0:
             return 20_000
         return round(min(max((self.in_flight_bytes - self.limit_bytes) / self.throughput * 1e6, 5_000.0), 20_000.0))
 
     def is_constrained(self, at: int) -> bool:
-        """Whether the line's queue was filled of late."""
+        """Return True if the link's queue was full within `CONSTRAINED_PERIOD_US`."""
         return self.queue_full_at is not None and at - self.queue_full_at < CONSTRAINED_PERIOD_US
 
     def is_slowing(self, at: int) -> bool:
-        """Whether the line turned out slower than thought just now: more than should waits in its queue."""
+        """Return True if the link has just become slower than estimated, so that its queue is too long."""
         return self._slowdown_at is not None and at - self._slowdown_at < SLOWDOWN_PERIOD_US

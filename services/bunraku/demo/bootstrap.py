@@ -13,15 +13,18 @@ import logging
 import tempfile
 from pathlib import Path
 
-from bunraku.http.problem_details import ProblemError
 from bunraku.ingest.audio import AudioOperation
 from bunraku.ingest.keyframe import Staging
-from bunraku.ingest.motion import UploadOperation, derive_motion_id
+from bunraku.ingest.motion import MotionOperation
+from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.scene import SceneOperation
+from bunraku.ingest.source_file import SourceFile
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.key_value import RevisionConflict
 from bunraku.messaging.lease import hold_lease
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.session_manager import SessionManager
 
 DEMO_NOTE_KEY = "demo"
@@ -98,10 +101,10 @@ async def _create_motion(context: ServiceContext, fingerprint: str) -> str:
             # made by other code: its blocks differ from those that this code would send
             await context.catalogue.remove_motion(previous)
             await context.motion_store.remove(previous)
-        uploads = UploadOperation(context)
-        await uploads.ingest_file(motion, source, f"{title}.bvh")
-        with_music, _ = await AudioOperation(context, uploads).add_audio(motion, digest, song, f"{title}.wav")
-        staged, _ = await SceneOperation(context, uploads).add_scene(
+        slots = WorkerSlots()
+        await MotionOperation(context, slots).ingest_file(motion, SourceFile(source, f"{title}.bvh"))
+        with_music, _ = await AudioOperation(context, slots).add_audio(motion, SourceFile(song, f"{title}.wav"), digest)
+        staged, _ = await SceneOperation(context, slots).add_scene(
             with_music.id, await asyncio.to_thread(_build_staging)
         )
         for intermediate in (motion, with_music.id):

@@ -9,9 +9,9 @@ from http import HTTPMethod
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bunraku.http import request_id
-from bunraku.http.request_id import REQUEST_ID_HEADER
+from bunraku.runtime import request_id
 from bunraku.runtime.metrics import LabelledHistograms, Metrics
+from bunraku.runtime.request_id import REQUEST_ID_HEADER
 
 ROUTE_SCOPE_KEY = "bunraku.route"
 """Key of the ASGI scope under which `AuthorizationMiddleware` stores the path of the route: `/v1/motions/{motion}`."""

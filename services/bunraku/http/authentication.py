@@ -15,12 +15,13 @@ import msgpack
 
 from bunraku.http.access_control import FULL_ACCESS, Access, Role
 from bunraku.http.access_token import InvalidToken, TokenSigner
-from bunraku.http.problem_details import ProblemError
 from bunraku.http.ticket_store import TicketStore
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
-from bunraku.storage.catalogue import Catalogue, Share
+from bunraku.storage.catalogue import Catalogue
+from bunraku.storage.record import Share
 from bunraku.websocket.subprotocol import UNAUTHORIZED, CloseConnection
 
 SHARE_REVOKED_SUBJECT = "shares.revoked"

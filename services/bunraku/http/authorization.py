@@ -24,17 +24,12 @@ from bunraku.http.access_control import ACCESS_SCOPE_KEY, Access, Requirement, R
 from bunraku.http.access_log import API_PREFIX, ROUTE_SCOPE_KEY
 from bunraku.http.authentication import unauthorized
 from bunraku.http.origin import is_allowed_origin, is_local_host, parse_origins
-from bunraku.http.problem_details import (
-    ProblemError,
-    motion_not_found,
-    problem_response,
-    session_not_found,
-    unavailable_response,
-)
+from bunraku.http.problem_details import motion_not_found, problem_response, session_not_found, unavailable_response
 from bunraku.http.request_body import limit_body, too_large_detail
 from bunraku.http.token_bucket import KeyedTokenBuckets, client_network
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.websocket import subprotocol
 from bunraku.websocket.subprotocol import CloseConnection
 

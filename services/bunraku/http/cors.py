@@ -11,7 +11,7 @@ from starlette.datastructures import MutableHeaders
 from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from bunraku.http.request_id import REQUEST_ID_HEADER
+from bunraku.runtime.request_id import REQUEST_ID_HEADER
 
 PREFLIGHT_MAX_AGE_S = 7_200
 """Time for which browsers may cache a preflight response. No browser caches it for longer."""

@@ -2,52 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
-import errno
 import logging
-from collections.abc import Iterator
 from http import HTTPStatus
-from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from bunraku.http import request_id
+from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.problem import ProblemError
 
 MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER_S = 2
 """Value of `Retry-After` in responses about an unavailable backend, in seconds."""
-_DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
 
 _log = logging.getLogger(__name__)
-
-
-class ProblemError(Exception):
-    """Error that is answered with a problem document.
-
-    `title` names the kind of problem and `detail` describes this occurrence. `extra` has further members of the
-    document, such as `field`, `hint` or `line`; members that are None are omitted.
-    """
-
-    def __init__(self, status: int, title: str, detail: str, **extra: Any) -> None:
-        super().__init__(detail)
-        self.status = status
-        self.title = title
-        self.detail = detail
-        self.extra = extra
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for a message on the bus. `from_dict` is the inverse."""
-        extra = {name: value for name, value in self.extra.items() if value is not None}
-        return {"status": self.status, "title": self.title, "detail": self.detail, **extra}
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> ProblemError:
-        """Return the problem that another service reported on the bus."""
-        return cls(**values)
 
 
 def motion_not_found(motion_id: str) -> ProblemError:
@@ -69,37 +40,6 @@ def invalid_field_problem(location: tuple[int | str, ...], message: str) -> Prob
     """
     field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
     return ProblemError(422, "Invalid request", f"{field}: {message}" if field else message, field=field or None)
-
-
-def insufficient_storage(resource: str) -> ProblemError:
-    """Return the problem for a request that a full disk or quota prevents."""
-    return ProblemError(
-        507,
-        "No room left",
-        f"{resource} has no space left; nothing was stored",
-        hint="remove motions, or provide more storage",
-    )
-
-
-def is_disk_full(error: BaseException) -> bool:
-    """Return whether an error means that a disk or quota is full.
-
-    Accepts OSError and errors of libraries that mention the error number in their message only.
-    """
-    if isinstance(error, OSError) and error.errno is not None:
-        return error.errno in _DISK_FULL_ERRNOS
-    return any(f"os error {number})" in str(error) for number in _DISK_FULL_ERRNOS)
-
-
-@contextlib.contextmanager
-def translate_disk_full(resource: str) -> Iterator[None]:
-    """Raise `insufficient_storage` instead of an OSError about a full disk or quota."""
-    try:
-        yield
-    except OSError as error:
-        if is_disk_full(error):
-            raise insufficient_storage(resource) from error
-        raise
 
 
 def problem_response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:

@@ -1,1 +1,1 @@
-"""The service that gives arm tables and solves limbs."""
+"""Inverse kinematics service: bend tables and batched solutions."""

@@ -1,4 +1,4 @@
-"""The inverse kinematics service: the arms' tables and figures as resources, and lookups in batches."""
+"""Inverse kinematics service: bend tables and figures of arms as resources, and solutions in batches."""
 
 from __future__ import annotations
 
@@ -13,45 +13,45 @@ from fastapi import FastAPI, Header, Request, Response
 from bunraku import __version__
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, requires
-from bunraku.http.problem_details import ProblemError
 from bunraku.ik import batch
 from bunraku.marionette import bend_table, figures
 from bunraku.marionette.proportions import Proportions, ProportionsError
+from bunraku.runtime.problem import ProblemError
 
 MAX_CACHED_TABLES = 256
-"""Tables kept as bytes: 2 MB."""
+"""Cached tables: 2 MB."""
 MAX_CACHED_FIGURES = 32
-"""Figures kept as text: 1 MB."""
+"""Cached figures: 1 MB."""
 IMMUTABLE_CACHE_CONTROL = "public, max-age=31536000, immutable"
 
 
 @dataclass(frozen=True, slots=True)
 class CachedResource:
-    """A resource as it is served: its bytes and the strong entity tag of them."""
+    """Bytes of a resource and their strong entity tag."""
 
     data: bytes
     etag: str
 
     @classmethod
     def from_bytes(cls, data: bytes) -> CachedResource:
-        """These bytes, and the tag of them."""
+        """Return the resource with these bytes."""
         return cls(data, f'"{hashlib.sha256(data).hexdigest()[:32]}"')
 
 
 @lru_cache(maxsize=MAX_CACHED_TABLES)
 def cached_table(proportions: Proportions) -> CachedResource:
-    """The table of these proportions (already rounded to their identity), built the first time."""
+    """Return the table of proportions that are rounded to their identity."""
     return CachedResource.from_bytes(bend_table.pack_bend_table(bend_table.build_bend_table(proportions)))
 
 
 @lru_cache(maxsize=MAX_CACHED_FIGURES)
 def cached_figure(proportions: Proportions, name: figures.Figure) -> CachedResource:
-    """A figure of the arm with these proportions (already rounded), drawn the first time."""
+    """Return a figure of the arm with proportions that are rounded to their identity."""
     return CachedResource.from_bytes(figures.draw_figure(proportions, name).encode())
 
 
 def parse_proportions(identity: str) -> Proportions:
-    """The proportions named by `identity`; raises `ProblemError` 422 with the field and a hint."""
+    """Parse an identity; raises `ProblemError` 422 with field and hint."""
     try:
         return Proportions.parse(identity)
     except ProportionsError as error:
@@ -59,10 +59,10 @@ def parse_proportions(identity: str) -> Proportions:
 
 
 def create_app() -> FastAPI:
-    """The service, standing alone: it keeps nothing but the tables it has built."""
+    """Create the service, which has no state but its caches."""
     app = FastAPI(title="Bunraku inverse kinematics", version=__version__)
     problem_details.install_problem_handlers(app)
-    # building is plain arithmetic on small arrays, one at a time is enough; the loop stays free
+    # one table or figure at a time, in a thread, so that the event loop stays free
     building = asyncio.Semaphore(1)
 
     async def table_for(proportions: Proportions) -> CachedResource:
@@ -74,14 +74,13 @@ def create_app() -> FastAPI:
         response_class=Response,
         responses={
             200: {"content": {"application/octet-stream": {}}, "description": "64 x 64 float16, little-endian"},
-            304: {"description": "the client has it"},
+            304: {"description": "not modified"},
             422: {"content": {problem_details.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
         },
     )
     @requires(Role.VIEW, allow_bound=True)
     async def arm_table(proportions: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
-        """The table of bends of an arm with these proportions: `L0-L1-L2-M0-M1-M2` in thousandths or
-        ten-thousandths."""
+        """Bend table of the arm with proportions `L0-L1-L2-M0-M1-M2` in thousandths or ten-thousandths."""
         stored = await table_for(parse_proportions(proportions))
         return _resource_response(stored, "application/octet-stream", if_none_match)
 
@@ -89,8 +88,8 @@ def create_app() -> FastAPI:
         "/v1/arms/{proportions}/figures/{name}",
         response_class=Response,
         responses={
-            200: {"content": {"image/svg+xml": {}}, "description": "the picture"},
-            304: {"description": "the client has it"},
+            200: {"content": {"image/svg+xml": {}}, "description": "SVG"},
+            304: {"description": "not modified"},
             404: {"content": {problem_details.MEDIA_TYPE: {}}, "description": "no figure has this name"},
             422: {"content": {problem_details.MEDIA_TYPE: {}}, "description": "no arm has these proportions"},
         },
@@ -99,34 +98,34 @@ def create_app() -> FastAPI:
     async def arm_figure(
         proportions: str, name: str, if_none_match: Annotated[str | None, Header()] = None
     ) -> Response:
-        """The arm while its tip runs round a circle (`circle`) or along a line (`horizontal`): the paper's figures 8
-        and 9, drawn for this arm as the paper solves it and as we do."""
-        arm, known = parse_proportions(proportions), next((one for one in figures.FIGURES if one == name), None)
-        if known is None:
+        """Figure 8 (`circle`) or 9 (`horizontal`) of the paper for this arm: the arm while its tip follows the path,
+        solved as in the paper and exactly."""
+        arm, figure = parse_proportions(proportions), next((one for one in figures.FIGURES if one == name), None)
+        if figure is None:
             hint = " or ".join(figures.FIGURES)
             raise ProblemError(404, "No such figure", f"there is no figure {name[:60]!r}", field="name", hint=hint)
         async with building:
-            stored = await asyncio.to_thread(cached_figure, arm, known)
+            stored = await asyncio.to_thread(cached_figure, arm, figure)
         return _resource_response(stored, "image/svg+xml", if_none_match)
 
     @app.post("/v1/solve", response_model=batch.SolveAnswer, openapi_extra=batch.OPENAPI_REQUEST_BODY)
     @requires(Role.VIEW, allow_bound=True, max_body_bytes=batch.MAX_BODY_BYTES)
     async def solve(request: Request) -> Response:
-        """Arms for hand targets and legs for thigh angles, in a batch; JSON or MessagePack."""
+        """Solve arms for hand targets and legs for thigh angles, in a batch; JSON or MessagePack."""
         kind = batch.parse_content_type(request.headers.get("content-type"))
         accepted = batch.negotiate_media_type(request.headers.get("accept"), kind)
         body = await batch.read_body(request)
-        asked = await asyncio.to_thread(batch.decode_request, body, kind)
-        proportions = parse_proportions(asked.proportions)
+        solve_request = await asyncio.to_thread(batch.decode_request, body, kind)
+        proportions = parse_proportions(solve_request.proportions)
         stored = await table_for(proportions)
-        answer = await asyncio.to_thread(batch.solve_batch, asked, proportions, stored.data, accepted)
+        answer = await asyncio.to_thread(batch.solve_batch, solve_request, proportions, stored.data, accepted)
         return Response(answer, media_type=accepted)
 
     return app
 
 
 def _resource_response(stored: CachedResource, media_type: str, if_none_match: str | None) -> Response:
-    """What never changes, or that the client has it."""
+    """Return an immutable resource, or 304 if the client has it."""
     headers = {"ETag": stored.etag, "Cache-Control": IMMUTABLE_CACHE_CONTROL}
     if if_none_match is not None and _etag_matches(if_none_match, stored.etag):
         return Response(status_code=304, headers=headers)
@@ -134,6 +133,6 @@ def _resource_response(stored: CachedResource, media_type: str, if_none_match: s
 
 
 def _etag_matches(header: str, etag: str) -> bool:
-    """Whether If-None-Match names `etag`, by the weak comparison of RFC 9110 13.1.2."""
+    """Return whether If-None-Match matches `etag` by weak comparison (RFC 9110, 13.1.2)."""
     tags = [tag.strip().removeprefix("W/") for tag in header.split(",")]
     return "*" in tags or etag in tags

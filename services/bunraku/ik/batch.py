@@ -1,4 +1,4 @@
-"""Batches of lookups: what `POST /v1/solve` reads and says, in JSON or MessagePack."""
+"""Request and response of `POST /v1/solve`, in JSON or MessagePack."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from bunraku.http.problem_details import ProblemError, invalid_field_problem
+from bunraku.http.problem_details import invalid_field_problem
 from bunraku.marionette import arm_batch, bend_table, leg
 from bunraku.marionette.proportions import Proportions
+from bunraku.runtime.problem import ProblemError
 
 JSON = "application/json"
 MSGPACK = "application/msgpack"
@@ -26,7 +27,7 @@ Point = tuple[FiniteNumber, FiniteNumber, FiniteNumber]
 
 
 class SolveRequest(BaseModel):
-    """Hand tips to reach and thighs to lift."""
+    """Hand targets and thigh angles."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -43,7 +44,7 @@ class SolveRequest(BaseModel):
 
 class Arms(BaseModel):
     """One entry per target. Angles in radians: the azimuth of the plane from z towards x, the links t0, t1, t2 from the
-    horizontal upwards; places in arm lengths, y up."""
+    horizontal upwards. Positions in arm lengths, y up."""
 
     azimuth: list[float]
     t0: list[float]
@@ -55,14 +56,14 @@ class Arms(BaseModel):
 
 
 class Legs(BaseModel):
-    """One entry per leg: how far the hip is bent forwards and the knee backwards, radians."""
+    """One entry per leg: the hip's angle forwards and the knee's backwards, radians."""
 
     hip: list[float]
     knee: list[float]
 
 
 class SolveAnswer(BaseModel):
-    """What was asked, in the same order."""
+    """Solutions in the order of the request."""
 
     arms: Arms
     legs: Legs
@@ -74,22 +75,28 @@ OPENAPI_REQUEST_BODY: dict[str, Any] = {
         "content": {kind: {"schema": SolveRequest.model_json_schema()} for kind in (JSON, MSGPACK)},
     },
 }
-"""The request's body for OpenAPI: it is read by hand, as its kind depends on Content-Type."""
+"""Request body for OpenAPI; it is parsed by hand, because its type depends on Content-Type."""
 
 
 def parse_content_type(header: str | None) -> str:
-    """The media type of the request's body; raises `ProblemError` 415 for one not read here."""
+    """Return the media type of the request's body; raises `ProblemError` 415 for an unsupported one."""
     name = (header or JSON).split(";")[0].strip().lower()
     if name not in _MEDIA_TYPES:
         raise ProblemError(
-            415, "Unsupported media type", f"{name} is not read here", field="Content-Type", hint=f"{JSON} or {MSGPACK}"
+            415,
+            "Unsupported media type",
+            f"the media type {name} is not supported",
+            field="Content-Type",
+            hint=f"{JSON} or {MSGPACK}",
         )
     return _MEDIA_TYPES[name]
 
 
 def negotiate_media_type(header: str | None, default: str) -> str:
-    """The media type of the answer: the first known one that Accept names, else (no Accept, or a wildcard) that of the
-    request; raises `ProblemError` 406 where none fits."""
+    """Return the media type of the response: the first supported one of Accept, or `default` for a wildcard.
+
+    Raises `ProblemError` 406 if none is supported.
+    """
     if header is None:
         return default
     for part in header.split(","):
@@ -98,11 +105,13 @@ def negotiate_media_type(header: str | None, default: str) -> str:
             return _MEDIA_TYPES[name]
         if name in ("*/*", "application/*"):
             return default
-    raise ProblemError(406, "Not acceptable", f"{header} is not said here", field="Accept", hint=f"{JSON} or {MSGPACK}")
+    raise ProblemError(
+        406, "Not acceptable", f"no media type of {header} is supported", field="Accept", hint=f"{JSON} or {MSGPACK}"
+    )
 
 
 async def read_body(request: Request) -> bytes:
-    """The whole body; raises `ProblemError` 413 as soon as it is more than `LARGEST_BODY`."""
+    """Read the body; raises `ProblemError` 413 as soon as it exceeds `MAX_BODY_BYTES`."""
     body = bytearray()
     async for chunk in request.stream():
         body += chunk
@@ -114,7 +123,7 @@ async def read_body(request: Request) -> bytes:
 
 
 def decode_request(body: bytes, media_type: str) -> SolveRequest:
-    """The request in `body`; raises `ProblemError` 400 if it cannot be parsed, 422 with the field if it is not one."""
+    """Decode a request; raises `ProblemError` 400 for a malformed body, 422 with the field for an invalid one."""
     try:
         content = json.loads(body) if media_type == JSON else msgpack.unpackb(body)
     except (ValueError, RecursionError, msgpack.exceptions.UnpackException) as error:
@@ -127,15 +136,15 @@ def decode_request(body: bytes, media_type: str) -> SolveRequest:
 
 
 def solve_batch(request: SolveRequest, proportions: Proportions, table_bytes: bytes, media_type: str) -> bytes:
-    """The answer as bytes of `kind`; `data` is the table's bytes."""
+    """Solve a request and return the response in `media_type`; `table_bytes` is the packed bend table."""
     targets = np.array(request.targets, dtype=np.float64).reshape(-1, 3)
     solved = arm_batch.solve_arms(proportions, bend_table.parse_bend_table(table_bytes), targets)
     t0, t1, t2 = solved.angles()
     hip, knee = leg.solve_legs(np.array(request.legs, dtype=np.float64))
-    hung = {"azimuth": solved.azimuth, "t0": t0, "t1": t1, "t2": t2}
-    hung |= {"elbow": solved.elbow, "wrist": solved.wrist, "tip": solved.tip}
+    arms = {"azimuth": solved.azimuth, "t0": t0, "t1": t1, "t2": t2}
+    arms |= {"elbow": solved.elbow, "wrist": solved.wrist, "tip": solved.tip}
     answer = {
-        "arms": {name: values.tolist() for name, values in hung.items()},
+        "arms": {name: values.tolist() for name, values in arms.items()},
         "legs": {"hip": hip.tolist(), "knee": knee.tolist()},
     }
     if media_type == JSON:

@@ -1,4 +1,4 @@
-"""The ingest service: uploads and sessions become motions; motions are listed, described and removed."""
+"""Ingest service: creates motions from uploads and sessions; lists, describes and removes motions."""
 
 from __future__ import annotations
 
@@ -13,111 +13,124 @@ from starlette.requests import ClientDisconnect
 
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
-from bunraku.http.problem_details import ProblemError, motion_not_found
-from bunraku.ingest import metrics
-from bunraku.ingest.audio import AudioOperation
+from bunraku.http.problem_details import motion_not_found
+from bunraku.ingest.audio import AudioOperation, create_audio_job
 from bunraku.ingest.entry import entry_json
+from bunraku.ingest.job_queue import JobQueue
 from bunraku.ingest.keyframe import Staging
-from bunraku.ingest.motion import UploadOperation
+from bunraku.ingest.metrics import register_metrics
+from bunraku.ingest.motion import MotionOperation, create_motion_job
 from bunraku.ingest.performers import PerformersOperation, PerformersRequest
+from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.recording import RECORDING_SUBJECT, RecordingOperation
 from bunraku.ingest.scene import SceneOperation
+from bunraku.ingest.upload import UploadReceiver
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
-from bunraku.storage.catalogue import InvalidCursor
+from bunraku.runtime.problem import ProblemError
+from bunraku.storage.record import InvalidCursor
 
 MAX_KEYFRAMES_BYTES = 16 << 20
-"""Bytes of a camera and lights."""
+"""Maximum size of a request with a camera and lights."""
 UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
-"""Of an upload, chosen at random by its sender."""
+"""Pattern of an upload's name, which its client chooses at random."""
+
+Filename = Annotated[str, Query(min_length=1, max_length=255)]
+UploadName = Annotated[str | None, Query(pattern=UPLOAD_NAME_PATTERN)]
 
 
-def create_app(backing: ServiceContext) -> FastAPI:
-    """The service upon `backing`."""
-    uploads = UploadOperation(backing)
-    soundtracks = AudioOperation(backing, uploads)
-    stagings = SceneOperation(backing, uploads)
-    performers = PerformersOperation(backing, uploads)
-    recordings = RecordingOperation(backing, uploads.worker_slots)
+def create_app(context: ServiceContext) -> FastAPI:
+    """Create the ingest service."""
+    worker_slots = WorkerSlots()
+    motions = MotionOperation(context, worker_slots)
+    soundtracks = AudioOperation(context, worker_slots)
+    scenes = SceneOperation(context, worker_slots)
+    performers = PerformersOperation(context, worker_slots)
+    recordings = RecordingOperation(context, worker_slots)
+    job_queue = JobQueue(context, worker_slots, {"motion": motions.run_job, "audio": soundtracks.run_job})
+    uploads = UploadReceiver(context, job_queue)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        metrics.register_metrics(backing.metrics, uploads)
-        answering = backing.bus.serve(RECORDING_SUBJECT, recordings.handle_message)
-        looking = asyncio.create_task(uploads.job_queue.run(), name="jobs of this replica")
+        register_metrics(context.metrics, uploads, job_queue, worker_slots)
+        recording_requests = context.bus.serve(RECORDING_SUBJECT, recordings.handle_message)
+        queue_task = asyncio.create_task(job_queue.run(), name="job queue")
         try:
             yield
         finally:
-            answering.unsubscribe()
-            looking.cancel()
-            await asyncio.wait((looking,))
-            await uploads.job_queue.release_jobs()
+            recording_requests.unsubscribe()
+            queue_task.cancel()
+            await asyncio.wait((queue_task,))
+            await job_queue.release_jobs()
 
     app = FastAPI(title="Bunraku ingest", lifespan=lifespan)
     problem_details.install_problem_handlers(app)
 
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
     @requires(Role.INGEST, max_body_bytes=None)
-    async def upload(
-        request: Request,
-        filename: Annotated[str, Query(min_length=1, max_length=255)],
-        upload: Annotated[str | None, Query(pattern=UPLOAD_NAME_PATTERN)] = None,
-    ) -> Response:
-        """Make a motion of the file in the request's body. The same bytes again give the same motion, with 200. With a
-        random name in `upload`, `GET /v1/uploads/{upload}` says meanwhile how far it is."""
+    async def upload(request: Request, filename: Filename, upload: UploadName = None) -> Response:
+        """Create a motion from the file in the request body.
+
+        Uploading the same bytes again returns the same motion with 200. With a random name in `upload`,
+        `GET /v1/uploads/{upload}` reports the progress meanwhile.
+        """
+        subject = access_of(request).subject
         try:
-            entry, new = await uploads.upload_motion(request, filename, upload)
+            outcome = await uploads.receive(
+                request, upload, lambda digest: create_motion_job(digest, filename, subject)
+            )
         except ClientDisconnect:
-            # nobody is there to read this
-            return Response(status_code=400)
-        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+            return _disconnected_response()
+        return _stored_response(outcome)
 
     @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
     @requires(Role.INGEST, max_body_bytes=None)
-    async def add_audio(
-        request: Request,
-        motion: str,
-        filename: Annotated[str, Query(min_length=1, max_length=255)],
-        upload: Annotated[str | None, Query(pattern=UPLOAD_NAME_PATTERN)] = None,
-    ) -> Response:
-        """Make a motion that is another with the sound of the file in the request's body: WAV, FLAC, MP3 or Ogg. What
-        is beyond the motion's end is left out. The motion itself stays as it is; the same file again gives the same
-        new motion, with 200. `upload` as of an uploaded motion."""
+    async def add_audio(request: Request, motion: str, filename: Filename, upload: UploadName = None) -> Response:
+        """Create a copy of a motion with the sound of the file in the request body: WAV, FLAC, MP3 or Ogg.
+
+        Sound beyond the end of the motion is cut. The original stays unchanged; the same file again returns the same
+        new motion with 200. `upload` is the same as for uploaded motions.
+        """
+        subject = access_of(request).subject
         try:
-            entry, new = await soundtracks.upload_audio(request, motion, filename, upload)
+            await soundtracks.require_motion(motion)
+            outcome = await uploads.receive(
+                request, upload, lambda digest: create_audio_job(motion, digest, filename, subject)
+            )
         except ClientDisconnect:
-            # nobody is there to read this
-            return Response(status_code=400)
-        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+            return _disconnected_response()
+        return _stored_response(outcome)
 
     @app.post("/v1/motions/{motion}/scene", status_code=201, tags=["motions"])
     @requires(Role.INGEST, max_body_bytes=MAX_KEYFRAMES_BYTES)
-    async def add_scene(motion: str, asked: Staging, request: Request) -> Response:
-        """Make a motion that is another with a camera and lights, given as keyframes in motion time. What is left out
-        stays as that motion has it. The motion itself stays as it is; the same keyframes again give the same new
-        motion, with 200."""
-        entry, new = await stagings.add_scene(motion, asked, access_of(request).subject)
-        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+    async def add_scene(motion: str, staging: Staging, request: Request) -> Response:
+        """Create a copy of a motion with a camera and lights, given as keyframes in motion time.
+
+        Omitted parts stay as in the original, which stays unchanged. The same keyframes again return the same new
+        motion with 200.
+        """
+        return _stored_response(await scenes.add_scene(motion, staging, access_of(request).subject))
 
     @app.post("/v1/motions/{motion}/performers", status_code=201, tags=["motions"])
     @requires(Role.INGEST)
-    async def add_performers(motion: str, asked: PerformersRequest, request: Request) -> Response:
-        """Make a motion in which the performers of others dance beside this one's, four of them at most. The motion
-        itself stays as it is, with its sound, cameras and lights; the others' stay out. The same motions at the same
-        places again give the same new motion, with 200."""
-        entry, new = await performers.add_performers(motion, asked, access_of(request).subject)
-        return JSONResponse(entry_json(entry), 201 if new else 200, {"Location": f"/v1/motions/{entry.id}"})
+    async def add_performers(motion: str, body: PerformersRequest, request: Request) -> Response:
+        """Create a copy of a motion with the performers of other motions beside its own, at most four in all.
+
+        The copy has the sound, camera and lights of the original, which stays unchanged. The same motions with the same
+        placement again return the same new motion with 200.
+        """
+        return _stored_response(await performers.add_performers(motion, body, access_of(request).subject))
 
     @app.get("/v1/uploads/{upload}", tags=["motions"])
     @requires(Role.INGEST)
     async def progress(upload: Annotated[str, Path(pattern=UPLOAD_NAME_PATTERN)], response: Response) -> UploadProgress:
-        """How far an upload is that is under way: what is being done, and the share of that which is done. 404 before
-        and after."""
-        found = uploads.get_progress(upload)
-        if found is None:
-            raise ProblemError(404, "No such upload", f"no upload {upload!r} is under way here")
+        """Return the stage of an upload in progress and the completed share of that stage; 404 before and after."""
+        current = uploads.get_progress(upload)
+        if current is None:
+            raise ProblemError(404, "No such upload", f"no upload {upload!r} is in progress on this server")
         response.headers["Cache-Control"] = "no-store"
-        return found
+        return current
 
     @app.get("/v1/motions", tags=["motions"])
     @requires(Role.VIEW, allow_bound=True)
@@ -126,23 +139,28 @@ def create_app(backing: ServiceContext) -> FastAPI:
         limit: Annotated[int, Query(ge=1, le=200)] = 50,
         cursor: Annotated[str | None, Query(max_length=200)] = None,
     ) -> dict[str, Any]:
-        """Motions, newest first; `next` is the cursor of the next page. Who is bound to one sees that alone."""
-        by = access_of(request)
-        if by.is_bound:
-            shown = by.motion if by.session is None else await backing.authenticator.get_session_motion(by.session)
-            found = None if shown is None else await backing.catalogue.get_motion(shown)
-            return {"items": [] if found is None else [entry_json(found)], "next": None}
+        """Return motions, newest first; `next` is the cursor of the next page.
+
+        A viewer link for one session or motion gets only its motion.
+        """
+        access = access_of(request)
+        if access.is_bound:
+            motion_id = access.motion
+            if access.session is not None:
+                motion_id = await context.authenticator.get_session_motion(access.session)
+            entry = None if motion_id is None else await context.catalogue.get_motion(motion_id)
+            return {"items": [] if entry is None else [entry_json(entry)], "next": None}
         try:
-            entries, following = await backing.catalogue.list_motions(limit, cursor)
+            entries, next_cursor = await context.catalogue.list_motions(limit, cursor)
         except InvalidCursor as error:
             raise ProblemError(422, "Bad cursor", str(error), field="cursor") from None
-        return {"items": [entry_json(entry) for entry in entries], "next": following}
+        return {"items": [entry_json(entry) for entry in entries], "next": next_cursor}
 
     @app.get("/v1/motions/{motion}", tags=["motions"])
     @requires(Role.VIEW)
     async def describe(motion: str) -> dict[str, Any]:
-        """One motion."""
-        entry = await backing.catalogue.get_motion(motion)
+        """Return a motion."""
+        entry = await context.catalogue.get_motion(motion)
         if entry is None:
             raise motion_not_found(motion)
         return entry_json(entry)
@@ -150,16 +168,26 @@ def create_app(backing: ServiceContext) -> FastAPI:
     @app.delete("/v1/motions/{motion}", status_code=204, tags=["motions"])
     @requires(Role.INGEST)
     async def remove(motion: str, request: Request) -> None:
-        """Remove one motion; sessions that play it go on with what they have. Who is no admin removes their own."""
-        by, found = access_of(request), await backing.catalogue.get_motion(motion)
-        if found is not None and by.role < Role.ADMIN and found.subject != by.subject:
-            detail = f"{motion} was stored by another; this needs the role admin"
+        """Remove a motion; sessions that play it continue. Without the role admin, only motions of one's subject."""
+        access, entry = access_of(request), await context.catalogue.get_motion(motion)
+        if entry is not None and access.role < Role.ADMIN and entry.subject != access.subject:
+            detail = f"{motion} was stored by another subject; removing it needs the role admin"
             raise ProblemError(403, "Not allowed", detail, needed="admin")
-        if not await backing.catalogue.remove_motion(motion):
+        if not await context.catalogue.remove_motion(motion):
             raise motion_not_found(motion)
-        await backing.motion_store.remove(motion)
+        await context.motion_store.remove(motion)
 
     return app
+
+
+def _stored_response(outcome: StoreOutcome) -> Response:
+    entry, is_new = outcome
+    return JSONResponse(entry_json(entry), 201 if is_new else 200, {"Location": f"/v1/motions/{entry.id}"})
+
+
+def _disconnected_response() -> Response:
+    # the client has disconnected and does not read it
+    return Response(status_code=400)
 
 
 _BINARY_REQUEST_BODY = {

@@ -1,4 +1,4 @@
-"""Sound for motions: a motion stays as it is, and a new one is made that is the same with audio beside it."""
+"""Operation that derives a motion with the sound of an uploaded file."""
 
 from __future__ import annotations
 
@@ -7,77 +7,71 @@ import os
 from pathlib import Path
 from typing import Any
 
-from starlette.requests import Request
-
 from bunraku.codec.container import StoredMotion
-from bunraku.http.access_control import access_of
-from bunraku.ingest.derived_motion import DerivedMotionFactory
-from bunraku.ingest.motion import UploadOperation, derive_motion_id
+from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
+from bunraku.ingest.job_process import JobKind
+from bunraku.ingest.job_queue import JobDetails, UploadJob
+from bunraku.ingest.motion_id import derive_motion_id
+from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.ingest.source_file import SourceFile
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
-from bunraku.storage.catalogue import CatalogueEntry
+from bunraku.storage.record import CatalogueEntry
+
+
+def create_audio_job(motion_id: str, digest: bytes, filename: str, subject: str) -> UploadJob:
+    """Describe the job that adds the sound file with this SHA-256 digest to a motion."""
+    details = {"kind": "audio", "motion": motion_id, "digest": digest.hex(), "filename": filename, "subject": subject}
+    return UploadJob(f"{motion_id}-{derive_motion_id(digest)}", details)
 
 
 class AudioOperation:
-    """The sounds that come to one replica, as uploads beside its `uploads`."""
+    """Addition of sound files to motions."""
 
-    def __init__(self, backing: ServiceContext, uploads: UploadOperation) -> None:
-        self._uploads = uploads
-        self._derived_motions = DerivedMotionFactory(backing, uploads)
-        self._worker_slots = uploads.worker_slots
-        self._timeout_s = backing.settings.upload_seconds
-        uploads.job_queue.handlers["audio"] = self._resume_job
+    def __init__(self, context: ServiceContext, worker_slots: WorkerSlots) -> None:
+        self._derived_motions = DerivedMotionFactory(context, worker_slots)
+        self._worker_slots = worker_slots
+        self._timeout_s = context.settings.upload_seconds
 
-    async def upload_audio(
-        self, request: Request, motion: str, filename: str, upload: str | None = None
-    ) -> tuple[CatalogueEntry, bool]:
-        """The motion `motion` with the sound of the request's body, and whether it is new. `upload` and errors as of
-        `Uploads.receive`; a motion that there is not raises `ProblemError` before the body is read."""
-        await self._derived_motions.require_motion(motion)
-        subject = access_of(request).subject
+    async def require_motion(self, motion_id: str) -> None:
+        """Raise `ProblemError` (404) if a motion does not exist, before its sound file is received."""
+        await self._derived_motions.require_motion(motion_id)
 
-        async def add(digest: bytes, path: Path, progress: UploadProgress) -> tuple[CatalogueEntry, bool]:
-            return await self.add_audio(motion, digest, path, filename, progress, subject=subject)
-
-        def details(digest: bytes) -> tuple[str, dict[str, Any]]:
-            said = {"kind": "audio", "motion": motion, "digest": digest.hex(), "filename": filename, "subject": subject}
-            return f"{motion}-{derive_motion_id(digest)}", said
-
-        return await self._uploads.receive_upload(request, upload, details, add)
-
-    async def _resume_job(self, details: dict[str, Any], path: Path) -> None:
-        """As `queue.Make`."""
-        digest, subject = bytes.fromhex(details["digest"]), details.get("subject", "")
-        await self.add_audio(details["motion"], digest, path, details["filename"], subject=subject)
+    async def run_job(self, details: JobDetails, path: Path, progress: UploadProgress) -> StoreOutcome:
+        """Run a job of `create_audio_job` (a `JobHandler`)."""
+        source = SourceFile(path, details["filename"], details.get("subject", ""))
+        return await self.add_audio(details["motion"], source, bytes.fromhex(details["digest"]), progress)
 
     async def add_audio(
-        self,
-        motion: str,
-        digest: bytes,
-        path: Path,
-        filename: str,
-        progress: UploadProgress | None = None,
-        *,
-        subject: str = "",
-    ) -> tuple[CatalogueEntry, bool]:
-        """The motion `motion` with the sound of the file at `path`, whose SHA-256 is `digest`, stored by `subject`, and
-        whether it is new; raises `ProblemError`."""
-        under_way = progress or UploadProgress()
-        under_way.advance_to("waiting")
+        self, motion_id: str, source: SourceFile, digest: bytes, progress: UploadProgress | None = None
+    ) -> StoreOutcome:
+        """Derive a motion with the sound of a file with this SHA-256 digest; raise `ProblemError`."""
+        upload_progress = progress or UploadProgress()
+        upload_progress.advance_to("waiting")
 
-        async def sing(made: str, stored: StoredMotion) -> JobResult | JobRejection:
-            under_way.advance_to("reading")
+        async def run(new_id: str, stored: StoredMotion) -> JobResult | JobRejection:
+            upload_progress.advance_to("reading")
             return await self._worker_slots.run_job(
-                "add", (made, stored, path), self._timeout_s, lambda share: under_way.advance_to("encoding", share)
+                JobKind.AUDIO,
+                (new_id, stored, source.path),
+                self._timeout_s,
+                lambda share: upload_progress.advance_to("encoding", share),
             )
 
-        async def described(before: CatalogueEntry, made: JobResult) -> dict[str, Any]:
-            size = await asyncio.to_thread(os.path.getsize, path)
-            audio = {"filename": filename, "bytes": size, **made.description["audio"]}
-            return {**before.description, **made.description, "audio": audio}
+        async def describe(base: CatalogueEntry, result: JobResult) -> dict[str, Any]:
+            size = await asyncio.to_thread(os.path.getsize, source.path)
+            audio = {"filename": source.filename, "bytes": size, **result.description["audio"]}
+            return {**base.description, **result.description, "audio": audio}
 
-        with_what = b" with the sound " + digest
         return await self._derived_motions.find_or_create(
-            motion, with_what, sing, described, subject=subject, filename=filename
+            Derivation(
+                motion_id,
+                b" with the sound " + digest,
+                run,
+                describe,
+                source.subject,
+                {"filename": source.filename},
+            )
         )

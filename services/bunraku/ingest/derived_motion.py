@@ -1,67 +1,82 @@
-"""Motions made from another, which stays as it is: found again where the same was made before, else made and stored."""
+"""Motions derived from a stored motion, which stays unchanged.
+
+The id of a derived motion is a hash of its source and of the addition, so that a repeated operation finds it again.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http.problem_details import ProblemError, motion_not_found
-from bunraku.ingest.motion import UploadOperation, derive_motion_id
-from bunraku.ingest.persistence import check_quota, store_motion
-from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.http.problem_details import motion_not_found
+from bunraku.ingest.motion_id import derive_motion_id
+from bunraku.ingest.persistence import StoreOutcome, check_quota, store_motion
+from bunraku.ingest.result import JobRejection, JobResult, require_result
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
-from bunraku.storage.catalogue import CatalogueEntry
+from bunraku.storage.record import CatalogueEntry
 
 DerivationJob = Callable[[str, StoredMotion], Awaitable[JobResult | JobRejection]]
-"""Makes the motion of this new id from the stored one."""
+"""Function that derives the motion of a new id from the stored one; it runs while a worker slot is held."""
 DescriptionBuilder = Callable[[CatalogueEntry, JobResult], Awaitable[dict[str, Any]]]
-"""What the catalogue says of the new motion, from what it says of the other and what was made."""
+"""Function that describes the new motion, from the entry of its source and the result of the job."""
+
+
+@dataclass(frozen=True, slots=True)
+class Derivation:
+    """A motion to derive."""
+
+    source_id: str
+    key: bytes
+    """Identity of the addition: equal keys give the same motion."""
+    run: DerivationJob
+    describe: DescriptionBuilder
+    subject: str = ""
+    """Subject that stores the motion."""
+    problem_members: Mapping[str, str] = field(default_factory=dict)
+    """Further members of the problem document if the job rejects its input."""
 
 
 class DerivedMotionFactory:
-    """Those of one replica. Their jobs take the places of its `uploads`."""
+    """Creation of derived motions."""
 
-    def __init__(self, backing: ServiceContext, uploads: UploadOperation) -> None:
-        self._backing = backing
-        self._uploads = uploads
+    def __init__(self, context: ServiceContext, worker_slots: WorkerSlots) -> None:
+        self._context = context
+        self._worker_slots = worker_slots
 
     async def require_motion(self, motion_id: str) -> CatalogueEntry:
-        """What the catalogue says of a motion that can be made something of; raises `ProblemError`."""
-        entry = await self._backing.catalogue.get_motion(motion_id)
-        if entry is None or await self._backing.motion_store.get(motion_id) is None:
+        """Return the entry of a stored motion; raise `ProblemError` (404) if it does not exist."""
+        entry = await self._context.catalogue.get_motion(motion_id)
+        if entry is None:
             raise motion_not_found(motion_id)
+        await self.require_object(motion_id)
         return entry
 
-    async def find_or_create(
-        self,
-        source_id: str,
-        derivation_key: bytes,
-        job: DerivationJob,
-        describe: DescriptionBuilder,
-        *,
-        subject: str = "",
-        **problem_fields: str,
-    ) -> tuple[CatalogueEntry, bool]:
-        """The motion `motion` with something, and whether it is new; `with_what` says with what exactly: the same gives
-        the same motion. `subject` is who stores it. Raises `ProblemError`, with `told` where the job refuses."""
-        backing = self._backing
-        before = await self.require_motion(source_id)
-        made_id = derive_motion_id(hashlib.sha256(source_id.encode() + derivation_key).digest())
-        known = await backing.catalogue.get_motion(made_id)
-        if known is not None and await backing.motion_store.get(made_id) is not None:
-            return known, False
-        await check_quota(backing, subject)
-        async with self._uploads.worker_slots:
-            # it may have been removed while this waited
-            stored = await backing.motion_store.get(source_id)
-            if stored is None:
-                raise motion_not_found(source_id)
-            made = await job(made_id, stored)
-        if isinstance(made, JobRejection):
-            raise ProblemError(422, made.title, made.detail, field=made.field, hint=made.hint, **problem_fields)
+    async def require_object(self, motion_id: str) -> StoredMotion:
+        """Return a stored motion; raise `ProblemError` (404) if it does not exist."""
+        stored = await self._context.motion_store.get(motion_id)
+        if stored is None:
+            raise motion_not_found(motion_id)
+        return stored
+
+    async def find_or_create(self, derivation: Derivation) -> StoreOutcome:
+        """Return the derived motion, created unless it is stored already; raise `ProblemError`."""
+        context = self._context
+        source = await self.require_motion(derivation.source_id)
+        motion_id = derive_motion_id(hashlib.sha256(derivation.source_id.encode() + derivation.key).digest())
+        known = await context.catalogue.get_motion(motion_id)
+        if known is not None and await context.motion_store.get(motion_id) is not None:
+            return StoreOutcome(known, False)
+        await check_quota(context, derivation.subject)
+        async with self._worker_slots:
+            # loaded only now, as the source may have been removed while this waited
+            outcome = await derivation.run(motion_id, await self.require_object(derivation.source_id))
+        result = require_result(outcome, **derivation.problem_members)
         if known is not None:
-            # stored in a codec that is no longer spoken: made anew
-            await backing.catalogue.remove_motion(made_id)
-        return await store_motion(backing, made_id, made, await describe(before, made), subject)
+            # its object is missing, or in a codec of an older release
+            await context.catalogue.remove_motion(motion_id)
+        description = await derivation.describe(source, result)
+        return await store_motion(context, motion_id, result, description, derivation.subject)

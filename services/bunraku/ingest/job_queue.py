@@ -1,7 +1,8 @@
-"""Uploads that must not be forgotten: what was received whole is kept with a note of it until it is a motion.
+"""Queue of received uploads that survives the failure of a replica.
 
-A replica that dies at work leaves both behind. The note's time runs out, and whichever replica finds it makes the
-motion: the sender has got no answer, and need not send again. Who goes away while waiting takes the upload back.
+A received file stays in the motion store, with a job in the catalogue, until it is a motion. If a replica fails, its
+hold on the job expires and another replica runs the job: the client gets no response, but need not upload again. A
+client that disconnects while waiting cancels its job.
 """
 
 from __future__ import annotations
@@ -11,145 +12,175 @@ import contextlib
 import logging
 import secrets
 import tempfile
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bunraku.http import request_id
-from bunraku.http.problem_details import ProblemError
+from bunraku.ingest.persistence import StoreOutcome
+from bunraku.ingest.progress import UploadProgress
+from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext
-from bunraku.storage.catalogue import Job
+from bunraku.runtime.problem import ProblemError
+from bunraku.storage.record import Job
 
 POLL_INTERVAL_S = 2.0
-"""Seconds between two looks for jobs that nobody is at; as often those that are held here are held on."""
 JOB_LEASE_US = 8_000_000
-"""Microseconds for which a job is held from each look on."""
 REQUEST_ID_KEY = "request_id"
-"""Of a job's details, what the request that sent it is called."""
+"""Key in a job's details with the id of the HTTP request that uploaded it."""
 MAX_ATTEMPTS = 3
-"""Times that a job is begun again: one that ends its replica each time is given up."""
+"""Number of times that a job is resumed: a job that crashes each replica is given up."""
 
-JobHandler = Callable[[dict[str, Any], Path], Awaitable[object]]
-"""Makes a motion of a job's details and the file that was sent; raises `ProblemError` where there is none in it."""
+JobDetails = dict[str, Any]
+"""Parameters of a job as JSON; `kind` selects the handler."""
+JobHandler = Callable[[JobDetails, Path, UploadProgress], Awaitable[StoreOutcome]]
+"""Function that stores the motion of a job's details and uploaded file; it raises `ProblemError` for a bad file."""
 
 _log = logging.getLogger(__name__)
 
 
-class JobQueue:
-    """The jobs of one replica, and those that others left. `kinds` says how each kind is made; whoever makes some adds
-    them."""
+@dataclass(frozen=True, slots=True)
+class UploadJob:
+    """A job with its id and the details from which any replica can run it."""
 
-    def __init__(self, backing: ServiceContext, worker_slots: asyncio.Semaphore) -> None:
-        """Nothing is taken up while all `places` are at work."""
-        self._backing = backing
+    id: str
+    details: JobDetails
+
+
+@dataclass(frozen=True, slots=True)
+class JobQueueTiming:
+    """Intervals of a job queue."""
+
+    poll_s: float = POLL_INTERVAL_S
+    """Interval between searches for abandoned jobs and renewals of own jobs, in seconds."""
+    lease_us: int = JOB_LEASE_US
+    """Time for which each renewal holds a job, in microseconds."""
+
+
+DEFAULT_TIMING = JobQueueTiming()
+
+
+class JobQueue:
+    """Persistent jobs of one replica, and the abandoned jobs of others."""
+
+    def __init__(
+        self,
+        context: ServiceContext,
+        worker_slots: asyncio.Semaphore,
+        handlers: Mapping[str, JobHandler],
+        timing: JobQueueTiming = DEFAULT_TIMING,
+    ) -> None:
+        """`handlers` are by kind of job. Abandoned jobs are resumed only while a worker slot is free."""
+        self._context = context
         self._worker_slots = worker_slots
+        self._handlers = handlers
+        self._timing = timing
         self._replica_id = secrets.token_hex(8)
         self._held_jobs: set[str] = set()
         self._resumed_tasks: set[asyncio.Task[None]] = set()
-        self.handlers: dict[str, JobHandler] = {}
         self.resumed_jobs = 0
-        """Jobs taken up that another replica left."""
+        """Number of abandoned jobs that this replica has resumed."""
+
+    async def run_job(self, job: UploadJob, path: Path, progress: UploadProgress) -> StoreOutcome:
+        """Persist a job, run its handler on the file at `path` and remove the job."""
+        async with self.persist_job(job, path):
+            return await self._handlers[job.details["kind"]](job.details, path, progress)
 
     @asynccontextmanager
-    async def persist_job(self, job_id: str, details: dict[str, Any], path: Path) -> AsyncIterator[None]:
-        """While this lasts the file at `path` is in the library, and the catalogue has a job of this id to make a
-        motion of it, as `details` with its `kind` say. It stays there only where this replica ends meanwhile.
+    async def persist_job(self, job: UploadJob, path: Path) -> AsyncIterator[None]:
+        """Store a job and its file during the block; they stay only if the replica fails or the block is cancelled.
 
-        Raises `Unavailable`, and `ProblemError` where there is no room.
+        Raise `BackendUnavailable`, or `ProblemError` (507) without storage space.
         """
-        library, catalogue = self._backing.motion_store, self._backing.catalogue
-        await library.put_source(job_id, await asyncio.to_thread(path.read_bytes))
-        self._held_jobs.add(job_id)
+        motion_store, catalogue = self._context.motion_store, self._context.catalogue
+        await motion_store.put_source(job.id, await asyncio.to_thread(path.read_bytes))
+        self._held_jobs.add(job.id)
         try:
-            await catalogue.add_job(
-                Job(job_id, clock(), {**details, REQUEST_ID_KEY: request_id.current()}, 0),
-                self._replica_id,
-                clock() + JOB_LEASE_US,
-            )
+            now = self._context.clock()
+            details = {**job.details, REQUEST_ID_KEY: request_id.current()}
+            await catalogue.add_job(Job(job.id, now, details), self._replica_id, now + self._timing.lease_us)
             yield
         except asyncio.CancelledError:
-            # whoever ends it knows whether it is to be forgotten
+            # the canceller decides whether the job is discarded
             raise
         except BaseException:
-            await self.discard_job(job_id)
+            await self.discard_job(job.id)
             raise
         else:
-            await self.discard_job(job_id)
+            await self.discard_job(job.id)
         finally:
-            self._held_jobs.discard(job_id)
+            self._held_jobs.discard(job.id)
 
     async def discard_job(self, job_id: str) -> None:
-        """A job is done, or nobody wants it. One that the catalogue cannot be told of now is found done later."""
+        """Remove a job and its file. If the catalogue is unavailable, the job is resumed later and found complete."""
         with contextlib.suppress(BackendUnavailable):
-            await self._backing.catalogue.remove_job(job_id)
-            await self._backing.motion_store.remove_source(job_id)
+            await self._context.catalogue.remove_job(job_id)
+            await self._context.motion_store.remove_source(job_id)
 
     async def run(self) -> None:
-        """Hold what is at work here, and take up what nobody is at; until cancelled."""
+        """Renew the hold on own jobs and resume abandoned ones, until cancelled."""
         try:
             while True:
-                await asyncio.sleep(POLL_INTERVAL_S)
+                await asyncio.sleep(self._timing.poll_s)
                 try:
                     if self._held_jobs:
-                        await self._backing.catalogue.renew_jobs(self._replica_id, clock() + JOB_LEASE_US)
+                        held_until = self._context.clock() + self._timing.lease_us
+                        await self._context.catalogue.renew_jobs(self._replica_id, held_until)
                     if not self._worker_slots.locked():
                         await self._claim_abandoned_job()
                 except BackendUnavailable:
-                    # whoever needs it now says so
+                    # logged by the requests that need the backend
                     continue
                 except Exception:
-                    _log.exception("jobs could not be looked after; trying again")
+                    _log.exception("Job queue failed; trying again")
         finally:
             for task in self._resumed_tasks:
                 task.cancel()
             await asyncio.gather(*self._resumed_tasks, return_exceptions=True)
 
     async def release_jobs(self) -> None:
-        """Leave to others what is not done."""
+        """Release all unfinished jobs to other replicas."""
         with contextlib.suppress(BackendUnavailable):
-            await self._backing.catalogue.renew_jobs(self._replica_id, 0)
+            await self._context.catalogue.renew_jobs(self._replica_id, 0)
 
     async def _claim_abandoned_job(self) -> None:
-        now = clock()
-        job = await self._backing.catalogue.claim_job(self._replica_id, now, now + JOB_LEASE_US)
+        now = self._context.clock()
+        job = await self._context.catalogue.claim_job(self._replica_id, now, now + self._timing.lease_us)
         if job is None or job.id in self._held_jobs:
             return
         self._held_jobs.add(job.id)
-        working = asyncio.create_task(self._resume_job(job), name=f"job {job.id}")
-        self._resumed_tasks.add(working)
-        working.add_done_callback(self._resumed_tasks.discard)
+        task = asyncio.create_task(self._resume_job(job), name=f"job {job.id}")
+        self._resumed_tasks.add(task)
+        task.add_done_callback(self._resumed_tasks.discard)
 
     async def _resume_job(self, job: Job) -> None:
-        """Make what another replica began, in the name of the request that sent it."""
+        """Run an abandoned job under the id of the request that uploaded it."""
         with request_id.bind(job.details.get(REQUEST_ID_KEY, "")):
             await self._run_resumed_job(job)
 
     async def _run_resumed_job(self, job: Job) -> None:
         self.resumed_jobs += 1
         try:
-            make, source = (
-                self.handlers.get(job.details.get("kind", "")),
-                await self._backing.motion_store.get_source(job.id),
-            )
-            if make is None or source is None or job.tries > MAX_ATTEMPTS:
-                _log.error("job %s is given up: %s, begun %d times", job.id, job.details, job.tries)
+            handler = self._handlers.get(job.details.get("kind", ""))
+            source = await self._context.motion_store.get_source(job.id)
+            if handler is None or source is None or job.tries > MAX_ATTEMPTS:
+                _log.error("Job %s given up after %d attempts: %s", job.id, job.tries, job.details)
             else:
-                _log.warning("job %s was left by its server and is done here", job.id)
+                _log.warning("Job %s was abandoned by its replica; running it here", job.id)
                 with tempfile.TemporaryDirectory(prefix="bunraku-job-") as folder:
                     path = Path(folder) / "source"
                     await asyncio.to_thread(path.write_bytes, source)
-                    await make(job.details, path)
+                    await handler(job.details, path, UploadProgress())
         except ProblemError as error:
             if error.status >= 500:
-                # of this moment, not of the file: it is taken up again
-                _log.warning("job %s: %s; trying again", job.id, error.detail)
+                # not caused by the file: the job is resumed again
+                _log.warning("Job %s failed: %s; trying again", job.id, error.detail)
                 return
-            _log.warning("job %s: %s", job.id, error.detail)
+            _log.warning("Job %s failed: %s", job.id, error.detail)
         except BackendUnavailable as error:
-            _log.warning("job %s: %s; trying again", job.id, error)
+            _log.warning("Job %s failed: %s; trying again", job.id, error)
             return
         finally:
             self._held_jobs.discard(job.id)

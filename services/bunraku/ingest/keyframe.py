@@ -1,4 +1,4 @@
-"""A camera and lights as people write them: keyframes in motion time."""
+"""Cameras and lights as keyframes in motion time, in the API's JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from bunraku.codec.scene import MAX_FIELD_OF_VIEW_RAD, MIN_FIELD_OF_VIEW_RAD
 
 MAX_KEYFRAMES = 10_000
-"""Of one camera or light."""
+"""Maximum number of keyframes of one camera or light."""
 MAX_LIGHTS = 8
 
 Point = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3, description="x, y, z, metres, y up")]
@@ -18,8 +18,10 @@ ColourComponent = Annotated[FiniteFloat, Field(ge=0.0, le=100.0)]
 
 
 class _Keyframe(BaseModel):
-    """At an instant of the motion; `ease` says how it is come to from the keyframe before: evenly, or, `smooth`, at
-    rest at both ends."""
+    """Values at one motion time.
+
+    `ease` is the interpolation from the previous keyframe: `linear`, or `smooth` with zero velocity at both ends.
+    """
 
     model_config = ConfigDict(extra="forbid")
     time: Annotated[int, Field(ge=0, lt=1 << 53, description="motion time, microseconds")]
@@ -28,7 +30,7 @@ class _Keyframe(BaseModel):
 
 
 class CameraKeyframe(_Keyframe):
-    """Where a camera is, what it looks at, and how wide."""
+    """Position, gaze point and field of view of a camera."""
 
     gaze: Point
     fov: Annotated[
@@ -38,19 +40,21 @@ class CameraKeyframe(_Keyframe):
 
     @property
     def scene_values(self) -> list[float]:
-        """The seven of a scene."""
+        """The seven values of a scene track."""
         return [*self.position, *self.gaze, self.fov]
 
 
 class LightKeyframe(_Keyframe):
-    """Where a light is, and how it shines."""
+    """Position, colour and intensity of a light."""
 
-    colour: Annotated[list[ColourComponent], Field(min_length=3, max_length=3, description="linear RGB, one is full")]
-    intensity: Annotated[FiniteFloat, Field(ge=0.0, le=1e6, description="the brightest of the track counts as full")]
+    colour: Annotated[list[ColourComponent], Field(min_length=3, max_length=3, description="linear RGB, 1 is full")]
+    intensity: Annotated[
+        FiniteFloat, Field(ge=0.0, le=1e6, description="relative to the brightest keyframe of the track")
+    ]
 
     @property
     def scene_values(self) -> list[float]:
-        """The seven of a scene."""
+        """The seven values of a scene track."""
         return [*self.position, *self.colour, self.intensity]
 
 
@@ -59,7 +63,7 @@ Light = Annotated[list[LightKeyframe], Field(min_length=1, max_length=MAX_KEYFRA
 
 
 class Staging(BaseModel):
-    """A camera and lights for a motion; what is left out stays as the motion has it, `lights: []` takes them away."""
+    """A camera and lights for a motion; None keeps those of the motion, `lights: []` removes all lights."""
 
     model_config = ConfigDict(extra="forbid")
     camera: Camera | None = None
@@ -67,7 +71,7 @@ class Staging(BaseModel):
 
 
 class KeyframeOrderError(ValueError):
-    """Keyframes that do not follow each other; `field` says which."""
+    """Keyframes whose times do not ascend, at `field`."""
 
     def __init__(self, field: str, detail: str) -> None:
         super().__init__(detail)
@@ -75,11 +79,11 @@ class KeyframeOrderError(ValueError):
 
 
 def check_keyframe_order(staging: Staging) -> None:
-    """Raises `OutOfOrder` where a keyframe does not come after the one before."""
+    """Raise `KeyframeOrderError` unless the times of each track ascend."""
     tracks: list[tuple[str, Sequence[_Keyframe]]] = [("camera", staging.camera or [])]
-    tracks += [(f"lights[{nth}]", light) for nth, light in enumerate(staging.lights or [])]
+    tracks += [(f"lights[{index}]", light) for index, light in enumerate(staging.lights or [])]
     for field, keyframes in tracks:
-        for nth in range(1, len(keyframes)):
-            if keyframes[nth].time <= keyframes[nth - 1].time:
-                said = f"keyframe {nth} is at {keyframes[nth].time} µs, not after the one before it"
-                raise KeyframeOrderError(f"{field}[{nth}].time", said)
+        for index in range(1, len(keyframes)):
+            if keyframes[index].time <= keyframes[index - 1].time:
+                detail = f"keyframe {index} is at {keyframes[index].time} µs, not after the one before it"
+                raise KeyframeOrderError(f"{field}[{index}].time", detail)

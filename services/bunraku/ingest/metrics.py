@@ -1,21 +1,19 @@
-"""What the ingest service tells of itself."""
+"""Metrics of the ingest service."""
 
 from __future__ import annotations
 
-from bunraku.ingest.motion import UploadOperation
+from bunraku.ingest.job_queue import JobQueue
+from bunraku.ingest.upload import UploadReceiver
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.metrics import Metrics
 
 
-def register_metrics(metrics: Metrics, uploads: UploadOperation) -> None:
-    """Have what is on its way in counted."""
-    places, queue = uploads.worker_slots, uploads.job_queue
-    metrics.gauge("uploads_under_way", "Uploads that are received or made a motion of", lambda: uploads.active_count)
-    metrics.gauge("jobs_waiting", "Jobs that wait for a place to work at", lambda: places.waiting_jobs)
-    metrics.gauge("jobs_running", "Jobs that are at work", lambda: places.running_jobs)
-    metrics.counter("jobs_resumed_total", "Jobs taken up that another replica left", lambda: queue.resumed_jobs)
+def register_metrics(metrics: Metrics, uploads: UploadReceiver, queue: JobQueue, slots: WorkerSlots) -> None:
+    """Register the metrics of uploads and jobs."""
+    metrics.gauge("uploads_under_way", "Uploads being received or processed", lambda: uploads.active_count)
+    metrics.gauge("jobs_waiting", "Jobs waiting for a worker slot", lambda: slots.waiting_jobs)
+    metrics.gauge("jobs_running", "Jobs running", lambda: slots.running_jobs)
+    metrics.counter("jobs_resumed_total", "Jobs of failed replicas resumed here", lambda: queue.resumed_jobs)
     metrics.histograms(
-        "job_duration_seconds",
-        "Jobs by kind and outcome, and how long they took",
-        places.durations,
-        ("kind", "outcome"),
+        "job_duration_seconds", "Duration of jobs by kind and outcome", slots.durations, ("kind", "outcome")
     )

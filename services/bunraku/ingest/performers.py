@@ -1,4 +1,4 @@
-"""Performers for motions: a motion stays as it is, and a new one is made in which others dance beside its own."""
+"""Operation that derives a motion with the performers of further motions."""
 
 from __future__ import annotations
 
@@ -9,25 +9,28 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http.problem_details import ProblemError, invalid_field_problem, motion_not_found
-from bunraku.ingest.derived_motion import DerivedMotionFactory
-from bunraku.ingest.motion import MAX_ACTIVE_UPLOADS, UploadOperation
+from bunraku.http.problem_details import invalid_field_problem
+from bunraku.ingest.admission import AdmissionLimit
+from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
+from bunraku.ingest.job_process import JobKind
+from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.motion.placement import Placement
 from bunraku.runtime.context import ServiceContext
-from bunraku.storage.catalogue import CatalogueEntry
+from bunraku.storage.record import CatalogueEntry
 from bunraku.wire.limbs import MAX_PERFORMERS
 
 MAX_NAME_LENGTH = 200
 
 
 class PerformersRequest(BaseModel):
-    """Whose performers dance beside a motion's own, and where all of them do."""
+    """Motions whose performers join a motion, and the placement of all performers."""
 
     model_config = ConfigDict(extra="forbid")
     motions: Annotated[
         list[Annotated[str, Field(max_length=64)]],
-        Field(min_length=1, max_length=MAX_PERFORMERS - 1, description="motions; the same one may come again"),
+        Field(min_length=1, max_length=MAX_PERFORMERS - 1, description="motion ids; an id may occur repeatedly"),
     ]
     places: Annotated[
         list[Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]] | None,
@@ -35,91 +38,78 @@ class PerformersRequest(BaseModel):
             min_length=2,
             max_length=MAX_PERFORMERS,
             description="x and z, metres, and turn about y, radians, of every performer, the motion's own first; "
-            "in a row, facing one way, if not said",
+            "default: in a row, facing one way",
         ),
     ] = None
 
 
 class PerformersOperation:
-    """Those of one replica. Their jobs take the places of its `uploads`."""
+    """Combination of the performers of several motions."""
 
-    def __init__(self, backing: ServiceContext, uploads: UploadOperation) -> None:
-        self._backing = backing
-        self._derived_motions = DerivedMotionFactory(backing, uploads)
-        self._worker_slots = uploads.worker_slots
-        self._timeout_s = backing.settings.upload_seconds
-        self._active = 0
+    def __init__(self, context: ServiceContext, worker_slots: WorkerSlots) -> None:
+        self._derived_motions = DerivedMotionFactory(context, worker_slots)
+        self._worker_slots = worker_slots
+        self._timeout_s = context.settings.upload_seconds
+        self._limit = AdmissionLimit("performer edits")
 
-    async def add_performers(
-        self, motion: str, request: PerformersRequest, subject: str = ""
-    ) -> tuple[CatalogueEntry, bool]:
-        """The motion `motion` with the performers that are asked for, stored by `subject`, and whether it is new;
-        raises `ProblemError`."""
-        places = (
-            None if request.places is None else [_parse_placement(nth, said) for nth, said in enumerate(request.places)]
+    async def add_performers(self, motion_id: str, request: PerformersRequest, subject: str = "") -> StoreOutcome:
+        """Derive a motion with the requested performers, stored by `subject`; raise `ProblemError`."""
+        placements = (
+            None
+            if request.places is None
+            else [_parse_placement(index, values) for index, values in enumerate(request.places)]
         )
         others = [await self._derived_motions.require_motion(other) for other in request.motions]
-        if self._active >= MAX_ACTIVE_UPLOADS:
-            raise ProblemError(
-                503, "Busy", f"{MAX_ACTIVE_UPLOADS} gatherings are under way", hint="try again in a few seconds"
-            )
 
-        async def gather(made: str, stored: StoredMotion) -> JobResult | JobRejection:
-            found = [await self._require_stored(other) for other in request.motions]
-            return await self._worker_slots.run_job("gather", (made, stored, found, places), self._timeout_s)
+        async def run(new_id: str, stored: StoredMotion) -> JobResult | JobRejection:
+            other_motions = [await self._derived_motions.require_object(other) for other in request.motions]
+            arguments = (new_id, stored, other_motions, placements)
+            return await self._worker_slots.run_job(JobKind.PERFORMERS, arguments, self._timeout_s)
 
-        async def described(before: CatalogueEntry, made: JobResult) -> dict[str, Any]:
-            pieces = [piece for entry in (before, *others) for piece in performer_motion_names(entry)]
-            rates = combined_ladder([entry.description["rates"] for entry in (before, *others)])
+        async def describe(base: CatalogueEntry, result: JobResult) -> dict[str, Any]:
+            motion_names = [name for entry in (base, *others) for name in performer_motion_names(entry)]
             return {
-                **before.description,
-                **made.description,
-                "name": combined_name(pieces),
-                "pieces": pieces,
-                "rates": rates,
+                **base.description,
+                **result.description,
+                "name": combined_name(motion_names),
+                "pieces": motion_names,
+                "rates": combined_ladder([entry.description["rates"] for entry in (base, *others)]),
             }
 
-        self._active += 1
-        try:
-            performed = f" performed with {json.dumps([request.motions, request.places])}".encode()
-            return await self._derived_motions.find_or_create(motion, performed, gather, described, subject=subject)
-        finally:
-            self._active -= 1
-
-    async def _require_stored(self, motion: str) -> StoredMotion:
-        stored = await self._backing.motion_store.get(motion)
-        if stored is None:
-            raise motion_not_found(motion)
-        return stored
+        key = f" performed with {json.dumps([request.motions, request.places])}".encode()
+        with self._limit:
+            return await self._derived_motions.find_or_create(Derivation(motion_id, key, run, describe, subject))
 
 
 def performer_motion_names(entry: CatalogueEntry) -> list[str]:
-    """What the performers of a motion dance, by name."""
-    known = entry.description
-    return known.get("pieces") or [str(known.get("name") or "A dance")] * int(known.get("performers", 1))
+    """Return the name of the original motion of each performer."""
+    description = entry.description
+    names: list[str] | None = description.get("pieces")
+    return names or [str(description.get("name") or "A dance")] * int(description.get("performers", 1))
 
 
 def combined_name(motion_names: list[str]) -> str:
-    """What a motion in which these are danced side by side is called."""
-    times = Counter(motion_names)
-    name = " + ".join(piece if many == 1 else f"{piece} \u00d7 {many}" for piece, many in times.items())
+    """Return a name for a combination of motions, at most `MAX_NAME_LENGTH` characters."""
+    counts = Counter(motion_names)
+    name = " + ".join(each if count == 1 else f"{each} \u00d7 {count}" for each, count in counts.items())
     return name if len(name) <= MAX_NAME_LENGTH else f"{name[: MAX_NAME_LENGTH - 1]}\u2026"
 
 
 def combined_ladder(ladders: list[list[dict[str, float]]]) -> list[dict[str, float]]:
-    """What the rates of several dances cost together, kbit/s, and keep of each: as many as one has at most, of one with
-    fewer its highest."""
-    return [
-        {
-            "kbps": round(sum(rates[min(rate, len(rates) - 1)]["kbps"] for rates in ladders), 3),
-            **{key: max(rates[min(rate, len(rates) - 1)][key] for rates in ladders) for key in ("mean", "max")},
-        }
-        for rate in range(max(map(len, ladders)))
-    ]
+    """Return the bitrate ladder of combined motions: the sum of bitrates (kbit/s), the largest error (mm).
+
+    It has as many levels as the longest ladder; shorter ladders contribute their highest level to the rest.
+    """
+    combined = []
+    for index in range(max(map(len, ladders))):
+        levels = [ladder[min(index, len(ladder) - 1)] for ladder in ladders]
+        errors = {key: max(level[key] for level in levels) for key in ("mean", "max")}
+        combined.append({"kbps": round(sum(level["kbps"] for level in levels), 3), **errors})
+    return combined
 
 
-def _parse_placement(nth: int, values: list[float]) -> Placement:
+def _parse_placement(index: int, values: list[float]) -> Placement:
     try:
         return Placement.parse(values)
     except ValueError as error:
-        raise invalid_field_problem(("places", nth), str(error)) from None
+        raise invalid_field_problem(("places", index), str(error)) from None

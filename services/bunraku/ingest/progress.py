@@ -1,4 +1,4 @@
-"""How far an upload is."""
+"""Progress of an upload."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ UploadStage = Literal["receiving", "waiting", "reading", "encoding"]
 
 @dataclass(slots=True)
 class UploadProgress:
-    """What is being done with an upload, and the share of that which is done, 0..1: of its bytes while it is received,
-    of its blocks while it is encoded. It waits where others are encoded first; reading has no share."""
+    """Stage of an upload and the completed share of that stage, 0..1.
+
+    The share counts bytes while receiving and blocks while encoding. An upload is waiting while all worker slots are
+    in use. Waiting and reading have no share.
+    """
 
     stage: UploadStage = "receiving"
     share: float = 0.0
 
     def advance_to(self, stage: UploadStage, share: float = 0.0) -> None:
-        """Note where the upload is now."""
+        """Set the current stage and share."""
         self.stage, self.share = stage, share

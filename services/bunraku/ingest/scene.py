@@ -1,51 +1,47 @@
-"""Cameras and lights for motions: a motion stays as it is, and a new one is made that is the same with them beside."""
+"""Operation that derives a motion with a camera and lights."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http.problem_details import ProblemError
-from bunraku.ingest.derived_motion import DerivedMotionFactory
+from bunraku.ingest.admission import AdmissionLimit
+from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
+from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.keyframe import KeyframeOrderError, Staging, check_keyframe_order
-from bunraku.ingest.motion import MAX_ACTIVE_UPLOADS, UploadOperation
+from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
-from bunraku.storage.catalogue import CatalogueEntry
+from bunraku.runtime.problem import ProblemError
+from bunraku.storage.record import CatalogueEntry
 
 
 class SceneOperation:
-    """Those of one replica. Their jobs take the places of its `uploads`."""
+    """Addition of cameras and lights to motions."""
 
-    def __init__(self, backing: ServiceContext, uploads: UploadOperation) -> None:
-        self._derived_motions = DerivedMotionFactory(backing, uploads)
-        self._worker_slots = uploads.worker_slots
-        self._timeout_s = backing.settings.upload_seconds
-        self._active = 0
+    def __init__(self, context: ServiceContext, worker_slots: WorkerSlots) -> None:
+        self._derived_motions = DerivedMotionFactory(context, worker_slots)
+        self._worker_slots = worker_slots
+        self._timeout_s = context.settings.upload_seconds
+        self._limit = AdmissionLimit("scene edits")
 
-    async def add_scene(self, motion: str, staging: Staging, subject: str = "") -> tuple[CatalogueEntry, bool]:
-        """The motion `motion` with what is asked for, stored by `subject`, and whether it is new; raises
-        `ProblemError`."""
+    async def add_scene(self, motion_id: str, staging: Staging, subject: str = "") -> StoreOutcome:
+        """Derive a motion with the camera and lights of `staging`, stored by `subject`; raise `ProblemError`."""
         if staging.camera is None and staging.lights is None:
-            raise ProblemError(422, "Nothing to add", "neither a camera nor lights are in it", field="camera")
+            detail = "the request has neither a camera nor lights; send at least one of them"
+            raise ProblemError(422, "Nothing to add", detail, field="camera")
         try:
             check_keyframe_order(staging)
         except KeyframeOrderError as error:
             raise ProblemError(422, "Out of order", str(error), field=error.field) from None
-        if self._active >= MAX_ACTIVE_UPLOADS:
-            raise ProblemError(
-                503, "Busy", f"{MAX_ACTIVE_UPLOADS} stagings are under way", hint="try again in a few seconds"
-            )
 
-        async def dress(made: str, stored: StoredMotion) -> JobResult | JobRejection:
-            return await self._worker_slots.run_job("dress", (made, stored, staging), self._timeout_s)
+        async def run(new_id: str, stored: StoredMotion) -> JobResult | JobRejection:
+            return await self._worker_slots.run_job(JobKind.SCENE, (new_id, stored, staging), self._timeout_s)
 
-        async def described(before: CatalogueEntry, made: JobResult) -> dict[str, Any]:
-            return {**before.description, **made.description}
+        async def describe(base: CatalogueEntry, result: JobResult) -> dict[str, Any]:
+            return {**base.description, **result.description}
 
-        self._active += 1
-        try:
-            staged = f" staged {staging.model_dump_json()}".encode()
-            return await self._derived_motions.find_or_create(motion, staged, dress, described, subject=subject)
-        finally:
-            self._active -= 1
+        key = f" staged {staging.model_dump_json()}".encode()
+        with self._limit:
+            return await self._derived_motions.find_or_create(Derivation(motion_id, key, run, describe, subject))

@@ -1,8 +1,8 @@
-"""Many arms at once: hand tips in, places of elbow, wrist and tip out, by square roots alone.
+"""Many arms at once: positions of elbow, wrist and tip from hand targets, with square roots alone.
 
-The same arm as `arm`, without trigonometry. A planar place is a complex number x + iy; an elbow is the tip times a
-number that closes the triangle of upper arm, the rest of the arm, and the line to the tip; the forearm's direction is
-the line from elbow to tip over the rest's own shape. Angles are made from the places, where somebody asks for them.
+The arm is that of `arm`, without trigonometry. A position in the plane is a complex number x + iy. The elbow is the tip
+times a number that closes the triangle of upper arm, rest of the arm, and chord; the forearm's direction is the line
+from elbow to tip divided by the shape of the rest. Angles are computed from the positions on request.
 
 In space the shoulder is the origin and y is up; the azimuth of the plane is from z (forwards) towards x.
 """
@@ -16,45 +16,52 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bunraku.marionette.arm import BendTable, folded_elbow
-from bunraku.marionette.planar_arm import TABLE_SIDE
-from bunraku.marionette.proportions import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD, Proportions
+from bunraku.marionette.constants import (
+    MAX_ELBOW_BEND_RAD,
+    MAX_TIP_DISTANCE,
+    MAX_WRIST_BEND_RAD,
+    MIN_TARGET_DISTANCE,
+    TABLE_SIDE,
+)
+from bunraku.marionette.proportions import Proportions
 from bunraku.motion.rotation import Array
 
 CHUNK_ARMS = 8192
-"""Arms that are solved together, so that what lies between is still in the processor's cache."""
-MIN_TARGET_DISTANCE = 1e-12
-"""A target nearer to the shoulder than this has no direction to keep."""
+"""Arms solved together, so that intermediate results stay in the processor's cache."""
 _MIN_HORIZONTAL_DISTANCE = 1e-150
-"""A level distance is 0 below this: far under any that matters, far above where a square loses digits."""
+"""Horizontal distance below which the tip counts as on the axis.
+
+Far below any that matters, and far above those whose square loses digits.
+"""
 
 
 class ArmConstants(NamedTuple):
-    """An arm in the numbers that solving takes. Lengths are in arm lengths; a half bend is told by its sine."""
+    """Numbers that depend on the arm's proportions only. Lengths are in arm lengths; half bends are sines."""
 
     upper: float
     forearm: float
     hand: float
     min_tip_distance: float
-    """The nearest that a tip is solved for."""
+    """Smallest solved distance of the tip."""
     inverse_distance_range: float
-    """1 / (1 - inner)."""
+    """1 / (1 - min_tip_distance)."""
     straight_elbow_factor: float
-    """Times 1 - r^2: the squared sine of the half bend with which the wrist reaches r, the elbow being straight."""
+    """Factor of 1 - r^2 in the squared sine of half the wrist bend that reaches r with a straight elbow."""
     folded_elbow_factor: float
-    """1 / (4 d hand): as `straight`, the elbow being at its limit and the wrist d from the shoulder."""
+    """1 / (4 d hand): the same with the elbow at its limit, the wrist at distance d from the shoulder."""
     folded_near_squared: float
     """(d - hand)^2."""
     folded_far_squared: float
     """(d + hand)^2."""
     half_lean_sine: float
-    """Sine of half the angle between the line to that wrist and the folded forearm, negative; `lean_cosine` alike."""
+    """Sine of half the angle between the segment to that wrist and the folded forearm; negative."""
     half_lean_cosine: float
     max_half_bend_sine: float
-    """The wrist's own limit."""
+    """Limit of the wrist."""
 
 
 def arm_constants(proportions: Proportions) -> ArmConstants:
-    """What `place` needs of an arm with these proportions."""
+    """Return the constants of an arm with these proportions."""
     upper, fore, hand = proportions.lengths
     inner = proportions.min_tip_distance
     distance, angle = folded_elbow(proportions)
@@ -76,18 +83,18 @@ def arm_constants(proportions: Proportions) -> ArmConstants:
 
 
 def solve_tip(constants: ArmConstants, nodes: Array, x: Any, y: Any, z: Any) -> Any:
-    """Sine and cosine of the azimuth, then elbow, wrist and tip (each x, y, z) for a hand tip at (x, y, z).
+    """Return sine and cosine of the azimuth, then elbow, wrist and tip (x, y, z each) for a target at (x, y, z).
 
-    One set of formulae for arrays (n,) and, compiled, for single numbers. `nodes` is the table, flat, in float64. A
-    target out of reach is brought in with its direction kept; the shoulder itself counts as straight below.
+    The formulae are the same for arrays (n,) and, compiled, for single numbers. `nodes` is the flat table in float64. A
+    target out of reach is moved into reach along its direction; the shoulder itself counts as straight below.
     """
     flat = x * x + z * z
     level, reach = np.sqrt(flat), np.sqrt(flat + y * y)
-    lost = reach < MIN_TARGET_DISTANCE
-    found = 1.0 - lost
-    x, y, z, level = x * found, y * found - MIN_TARGET_DISTANCE * lost, z * found, level * found
+    at_shoulder = reach < MIN_TARGET_DISTANCE
+    found = 1.0 - at_shoulder
+    x, y, z, level = x * found, y * found - MIN_TARGET_DISTANCE * at_shoulder, z * found, level * found
     reach = np.maximum(reach, MIN_TARGET_DISTANCE)
-    # on the axis the plane is the one that faces forwards
+    # on the axis the plane faces forwards
     off, across = level >= _MIN_HORIZONTAL_DISTANCE, np.maximum(level, _MIN_HORIZONTAL_DISTANCE)
     sine, cosine = x * off / across, (z * off + _MIN_HORIZONTAL_DISTANCE * (1.0 - off)) / across
     r = np.minimum(np.maximum(reach, constants.min_tip_distance), MAX_TIP_DISTANCE)
@@ -101,7 +108,7 @@ def solve_tip(constants: ArmConstants, nodes: Array, x: Any, y: Any, z: Any) -> 
     share = inside + (outside - inside) * u
     square = r * r
     greatest = np.minimum(constants.max_half_bend_sine, np.sqrt((1.0 - square) * constants.straight_elbow_factor))
-    # half of an angle sum: the folded elbow's lean, and the bend that reaches r from there
+    # sine of half an angle sum: the lean of the folded elbow and the bend that reaches r from there
     bend_sine = np.sqrt(
         np.minimum(np.maximum((constants.folded_far_squared - square) * constants.folded_elbow_factor, 0.0), 1.0)
     )
@@ -112,7 +119,7 @@ def solve_tip(constants: ArmConstants, nodes: Array, x: Any, y: Any, z: Any) -> 
     least = np.minimum(least, greatest)
     half = least + share * (greatest - least)
     cos_bend, sin_bend = 1.0 - 2.0 * half * half, 2.0 * half * np.sqrt(1.0 - half * half)
-    # the rest of the arm, seen along the forearm, and the triangle it makes with the upper arm
+    # the rest of the arm in the frame of the forearm, and its triangle with the upper arm
     rest_x, rest_y = constants.forearm + constants.hand * cos_bend, constants.hand * sin_bend
     rest = (constants.forearm + constants.hand) ** 2 - 4.0 * constants.forearm * constants.hand * half * half
     along = (constants.upper * constants.upper + square - rest) * 0.5 / square
@@ -141,13 +148,13 @@ def solve_tip(constants: ArmConstants, nodes: Array, x: Any, y: Any, z: Any) -> 
 
 @dataclass(frozen=True, slots=True)
 class SolvedArms:
-    """Solved arms: `solved` (11, n) as `place` gives it. Angles in radians, places in arm lengths, y up."""
+    """Solved arms: `rows` (11, n) as `solve_tip` returns them. Angles in radians, positions in arm lengths, y up."""
 
     rows: Array
 
     @property
     def azimuth(self) -> Array:
-        """The plane's azimuth (n,), from z towards x."""
+        """Azimuth (n,) of the plane, from z towards x."""
         azimuth: Array = np.arctan2(self.rows[0], self.rows[1])
         return azimuth
 
@@ -167,12 +174,12 @@ class SolvedArms:
         return self.rows[8:11].T
 
     def angles(self) -> tuple[Array, Array, Array]:
-        """Angles t0, t1, t2 (n,) of the links in their plane, from the horizontal upwards, as `Arm.angles` has them."""
+        """Return the link angles t0, t1, t2 (n,) in their plane, from the horizontal upwards."""
         elbow, wrist, tip = (
             self.rows[at] * self.rows[0] + self.rows[at + 2] * self.rows[1] + 1j * self.rows[at + 1] for at in (2, 5, 8)
         )
         fore = wrist - elbow
-        # each turn by itself, none of them beyond half a turn, so that nothing wraps
+        # each angle by itself: none exceeds half a turn, so none wraps
         t0 = np.angle(tip) - np.angle(tip * elbow.conj())
         t1 = t0 + np.angle(fore * elbow.conj())
         t2 = t1 + np.angle((tip - wrist) * fore.conj())
@@ -180,16 +187,16 @@ class SolvedArms:
 
 
 def solve_arms(proportions: Proportions, table: BendTable, targets: Array) -> SolvedArms:
-    """The arms whose tips are at `targets` (n, 3), in arm lengths with y up.
+    """Return the arms with their tips at `targets` (n, 3), in arm lengths with y up.
 
-    A target nearer than the inner radius or farther than the arm is brought to the limit with its direction kept; one
-    at the shoulder itself counts as straight below. Straight above or below, the plane is the one that faces forwards.
+    A target out of reach is moved into reach along its direction; the shoulder itself counts as straight below.
+    Straight above or below the shoulder, the plane of the arm faces forwards.
     """
     targets = np.asarray(targets, dtype=np.float64)
-    shape, nodes = arm_constants(proportions), table.astype(np.float64).ravel()
+    constants, nodes = arm_constants(proportions), table.astype(np.float64).ravel()
     solved = np.empty((11, len(targets)))
     for start in range(0, len(targets), CHUNK_ARMS):
         x, y, z = np.ascontiguousarray(targets[start : start + CHUNK_ARMS].T)
-        for row, values in zip(solved, solve_tip(shape, nodes, x, y, z), strict=True):
+        for row, values in zip(solved, solve_tip(constants, nodes, x, y, z), strict=True):
             row[start : start + CHUNK_ARMS] = values
     return SolvedArms(solved)

@@ -1,9 +1,9 @@
-"""The table of an arm: for each place of the hand tip, where between its limits gravity leaves the wrist bend.
+"""Bend table of an arm: the wrist bend of least energy for each position of the hand tip, relative to its limits.
 
-A value s in 0..1 tells the sine of half the bend: sin(d/2) = sin(lo/2) + s (sin(hi/2) - sin(lo/2)), float16: 8,192
-bytes, within the paper's 8 kB. Rows are even in (1 - q)(1 + 3q/4), q = sqrt((1 - r) / (1 - inner)): closer both where
-the arm straightens and where it folds, as angles change fast there. Columns are even in y / (x + |y|), x and y the
-tip's level and upward share: an elevation without an angle.
+A value s in 0..1 gives the bend d by its half sine: sin(d/2) = sin(lo/2) + s (sin(hi/2) - sin(lo/2)). Values are
+float16: 8,192 bytes, within the paper's 8 kB. Rows are evenly spaced in (1 - q)(1 + 3q/4) with q = sqrt((1 - r) / (1 -
+r_min)): denser where the arm straightens and where it folds, because angles change fast there. Columns are evenly
+spaced in y / (x + |y|), x and y being the horizontal and vertical part of the tip: an elevation without an angle.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from functools import lru_cache
 import numpy as np
 
 from bunraku.marionette.arm import BendTable, close_chain, wrist_bend_limits
-from bunraku.marionette.planar_arm import TABLE_SIDE
-from bunraku.marionette.proportions import MAX_TIP_DISTANCE, Proportions
+from bunraku.marionette.constants import MAX_TIP_DISTANCE, TABLE_SIDE
+from bunraku.marionette.proportions import Proportions
 from bunraku.motion.rotation import Array
 
 TABLE_BYTES = TABLE_SIDE * TABLE_SIDE * 2
@@ -23,7 +23,7 @@ _BISECTIONS = 40
 
 
 def potential(proportions: Proportions, r: Array, beta: Array, bend: Array) -> Array:
-    """The part of the paper's E (paper 4) that the bend can change, twice and without g; uniform rods, y up."""
+    """Return twice the part of the paper's E (paper 4) that depends on the bend, without g; uniform rods, y up."""
     upper, fore, _ = proportions.lengths
     m0, m1, m2 = proportions.masses
     t0, t1, _ = close_chain(proportions, r, beta, bend)
@@ -32,7 +32,7 @@ def potential(proportions: Proportions, r: Array, beta: Array, bend: Array) -> A
 
 
 def node_coordinates(proportions: Proportions) -> tuple[Array, Array]:
-    """Where the nodes are: their distances and elevations (SIDE, SIDE), radians."""
+    """Return distance and elevation (radians) of the nodes, (64, 64) each."""
     u, v = np.meshgrid(np.linspace(0.0, 1.0, TABLE_SIDE), np.linspace(-1.0, 1.0, TABLE_SIDE), indexing="ij")
     q = (np.sqrt(1.0 + 48.0 * (1.0 - u)) - 1.0) / 6.0
     r = np.minimum(1.0 - (1.0 - proportions.min_tip_distance) * q * q, MAX_TIP_DISTANCE)
@@ -40,7 +40,7 @@ def node_coordinates(proportions: Proportions) -> tuple[Array, Array]:
 
 
 def build_bend_table(proportions: Proportions) -> BendTable:
-    """The (SIDE, SIDE) table of these proportions: rows by distance, columns by elevation."""
+    """Return the table (64, 64) of these proportions: rows by distance, columns by elevation."""
     r, beta = node_coordinates(proportions)
     least, greatest = (np.sin(0.5 * bend) for bend in wrist_bend_limits(proportions, r))
     bend = min_potential_bend(proportions, r, beta)
@@ -50,7 +50,7 @@ def build_bend_table(proportions: Proportions) -> BendTable:
 
 
 def min_potential_bend(proportions: Proportions, r: Array, beta: Array) -> Array:
-    """The wrist bend of least potential, radians, by a search of all bends and halving; of the shape of `r`."""
+    """Return the wrist bend of least potential, radians, of the shape of `r`: a scan, then bisection."""
     low, high = wrist_bend_limits(proportions, r)
     shares = np.linspace(0.0, 1.0, _SCAN_SAMPLES)
     lowest, best = np.full(r.shape, np.inf), np.zeros(r.shape, dtype=np.int64)
@@ -58,7 +58,7 @@ def min_potential_bend(proportions: Proportions, r: Array, beta: Array) -> Array
         height = potential(proportions, r, beta, low + share * (high - low))
         best = np.where(height < lowest, nth, best)
         lowest = np.minimum(height, lowest)
-    # the lowest sample and its neighbours hold the minimum; halve on the sign of the slope
+    # the minimum is next to the lowest sample: bisect on the sign of the slope
     left, right = shares[np.maximum(best - 1, 0)], shares[np.minimum(best + 1, _SCAN_SAMPLES - 1)]
     for _ in range(_BISECTIONS):
         middle = 0.5 * (left + right)
@@ -68,7 +68,10 @@ def min_potential_bend(proportions: Proportions, r: Array, beta: Array) -> Array
 
 
 def _potential_slope(proportions: Proportions, r: Array, beta: Array, bend: Array) -> Array:
-    """Of the sign of the potential's change with the bend; zero where (A+B) cos t0 sin(t2-t1) = B cos t1 sin(t2-t0)."""
+    """Return a number with the sign of the potential's derivative by the bend.
+
+    It is zero where (A+B) cos t0 sin(t2-t1) = B cos t1 sin(t2-t0).
+    """
     m0, m1, m2 = proportions.masses
     t0, t1, t2 = close_chain(proportions, r, beta, bend)
     slope: Array = (m0 + 2.0 * m1 + m2) * np.cos(t0) * np.sin(t2 - t1) - (m1 + m2) * np.cos(t1) * np.sin(t2 - t0)
@@ -77,22 +80,22 @@ def _potential_slope(proportions: Proportions, r: Array, beta: Array, bend: Arra
 
 @lru_cache(maxsize=64)
 def load_bend_table(identity: str) -> BendTable:
-    """The table known by this identity (`Proportions.identity`), built once. Raises `ProportionsError`."""
+    """Return the table of `Proportions.identity`, built once. Raises `ProportionsError`."""
     table = build_bend_table(Proportions.parse(identity))
     table.flags.writeable = False
     return table
 
 
 def pack_bend_table(table: BendTable) -> bytes:
-    """`TABLE_BYTES` bytes: float16, little-endian, row by row."""
+    """Return `TABLE_BYTES` bytes: float16, little-endian, row by row."""
     return table.astype("<f2").tobytes()
 
 
 def parse_bend_table(data: bytes) -> BendTable:
-    """The table in `data`. Raises `ValueError` if there are not `TABLE_BYTES` or a value is outside 0..1."""
+    """Return the table in `data`. Raises ValueError for another length or a value outside 0..1."""
     if len(data) != TABLE_BYTES:
-        raise ValueError(f"a table of an arm has {TABLE_BYTES} bytes, not {len(data)}")
+        raise ValueError(f"bend table rejected: {len(data)} bytes, expected {TABLE_BYTES}")
     table = np.frombuffer(data, dtype="<f2").reshape(TABLE_SIDE, TABLE_SIDE).astype(np.float16)
     if not bool(((table >= 0.0) & (table <= 1.0)).all()):
-        raise ValueError("a table of an arm has values in 0..1 only")
+        raise ValueError("bend table rejected: a value is outside 0..1")
     return table

@@ -1,35 +1,41 @@
-"""An arm between the dance's way of reaching its hand tip and the marionette's.
+"""Blend of an arm between the stored motion's joints and the solver's.
 
-Both arms are seen in the frame of their chord, the line from shoulder to tip with the plane of the elbow about it.
-There they differ by little, and mixing their joints moves the tip by little; the arm is then closed on the target
-again, so that the tip is exact all the way. What is left of jumps turns nothing but the elbow about the chord, or links
-about themselves, and is gone through at a bounded speed.
+Both arms are expressed in the frame of their chord, the segment from shoulder to tip with the plane of the elbow. There
+they differ little, and interpolating their joints moves the tip little; the arm is then closed on the target again, so
+that the tip is exact throughout. The jumps that remain affect only the swivel of the elbow about the chord and the
+twist of the bones, and both change at a bounded speed.
 """
 
 from __future__ import annotations
 
 from math import atan2, cbrt, copysign, hypot, pi, sqrt
 
-from bunraku.marionette import vector
-from bunraku.marionette.limb_rig import ArmRig, JointRotations
-from bunraku.marionette.twist import MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S, TwistLimiter
-from bunraku.marionette.vector import Quaternion, Vector
-
-SWIVEL_RESET_WEIGHT = 0.05
-"""Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more."""
-DISTANCE_WEIGHT = 2.0
-"""An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned quite otherwise, at any weight."""
+from bunraku.marionette.constants import (
+    DISTANCE_WEIGHT,
+    MAX_TWIST_LAG_RAD,
+    MAX_TWIST_SPEED_RAD_S,
+    SWIVEL_RESET_WEIGHT,
+)
+from bunraku.marionette.limb_rig import ArmRig
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.limb_solver import LimbSolver
+from bunraku.marionette.solver.vector import JointRotations, Quaternion, Vector
+from bunraku.marionette.twist import TwistLimiter
 
 
 class ArmBlend:
-    """One arm on its way. It remembers which way round the elbow swings, and how far its links are turned."""
+    """Blend of one arm, with the state of the elbow's swivel and of the bones' twist."""
 
     def __init__(self, rig: ArmRig) -> None:
         self._rig = rig
         self._swivel_rad: float | None = None
-        # radians about the chord that the elbow is shown ahead of its way, and goes back
+        # decaying offset about the chord that hides a change of the way round
         self._swivel_offset_rad = 0.0
-        self._twist_limiter = TwistLimiter(rig.bones)
+        self._twist_limiter = TwistLimiter(rig.bones, rig.solver)
+
+    def use_solver(self, solver: LimbSolver) -> None:
+        """Use another solver from the next call on."""
+        self._twist_limiter.solver = solver
 
     def blend(
         self,
@@ -41,20 +47,20 @@ class ArmBlend:
         weight: float,
         seconds: float,
     ) -> JointRotations:
-        """The joints at `weight`, `seconds` after the last: 0 gives back the dance's, 1 the bent arm's in the plane of
-        `normal`, both as soon as the links have come round.
+        """Return the joints at `weight`, `seconds` after the last call.
 
-        `dance` are the pose's joints, `bent` those of `ArmRig.bend` for the `target` (arm lengths, axes of vl5); `turn`
-        brings the direction of the dance's own hand to the target's, and `normal` is a unit vector square to that.
-        Between, the elbow goes to the nearest place from which forearm and hand reach the target; where the mixed wrist
-        leaves none, the tip comes as near as it can.
+        Weight 0 gives the motion's joints and weight 1 the solver's in the plane of `normal`, both once no bone's twist
+        lags. `solved_joints` are those of `ArmRig.bend_joints` for the `target` (arm lengths, axes of vl5).
+        `alignment` rotates the direction of the motion's hand to the target's; `normal` is a unit vector perpendicular
+        to the target. In between, the elbow is at the nearest position from which forearm and hand reach the target. If
+        the interpolated wrist leaves none, the tip comes as near as it can.
         """
         direction = self._rig.target_direction(target)
         own = self._rig.tip_target(motion_joints) if weight < 1.0 else target
-        # nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
+        # offset and lag vanish with the weight, so that the release of the limb is no jump
         share = min(max(cbrt(weight), DISTANCE_WEIGHT * vector.length(vector.subtract(target, own))), 1.0)
-        most = min(abs(self._swivel_offset_rad), 2.0 * pi * share)
-        self._swivel_offset_rad = copysign(max(most - MAX_TWIST_SPEED_RAD_S * seconds, 0.0), self._swivel_offset_rad)
+        offset = min(abs(self._swivel_offset_rad), 2.0 * pi * share)
+        self._swivel_offset_rad = copysign(max(offset - MAX_TWIST_SPEED_RAD_S * seconds, 0.0), self._swivel_offset_rad)
         if weight >= 1.0:
             self._swivel_rad = None
             plane = (
@@ -80,7 +86,7 @@ class ArmBlend:
         normal: Vector,
         weight: float,
     ) -> JointRotations:
-        """The joints below weight 1; `own` is the direction of the dance's hand."""
+        """Return the joints below weight 1; `motion_direction` is the direction of the motion's hand."""
         rig = self._rig
         direction = rig.target_direction(target)
         own_normal = vector.unit(
@@ -90,13 +96,13 @@ class ArmBlend:
         carried = vector.rotate(alignment, own_normal)
         swivel = atan2(vector.dot(vector.cross(carried, normal), direction), vector.dot(carried, normal))
         if self._swivel_rad is not None:
-            onwards = swivel + 2.0 * pi * round((self._swivel_rad - swivel) / (2.0 * pi))
-            if weight > SWIVEL_RESET_WEIGHT and abs(onwards) <= MAX_TWIST_LAG_RAD:
-                swivel = onwards
+            continued = swivel + 2.0 * pi * round((self._swivel_rad - swivel) / (2.0 * pi))
+            if weight > SWIVEL_RESET_WEIGHT and abs(continued) <= MAX_TWIST_LAG_RAD:
+                swivel = continued
             else:
-                # the other way round from here on; it is shown where it was, and comes over
-                ahead = self._swivel_offset_rad + weight * (onwards - swivel)
-                self._swivel_offset_rad = ahead - 2.0 * pi * round(ahead / (2.0 * pi))
+                # the other way round from here on: the offset keeps the shown elbow in place and decays
+                offset = self._swivel_offset_rad + weight * (continued - swivel)
+                self._swivel_offset_rad = offset - 2.0 * pi * round(offset / (2.0 * pi))
         self._swivel_rad = swivel
         if weight <= 0.0:
             return motion_joints
@@ -110,7 +116,7 @@ class ArmBlend:
     def _close_on_tip(
         self, shoulder: Quaternion, elbow: Quaternion, wrist: Quaternion, reach: float
     ) -> tuple[Quaternion, Quaternion]:
-        """Shoulder and elbow, turned by as little as brings the tip to `reach` arm lengths along the chord."""
+        """Return shoulder and elbow rotated least so that the tip is at `reach` arm lengths along the chord."""
         upper, fore, hand = self._rig.bones
         rest = vector.add(fore, vector.rotate(wrist, hand))
         near, far = vector.length(upper), vector.length(rest)
@@ -118,15 +124,15 @@ class ArmBlend:
         along = min(max((near * near + chord * chord - far * far) / (2.0 * chord), -near), near)
         off = sqrt(max(near * near - along * along, 0.0))
         mixed = vector.rotate(shoulder, upper)
-        # where the elbow has to go farther off the chord, it goes to the side of -y: a straight arm leaves open which,
-        # and that of the bent arm is there
+        # an elbow that must move away from the chord moves towards -y: a straight arm leaves the side open, and the
+        # elbow of the bent arm is there
         farther = max(off - hypot(mixed[1], mixed[2]), 0.0)
         _, y, z = vector.unit((0.0, mixed[1] - farther, mixed[2]), (0.0, -1.0, 0.0))
-        place = (along, off * y, off * z)
+        position = (along, off * y, off * z)
         before = vector.multiply(shoulder, elbow)
-        raised = vector.rotation_between(vector.scale(mixed, 1.0 / near), vector.scale(place, 1.0 / near))
+        raised = vector.rotation_between(vector.scale(mixed, 1.0 / near), vector.scale(position, 1.0 / near))
         shoulder = vector.multiply(raised, shoulder)
         lower = vector.unit(vector.rotate(before, rest), (1.0, 0.0, 0.0))
-        wanted = vector.unit(vector.subtract((chord, 0.0, 0.0), place), (1.0, 0.0, 0.0))
-        turned = vector.multiply(vector.rotation_between(lower, wanted), before)
+        goal = vector.unit(vector.subtract((chord, 0.0, 0.0), position), (1.0, 0.0, 0.0))
+        turned = vector.multiply(vector.rotation_between(lower, goal), before)
         return shoulder, vector.normalise(vector.multiply(vector.conjugate(shoulder), turned))

@@ -1,15 +1,16 @@
-"""Arms of three bodies, with where their numbers come from: what solving is measured on."""
+"""Arms of three bodies from the literature, for measurements."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bunraku.marionette.proportions import WINTER_LENGTHS, WINTER_MASSES, Proportions
+from bunraku.marionette.constants import ARM_LENGTH_RATIOS, ARM_MASS_RATIOS
+from bunraku.marionette.proportions import Proportions
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """An arm's `proportions`, the `name` they go by, and the `source` of lengths and masses."""
+    """Name and `proportions` of an arm, and the `source` of its lengths and masses."""
 
     name: str
     proportions: Proportions
@@ -19,7 +20,7 @@ class Body:
 BODIES = (
     Body(
         "Winter",
-        Proportions.from_links(WINTER_LENGTHS, WINTER_MASSES),
+        Proportions.from_links(ARM_LENGTH_RATIOS, ARM_MASS_RATIOS),
         "D. A. Winter, Biomechanics and Motor Control of Human Movement: lengths as parts of the height, figure 4.1 "
         "(Drillis and Contini 1966), masses as parts of the body's, table 4.1",
     ),
@@ -37,4 +38,4 @@ BODIES = (
         "H-Anim specification, joint centres of the LOA-1 example figure, in metres; masses by length, as Winter's",
     ),
 )
-"""The three bodies."""
+"""Winter, de Leva and the H-Anim example figure."""

@@ -1,118 +1,125 @@
-"""One limb between the dance and a hand: taken, pulled, let go.
+"""One limb between the stored motion and a puppeteer, from claim to return.
 
-Each frame the limb is first shown the dance (`see`), then, while it is not wholly the dance's, pulled (`pull`). It
-remembers where it is and how fast it goes, and is moved on by the time between frames, in seconds. Places are hand tips
-in the shoulder's frame in arm lengths; of a leg the thigh's angle, first of three.
+Each frame the limb first observes the motion's pose (`observe_pose`), then, while it is controlled, its joints are
+solved (`solve_joints`). Its state is position and velocity, advanced by the time between frames in seconds. A position
+is a hand tip in the shoulder's frame in arm lengths, or a thigh angle in radians, the first of three numbers.
 """
 
 from __future__ import annotations
 
-from bunraku.marionette import vector
 from bunraku.marionette.blend import ArmBlend
-from bunraku.marionette.elbow import Elbow, lift_angle
-from bunraku.marionette.follower import ZERO_VELOCITY, Follower
-from bunraku.marionette.handover import (
+from bunraku.marionette.constants import (
+    ARRIVAL_TOLERANCE,
     HAND_ACCELERATION,
+    MAX_HAND_RETURN_ACCELERATION,
+    MAX_REACH,
+    MAX_TIP_DISTANCE,
+    MIN_REACH,
+    MIN_SOLVE_WEIGHT,
     THIGH_ACCELERATION,
-    DirectionAlignment,
-    JointBlend,
-    return_acceleration,
 )
-from bunraku.marionette.limb_rig import ArmRig, JointRotations, LegRig, Limb, Pose
-from bunraku.marionette.proportions import MAX_TIP_DISTANCE
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.elbow import Elbow
+from bunraku.marionette.follower import Follower
+from bunraku.marionette.handover import DirectionAlignment, JointBlend, return_acceleration
+from bunraku.marionette.limb_rig import ArmRig, LegRig, Limb, Pose
+from bunraku.marionette.solver import vector
+from bunraku.marionette.solver.elbow_step import lift_angle
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.vector import ZERO, JointRotations, Vector
 from bunraku.motion.skeleton import Figure
-
-MAX_REACH = 0.9995
-"""Arm lengths: a pulled arm is never quite locked, so that its elbow leaves the line at a bounded speed."""
-MIN_REACH = 0.15
-"""Arm lengths from the shoulder that a hand is pulled to at least: nearer in, the elbow would have to whirl."""
-MAX_HAND_RETURN_ACCELERATION = 79.0
-"""Arm lengths per second squared, against the dance, that a hand let go comes back with at most."""
-ARRIVAL_TOLERANCE = 1e-6
-"""Arm lengths, or radians, within which a limb is the dance's again."""
-MIN_WEIGHT = 1e-9
-"""A limb on its last way home is still solved for."""
 
 
 class _ControlledLimb:
-    """What hands and legs have in common: how the dance has the limb, and how it moves."""
+    """Common part of hands and legs: the position in the motion and the moving limb."""
 
-    def __init__(self) -> None:
+    def __init__(self, solver: LimbSolver) -> None:
+        self._solver = solver
         self._motion_position: Vector | None = None
-        self._previous_position = ZERO_VELOCITY
-        self._velocity = self._previous_velocity = ZERO_VELOCITY
+        self._previous_position = ZERO
+        self._velocity = self._previous_velocity = ZERO
         self._follower: Follower | None = None
         self._return_acceleration: float | None = None
 
     @property
     def motion_position(self) -> Vector:
-        """Where the dance has the limb, as last seen."""
-        return self._motion_position or ZERO_VELOCITY
+        """Position of the limb in the last observed pose of the motion."""
+        return self._motion_position or ZERO
 
     @property
     def is_controlled(self) -> bool:
-        """Whether it is not wholly the dance's."""
+        """True if the limb differs from the motion."""
         return self._follower is not None
 
     @property
     def position(self) -> Vector:
-        """Where the limb is."""
+        """Shown position of the limb."""
         return self.motion_position if self._follower is None else self._follower.position
 
     @property
     def speed(self) -> float:
-        """Arm lengths, or radians, per second that it goes at."""
+        """Speed in arm lengths, or radians, per second."""
         return 0.0 if self._follower is None else vector.length(self._follower.velocity)
+
+    def use_solver(self, solver: LimbSolver) -> None:
+        """Use another solver from the next frame on."""
+        self._solver = solver
+        if self._follower is not None:
+            self._follower.solver = solver
 
     def _record_position(self, position: Vector, seconds: float) -> None:
         self._previous_position = self._motion_position or position
         self._previous_velocity = self._velocity
         moved = vector.subtract(position, self._previous_position)
-        self._velocity = vector.scale(moved, 1.0 / seconds) if seconds > 0.0 else ZERO_VELOCITY
+        self._velocity = vector.scale(moved, 1.0 / seconds) if seconds > 0.0 else ZERO
         self._motion_position = position
 
     def _ensure_follower(self) -> Follower:
-        """What moves the limb; it starts from where the dance had it a frame ago, at the speed it had."""
+        """Return the follower, which starts with the position and velocity of the motion a frame ago."""
         if self._follower is None:
-            self._follower = Follower(self._previous_position, self._previous_velocity)
+            self._follower = Follower(self._previous_position, self._previous_velocity, self._solver)
         return self._follower
 
     def _choose_return_acceleration(self, max_acceleration: float) -> float:
-        """The acceleration on the way back to the dance, settled when the limb is let go."""
+        """Return the acceleration of the return to the motion, chosen once when the limb is released."""
         if self._return_acceleration is None:
             follower = self._ensure_follower()
-            away = vector.length(vector.subtract(follower.position, self._previous_position))
+            distance = vector.length(vector.subtract(follower.position, self._previous_position))
             speed = vector.length(vector.subtract(follower.velocity, self._velocity))
-            self._return_acceleration = return_acceleration(away, speed, max_acceleration)
+            self._return_acceleration = return_acceleration(distance, speed, max_acceleration)
         return self._return_acceleration
 
 
 class ControlledHand(_ControlledLimb):
     """One hand of a figure."""
 
-    def __init__(self, figure: Figure, limb: Limb) -> None:
-        """Raises `ProportionsError` for an arm whose bones are too short to hang."""
-        super().__init__()
-        self.rig = ArmRig(figure, limb)
+    def __init__(self, figure: Figure, limb: Limb, solver: LimbSolver = PYTHON_SOLVER) -> None:
+        """Raise `ProportionsError` for an arm whose bones are too short."""
+        super().__init__(solver)
+        self.rig = ArmRig(figure, limb, solver)
         self.reset()
 
     def reset(self) -> None:
-        """The limb is wholly the dance's."""
+        """Return to the motion at once and forget the state."""
         self._follower = self._return_acceleration = None
-        self._elbow = Elbow(self.rig.arm, self.rig.shoulder)
+        self._elbow = Elbow(self.rig.arm, self.rig.shoulder, self._solver)
         self._alignment = DirectionAlignment()
         self._blend = ArmBlend(self.rig)
 
+    def use_solver(self, solver: LimbSolver) -> None:
+        """Use another solver from the next frame on."""
+        super().use_solver(solver)
+        self.rig.solver = self._elbow.solver = solver
+        self._blend.use_solver(solver)
+
     def observe_pose(self, pose: Pose, seconds: float) -> None:
-        """The dance's pose, `seconds` after the last."""
+        """Observe the motion's pose, `seconds` after the last one."""
         self._record_position(self.rig.tip_target(self.rig.pose_joints(pose)), seconds)
 
     def solve_joints(self, pose: Pose, goal: Vector | None, weight: float, seconds: float) -> JointRotations | None:
-        """The arm's joints, `seconds` after the last, in the pose that was seen just now; None once it is back.
+        """Return the arm's joints, `seconds` after the last call, or None once the hand is back in the motion.
 
-        The hand is on its way to `wanted`, or, where that is None, back to the dance; `weight` (0..1) says how far the
-        arm has gone over from the dance's way of reaching a place to the marionette's.
+        `pose` is the last observed pose. The hand moves towards `goal`, or back to the motion if that is None. `weight`
+        (0..1) is the weight of the solver's joints against the motion's.
         """
         rig, follower, own = self.rig, self._ensure_follower(), self.motion_position
         if goal is not None:
@@ -121,52 +128,54 @@ class ControlledHand(_ControlledLimb):
             goal = vector.scale(rig.target_direction(goal), reach)
             hand = follower.step(goal, seconds, HAND_ACCELERATION, rig.arm.min_tip_distance, MAX_TIP_DISTANCE)
         else:
-            home = self._choose_return_acceleration(MAX_HAND_RETURN_ACCELERATION)
-            # the dance may have its hand nearer to the shoulder than one is pulled
+            acceleration = self._choose_return_acceleration(MAX_HAND_RETURN_ACCELERATION)
+            # the motion may have its hand nearer to the shoulder than a controlled one goes
             inner = min(rig.arm.min_tip_distance, vector.length(own))
-            hand = follower.step(own, seconds, home, inner, 1.0, self._velocity)
+            hand = follower.step(own, seconds, acceleration, inner, 1.0, self._velocity)
             if weight <= 0.0 and vector.length(vector.subtract(hand, own)) < ARRIVAL_TOLERANCE:
                 return None
-        dance = rig.pose_joints(pose)
+        motion_joints = rig.pose_joints(pose)
         if not self._elbow.has_begun:
-            elbow, chord = rig.joint_positions(dance)[0], rig.target_direction(own)
-            self._elbow.begin(chord, rig.plane_normal(dance), lift_angle(elbow, chord))
+            elbow, chord = rig.joint_positions(motion_joints)[0], rig.target_direction(own)
+            self._elbow.begin(chord, rig.plane_normal(motion_joints), lift_angle(elbow, chord))
         tip, normal, bend = self._elbow.step(
             rig.target_direction(hand), vector.length(hand), rig.local_up(pose), seconds
         )
-        bent = rig.bend_joints(vector.length(tip), bend)
-        # the dance may hold its arms where the marionette's shoulders do not go: that they do not comes with the weight
+        solved = rig.bend_joints(vector.length(tip), bend)
+        # the motion may hold an arm where the shoulder's limit forbids it: the limit comes in with the weight
         target = vector.add(hand, vector.scale(vector.subtract(tip, hand), weight))
-        turn = self._alignment.update(own, target, weight)
-        return self._blend.blend(dance, bent, target, turn, normal, max(weight, MIN_WEIGHT), seconds)
+        alignment = self._alignment.update(own, target, weight)
+        return self._blend.blend(
+            motion_joints, solved, target, alignment, normal, max(weight, MIN_SOLVE_WEIGHT), seconds
+        )
 
 
 class ControlledLeg(_ControlledLimb):
     """One leg of a figure."""
 
-    def __init__(self, figure: Figure, limb: Limb) -> None:
-        super().__init__()
+    def __init__(self, figure: Figure, limb: Limb, solver: LimbSolver = PYTHON_SOLVER) -> None:
+        super().__init__(solver)
         self.rig = LegRig(figure, limb)
         self.reset()
 
     def reset(self) -> None:
-        """The limb is wholly the dance's."""
+        """Return to the motion at once and forget the state."""
         self._follower = self._return_acceleration = None
         self._blend = JointBlend()
 
     def observe_pose(self, pose: Pose, seconds: float) -> None:
-        """The dance's pose, `seconds` after the last."""
+        """Observe the motion's pose, `seconds` after the last one."""
         self._record_position((self.rig.thigh_angle(pose, self.motion_position[0]), 0.0, 0.0), seconds)
 
     def solve_joints(self, pose: Pose, goal: Vector | None, weight: float, seconds: float) -> JointRotations | None:
-        """As `PulledHand.pull`, of the leg's joints."""
+        """Return the leg's joints, as `ControlledHand.solve_joints` does."""
         follower, own = self._ensure_follower(), self.motion_position
         if goal is not None:
             self._return_acceleration = None
             theta = follower.step(goal, seconds, THIGH_ACCELERATION)[0]
         else:
-            home = self._choose_return_acceleration(THIGH_ACCELERATION)
-            theta = follower.step(own, seconds, home, frame_velocity=self._velocity)[0]
+            acceleration = self._choose_return_acceleration(THIGH_ACCELERATION)
+            theta = follower.step(own, seconds, acceleration, frame_velocity=self._velocity)[0]
             if weight <= 0.0 and abs(theta - own[0]) < ARRIVAL_TOLERANCE:
                 return None
-        return self._blend.blend(self.rig.pose_joints(pose), self.rig.solve(theta, pose), max(weight, MIN_WEIGHT))
+        return self._blend.blend(self.rig.pose_joints(pose), self.rig.solve(theta, pose), max(weight, MIN_SOLVE_WEIGHT))

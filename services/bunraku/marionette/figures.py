@@ -1,7 +1,7 @@
-"""Figures 8 and 9 of the paper, drawn: the arm while its tip runs round a circle, and along a horizontal line.
+"""Figures 8 and 9 of the paper as SVG: the arm while its tip follows a circle or a horizontal path.
 
-Each shows two arms: on the left the paper's, angles from its table, on the right ours, exact and with the joints'
-limits kept. SVG with a ground of its own, so that it reads on dark pages and on light ones.
+Each figure shows two arms: on the left the paper's, with angles from its table; on the right ours, exact and within the
+limits of the joints. The SVG has a background, so that it is legible on dark and on light pages.
 """
 
 from __future__ import annotations
@@ -19,13 +19,12 @@ from bunraku.marionette.proportions import Proportions
 
 Figure = Literal["circle", "horizontal"]
 FIGURES: tuple[Figure, ...] = get_args(Figure)
-"""What the tip does: names of the figures."""
+"""Names of the figures, which are the tip's paths."""
 
 PlanarPoints = npt.NDArray[np.complex128]
 
 WIDTH, HEIGHT = 1000, 540
 _PIXELS_PER_ARM_LENGTH = 340.0
-"""Pixels of an arm's length."""
 _SHOULDER_XS = (96.0, 576.0)
 _SHOULDER_Y = 268.0
 _CIRCLE_CENTRE, _CIRCLE_RADIUS = 0.52 - 0.12j, 0.34
@@ -43,29 +42,28 @@ _TITLES: dict[Figure, str] = {
 
 
 def tip_path(name: Figure, count: int) -> PlanarPoints:
-    """Places (count,) of the tip on its way, as x + iy in the arm's plane, in arm lengths; a circle ends where it
-    began."""
-    way = np.linspace(0.0, 1.0, count)
+    """Return `count` positions of the tip, as x + iy in the arm's plane, in arm lengths; the circle is closed."""
+    progress = np.linspace(0.0, 1.0, count)
     if name == "circle":
-        return np.asarray(_CIRCLE_CENTRE + _CIRCLE_RADIUS * np.exp(2j * pi * way))
-    return np.asarray(_LINE_ENDS[0] + (_LINE_ENDS[1] - _LINE_ENDS[0]) * way)
+        return np.asarray(_CIRCLE_CENTRE + _CIRCLE_RADIUS * np.exp(2j * pi * progress))
+    return np.asarray(_LINE_ENDS[0] + (_LINE_ENDS[1] - _LINE_ENDS[0]) * progress)
 
 
 def paper_arm(proportions: Proportions, tips: PlanarPoints) -> PlanarPoints:
-    """Elbow, wrist and tip (3, n) of the paper's arm for tips (n,)."""
+    """Return elbow, wrist and tip (3, n) of the paper's arm for targets (n,)."""
     table = build_paper_table(proportions)
     return joint_positions(proportions, paper_angles(table, np.abs(tips), np.angle(tips)))
 
 
 def exact_arm(proportions: Proportions, tips: PlanarPoints) -> PlanarPoints:
-    """Elbow, wrist and tip (3, n) of our arm for tips (n,)."""
+    """Return elbow, wrist and tip (3, n) of the exact arm for targets (n,)."""
     targets = np.stack([np.zeros(len(tips)), tips.imag, tips.real], axis=-1)
     solved = arm_batch.solve_arms(proportions, build_bend_table(proportions), targets)
     return np.stack([joint[:, 2] + 1j * joint[:, 1] for joint in (solved.elbow, solved.wrist, solved.tip)])
 
 
 def draw_figure(proportions: Proportions, name: Figure) -> str:
-    """The figure as SVG."""
+    """Return the figure as SVG."""
     way, poses = tip_path(name, 241), tip_path(name, _POSE_COUNT + 1)[: _POSE_COUNT if name == "circle" else None]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="{_SANS}" font-size="13" '
@@ -85,15 +83,15 @@ def draw_figure(proportions: Proportions, name: Figure) -> str:
 
 
 def _panel(left: float, poses: PlanarPoints, joint_paths: PlanarPoints, caption: str) -> list[str]:
-    """One arm: the half disc it reaches, its joints' ways, and its poses one over the other."""
+    """Draw one arm: the half disc within reach, the paths of its joints, and its poses."""
 
-    def at(place: complex) -> str:
-        return (
-            f"{left + _PIXELS_PER_ARM_LENGTH * place.real:.1f} {_SHOULDER_Y - _PIXELS_PER_ARM_LENGTH * place.imag:.1f}"
-        )
+    def to_pixels(position: complex) -> str:
+        x = left + _PIXELS_PER_ARM_LENGTH * position.real
+        y = _SHOULDER_Y - _PIXELS_PER_ARM_LENGTH * position.imag
+        return f"{x:.1f} {y:.1f}"
 
     def line(joints: list[complex], look: str) -> str:
-        return f'<path d="M{"L".join(at(place) for place in joints)}" fill="none" {look}/>'
+        return f'<path d="M{"L".join(to_pixels(joint) for joint in joints)}" fill="none" {look}/>'
 
     disc = [0.55 * np.exp(1j * angle) for angle in np.linspace(-0.5, 0.5, 2) * pi]
     parts = [
@@ -109,7 +107,7 @@ def _panel(left: float, poses: PlanarPoints, joint_paths: PlanarPoints, caption:
         parts.append(line(joint.tolist(), f'stroke="{colour}" stroke-width="2.2" stroke-linejoin="round"'))
     for nth in range(0, poses.shape[1], 6):
         for joint, colour in zip(poses[:, nth].tolist(), (_ELBOW, _WRIST, _TIP), strict=True):
-            x, y = at(joint).split(" ")
+            x, y = to_pixels(joint).split(" ")
             parts.append(f'<circle cx="{x}" cy="{y}" r="4" fill="{_PAPER}" stroke="{colour}" stroke-width="2"/>')
     parts.append(f'<circle cx="{left:.1f}" cy="{_SHOULDER_Y:.1f}" r="6" fill="{_INK}"/>')
     return parts

@@ -1,33 +1,27 @@
 """The leg (paper 4): the thigh is lifted by an angle, the shank hangs, the ankle is fixed.
 
-Angles are radians. The thigh's is from straight down, forwards positive.
+Angles are in radians. The thigh's angle is measured from straight down, forwards positive.
 """
 
 from __future__ import annotations
 
-from math import pi
-
 import numpy as np
 
+from bunraku.marionette.constants import MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD
 from bunraku.motion.rotation import Array
-
-MIN_THIGH_ANGLE_RAD = -pi / 4.0
-"""The farthest back a thigh is pulled."""
-MAX_THIGH_ANGLE_RAD = 2.0 * pi / 3.0
-"""The farthest up a thigh is pulled."""
 
 
 def clamp_thigh(theta: float) -> float:
-    """The nearest angle a thigh is pulled to."""
+    """Return the nearest angle within the limits of a thigh."""
     return min(max(theta, MIN_THIGH_ANGLE_RAD), MAX_THIGH_ANGLE_RAD)
 
 
 def knee_bend(theta: float) -> float:
-    """How far the knee bends so that the shank hangs; a thigh pulled back keeps it straight, as knees bend one way."""
+    """Return the bend of the knee with which the shank hangs; 0 for a thigh behind the vertical."""
     return max(0.0, theta)
 
 
 def solve_legs(theta: Array) -> tuple[Array, Array]:
-    """Hip and knee angles (n,) for thigh angles (n,), within the thigh's limits."""
+    """Return hip and knee angles (n,) for thigh angles (n,), within the thigh's limits."""
     hip: Array = np.clip(theta, MIN_THIGH_ANGLE_RAD, MAX_THIGH_ANGLE_RAD)
     return hip, np.maximum(0.0, hip)

@@ -1,168 +1,108 @@
-"""The puppets of one stage: limb l of performer k is 4 k + l, and each puppet is as if it were alone (paper 5).
-
-What is done to a limb is done to its puppet; `now` is as of `marionette.merge.Marionette`.
-"""
+"""Marionettes of one stage: limb l of performer k has the number 4 k + l (paper 5)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
-from bunraku.marionette.limb_rig import ALL_LIMBS, JointRotations
 from bunraku.marionette.merge import Marionette
-from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, LimbRefusal
+from bunraku.marionette.ownership import INITIAL_EPOCHS, LIMBS_PER_PERFORMER, Ownership
+from bunraku.marionette.recorder import CommandKind, CommandRecorder
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
+from bunraku.marionette.solver.vector import JointRotations
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
-from bunraku.wire.limbs import MAX_LIMBS, MAX_PERFORMERS
-
-LIMBS_PER_PERFORMER = len(ALL_LIMBS)
-INITIAL_EPOCHS = (0,) * MAX_LIMBS
-"""The epochs of a stage on which nothing was ever held."""
+from bunraku.wire.limbs import MAX_PERFORMERS
 
 OverlayJoints = dict[int, JointRotations]
-"""What lies over the dances: of each pulled limb the local rotations of its joints."""
+"""Local rotations of the joints of each controlled limb, by the limb's number."""
 
 
 class Marionettes:
-    """One to four puppets."""
+    """One to four marionettes; each is independent of the others.
 
-    def __init__(self, figures: Sequence[Figure], epochs: Sequence[int] = INITIAL_EPOCHS) -> None:
-        """As `set_figures`; `epochs` are those of a troupe at rest, to go on from."""
-        self._epochs = list(epochs)
+    Puppeteers act on `ownership`. The marionettes compute the overlay that follows from it. `now` is clock time in
+    integer µs and must not run backwards.
+    """
+
+    def __init__(
+        self,
+        figures: Sequence[Figure],
+        epochs: Sequence[int] = INITIAL_EPOCHS,
+        recorder: CommandRecorder | None = None,
+        solver: LimbSolver = PYTHON_SOLVER,
+    ) -> None:
+        """`epochs` are those of the last grants on this stage. Raises as `set_figures` does."""
+        self.ownership = Ownership(0, epochs, recorder)
+        self._recorder = recorder
+        self._solver = solver
         self._marionettes: list[Marionette] = []
-        self.set_figures(figures)
-
-    def set_figures(self, figures: Sequence[Figure]) -> list[tuple[int, str]]:
-        """Others on the stage: limbs of a puppet that was there stay in the hands they are in. Says which limbs went
-        with puppets that are there no more, and whose they were.
-
-        Takes its time as `Marionette.set_figure`. Raises `ProportionsError` for a figure whose arms are too short to
-        hang, ValueError for none or more than four of them, and changes nothing.
-        """
-        if not 1 <= len(figures) <= MAX_PERFORMERS:
-            raise ValueError(f"a stage has 1 to {MAX_PERFORMERS} performers, not {len(figures)}")
-        here = len(self._marionettes)
-        # all that may be refused is refused before anything is changed
-        made = [
-            Marionette(figure, self._epochs[LIMBS_PER_PERFORMER * nth : LIMBS_PER_PERFORMER * (nth + 1)])
-            for nth, figure in enumerate(figures)
-        ]
-        for puppet, figure in zip(self._marionettes, figures, strict=False):
-            puppet.set_figure(figure)
-        gone = [
-            (limb, holder)
-            for limb, holder in enumerate(self.holders())
-            if holder is not None and limb >= LIMBS_PER_PERFORMER * len(figures)
-        ]
-        self._epochs = list(self.epochs)
-        self._marionettes = [*self._marionettes[: len(figures)], *made[here:]]
-        return gone
+        self._wake_count = 0
+        self._replace_figures(figures)
 
     def __len__(self) -> int:
-        """How many limbs there are."""
-        return LIMBS_PER_PERFORMER * len(self._marionettes)
+        """Number of limbs."""
+        return len(self.ownership)
 
-    def reset(self) -> None:
-        """As `Marionette.begin_anew`, of all."""
-        for puppet in self._marionettes:
-            puppet.reset()
+    def set_figures(self, figures: Sequence[Figure], motion: str = "", now: int = 0) -> list[tuple[int, str]]:
+        """Change the performers to those of a motion; return the held limbs that disappear, and their holders.
 
-    def holders(self) -> tuple[str | None, ...]:
-        """The holder's id of each limb, or None."""
-        return tuple(holder for puppet in self._marionettes for holder in puppet.holders())
+        Limbs of the performers that remain stay held. Each new arm takes a tenth of a second, as in
+        `Marionette.set_figure`. Raises, without effect, `ProportionsError` for a figure whose arms are too short, and
+        ValueError for no figure or more than four.
+        """
+        removed = self._replace_figures(figures)
+        self.ownership.record(CommandKind.FIGURES, now, motion)
+        if self._recorder is not None:
+            self._recorder.change_motion(motion)
+        return removed
 
-    def asks(self) -> tuple[tuple[str, ...], ...]:
-        """Of each limb the ids of those who ask for it, first come first."""
-        return tuple(limb for puppet in self._marionettes for limb in puppet.asks())
-
-    def claim(self, limb: int, puppeteer: str, now: int) -> LimbGrant | LimbRefusal:
-        """As `Marionette.claim`."""
-        if not 0 <= limb < len(self):
-            return LimbRefusal(limb, None, "unknown")
-        return replace(
-            self._marionettes[limb // LIMBS_PER_PERFORMER].claim(limb % LIMBS_PER_PERFORMER, puppeteer, now), limb=limb
-        )
-
-    def release(self, limb: int, puppeteer: str, epoch: int, now: int) -> bool:
-        """As `Marionette.release`."""
-        return 0 <= limb < len(self) and self._marionettes[limb // LIMBS_PER_PERFORMER].release(
-            limb % LIMBS_PER_PERFORMER, puppeteer, epoch, now
-        )
-
-    def leave(self, puppeteer: str, now: int) -> tuple[int, ...]:
-        """As `Marionette.leave`."""
-        return tuple(
-            LIMBS_PER_PERFORMER * nth + limb
-            for nth, puppet in enumerate(self._marionettes)
-            for limb in puppet.leave(puppeteer, now)
-        )
-
-    def keep_alive(self, puppeteer: str, limbs: Iterable[int], now: int) -> None:
-        """As `Marionette.alive`."""
-        for limb in limbs:
-            if 0 <= limb < len(self):
-                self._marionettes[limb // LIMBS_PER_PERFORMER].keep_alive(puppeteer, (limb % LIMBS_PER_PERFORMER,), now)
-
-    def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
-        """As `Marionette.ask`."""
-        return 0 <= limb < len(self) and self._marionettes[limb // LIMBS_PER_PERFORMER].ask(
-            limb % LIMBS_PER_PERFORMER, puppeteer, wanted, now
-        )
-
-    def grant_free_limbs(self, now: int) -> tuple[list[tuple[str, LimbGrant]], bool]:
-        """As `Marionette.settle`."""
-        grants: list[tuple[str, LimbGrant]] = []
-        changed = False
-        for nth, puppet in enumerate(self._marionettes):
-            given, otherwise = puppet.grant_free_limbs(now)
-            grants += [(who, replace(grant, limb=LIMBS_PER_PERFORMER * nth + grant.limb)) for who, grant in given]
-            changed = changed or otherwise
-        return grants, changed
-
-    def apply_input(self, puppeteer: str, limb_input: LimbInput, now: int) -> InputOutcome:
-        """As `Marionette.input`."""
-        if not 0 <= limb_input.limb < len(self):
-            return InputOutcome.NOT_OWNER
-        return self._marionettes[limb_input.limb // LIMBS_PER_PERFORMER].apply_input(
-            puppeteer, replace(limb_input, limb=limb_input.limb % LIMBS_PER_PERFORMER), now
-        )
-
-    def expire(self, now: int) -> list[tuple[int, str]]:
-        """As `Marionette.expire`."""
-        return [
-            (LIMBS_PER_PERFORMER * nth + limb, who)
-            for nth, puppet in enumerate(self._marionettes)
-            for limb, who in puppet.expire(now)
-        ]
-
-    @property
-    def is_at_rest(self) -> bool:
-        """Whether the dances are alone: nobody holds a limb, and all are back."""
-        return all(puppet.is_at_rest for puppet in self._marionettes)
+    def use_solver(self, solver: LimbSolver) -> None:
+        """Use another solver from the next frame on."""
+        self._solver = solver
+        for marionette in self._marionettes:
+            marionette.use_solver(solver)
 
     @property
     def needs_full_rate(self) -> bool:
-        """As `Marionette.lively`, of any."""
-        return any(puppet.needs_full_rate for puppet in self._marionettes)
+        """True if any marionette needs every frame."""
+        return any(marionette.needs_full_rate for marionette in self._marionettes)
 
-    @property
-    def epochs(self) -> tuple[int, ...]:
-        """Of every limb that there can be the epoch of its last grant."""
-        here = [epoch for puppet in self._marionettes for epoch in puppet.epochs]
-        return (*here, *self._epochs[len(here) :])
+    def observe_poses(self, poses: Sequence[Array], now: int, due: int = 0) -> None:
+        """Observe the rotations (18, 4) of each performer before the first overlay; `due` is their clock time."""
+        self.ownership.record(CommandKind.OBSERVE, now, due)
+        self._reset_after_rest()
+        for marionette, rotations in zip(self._marionettes, poses, strict=False):
+            marionette.observe_pose(rotations, now)
 
-    def observe_poses(self, poses: Sequence[Array], now: int) -> None:
-        """As `Marionette.see`, the rotations (18, 4) of each."""
-        for puppet, rotations in zip(self._marionettes, poses, strict=False):
-            puppet.observe_pose(rotations, now)
-
-    def compute_overlay(self, poses: Sequence[Array], now: int) -> OverlayJoints:
-        """As `Marionette.overlay`, over the rotations (18, 4) of each; empty if no limb is pulled."""
-        laid: OverlayJoints = {}
-        for nth, (puppet, rotations) in enumerate(zip(self._marionettes, poses, strict=False)):
-            if (over := puppet.compute_overlay(rotations, now)) is not None:
-                laid |= {
-                    LIMBS_PER_PERFORMER * nth + limb: joints
-                    for limb, joints in zip(over.limbs, over.joints, strict=True)
+    def compute_overlay(self, poses: Sequence[Array], now: int, due: int = 0) -> OverlayJoints:
+        """Return the overlay of the rotations (18, 4) of each performer; `due` is their clock time."""
+        self.ownership.record(CommandKind.OVERLAY, now, due)
+        self._reset_after_rest()
+        overlay: OverlayJoints = {}
+        for performer, (marionette, rotations) in enumerate(zip(self._marionettes, poses, strict=False)):
+            if (joint_overlay := marionette.compute_overlay(rotations, now)) is not None:
+                overlay |= {
+                    LIMBS_PER_PERFORMER * performer + limb: joints
+                    for limb, joints in zip(joint_overlay.limbs, joint_overlay.joints, strict=True)
                 }
-        return laid
+        return overlay
+
+    def _replace_figures(self, figures: Sequence[Figure]) -> list[tuple[int, str]]:
+        if not 1 <= len(figures) <= MAX_PERFORMERS:
+            raise ValueError(f"a stage has 1 to {MAX_PERFORMERS} performers, not {len(figures)}")
+        here = len(self._marionettes)
+        # creating all of them first raises before anything changes
+        created = [
+            Marionette(figure, self.ownership, performer, self._solver) for performer, figure in enumerate(figures)
+        ]
+        for marionette, figure in zip(self._marionettes, figures, strict=False):
+            marionette.set_figure(figure)
+        self._marionettes = [*self._marionettes[: len(figures)], *created[here:]]
+        return self.ownership.set_limb_count(LIMBS_PER_PERFORMER * len(figures))
+
+    def _reset_after_rest(self) -> None:
+        """Forget what happened before the last rest, so that a log replays from any rest to the same overlays."""
+        if self._wake_count != self.ownership.wake_count:
+            self._wake_count = self.ownership.wake_count
+            for marionette in self._marionettes:
+                marionette.reset()

@@ -1,30 +1,34 @@
-"""Who holds which limb: claims, asks, epochs, inputs, and what happens when a puppeteer falls silent.
+"""Ownership of limbs: claims, requests, epochs, inputs and timeouts.
 
-A limb has at most one holder. Every grant has a new epoch, and inputs of another epoch move nothing, so that what a
-former holder sent late is harmless. A held limb can be asked for; nothing is taken by force, but who asked first gets
-it when it becomes free. Times are clock time in µs and come in as arguments.
+A limb has at most one holder. Every grant has a new epoch, and inputs of another epoch are ignored, so that late inputs
+of an earlier holder have no effect. A puppeteer may ask for a held limb. No limb is taken by force; the first who asked
+gets it when it becomes free. Times are clock time in µs and come in as arguments.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal
 
 from bunraku.marionette.limb_rig import ALL_LIMBS, Limb
 from bunraku.marionette.limb_target import InputKind, LateInput, LimbTarget
-from bunraku.marionette.vector import Vector
+from bunraku.marionette.recorder import CommandKind, CommandRecorder
+from bunraku.marionette.solver.vector import Vector
+from bunraku.wire.limbs import MAX_LIMBS
 
 INPUT_TIMEOUT_US = 500_000
-"""Without a word from its holder for this many µs a limb returns to the dance."""
+"""Silence of its holder after which a limb returns to the motion."""
 ASK_LIFETIME_US = 20_000_000
-"""An ask is forgotten after this many µs."""
+LIMBS_PER_PERFORMER = len(ALL_LIMBS)
+INITIAL_EPOCHS = (0,) * MAX_LIMBS
+"""Epochs of a stage on which no limb was ever granted."""
 
 
 @dataclass(frozen=True, slots=True)
 class LimbGrant:
-    """`limb` is the claimant's; its inputs must carry `epoch`."""
+    """Grant of a limb; inputs for it must carry `epoch`."""
 
     limb: int
     epoch: int
@@ -32,8 +36,11 @@ class LimbGrant:
 
 @dataclass(frozen=True, slots=True)
 class LimbRefusal:
-    """`limb` is not the puppeteer's: `holder` has it (`held`), there is no such limb (`unknown`), or it was the
-    puppeteer's and went back to the dance for want of a word (`lost`)."""
+    """Refusal of a limb.
+
+    Reasons: `held` by `holder`; `unknown`, there is no such limb; `lost`, the puppeteer held it and was silent for too
+    long.
+    """
 
     limb: int
     holder: str | None
@@ -44,8 +51,8 @@ class LimbRefusal:
 class LimbInput:
     """One sample of a controller, as message 70 of the contract.
 
-    `values` of a hand: arm lengths on the axes of vl5 from the shoulder, or as velocity -1..1 of full speed; of a leg
-    the first is the thigh's angle in radians, or -1..1 of full speed. `sampled` is in µs, on the sender's clock.
+    For a hand, `values` are arm lengths on the axes of vl5 from the shoulder, or velocities as -1..1 of full speed. For
+    a leg, the first value is the thigh angle in radians, or -1..1 of full speed. `sampled_us` is on the sender's clock.
     """
 
     limb: int
@@ -57,16 +64,16 @@ class LimbInput:
 
 
 class InputOutcome(Enum):
-    """What became of an input."""
+    """Result of an input; the values are the labels of the metric and of notices."""
 
     ACCEPTED = "taken"
-    """It counts."""
+    """Applied."""
     CLAMPED = "reach"
-    """It counts, brought within reach."""
+    """Applied, with the target moved into reach."""
     NOT_OWNER = "owner"
-    """It moves nothing: the limb is another's, or nobody's."""
+    """Ignored: another puppeteer holds the limb, or none does."""
     LATE = "late"
-    """It moves nothing: of an epoch before, a duplicate, or too late."""
+    """Ignored: of an earlier epoch, a duplicate, or too late."""
 
 
 @dataclass(slots=True)
@@ -83,130 +90,206 @@ class _LimbState:
 
 
 class Ownership:
-    """The four limbs of one puppet and their holders."""
+    """Limbs of a stage and their holders: the one interface for what puppeteers do.
 
-    def __init__(self, epochs: Sequence[int] = (0, 0, 0, 0)) -> None:
-        # by the limb's number: they are asked for at the stage's rate
-        self._limbs = [_LimbState(epoch=epoch) for epoch in epochs]
+    Limb l of performer k has the number 4 k + l. A recorder receives every command that can have a consequence.
+    """
+
+    def __init__(
+        self,
+        limb_count: int = LIMBS_PER_PERFORMER,
+        epochs: Sequence[int] = INITIAL_EPOCHS,
+        recorder: CommandRecorder | None = None,
+    ) -> None:
+        """`epochs` are those of the last grants, by limb."""
+        self._recorder = recorder
+        # of all limbs that a stage can have, so that a limb that disappears and comes back never repeats an epoch
+        self._epochs = [*epochs, *INITIAL_EPOCHS[len(epochs) :]]
+        self._limbs: list[_LimbState] = []
+        self.wake_count = 0
+        """Number of claims while all limbs were at rest."""
+        self.set_limb_count(limb_count)
+
+    def __len__(self) -> int:
+        return len(self._limbs)
+
+    def set_limb_count(self, count: int) -> list[tuple[int, str]]:
+        """Add free limbs or remove the last ones; return the removed limbs that were held, and their holders."""
+        self._epochs = list(self.epochs)
+        removed = [
+            (limb, state.holder) for limb, state in enumerate(self._limbs) if limb >= count and state.holder is not None
+        ]
+        here = len(self._limbs)
+        self._limbs = [*self._limbs[:count], *(_LimbState(epoch=epoch) for epoch in self._epochs[here:count])]
+        return removed
 
     def holders(self) -> tuple[str | None, ...]:
-        """The holder's id of each limb, or None."""
-        return tuple([hold.holder for hold in self._limbs])
+        """Return the holder's id of each limb, or None."""
+        return tuple([state.holder for state in self._limbs])
 
     def asks(self) -> tuple[tuple[str, ...], ...]:
-        """Of each limb the ids of those who ask for it, first come first."""
-        return tuple(tuple(hold.asks) for hold in self._limbs)
+        """Return for each limb the ids of the puppeteers who ask for it, in order."""
+        return tuple(tuple(state.asks) for state in self._limbs)
+
+    @property
+    def epochs(self) -> tuple[int, ...]:
+        """Epoch of the last grant of every limb that a stage can have; 0 before the first."""
+        return (*(state.epoch for state in self._limbs), *self._epochs[len(self._limbs) :])
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether nobody holds a limb, and all are the dance's again."""
-        return all(hold.target is None for hold in self._limbs)
+        """True if no limb is held and all are back in the motion."""
+        return all(state.target is None for state in self._limbs)
 
-    def epoch(self, limb: Limb) -> int:
-        """The epoch of the limb's last grant; 0 before the first."""
-        return self._limbs[limb].epoch
-
-    def target(self, limb: Limb) -> LimbTarget | None:
-        """What the holder asks of the limb; after a release the last that was asked; None before the first grant."""
+    def target(self, limb: int) -> LimbTarget | None:
+        """Return the limb's target: the holder's, after a release the last one, None before the first grant."""
         return self._limbs[limb].target
 
+    def record(self, kind: CommandKind, now: int, *values: str | float) -> None:
+        """Pass a command to the recorder, unless all limbs are at rest: then it has no consequence."""
+        if self._recorder is not None and not self.is_at_rest:
+            self._recorder.append(kind, now, *values)
+
     def claim(self, limb: int, puppeteer: str, now: int) -> LimbGrant | LimbRefusal:
-        """Grants a free limb, or again the claimant's own with a new epoch."""
-        if not 0 <= limb < len(self._limbs):
+        """Grant a limb that is free, or the claimant's own again with a new epoch."""
+        if not self._has_limb(limb):
             return LimbRefusal(limb, None, "unknown")
-        hold = self._limbs[limb]
-        if hold.holder not in (None, puppeteer):
-            return LimbRefusal(limb, hold.holder, "held")
-        hold.asks.pop(puppeteer, None)
-        hold.holder = puppeteer
-        hold.epoch += 1
-        hold.target = LimbTarget(Limb(limb).is_hand, now)
-        return LimbGrant(Limb(limb), hold.epoch)
-
-    def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
-        """Asks for a limb that another holds, or no longer; whether the asks have changed."""
-        if not 0 <= limb < len(self._limbs):
-            return False
-        hold = self._limbs[limb]
-        if not wanted:
-            return hold.asks.pop(puppeteer, None) is not None
-        if hold.holder in (None, puppeteer):
-            return False
-        new = puppeteer not in hold.asks
-        hold.asks[puppeteer] = now + ASK_LIFETIME_US
-        return new
-
-    def grant_free_limbs(self, now: int) -> tuple[list[tuple[str, LimbGrant]], bool]:
-        """Grants free limbs to those who asked first: whose and what, and whether any asks have changed. Asks that are
-        too old are forgotten."""
-        grants: list[tuple[str, LimbGrant]] = []
-        changed = False
-        for limb, hold in zip(ALL_LIMBS, self._limbs, strict=True):
-            for old in [who for who, until in hold.asks.items() if until <= now]:
-                del hold.asks[old]
-                changed = True
-            if hold.holder is None and hold.asks:
-                first = next(iter(hold.asks))
-                grant = self.claim(limb, first, now)
-                assert isinstance(grant, LimbGrant)
-                grants.append((first, grant))
-        return grants, changed or bool(grants)
+        if self.is_at_rest:
+            self.wake_count += 1
+            if self._recorder is not None:
+                self._recorder.begin_segment(self.epochs, now)
+        if self._recorder is not None:
+            self._recorder.append(CommandKind.CLAIM, now, puppeteer, limb)
+        return self._grant(limb, puppeteer, now)
 
     def release(self, limb: int, puppeteer: str, epoch: int, now: int) -> bool:
-        """Frees a limb; False, and nothing changes, if it is not this puppeteer's at this epoch."""
-        hold = self._held_by(limb, puppeteer)
-        if hold is None or hold.epoch != epoch:
+        """Free a limb; return False, without effect, if the puppeteer does not hold it at this epoch."""
+        state = self._held_by(limb, puppeteer)
+        if state is None or state.epoch != epoch:
             return False
-        hold.release(now)
+        state.release(now)
+        self.record(CommandKind.RELEASE, now, puppeteer, limb, epoch)
         return True
 
-    def leave(self, puppeteer: str, now: int) -> tuple[Limb, ...]:
-        """Frees all that a puppeteer holds and forgets what it asked for; says which limbs became free."""
-        freed = tuple(Limb(limb) for limb, hold in enumerate(self._limbs) if hold.holder == puppeteer)
+    def leave(self, puppeteer: str, now: int) -> tuple[int, ...]:
+        """Free all limbs of a puppeteer, drop the puppeteer's requests, and return the freed limbs."""
+        self.record(CommandKind.LEAVE, now, puppeteer)
+        freed = tuple(limb for limb, state in enumerate(self._limbs) if state.holder == puppeteer)
         for limb in freed:
             self._limbs[limb].release(now)
-        for hold in self._limbs:
-            hold.asks.pop(puppeteer, None)
+        for state in self._limbs:
+            state.asks.pop(puppeteer, None)
         return freed
 
-    def keep_alive(self, puppeteer: str, limbs: list[int], now: int) -> None:
-        """The puppeteer still holds `limbs`, without a new input; those it does not hold are passed over."""
-        for limb in limbs:
-            hold = self._held_by(limb, puppeteer)
-            if hold is not None and hold.target is not None:
-                hold.target.keep_alive(now)
+    def keep_alive(self, puppeteer: str, limbs: Iterable[int], now: int) -> None:
+        """Record that the puppeteer still holds `limbs` without a new input; limbs of others are ignored."""
+        known = {limb for limb in limbs if self._has_limb(limb)}
+        self.record(CommandKind.KEEP_ALIVE, now, puppeteer, sum(1 << limb for limb in known))
+        for limb in known:
+            state = self._held_by(limb, puppeteer)
+            if state is not None and state.target is not None:
+                state.target.keep_alive(now)
+
+    def ask(self, limb: int, puppeteer: str, wanted: bool, now: int) -> bool:
+        """Ask for a limb that another puppeteer holds, or no longer; return whether the requests have changed."""
+        if not self._has_limb(limb):
+            return False
+        self.record(CommandKind.ASK, now, puppeteer, limb, wanted)
+        state = self._limbs[limb]
+        if not wanted:
+            return state.asks.pop(puppeteer, None) is not None
+        if state.holder in (None, puppeteer):
+            return False
+        is_new = puppeteer not in state.asks
+        state.asks[puppeteer] = now + ASK_LIFETIME_US
+        return is_new
 
     def apply_input(self, puppeteer: str, limb_input: LimbInput, now: int) -> InputOutcome:
-        """Takes an input, or says why not. Raises `ValueError` for numbers that are not finite or an unknown kind."""
-        kind = InputKind(limb_input.kind)
-        hold = self._held_by(limb_input.limb, puppeteer)
-        if hold is None or hold.target is None:
+        """Apply an input and return its outcome.
+
+        Raises ValueError for an input that no controller sends: an unknown kind, or values that are not finite.
+        """
+        if not self._has_limb(limb_input.limb):
             return InputOutcome.NOT_OWNER
-        if hold.epoch != limb_input.epoch:
+        kind = InputKind(limb_input.kind)
+        state = self._held_by(limb_input.limb, puppeteer)
+        if state is None or state.target is None:
+            return InputOutcome.NOT_OWNER
+        if state.epoch != limb_input.epoch:
             return InputOutcome.LATE
         try:
-            within = hold.target.add_input(kind, limb_input.values, limb_input.sequence, limb_input.sampled_us, now)
+            is_within_reach = state.target.add_input(
+                kind, limb_input.values, limb_input.sequence, limb_input.sampled_us, now
+            )
         except LateInput:
             return InputOutcome.LATE
-        return InputOutcome.ACCEPTED if within else InputOutcome.CLAMPED
+        self.record(
+            CommandKind.INPUT,
+            now,
+            puppeteer,
+            limb_input.limb,
+            limb_input.kind,
+            limb_input.epoch,
+            limb_input.sequence,
+            # the largest and smallest number that the log can hold
+            max(min(limb_input.sampled_us, (1 << 63) - 1), -(1 << 63)),
+            *limb_input.values,
+        )
+        return InputOutcome.ACCEPTED if is_within_reach else InputOutcome.CLAMPED
 
-    def expire(self, now: int) -> list[tuple[Limb, str]]:
-        """Frees the limbs whose holders have been silent for `LOST_AFTER`; says which, and whose they were."""
-        lost: list[tuple[Limb, str]] = []
-        for limb, hold in zip(ALL_LIMBS, self._limbs, strict=True):
-            if hold.holder is not None and hold.target and now - hold.target.last_heard_us >= INPUT_TIMEOUT_US:
-                lost.append((limb, hold.holder))
-                hold.release(now)
+    def grant_free_limbs(self, now: int) -> tuple[list[tuple[str, LimbGrant]], bool]:
+        """Grant free limbs to the first who asked, and drop requests that are too old.
+
+        Returns the grants with their puppeteers, and whether any requests have changed.
+        """
+        grants: list[tuple[str, LimbGrant]] = []
+        changed = False
+        for limb, state in enumerate(self._limbs):
+            for expired in [puppeteer for puppeteer, until in state.asks.items() if until <= now]:
+                del state.asks[expired]
+                changed = True
+            if state.holder is None and state.asks:
+                first = next(iter(state.asks))
+                grant = self._grant(limb, first, now)
+                assert isinstance(grant, LimbGrant)
+                grants.append((first, grant))
+        changed = changed or bool(grants)
+        if changed:
+            self.record(CommandKind.GRANT_FREE_LIMBS, now)
+        return grants, changed
+
+    def expire(self, now: int) -> list[tuple[int, str]]:
+        """Free the limbs whose holders were silent for `INPUT_TIMEOUT_US`; return them with their holders."""
+        lost: list[tuple[int, str]] = []
+        for limb, state in enumerate(self._limbs):
+            if state.holder is not None and state.target and now - state.target.last_heard_us >= INPUT_TIMEOUT_US:
+                lost.append((limb, state.holder))
+                state.release(now)
+        if lost:
+            self.record(CommandKind.EXPIRE, now)
         return lost
 
-    def clear_target(self, limb: Limb) -> None:
-        """The limb is wholly the dance's again: the next to hold it starts from there."""
-        hold = self._limbs[limb]
-        if hold.holder is None:
-            hold.target = None
+    def clear_target(self, limb: int) -> None:
+        """Forget the target of a free limb that is back in the motion."""
+        state = self._limbs[limb]
+        if state.holder is None:
+            state.target = None
+
+    def _grant(self, limb: int, puppeteer: str, now: int) -> LimbGrant | LimbRefusal:
+        state = self._limbs[limb]
+        if state.holder not in (None, puppeteer):
+            return LimbRefusal(limb, state.holder, "held")
+        state.asks.pop(puppeteer, None)
+        state.holder = puppeteer
+        state.epoch += 1
+        state.target = LimbTarget(Limb(limb % LIMBS_PER_PERFORMER).is_hand, now)
+        return LimbGrant(limb, state.epoch)
+
+    def _has_limb(self, limb: int) -> bool:
+        return 0 <= limb < len(self._limbs)
 
     def _held_by(self, limb: int, puppeteer: str) -> _LimbState | None:
-        if not 0 <= limb < len(self._limbs):
+        if not self._has_limb(limb):
             return None
-        hold = self._limbs[limb]
-        return hold if hold.holder == puppeteer else None
+        state = self._limbs[limb]
+        return state if state.holder == puppeteer else None

@@ -1,11 +1,11 @@
-"""The paper's own arm (paper 4.2, 4.3): three angles in a table, looked up and interpolated.
+"""Arm of the paper (paper 4.2, 4.3) as a reference for measurements: three angles in a table, interpolated.
 
-Kept to be measured against. Nodes are even over the half disc, 100 divisions of the distance and 18 of the elevation;
-each holds the angles t0, t1, t2 of least potential, float32; between nodes they are bilinear, so the tip misses its
-target by a little. Elbow and wrist bend as far as they like, as in the paper, though only in their own sense: among
-poses that are alike for gravity those are taken that the neighbours lead to, without which angles jump between nodes.
+Nodes are evenly spaced over the half disc, 100 divisions of the distance and 18 of the elevation. Each node holds the
+angles t0, t1, t2 of least potential, float32. Between nodes they are bilinear, so the tip misses its target slightly.
+Elbow and wrist have no limits, as in the paper, but bend in their natural direction only: among poses of equal
+potential the one closest to the neighbours is chosen, because angles would jump between nodes otherwise.
 
-In the plane: x outwards, y up; angles from x towards y, radians; lengths in arm lengths.
+In the plane x points outwards and y up; angles are from x towards y, radians; lengths are in arm lengths.
 """
 
 from __future__ import annotations
@@ -21,20 +21,19 @@ from bunraku.motion.rotation import Array
 DISTANCE_NODES, ELEVATION_NODES = 101, 19
 """Nodes along r, 0..1, and along beta, -pi/2..pi/2."""
 PAPER_BYTES = DISTANCE_NODES * ELEVATION_NODES * 3 * 4
-"""Of a table: 23,028. The paper says "within 8 kB", which one of the three angles takes."""
+"""Size of a table: 23,028. The paper says "within 8 kB", which one of the three angles takes."""
 
 PaperTable = npt.NDArray[np.float32]
 _SCAN_SAMPLES = 181
 _BISECTIONS = 40
 _AXIS_OFFSET_RAD = 1e-6
-"""Straight up and down an arm may bow to either side. A node there is taken this little from it, radians, so that the
-arm bows to the side it does beside it."""
+"""Offset of the nodes on the vertical axis, where an arm may bow to either side: it bows as beside the axis."""
 
 
 def build_paper_table(proportions: Proportions) -> PaperTable:
-    """The angles (3, DISTANCES, ELEVATIONS) of least potential, by a search of all poses and halving.
+    """Return the angles (3, 101, 19) of least potential, by a scan of all poses and bisection.
 
-    A node nearer than an arm with one long link can fold has the angles of the nearest place that it does reach.
+    A node too near for an arm with one long link has the angles of the nearest position within reach.
     """
     r, beta = np.meshgrid(
         np.linspace(0.0, 1.0, DISTANCE_NODES), np.linspace(-0.5, 0.5, ELEVATION_NODES) * pi, indexing="ij"
@@ -44,25 +43,25 @@ def build_paper_table(proportions: Proportions) -> PaperTable:
     step = 2.0 * pi / (_SCAN_SAMPLES - 1)
     best, lowest = np.zeros(r.shape), np.full(r.shape, np.inf)
 
-    def look(turn: Array) -> None:
+    def keep_lower(turn: Array) -> None:
         nonlocal best, lowest
         height = _potential(proportions, _close_chain(proportions, r, beta, turn))
-        # by more than rounding: poses that are alike keep their order
+        # by more than rounding: the first of equal poses is kept
         lower = height < lowest - 1e-13
         best, lowest = np.where(lower, turn, best), np.where(lower, height, lowest)
 
     for nth in range(_SCAN_SAMPLES):
-        look(np.full(r.shape, nth * step))
+        keep_lower(np.full(r.shape, nth * step))
     for _ in range(_BISECTIONS):
         step *= 0.5
         middle = best
-        look(middle - step)
-        look(middle + step)
+        keep_lower(middle - step)
+        keep_lower(middle + step)
     return _close_chain(proportions, r, beta, best).astype(np.float32)
 
 
 def paper_angles(table: PaperTable, r: Array, beta: Array) -> Array:
-    """Angles t0, t1, t2 (3, n) for tips at (`r`, `beta`), 0..1 and -pi/2..pi/2: bilinear between four nodes."""
+    """Return angles t0, t1, t2 (3, n) for tips at (`r`, `beta`), 0..1 and -pi/2..pi/2, by bilinear interpolation."""
     u, v = r * (DISTANCE_NODES - 1), (beta / pi + 0.5) * (ELEVATION_NODES - 1)
     i = np.clip(u.astype(np.int64), 0, DISTANCE_NODES - 2)
     j = np.clip(v.astype(np.int64), 0, ELEVATION_NODES - 2)
@@ -74,26 +73,28 @@ def paper_angles(table: PaperTable, r: Array, beta: Array) -> Array:
 
 
 def joint_positions(proportions: Proportions, angles: Array) -> npt.NDArray[np.complex128]:
-    """Elbow, wrist and tip (3, n) of link angles (3, n), as x + iy in the arm's plane."""
+    """Return elbow, wrist and tip (3, n) of link angles (3, n), as x + iy in the arm's plane."""
     links = np.array(proportions.lengths)[:, None] * np.exp(1j * angles)
     joints: npt.NDArray[np.complex128] = np.cumsum(links, axis=0)
     return joints
 
 
 def tip_error(proportions: Proportions, table: PaperTable, r: Array, beta: Array) -> Array:
-    """How far (n,) tips are from their targets, in arm lengths: the paper's measure (4.3)."""
+    """Return the distances (n,) of tips from their targets, in arm lengths: the paper's measure (4.3)."""
     error: Array = np.abs(joint_positions(proportions, paper_angles(table, r, beta))[2] - r * np.exp(1j * beta))
     return error
 
 
 def _close_chain(proportions: Proportions, r: Array, beta: Array, turn: Array) -> Array:
-    """Link angles (3, ...) that bring the tip to (`r`, `beta`) with the upper arm turned down by `turn` from its
-    direction; NaN where the rest does not reach, or a joint would bend against its sense."""
+    """Return link angles (3, ...) with the tip at (`r`, `beta`) and the upper arm `turn` below the chord.
+
+    NaN if the rest of the arm does not reach, or a joint would bend backwards.
+    """
     upper, fore, hand = proportions.lengths
     rest = upper**2 + r**2 - 2.0 * upper * r * np.cos(turn)
     cosine = (rest - fore**2 - hand**2) / (2.0 * fore * hand)
     bend = np.arccos(np.clip(cosine, -1.0, 1.0))
-    # from the upper arm to the line from elbow to tip, the way an elbow bends
+    # from the upper arm to the segment from elbow to tip, in the direction in which an elbow bends
     chord = np.angle(r * np.exp(1j * turn) - upper)
     chord = np.where(chord < -1e-9, chord + 2.0 * pi, chord)
     elbow = chord - np.arctan2(hand * np.sin(bend), fore + hand * np.cos(bend))
@@ -103,7 +104,7 @@ def _close_chain(proportions: Proportions, r: Array, beta: Array, turn: Array) -
 
 
 def _potential(proportions: Proportions, angles: Array) -> Array:
-    """The part of the paper's E that a pose can change, twice and without g; infinite where there is no pose."""
+    """Return twice the part of the paper's E that depends on the pose, without g; infinite for no pose."""
     upper, fore, _ = proportions.lengths
     m0, m1, m2 = proportions.masses
     height = (m0 + 2.0 * m1 + m2) * upper * np.sin(angles[0]) + (m1 + m2) * fore * np.sin(angles[1])

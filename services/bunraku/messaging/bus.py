@@ -1,8 +1,8 @@
-"""What services say to each other: subjects, published bytes, and questions with one answer.
+"""Message bus between services: published messages, and requests with one response.
 
-The shape is that of NATS core, so that a broker can take the place of this process's own (`bunraku.messaging.bus_nats`).
-Subjects are words joined by dots. Handlers of published messages are plain functions that must return at once; they run
-in the order of publishing, that of each publisher. What one raises is logged, and nobody else sees it.
+The interface is that of NATS core, so that a broker (`bunraku.messaging.bus_nats`) can replace the bus of one process.
+Subjects are tokens joined by dots. Handlers of published messages are plain functions that must return at once; they
+run in the order in which each publisher sent. An exception of a handler is logged and affects no other handler.
 """
 
 from __future__ import annotations
@@ -27,105 +27,109 @@ _log = logging.getLogger(__name__)
 
 
 def is_subject_token(text: str) -> bool:
-    """Whether a text can be one word of a subject or of a key: what is not could be many (`*`, `>`)."""
+    """Return whether a text is safe as one token of a subject or key (no dots, no wildcards `*` and `>`)."""
     return _TOKEN_PATTERN.fullmatch(text) is not None
 
 
 class NoResponse(Exception):
-    """A question that nobody answered in time."""
+    """A request without a responder, or without a response in time."""
 
 
 class ResponderFailed(Exception):
-    """A question whose answerer failed; its own log says how."""
+    """A request whose responder raised an exception; the responder's process logs it."""
 
 
 def is_subject(subject: str) -> bool:
-    """Whether this is a subject: words joined by dots, without white space, wildcards or control characters, at most
-    `LONGEST_SUBJECT` characters. What people send in becomes part of subjects."""
+    """Return whether this is a subject of at most `MAX_SUBJECT_LENGTH` characters.
+
+    Subjects are tokens joined by dots, without white space, wildcards and control characters. Input of clients becomes
+    part of subjects.
+    """
     return len(subject) <= MAX_SUBJECT_LENGTH and _SUBJECT_PATTERN.fullmatch(subject) is not None
 
 
 def validate_subject(subject: str) -> str:
-    """The subject; raises ValueError where it is none."""
+    """Return the subject; raise ValueError if it is invalid."""
     if not is_subject(subject):
-        raise ValueError(f"a subject is words joined by dots, not {subject[:80]!r}")
+        raise ValueError(f"invalid subject {subject[:80]!r}, expected tokens joined by dots")
     return subject
 
 
 def deliver(handler: MessageHandler, subject: str, data: bytes) -> None:
-    """Call a handler with a message."""
+    """Call a handler with a message and log its exceptions."""
     try:
         handler(data)
     except Exception:
-        _log.exception("a message to %s could not be taken", subject)
+        _log.exception("Handler of %s failed", subject)
 
 
 async def call_responder(responder: Responder, subject: str, data: bytes) -> bytes:
-    """What an answerer says; raises `Unavailable` as it does, `AnswerFailed` for all else that it raises."""
+    """Return a response; pass `BackendUnavailable` on, log other exceptions and raise `ResponderFailed`."""
     try:
         return await responder(data)
     except BackendUnavailable:
         raise
     except Exception:
-        _log.exception("a question to %s could not be answered", subject)
+        _log.exception("Responder of %s failed", subject)
         raise ResponderFailed(subject) from None
 
 
 class Subscription(Protocol):
-    """What ends a subscription."""
+    """A handle that ends a subscription."""
 
     def unsubscribe(self) -> None:
-        """No message comes after this."""
+        """End the subscription; no message is delivered after this."""
 
 
 class Bus(Protocol):
-    """The bus as the services see it. Methods raise ValueError for what is no subject."""
+    """Message bus as services use it. Methods raise ValueError for an invalid subject."""
 
     @property
     def is_connected(self) -> bool:
-        """Whether messages can be sent now."""
+        """True while messages can be sent."""
 
     @property
     def reconnects(self) -> int:
-        """How often the bus was away and came back."""
+        """Number of reconnections after an outage."""
 
     def on_reconnect(self, handler: Callable[[], None]) -> Subscription:
-        """Call `handler` whenever the bus is up again after it was away, with all subscriptions in place. What was
-        published meanwhile is lost: who keeps something up to date asks for it anew."""
+        """Call `handler` after each reconnection, with all subscriptions restored.
+
+        Messages published during the outage are lost: a service that mirrors state must request it again.
+        """
 
     def publish(self, subject: str, data: bytes) -> None:
-        """Send to all who have subscribed; lost where nobody has, or the bus is away. Never blocks."""
+        """Send to all subscribers without blocking; the message is lost without subscribers or connection."""
 
     def subscribe(self, subject: str, handler: MessageHandler) -> Subscription:
         """Call `handler` with every message to `subject` from now on."""
 
     def serve(self, subject: str, responder: Responder) -> Subscription:
-        """Answer the questions put to `subject`. Of several processes that do, one gets each question."""
+        """Respond to requests to `subject`; if several processes do, each request goes to one of them."""
 
     async def request(self, subject: str, data: bytes = b"", timeout_s: float = BACKEND_TIMEOUT_S) -> bytes:
-        """The answer to a question.
+        """Send a request and return the response.
 
-        Raises `NobodyAnswers` after `seconds`, or at once where nobody is there or could be; `Unavailable` where the
-        bus is away, or the answerer misses what it stands on; `AnswerFailed` where that raises anything else.
+        Raise `NoResponse` after `timeout_s` seconds, or at once without a responder; `BackendUnavailable` if the bus or
+        a backend of the responder is unavailable; `ResponderFailed` if the responder raises anything else.
         """
 
     async def close(self) -> None:
-        """End every subscription."""
+        """End all subscriptions."""
 
 
 class CallbackSubscription:
-    """A subscription that ends by a function."""
+    """A subscription that a callback ends."""
 
     def __init__(self, unsubscribe: Callable[[], None]) -> None:
         self._unsubscribe = unsubscribe
 
     def unsubscribe(self) -> None:
-        """As `Subscription.end`."""
         self._unsubscribe()
 
 
 class MemoryBus:
-    """The bus within one process: never away."""
+    """Bus within one process; it is always connected."""
 
     is_connected = True
     reconnects = 0
@@ -135,50 +139,44 @@ class MemoryBus:
         self._responders: dict[str, Responder] = {}
 
     def on_reconnect(self, _: Callable[[], None]) -> Subscription:
-        """As `Bus.on_return`."""
         return CallbackSubscription(lambda: None)
 
     def publish(self, subject: str, data: bytes) -> None:
-        """As `Bus.publish`."""
         for handler in tuple(self._handlers.get(validate_subject(subject), ())):
             deliver(handler, subject, data)
 
     def subscribe(self, subject: str, handler: MessageHandler) -> Subscription:
-        """As `Bus.subscribe`."""
         self._handlers[validate_subject(subject)].append(handler)
 
-        def end() -> None:
+        def unsubscribe() -> None:
             handlers = self._handlers.get(subject, [])
             if handler in handlers:
                 handlers.remove(handler)
             if not handlers:
                 self._handlers.pop(subject, None)
 
-        return CallbackSubscription(end)
+        return CallbackSubscription(unsubscribe)
 
     def serve(self, subject: str, responder: Responder) -> Subscription:
-        """As `Bus.answer`."""
         self._responders[validate_subject(subject)] = responder
 
-        def end() -> None:
-            # another may answer by now
+        def unsubscribe() -> None:
+            # another responder may have replaced this one
             if self._responders.get(subject) is responder:
                 del self._responders[subject]
 
-        return CallbackSubscription(end)
+        return CallbackSubscription(unsubscribe)
 
     async def request(self, subject: str, data: bytes = b"", timeout_s: float = BACKEND_TIMEOUT_S) -> bytes:
-        """As `Bus.ask`."""
-        answerer = self._responders.get(subject)
-        if answerer is None:
+        responder = self._responders.get(subject)
+        if responder is None:
             raise NoResponse(subject)
         try:
             async with asyncio.timeout(timeout_s):
-                return await call_responder(answerer, subject, data)
+                return await call_responder(responder, subject, data)
         except TimeoutError:
             raise NoResponse(subject) from None
 
     async def close(self) -> None:
-        """As `Bus.close`."""
         self._handlers.clear()
         self._responders.clear()

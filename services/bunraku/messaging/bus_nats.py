@@ -1,6 +1,6 @@
-"""The bus between processes: NATS core. Whenever a connection ends another is made, with every subscription, for ever.
+"""Bus between processes over NATS core; it reconnects for ever and restores all subscriptions.
 
-The client is our own (proto/NOTES.md says why): what is published leaves at once, and comes in its order.
+The client is our own (`proto/NOTES.md` gives the reasons): messages are sent at once and delivered in order.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import secrets
 from collections.abc import Callable, Mapping, Set
 from itertools import count, cycle
 
-from bunraku.http import request_id
 from bunraku.messaging.bus import (
     CallbackSubscription,
     MessageHandler,
@@ -30,27 +29,30 @@ from bunraku.messaging.nats_connection import (
     HEARTBEAT_INTERVAL_S,
     MAX_MISSED_HEARTBEATS,
     NatsConnection,
+    NatsMessage,
     parse_servers,
 )
+from bunraku.runtime import request_id
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendUnavailable
 
 RECONNECT_DELAY_RANGE_S = (0.1, 0.4)
-"""Seconds between two tries to connect, at random between these so that not all come at once."""
+"""Range of the random delay between attempts to connect, in seconds; it spreads the clients of a restarted server."""
 _INBOX_SUBSCRIPTION_ID = 0
-"""The number of the subscription that answers come to."""
+"""Id of the subscription that receives responses."""
 _NO_RESPONDERS_STATUS, _FAILED_STATUS = b"503", b"500"
-_DeliveryCallback = Callable[[str, bytes, bytes], None]
-"""Takes the reply's subject, the message, and its headers as they came."""
+_DeliveryCallback = Callable[[NatsMessage], None]
 
 _log = logging.getLogger(__name__)
 
 
 class NatsBus:
-    """The bus at some servers, of which any one will do."""
+    """Bus on one of several equivalent servers."""
 
     def __init__(self, url: str) -> None:
-        """`url` is `nats://host:port` or `nats://user:password@host:port`, more servers after commas; raises ValueError
-        for another. `open` connects."""
+        """`url` is `nats://host:port` or `nats://user:password@host:port`, more servers after commas.
+
+        Raise ValueError for another URL. `open` connects.
+        """
         self._servers = parse_servers(url)
         self._inbox = f"_INBOX.{secrets.token_hex(12)}"
         self._subscription_ids = count(_INBOX_SUBSCRIPTION_ID + 1)
@@ -61,13 +63,12 @@ class NatsBus:
         self._connected = asyncio.Event()
         self._was_disconnected = False
         self.reconnects = 0
-        """As `Bus.returns`."""
         self._run_task: asyncio.Task[None] | None = None
         self._response_tasks: set[asyncio.Task[None]] = set()
 
     async def open(self, timeout_s: float = 2 * CONNECT_TIMEOUT_S) -> None:
-        """Connect. Where no server answers within `seconds` the bus is not `up`, and goes on trying."""
-        self._run_task = asyncio.create_task(self._maintain_connection(), name="the bus")
+        """Connect; if no server responds within `timeout_s`, return and keep trying in the background."""
+        self._run_task = asyncio.create_task(self._maintain_connection(), name="bus connection")
         try:
             async with asyncio.timeout(timeout_s):
                 await self._connected.wait()
@@ -75,7 +76,7 @@ class NatsBus:
             self._was_disconnected = True
 
     async def close(self) -> None:
-        """As `Bus.close`; what was published before is sent, if that takes no longer than a second."""
+        # closing the connection sends unsent messages, within CONNECT_TIMEOUT_S
         self._subscriptions.clear()
         self._reconnect_handlers.clear()
         self._connected.set()
@@ -86,57 +87,51 @@ class NatsBus:
 
     @property
     def is_connected(self) -> bool:
-        """As `Bus.up`: a server has answered within the last two seconds."""
         return self._connection is not None
 
     def on_reconnect(self, handler: Callable[[], None]) -> Subscription:
-        """As `Bus.on_return`."""
         number = next(self._subscription_ids)
         self._reconnect_handlers[number] = handler
 
-        def end() -> None:
+        def unsubscribe() -> None:
             self._reconnect_handlers.pop(number, None)
 
-        return CallbackSubscription(end)
+        return CallbackSubscription(unsubscribe)
 
     def publish(self, subject: str, data: bytes) -> None:
-        """As `Bus.publish`."""
         validate_subject(subject)
         if self._connection is None:
             return
         if len(data) > self._connection.max_payload:
-            most = self._connection.max_payload
-            _log.error("%d bytes to %s: the bus takes %d, see its max_payload", len(data), subject, most)
+            limit = self._connection.max_payload
+            _log.error(
+                "Message of %d bytes to %s dropped: max_payload of the NATS server is %d", len(data), subject, limit
+            )
             return
         self._connection.publish(subject, data)
 
     def subscribe(self, subject: str, handler: MessageHandler) -> Subscription:
-        """As `Bus.subscribe`. Order holds for all subjects of one publisher."""
-        return self._subscribe_raw(subject, "", lambda _, data, __: deliver(handler, subject, data))
+        return self._subscribe_raw(subject, "", lambda message: deliver(handler, subject, message.data))
 
     def serve(self, subject: str, responder: Responder) -> Subscription:
-        """As `Bus.answer`."""
-
-        async def answer(reply: str, data: bytes, request: str) -> None:
+        async def respond(message: NatsMessage) -> None:
             try:
-                with request_id.bind(request):
-                    said = await call_responder(responder, subject, data)
-                self.publish(reply, said)
+                with request_id.bind(request_id.from_message_headers(message.headers)):
+                    response = await call_responder(responder, subject, message.data)
+                self.publish(message.reply, response)
             except (ResponderFailed, BackendUnavailable) as error:
                 if self._connection is not None:
-                    self._connection.respond_error(
-                        reply, error.backend if isinstance(error, BackendUnavailable) else ""
-                    )
+                    backend = error.backend if isinstance(error, BackendUnavailable) else ""
+                    self._connection.respond_error(message.reply, backend)
 
-        def asked(reply: str, data: bytes, head: bytes) -> None:
-            if reply:
-                request = request_id.from_message_headers(head)
-                replying = asyncio.create_task(answer(reply, data, request), name=f"answer to {subject}")
-                self._response_tasks.add(replying)
-                replying.add_done_callback(self._response_tasks.discard)
+        def on_request(message: NatsMessage) -> None:
+            if message.reply:
+                task = asyncio.create_task(respond(message), name=f"response to {subject}")
+                self._response_tasks.add(task)
+                task.add_done_callback(self._response_tasks.discard)
 
-        # members of a queue group, of whom one gets each question
-        return self._subscribe_raw(subject, "answer", asked)
+        # a queue group: the server sends each request to one member
+        return self._subscribe_raw(subject, "answer", on_request)
 
     async def request(
         self,
@@ -145,59 +140,59 @@ class NatsBus:
         timeout_s: float = BACKEND_TIMEOUT_S,
         headers: Mapping[str, str] | None = None,
     ) -> bytes:
-        """As `Bus.ask`; `headers` are by default the name of the request that is at work. Raises ValueError for more
-        bytes than the server takes in one message."""
+        """Send a request as `Bus.request` does; `headers` default to the id of the current HTTP request.
+
+        Raise ValueError if `data` is larger than the server's `max_payload`.
+        """
         if not is_subject(subject):
             raise NoResponse(subject)
-        link = self._connection
-        if link is None:
-            raise BackendUnavailable("the bus", "no server answers")
-        if len(data) > link.max_payload:
-            raise ValueError(f"a question has {len(data)} bytes: the bus takes {link.max_payload}, see its max_payload")
+        connection = self._connection
+        if connection is None:
+            raise BackendUnavailable("the bus", "no server responds")
+        if len(data) > connection.max_payload:
+            raise ValueError(
+                f"request of {len(data)} bytes: max_payload of the NATS server is {connection.max_payload}"
+            )
         token = str(next(self._subscription_ids))
-        answer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
-        self._pending_requests[token] = answer
-        heard = link.receive_count
+        response: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        self._pending_requests[token] = response
+        received_before = connection.receive_count
         try:
-            if not link.publish(
-                subject, data, f"{self._inbox}.{token}", request_id.message_headers() if headers is None else headers
-            ):
-                raise BackendUnavailable("the bus", "the server does not keep up")
+            sent_headers = request_id.message_headers() if headers is None else headers
+            if not connection.publish(subject, data, f"{self._inbox}.{token}", sent_headers):
+                raise BackendUnavailable("the bus", "the send buffer is full")
             async with asyncio.timeout(timeout_s):
-                return await answer
+                return await response
         except TimeoutError:
-            # what came while this process stood still is not looked at yet
+            # lets the event loop read data that arrived while it was blocked
             await asyncio.sleep(0)
-            if link.receive_count == heard and timeout_s > MAX_MISSED_HEARTBEATS * HEARTBEAT_INTERVAL_S:
-                # beats in between were not answered either
-                link.abort("the server is silent")
-                if self._connection is link:
+            if connection.receive_count == received_before and timeout_s > MAX_MISSED_HEARTBEATS * HEARTBEAT_INTERVAL_S:
+                # the PINGs of this time were not answered either
+                connection.abort("the server does not respond")
+                if self._connection is connection:
                     self._connection = None
-                raise BackendUnavailable("the bus", "the server is silent") from None
+                raise BackendUnavailable("the bus", "the server does not respond") from None
             raise NoResponse(subject) from None
         finally:
             del self._pending_requests[token]
 
-    def on_message(
-        self, subscription_id: int, subject: str, reply: str, data: bytes, headers: bytes, status: bytes
-    ) -> None:
-        """As `Listener`."""
-        if subscription_id != _INBOX_SUBSCRIPTION_ID:
-            # one that has ended may still hear what was on the way
-            if subscription_id in self._subscriptions:
-                self._subscriptions[subscription_id][1](reply, data, headers)
+    def on_message(self, message: NatsMessage) -> None:
+        if message.subscription_id != _INBOX_SUBSCRIPTION_ID:
+            # messages to an ended subscription may still arrive
+            if message.subscription_id in self._subscriptions:
+                self._subscriptions[message.subscription_id][1](message)
             return
-        question = self._pending_requests.get(subject.rpartition(".")[2])
-        if question is None or question.done():
+        pending = self._pending_requests.get(message.subject.rpartition(".")[2])
+        if pending is None or pending.done():
             return
-        if status == _NO_RESPONDERS_STATUS:
-            question.set_exception(NoResponse("nobody is there"))
-        elif status == _FAILED_STATUS and data:
-            question.set_exception(BackendUnavailable(data.decode(), "so says who was asked"))
-        elif status == _FAILED_STATUS:
-            question.set_exception(ResponderFailed("who was asked could not answer"))
+        if message.status == _NO_RESPONDERS_STATUS:
+            pending.set_exception(NoResponse("no responder"))
+        elif message.status == _FAILED_STATUS and message.data:
+            pending.set_exception(BackendUnavailable(message.data.decode(), "reported by the responder"))
+        elif message.status == _FAILED_STATUS:
+            pending.set_exception(ResponderFailed("the responder raised an exception"))
         else:
-            question.set_result(data)
+            pending.set_result(message.data)
 
     def _subscribe_raw(self, subject: str, group: str, on_delivery: _DeliveryCallback) -> Subscription:
         number = next(self._subscription_ids)
@@ -205,45 +200,45 @@ class NatsBus:
         self._subscriptions[number] = command, on_delivery
         self._send_command(command)
 
-        def end() -> None:
+        def unsubscribe() -> None:
             if self._subscriptions.pop(number, None) is not None:
                 self._send_command(b"UNSUB %d\r\n" % number)
 
-        return CallbackSubscription(end)
+        return CallbackSubscription(unsubscribe)
 
     def _send_command(self, command: bytes) -> None:
-        # without room for it the connection begins anew, with what holds then
+        # if the send buffer is full, reconnect: that restores the current subscriptions
         if self._connection is not None and not self._connection.send_command(command):
-            self._connection.abort("the server does not keep up")
+            self._connection.abort("the send buffer is full")
 
     async def _maintain_connection(self) -> None:
         """Connect to one server after the other, for ever."""
-        told = False
+        is_outage_logged = False
         for server in cycle(random.sample(self._servers, len(self._servers))):
-            known = dict(self._subscriptions)
-            first = [
+            subscriptions = dict(self._subscriptions)
+            initial_commands = [
                 b"SUB %b.* %d\r\n" % (self._inbox.encode(), _INBOX_SUBSCRIPTION_ID),
-                *(command for command, _ in known.values()),
+                *(command for command, _ in subscriptions.values()),
             ]
             try:
-                link = await NatsConnection.open(server, self, first)
+                connection = await NatsConnection.open(server, self, initial_commands)
             except OSError as error:
-                if not told:
-                    _log.warning("the bus is away: %s", error)
-                told, self._was_disconnected = True, True
+                if not is_outage_logged:
+                    _log.warning("Bus disconnected: %s; reconnecting", error)
+                is_outage_logged, self._was_disconnected = True, True
             else:
-                told = False
+                is_outage_logged = False
                 try:
-                    self._on_connected(link, known.keys())
-                    await asyncio.wait((link.closed,))
-                    _log.warning("the bus is away: %s", link.closed.result())
+                    self._on_connected(connection, subscriptions.keys())
+                    await asyncio.wait((connection.closed,))
+                    _log.warning("Bus disconnected: %s; reconnecting", connection.closed.result())
                 finally:
                     self._on_disconnected()
-                    await link.close()
+                    await connection.close()
             await asyncio.sleep(random.uniform(*RECONNECT_DELAY_RANGE_S))
 
     def _on_connected(self, connection: NatsConnection, subscribed_ids: Set[int]) -> None:
-        """The bus is up, with a connection that has the subscriptions `known`; what changed meanwhile is caught up."""
+        """Use a new connection, and send the changes of subscriptions since its initial commands."""
         self._connection = connection
         for number in subscribed_ids - self._subscriptions.keys():
             self._send_command(b"UNSUB %d\r\n" % number)
@@ -253,16 +248,15 @@ class NatsBus:
         if not self._was_disconnected:
             return
         self.reconnects += 1
-        _log.warning("the bus is back")
+        _log.warning("Bus reconnected")
         for handler in tuple(self._reconnect_handlers.values()):
             try:
                 handler()
             except Exception:
-                _log.exception("the bus is back, and somebody could not take it")
+                _log.exception("Reconnection handler failed")
 
     def _on_disconnected(self) -> None:
-        """The bus is away."""
         self._connection, self._was_disconnected = None, True
-        for question in self._pending_requests.values():
-            if not question.done():
-                question.set_exception(BackendUnavailable("the bus", "the connection ended while a question was asked"))
+        for pending in self._pending_requests.values():
+            if not pending.done():
+                pending.set_exception(BackendUnavailable("the bus", "the connection closed during a request"))

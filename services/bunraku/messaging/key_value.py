@@ -1,7 +1,7 @@
-"""What replicas must agree on: small values under keys, each changed only by who has seen its newest revision.
+"""Key-value store for state on which replicas must agree, with optimistic concurrency by revisions.
 
-The shape is that of a key-value bucket of NATS JetStream, so that a broker can take the place of this process's own.
-Keys are words of A-Z a-z 0-9 _ - joined by dots.
+The interface is that of a NATS JetStream key-value bucket, so that a broker (`bunraku.messaging.key_value_nats`) can
+replace the store of one process. Keys are tokens of A-Z a-z 0-9 _ - joined by dots.
 """
 
 from __future__ import annotations
@@ -11,73 +11,70 @@ from itertools import count
 from typing import Protocol
 
 SESSION_KEY_PREFIX = "sessions"
-"""`sessions.{id}` has what another replica needs to go on with a session, as long as it is open."""
+"""Prefix of `sessions.{id}`: the state with which another replica can take over an open session."""
 
 
 class RevisionConflict(Exception):
-    """The value has changed since it was read."""
+    """A write whose expected revision is not the current one."""
 
 
 @dataclass(frozen=True, slots=True)
 class KeyValueEntry:
-    """A value and its revision, a number that each change makes greater."""
+    """A value and its revision, a number that increases with each write."""
 
     value: bytes
     revision: int
 
 
 class KeyValueStore(Protocol):
-    """The register as the services see it. Each call raises `Unavailable` where the broker is gone."""
+    """Key-value store as services use it. Methods raise `BackendUnavailable` if the broker does not respond."""
 
     async def get(self, key: str) -> KeyValueEntry | None:
-        """What is under a key."""
+        """Return the entry of a key, None if it does not exist."""
 
     async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
-        """Everything under keys that begin with `prefix` and a dot, in no order."""
+        """Return all entries whose keys begin with `prefix` and a dot, in no order."""
 
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
-        """Its new revision. With `revision` only where that is still the newest, 0 where nothing is there; raises
-        `Conflict`."""
+        """Write a value and return its revision.
+
+        With `revision`, raise `RevisionConflict` unless it is the current one; 0 means that the key must not exist.
+        """
 
     async def remove(self, key: str, revision: int | None = None) -> None:
-        """Remove a key; nothing happens where there is none. `revision` as in `put`."""
+        """Remove a key if it exists; `revision` as in `put`."""
 
     async def close(self) -> None:
-        """Nothing is asked after this."""
+        """End the use of the store."""
 
 
 class MemoryKeyValueStore:
-    """The register within one process."""
+    """Key-value store within one process."""
 
     def __init__(self) -> None:
         self._entries: dict[str, KeyValueEntry] = {}
         self._revisions = count(1)
 
     async def get(self, key: str) -> KeyValueEntry | None:
-        """As `Register.get`."""
         return self._entries.get(key)
 
     async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
-        """As `Register.all`."""
         return {key: value for key, value in self._entries.items() if key.startswith(f"{prefix}.")}
 
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
-        """As `Register.put`."""
         self._check_revision(key, revision)
-        new = next(self._revisions)
-        self._entries[key] = KeyValueEntry(value, new)
-        return new
+        new_revision = next(self._revisions)
+        self._entries[key] = KeyValueEntry(value, new_revision)
+        return new_revision
 
     async def remove(self, key: str, revision: int | None = None) -> None:
-        """As `Register.remove`."""
         self._check_revision(key, revision)
         self._entries.pop(key, None)
 
     async def close(self) -> None:
-        """As `Register.close`."""
         self._entries.clear()
 
     def _check_revision(self, key: str, revision: int | None) -> None:
-        here = self._entries.get(key)
-        if revision is not None and revision != (here.revision if here else 0):
+        current = self._entries.get(key)
+        if revision is not None and revision != (current.revision if current else 0):
             raise RevisionConflict(key)

@@ -1,7 +1,7 @@
-"""The register between processes: a key-value bucket of NATS JetStream, as NATS ADR-8 lays it out.
+"""Key-value store between processes: a bucket of NATS JetStream (NATS ADR-8).
 
-A bucket is a stream that keeps the last message of each subject `$KV.{bucket}.{key}`; a revision is the number of that
-message. All is asked over the bus's own connection.
+A bucket is a stream that keeps the last message of each subject `$KV.{bucket}.{key}`; a revision is the sequence number
+of that message. Requests use the connection of the bus.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ _NO_MESSAGE_ERROR, _WRONG_LAST_SEQUENCE_ERROR, _NO_STREAM_ERROR, _STREAM_EXISTS_
 
 
 class _LastMessage(NamedTuple):
-    """The last message under a key; `removed` where it says that nothing is there."""
+    """Last message of a key, which may mark the key as removed."""
 
     entry: KeyValueEntry
     is_removed: bool
 
 
 class _JetStreamError(Exception):
-    """JetStream says no, for a reason with this number."""
+    """An error response of JetStream, with its error code."""
 
     def __init__(self, code: int, description: str) -> None:
         super().__init__(description)
@@ -51,83 +51,79 @@ class _JetStreamError(Exception):
 
 
 class NatsKeyValueStore:
-    """The register upon a bus to servers with JetStream."""
+    """Key-value store on NATS servers with JetStream."""
 
     def __init__(self, bus: NatsBus, replicas: int = 1) -> None:
-        """`replicas` servers of a cluster keep it, where it is not there yet."""
+        """`replicas` is the number of servers that store the bucket, applied when it is created."""
         self._bus = bus
         self._replicas = replicas
         self._stream_created = False
 
     async def get(self, key: str) -> KeyValueEntry | None:
-        """As `Register.get`."""
         last = await self._get_last_message(_subject(key))
         return None if last is None or last.is_removed else last.entry
 
     async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
-        """As `Register.all`."""
-        asked = {"subjects_filter": _subject(f"{prefix}.>")}
+        query = {"subjects_filter": _subject(f"{prefix}.>")}
         try:
-            told = await self._request(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", json.dumps(asked).encode())
-        except _JetStreamError as refused:
-            raise BackendUnavailable("the register", str(refused)) from None
-        subjects = list(told["state"].get("subjects") or ())
-        found = await asyncio.gather(*map(self._get_last_message, subjects))
+            info = await self._request(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", json.dumps(query).encode())
+        except _JetStreamError as error:
+            raise BackendUnavailable("the register", str(error)) from None
+        subjects = list(info["state"].get("subjects") or ())
+        messages = await asyncio.gather(*map(self._get_last_message, subjects))
         return {
             subject.removeprefix(_subject("")): last.entry
-            for subject, last in zip(subjects, found, strict=True)
+            for subject, last in zip(subjects, messages, strict=True)
             if last is not None and not last.is_removed
         }
 
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
-        """As `Register.put`."""
         try:
             return await self._put(key, value, revision)
         except RevisionConflict:
-            # what was removed leaves a message behind
+            # a removed key has a message that marks the removal
             last = await self._get_last_message(_subject(key)) if revision == 0 else None
             if last is None or not last.is_removed:
                 raise
             return await self._put(key, value, last.entry.revision)
 
     async def remove(self, key: str, revision: int | None = None) -> None:
-        """As `Register.remove`."""
         await self._put(key, b"", revision, {_OPERATION_HEADER: "DEL"})
 
     async def close(self) -> None:
-        """As `Register.close`; the bus is closed by who opened it."""
+        """Do nothing: the owner of the bus closes it."""
 
     async def _put(self, key: str, value: bytes, revision: int | None, headers: Mapping[str, str] | None = None) -> int:
         expected = {} if revision is None else {_EXPECTED_SEQUENCE_HEADER: str(revision)}
         try:
-            told = await self._request(_subject(key), value, {**(headers or {}), **expected})
-        except _JetStreamError as refused:
-            if refused.code != _WRONG_LAST_SEQUENCE_ERROR:
-                raise BackendUnavailable("the register", str(refused)) from None
+            response = await self._request(_subject(key), value, {**(headers or {}), **expected})
+        except _JetStreamError as error:
+            if error.code != _WRONG_LAST_SEQUENCE_ERROR:
+                raise BackendUnavailable("the register", str(error)) from None
             raise RevisionConflict(key) from None
-        return int(told["seq"])
+        return int(response["seq"])
 
     async def _get_last_message(self, subject: str) -> _LastMessage | None:
-        asked = json.dumps({"last_by_subj": subject}).encode()
+        query = json.dumps({"last_by_subj": subject}).encode()
         try:
-            message = (await self._request(f"{_API_PREFIX}.MSG.GET.{_STREAM_NAME}", asked))["message"]
-        except _JetStreamError as refused:
-            if refused.code != _NO_MESSAGE_ERROR:
-                raise BackendUnavailable("the register", str(refused)) from None
+            message = (await self._request(f"{_API_PREFIX}.MSG.GET.{_STREAM_NAME}", query))["message"]
+        except _JetStreamError as error:
+            if error.code != _NO_MESSAGE_ERROR:
+                raise BackendUnavailable("the register", str(error)) from None
             return None
         removed = f"{_OPERATION_HEADER}:".encode() in base64.b64decode(message.get("hdrs", ""))
         return _LastMessage(KeyValueEntry(base64.b64decode(message.get("data", "")), int(message["seq"])), removed)
 
     async def _request(self, subject: str, data: bytes, headers: Mapping[str, str] | None = None) -> dict[str, Any]:
-        """What JetStream answers, the bucket made where it is missing; raises `_Refused`."""
+        """Return a response of JetStream, creating the bucket if needed; raise `_JetStreamError`."""
         if not self._stream_created:
             await self._create_stream()
         try:
             return await self._request_once(subject, data, headers)
-        except _JetStreamError as refused:
-            if refused.code != _NO_STREAM_ERROR:
+        except _JetStreamError as error:
+            if error.code != _NO_STREAM_ERROR:
                 raise
-        # of a server that has lost everything
+        # the server has lost its data
         await self._create_stream()
         return await self._request_once(subject, data, headers)
 
@@ -137,25 +133,29 @@ class NatsKeyValueStore:
                 f"{_API_PREFIX}.CREATE.{_STREAM_NAME}",
                 json.dumps(_STREAM_CONFIG | {"num_replicas": self._replicas}).encode(),
             )
-        except _JetStreamError as refused:
-            # one that was made with other settings, more replicas say, is as good
-            if refused.code != _STREAM_EXISTS_ERROR:
-                raise BackendUnavailable("the register", str(refused)) from None
+        except _JetStreamError as error:
+            # a bucket with other settings, for example more replicas, is used as it is
+            if error.code != _STREAM_EXISTS_ERROR:
+                raise BackendUnavailable("the register", str(error)) from None
         self._stream_created = True
 
     async def _request_once(
         self, subject: str, data: bytes, headers: Mapping[str, str] | None = None
     ) -> dict[str, Any]:
         try:
-            told: dict[str, Any] = json.loads(await self._bus.request(subject, data, headers=headers or {}))
+            response: dict[str, Any] = json.loads(await self._bus.request(subject, data, headers=headers or {}))
         except NoResponse:
-            # the server is there, and what keeps things is not: off, or without a leader; a stream that is gone too
+            # the server responds, but JetStream is off or has no leader, or the stream does not exist
             self._stream_created = False
-            raise BackendUnavailable("the register", "JetStream does not answer") from None
-        error = told.get("error")
+            raise BackendUnavailable(
+                "the register", "JetStream does not answer; check that it is enabled and has a leader"
+            ) from None
+        error = response.get("error")
         if error is not None:
-            raise _JetStreamError(int(error.get("err_code", 0)), str(error.get("description", "JetStream says no")))
-        return told
+            raise _JetStreamError(
+                int(error.get("err_code", 0)), str(error.get("description", "unknown JetStream error"))
+            )
+        return response
 
 
 def _subject(key: str) -> str:

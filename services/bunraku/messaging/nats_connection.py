@@ -1,6 +1,7 @@
 """One connection to a NATS server (https://docs.nats.io/reference/reference-protocols/nats-protocol).
 
-Only what the bus needs of NATS core: what is written leaves at once, what comes is handed on as it is read, in order.
+Implements the part of NATS core that the bus needs. Writes are sent at once; messages are delivered in order as they
+are read.
 """
 
 from __future__ import annotations
@@ -10,25 +11,26 @@ import json
 import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import Any, NamedTuple, Protocol, cast
 from urllib.parse import unquote, urlsplit
 
 from bunraku import __version__
 
 CONNECT_TIMEOUT_S = 1.0
-"""Seconds that a server has to accept a connection and to speak, and to take what is left when it is closed."""
+"""Time limit for connecting and for the handshake, and for sending unsent data at closing, in seconds."""
 HEARTBEAT_INTERVAL_S = 0.4
-"""Seconds between two signs of life that the server is asked for."""
+"""Interval between PINGs to the server, in seconds."""
 MAX_MISSED_HEARTBEATS = 3
-"""So many that stay unanswered end the connection."""
+"""Number of unanswered PINGs after which the connection is closed."""
 MAX_UNSENT_BYTES = 1 << 20
-"""Bytes that may wait to be taken by the server; while more do, what is said is lost."""
+"""Maximum size of the send buffer, in bytes; beyond it messages are dropped."""
 MAX_LINE_BYTES = 1 << 16
+"""Maximum length of a control line of the protocol."""
 
 
 @dataclass(frozen=True, slots=True)
 class NatsServer:
-    """Where a server is, and who we are to it: `login` has the fields of CONNECT that say so."""
+    """Address of a server; `login` holds the credentials as fields of CONNECT."""
 
     host: str
     port: int
@@ -36,19 +38,19 @@ class NatsServer:
 
 
 def parse_servers(url: str) -> list[NatsServer]:
-    """The servers of `nats://one:4222,user:password@two:4222`; raises ValueError where it is no such address."""
+    """Parse `nats://one:4222,user:password@two:4222`; raise ValueError for an invalid address."""
     scheme, _, rest = url.partition("://")
     servers = []
     for part in rest.split(","):
         try:
             parts = urlsplit(f"nats://{part.removeprefix('nats://')}")
-            # reading the port looks at it
-            fine = scheme == "nats" and parts.hostname and parts.port != 0 and parts.path in ("", "/")
+            # reading the port validates it
+            valid = scheme == "nats" and parts.hostname and parts.port != 0 and parts.path in ("", "/")
         except ValueError:
-            fine = False
-        if not fine:
-            # not the address itself, which may have a password
-            raise ValueError("a bus is at memory: or nats://host:port, more servers after commas")
+            valid = False
+        if not valid:
+            # without the address, which may contain a password
+            raise ValueError("invalid bus address, expected memory: or nats://host:port, more servers after commas")
         login = {}
         if parts.username and parts.password is None:
             login = {"auth_token": unquote(parts.username)}
@@ -58,18 +60,29 @@ def parse_servers(url: str) -> list[NatsServer]:
     return servers
 
 
-class NatsListener(Protocol):
-    """Who a connection belongs to."""
+class NatsMessage(NamedTuple):
+    """A message for a subscription."""
 
-    def on_message(
-        self, subscription_id: int, subject: str, reply: str, data: bytes, headers: bytes, status: bytes
-    ) -> None:
-        """A message to subscription `number`; `head` are its headers as they came, empty where it has none; `status` is
-        empty, 500 where an answer failed, or the server's own 503 where nobody listens."""
+    subscription_id: int
+    subject: str
+    reply: str
+    """Subject for the response, empty if none is expected."""
+    data: bytes
+    headers: bytes
+    """Raw headers, empty if there are none."""
+    status: bytes
+    """Empty, 500 for a failed response, or the server's 503 for a request without a responder."""
+
+
+class NatsListener(Protocol):
+    """Receiver of the messages of a connection."""
+
+    def on_message(self, message: NatsMessage) -> None:
+        """Process a message at once."""
 
 
 class NatsConnection(asyncio.Protocol):
-    """One connection, open until `ended` is done; its result says why it ended."""
+    """One connection to a server, open until `closed` is done; the result of `closed` is the reason."""
 
     def __init__(self, listener: NatsListener) -> None:
         self._listener = listener
@@ -81,46 +94,46 @@ class NatsConnection(asyncio.Protocol):
         self._heartbeat_timer: asyncio.TimerHandle | None = None
         self._missed_heartbeats = 0
         self._receive_buffer = bytearray()
-        self._close_reason = "the server has ended the connection"
+        self._close_reason = "the server closed the connection"
         self.max_payload = 0
         self.receive_count = 0
-        """How often anything came."""
+        """Number of reads; shows whether the server has sent anything."""
 
     @classmethod
     async def open(cls, server: NatsServer, listener: NatsListener, initial_commands: list[bytes]) -> NatsConnection:
-        """Connect, with the commands `first` said and taken; raises OSError where that does not succeed."""
+        """Connect and send `initial_commands`, confirmed by the server; raise OSError on failure."""
         try:
             async with asyncio.timeout(CONNECT_TIMEOUT_S):
-                link = await cls._connect(server, listener)
+                connection = await cls._connect(server, listener)
                 try:
-                    await link._handshake(server, initial_commands)
+                    await connection._handshake(server, initial_commands)
                 except BaseException:
-                    link.abort("not connected")
+                    connection.abort("not connected")
                     raise
-                return link
+                return connection
         except TimeoutError:
-            raise ConnectionError("the server does not answer") from None
+            raise ConnectionError("the server does not respond") from None
 
     @classmethod
     async def _connect(cls, server: NatsServer, listener: NatsListener) -> NatsConnection:
         loop = asyncio.get_running_loop()
-        # looked up here: within `create_connection` one that fails when nobody waits any more is logged as a fault
-        found = await loop.getaddrinfo(server.host, server.port, type=socket.SOCK_STREAM)
-        refused = OSError("its name has no address")
-        for *_, address in found:
+        # resolved here: asyncio logs an error if a lookup inside `create_connection` fails after cancellation
+        addresses = await loop.getaddrinfo(server.host, server.port, type=socket.SOCK_STREAM)
+        failure = OSError("its name has no address")
+        for *_, address in addresses:
             try:
-                _, link = await loop.create_connection(lambda: cls(listener), str(address[0]), server.port)
+                _, connection = await loop.create_connection(lambda: cls(listener), str(address[0]), server.port)
             except OSError as error:
-                refused = error
+                failure = error
             else:
-                return link
-        raise refused
+                return connection
+        raise failure
 
     async def _handshake(self, server: NatsServer, initial_commands: list[bytes]) -> None:
         await self._wait_or_raise(self._info_received)
-        about = {"lang": "python", "version": __version__, "name": "bunraku", "protocol": 1, "headers": True}
+        client = {"lang": "python", "version": __version__, "name": "bunraku", "protocol": 1, "headers": True}
         modes = {"verbose": False, "pedantic": False, "no_responders": True}
-        connect = json.dumps(about | modes | server.login).encode()
+        connect = json.dumps(client | modes | server.login).encode()
         self._transport.write(b"CONNECT %b\r\n%bPING\r\n" % (connect, b"".join(initial_commands)))
         await self._wait_or_raise(self._pong_received)
         self._send_heartbeat()
@@ -131,14 +144,14 @@ class NatsConnection(asyncio.Protocol):
             raise ConnectionError(self.closed.result())
 
     def send_command(self, command: bytes) -> bool:
-        """Say a whole command; whether there was room for it."""
+        """Send a complete command; return False, with nothing sent, if the send buffer is full."""
         if self._transport.is_closing() or self.unsent_bytes > MAX_UNSENT_BYTES:
             return False
         self._transport.write(command)
         return True
 
     def publish(self, subject: str, data: bytes, reply: str = "", headers: Mapping[str, str] | None = None) -> bool:
-        """Send a message of at most `max_payload` bytes; whether there was room for it."""
+        """Send a message of at most `max_payload` bytes; return False if the send buffer is full."""
         if headers:
             head = "".join(
                 ["NATS/1.0\r\n", *(f"{name}: {value}\r\n" for name, value in headers.items()), "\r\n"]
@@ -150,25 +163,25 @@ class NatsConnection(asyncio.Protocol):
         return self.send_command(b"PUB %b %b %d\r\n%b\r\n" % (subject.encode(), reply.encode(), len(data), data))
 
     def respond_error(self, subject: str, reason: str) -> bool:
-        """Send `why` under the status 500, in place of an answer; whether there was room for it."""
+        """Send `reason` with status 500 instead of a response; return False if the send buffer is full."""
         head, data = b"NATS/1.0 500\r\n\r\n", reason.encode()
         sizes = len(head), len(head) + len(data)
         return self.send_command(b"HPUB %b %d %d\r\n%b%b\r\n" % (subject.encode(), *sizes, head, data))
 
     @property
     def unsent_bytes(self) -> int:
-        """Bytes that wait to be taken by the server."""
+        """Size of the send buffer."""
         return self._transport.get_write_buffer_size()
 
     async def close(self) -> None:
-        """End it; what waits is sent if that takes no longer than a second."""
+        """Close the connection; unsent data is sent if the server accepts it within `CONNECT_TIMEOUT_S`."""
         self._close_reason = "closed"
         self._transport.close()
         await asyncio.wait((self.closed,), timeout=CONNECT_TIMEOUT_S)
         self.abort("closed")
 
     def abort(self, reason: str) -> None:
-        """End it at once."""
+        """Close the connection at once and discard unsent data."""
         self._close_reason = reason
         self._transport.abort()
         self.connection_lost(None)
@@ -177,27 +190,24 @@ class NatsConnection(asyncio.Protocol):
         if self.closed.done():
             return
         if self._missed_heartbeats >= MAX_MISSED_HEARTBEATS:
-            self.abort("the server is silent")
+            self.abort("the server does not respond")
             return
         self._missed_heartbeats += 1
-        # past the limit of what may wait: there is little of it
+        # not limited by the send buffer: PINGs are small
         self._transport.write(b"PING\r\n")
         self._heartbeat_timer = asyncio.get_running_loop().call_later(HEARTBEAT_INTERVAL_S, self._send_heartbeat)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As asyncio has it."""
-        # uvloop's are none in name
+        # cast: transports of uvloop do not inherit from asyncio.Transport
         self._transport = cast(asyncio.Transport, transport)
 
     def connection_lost(self, error: Exception | None) -> None:
-        """As asyncio has it."""
         if self._heartbeat_timer is not None:
             self._heartbeat_timer.cancel()
         if not self.closed.done():
             self.closed.set_result(f"{self._close_reason}: {error}" if error else self._close_reason)
 
     def data_received(self, data: bytes) -> None:
-        """As asyncio has it."""
         self._missed_heartbeats = 0
         self.receive_count += 1
         self._receive_buffer += data
@@ -206,37 +216,47 @@ class NatsConnection(asyncio.Protocol):
             end = self._receive_buffer.find(b"\r\n", start)
             if end < 0:
                 if len(self._receive_buffer) - start > MAX_LINE_BYTES:
-                    self.abort("the server speaks something else")
+                    self.abort("not a NATS server: a control line is too long")
                 break
             try:
-                after = self._parse_operation(bytes(self._receive_buffer[start:end]), end + 2)
+                next_start = self._parse_operation(bytes(self._receive_buffer[start:end]), end + 2)
             except (ValueError, IndexError, KeyError) as error:
-                self.abort(f"the server speaks something else: {error!r}")
+                self.abort(f"not a NATS server: {error!r}")
                 break
-            if after is None:
+            if next_start is None:
                 break
-            start = after
+            start = next_start
         del self._receive_buffer[:start]
 
     def _parse_operation(self, line: bytes, payload_start: int) -> int | None:
-        """Take a line in, whose payload would begin `at`; where the next begins, None where the payload is not all
-        there."""
+        """Process a control line and its payload at `payload_start` in the buffer.
+
+        Return the start of the next operation, None if the payload is incomplete.
+        """
         operation, _, rest = line.partition(b" ")
         match operation.upper():
             case b"MSG" | b"HMSG":
-                headed = len(operation) == 4
+                has_headers = len(operation) == 4
                 words = rest.split()
                 size = int(words[-1])
                 if len(self._receive_buffer) < payload_start + size + 2:
                     return None
                 payload = bytes(self._receive_buffer[payload_start : payload_start + size])
-                header = int(words[-2]) if headed else 0
-                # the first line is NATS/1.0, then the status, where there is one
-                head = payload[:header]
-                status = head.split(b"\r\n", 1)[0].split()[1:2]
-                reply = words[2].decode() if len(words) == (5 if headed else 4) else ""
-                number, subject = int(words[1]), words[0].decode()
-                self._listener.on_message(number, subject, reply, payload[header:], head, status[0] if status else b"")
+                header_bytes = int(words[-2]) if has_headers else 0
+                # the first header line is NATS/1.0, followed by an optional status
+                headers = payload[:header_bytes]
+                status = headers.split(b"\r\n", 1)[0].split()[1:2]
+                reply = words[2].decode() if len(words) == (5 if has_headers else 4) else ""
+                self._listener.on_message(
+                    NatsMessage(
+                        subscription_id=int(words[1]),
+                        subject=words[0].decode(),
+                        reply=reply,
+                        data=payload[header_bytes:],
+                        headers=headers,
+                        status=status[0] if status else b"",
+                    )
+                )
                 return payload_start + size + 2
             case b"PING":
                 self._transport.write(b"PONG\r\n")
@@ -244,15 +264,15 @@ class NatsConnection(asyncio.Protocol):
                 if not self._pong_received.done():
                     self._pong_received.set_result(None)
             case b"INFO":
-                told: dict[str, Any] = json.loads(rest)
-                self.max_payload = int(told["max_payload"])
-                if told.get("tls_required"):
-                    self.abort("the server wants TLS, which is not spoken here")
+                info: dict[str, Any] = json.loads(rest)
+                self.max_payload = int(info["max_payload"])
+                if info.get("tls_required"):
+                    self.abort("the server requires TLS, which is not supported")
                 elif not self._info_received.done():
                     self._info_received.set_result(None)
             case b"-ERR":
-                # where it is grave, the server ends the connection after it
-                self._close_reason = f"the server says {rest.decode(errors='replace')}"
+                # after a fatal error the server closes the connection
+                self._close_reason = f"the server reports {rest.decode(errors='replace')}"
             case b"+OK":
                 pass
             case _:

@@ -1,6 +1,7 @@
-"""What the session service asks for on the bus when a session is to be kept as a motion (subject `ingest.keep`).
+"""Request of the session service to record a session as a motion (bus subject `ingest.keep`).
 
-On the bus goes the name under which the order, MessagePack, lies in the library beside the log that it names.
+The request, as MessagePack, and the session log are stored in the motion store; the bus message is the name of the
+stored request.
 """
 
 from __future__ import annotations
@@ -10,32 +11,35 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 RECORDING_FPS = 60
-"""Frames a second of a kept motion: as many as viewers are shown."""
+"""Frame rate of a recorded motion, the rate at which viewers render."""
 MAX_RECORDING_S = 600
-"""The longest that is kept in one motion."""
+"""Maximum duration of a recording, in seconds."""
 MAX_CAMERA_KEYFRAMES = 36_001
-"""Of the camera: one a frame of the longest motion."""
+"""Maximum number of camera keyframes: one per frame of the longest recording."""
 
 ClockTime = Annotated[int, Field(ge=0, lt=1 << 53)]
 KeyframeValues = Annotated[list[FiniteFloat], Field(min_length=8, max_length=8)]
 
 
 class RecordingRequest(BaseModel):
-    """What to keep: clock times `begin` to `end`, microseconds, of the session whose log is the library's object `log`.
-
-    `subject` is who stores it. `camera` are keyframes in ascending order of clock time: time, position and the point
-    gazed at in metres, vertical field of view in radians. Without a `name` the motion has that of the dance.
-    """
+    """Interval of a session to record as a motion."""
 
     model_config = ConfigDict(extra="ignore")
     log: str
+    """Name of the session log in the motion store."""
     name: Annotated[str | None, Field(max_length=200)] = None
+    """Name of the new motion; None: derived from the name of the motion that was played."""
     subject: Annotated[str, Field(max_length=64)] = ""
+    """Subject that stores the motion."""
     begin: ClockTime
+    """Start of the interval, clock time in microseconds."""
     end: ClockTime
+    """End of the interval, clock time in microseconds."""
     camera: Annotated[list[KeyframeValues], Field(max_length=MAX_CAMERA_KEYFRAMES)] = []
+    """Keyframes in ascending order of clock time: time (microseconds), position and gaze point (metres), vertical field
+    of view (radians)."""
 
     @property
     def frame_count(self) -> int:
-        """Frames of the motion, should all of it be kept."""
+        """Number of frames of the complete interval."""
         return max(round((self.end - self.begin) * RECORDING_FPS / 1e6), 0)

@@ -16,7 +16,7 @@ PROCRUSTES_ITERATIONS = 12
 
 
 def solve_kabsch(points: Array, targets: Array, weights: Array) -> Array:
-    """Return rotations (..., 4) from `points` (m, 3) to the nearest of `targets` (..., m, 3); `weights` (m,)."""
+    """Return rotations (..., 4) of `points` (m, 3) nearest to `targets` (..., m, 3)."""
     covariance = np.einsum("m,...mi,mj->...ij", weights, targets, points)
     u, _, v = np.linalg.svd(covariance)
     proper = np.linalg.det(u) * np.linalg.det(v)
@@ -25,7 +25,7 @@ def solve_kabsch(points: Array, targets: Array, weights: Array) -> Array:
 
 
 def mean_local_positions(orientation: Array, targets: Array) -> Array:
-    """Return the mean positions (m, 3) of `targets` (n, m, 3), relative to a joint, in its frame; `orientation` (n, 4)."""
+    """Return the mean positions (m, 3) of `targets` (n, m, 3) in the frame of a joint; `orientation` (n, 4)."""
     places: Array = rotation.rotate(rotation.conjugate(orientation)[:, None], targets).mean(axis=0)
     return places
 

@@ -1,4 +1,4 @@
-"""The sound a viewer holds, and the packets to be decoded from any instant on (SPEC.md, Audio block)."""
+"""Audio blocks that a viewer holds, and the packets to decode from any position (SPEC.md, Audio block)."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from bunraku.playout.block_store import TrackBlockStore
 
 @dataclass(frozen=True, slots=True)
 class AudioBlock:
-    """A block of `frames` frames of the motion, and the packets that start in it."""
+    """Packets that start in a block of `frames` frames of the motion."""
 
     frames: int
     packets: list[AudioPacket]
 
 
 class AudioBlockStore(TrackBlockStore[AudioTrack, AudioBlock]):
-    """Blocks of one audio track, of each the best rate that came."""
+    """Blocks of one audio track, each at the highest level received."""
 
     def put_encoded(self, index: int, level: int, data: bytes) -> bool:
-        """As `put`, of a block's bytes; raises `DamagedBlock` for what cannot be one of this track."""
+        """Parse a block and `put` it; raise `DamagedBlock` if it is not one of this track."""
         packets = unpack_audio_block(data)
         if packets and packets[-1].number >= self.track.packet_count:
             raise DamagedBlock(
-                f"this audio has {self.track.packet_count} packets, and none of number {packets[-1].number}"
+                f"Block {index} of the audio track holds packet {packets[-1].number}, "
+                f"but the track has {self.track.packet_count} packets only"
             )
         return self.put(index, level, AudioBlock(self.track.frames_in(index), packets))
 
     def packets_from(self, position: int) -> list[AudioPacket]:
-        """The packets that are here without a gap, from the one that is heard at motion time `position`, microseconds,
-        to the end of the motion at most."""
-        heard = (position * SAMPLE_RATE // 1_000_000 + self.track.pre_skip) // PACKET_SAMPLES
+        """Return the packets from motion time `position` (microseconds) to the first gap, or the end of the motion."""
+        first = (position * SAMPLE_RATE // 1_000_000 + self.track.pre_skip) // PACKET_SAMPLES
         found: list[AudioPacket] = []
-        # a packet sounds on beyond its block's end, and a block may be shorter than it
-        for index in range(self.track.block_of_packet(heard), self.track.block_count):
+        # a packet may extend beyond its block, and a block may be shorter than a packet
+        for index in range(self.track.block_of_packet(first), self.track.block_count):
             if index not in self._blocks:
                 break
             for packet in self._blocks[index][1].packets:
-                if packet.number == heard + len(found):
+                if packet.number == first + len(found):
                     found.append(packet)
         return found

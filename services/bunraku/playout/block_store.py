@@ -1,4 +1,4 @@
-"""The blocks a viewer holds, and what they show at any instant (SPEC.md, Motion block and Scene block)."""
+"""Blocks that a viewer holds, and their values at any position (SPEC.md, Motion block and Scene block)."""
 
 from __future__ import annotations
 
@@ -29,28 +29,30 @@ Track = TypeVar("Track", bound=Timing)
 
 
 class TrackBlockStore(Generic[Track, Block]):
-    """Decoded blocks of one track, of each the best rate that came."""
+    """Decoded blocks of one track, each at the highest level received."""
 
     def __init__(self, track: Track) -> None:
         self.track = track
         self._blocks: dict[int, tuple[int, Block]] = {}
 
     def put(self, index: int, level: int, block: Block) -> bool:
-        """Keep a block unless a better one is here; whether it was kept. One that does not fit the track is refused
-        with ValueError."""
+        """Store a block unless one of a higher level is stored; return True if it was stored.
+
+        Raises ValueError if the block does not fit the track.
+        """
         if not 0 <= index < self.track.block_count or block.frames != self.track.frames_in(index):
-            raise ValueError(f"block {index} with {block.frames} frames is not of this motion")
+            raise ValueError(f"Block {index} with {block.frames} frames does not belong to this track")
         if index in self._blocks and self._blocks[index][0] > level:
             return False
         self._blocks[index] = (level, block)
         return True
 
     def level(self, index: int) -> int:
-        """The rate held of a block, -1 where it is missing."""
+        """Return the level of the stored block, -1 if it is missing."""
         return self._blocks[index][0] if index in self._blocks else -1
 
     def buffered_us(self, position: int, loop: bool) -> int:
-        """Microseconds of motion that are here from `position` on without a gap, once around at most."""
+        """Return the duration stored from `position` on without a gap, at most one loop; microseconds."""
         track, end = self.track, position
         first = track.block_at(position)
         for index in range(first, first + track.block_count if loop else track.block_count):
@@ -63,9 +65,12 @@ class TrackBlockStore(Generic[Track, Block]):
     def _find_block(
         self, position: int, loop: bool, duration: int | None = None
     ) -> tuple[Block, float, Block | None] | None:
-        """The block at motion time `position` and the instant in it, in frames from its first; past its last frame
-        also the block that follows, where that is here: at the end of a loop where the track is as long as the motion,
-        whose `duration` in microseconds is its own where that is not given. None where the block is missing."""
+        """Return the block at motion time `position`, the instant in it in frames, and the following block.
+
+        The following block is returned past the last frame only, if it is stored. At the end of a loop it is the first
+        one, if the track is as long as the motion (`duration` microseconds, by default that of the track). Returns None
+        if the block is missing.
+        """
         track = self.track
         loop = loop and (duration is None or track.duration_us + 1e6 / track.fps > duration)
         index = track.block_at(position)
@@ -80,14 +85,14 @@ class TrackBlockStore(Generic[Track, Block]):
 
 
 class MotionBlockStore(TrackBlockStore[MotionTrack, MotionBlock]):
-    """Decoded blocks of one motion, of each the best rate that came."""
+    """Decoded blocks of one performer's motion, each at the highest level received."""
 
     def pose_at(self, position: int, loop: bool = True, duration: int | None = None) -> Pose | None:
-        """The pose at motion time `position` in microseconds, None where its block is missing.
+        """Return the pose at motion time `position` (microseconds), None if its block is missing.
 
-        Between the last frame of a block and the first of the next it is the mix of the two where the next is here, at
-        the end of a loop too where the track is as long as the motion, which lasts `duration` microseconds (its own
-        length, if not said); past the end of a shorter one it stands still.
+        Between the last frame of a block and the first of the next, the two are interpolated if the next is stored.
+        This holds at the end of a loop, too, if the track is as long as the motion (`duration` microseconds, by default
+        that of the track). Past the end of a shorter track the pose stays constant.
         """
         found = self._find_block(position, loop, duration)
         if found is None:
@@ -104,18 +109,18 @@ class MotionBlockStore(TrackBlockStore[MotionTrack, MotionBlock]):
         )
 
     def rotations_at(self, positions: list[int], loop: bool = True, duration: int | None = None) -> list[Array | None]:
-        """The rotations (18, 4) of `pose_at` at some motion times at once, which costs little more than one."""
+        """Return the rotations (18, 4) of `pose_at` at several motion times, for little more than the cost of one."""
         found: list[Array | None] = [None] * len(positions)
-        together: dict[tuple[int, bool], tuple[MotionBlock, MotionBlock | None, list[int], list[float]]] = {}
+        groups: dict[tuple[int, bool], tuple[MotionBlock, MotionBlock | None, list[int], list[float]]] = {}
         for nth, position in enumerate(positions):
-            place = self._find_block(position, loop, duration)
-            if place is None:
+            location = self._find_block(position, loop, duration)
+            if location is None:
                 continue
-            block, instant, following = place
-            members = together.setdefault((id(block), following is None), (block, following, [], []))
+            block, instant, following = location
+            members = groups.setdefault((id(block), following is None), (block, following, [], []))
             members[2].append(nth)
             members[3].append(instant)
-        for block, following, numbers, instants in together.values():
+        for block, following, numbers, instants in groups.values():
             for nth, rotations in zip(
                 numbers, _interpolate_rotations(block, following, np.array(instants)), strict=True
             ):
@@ -124,7 +129,7 @@ class MotionBlockStore(TrackBlockStore[MotionTrack, MotionBlock]):
 
 
 def _interpolate_rotations(block: MotionBlock, following: MotionBlock | None, instants: Array) -> Array:
-    """Rotations (m, 18, 4) at `instants` (m,) of a block, or between its last frame and the `following` one's first."""
+    """Return rotations (m, 18, 4) at `instants` (m,) of a block, or between its last frame and the following block."""
     if following is None:
         return block.pose_at(instants)[1]
     last, first = block.pose_at(block.frames - 1.0)[1][0], following.pose_at(0.0)[1][0]
@@ -133,13 +138,13 @@ def _interpolate_rotations(block: MotionBlock, following: MotionBlock | None, in
 
 
 class SceneBlockStore(TrackBlockStore[SceneTrack, SceneBlock]):
-    """Decoded blocks of one camera or light, of each the best rate that came."""
+    """Decoded blocks of one camera or light, each at the highest level received."""
 
     def scene_at(self, position: int, loop: bool, duration: int) -> Array | None:
-        """The seven numbers (7,) at `position` of a motion of `duration` microseconds, None where the block is missing.
+        """Return the values (7,) at `position` of a motion of `duration` microseconds, None if the block is missing.
 
-        Between blocks they are the linear mix, at the end of a loop too where the track is as long as the motion; past
-        the end of a shorter one they stand still.
+        They are interpolated linearly between blocks, and at the end of a loop if the track is as long as the motion.
+        Past the end of a shorter track they stay constant.
         """
         found = self._find_block(position, loop, duration)
         if found is None:

@@ -1,10 +1,9 @@
-"""The reference clock as seen from this end of a line.
+"""Reference clock as estimated at this end of a connection.
 
-Pings and pongs are of equal size, so on a narrow line both ways take equally long to send. Each answer says between
-which bounds the offset lies: it is off by half its round trip at most, and by what the clocks have drifted since. The
-offset is the middle of what the last samples leave (Marzullo and Owicki 1983): one that waited least on its way there
-and another that waited least on its way back say it together. What is shown slews towards it and never steps, so the
-picture does not jump.
+Ping and Pong have the same size, so both directions take equally long on a constrained link. Each round trip bounds the
+offset: it is wrong by at most half the round trip, plus the drift since then. The estimate is the middle of the
+intersection of these bounds (Marzullo and Owicki 1983): a sample with a fast outward way and another with a fast return
+complement each other. The offset in use slews towards the estimate and never steps, so the picture does not jump.
 """
 
 from __future__ import annotations
@@ -15,31 +14,32 @@ from dataclasses import dataclass
 
 MAX_SAMPLES = 32
 MAX_CLOCK_DRIFT = 200e-6
-"""Microseconds a microsecond that two clocks may go apart."""
+"""Upper bound of the drift between two clocks, microseconds per microsecond."""
 SLEW_TIME_CONSTANT_US = 250_000
-"""The shown offset closes on the best one with this time constant, microseconds."""
+"""Time constant with which the offset in use approaches the estimate, microseconds."""
 MAX_SLEW_RATE = 0.9
-"""It moves by this at most, microseconds a microsecond: shown time never stands or runs back."""
+"""Upper bound of the slew, microseconds per microsecond: time in use never stops or runs backwards."""
 RESET_THRESHOLD_US = 1_000_000
-"""Further off than this, at the start or after a pause of the machine, the clock is set anew."""
+"""An offset that is wrong by more, at the start or after the machine was suspended, is stepped, microseconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class ClockSample:
-    """One round trip: reference minus local `offset`, the time on the way, `trip`, and when it came, `at` on the local
-    clock; microseconds."""
+    """Measurement of one round trip; microseconds."""
 
     offset: float
+    """Reference time minus local time."""
     round_trip_us: int
     received_at: int = 0
+    """Local time at which the answer was received."""
 
     def error_bound(self, now: int) -> float:
-        """How far the offset may be off at `now`."""
+        """Return the maximum error of the offset at local time `now`."""
         return self.round_trip_us / 2 + MAX_CLOCK_DRIFT * (now - self.received_at)
 
 
 class ReferenceClock:
-    """Local time to reference time. All arguments and results are microseconds."""
+    """Conversion of local time to reference time. All arguments and results are microseconds."""
 
     def __init__(self) -> None:
         self._samples: deque[ClockSample] = deque(maxlen=MAX_SAMPLES)
@@ -48,9 +48,9 @@ class ReferenceClock:
         self._slewed_at: int | None = None
 
     def add_sample(self, sent: int, received: int, answered: int, arrived: int) -> None:
-        """Take in an answer: `sent` and `arrived` on the local clock, `received` and `answered` on the reference clock.
+        """Add a Pong: `sent` and `arrived` are local times, `received` and `answered` reference times.
 
-        An answer that took less than no time is ignored.
+        An answer with a negative round trip is ignored.
         """
         trip = (arrived - sent) - (answered - received)
         if trip < 0 or answered < received:
@@ -61,27 +61,27 @@ class ReferenceClock:
             self._slewed_offset, self._slewed_at = self.offset, arrived
 
     def set_estimate(self, reference: int, local: int) -> None:
-        """A first idea of the time, from a message that said it: used until an answer says it well."""
+        """Set the offset from a message that holds the reference time; it is used until the first sample."""
         if self._slewed_at is None:
             self._slewed_offset, self._slewed_at = float(reference - local), local
 
     @property
     def is_synchronised(self) -> bool:
-        """Whether an answer has come yet."""
+        """True once a sample was added."""
         return bool(self._samples)
 
     @property
     def offset(self) -> float:
-        """Reference minus local, as far as the samples say."""
+        """Estimate of reference time minus local time."""
         return (self._min_offset + self._max_offset) / 2 if self._samples else 0.0
 
     @property
     def error_bound(self) -> float:
-        """How far the offset may be off at most, when the last answer came."""
+        """Maximum error of the offset at the time of the last sample."""
         return (self._max_offset - self._min_offset) / 2 if self._samples else float("inf")
 
     def restart(self) -> None:
-        """A new connection, perhaps to another machine: older answers say nothing about it. The offset in use stays."""
+        """Discard the samples after a reconnect, perhaps to another machine; the offset in use stays."""
         self._samples.clear()
 
     def _update_bounds(self, now: int) -> None:
@@ -90,19 +90,19 @@ class ReferenceClock:
             self._max_offset = min(sample.offset + sample.error_bound(now) for sample in self._samples)
             if self._min_offset <= self._max_offset or len(self._samples) == 1:
                 return
-            # a clock was set anew: what was said before is no longer true
+            # the bounds contradict each other: a clock was stepped, and older samples are invalid
             self._samples.popleft()
 
     @property
     def slewed_offset(self) -> float:
-        """The offset in use: on its way to `offset`."""
+        """Offset in use, which approaches `offset`."""
         return self._slewed_offset
 
     def at(self, local: int) -> int:
-        """The reference time at `local`; calls come in order of time."""
+        """Return the reference time at `local`; calls must be in order of time."""
         if self._samples and self._slewed_at is not None and local > self._slewed_at:
-            passed = local - self._slewed_at
-            closed = (self.offset - self._slewed_offset) * -math.expm1(-passed / SLEW_TIME_CONSTANT_US)
-            self._slewed_offset += min(max(closed, -MAX_SLEW_RATE * passed), MAX_SLEW_RATE * passed)
+            elapsed = local - self._slewed_at
+            correction = (self.offset - self._slewed_offset) * -math.expm1(-elapsed / SLEW_TIME_CONSTANT_US)
+            self._slewed_offset += min(max(correction, -MAX_SLEW_RATE * elapsed), MAX_SLEW_RATE * elapsed)
             self._slewed_at = local
         return round(local + self._slewed_offset)

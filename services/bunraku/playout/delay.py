@@ -1,8 +1,8 @@
-"""How much later than the reference clock a viewer shows the stage, so that what is pulled has come when it is due.
+"""Play-out delay of a viewer behind the reference clock, so that overlays arrive before they are due.
 
 Adaptive play-out (Ramjee, Kurose, Towsley and Schulzrinne, Infocom 1994): nearly all of the last messages would have
-come in time; on a quick line the delay is none. It is slewed and never steps: up at 5 % of the time that passes, down
-over some ten seconds. All arguments and results are microseconds.
+arrived in time; on a fast link the delay is zero. It slews and never steps: up by 5 % of the elapsed time, down over
+some ten seconds. All arguments and results are microseconds.
 """
 
 from __future__ import annotations
@@ -11,46 +11,48 @@ import math
 from collections import deque
 
 ON_TIME_QUANTILE = 0.95
-"""Of the last messages, this part is to come in time."""
+"""Share of the last messages that must arrive in time."""
 DELAY_MARGIN_US = 10_000
-"""Beyond that."""
+"""Added to that quantile, microseconds."""
 MAX_DELAY_US = 400_000
-"""No stage is shown later."""
+"""Upper bound of the delay, microseconds."""
 LATENESS_SAMPLES = 128
-"""Messages that are remembered: four seconds, at thirty a second."""
+"""Messages in the quantile: four seconds at 30 per second."""
 MIN_LATENESS_SAMPLES = 20
-"""Nothing is said by fewer: the first one may be an old one, sent to who joins."""
+"""Minimum number of messages: the first may be an old one, sent to a viewer that joins."""
 MAX_GROWTH_RATE = 0.05
-"""Microseconds a microsecond."""
+"""Upper bound of the growth of the delay, microseconds per microsecond."""
 SHRINK_TIME_CONSTANT_US = 10_000_000
-"""Time constant on the way down."""
+"""Time constant of its decrease, microseconds."""
 
 
 class PlayoutDelay:
-    """The delay of one viewer."""
+    """Play-out delay of one viewer."""
 
     def __init__(self) -> None:
         self._lateness: deque[float] = deque(maxlen=LATENESS_SAMPLES)
-        # the delay in use was `_from` at local time `_since`, and goes to `_goal`
+        # the delay in use was `_start` at local time `_started_at`, and approaches `_target`
         self._start = 0.0
         self._started_at = 0
         self._target = 0.0
 
     def add_lateness(self, lateness: float, local: int) -> None:
-        """At local time `local` a message came `late` after it was first needed, below zero before. With none the delay
-        stays as it is."""
+        """Add a message that arrived at local time `local`, `lateness` after it was needed (negative if before).
+
+        Without messages the delay does not change.
+        """
         self._lateness.append(lateness)
         if len(self._lateness) < MIN_LATENESS_SAMPLES:
             return
-        enough = sorted(self._lateness)[math.ceil(ON_TIME_QUANTILE * len(self._lateness)) - 1] + DELAY_MARGIN_US
+        required = sorted(self._lateness)[math.ceil(ON_TIME_QUANTILE * len(self._lateness)) - 1] + DELAY_MARGIN_US
         self._start = self.at(local)
         self._started_at = max(local, self._started_at)
-        self._target = min(max(enough, 0.0), MAX_DELAY_US)
+        self._target = min(max(required, 0.0), MAX_DELAY_US)
 
     def at(self, local: int) -> float:
-        """The delay in use at local time `local`: on its way to what is enough."""
-        passed, away = max(local - self._started_at, 0), self._target - self._start
-        if away >= 0.0:
-            return min(self._start + MAX_GROWTH_RATE * passed, self._target)
-        # no more than the greatest delay over the time constant: within the slew
-        return self._target - away * math.exp(-passed / SHRINK_TIME_CONSTANT_US)
+        """Return the delay in use at local time `local`."""
+        elapsed, difference = max(local - self._started_at, 0), self._target - self._start
+        if difference >= 0.0:
+            return min(self._start + MAX_GROWTH_RATE * elapsed, self._target)
+        # the rate of decrease is at most MAX_DELAY_US / SHRINK_TIME_CONSTANT_US
+        return self._target - difference * math.exp(-elapsed / SHRINK_TIME_CONSTANT_US)

@@ -1,4 +1,4 @@
-"""The tracks of a stream that are known here: the dance, and the sound, the cameras and the lights beside it."""
+"""Tracks of a stream that a viewer can play: performers, audio, cameras and lights."""
 
 from __future__ import annotations
 
@@ -19,37 +19,41 @@ AnyBlockStore = MotionBlockStore | SceneBlockStore | AudioBlockStore
 
 
 class TrackSet:
-    """Of one motion."""
+    """Block stores of one motion's tracks."""
 
     def __init__(self, descriptions: Sequence[dict[str, Any]]) -> None:
-        """`described` are the tracks of a Description; those of a type or codec that is not known here are skipped.
-        Raises `DamagedBlock` where there is no motion among them that can be played here."""
+        """Create the stores for the tracks of a Description; tracks of an unknown type or codec are skipped.
+
+        Raises `DamagedBlock` if there is no motion track that can be played.
+        """
         number = next((n for n, track in enumerate(descriptions) if track.get("type") == "motion"), None)
         if number is None:
-            kinds = ", ".join(str(track.get("type")) for track in descriptions) or "nothing"
-            raise DamagedBlock(f"the stream has no motion track in it, only {kinds}: there is no dance to show")
+            types = ", ".join(str(track.get("type")) for track in descriptions) or "none"
+            raise DamagedBlock(f"The stream has no motion track (types of its tracks: {types})")
         self.first_performer = MotionBlockStore(parse_motion_track(descriptions[number]))
-        """The first performer's."""
+        """Store of the first performer."""
         self.performers: list[MotionBlockStore | None] = []
-        """The dances of the performers, in the Description's order; None of one that cannot be played here."""
+        """Stores of the performers, in the Description's order; None for one that cannot be played."""
         self.placements: list[Placement] = []
-        """Where they dance."""
-        self.kbps = [float(rate.get("kbps", 0.0)) for rate in descriptions[number].get("rates", [])]
-        """What each rate of the dance costs, kbit/s."""
+        """Placements of the performers on the stage."""
+        self.kbps = [float(level.get("kbps", 0.0)) for level in descriptions[number].get("rates", [])]
+        """Bitrate of each level of the first performer, kbit/s."""
         self.scenes: list[SceneBlockStore] = []
         """Cameras and lights, in the Description's order."""
         self.audio: AudioBlockStore | None = None
-        """None where there is none that can be heard here: the first of the Description."""
+        """Store of the first audio track that can be played, if any."""
         self.described_count = 0
-        """How many tracks were told of."""
+        """Number of tracks that were described."""
         self._stores: dict[int, AnyBlockStore] = {number: self.first_performer}
         self.add(0, descriptions)
         if self.performers[0] is None:
-            raise DamagedBlock(f"of track {number}: {descriptions[number].get('place')!r} is no place to dance at")
+            raise DamagedBlock(f"Track {number} has an invalid placement: {descriptions[number].get('place')!r}")
 
     def add(self, first: int, descriptions: Sequence[dict[str, Any]]) -> None:
-        """Take in the tracks from number `first` on that were not told of yet: a narrow line may bring them after the
-        first blocks."""
+        """Add the tracks from index `first` on that were not described yet.
+
+        On a constrained link they are described after the first blocks.
+        """
         for number, track in enumerate(descriptions, first):
             if number < self.described_count:
                 continue
@@ -68,17 +72,17 @@ class TrackSet:
     def _add_performer(self, number: int, track: dict[str, Any]) -> None:
         if len(self.performers) == MAX_PERFORMERS:
             return
-        # whoever cannot be shown keeps the number, and the limbs by which the others are called
+        # a performer that cannot be played keeps its number, by which the limbs of the others are addressed
         self.performers.append(None)
         self.placements.append(STAGE_CENTRE)
         try:
             self.placements[-1] = Placement.parse(track.get("place", STAGE_CENTRE))
         except ValueError as error:
-            raise DamagedBlock(f"of track {number}: {error}") from None
+            raise DamagedBlock(f"Track {number} has an invalid placement: {error}") from None
         store = self._stores.get(number) or MotionBlockStore(parse_motion_track(track))
         assert isinstance(store, MotionBlockStore)
         self._stores[number] = self.performers[-1] = store
 
     def store(self, track: int) -> AnyBlockStore | None:
-        """What keeps the blocks of the track of this number, None where it is not known here."""
+        """Return the store of the track with this index, None if it cannot be played."""
         return self._stores.get(track)

@@ -1,4 +1,4 @@
-"""What a service says when something that it stands on does not answer."""
+"""Errors and time limits for backends that do not respond."""
 
 from __future__ import annotations
 
@@ -7,33 +7,39 @@ from collections.abc import Awaitable
 from typing import Any, TypeVar
 
 BACKEND_TIMEOUT_S = 1.8
-"""Seconds after which the catalogue, the library or the bus counts as gone: who asked a service hears it within two."""
+"""Time after which the catalogue, the library or the bus counts as unavailable, in seconds: clients get an answer
+within two seconds."""
 STALL_GRACE_S = 0.3
-"""Of these, those in which a loop that stood still reads what came meanwhile."""
+"""Last part of a timeout, in seconds, in which an event loop that was blocked still reads answers that arrived."""
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 class BackendUnavailable(Exception):
-    """The catalogue, the library or the bus cannot be used now; `what` names which. Over HTTP it is a 503, and the same
-    request may be sent again."""
+    """A backend (`the catalogue`, `the library`, `the bus`, `the register`) that cannot be used now.
+
+    Over HTTP it becomes a 503; the same request may be repeated.
+    """
 
     def __init__(self, backend: str, reason: str) -> None:
-        """`why` is for the log, as it may name addresses."""
-        super().__init__(f"{backend} cannot be used now: {reason}")
+        """`reason` is for the log only, as it may contain addresses."""
+        super().__init__(f"{backend} is unavailable: {reason}")
         self.backend = backend
 
 
 class BackendTimeout:
-    """Waits for answers no longer than it should. What is given up is cancelled at once and ends behind the back of who
-    asked, as putting a connection in order takes a while where nobody answers."""
+    """Time limit for the calls of one backend.
+
+    A call that exceeds it is cancelled and finishes in the background: closing a connection to a backend that does
+    not respond takes time.
+    """
 
     def __init__(self, backend: str) -> None:
         self._backend = backend
         self._abandoned: set[asyncio.Future[Any]] = set()
 
-    async def wait(self, awaitable: Awaitable[Found], timeout_s: float | None = BACKEND_TIMEOUT_S) -> Found:
-        """What is `asked`; raises `Unavailable` after `seconds`, not before where these are None."""
+    async def wait(self, awaitable: Awaitable[Result], timeout_s: float | None = BACKEND_TIMEOUT_S) -> Result:
+        """Return the result of `awaitable`; raise `BackendUnavailable` after `timeout_s` seconds (None: no limit)."""
         task = asyncio.ensure_future(awaitable)
         try:
             for part in (None,) if timeout_s is None else (timeout_s - STALL_GRACE_S, STALL_GRACE_S):
@@ -45,15 +51,15 @@ class BackendTimeout:
                 task.cancel()
                 self._abandoned.add(task)
                 task.add_done_callback(self._discard_abandoned)
-        raise BackendUnavailable(self._backend, "no answer in time")
+        raise BackendUnavailable(self._backend, f"no answer within {timeout_s:g} s")
 
     async def drain_abandoned(self) -> None:
-        """Give what was given up a last chance to end."""
+        """Wait for abandoned calls to finish, at most `BACKEND_TIMEOUT_S`."""
         if self._abandoned:
             await asyncio.wait(tuple(self._abandoned), timeout=BACKEND_TIMEOUT_S)
 
     def _discard_abandoned(self, task: asyncio.Future[Any]) -> None:
         self._abandoned.discard(task)
         if not task.cancelled():
-            # looked at, so that nobody warns of it: who asked was told already
+            # retrieve the exception, so that asyncio does not log it: the caller got its own
             task.exception()

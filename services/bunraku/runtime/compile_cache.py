@@ -1,4 +1,4 @@
-"""Where compiled code is kept from run to run."""
+"""Folder for compiled kernels, reused between runs."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ PACKAGE_FOLDER = Path(__file__).parents[1]
 
 
 def compile_cache_folder(package: str) -> str | None:
-    """A folder for what is compiled of a room of this package, named by all its sources; None where there is none to
-    write in.
+    """Return the folder for compiled code of a subpackage, None if none is writable.
 
-    It lies where Python keeps its own compiled code, or in `NUMBA_CACHE_DIR` where that is set.
+    Its name is a hash of all sources of the subpackage. It lies in `__pycache__`, or in `NUMBA_CACHE_DIR` if that is
+    set.
     """
     sources = sha256()
-    for file in sorted((PACKAGE_FOLDER / package).glob("*.py")):
-        sources.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    folder = (Path(given) / package if given else PACKAGE_FOLDER / package / "__pycache__") / sources.hexdigest()[:16]
+    root = PACKAGE_FOLDER / package
+    for file in sorted(file for file in root.rglob("*") if file.suffix in (".py", ".json")):
+        sources.update(str(file.relative_to(root)).encode() + b"\0" + file.read_bytes() + b"\0")
+    configured = os.environ.get("NUMBA_CACHE_DIR")
+    parent = Path(configured) / package if configured else PACKAGE_FOLDER / package / "__pycache__"
+    folder = parent / sources.hexdigest()[:16]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:

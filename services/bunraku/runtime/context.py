@@ -1,4 +1,4 @@
-"""Catalogue, library, bus, register, gate and clock, opened together: what every service is given."""
+"""Backends, clock and metrics that every service is created with."""
 
 from __future__ import annotations
 
@@ -18,47 +18,57 @@ from bunraku.storage.motion_store import MotionStore
 
 @dataclass(frozen=True, slots=True)
 class ServiceContext:
-    """What a service stands on."""
+    """Dependencies of a service: settings, backends, access control, metrics and clock.
+
+    The services of one process share one context. Tests replace single fields.
+    """
 
     settings: Settings
+    """Addresses and limits of the process."""
     catalogue: Catalogue
+    """Rows of motions, viewer links and pending jobs."""
     motion_store: MotionStore
+    """Objects: encoded motions, uploaded files, session logs, notes."""
     bus: Bus
+    """Messages and requests between services."""
     key_values: KeyValueStore
+    """State on which replicas must agree, with revisions: session ownership, leases."""
     authenticator: Authenticator
+    """Verification of tokens, tickets and viewer links."""
     metrics: Metrics = field(default_factory=Metrics)
+    """Metrics of the process, for Prometheus."""
     clock: Callable[[], int] = clock
     """Reference clock, microseconds since 1970."""
 
 
 @asynccontextmanager
 async def open_context(settings: Settings) -> AsyncIterator[ServiceContext]:
-    """Open everything at the addresses in `settings`, and close it again; raises ValueError for what is no address.
+    """Open the backends at the addresses in `settings` and close them at the end.
 
-    Nothing need be there yet: what is away is tried again when it is used, or goes on being tried.
+    A backend may still be unavailable: it is tried again when it is used, or in the background. Raise ValueError for an
+    invalid address.
     """
     settings.data.mkdir(parents=True, exist_ok=True)
     catalogue = Catalogue(settings.catalogue_url())
-    library = MotionStore.open(settings.library_url())
-    bus, register = await _open_messaging(settings.bus, settings.register_replicas)
-    gate = Authenticator(settings, catalogue, bus)
-    backing = ServiceContext(settings, catalogue, library, bus, register, gate)
-    backing.metrics.gauge("bus_up", "Whether the bus can be used now", lambda: bus.is_connected)
-    backing.metrics.counter("bus_reconnects_total", "Times that the bus came back", lambda: bus.reconnects)
+    motion_store = MotionStore.open(settings.library_url())
+    bus, key_values = await _open_messaging(settings.bus, settings.register_replicas)
+    authenticator = Authenticator(settings, catalogue, bus)
+    context = ServiceContext(settings, catalogue, motion_store, bus, key_values, authenticator)
+    context.metrics.gauge("bus_up", "Whether the bus is connected", lambda: bus.is_connected)
+    context.metrics.counter("bus_reconnects_total", "Reconnections of the bus", lambda: bus.reconnects)
     try:
-        yield backing
+        yield context
     finally:
-        gate.close()
-        await register.close()
+        authenticator.close()
+        await key_values.close()
         await bus.close()
         await catalogue.close()
 
 
 async def _open_messaging(url: str, replicas: int) -> tuple[Bus, KeyValueStore]:
-    """The bus and the register at one address."""
     if url == "memory:":
         return MemoryBus(), MemoryKeyValueStore()
-    # imported here, as most processes have no use for them
+    # imported here, as a single process does not need them
     from bunraku.messaging.bus_nats import NatsBus
     from bunraku.messaging.key_value_nats import NatsKeyValueStore
 

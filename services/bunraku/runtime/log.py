@@ -1,7 +1,7 @@
-"""What a process says of itself, on stderr: a line for people, or one JSON object for machines.
+"""Logging of a process to stderr: plain lines for people or JSON objects for machines.
 
-All goes through the standard library's `logging`, so that a line of uvicorn's looks like one of ours. Others than we
-are heard from WARNING on: below it some tell of queries, which may hold tickets, and of statements with values.
+Everything goes through the standard library's `logging`, so that lines of uvicorn look the same. Other libraries log
+from WARNING on: below it some log queries, which may contain tickets, and SQL statements with values.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, Literal, TextIO
 import structlog
 from structlog.typing import EventDict, Processor
 
-from bunraku.http import request_id
+from bunraku.runtime import request_id
 
 LogStyle = Literal["plain", "json"]
 LogLevel = Literal["", "debug", "info", "warning", "error"]
@@ -22,29 +22,30 @@ ROOT_LOGGER = "bunraku"
 
 
 def configure_logging(style: LogStyle, level: LogLevel, service: str, stream: TextIO | None = None) -> None:
-    """Have this process log to `stream`, by default stderr; `level` empty: INFO where it is JSON, WARNING where people
-    read it. `service` says what the process is."""
-    to = sys.stderr if stream is None else stream
-    handler = _StreamHandler(to)
-    handler.setFormatter(_formatter(style, service, _supports_colour(to)))
+    """Send the log of this process to `stream`, by default stderr.
+
+    An empty `level` is INFO for JSON and WARNING for plain lines. `service` names the process in JSON.
+    """
+    output = sys.stderr if stream is None else stream
+    handler = _StreamHandler(output)
+    handler.setFormatter(_create_formatter(style, service, _supports_colour(output)))
     root = logging.getLogger()
-    for other in [one for one in root.handlers if isinstance(one, _StreamHandler)]:
-        root.removeHandler(other)
+    for previous in [each for each in root.handlers if isinstance(each, _StreamHandler)]:
+        root.removeHandler(previous)
     root.addHandler(handler)
     root.setLevel(logging.WARNING)
-    chosen = level or ("info" if style == "json" else "warning")
-    logging.getLogger(ROOT_LOGGER).setLevel(chosen.upper())
+    effective_level = level or ("info" if style == "json" else "warning")
+    logging.getLogger(ROOT_LOGGER).setLevel(effective_level.upper())
     logging.captureWarnings(True)
 
 
 class _StreamHandler(logging.StreamHandler[TextIO]):
-    """The one that is set here."""
+    """The handler that `configure_logging` installs and replaces."""
 
 
-def _formatter(style: LogStyle, service: str, use_colour: bool) -> logging.Formatter:
-    def told(_: Any, __: str, event: EventDict) -> EventDict:
-        """Which process, and which request."""
-        # what other handlers of the same line have left in it
+def _create_formatter(style: LogStyle, service: str, use_colour: bool) -> logging.Formatter:
+    def add_process_fields(_: Any, __: str, event: EventDict) -> EventDict:
+        # other handlers of the same record leave these two
         event.pop("message", None)
         event.pop("asctime", None)
         if style == "json":
@@ -58,10 +59,10 @@ def _formatter(style: LogStyle, service: str, use_colour: bool) -> logging.Forma
         structlog.stdlib.add_logger_name,
         structlog.stdlib.ExtraAdder(),
         structlog.processors.TimeStamper(fmt="iso", utc=True, key="time" if style == "json" else "timestamp"),
-        told,
+        add_process_fields,
     ]
-    # locals, which tracebacks may show, hold what is nobody's business
-    last: list[Processor] = (
+    # tracebacks without local variables, which may hold secrets
+    renderers: list[Processor] = (
         [structlog.processors.format_exc_info, structlog.processors.JSONRenderer(default=str)]
         if style == "json"
         else [
@@ -71,7 +72,7 @@ def _formatter(style: LogStyle, service: str, use_colour: bool) -> logging.Forma
         ]
     )
     return structlog.stdlib.ProcessorFormatter(
-        foreign_pre_chain=shared, processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *last]
+        foreign_pre_chain=shared, processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *renderers]
     )
 
 

@@ -1,6 +1,6 @@
-"""Where the services find what they stand on: environment variables `BUNRAKU_...`, or defaults for one machine.
+"""Settings of a process: environment variables `BUNRAKU_...`, with defaults for a single machine.
 
-docs/settings.md says it for people.
+`docs/operations.md` documents them for operators.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from bunraku.http.access_token import TokenSigner
 from bunraku.http.origin import OPAQUE_ORIGIN, parse_origins
 from bunraku.runtime import metrics
-from bunraku.storage.catalogue import Quota
+from bunraku.storage.record import Quota
 
 
 class Settings(BaseSettings):
@@ -27,44 +27,47 @@ class Settings(BaseSettings):
     catalogue: str = ""
     """URL of the catalogue, `sqlite:///...` or `postgresql://...`; empty: SQLite in `data`."""
     library: str = ""
-    """URL of the library, `file:///...`, `s3://...` and what else obstore knows; empty: a folder in `data`."""
+    """URL of the object store for motions, `file:///...`, `s3://...` or another that obstore supports; empty: a
+    folder in `data`."""
     bus: str = "memory:"
-    """URL of the bus, `memory:` for one process or `nats://...`, more servers after commas."""
+    """URL of the bus: `memory:` for one process, or `nats://...` with further servers after commas."""
     register_replicas: int = Field(default=1, ge=1, le=5)
-    """Servers of the bus that each keep the register, when it is made: 1, or 3 or 5 of a cluster."""
+    """Number of NATS servers that store the key-value bucket when it is created: 1, or 3 or 5 in a cluster."""
     upload_bytes: int = 64 << 20
-    """The largest upload."""
+    """Maximum size of an upload."""
     upload_seconds: float = 60.0
-    """The longest that reading, analysing and encoding one upload may take."""
+    """Time limit for parsing, analysing and encoding one upload."""
 
     secret: SecretStr = SecretStr("")
-    """What tokens are signed with, the same at all replicas; empty: everybody may do everything."""
+    """Key that signs tokens, equal on all replicas; empty: no access control."""
     secret_before: SecretStr = SecretStr("")
-    """A secret whose tokens are still good, while the secret is changed."""
+    """Previous secret, whose tokens stay valid during a rotation."""
     published: str = ""
-    """The address at which people reach the port, where that is not the one listened at: a container's."""
+    """Public address of the port if it differs from the listening address, as in a container."""
     origins: str = ""
-    """Pages elsewhere that may read answers, open sockets and change things, `https://dance.example`, more after
-    commas; `null`: pages from files, and frames in a sandbox, of whatever site: only with a secret."""
+    """Origins that may use the server from other pages, `https://dance.example`, separated by commas.
+
+    `null` stands for pages from files and sandboxed frames of any site; it requires a secret.
+    """
     connects: float = 50.0
-    """Sockets that one address may open in a second, ten times as many at once; 0: any number."""
+    """WebSocket connections that one address may open per second, with bursts of ten times as many; 0: unlimited."""
     body_seconds: float = 30.0
-    """The longest that the body of a request may take, beside a second for each 1,000 bytes of it."""
+    """Time limit for the body of a request, plus one second for each 1,000 bytes."""
     quota_motions: int = 500
-    """Motions that one subject may keep; 0: any number. Where there is a secret."""
+    """Maximum number of motions of one subject; 0: unlimited. Effective with a secret."""
     quota_bytes: int = 1 << 30
-    """Bytes of motions that one subject may keep; 0: any number. Where there is a secret."""
+    """Maximum bytes of motions of one subject; 0: unlimited. Effective with a secret."""
     total_motions: int = 0
-    """Motions that all may keep; 0: any number."""
+    """Maximum number of motions of all subjects; 0: unlimited."""
     total_bytes: int = 0
-    """Bytes of motions that all may keep; 0: any number."""
+    """Maximum bytes of motions of all subjects; 0: unlimited."""
 
     metrics: str = ""
-    """`host:port` of a listener that answers `/metrics` and nothing else; empty: none."""
+    """`host:port` of a listener that serves only `/metrics`; empty: none."""
     logs: Literal["plain", "json"] = "plain"
-    """How the log is written."""
+    """Format of the log."""
     log_level: Literal["", "debug", "info", "warning", "error"] = ""
-    """From which level on; empty: INFO where it is JSON, else WARNING."""
+    """Minimum level of log messages; empty: INFO for JSON, else WARNING."""
 
     @field_validator("metrics")
     @classmethod
@@ -76,7 +79,7 @@ class Settings(BaseSettings):
     @field_validator("logs", "log_level", mode="before")
     @classmethod
     def _normalise_choice(cls, value: object, info: ValidationInfo) -> object:
-        # what is set and empty, as compose sets it, is as if it were not
+        # Compose sets variables without a value to the empty string: use the default
         return (value.lower() or cls.model_fields[info.field_name or ""].default) if isinstance(value, str) else value
 
     @field_validator("secret", "secret_before")
@@ -91,18 +94,18 @@ class Settings(BaseSettings):
     def _validate_origins(cls, origins: str, info: ValidationInfo) -> str:
         secret = info.data.get("secret")
         if OPAQUE_ORIGIN in parse_origins(origins) and not (secret and secret.get_secret_value()):
-            raise ValueError("null lets in frames of whatever site, so that it takes a secret to tell who comes")
+            raise ValueError("the origin null admits frames of any site: set BUNRAKU_SECRET, or remove null")
         return origins
 
     def quota(self) -> Quota:
-        """How much may be kept; of one subject there is a limit only where subjects are known."""
-        one = (self.quota_motions, self.quota_bytes) if self.secret.get_secret_value() else (0, 0)
-        return Quota(*one, self.total_motions, self.total_bytes)
+        """Return the limits on stored motions; those per subject apply only with a secret, as subjects need tokens."""
+        per_subject = (self.quota_motions, self.quota_bytes) if self.secret.get_secret_value() else (0, 0)
+        return Quota(*per_subject, self.total_motions, self.total_bytes)
 
     def catalogue_url(self) -> str:
-        """The catalogue's URL, the default filled in."""
+        """Return the URL of the catalogue, or its default."""
         return self.catalogue or f"sqlite:///{self.data.resolve() / 'catalogue.sqlite'}"
 
     def library_url(self) -> str:
-        """The library's URL, the default filled in."""
+        """Return the URL of the object store, or its default."""
         return self.library or f"file://{self.data.resolve() / 'library'}"

@@ -1,1 +1,1 @@
-"""The service that holds the stage: timeline, puppeteers, merge."""
+"""Session service: timeline, puppeteers and overlays of each stage."""

@@ -1,4 +1,4 @@
-"""The session service: stages that are made, edited and pulled at, each on one replica and reached through any."""
+"""Session service: creates, edits and controls stages, each on one replica and reachable through any."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from starlette.websockets import WebSocketDisconnect
 
 from bunraku.http import problem_details
 from bunraku.http.access_control import Access, Role, access_of, requires
-from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session import control_endpoint, metrics, recorder
 from bunraku.session.recorder import Recording
 from bunraku.session.schema import NewSession, SessionEdit
 from bunraku.session.session_manager import SessionManager
 
 MAX_RECORDING_BODY_BYTES = 16 << 20
-"""Bytes of a camera's moves."""
+"""Largest request: the keyframes of a camera."""
 
 
 def create_app(context: ServiceContext) -> FastAPI:
-    """The service upon `backing`."""
+    """Create the service."""
     sessions = SessionManager(context)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         metrics.register_metrics(context.metrics, sessions)
-        running = asyncio.create_task(sessions.run(), name="sessions of this replica")
+        maintenance = asyncio.create_task(sessions.run(), name="sessions of this replica")
         try:
             yield
         finally:
-            running.cancel()
-            await asyncio.wait((running,))
+            maintenance.cancel()
+            await asyncio.wait((maintenance,))
             await sessions.close()
 
     app = FastAPI(title="Bunraku session", lifespan=lifespan)
@@ -58,17 +58,17 @@ def create_app(context: ServiceContext) -> FastAPI:
         limit: Annotated[int, Query(ge=1, le=200)] = 50,
         cursor: Annotated[str | None, Query(max_length=64)] = None,
     ) -> dict[str, Any]:
-        """Sessions, oldest first; `next` is the cursor of the next page. Who is bound to one sees that alone."""
-        by = access_of(request)
-        if by.is_bound:
-            return {"items": await _own(by), "next": None}
+        """List sessions, oldest first; `next` is the cursor of the next page. A guest of one session sees it alone."""
+        access = access_of(request)
+        if access.is_bound:
+            return {"items": await bound_session(access), "next": None}
         items, following = await sessions.list_sessions(limit, cursor)
         return {"items": items, "next": following}
 
     @app.get("/v1/sessions/{session}", tags=["sessions"])
     @requires(Role.VIEW)
     async def describe(session: str) -> dict[str, Any]:
-        """One session."""
+        """Describe one session."""
         return await sessions.stage_proxy(session).describe()
 
     @app.patch("/v1/sessions/{session}", tags=["sessions"])
@@ -89,24 +89,22 @@ def create_app(context: ServiceContext) -> FastAPI:
     @app.post("/v1/sessions/{session}/recordings", status_code=201, tags=["sessions"])
     @requires(Role.INGEST, max_body_bytes=MAX_RECORDING_BODY_BYTES)
     async def record(session: str, recording: Recording, request: Request) -> JSONResponse:
-        """Keep what was shown as a motion in the library: the dance with what was pulled, and the camera if one is
-        given."""
+        """Store the shown motion with the controlled limbs as a new motion, with a camera if one is given."""
         subject = access_of(request).subject
         motion = await recorder.record_session(sessions.stage_proxy(session), recording, context, subject)
         return JSONResponse(motion, 201, {"Location": f"/v1/motions/{motion['id']}"})
 
     @app.websocket("/v1/sessions/{session}/control")
     @requires(Role.CONTROL)
-    async def pull(socket: WebSocket, session: str, name: str = "Someone") -> None:
+    async def control(socket: WebSocket, session: str, name: str = "Someone") -> None:
         with contextlib.suppress(WebSocketDisconnect):
             await control_endpoint.serve_puppeteer(
                 socket, sessions.stage_proxy(session), context, name, sessions.counters
             )
 
-    async def _own(by: Access) -> list[dict[str, Any]]:
-        """The session that one is bound to, if it is there."""
+    async def bound_session(access: Access) -> list[dict[str, Any]]:
         try:
-            return [await sessions.stage_proxy(by.session).describe()] if by.session is not None else []
+            return [await sessions.stage_proxy(access.session).describe()] if access.session is not None else []
         except ProblemError:
             return []
 
@@ -114,6 +112,8 @@ def create_app(context: ServiceContext) -> FastAPI:
 
 
 def _require_unbound(access: Access) -> None:
-    """Raise `ProblemError` for one who is bound to this session: a guest does not end it, nor know other motions."""
+    """Raise `ProblemError` for a guest, who must neither end the session nor see other motions."""
     if access.is_bound:
-        raise ProblemError(403, "Not allowed", "your link is for what is on this stage: it does not end or change it")
+        raise ProblemError(
+            403, "Not allowed", "your link allows this session only: it cannot end it or change its motion"
+        )

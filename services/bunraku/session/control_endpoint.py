@@ -1,20 +1,20 @@
-"""A puppeteer's socket: what the controller says, and what it is told (SPEC.md, Sockets).
+"""WebSocket endpoint of a puppeteer (SPEC.md, Sockets).
 
-The stage may be at another replica: whole messages go there and come from there over the bus.
+The stage may be on another replica: messages travel to and from it over the bus.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from http import HTTPStatus
 
 from starlette.websockets import WebSocket
 
 from bunraku.http.access_control import access_of
-from bunraku.http.problem_details import ProblemError
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.counters import RATE_LIMITED, SessionCounters
 from bunraku.session.puppeteer_connection import MAX_QUEUED_MESSAGES, PuppeteerConnection
 from bunraku.session.stage_endpoint import PUPPETEER_HEARTBEAT_S
@@ -25,35 +25,38 @@ from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Input, Ping, Pong, unpack
 
 RATE_LIMIT_DELAY_S = 0.004
-"""Seconds that one who says too much waits for each message: the line fills, and the sender's own writes wait."""
+"""Delay of each message above the rate limit: the link fills, and the sender's writes block."""
 MAX_NAME_CHARACTERS = 40
-"""Characters of a puppeteer's name."""
+"""Longest name of a puppeteer."""
 
 
 async def serve_puppeteer(
     socket: WebSocket, stage: StageProxy, context: ServiceContext, name: str, counters: SessionCounters
 ) -> None:
-    """Bring a puppeteer to the stage until either ends, or what they came with; `tally` counts what is dropped here."""
+    """Connect a puppeteer to the stage until one of them ends or the access expires.
+
+    `counters` count the inputs that the rate limit drops.
+    """
     try:
         await subprotocol.accept(socket)
-        visitor = PuppeteerConnection()
-        ended = context.authenticator.register_connection(access_of(socket), visitor.close)
-        listening = context.bus.subscribe(stage.outgoing_subject(visitor), visitor.send)
+        connection = PuppeteerConnection()
+        unregister = context.authenticator.register_connection(access_of(socket), connection.close)
+        subscription = context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
         try:
-            await _join_stage(stage, visitor, name)
+            await _join_stage(stage, connection, name)
             try:
                 await subprotocol.run_until_first_ends(
-                    _receive_messages(socket, stage, visitor, counters),
-                    _send_messages(socket, visitor),
-                    _send_heartbeats(stage, visitor),
+                    _receive_messages(socket, stage, connection, counters, context.clock),
+                    _send_messages(socket, connection),
+                    _send_heartbeats(stage, connection),
                 )
             finally:
-                stage.send(visitor, None)
+                stage.send(connection, None)
         finally:
-            listening.unsubscribe()
-            ended()
-    except CloseConnection as refusal:
-        await subprotocol.close_with_problem(socket, refusal)
+            subscription.unsubscribe()
+            unregister()
+    except CloseConnection as reason:
+        await subprotocol.close_with_problem(socket, reason)
 
 
 async def _join_stage(stage: StageProxy, connection: PuppeteerConnection, name: str) -> None:
@@ -61,17 +64,21 @@ async def _join_stage(stage: StageProxy, connection: PuppeteerConnection, name: 
         await stage.join(connection, _display_name(name))
     except ProblemError as error:
         if error.status == HTTPStatus.NOT_FOUND:
-            detail = "there is no such session; it may have ended"
+            detail = "there is no session with this id; it may have ended"
             raise CloseConnection(subprotocol.NOT_FOUND, error.title, detail) from None
         raise CloseConnection(subprotocol.TRY_AGAIN_LATER, error.title, error.detail) from None
     except BackendUnavailable as error:
         raise CloseConnection(
-            subprotocol.TRY_AGAIN_LATER, "Not now", f"{error.backend} cannot be used now; come again"
+            subprotocol.TRY_AGAIN_LATER, "Not now", f"{error.backend} is unavailable; reconnect"
         ) from None
 
 
 async def _receive_messages(
-    socket: WebSocket, stage: StageProxy, connection: PuppeteerConnection, counters: SessionCounters
+    socket: WebSocket,
+    stage: StageProxy,
+    connection: PuppeteerConnection,
+    counters: SessionCounters,
+    clock: Callable[[], int],
 ) -> None:
     while True:
         data = await subprotocol.receive(socket)
@@ -99,7 +106,7 @@ async def _send_messages(socket: WebSocket, connection: PuppeteerConnection) -> 
         connection.has_messages.clear()
         if connection.is_overrun:
             raise CloseConnection(
-                subprotocol.TRY_AGAIN_LATER, "Too slow", f"{MAX_QUEUED_MESSAGES} messages waited; come again"
+                subprotocol.TRY_AGAIN_LATER, "Too slow", f"{MAX_QUEUED_MESSAGES} messages were queued; reconnect"
             )
         while connection.queued:
             await socket.send_bytes(connection.queued.popleft())
@@ -107,17 +114,17 @@ async def _send_messages(socket: WebSocket, connection: PuppeteerConnection) -> 
             raise connection.close_reason
         if connection.is_unknown:
             raise CloseConnection(
-                subprotocol.TRY_AGAIN_LATER, "Session elsewhere", "the session went on at another server; come again"
+                subprotocol.TRY_AGAIN_LATER, "Session elsewhere", "another server has taken over the session; reconnect"
             )
 
 
 async def _send_heartbeats(stage: StageProxy, connection: PuppeteerConnection) -> None:
-    """The stage hears that its puppeteer is still there."""
+    """Send the stage heartbeats for the puppeteer, until cancelled."""
     while True:
         await asyncio.sleep(PUPPETEER_HEARTBEAT_S)
         stage.send(connection, b"")
 
 
 def _display_name(name: str) -> str:
-    """A name as it may be shown: printable, trimmed, not empty."""
+    """Return a name for display: printable, trimmed, not empty."""
     return "".join(c for c in name if c.isprintable()).strip()[:MAX_NAME_CHARACTERS] or "Someone"

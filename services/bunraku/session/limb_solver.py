@@ -1,21 +1,21 @@
-"""Limbs solved by compiled code."""
+"""Compiled solver of limbs, loaded once per process."""
 
 from __future__ import annotations
 
 from threading import Lock
 
+from bunraku.kernels import load_kernels
+from bunraku.marionette.solver.limb_solver import LimbSolver
 from bunraku.runtime.compile_cache import compile_cache_folder
 
 _load_lock = Lock()
 
 
-def warm_up_solver() -> None:
-    """Load what solves limbs, or the first time compile it; takes seconds, and limbs are solved without before.
+def load_compiled_solver() -> LimbSolver:
+    """Load the compiled solver, or compile it the first time; takes seconds.
 
-    Can be called in a thread, and by several servers of one process at the same time.
+    Call it in a thread. Servers of one process may call it at the same time.
     """
-    # imported here, as it brings the compiler along
-    from bunraku.marionette import jit
-
     with _load_lock:
-        jit.enable(compile_cache_folder("marionette"))
+        solver: LimbSolver = load_kernels("marionette").compile_solver(compile_cache_folder("marionette"))
+    return solver

@@ -1,4 +1,4 @@
-"""Why inputs were not taken as they came, said quietly: once a second for each reason and limb (SPEC.md, Notice)."""
+"""Notices about inputs that were changed or ignored, at most one a second per reason and limb (SPEC.md, Notice)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from bunraku.wire.limbs import LIMBS, MAX_LIMBS
 from bunraku.wire.messages import Notice
 
 NOTICE_INTERVAL_US = 1_000_000
-"""Microseconds between two notices of one kind about one limb."""
+"""Interval between two notices of one reason about one limb."""
 MAX_MESSAGES_PER_S = 320
-"""Messages a second that a puppeteer may send: four limbs at the rate of a screen, and what goes with them."""
+"""Message rate of a puppeteer: four limbs at the frame rate of a screen, and other messages."""
 
 _DETAILS = {
     "reach": "the {limb} was asked to a place out of reach and goes as near as it can",
@@ -24,13 +24,13 @@ _LIMB_LABELS = [
 
 
 class NoticeThrottle:
-    """Those to one puppeteer."""
+    """Throttle of the notices to one puppeteer."""
 
     def __init__(self) -> None:
         self._last_sent_us: dict[tuple[int, str], int] = {}
 
     def make_notice(self, limb: int, reason: str, now: int) -> bytes | None:
-        """The message, None where the same was said within the last second; `now` in microseconds."""
+        """Return the notice, or None if the same was sent within the last second."""
         last = self._last_sent_us.get((limb, reason))
         if last is not None and now - last < NOTICE_INTERVAL_US:
             return None

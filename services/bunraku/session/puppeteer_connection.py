@@ -1,4 +1,4 @@
-"""A puppeteer at the door they came in by: what is still to be said to them, and how much they may say."""
+"""Connection of a puppeteer on the replica that accepted it: send queue and rate limit."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from bunraku.session.notice_throttle import MAX_MESSAGES_PER_S, NoticeThrottle
 from bunraku.websocket.subprotocol import CloseConnection
 
 MAX_QUEUED_MESSAGES = 64
-"""Messages that may wait for a puppeteer."""
+"""Size of the send queue."""
 
 
 class PuppeteerConnection:
-    """One puppeteer's socket, as its replica sees it."""
+    """Send queue and rate limit of one puppeteer's WebSocket."""
 
     def __init__(self) -> None:
         self.id = secrets.token_hex(5)
         self.queued: deque[bytes] = deque()
         self.has_messages = asyncio.Event()
         self.is_overrun = False
-        """Whether more waited than may."""
+        """True if the send queue was full."""
         self.is_unknown = False
-        """Whether the stage knows this puppeteer no more."""
+        """True if the stage no longer knows this puppeteer."""
         self.close_reason: CloseConnection | None = None
-        """Why they may not be here any more."""
+        """Reason to close the connection."""
         self._notice_throttle = NoticeThrottle()
         self._message_rate = TokenBucket(MAX_MESSAGES_PER_S, MAX_MESSAGES_PER_S)
 
     def send(self, message: bytes) -> None:
-        """Queue a message; none, of no bytes, says that the stage knows this puppeteer no more."""
+        """Queue a message; an empty one means that the stage no longer knows this puppeteer."""
         if not message:
             self.is_unknown = True
         elif len(self.queued) >= MAX_QUEUED_MESSAGES:
@@ -41,16 +41,16 @@ class PuppeteerConnection:
         self.has_messages.set()
 
     def may_send(self, now: int) -> bool:
-        """Whether one more message at `now` (µs) is within `RATE`: a bucket that a second's worth fits into."""
+        """Return whether a message at `now` (µs) is within the rate limit, a token bucket of one second."""
         return self._message_rate.take(now * 1e-6)
 
     def close(self, reason: CloseConnection) -> None:
-        """They may not be here any more."""
+        """Close the connection with a reason."""
         self.close_reason = reason
         self.has_messages.set()
 
     def send_notice(self, limb: int, reason: str, now: int) -> None:
-        """Say why an input was not taken as it came."""
+        """Send a notice about an input, unless it is throttled."""
         notice = self._notice_throttle.make_notice(limb, reason, now)
         if notice is not None:
             self.send(notice)

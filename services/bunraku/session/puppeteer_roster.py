@@ -1,4 +1,4 @@
-"""Who pulls at a stage, through whichever replica they came in."""
+"""Puppeteers of a stage, connected through any replica."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ from bunraku.wire.messages import Refusal
 
 COLOUR_COUNT = 5
 MAX_PUPPETEERS = 32
-"""Puppeteers of one session."""
+"""Most puppeteers of one session."""
 LOST_NOTICE_INTERVAL_US = 1_000_000
-"""Microseconds after which one who still takes a limb for theirs is told again."""
+"""Interval between two refusals sent to a puppeteer who still acts on a lost limb."""
 
 
 class SessionFull(Exception):
-    """A session that has as many puppeteers as it may."""
+    """Session with `MAX_PUPPETEERS` puppeteers."""
 
 
 @dataclass(eq=False, slots=True)
 class Puppeteer:
-    """One who may take limbs, and how they are told something: `tell` takes one whole message, and returns at once.
-    `heard` is the clock time when something came from them last, microseconds; `granted` are the limbs that were theirs
-    and that they have not let go."""
+    """Puppeteer of a stage.
+
+    `send` queues one message and returns at once. `last_heard_us` is the clock time of the last message or heartbeat.
+    `granted_limbs` are the limbs that the puppeteer was granted and has not released.
+    """
 
     id: str
     name: str
@@ -35,13 +37,13 @@ class Puppeteer:
     _lost_notice_us: dict[int, int] = field(default_factory=dict)
 
     def send_notice(self, limb: int, reason: str, now: int) -> None:
-        """Say why an input was not taken as it came."""
+        """Send a notice about an input, unless it is throttled."""
         notice = self._notice_throttle.make_notice(limb, reason, now)
         if notice is not None:
             self.send(notice)
 
     def send_limb_lost(self, limb: int, now: int) -> None:
-        """Say that a limb is not theirs any more, at most once a second: what was said before may not have come."""
+        """Send that a limb is lost, at most once a second: an earlier message may have been lost."""
         if (
             limb in self.granted_limbs
             and now - self._lost_notice_us.get(limb, -LOST_NOTICE_INTERVAL_US) >= LOST_NOTICE_INTERVAL_US
@@ -51,7 +53,7 @@ class Puppeteer:
 
 
 class PuppeteerRoster:
-    """Those who are at one stage, in the order in which they came."""
+    """Puppeteers of one stage, in the order of joining."""
 
     def __init__(self) -> None:
         self._by_id: dict[str, Puppeteer] = {}
@@ -63,11 +65,11 @@ class PuppeteerRoster:
         return len(self._by_id)
 
     def get(self, puppeteer_id: str) -> Puppeteer | None:
-        """The one of this id, None where they are not here."""
+        """Return the puppeteer of this id, or None."""
         return self._by_id.get(puppeteer_id)
 
     def join(self, puppeteer_id: str, name: str, send: Callable[[bytes], None], now: int) -> Puppeteer:
-        """One more, with the first free colour; raises `Full`."""
+        """Add a puppeteer with the first free colour; raises `SessionFull`."""
         if len(self._by_id) >= MAX_PUPPETEERS:
             raise SessionFull(f"{MAX_PUPPETEERS} puppeteers are here already")
         used = [p.colour for p in self]
@@ -76,5 +78,5 @@ class PuppeteerRoster:
         return puppeteer
 
     def leave(self, puppeteer: Puppeteer) -> None:
-        """One goes."""
+        """Remove a puppeteer."""
         self._by_id.pop(puppeteer.id, None)

@@ -1,4 +1,4 @@
-"""What the API is asked about sessions."""
+"""Request bodies of the sessions API."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class NewSession(BaseModel):
-    """What a session is made of."""
+    """Session to open."""
 
     model_config = ConfigDict(extra="forbid")
     motion: Annotated[str, Field(max_length=64)]
@@ -17,7 +17,7 @@ class NewSession(BaseModel):
 
 
 class SessionEdit(BaseModel):
-    """Edits of a session's timeline; what is left out stays."""
+    """Edits of a session's timeline; omitted fields stay unchanged."""
 
     model_config = ConfigDict(extra="forbid")
     playing: bool | None = None

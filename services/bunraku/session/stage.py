@@ -1,9 +1,8 @@
-"""One session: its timeline, its puppeteers, and the merge of their limbs into the dance (paper 5).
+"""One session: timeline, puppeteers, and the overlay of their limbs (paper 5).
 
 The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5), and `appear`
-where it goes on with a session of another replica; it listens to `viewers` and answers `state`. Overlays are computed
-for the instant when they are due, `LEAD` ahead of now, so that every viewer can lay them over the dance in time and at
-the same time.
+when it takes over a session of another replica. It subscribes to `viewers` and responds to `state`. Overlays are
+computed for the time when they are due, `OVERLAY_LEAD_US` ahead of now, so that every viewer can show them on time.
 """
 
 from __future__ import annotations
@@ -13,20 +12,19 @@ import contextlib
 import secrets
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import msgpack
 
 from bunraku.codec.container import StoredMotion
-from bunraku.marionette.input_log import InputLog, LoggedMarionettes
+from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes, OverlayJoints
-from bunraku.marionette.ownership import InputOutcome
-from bunraku.marionette.ownership import LimbGrant as Granted
-from bunraku.marionette.ownership import LimbInput as Given
+from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, LimbRefusal
+from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.messaging.bus import Bus, Subscription
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.overlay_buffer import pack_joints
-from bunraku.runtime.clock import clock
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.pose_cache import PoseCache
@@ -37,39 +35,53 @@ from bunraku.wire.messages import Alive, Ask, Claim, Grant, Input, Presence, Ref
 from bunraku.wire.overlay import Overlay
 
 OVERLAY_LEAD_US = 60_000
-"""How far ahead of now overlays are due, microseconds: a message every two frames, and its way to a viewer near by."""
+"""Lead time of overlays: a message every two frames, and the latency to a viewer near by."""
 EDIT_LEAD_US = 100_000
-"""How far ahead of now edits of the timeline are due, microseconds."""
+"""Lead time of edits of the timeline."""
 FRAME_INTERVAL_US = Overlay.FRAME_INTERVAL_US
 FRAMES_PER_MESSAGE = 2
-"""Frames in one message: on a narrow line packets count, not bytes."""
+"""Frames of one message: packets, not bytes, fill a constrained link."""
 MAX_CATCH_UP_FRAMES = 6
-"""Frames: a stage that was kept from working for longer leaves them out."""
+"""Frames published late after a stall; earlier ones are skipped."""
 VIEWER_COUNT_INTERVAL_S = 0.5
-"""Seconds between two tellings of how many watch."""
+"""Interval between two publications of the viewer count."""
+
+
+@dataclass(frozen=True, slots=True)
+class SessionStart:
+    """Session from which a stage starts: a new one, or one of another replica."""
+
+    id: str
+    motion: StoredMotion
+    timeline: TimelineState
+    """Timeline of the motion."""
+    created_us: int
+    """Clock time of the creation."""
 
 
 class Stage:
-    """A motion on a shared timeline, and those who pull at it."""
+    """A motion on a shared timeline, and the puppeteers who control its limbs."""
 
     def __init__(
         self,
-        session: str,
-        motion: StoredMotion,
-        marionettes: Marionettes,
+        start: SessionStart,
         bus: Bus,
-        state: TimelineState,
-        created: int,
+        clock: Callable[[], int],
         counters: SessionCounters | None = None,
+        solver: LimbSolver = PYTHON_SOLVER,
     ) -> None:
-        """`troupe` is of the motion's figures; the caller builds it, which takes a tenth of a second. `state` is of
-        this motion; `created` a clock time, microseconds; `tally` counts what goes on at all stages of a replica."""
-        self.id = session
-        self.created = created
+        """Open the session's subjects on the bus and start its task.
+
+        `clock` returns microseconds; `counters` are shared by all stages of a replica. Creating the marionettes takes a
+        tenth of a second unless `load_bend_tables` was called for the motion.
+        """
+        self.id = start.id
+        self.created = start.created_us
         self._bus = bus
+        self._clock = clock
         self._counters = counters or SessionCounters()
         self._timelines = timeline.TimelineHistory()
-        self._timelines.put(state)
+        self._timelines.put(start.timeline)
         self.puppeteers = PuppeteerRoster()
         self._viewers_by_replica: dict[str, int] = {}
         self._viewer_count_timer: asyncio.TimerHandle | None = None
@@ -79,19 +91,20 @@ class Stage:
         self._phase_us = secrets.randbelow(FRAMES_PER_MESSAGE * FRAME_INTERVAL_US)
         self._last_overlay: bytes | None = None
         self.last_active_us = clock()
-        self.log = InputLog()
+        self.log = InputLog(start.motion.id)
         self.log.add_timeline(self.timeline)
-        self._marionettes = LoggedMarionettes(marionettes, motion.id, self.log)
-        self._set_motion(motion)
-        subject = f"session.{session}"
+        self._marionettes = Marionettes(_performer_figures(start.motion), recorder=self.log, solver=solver)
+        self._ownership = self._marionettes.ownership
+        self._set_motion(start.motion)
+        subject = f"session.{start.id}"
         self._subscriptions: list[Subscription] = [
             bus.serve(f"{subject}.state", self._answer_state),
             bus.subscribe(f"{subject}.viewers", self._receive_viewer_count),
         ]
-        self._tick_task = asyncio.create_task(self._run_ticks(), name=f"stage {session}")
+        self._tick_task = asyncio.create_task(self._run_ticks(), name=f"stage {start.id}")
 
     async def close(self) -> None:
-        """End the session; its puppeteers are told nothing more."""
+        """Stop the stage; its puppeteers receive nothing more."""
         if self._viewer_count_timer is not None:
             self._viewer_count_timer.cancel()
         self._tick_task.cancel()
@@ -102,118 +115,129 @@ class Stage:
 
     @property
     def timeline(self) -> TimelineState:
-        """The newest timeline."""
+        """Newest timeline."""
         newest = self._timelines.newest
         assert newest is not None
         return newest
 
+    def use_solver(self, solver: LimbSolver) -> None:
+        """Solve limbs with another solver from the next frame on."""
+        self._marionettes.use_solver(solver)
+
     def announce_takeover(self) -> None:
-        """Tell those who watched when the session was another replica's where it goes on: nobody holds a limb."""
+        """Publish the state of a session that was another replica's: no limb is held any more."""
         self._bus.publish(f"session.{self.id}.appear", b"")
         self._bus.publish(f"session.{self.id}.timeline", self.timeline.pack())
         self._publish_presence()
         self._sequence += 1
-        self._bus.publish(f"session.{self.id}.overlay", Overlay(self._sequence, clock() + OVERLAY_LEAD_US, {}).pack())
+        self._bus.publish(
+            f"session.{self.id}.overlay", Overlay(self._sequence, self._clock() + OVERLAY_LEAD_US, {}).pack()
+        )
 
     @property
     def participant_count(self) -> int:
-        """Viewers and puppeteers."""
+        """Number of viewers and puppeteers."""
         return sum(self._viewers_by_replica.values()) + len(self.puppeteers)
 
     @property
     def holders(self) -> tuple[str | None, ...]:
-        """The holder's id of each limb, or None."""
-        return self._marionettes.marionettes.holders()
+        """Holder's id of each limb, or None."""
+        return self._ownership.holders()
 
     @property
     def presence(self) -> Presence:
-        """Who is here, who holds what, and who asks for it."""
+        """Viewer count, puppeteers, limb holders and requests for limbs."""
         puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
-        troupe = self._marionettes.marionettes
-        asks = [list(limb) for limb in troupe.asks()]
-        return Presence(sum(self._viewers_by_replica.values()), puppeteers, list(troupe.holders()), asks)
+        asks = [list(limb) for limb in self._ownership.asks()]
+        return Presence(sum(self._viewers_by_replica.values()), puppeteers, list(self.holders), asks)
 
     def edit_timeline(self, *, playing: bool | None, position: int | None, loop: bool | None) -> TimelineState:
-        """Edit the timeline for everyone, `EDIT_LEAD` from now."""
-        due = clock() + EDIT_LEAD_US
+        """Edit the timeline for everyone, `EDIT_LEAD_US` from now."""
+        due = self._clock() + EDIT_LEAD_US
         return self._publish_timeline(timeline.edit(self.timeline, due, playing=playing, position=position, loop=loop))
 
     async def change_motion(self, motion: StoredMotion) -> TimelineState:
-        """Another motion for everyone, from its start; limbs stay in the hands they are in."""
-        # the first arm of its proportions takes a tenth of a second; the loop goes on meanwhile
-        await asyncio.to_thread(make_marionettes, motion)
-        now, before = clock(), self.holders
+        """Change the motion for everyone, from its start; limbs stay held."""
+        # the first arm of its proportions takes a tenth of a second, in which the event loop must not block
+        await asyncio.to_thread(load_bend_tables, motion)
+        now, before = self._clock(), self.holders
         for limb, holder in self._marionettes.set_figures(_performer_figures(motion), motion.id, now):
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.send_limb_lost(limb, now)
         self._set_motion(motion)
         state = self._publish_timeline(
-            timeline.change_motion(self.timeline, clock() + EDIT_LEAD_US, motion.id, motion.first_track.duration_us)
+            timeline.change_motion(
+                self.timeline, self._clock() + EDIT_LEAD_US, motion.id, motion.first_track.duration_us
+            )
         )
         if len(self.holders) != len(before):
             self._publish_presence()
         return state
 
     def join(self, puppeteer_id: str, name: str, send: Callable[[bytes], None]) -> Puppeteer:
-        """A puppeteer comes, of the id `who`, and is told what there is with `tell`; raises `Full`."""
-        puppeteer = self.puppeteers.join(puppeteer_id, name, send, clock())
+        """Add a puppeteer, whose messages are passed to `send`; raises `SessionFull`."""
+        puppeteer = self.puppeteers.join(puppeteer_id, name, send, self._clock())
         puppeteer.send(Welcome(puppeteer.id, puppeteer.colour, OVERLAY_LEAD_US).pack())
         self._publish_presence()
         return puppeteer
 
     def leave(self, puppeteer: Puppeteer) -> None:
-        """A puppeteer goes; what they held goes to who asked for it, or back to the dance."""
+        """Remove a puppeteer, whose limbs go to the puppeteers who asked for them, or return to the motion."""
         self.puppeteers.leave(puppeteer)
-        now = clock()
-        self._marionettes.leave(puppeteer.id, now)
+        now = self._clock()
+        self._ownership.leave(puppeteer.id, now)
         self._grant_free_limbs(now)
         self._publish_presence()
 
     def receive(self, puppeteer: Puppeteer, message: messages.Message | None) -> None:
-        """What a puppeteer's controller says."""
-        now = clock()
-        who = puppeteer.id
+        """Apply a message of a puppeteer's controller."""
+        now = self._clock()
         if isinstance(message, Claim):
-            answer = self._marionettes.claim(message.limb, who, now)
-            if isinstance(answer, Granted):
-                self._send_grant(who, answer)
-                self._publish_presence()
-            else:
+            answer = self._ownership.claim(message.limb, puppeteer.id, now)
+            if isinstance(answer, LimbRefusal):
                 puppeteer.send(Refusal(message.limb, answer.reason, answer.holder).pack())
+            else:
+                self._send_grant(puppeteer.id, answer)
+                self._publish_presence()
         elif isinstance(message, Release):
             puppeteer.granted_limbs.discard(message.limb)
-            if self._marionettes.release(message.limb, who, message.epoch, now):
+            if self._ownership.release(message.limb, puppeteer.id, message.epoch, now):
                 self._grant_free_limbs(now)
                 self._publish_presence()
         elif isinstance(message, Alive):
-            self._marionettes.keep_alive(who, message.limbs, now)
-            holders = self._marionettes.marionettes.holders()
+            self._ownership.keep_alive(puppeteer.id, message.limbs, now)
+            holders = self.holders
             for limb in set(message.limbs):
-                if limb >= len(holders) or holders[limb] != who:
+                if limb >= len(holders) or holders[limb] != puppeteer.id:
                     puppeteer.send_limb_lost(limb, now)
         elif isinstance(message, Ask):
-            if self._marionettes.ask(message.limb, who, message.wanted, now):
+            if self._ownership.ask(message.limb, puppeteer.id, message.wanted, now):
                 self._publish_presence()
         elif isinstance(message, Input):
-            given = Given(message.limb, message.kind, message.epoch, message.sequence, message.sampled, message.values)
-            outcome = self._marionettes.apply_input(who, given, now)
-            self._counters.inputs[outcome.value] += 1
-            if outcome in (InputOutcome.CLAMPED, InputOutcome.NOT_OWNER):
-                puppeteer.send_notice(message.limb, outcome.value, now)
-            if outcome is InputOutcome.NOT_OWNER:
-                puppeteer.send_limb_lost(message.limb, now)
+            self._receive_input(puppeteer, message, now)
 
-    def _send_grant(self, puppeteer_id: str, grant: Granted) -> None:
+    def _receive_input(self, puppeteer: Puppeteer, message: Input, now: int) -> None:
+        limb_input = LimbInput(
+            message.limb, message.kind, message.epoch, message.sequence, message.sampled, message.values
+        )
+        outcome = self._ownership.apply_input(puppeteer.id, limb_input, now)
+        self._counters.inputs[outcome.value] += 1
+        if outcome in (InputOutcome.CLAMPED, InputOutcome.NOT_OWNER):
+            puppeteer.send_notice(message.limb, outcome.value, now)
+        if outcome is InputOutcome.NOT_OWNER:
+            puppeteer.send_limb_lost(message.limb, now)
+
+    def _send_grant(self, puppeteer_id: str, grant: LimbGrant) -> None:
         if (puppeteer := self.puppeteers.get(puppeteer_id)) is not None:
             puppeteer.granted_limbs.add(grant.limb)
             puppeteer.send(Grant(grant.limb, grant.epoch).pack())
         self._has_grants.set()
 
     def _grant_free_limbs(self, now: int) -> bool:
-        """Limbs that became free go to who asked for them; whether asks have changed."""
-        grants, changed = self._marionettes.grant_free_limbs(now)
-        for who, grant in grants:
-            self._send_grant(who, grant)
+        """Grant free limbs to the puppeteers who asked for them; return whether requests have changed."""
+        grants, changed = self._ownership.grant_free_limbs(now)
+        for puppeteer_id, grant in grants:
+            self._send_grant(puppeteer_id, grant)
         self._counters.hand_overs += len(grants)
         return changed
 
@@ -227,7 +251,7 @@ class Stage:
         return state
 
     def _publish_presence(self) -> None:
-        self.last_active_us = clock()
+        self.last_active_us = self._clock()
         packed = self.presence.pack()
         self._bus.publish(f"session.{self.id}.presence", packed)
         for puppeteer in self.puppeteers:
@@ -245,12 +269,15 @@ class Stage:
         self._schedule_presence()
 
     def _schedule_presence(self) -> None:
-        """Tell how many watch, now or before long: each replica counts for itself, and each count goes to everybody."""
+        """Publish the viewer count now, or after the interval if it was published just now.
+
+        Each stream replica reports its own count, and every publication goes to all viewers.
+        """
         if self._viewer_count_timer is None:
             self._publish_presence()
-            told = self._viewers_by_replica.copy()
+            published = self._viewers_by_replica.copy()
             self._viewer_count_timer = asyncio.get_running_loop().call_later(
-                VIEWER_COUNT_INTERVAL_S, self._publish_changed_count, told
+                VIEWER_COUNT_INTERVAL_S, self._publish_changed_count, published
             )
 
     def _publish_changed_count(self, published_counts: dict[str, int]) -> None:
@@ -262,83 +289,87 @@ class Stage:
         while True:
             await self._has_grants.wait()
             self._has_grants.clear()
-            frame = self._frame_at(clock()) + 1
+            frame = self._frame_at(self._clock()) + 1
             await self._pose_cache.decode_blocks(self._frame_time_us(frame) + OVERLAY_LEAD_US)
             for before in (frame - 2, frame - 1):
                 due = self._frame_time_us(before) + OVERLAY_LEAD_US
                 if (poses := self._pose_cache.poses_at(due, FRAME_INTERVAL_US)) is not None:
-                    self._marionettes.observe_poses(poses, due, self._frame_time_us(before))
-            pace, late = FrameRateControl(), 0
+                    self._marionettes.observe_poses(poses, self._frame_time_us(before), due)
+            frame_rate, lateness_us = FrameRateControl(), 0
             while self._publish_frames(
                 range(
-                    frame if self._needs_every_frame(pace) else frame + FRAMES_PER_MESSAGE - 1,
+                    frame if self._needs_every_frame(frame_rate) else frame + FRAMES_PER_MESSAGE - 1,
                     frame + FRAMES_PER_MESSAGE,
                 ),
-                late,
+                lateness_us,
             ):
-                # a stage that was kept from working goes on from where it should be, in step with the others
-                frame = max(frame + FRAMES_PER_MESSAGE, self._frame_at(clock()) - MAX_CATCH_UP_FRAMES)
+                # after a stall, continue with the current frame, in step with the timeline
+                frame = max(frame + FRAMES_PER_MESSAGE, self._frame_at(self._clock()) - MAX_CATCH_UP_FRAMES)
                 planned = self._frame_time_us(frame + FRAMES_PER_MESSAGE - 1)
-                await asyncio.sleep((planned - clock()) * 1e-6)
-                late = clock() - planned
-                pace.record_lateness(late)
-                self._counters.tick_lateness_s.observe(max(late, 0) * 1e-6)
+                await asyncio.sleep((planned - self._clock()) * 1e-6)
+                lateness_us = self._clock() - planned
+                frame_rate.record_lateness(lateness_us)
+                self._counters.tick_lateness_s.observe(max(lateness_us, 0) * 1e-6)
                 await self._pose_cache.decode_blocks(self._frame_time_us(frame) + OVERLAY_LEAD_US)
 
     def _needs_every_frame(self, frame_rate: FrameRateControl) -> bool:
-        """Whether the next message has all its frames: of a limb that is held, or moved as hands move, the last is
-        enough, as viewers show what lies between."""
-        return frame_rate.is_full_rate and self._marionettes.marionettes.needs_full_rate
+        """Return whether the next message needs all its frames.
+
+        For a limb that is still or moves slowly the last frame is enough, because viewers interpolate.
+        """
+        return frame_rate.is_full_rate and self._marionettes.needs_full_rate
 
     def _frame_time_us(self, frame: int) -> int:
-        """The clock time of a frame: no two stages of a process work at the same instants."""
+        """Return the clock time of a frame; the random phase spreads the stages of a process over time."""
         return frame * FRAME_INTERVAL_US + self._phase_us
 
     def _frame_at(self, now: int) -> int:
         return (now - self._phase_us) // FRAME_INTERVAL_US
 
     def _publish_frames(self, frames: range, lateness_us: int = 0) -> bool:
-        """Publish what lies over the dance in some frames, each due `LEAD` after its time; whether any limb is
-        pulled. It is `late` by so many microseconds, in which nobody could be heard: they are not taken for silence."""
-        now, begun = clock(), time.perf_counter()
-        lost = self._marionettes.expire(now - self._stall_compensation.compensate(lateness_us, now))
+        """Publish the overlay of some frames, each due `OVERLAY_LEAD_US` after its time.
+
+        Returns whether any limb is controlled. `lateness_us` is the delay of this call, in which no message could be
+        received: it does not count as silence of a puppeteer.
+        """
+        now, begin_s = self._clock(), time.perf_counter()
+        lost = self._ownership.expire(now - self._stall_compensation.compensate(lateness_us, now))
         for limb, holder in lost:
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.send_limb_lost(limb, now)
         if self._grant_free_limbs(now) or lost:
             self._publish_presence()
-        shown: list[OverlayJoints] = []
+        frame_overlays: list[OverlayJoints] = []
         for frame in frames:
             due = self._frame_time_us(frame) + OVERLAY_LEAD_US
             poses = self._pose_cache.poses_at(due, FRAME_INTERVAL_US)
-            shown.append(
-                self._marionettes.compute_overlay(poses, due, self._frame_time_us(frame)) if poses is not None else {}
-            )
+            overlay = self._marionettes.compute_overlay(poses, self._frame_time_us(frame), due) if poses else {}
+            frame_overlays.append(overlay)
         self._sequence += 1
-        message = _pack_overlay(self._sequence, self._frame_time_us(frames[-1]) + OVERLAY_LEAD_US, shown)
-        self._last_overlay = message if shown[-1] else None
-        self._counters.tick_duration_s.observe(time.perf_counter() - begun)
+        message = _pack_overlay(self._sequence, self._frame_time_us(frames[-1]) + OVERLAY_LEAD_US, frame_overlays)
+        self._last_overlay = message if frame_overlays[-1] else None
+        self._counters.tick_duration_s.observe(time.perf_counter() - begin_s)
         self._bus.publish(f"session.{self.id}.overlay", message)
-        return not self._marionettes.marionettes.is_at_rest
+        return not self._ownership.is_at_rest
 
 
-def make_marionettes(motion: StoredMotion) -> Marionettes:
-    """The puppets for a motion; takes a tenth of a second."""
-    return Marionettes(_performer_figures(motion))
+def load_bend_tables(motion: StoredMotion) -> None:
+    """Build the bend tables of a motion's performers; takes a tenth of a second for each new arm."""
+    Marionettes(_performer_figures(motion))
 
 
 def _performer_figures(motion: StoredMotion) -> list[Figure]:
-    return [dance.track.figure for dance in motion.performers]
+    return [performer.track.figure for performer in motion.performers]
 
 
 def _pack_overlay(sequence: int, due: int, frame_overlays: list[OverlayJoints]) -> bytes:
-    """The message of some frames: those of the end that have the limbs of the last."""
-    last = frame_overlays[-1].keys()
+    """Pack the last frames that have the same limbs as the very last one."""
+    limbs = frame_overlays[-1].keys()
     frames: list[dict[int, tuple[int, ...]]] = []
-    for laid in reversed(frame_overlays):
-        if laid.keys() != last:
+    for overlay in reversed(frame_overlays):
+        if overlay.keys() != limbs:
             break
-        frames.append({limb: pack_joints(joints) for limb, joints in laid.items()})
-    if not last:
+        frames.append({limb: pack_joints(joints) for limb, joints in overlay.items()})
+    if not limbs:
         return Overlay(sequence, due, {}).pack()
     return Overlay(sequence, due, frames[0], tuple(reversed(frames[1:]))).pack()

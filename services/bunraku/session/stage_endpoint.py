@@ -1,9 +1,9 @@
-"""The way to a stage from any replica: what is asked and said on the bus is done here, where the stage is.
+"""RPC endpoint of a stage on the bus, which every replica can reach.
 
-On `session.{id}.` the words `describe`, `edit`, `log`, `end` and `join` are questions, answered with MessagePack of
-what the API shows, or of `{"problem": ...}`. On `said` is published what puppeteers say, `[puppeteer, message]`: None
-for one who has left, no bytes for one who is still there. What a puppeteer is told is published on `told.{puppeteer}`,
-one whole message each; one of no bytes says that the stage does not know them.
+On `session.{id}.` it responds to the requests `describe`, `edit`, `log`, `end` and `join` with MessagePack: the answer
+as the API shows it, or `{"problem": ...}`. Puppeteers publish their messages on `said` as `[puppeteer, message]`; None
+means that the puppeteer has left, and an empty message is a heartbeat. Messages to a puppeteer are published on
+`told.{puppeteer}`; an empty one means that the stage does not know the puppeteer.
 """
 
 from __future__ import annotations
@@ -17,55 +17,55 @@ from typing import Any, Protocol
 import msgpack
 
 from bunraku.codec.container import StoredMotion
-from bunraku.http.problem_details import ProblemError
 from bunraku.messaging.bus import Subscription
 from bunraku.messaging.recording_request import MAX_RECORDING_S
 from bunraku.playout.timeline import position_at
-from bunraku.runtime.clock import clock
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.problem import ProblemError
 from bunraku.session.puppeteer_roster import SessionFull
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import Stage
 from bunraku.wire.messages import unpack
 
 PUPPETEER_HEARTBEAT_S = 2.0
-"""Seconds between two words of a replica that a puppeteer is still there."""
+"""Interval between the heartbeats that a replica sends for a puppeteer."""
 PUPPETEER_TIMEOUT_US = 7_000_000
-"""Microseconds after which one of whom nothing is heard has gone: their replica did not live to say so."""
+"""Silence after which a puppeteer is removed: the replica of the connection has died."""
 
 
 _log = logging.getLogger(__name__)
 
 
 class StageOwner(Protocol):
-    """Who keeps the stages of a replica."""
+    """Manager of the stages of a replica."""
 
     async def load_motion(self, motion: str) -> StoredMotion:
-        """A motion to be played; raises `ProblemError`."""
+        """Return a motion; raises `ProblemError`."""
 
     async def save_record(self, stage: Stage) -> None:
-        """Note where a stage is, so that another replica could go on with it."""
+        """Save the state of a stage, so that another replica can continue it."""
 
     async def end_session(self, session: str) -> None:
         """End a session."""
 
 
 class StageEndpoint:
-    """One stage's."""
+    """Endpoint of one stage."""
 
     def __init__(self, stage: Stage, context: ServiceContext, owner: StageOwner, revision: int) -> None:
         self.stage = stage
         self.revision = revision
-        """Of what stands in the register of the session, as its owner knows it."""
+        """Revision of the session's record in the key-value store."""
         self._context = context
+        self._clock = context.clock
         self._owner = owner
         self._subject = f"session.{stage.id}"
         bus = context.bus
         self._subscriptions: list[Subscription] = [
             bus.subscribe(f"{self._subject}.said", self._receive),
             *(
-                bus.serve(f"{self._subject}.{word}", self._make_responder(word, answer))
-                for word, answer in (
+                bus.serve(f"{self._subject}.{operation}", self._make_responder(operation, handler))
+                for operation, handler in (
                     ("describe", self._answer_describe),
                     ("edit", self._answer_edit),
                     ("log", self._answer_log),
@@ -77,7 +77,7 @@ class StageEndpoint:
         self._sweep_task = asyncio.create_task(self._remove_silent_puppeteers(), name=f"puppeteers of {stage.id}")
 
     async def close(self) -> None:
-        """Nobody comes in any more, and the stage is closed."""
+        """Stop responding, disconnect the puppeteers and close the stage."""
         for subscription in self._subscriptions:
             subscription.unsubscribe()
         self._sweep_task.cancel()
@@ -89,22 +89,22 @@ class StageEndpoint:
     def _make_responder(
         self, operation: str, handler: Callable[[Any], Awaitable[Any]]
     ) -> Callable[[bytes], Awaitable[bytes]]:
-        async def answered(question: bytes) -> bytes:
-            # who may see a session is asked for each of its guests' requests
+        async def respond(request: bytes) -> bytes:
+            # `describe` runs for every request of a guest, to check the session's motion
             _log.log(
                 logging.DEBUG if operation == "describe" else logging.INFO, "session %s: %s", self.stage.id, operation
             )
             try:
-                said = {"answer": await handler(msgpack.unpackb(question))}
+                answer = {"answer": await handler(msgpack.unpackb(request))}
             except ProblemError as error:
-                said = {"problem": error.to_dict()}
-            packed: bytes = msgpack.packb(said)
+                answer = {"problem": error.to_dict()}
+            packed: bytes = msgpack.packb(answer)
             return packed
 
-        return answered
+        return respond
 
     async def _answer_describe(self, _: None) -> dict[str, Any]:
-        return session_json(self.stage)
+        return session_json(self.stage, self._clock())
 
     async def _answer_edit(self, values: dict[str, Any]) -> dict[str, Any]:
         edit, stage = SessionEdit.model_validate(values), self.stage
@@ -113,65 +113,67 @@ class StageEndpoint:
         if (edit.playing, edit.position, edit.loop) != (None, None, None):
             stage.edit_timeline(playing=edit.playing, position=edit.position, loop=edit.loop)
         await self._owner.save_record(stage)
-        return session_json(stage)
+        return session_json(stage, self._clock())
 
     async def _answer_log(self, seconds: float | None) -> dict[str, Any]:
-        stage, end = self.stage, clock()
-        kept = seconds or min(stage.timeline.duration * 1e-6, MAX_RECORDING_S)
+        stage, end = self.stage, self._clock()
+        duration_s = seconds or min(stage.timeline.duration * 1e-6, MAX_RECORDING_S)
         name = f"{stage.id[:12]}-{secrets.token_hex(12)}"
         await self._context.motion_store.put_log(name, stage.log.pack())
-        return {"log": name, "begin": max(end - round(kept * 1e6), stage.created), "end": end}
+        return {"log": name, "begin": max(end - round(duration_s * 1e6), stage.created), "end": end}
 
     async def _answer_end(self, _: None) -> None:
         await self._owner.end_session(self.stage.id)
 
     async def _answer_join(self, values: list[str]) -> dict[str, Any]:
-        who, name = values
+        puppeteer_id, name = values
         try:
             puppeteer = self.stage.join(
-                who, name, lambda message: self._context.bus.publish(f"{self._subject}.told.{who}", message)
+                puppeteer_id,
+                name,
+                lambda message: self._context.bus.publish(f"{self._subject}.told.{puppeteer_id}", message),
             )
         except SessionFull as error:
             raise ProblemError(503, "Full", str(error)) from None
         return {"colour": puppeteer.colour}
 
     def _receive(self, message: bytes) -> None:
-        who, said = msgpack.unpackb(message)
-        puppeteer = self.stage.puppeteers.get(who)
+        puppeteer_id, packed = msgpack.unpackb(message)
+        puppeteer = self.stage.puppeteers.get(puppeteer_id)
         if puppeteer is None:
-            if said is not None:
-                self._context.bus.publish(f"{self._subject}.told.{who}", b"")
+            if packed is not None:
+                self._context.bus.publish(f"{self._subject}.told.{puppeteer_id}", b"")
             return
-        puppeteer.last_heard_us = clock()
-        if said is None:
+        puppeteer.last_heard_us = self._clock()
+        if packed is None:
             self.stage.leave(puppeteer)
-        elif said:
-            self.stage.receive(puppeteer, unpack(said))
+        elif packed:
+            self.stage.receive(puppeteer, unpack(packed))
 
     async def _remove_silent_puppeteers(self) -> None:
-        """Those who have vanished leave."""
+        """Remove the puppeteers whose replica has died, until cancelled."""
         while True:
-            begun = clock()
+            begin = self._clock()
             await asyncio.sleep(PUPPETEER_HEARTBEAT_S)
-            now = clock()
-            # while this process stood still nobody could be heard: that is not their silence
-            deaf = max(now - begun - round(PUPPETEER_HEARTBEAT_S * 1e6), 0)
+            now = self._clock()
+            # while the event loop was blocked, no heartbeat could be received
+            stalled_us = max(now - begin - round(PUPPETEER_HEARTBEAT_S * 1e6), 0)
             for puppeteer in self.stage.puppeteers:
-                puppeteer.last_heard_us += deaf
+                puppeteer.last_heard_us += stalled_us
                 if now - puppeteer.last_heard_us > PUPPETEER_TIMEOUT_US:
                     puppeteer.send(b"")
                     self.stage.leave(puppeteer)
 
 
-def session_json(stage: Stage) -> dict[str, Any]:
-    """A session as the API shows it."""
+def session_json(stage: Stage, now: int) -> dict[str, Any]:
+    """Return a session as the API shows it at clock time `now`."""
     state, presence = stage.timeline, stage.presence
     return {
         "id": stage.id,
         "motion": state.motion,
         "playing": state.playing,
         "loop": state.loop,
-        "position": position_at(state, clock()),
+        "position": position_at(state, now),
         "duration": state.duration,
         "epoch": state.epoch,
         "viewers": presence.viewers,

@@ -1,7 +1,8 @@
-"""Brings a catalogue to the version that this code is written for, whichever of several replicas comes first.
+"""Migration of a catalogue to the schema version of this code.
 
-A migration adds what the replicas that still run can do without: they go on while others already have the new version.
-A new one is a file in `migrations/versions` with the next `revision`, and `HEAD` here.
+Several replicas may start at once: a lock lets one migrate while the others wait. Replicas of the previous version keep
+running, so a migration only adds what they can ignore. A new migration is a file in `migrations/versions` with the next
+`revision`, and a new `HEAD_REVISION` here.
 """
 
 from __future__ import annotations
@@ -16,29 +17,29 @@ from sqlalchemy.ext.asyncio import AsyncConnection, create_async_engine
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendUnavailable
 
 HEAD_REVISION = "0003"
-"""The version that this code is written for."""
+"""Schema version of this code."""
 UNVERSIONED_REVISION = "0001"
-"""The version of a catalogue that has the table of motions and says none."""
+"""Schema version of a catalogue that has the table of motions and no version."""
 MIGRATION_TIMEOUT_S = 60.0
-"""Seconds for a migration, and for those of others before it."""
+"""Time limit for a migration, including the wait for other replicas, in seconds."""
 _MIGRATION_LOCK_ID = 0x42756E72616B75
-"""The name of PostgreSQL's advisory lock."""
+"""Key of the advisory lock in PostgreSQL."""
 _SCRIPTS_FOLDER = Path(__file__).parent / "migrations"
-# Alembic keeps what it is about in a module
+# Alembic keeps its state in module globals
 _alembic_lock = threading.Lock()
 
 
 class UnknownSchemaVersion(BackendUnavailable):
-    """The catalogue was last used by a Bunraku that is newer than this one."""
+    """A catalogue that was migrated by a newer Bunraku."""
 
     def __init__(self, found: str) -> None:
         super().__init__(
-            "the catalogue", f"it has version {found}, and this Bunraku knows {HEAD_REVISION}: run a newer one"
+            "the catalogue", f"it has schema version {found}, this Bunraku supports {HEAD_REVISION}: upgrade Bunraku"
         )
 
 
 def read_schema_version(connection: Connection) -> str | None:
-    """The version that a catalogue says it has. Loads nothing that migrating needs."""
+    """Return the schema version of a catalogue, without importing Alembic."""
     if not inspect(connection).has_table("alembic_version"):
         return None
     found: str | None = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
@@ -46,9 +47,9 @@ def read_schema_version(connection: Connection) -> str | None:
 
 
 def migrate(url: str) -> None:
-    """Bring the catalogue at an SQLAlchemy URL of an async driver to `HEAD`; nothing happens where it is there already.
+    """Migrate the catalogue at an SQLAlchemy URL with an async driver to `HEAD_REVISION`, if it is older.
 
-    Blocks, and loads Alembic: to be called in a thread. Raises `UnknownVersion`, and what SQLAlchemy raises.
+    Call it in a thread: it blocks and imports Alembic. Raise `UnknownSchemaVersion` and errors of SQLAlchemy.
     """
     with _alembic_lock:
         asyncio.run(_migrate(url))
@@ -56,12 +57,12 @@ def migrate(url: str) -> None:
 
 async def _migrate(url: str) -> None:
     postgres = url.startswith("postgresql")
-    patience = (
+    connect_args = (
         {"timeout": BACKEND_TIMEOUT_S, "command_timeout": MIGRATION_TIMEOUT_S}
         if postgres
         else {"timeout": MIGRATION_TIMEOUT_S}
     )
-    engine = create_async_engine(url, poolclass=NullPool, connect_args=patience)
+    engine = create_async_engine(url, poolclass=NullPool, connect_args=connect_args)
     try:
         async with engine.connect() as connection:
             if postgres:
@@ -75,7 +76,7 @@ async def _migrate(url: str) -> None:
 
 
 async def _upgrade_sqlite(connection: AsyncConnection) -> None:
-    """Upgrade SQLite in a transaction that writes from its beginning, so that there is one at a time."""
+    """Upgrade SQLite in a transaction that takes the write lock first, so that replicas migrate one at a time."""
     await connection.execution_options(isolation_level="AUTOCOMMIT")
     await connection.exec_driver_sql("BEGIN IMMEDIATE")
     try:
@@ -87,7 +88,7 @@ async def _upgrade_sqlite(connection: AsyncConnection) -> None:
 
 
 def _upgrade(connection: Connection) -> None:
-    # imported here, as it takes a second and is wanted once in a catalogue's life
+    # imported here: it takes a second and is needed once in the life of a catalogue
     from alembic import command
     from alembic.config import Config
     from alembic.script import ScriptDirectory
@@ -96,10 +97,10 @@ def _upgrade(connection: Connection) -> None:
     config.set_main_option("script_location", str(_SCRIPTS_FOLDER).replace("%", "%%"))
     config.set_main_option("path_separator", "os")
     config.attributes["connection"] = connection
-    at = read_schema_version(connection)
+    current = read_schema_version(connection)
     known = [script.revision for script in ScriptDirectory.from_config(config).walk_revisions()]
-    if at is not None and at not in known:
-        raise UnknownSchemaVersion(at)
-    if at is None and inspect(connection).has_table("motions"):
+    if current is not None and current not in known:
+        raise UnknownSchemaVersion(current)
+    if current is None and inspect(connection).has_table("motions"):
         command.stamp(config, UNVERSIONED_REVISION)
     command.upgrade(config, HEAD_REVISION)

@@ -1,7 +1,6 @@
-"""Encoded motions as objects: written once, never changed, in a folder or an object store by URL.
+"""Store of encoded motions: immutable objects in a folder or an object store.
 
-Beside the motions lie uploaded files and session logs that jobs still need, each for as long as its job takes, and
-notes that replicas share.
+The store also holds the uploaded files and session logs of pending jobs, and notes that replicas share.
 """
 
 from __future__ import annotations
@@ -18,8 +17,10 @@ _LOG_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
 
 class MotionStore:
-    """The motions in an object store, those last used kept in memory. Methods raise `Unavailable` as `Objects` has it;
-    what is in memory can be had without the store."""
+    """Motions in an object store, with a cache of the most recently used ones.
+
+    Methods raise `BackendUnavailable` as `ObjectStorage` does; cached motions are served without the store.
+    """
 
     def __init__(self, objects: ObjectStorage) -> None:
         self._objects = objects
@@ -28,16 +29,16 @@ class MotionStore:
 
     @classmethod
     def open(cls, url: str) -> MotionStore:
-        """The library at `file:///folder`, `s3://bucket/prefix` and what else obstore knows."""
+        """Open the store at `file:///folder`, `s3://bucket/prefix` or another URL that obstore supports."""
         return cls(ObjectStorage(url))
 
     async def put(self, motion_id: str, packed: bytes) -> None:
-        """Store the object that `pack_motion` made."""
+        """Store a motion, packed by `pack_motion`."""
         await self._objects.put(_motion_path(motion_id), packed)
 
     async def get(self, motion_id: str) -> StoredMotion | None:
-        """The motion of this id, None where there is none in a codec that is spoken; what could not be an id is never a
-        path."""
+        """Return a motion, None if it does not exist or is in an unsupported codec."""
+        # never use a string as a path that cannot be an id
         if not (motion_id.isascii() and motion_id.isalnum()):
             return None
         if motion_id in self._cache:
@@ -49,53 +50,53 @@ class MotionStore:
         try:
             stored = unpack_motion(motion_id, packed)
         except DamagedBlock:
-            # of a codec that is no longer spoken: its file can be sent again
+            # a codec of an older release: the file can be uploaded again
             return None
         self._cache_motion(stored)
         return stored
 
     async def remove(self, motion_id: str) -> None:
-        """Remove a motion's object; nothing happens where there is none."""
+        """Remove a motion if it exists."""
         dropped = self._cache.pop(motion_id, None)
         self._cached_bytes -= dropped.total_bytes if dropped else 0
         await self._objects.delete(_motion_path(motion_id))
 
     async def check(self) -> None:
-        """Raises `Unavailable` where the store cannot be used now."""
+        """Raise `BackendUnavailable` if the store cannot be used now."""
         await self._objects.check()
 
     async def put_note(self, name: str, data: bytes) -> None:
-        """Store a note under a name that the code gives it, a word."""
+        """Store a note; `name` is a constant of the code, one word."""
         await self._objects.put(f"notes/{name}", data)
 
     async def get_note(self, name: str) -> bytes | None:
-        """The note of this name, None where there is none."""
+        """Return a note, None if it does not exist."""
         return await self._objects.get(f"notes/{name}")
 
     async def put_source(self, name: str, data: bytes) -> None:
-        """Store a file that was sent, under a name that the code gives it, a word."""
+        """Store an uploaded file; `name` is derived from its hash, one word."""
         await self._objects.put(f"sources/{name}", data)
 
     async def get_source(self, name: str) -> bytes | None:
-        """The file of this name, None where there is none."""
+        """Return an uploaded file, None if it does not exist."""
         return await self._objects.get(f"sources/{name}")
 
     async def remove_source(self, name: str) -> None:
-        """Remove a file that was sent; nothing happens where there is none."""
+        """Remove an uploaded file if it exists."""
         await self._objects.delete(f"sources/{name}")
 
     async def put_log(self, name: str, data: bytes) -> None:
-        """Store a session's log under a random name of 1..64 of A-Z a-z 0-9 _ -; raises ValueError for another."""
+        """Store a session log; raise ValueError unless `name` is 1 to 64 characters of A-Z a-z 0-9 _ -."""
         if not _LOG_NAME_PATTERN.fullmatch(name):
-            raise ValueError(f"a log's name is 1..64 of A-Z a-z 0-9 _ -, not {name[:80]!r}")
+            raise ValueError(f"invalid log name {name[:80]!r}, expected 1 to 64 characters of A-Z a-z 0-9 _ -")
         await self._objects.put(_log_path(name), data)
 
     async def get_log(self, name: str) -> bytes | None:
-        """The log of this name, None where there is none."""
+        """Return a session log, None if it does not exist."""
         return await self._objects.get(_log_path(name)) if _LOG_NAME_PATTERN.fullmatch(name) else None
 
     async def remove_log(self, name: str) -> None:
-        """Remove a log; nothing happens where there is none."""
+        """Remove a session log if it exists."""
         if _LOG_NAME_PATTERN.fullmatch(name):
             await self._objects.delete(_log_path(name))
 

@@ -1,4 +1,4 @@
-"""Objects by name, in a folder or in an object store by URL."""
+"""Objects by path, in a folder or in an object store."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ import obstore
 from obstore.exceptions import BaseError
 from obstore.store import LocalStore, ObjectStore, from_url
 
-from bunraku.http.problem_details import insufficient_storage, is_disk_full
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendTimeout, BackendUnavailable
+from bunraku.runtime.insufficient_storage import insufficient_storage, is_disk_full
 
 MIN_THROUGHPUT_BYTES_PER_S = 1 << 20
-"""Bytes a second: a store that takes or gives fewer counts as gone."""
+"""Throughput below which an object store counts as unavailable, in bytes per second."""
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 class ObjectStorage:
-    """Objects at `file:///folder`, `s3://bucket/prefix`, and what else obstore knows.
+    """Objects at `file:///folder`, `s3://bucket/prefix` or another URL that obstore supports.
 
-    Methods raise `Unavailable` where a store is not the machine's own and is away, refuses us, or has no such bucket.
-    Endpoint and keys of S3 are those of the environment (`AWS_ENDPOINT_URL`, `AWS_ACCESS_KEY_ID` ...).
+    Methods raise `BackendUnavailable` if a remote store does not respond, denies access or has no such bucket. Endpoint
+    and keys of S3 come from the environment (`AWS_ENDPOINT_URL`, `AWS_ACCESS_KEY_ID` ...).
     """
 
     def __init__(self, url: str) -> None:
-        """Raises ValueError, or what obstore raises, for what is no address."""
+        """Raise ValueError, or an error of obstore, for an invalid URL."""
         self._timeout = BackendTimeout("the library")
         self._is_local = url.startswith("file://")
         self._store: ObjectStore
@@ -39,14 +39,16 @@ class ObjectStorage:
         elif url.startswith("memory:"):
             self._store = from_url(url)
         else:
-            # an endpoint without TLS is one only where somebody says so in its address
-            patience: Any = {"allow_http": True, "connect_timeout": timedelta(seconds=BACKEND_TIMEOUT_S / 2)}
-            again: Any = {"max_retries": 3, "retry_timeout": timedelta(seconds=BACKEND_TIMEOUT_S / 2)}
-            self._store = from_url(url, client_options=patience, retry_config=again)
+            # http:// is used only if the endpoint's URL has it
+            client_options: Any = {"allow_http": True, "connect_timeout": timedelta(seconds=BACKEND_TIMEOUT_S / 2)}
+            retry_config: Any = {"max_retries": 3, "retry_timeout": timedelta(seconds=BACKEND_TIMEOUT_S / 2)}
+            self._store = from_url(url, client_options=client_options, retry_config=retry_config)
 
     async def put(self, path: str, data: bytes) -> None:
-        """Store an object; once this returns it is there. Raises `ProblemError`, 507, where there is no room for it:
-        what was there under its name stays."""
+        """Store an object durably.
+
+        Raise `ProblemError` (507) if there is no space; the previous object of this path then stays.
+        """
         try:
             await self._run_request(obstore.put_async(self._store, path, data), len(data))
         except FileNotFoundError as error:
@@ -55,29 +57,29 @@ class ObjectStorage:
             raise BackendUnavailable("the library", _error_detail(error)) from error
 
     async def get(self, path: str) -> bytes | None:
-        """The object, None where there is none."""
+        """Return an object, None if it does not exist."""
         try:
-            found = await self._run_request(obstore.get_async(self._store, path))
-            return bytes(await self._run_request(found.bytes_async(), found.meta["size"]))
+            response = await self._run_request(obstore.get_async(self._store, path))
+            return bytes(await self._run_request(response.bytes_async(), response.meta["size"]))
         except FileNotFoundError:
             return None
 
     async def delete(self, path: str) -> None:
-        """Remove an object; nothing happens where there is none."""
+        """Remove an object if it exists."""
         try:
             await self._run_request(obstore.delete_async(self._store, path))
         except FileNotFoundError:
             return
 
     async def check(self) -> None:
-        """Raises `Unavailable` where the store cannot be used now."""
+        """Raise `BackendUnavailable` if the store cannot be used now."""
         if self._is_local:
             if not await asyncio.to_thread(os.access, self._folder, os.R_OK | os.W_OK | os.X_OK):
-                raise BackendUnavailable("the library", f"there is no folder {self._folder} to write in")
+                raise BackendUnavailable("the library", f"the folder {self._folder} does not exist or is not writable")
         else:
             await self.get("readyz")
 
-    async def _run_request(self, request: Awaitable[Found], transfer_bytes: int = 0) -> Found:
+    async def _run_request(self, request: Awaitable[Result], transfer_bytes: int = 0) -> Result:
         if self._is_local:
             try:
                 return await request
@@ -92,5 +94,5 @@ class ObjectStorage:
 
 
 def _error_detail(error: Exception) -> str:
-    """The first line of what obstore says at length."""
+    # the first line: obstore appends a debug dump
     return str(error).partition("\n")[0]

@@ -1,4 +1,4 @@
-"""Links for viewers in SQL."""
+"""SQL table of viewer links."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from typing import Any
 from sqlalchemy import Row, delete, select
 from sqlalchemy.ext.asyncio import AsyncEngine
 
-from bunraku.storage.catalogue import Share
+from bunraku.storage.record import Share
 from bunraku.storage.table import SHARES, QueryRunner
 
 
 class SqlShareTable:
-    """The table of links; each method as that of `Catalogue`."""
+    """Table of viewer links; `Catalogue` documents the methods."""
 
     def __init__(self, engine: AsyncEngine, run_query: QueryRunner) -> None:
         self._engine = engine
         self._run_query = run_query
 
     async def add(self, share: Share) -> None:
-        """Add one."""
+        """Add a link and remove expired ones."""
         await self._run_query(self._add(share))
 
     async def get(self, share_id: str) -> Share | None:
-        """The one of this id."""
-        found = await self._run_query(self._select(select(SHARES).where(SHARES.c.id == share_id)))
-        return found[0] if found else None
+        """Return a link, None if it does not exist."""
+        rows = await self._run_query(self._select(select(SHARES).where(SHARES.c.id == share_id)))
+        return rows[0] if rows else None
 
     async def list(self, subject: str | None, limit: int) -> builtins.list[Share]:
-        """The newest, of one subject or of all."""
+        """Return the newest links of one subject or of all."""
         statement = select(SHARES).order_by(SHARES.c.created.desc(), SHARES.c.id.desc()).limit(limit)
         if subject is not None:
             statement = statement.where(SHARES.c.subject == subject)
         return await self._run_query(self._select(statement))
 
     async def remove(self, share_id: str) -> bool:
-        """Revoke one; whether it was there."""
+        """Remove a link and return whether it existed."""
         return await self._run_query(self._remove(share_id))
 
     async def _add(self, share: Share) -> None:

@@ -1,4 +1,4 @@
-"""The catalogue's tables, and how they are asked."""
+"""Tables of the catalogue and the interface that runs their queries."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ SHARES = Table(
     Column("motion", String(64), nullable=True),
 )
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 class QueryRunner(Protocol):
-    """Waits for a database, as `SqlCatalogue` does."""
+    """Function that runs a query with the time limit and error handling of the database."""
 
-    def __call__(self, query: Coroutine[Any, Any, Found]) -> Coroutine[Any, Any, Found]:
-        """What it answers; raises `Unavailable`, and `ProblemError` where its disk is full."""
+    def __call__(self, query: Coroutine[Any, Any, Result]) -> Coroutine[Any, Any, Result]:
+        """Return the result; raise `BackendUnavailable`, or `ProblemError` (507) if the database's disk is full."""

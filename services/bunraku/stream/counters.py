@@ -1,7 +1,7 @@
-"""Who watches at one replica, and what they were sent: plain numbers, which only grow, and the viewers themselves.
+"""Counters of one stream replica, and the set of its viewers.
 
-What goes to many at once is counted once for all of them, and what goes to one, a first block or an overlay over a
-narrow line, where it is written.
+Data that is written to many viewers at once is counted once for all of them; data for one viewer, such as a first block
+or an overlay on a constrained link, where it is written.
 """
 
 from __future__ import annotations
@@ -14,62 +14,62 @@ from bunraku.websocket.connection import WebSocketConnection
 
 StreamKind = Literal["motion", "session"]
 TIMEOUT_REASON = "Silent"
-"""Why one is dropped of whom nothing is heard any more."""
+"""Reason counted for a viewer whose heartbeat timed out."""
 
 
 class CountedViewer(Protocol):
-    """A viewer, as it is counted."""
+    """Viewer, as far as it is counted."""
 
     connection: WebSocketConnection
 
     @property
     def choice(self) -> tuple[int, str] | None:
-        """The motion's rate that it is sent, and why, in a word of `Choice`; None where there is none yet."""
+        """Level of the motion that is sent, and the reason in a `Choice`; None before a motion is set."""
 
 
 class StreamCounters:
-    """Of one replica, since it began."""
+    """Counters since the start of the process; they only grow."""
 
     def __init__(self) -> None:
         self.bytes = 0
-        """Written to viewers once they had been shaken hands with: frames whole, answers and signs of life too."""
+        """Bytes written after the handshake: frames with their headers, Pongs and heartbeats included."""
         self.blocks = 0
         self.overlays = 0
         self.skipped_overlays = 0
-        """Overlays that a newer one took the place of, as the line had no room."""
+        """Overlays replaced by a newer one before the link had capacity."""
         self.joined: Counter[tuple[str, ...]] = Counter({("motion",): 0, ("session",): 0})
         self.dropped: Counter[tuple[str, ...]] = Counter({("Too slow",): 0, (TIMEOUT_REASON,): 0})
-        """Viewers that were ended from here, by why."""
+        """Viewers that the server disconnected, by reason."""
         self._viewers: dict[StreamKind, set[CountedViewer]] = {"motion": set(), "session": set()}
 
     def count_writes(self, connection: WebSocketConnection) -> None:
-        """Count what is written to this outlet from now on, but for what is written to many together."""
+        """Count the bytes written to this connection from now on, except those of multicast writes."""
         write = connection.write
 
-        def counted(data: bytes | bytearray | memoryview[int]) -> None:
+        def counted_write(data: bytes | bytearray | memoryview[int]) -> None:
             self.bytes += len(data)
             write(data)
 
-        connection.write = counted
+        connection.write = counted_write
 
     def add_viewer(self, viewer: CountedViewer, kind: StreamKind, on_end: Callable[[], None]) -> Callable[[], None]:
-        """A viewer of this kind is here until the answer is called, which calls `ended`."""
+        """Count a viewer as connected until the returned function is called, which also calls `on_end`."""
         self.joined[(kind,)] += 1
-        here = self._viewers[kind]
-        here.add(viewer)
+        viewers = self._viewers[kind]
+        viewers.add(viewer)
 
-        def go() -> None:
-            here.discard(viewer)
+        def remove_viewer() -> None:
+            viewers.discard(viewer)
             on_end()
 
-        return go
+        return remove_viewer
 
     def viewers_by_kind(self) -> dict[tuple[str, ...], int]:
-        """How many there are, by their kind."""
+        """Return the number of connected viewers, by kind of stream."""
         return {(kind,): len(viewers) for kind, viewers in self._viewers.items()}
 
     def viewers_by_level(self) -> Counter[tuple[str, ...]]:
-        """How many have which rate, and why."""
+        """Return the number of connected viewers, by bitrate level and reason."""
         found: Counter[tuple[str, ...]] = Counter()
         for viewer in self:
             if (choice := viewer.choice) is not None:
@@ -77,7 +77,7 @@ class StreamCounters:
         return found
 
     def unsent_bytes(self) -> list[int]:
-        """Of each viewer to whom not all that was written has gone, the bytes that are still in the process."""
+        """Return the bytes buffered in the process, for each viewer whose connection is not writable."""
         return [viewer.connection.buffered_bytes for viewer in self if not viewer.connection.is_writable]
 
     def __iter__(self) -> Iterator[CountedViewer]:

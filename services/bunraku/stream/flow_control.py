@@ -1,53 +1,105 @@
-"""When there is room on one viewer's line, and whose turn it is where the live overlay and blocks share it.
+"""Flow control of one viewer's link: what may be written now, and how overlays and blocks share the link.
 
-Most lines are quick, and asking the system about each of them for each overlay would cost more than writing it. So a
-line that had room many times in a row counts as quick, is written to unasked, and is looked at now and then.
+Most links are unconstrained, and a system call for each overlay would cost more than the write itself. A link that had
+capacity in many consecutive checks is therefore written to without a check, and reassessed now and then.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import Enum
 from typing import Protocol
 
 from bunraku.delivery.congestion import INITIAL_WINDOW_BYTES, PROBE_GAIN, CongestionWindow, bytes_on_wire
 from bunraku.websocket.link import LinkSample
 
 UNCONSTRAINED_CHECKS = 64
-"""So many times there was room at once before a line counts as quick."""
+"""Consecutive checks with capacity after which overlays are written without a check."""
 HIGH_RTT_US = 20_000
-"""Round trips that take longer, microseconds, may be those of a narrow line."""
+"""A link with a longer round trip may be a constrained one, microseconds."""
 MAX_UNTRACKED_BYTES = 16_384
-"""So much may wait on a line that is near: who reads in gulps is not narrow."""
+"""Unacknowledged bytes beyond the window's on a low-RTT link: a client that reads in bursts is not constrained."""
 MAX_RTT_INCREASE_US = 100_000
-"""So much longer than the least the round trips of a quick line may take: receivers may wait 40 ms to acknowledge."""
+"""Allowed increase over the minimum round trip of a link that is not checked: receivers delay acknowledgements by
+40 ms."""
 BLOCK_CREDIT_SHARE = 0.3
-"""The share of a narrow line that blocks get beside overlays,"""
+"""Share of a constrained link's throughput that blocks get beside overlays."""
 MAX_BLOCK_CREDIT_S = 0.2
-"""and for how many seconds they can save it up: several blocks in a row would keep overlays waiting."""
+"""Time for which that share may accumulate, seconds: several consecutive blocks would delay overlays."""
 
 
 class Link(Protocol):
-    """A line that can be read, as those of `bunraku.websocket.link`."""
+    """Link whose send queue can be observed; implemented in `bunraku.websocket.link`."""
 
     def sample(self) -> LinkSample:
-        """How it stands now; raises OSError once it is closed."""
+        """Return its present measurements; raise OSError once it is closed."""
 
     def probe(self, size: int, /) -> bytes:
-        """What is to be written right behind `size` bytes so that it can be read."""
+        """Return the bytes to write directly after `size` bytes, so that their arrival can be measured."""
 
     def receive_probe_echo(self, payload: bytes) -> None:
-        """What was asked has come back."""
+        """Process the answer to a probe."""
 
     def set_corked(self, corked: bool) -> None:
-        """Keep what is written together in packets as full as can be, or let it go."""
+        """Hold written data until packets are full, or release it."""
 
     def use_loss_based_congestion(self) -> None:
-        """Have the system hold back no more than it must."""
+        """Select loss-based congestion control in the kernel, so that it delays no data."""
+
+
+class LinkState(Enum):
+    """Checks that a write needs, by round trip and by recent congestion.
+
+    | state | round trip | overlays | blocks |
+    |---|---|---|---|
+    | UNLIMITED | low | written without a check | written without a check, no prefetch |
+    | LIMITED | low | checked | checked |
+    | HIGH_RTT | high | written without a check | checked, with prefetch |
+    | HIGH_RTT_LIMITED | high | checked | checked, with prefetch |
+
+    Whether the throughput is known, and whether the queue was full in the last seconds, are measurements of the
+    congestion window and no part of the state.
+    """
+
+    UNLIMITED = (False, True)
+    LIMITED = (False, False)
+    HIGH_RTT = (True, True)
+    HIGH_RTT_LIMITED = (True, False)
+
+    def __init__(self, is_high_rtt: bool, skips_overlay_check: bool) -> None:
+        self.is_high_rtt = is_high_rtt
+        self.skips_overlay_check = skips_overlay_check
+        # plain attributes: access to an enum's members by name is slow in Python 3.11, and this runs for each message
+        self.is_unlimited = skips_overlay_check and not is_high_rtt
+
+    @classmethod
+    def initial(cls, rtt_us: int) -> LinkState:
+        """Return the state of a new link with this round trip."""
+        return cls.HIGH_RTT_LIMITED if rtt_us > HIGH_RTT_US else cls.UNLIMITED
+
+    def after_congestion(self) -> LinkState:
+        """Return the state once the queue or the round trip has grown: every write is checked."""
+        return LinkState.HIGH_RTT_LIMITED if self.is_high_rtt else LinkState.LIMITED
+
+    def after_clear_checks(self) -> LinkState:
+        """Return the state after `UNCONSTRAINED_CHECKS` consecutive checks with capacity."""
+        return LinkState.HIGH_RTT if self.is_high_rtt else LinkState.UNLIMITED
+
+    def after_fast_echo(self) -> LinkState:
+        """Return the state once the first probe was answered quickly: the client is near, behind a proxy."""
+        return LinkState.UNLIMITED
+
+
+class PrefetchState(Enum):
+    """Progress of the prefetched base layer, before which nothing is upgraded on a high-RTT link."""
+
+    FILLING = "filling"
+    SENT = "sent"
+    DELIVERED = "delivered"
 
 
 class FlowControl:
-    """What one viewer's line can take now. `steady` says that it counts as quick: overlays are written to it unasked,
-    and need not be told of."""
+    """Flow control of one viewer's link."""
 
     __slots__ = (
         "_block_credit",
@@ -58,169 +110,168 @@ class FlowControl:
         "_prefetch_end",
         "_untracked_bytes",
         "is_corked",
-        "is_high_rtt",
-        "is_unconstrained",
+        "state",
         "window",
     )  # fmt: skip
 
     def __init__(self, link: Link | None, clock: Callable[[], int]) -> None:
-        """`line` None: nothing is known of it, and there is always room; `now` tells microseconds. Raises OSError for a
-        line that is closed already."""
-        reading = LinkSample(0, 0, 0) if link is None else link.sample()
+        """Start in the state that the link's round trip suggests.
+
+        A link of None cannot be observed and always has capacity. `clock` returns microseconds. Raises OSError if the
+        link is already closed.
+        """
+        sample = LinkSample(0, 0, 0) if link is None else link.sample()
         self._link = link
         self._clock = clock
         self.window = CongestionWindow()
-        # what had been written before the window was told of anything
-        self._untracked_bytes = reading.written_bytes
-        # of what the window was told, how much was written when the net reached far enough
+        # bytes written before the window recorded any
+        self._untracked_bytes = sample.written_bytes
+        # bytes recorded by the window when the prefetch reached far enough
         self._prefetch_end: int | None = None
         self._consecutive_clear = 0
         self._block_credit = 0.0
         self._credited_at = clock()
         self.is_corked = link is not None
-        """Whether what is written is held until the first block is."""
-        self.is_high_rtt = reading.rtt_us > HIGH_RTT_US
-        """Whether answers take their time: the line may be a narrow one, or one that stands now and then."""
-        self.is_unconstrained = not self.is_high_rtt
-        if self.is_high_rtt and link is not None:
+        """True while written data is held until the first block."""
+        self.state = LinkState.initial(sample.rtt_us)
+        if self.state.is_high_rtt and link is not None:
             link.use_loss_based_congestion()
 
-    @property
-    def is_unlimited(self) -> bool:
-        """Whether blocks, too, are written unasked, and none is kept as a net."""
-        return self.is_unconstrained and not self.is_high_rtt
-
     def uncork(self) -> None:
-        """The first block was written, or there is none: what was held so far goes, in one packet."""
+        """Release the data held since the start, in one packet: the first block was written, or there is none."""
         if self.is_corked and self._link is not None:
             self.is_corked = False
             self._link.set_corked(False)
 
     def record_write(self, size: int) -> None:
-        """Bytes were written, in one go."""
-        if self._link is not None and not self.is_unlimited:
+        """Record that `size` bytes were written at once."""
+        if self._link is not None and not self.state.is_unlimited:
             self.window.record_write(self._clock(), size)
 
     def probe(self, size: int, /) -> bytes:
-        """What is to be written right behind `size` bytes, in one go with them; of none before a look."""
-        return b"" if self._link is None or (self.is_unlimited and size) else self._link.probe(size)
+        """Return the bytes to write together with `size` bytes of data; a size of 0 asks for a probe alone."""
+        return b"" if self._link is None or (size and self.state.is_unlimited) else self._link.probe(size)
 
     def on_probe_echo(self, payload: bytes) -> None:
-        """The other end has answered a Ping that asked."""
+        """Process the client's answer to a probe."""
         if self._link is None:
             return
-        unknown = self.is_unmeasured
+        was_unmeasured = self.is_unmeasured
         self._link.receive_probe_echo(payload)
-        if unknown and 0 < self._link.sample().rtt_us <= HIGH_RTT_US:
-            # it is near, as far as the proxy is
-            self.is_high_rtt, self.is_unconstrained = False, True
+        if was_unmeasured and 0 < self._link.sample().rtt_us <= HIGH_RTT_US:
+            self.state = self.state.after_fast_echo()
 
     def reassess(self) -> None:
-        """Now and then, and not for each overlay: whether the line still counts as quick, or does again."""
+        """Update the state; called now and then, not for each overlay."""
         if self._link is None:
             return
-        if not self.is_unconstrained:
-            if not self.is_high_rtt:
+        if not self.state.skips_overlay_check:
+            if not self.state.is_high_rtt:
                 self._count_check(self.has_capacity() and not self.is_constrained)
             return
-        room = self.is_unlimited or (self.has_capacity() and not self.is_constrained)
+        has_capacity = self.state.is_unlimited or (self.has_capacity() and not self.is_constrained)
         try:
-            reading = self._link.sample()
+            sample = self._link.sample()
         except OSError:
-            # it is closed: whoever writes to it is told
+            # the link is closed, which the next write reports
             return
-        untold = reading.unacked_bytes - self.window.in_flight_bytes > (
-            INITIAL_WINDOW_BYTES if self.is_high_rtt else MAX_UNTRACKED_BYTES
+        has_backlog = sample.unacked_bytes - self.window.in_flight_bytes > (
+            INITIAL_WINDOW_BYTES if self.state.is_high_rtt else MAX_UNTRACKED_BYTES
         )
-        if untold or not room or reading.rtt_us > reading.min_rtt_us + MAX_RTT_INCREASE_US:
-            self.is_unconstrained, self._consecutive_clear = False, 0
-        if untold:
-            # it was filled by what the window knows nothing of
+        if has_backlog or not has_capacity or sample.rtt_us > sample.min_rtt_us + MAX_RTT_INCREASE_US:
+            self.state, self._consecutive_clear = self.state.after_congestion(), 0
+        if has_backlog:
+            # the queue was filled by writes that the window did not record
             self.window = CongestionWindow()
             self._prefetch_end = None if self._prefetch_end is None else 0
-            self.window.record_write(self._clock(), reading.unacked_bytes)
-            self._untracked_bytes = reading.written_bytes - reading.unacked_bytes
+            self.window.record_write(self._clock(), sample.unacked_bytes)
+            self._untracked_bytes = sample.written_bytes - sample.unacked_bytes
 
     def can_write_overlay(self) -> bool:
-        """Whether an overlay may be written whole and at once; the system is asked unless the line is `steady`."""
-        if self.is_unconstrained:
+        """Return True if an overlay may be written now; the kernel is asked only where the state requires it."""
+        if self.state.skips_overlay_check:
             return True
-        clean = not self.is_constrained and self.has_capacity()
-        self._count_check(clean)
-        return clean
+        is_clear = not self.is_constrained and self.has_capacity()
+        self._count_check(is_clear)
+        return is_clear
 
-    def _count_check(self, clear: bool) -> None:
-        self._consecutive_clear = self._consecutive_clear + 1 if clear else 0
-        self.is_unconstrained = self._consecutive_clear >= UNCONSTRAINED_CHECKS
+    def _count_check(self, is_clear: bool) -> None:
+        self._consecutive_clear = self._consecutive_clear + 1 if is_clear else 0
+        if self._consecutive_clear >= UNCONSTRAINED_CHECKS:
+            self.state = self.state.after_clear_checks()
 
     def has_capacity(self, extra_queue_us: int = 0) -> bool:
-        """Whether something may be written now; `ahead` as of `Window.room`."""
+        """Return True if data may be written now; `extra_queue_us` as in `CongestionWindow.has_capacity`."""
         if self._link is None:
             return True
         now = self._clock()
-        if self.window.in_flight_bytes or self.is_unconstrained:
+        if self.window.in_flight_bytes or self.state.skips_overlay_check:
             try:
-                reading = self._link.sample()
+                sample = self._link.sample()
             except OSError:
-                # it is closed: whoever writes to it is told
+                # the link is closed, which the next write reports
                 return True
-            # overlays that were written unasked
+            # overlays that were written without a check
             self.window.record_untracked_write(
-                max(reading.written_bytes - self._untracked_bytes - self.window.written, 0)
+                max(sample.written_bytes - self._untracked_bytes - self.window.written, 0)
             )
-            self.window.record_ack(now, reading.unacked_bytes, reading.min_rtt_us)
+            self.window.record_ack(now, sample.unacked_bytes, sample.min_rtt_us)
         return self.window.has_capacity(now, extra_queue_us)
 
     @property
     def is_constrained(self) -> bool:
-        """Whether the line was full of late."""
+        """True if the link's queue was full within the last seconds."""
         return self._link is not None and self.window.is_constrained(self._clock())
 
     @property
     def is_slowing(self) -> bool:
-        """Whether the line turned out slower than thought just now: what can wait would make it worse."""
+        """True if the link has just become slower than estimated: data that can wait would add to its queue."""
         return self._link is not None and self.window.is_slowing(self._clock())
 
     @property
-    def throughput(self) -> float | None:
-        """Bytes a second of a line that may be a narrow one, None where it is not or nothing is known."""
-        rate = self.window.throughput
-        if rate is None or not (self.is_high_rtt or self.is_constrained):
-            return None
-        # as long as it was never full it carries more than it was seen to
-        return rate if self.window.queue_full_at is not None else PROBE_GAIN * rate
+    def is_unmeasured(self) -> bool:
+        """True if the link may be constrained, and nothing was acknowledged yet."""
+        return self.state.is_high_rtt and self.window.throughput is None
 
     @property
-    def is_unmeasured(self) -> bool:
-        """Whether the line may be narrow: nothing was acknowledged yet."""
-        return self.is_high_rtt and self.window.throughput is None
+    def throughput(self) -> float | None:
+        """Throughput of a link that may be constrained, bytes/s; None for other links, and while it is unknown."""
+        throughput = self.window.throughput
+        if throughput is None or not (self.state.is_high_rtt or self.is_constrained):
+            return None
+        # a link that was never full has more throughput than was observed
+        return throughput if self.window.queue_full_at is not None else PROBE_GAIN * throughput
 
     @property
     def is_awaiting_ack(self) -> bool:
-        """Whether something is on its way that will tell of the line."""
-        return self.window.in_flight_bytes > 0 and (
-            self.is_unmeasured or (self._prefetch_end is not None and not self.is_prefetch_delivered)
-        )
+        """True if data is in flight whose acknowledgement decides what may be sent next."""
+        return self.window.in_flight_bytes > 0 and (self.is_unmeasured or self.prefetch_state is PrefetchState.SENT)
+
+    @property
+    def prefetch_state(self) -> PrefetchState:
+        """Progress of the prefetched base layer; always DELIVERED on a link that cannot be observed."""
+        if self._link is None:
+            return PrefetchState.DELIVERED
+        if self._prefetch_end is None:
+            return PrefetchState.FILLING
+        return PrefetchState.DELIVERED if self.window.is_acked(self._prefetch_end) else PrefetchState.SENT
 
     def mark_prefetch_sent(self) -> None:
-        """What was written by now is a net that reaches far enough."""
+        """Record that the data written so far includes a base layer that reaches far enough."""
         if self._prefetch_end is None:
             self._prefetch_end = self.window.written
 
-    @property
-    def is_prefetch_delivered(self) -> bool:
-        """Whether such a net is at the other end."""
-        return self._link is None or (self._prefetch_end is not None and self.window.is_acked(self._prefetch_end))
-
     def charge_block(self, size: int) -> None:
-        """A block was written."""
+        """Charge a block of `size` bytes to the credit of blocks."""
         self._block_credit -= bytes_on_wire(size)
 
     def may_send_block(self) -> bool:
-        """Whether a block that can wait may take room from overlays: on a narrow line they have a share of it, but not
-        while too much is on its way as it is."""
-        now, rate = self._clock(), self.window.throughput or 0.0
-        self._block_credit += BLOCK_CREDIT_SHARE * rate * (now - self._credited_at) * 1e-6
-        self._block_credit = min(self._block_credit, BLOCK_CREDIT_SHARE * rate * MAX_BLOCK_CREDIT_S)
+        """Return True if a block that can wait may take capacity from overlays.
+
+        Blocks have a share of a constrained link's throughput, but none while too much data is in flight.
+        """
+        now, throughput = self._clock(), self.window.throughput or 0.0
+        self._block_credit += BLOCK_CREDIT_SHARE * throughput * (now - self._credited_at) * 1e-6
+        self._block_credit = min(self._block_credit, BLOCK_CREDIT_SHARE * throughput * MAX_BLOCK_CREDIT_S)
         self._credited_at = now
         return self._block_credit > 0 and not self.is_slowing

@@ -1,26 +1,38 @@
-"""Whether a viewer is there still: one of whom nothing is heard is asked, and given up when nothing comes."""
+"""Ping timing of one viewer: the heartbeat, and quiet periods for clock samples.
+
+All times are clock times in microseconds.
+"""
 
 from __future__ import annotations
 
+from bunraku.stream.flow_control import FlowControl
 from bunraku.websocket.connection import WebSocketConnection
 
 PING_AFTER_US = 12_000_000
-"""A viewer of whom nothing was heard for this long, microseconds, is asked for a sign of life."""
+"""A viewer that has been silent for this long is sent a WebSocket Ping, microseconds."""
 HEARTBEAT_TIMEOUT_US = 18_000_000
-"""One of whom nothing was heard for this long is there no more."""
+"""A viewer that has been silent for this long is disconnected, microseconds."""
+QUIET_MARGIN_US = 15_000
+"""Added to the estimated time in which a link drains, microseconds."""
+MAX_QUIET_PERIOD_US = 500_000
+"""Upper bound of one quiet period, microseconds."""
+QUIET_INTERVAL_US = 2_000_000
+"""Minimum time between the starts of two quiet periods, microseconds."""
+INITIAL_QUIET_PERIODS = 4
+"""The first quiet periods are allowed at a quarter of the interval."""
 
 
 class Heartbeat:
-    """Of one viewer. Times are clock times in microseconds."""
+    """Detection of a viewer that no longer answers."""
 
     __slots__ = ("_pinged_at",)
 
     def __init__(self) -> None:
-        # when it was heard last before it was asked
+        # `last_received_at` of the connection when the last Ping was sent
         self._pinged_at = 0
 
     def check(self, connection: WebSocketConnection, now: int) -> bool:
-        """Whether it is there, so far as is known; asks where that is long ago."""
+        """Return False if the viewer has timed out; send one Ping if it has been silent for long."""
         silence = now - connection.last_received_at
         if PING_AFTER_US < silence <= HEARTBEAT_TIMEOUT_US and connection.last_received_at != self._pinged_at:
             self._pinged_at = connection.last_received_at
@@ -28,9 +40,40 @@ class Heartbeat:
         return silence <= HEARTBEAT_TIMEOUT_US
 
     def next_check(self, connection: WebSocketConnection) -> int:
-        """When to look next."""
+        """Return the time of the next check."""
         return (
             connection.last_received_at
             + (HEARTBEAT_TIMEOUT_US if connection.last_received_at == self._pinged_at else PING_AFTER_US)
             + 1
         )
+
+
+class QuietPeriod:
+    """Pause in sending, so that a clock sample is not delayed by queued data.
+
+    An answer that waits in the link's queue makes the clock estimate wrong by up to half its delay.
+    """
+
+    __slots__ = ("_count", "_next_at", "ends_at")
+
+    def __init__(self) -> None:
+        self.ends_at = 0
+        """Time until which nothing is written."""
+        self._next_at = self._count = 0
+
+    def start(self, now: int, flow: FlowControl) -> bool:
+        """Start a pause if the link is paced and measured, and the last pause was long enough ago.
+
+        Return True if a pause starts; it lasts until the link has drained.
+        """
+        if (
+            now < self.ends_at
+            or now < self._next_at
+            or flow.state.skips_overlay_check
+            or flow.window.throughput is None
+        ):
+            return False
+        self._next_at = now + (QUIET_INTERVAL_US if self._count >= INITIAL_QUIET_PERIODS else QUIET_INTERVAL_US // 4)
+        self._count += 1
+        self.ends_at = now + min(flow.window.time_to_drain(now) + QUIET_MARGIN_US, MAX_QUIET_PERIOD_US)
+        return True

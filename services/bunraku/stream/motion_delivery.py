@@ -1,34 +1,43 @@
-"""One motion as it is sent to one viewer: which block is next and at which rate, and what the viewer is told of it."""
+"""Delivery of a motion to one viewer: announcement, blocks, and the choice of a bitrate level."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from bunraku import __version__
 from bunraku.codec.container import StoredMotion
 from bunraku.delivery import allocation
 from bunraku.delivery.allocation import BitrateAllocation
 from bunraku.delivery.bitrate import BitrateSelector
-from bunraku.delivery.block_scheduler import BlockScheduler
+from bunraku.delivery.block_scheduler import BlockScheduler, SendPolicy
 from bunraku.delivery.congestion import HEADER_BYTES
 from bunraku.delivery.resume import ResumeState
-from bunraku.stream.flow_control import FlowControl
+from bunraku.playout.timeline import TimelineHistory
+from bunraku.stream.flow_control import FlowControl, PrefetchState
 from bunraku.stream.track_selection import (
+    ViewerOptions,
     build_allocations,
+    count_channels,
     count_described_tracks,
     motion_bitrates,
     pack_description,
     select_tracks,
 )
 from bunraku.websocket.frame import encode_frame
-from bunraku.wire.messages import Choice, Report, TimelineState
+from bunraku.wire.messages import ChannelHeader, Choice, Report, TimelineState
 
 OVERLAY_SHARING_US = 1_000_000
-"""So long after an overlay the hands share a narrow line with blocks, microseconds."""
+"""Time after an overlay for which overlays share a constrained link with blocks, microseconds."""
 MAX_IDLE_BLOCK_S = 1.5
-"""A block for which a narrow line has time takes it so many seconds at most: who plays on meanwhile waits for it."""
+"""Upper bound of the transmission time of a block sent while the link is idle, seconds: if playback resumes meanwhile,
+the next block waits for it."""
 
 
 class MotionDelivery:
-    """What one viewer has been sent of `motion`, and at which rate it is sent the rest; times are clock times in
-    microseconds."""
+    """Blocks of `motion` that one viewer has been sent, and the bitrate level of the following ones.
+
+    All times are clock times in microseconds.
+    """
 
     __slots__ = (
         "_announced_choice",
@@ -44,57 +53,63 @@ class MotionDelivery:
         "motion",
         "scheduler",
         "selector",
+        "track_types",
         "tracks",
     )
 
     def __init__(self, motion: StoredMotion, track_types: tuple[str, ...], pinned_level: int | None) -> None:
-        """`wanted` are the types of tracks whose blocks are sent, `pinned` the motion's rate to keep to, if any."""
+        """Send the tracks of `track_types`, the motion at `pinned_level` unless that is None."""
         self.motion = motion
+        self.track_types = track_types
         self.tracks = select_tracks(motion, track_types)
-        # tracks that the viewer is to be told of, and was
+        # tracks to describe to the viewer, and those described so far
         self._track_count = count_described_tracks(motion, track_types)
         self._described_count = self._track_count
         self.scheduler = BlockScheduler(self.tracks)
         self.allocations = allocation.filter_by_motion_level(build_allocations(motion, track_types), pinned_level)
-        first, safe = allocation.initial_index(self.allocations), allocation.fallback_index(self.allocations)
+        initial, fallback = allocation.initial_index(self.allocations), allocation.fallback_index(self.allocations)
         self.selector = BitrateSelector(
-            len(self.allocations), None, first, safe, [step.kbps for step in self.allocations]
+            len(self.allocations), None, initial, fallback, [each.kbps for each in self.allocations]
         )
-        # where no sound is sent all is the motion's
-        costs = motion_bitrates(motion)
-        self._motion_only_allocations = [BitrateAllocation(nth, -1, kbps) for nth, kbps in enumerate(costs)]
-        self._motion_only_selector = BitrateSelector(len(self._motion_only_allocations), bitrates_kbps=costs)
+        # while no audio is sent, the motion gets the whole bandwidth
+        bitrates = motion_bitrates(motion)
+        self._motion_only_allocations = [BitrateAllocation(level, -1, kbps) for level, kbps in enumerate(bitrates)]
+        self._motion_only_selector = BitrateSelector(len(self._motion_only_allocations), bitrates_kbps=bitrates)
         self._is_pinned = pinned_level is not None
         self._announces_level = "motion" in track_types
         self._is_constrained = False
         self._announced_choice: Choice | None = None
         self.has_unsent_choice = True
-        """Whether `news` may have something to say."""
+        """True if `take_choice` may return a message."""
 
     @property
-    def allocation(self) -> allocation.BitrateAllocation:
-        """How motion and sound share the line now."""
-        chosen = self._active_selector
+    def allocation(self) -> BitrateAllocation:
+        """Present allocation of bandwidth to motion and audio."""
+        active = self._active_selector
         return (
-            self._motion_only_allocations[chosen.level]
-            if chosen is self._motion_only_selector
-            else self.allocations[chosen.level]
+            self._motion_only_allocations[active.level]
+            if active is self._motion_only_selector
+            else self.allocations[active.level]
         )
 
     @property
     def choice(self) -> tuple[int, str]:
-        """The motion's rate now, and why."""
+        """Present level of the motion, and the reason for it."""
         return self.allocation.motion_level, "pinned" if self._is_pinned else self._active_selector.reason
 
     @property
     def _active_selector(self) -> BitrateSelector:
-        silent = len(self.allocations) > 1 and self.allocations[0].audio_level < 0 <= self.allocations[-1].audio_level
+        may_drop_audio = (
+            len(self.allocations) > 1 and self.allocations[0].audio_level < 0 <= self.allocations[-1].audio_level
+        )
         return (
-            self._motion_only_selector if silent and not self._is_pinned and self.selector.level == 0 else self.selector
+            self._motion_only_selector
+            if may_drop_audio and not self._is_pinned and self.selector.level == 0
+            else self.selector
         )
 
     def resume_from(self, resume_state: ResumeState | None) -> bool:
-        """What the viewer holds already is not sent again; whether it is of this motion."""
+        """Mark the blocks that the viewer already holds as sent; return False if they are of another motion."""
         if resume_state is None or resume_state.motion != self.motion.id:
             return False
         self._set_described_count(
@@ -103,16 +118,17 @@ class MotionDelivery:
                 self._track_count,
             )
         )
-        # dances are the first tracks; of one that is yet to be told of nothing can be held
-        dances = self.motion.performers[: self._described_count]
-        for number, (dance, (first, rates)) in enumerate(zip(dances, resume_state.performers, strict=False)):
-            for index, rate in enumerate(rates, first):
-                if rate >= 0:
-                    self.scheduler.mark_sent(number, index % dance.track.block_count, rate)
+        # performers are the first tracks; a viewer cannot hold blocks of one that was not described to it
+        performers = self.motion.performers[: self._described_count]
+        held = zip(performers, resume_state.performers, strict=False)
+        for track, (performer, (first, levels)) in enumerate(held):
+            for index, level in enumerate(levels, first):
+                if level >= 0:
+                    self.scheduler.mark_sent(track, index % performer.track.block_count, level)
         return True
 
     def initial_description(self, is_high_rtt: bool) -> bytes:
-        """The Description that goes before all else: of the motion alone where the line is `far` and there is more."""
+        """Return the first Description; on a high-RTT link it covers the first performer's motion alone."""
         self._set_described_count(1 if is_high_rtt and self._announces_level else self._track_count)
         return pack_description(self.motion, 0, self._described_count)
 
@@ -121,76 +137,168 @@ class MotionDelivery:
         self.scheduler.tracks = [track for track in self.tracks if track.index < count]
 
     def process_report(self, report: Report, clock: int) -> bool:
-        """How the viewer fares; whether rate or reason have changed."""
+        """Adapt the level to a viewer's report; return True if the level or its reason has changed."""
         before = self.allocation, self._active_selector.reason
-        for choice in (self.selector, self._motion_only_selector):
-            choice.process_report(report, clock)
+        for selector in (self.selector, self._motion_only_selector):
+            selector.process_report(report, clock)
         changed = (self.allocation, self._active_selector.reason) != before
         self.has_unsent_choice = self.has_unsent_choice or changed
         return changed
 
     def next_packet(self, state: TimelineState, clock: int, flow: FlowControl, overlay_waited_at: int) -> bytes | None:
-        """The Data to send next, None when enough is on its way; an overlay waited for room at `beside_at`."""
-        narrow = flow.is_constrained
-        beside = narrow and clock - overlay_waited_at < OVERLAY_SHARING_US
-        for choice in (self.selector, self._motion_only_selector):
-            choice.update_throughput(flow.throughput, clock, beside)
-        self._is_constrained = narrow
-        step = self.allocations[0] if flow.is_unmeasured else self.allocation
+        """Return the message to send next, None if enough was sent.
+
+        It is a Data message, or the Description of the remaining tracks. `overlay_waited_at` is when an overlay last
+        had to wait for capacity.
+        """
+        is_constrained = flow.is_constrained
+        shares = is_constrained and clock - overlay_waited_at < OVERLAY_SHARING_US
+        for selector in (self.selector, self._motion_only_selector):
+            selector.update_throughput(flow.throughput, clock, shares)
+        self._is_constrained = is_constrained
+        target = self.allocations[0] if flow.is_unmeasured else self.allocation
         if self._described_count < self._track_count:
             due = self.scheduler.next_block(
-                state, clock, step.motion_level, audio_level=step.audio_level, prefetch=True, has_spare_capacity=False
+                state,
+                clock,
+                SendPolicy(target.motion_level, target.audio_level, prefetch=True, has_spare_capacity=False),
             )
             if due is None:
-                # the motion goes on for a while
-                known = self._described_count
+                # enough of the motion was sent: describe the remaining tracks
+                described = self._described_count
                 self._set_described_count(self._track_count)
-                return pack_description(self.motion, known, self._described_count)
+                return pack_description(self.motion, described, self._described_count)
             return self.motion.packets[due.track][due.level][due.index]
-        spare = not beside or flow.may_send_block()
-        net = narrow or flow.is_high_rtt
-        better = not net or flow.is_prefetch_delivered
+        has_spare_capacity = not shares or flow.may_send_block()
+        prefetch = is_constrained or flow.state.is_high_rtt
+        allow_upgrades = not prefetch or flow.prefetch_state is PrefetchState.DELIVERED
         due = self.scheduler.next_block(
             state,
             clock,
-            step.motion_level,
-            audio_level=step.audio_level,
-            prefetch=net,
-            has_spare_capacity=spare,
-            allow_upgrades=better,
-            idle_level=step.motion_level if beside else self._idle_level(flow),
+            SendPolicy(
+                target.motion_level,
+                target.audio_level,
+                prefetch,
+                has_spare_capacity,
+                allow_upgrades,
+                target.motion_level if shares else self._idle_level(flow),
+            ),
         )
-        if not better and spare and (due is None or due.is_prefetch):
+        if not allow_upgrades and has_spare_capacity and (due is None or due.is_prefetch):
             flow.mark_prefetch_sent()
         return None if due is None else self.motion.packets[due.track][due.level][due.index]
 
     def _idle_level(self, flow: FlowControl) -> int:
-        """The rate of what a line has time for: the highest of which a block takes it no longer than `STILL`, unless
-        what it carries is not why there is a lower one."""
-        step, carries = self.allocation, flow.throughput
+        """Return the level for blocks that are sent while the link is idle.
+
+        It is the highest one whose blocks take at most `MAX_IDLE_BLOCK_S`. A level that is lower for another reason
+        than the throughput stays.
+        """
+        current, throughput = self.allocation, flow.throughput
         if flow.is_unmeasured or self._active_selector.reason in ("hidden", "machine"):
-            return step.motion_level
+            return current.motion_level
         highest = self.allocations[-1].motion_level
-        if carries is None:
+        if throughput is None:
             return highest
-        # what a second of one performer costs on the line
+        # bytes on the wire of one second of one performer, for each level
         costs = (
             each.kbps * 125 / len(self.motion.performers) + HEADER_BYTES
             for each in self._motion_only_allocations[: highest + 1]
         )
         return max(
-            [step.motion_level, *(rate for rate, cost in enumerate(costs) if cost <= MAX_IDLE_BLOCK_S * carries)]
+            [
+                current.motion_level,
+                *(level for level, cost in enumerate(costs) if cost <= MAX_IDLE_BLOCK_S * throughput),
+            ]
         )
 
     def take_choice(self) -> bytes | None:
-        """The framed choice of a rate, where the viewer has not been told yet."""
+        """Return the framed Choice message if level or reason differ from the last one sent."""
         self.has_unsent_choice = False
         if not self._announces_level:
             return None
-        chosen = self._active_selector
-        reason = "pinned" if self._is_pinned else chosen.reason
-        choice = Choice(self.allocation.motion_level, reason, chosen.throughput_bps if self._is_constrained else None)
-        told, self._announced_choice = self._announced_choice, choice
-        if told is not None and (told.rate, told.reason) == (choice.rate, choice.reason):
+        active = self._active_selector
+        reason = "pinned" if self._is_pinned else active.reason
+        choice = Choice(self.allocation.motion_level, reason, active.throughput_bps if self._is_constrained else None)
+        last, self._announced_choice = self._announced_choice, choice
+        if last is not None and (last.rate, last.reason) == (choice.rate, choice.reason):
             return None
         return encode_frame(choice.pack())
+
+
+class MotionFeed:
+    """Timeline and motion of one viewer, in the order in which they are sent."""
+
+    __slots__ = (
+        "_announced",
+        "_clock",
+        "_pinned_level",
+        "_resume_state",
+        "_timeline_history",
+        "_track_types",
+        "delivery",
+        "next_block_at",
+    )
+
+    def __init__(self, options: ViewerOptions, clock: Callable[[], int]) -> None:
+        """`clock` returns the reference time in microseconds."""
+        self._clock = clock
+        self._pinned_level = options.pinned_level
+        self._track_types = options.track_types
+        self._resume_state = options.resume_state
+        self._announced: tuple[StoredMotion, TimelineState] | None = None
+        self._timeline_history = TimelineHistory()
+        self.delivery: MotionDelivery | None = None
+        self.next_block_at: int | None = None
+        """Clock time at which the next block comes within reach; None while blocks are unsent, and if none follows."""
+
+    @property
+    def state(self) -> TimelineState | None:
+        """Newest timeline; it may begin a little in the future, and its first blocks are sent before that."""
+        return self._timeline_history.newest
+
+    @property
+    def has_unsent_choice(self) -> bool:
+        """True if `take_choice` may return a message."""
+        return self.delivery is not None and self.delivery.has_unsent_choice
+
+    def set_timeline(self, state: TimelineState, motion: StoredMotion) -> None:
+        """Switch to a new timeline and its motion."""
+        self._timeline_history.put(state)
+        if self.delivery is None or self.delivery.motion is not motion:
+            self.delivery = MotionDelivery(motion, self._track_types, self._pinned_level)
+
+    def take_announcement(self, is_high_rtt: bool) -> list[bytes]:
+        """Return the framed timeline if it is new, preceded by header and description of a new motion."""
+        state, delivery, last = self._timeline_history.newest, self.delivery, self._announced
+        if state is None or delivery is None or (last is not None and last[1] is state):
+            return []
+        motion = delivery.motion
+        messages = [state.pack()]
+        if last is None or last[0] is not motion:
+            resume_state, self._resume_state = self._resume_state, None
+            if not delivery.resume_from(resume_state):
+                messages.insert(0, delivery.initial_description(is_high_rtt))
+            messages.insert(0, ChannelHeader(motion.id, self._clock(), count_channels(motion), __version__).pack())
+        self._announced = motion, state
+        return [encode_frame(message) for message in messages]
+
+    def next_packet(self, now: int, flow: FlowControl, overlay_waited_at: int) -> bytes | None:
+        """Return the message to send next; see `MotionDelivery.next_packet`."""
+        state = self._timeline_history.newest
+        if state is None or self.delivery is None:
+            return None
+        return self.delivery.next_packet(state, now, flow, overlay_waited_at)
+
+    def take_choice(self) -> bytes | None:
+        """Return the framed Choice message, if there is a new one."""
+        return None if self.delivery is None else self.delivery.take_choice()
+
+    def update_next_block(self, now: int, prefetch: bool) -> None:
+        """Set `next_block_at`, once all blocks within reach have been sent."""
+        self.next_block_at = None
+        state = self._timeline_history.newest
+        if state is not None and self.delivery is not None:
+            start = max(now, state.clock)
+            wait = self.delivery.scheduler.time_until_next(state, start, prefetch)
+            self.next_block_at = None if wait is None else start + wait

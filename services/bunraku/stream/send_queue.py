@@ -1,55 +1,59 @@
-"""What waits for one viewer until its line has room: answers, messages that must arrive, and the newest overlay."""
+"""Messages of one viewer that wait until its connection is writable: Pongs, control messages, the newest overlay."""
 
 from __future__ import annotations
 
-from bunraku.runtime.clock import clock
+from collections.abc import Callable
+
 from bunraku.websocket.frame import encode_frame
 from bunraku.wire.messages import Ping, Pong
 
 MAX_CONTROL_MESSAGES = 64
-"""Messages that may wait for a viewer."""
+"""Control messages that may be queued for a viewer."""
 MAX_PENDING_PINGS = 8
-"""Pings whose answers may wait; more are not answered."""
+"""Pings that may wait for their Pong; further ones are not answered."""
 
 
 class SendQueue:
-    """All frames, but for pings: their answers tell when they leave."""
+    """Queue of encoded frames. Pings are kept as messages, since a Pong holds the time at which it is sent."""
 
-    __slots__ = ("_control", "_pings", "overlay")
+    __slots__ = ("_clock", "_control", "_pings", "overlay")
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], int]) -> None:
+        """`clock` returns the reference time in microseconds."""
+        self._clock = clock
         self._pings: list[tuple[Ping, int]] = []
         self._control: list[bytes] = []
         self.overlay: bytes | None = None
-        """The newest; one that was not sent is replaced by the next."""
+        """Newest overlay; an unsent one is replaced by the next."""
 
     def __bool__(self) -> bool:
-        """Whether anything waits."""
         return bool(self._pings or self._control or self.overlay is not None)
 
     def add_ping(self, ping: Ping, now: int) -> None:
-        """A ping that came at clock time `now`, microseconds."""
+        """Queue a Ping that was received at clock time `now`."""
         if len(self._pings) < MAX_PENDING_PINGS:
             self._pings.append((ping, now))
 
     def add_control(self, framed: bytes) -> bool:
-        """A message that must arrive; whether there is room for it."""
+        """Queue a message that must arrive; return False if the queue is full."""
         if len(self._control) >= MAX_CONTROL_MESSAGES:
             return False
         self._control.append(framed)
         return True
 
     def take_pongs(self) -> list[bytes]:
-        """Take the answers to the pings."""
+        """Remove the Pings and return their Pongs, framed."""
         pings, self._pings = self._pings, []
-        return [encode_frame(Pong(ping.sequence, ping.sent, received, clock()).pack()) for ping, received in pings]
+        return [
+            encode_frame(Pong(ping.sequence, ping.sent, received, self._clock()).pack()) for ping, received in pings
+        ]
 
     def take_control(self) -> list[bytes]:
-        """Take what must arrive."""
+        """Remove and return the control messages, framed, in their order."""
         control, self._control = self._control, []
         return control
 
     def take_overlay(self) -> bytes | None:
-        """Take the newest overlay."""
+        """Remove and return the newest overlay, framed."""
         overlay, self.overlay = self.overlay, None
         return overlay

@@ -1,44 +1,48 @@
-"""When viewers have a turn: one timer for all of them, and only so many at a time, so that whatever else is to be done
-gets in between."""
+"""Scheduler of the periodic work of all viewers: one event-loop timer, and bounded batches.
+
+A batch is bounded so that other tasks of the event loop run between two batches.
+"""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from contextvars import copy_context
 from typing import Protocol
 
 from bunraku.delivery.timing_wheel import SLOT_US, TimingWheel
-from bunraku.runtime.clock import clock
 
 MAX_BATCH = 32
-"""Viewers that have their turn one after the other; a millisecond or two."""
+"""Items that are ticked in one batch, which takes a millisecond or two."""
 
 
 class Tickable(Protocol):
-    """Who has turns."""
+    """Object with work to do at a scheduled time."""
 
     def tick(self) -> None:
-        """Have a turn."""
+        """Do the work that is due, and schedule the next tick."""
 
 
 class TickScheduler:
-    """The turns of all viewers of a service."""
+    """Scheduler with at most one pending tick for each item."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], int]) -> None:
+        """`clock` returns the reference time in microseconds."""
+        self._clock = clock
         self._wheel: TimingWheel[Tickable] = TimingWheel()
         self._timer: asyncio.Handle | None = None
         self._due = 0
-        # a turn is nobody's request, whoever came when the timer was set
+        # a tick must not inherit the request id of the request that happened to set the timer
         self._context = copy_context()
 
     def schedule(self, item: Tickable, due: int) -> None:
-        """`who` has a turn at clock time `due`, or a little after; one turn each, the one asked for last."""
+        """Tick `item` at clock time `due`, or up to `SLOT_US` later; this replaces its pending tick."""
         self._wheel.schedule(item, due)
         if self._timer is None or due + SLOT_US < self._due:
             self._set_timer()
 
     def cancel(self, item: Tickable) -> None:
-        """`who` has no turn any more."""
+        """Cancel the pending tick of `item`, if any."""
         self._wheel.cancel(item)
 
     def _set_timer(self) -> None:
@@ -48,13 +52,13 @@ class TickScheduler:
         due = self._wheel.next_due()
         if due is not None:
             self._due = due
-            wait = max(due - clock(), 0) * 1e-6
+            wait = max(due - self._clock(), 0) * 1e-6
             self._timer = asyncio.get_running_loop().call_later(wait, self._run, context=self._context)
 
     def _run(self) -> None:
         self._timer = None
         try:
-            for who in self._wheel.pop_due(clock(), MAX_BATCH):
-                who.tick()
+            for item in self._wheel.pop_due(self._clock(), MAX_BATCH):
+                item.tick()
         finally:
             self._set_timer()

@@ -1,8 +1,9 @@
-"""The tracks of a motion that a viewer wants, as they are paced and share its line."""
+"""Tracks of a motion that a viewer selects, as the scheduler and the bitrate selector see them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from bunraku.codec.audio import AudioTrack
 from bunraku.codec.container import StoredMotion, Track
@@ -11,59 +12,78 @@ from bunraku.codec.prior import SCENE_CHANNEL_COUNT
 from bunraku.codec.scene import SceneTrack
 from bunraku.delivery import allocation
 from bunraku.delivery.block_scheduler import ScheduledTrack
+from bunraku.delivery.resume import ResumeState
 from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.wire.messages import Description, unpack
 
 TRACK_TYPES = ("motion", "audio", "camera", "light")
-"""Types of tracks that a viewer may ask for."""
+"""Types of tracks that a viewer may request."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewerOptions:
+    """Options that a viewer sends in the URL of its stream."""
+
+    pinned_level: int | None = None
+    """Bitrate level of the motion to keep to; None to adapt it."""
+    track_types: tuple[str, ...] = TRACK_TYPES
+    """Types of the tracks whose blocks are sent."""
+    has_own_timeline: bool = False
+    """True for a viewer of a stored motion, who may edit the timeline."""
+    resume_state: ResumeState | None = None
+    """Blocks that the viewer still holds from an earlier connection; they are not sent again."""
 
 
 def count_channels(motion: StoredMotion) -> int:
-    """How many channels all the tracks of a motion have."""
+    """Return the number of channels of all tracks of a motion."""
     return sum(map(_count_track_channels, motion.tracks))
 
 
 def count_described_tracks(motion: StoredMotion, track_types: Sequence[str]) -> int:
-    """How many tracks one is told of who wants these types: none after the last wanted one, as that leaves the others'
-    numbers as they are."""
-    return 1 + max(
-        (number for number, track in enumerate(motion.tracks) if _track_type(track) in track_types), default=0
-    )
+    """Return how many tracks the Description for a viewer holds.
+
+    Tracks after the last selected one are left out; those before it stay, since a track is addressed by its index.
+    """
+    return 1 + max((index for index, track in enumerate(motion.tracks) if _track_type(track) in track_types), default=0)
 
 
 def pack_description(motion: StoredMotion, first: int, end: int) -> bytes:
-    """A motion's Description of the tracks from index `first` to before `end`: on a narrow line what is told of the
-    others costs more than the first block."""
+    """Pack a Description of the tracks from index `first` to before `end`.
+
+    On a constrained link the description of all tracks would cost more than the first block.
+    """
     if first == 0 and end == len(motion.tracks):
         return motion.description
-    whole = unpack(motion.description)
-    assert isinstance(whole, Description)
-    return Description(whole.motion, whole.tracks[first:end], first or None).pack()
+    complete = unpack(motion.description)
+    assert isinstance(complete, Description)
+    return Description(complete.motion, complete.tracks[first:end], first or None).pack()
 
 
 def select_tracks(motion: StoredMotion, track_types: Sequence[str]) -> list[ScheduledTrack]:
-    """The tracks of a motion whose blocks a viewer wants."""
+    """Return the tracks of these types, for the scheduler."""
     return [
         ScheduledTrack(
-            number, track, len(motion.packets[number]), _track_type(track) == "motion", _track_type(track) == "audio"
+            index, track, len(motion.packets[index]), _track_type(track) == "motion", _track_type(track) == "audio"
         )
-        for number, track in enumerate(motion.tracks)
+        for index, track in enumerate(motion.tracks)
         if _track_type(track) in track_types
     ]
 
 
 def build_allocations(motion: StoredMotion, track_types: Sequence[str]) -> tuple[allocation.BitrateAllocation, ...]:
-    """The ways in which the tracks that a viewer wants may share its line."""
-    kinds = list(map(_track_type, motion.tracks))
-    audio = motion.bitrates_kbps[kinds.index("audio")] if "audio" in kinds and "audio" in track_types else ()
+    """Return the allocations of bandwidth to the motion and audio tracks of these types."""
+    types = list(map(_track_type, motion.tracks))
+    audio = motion.bitrates_kbps[types.index("audio")] if "audio" in types and "audio" in track_types else ()
     return allocation.build_allocations(motion_bitrates(motion) if "motion" in track_types or not audio else (), audio)
 
 
 def motion_bitrates(motion: StoredMotion) -> list[float]:
-    """What each rate of the dances of all performers costs, kbit/s: as many as one has at most, of one with fewer its
-    highest."""
+    """Return the bitrate of all performers together at each level, kbit/s.
+
+    A performer with fewer levels than another counts with its highest.
+    """
     each = motion.bitrates_kbps[: len(motion.performers)]
-    return [sum(kbps[min(rate, len(kbps) - 1)] for kbps in each) for rate in range(max(map(len, each)))]
+    return [sum(kbps[min(level, len(kbps) - 1)] for kbps in each) for level in range(max(map(len, each)))]
 
 
 def _count_track_channels(track: Track) -> int:

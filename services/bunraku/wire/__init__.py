@@ -1,1 +1,1 @@
-"""Pure: messages to bytes and back."""
+"""Messages of `bunraku.v1` to bytes and back (proto/messages.md). Pure."""

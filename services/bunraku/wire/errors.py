@@ -1,5 +1,5 @@
-"""What is wrong with bytes that were to be a message."""
+"""Error of the message decoder."""
 
 
 class MalformedMessage(ValueError):
-    """A message of a known type that cannot be read; the text says what is wrong with it."""
+    """A message of a known type that breaks the format; the text names the type, the field and the rule."""

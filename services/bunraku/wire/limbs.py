@@ -1,11 +1,14 @@
-"""The limbs that are pulled, by number (SPEC.md, Conventions)."""
+"""Limbs by number (proto/SPEC.md, 1.4): limb l of performer k is 4 k + l."""
 
 LIMBS: tuple[str, ...] = ("left_hand", "right_hand", "left_leg", "right_leg")
-"""Of each performer."""
+"""Limbs of one performer."""
 MAX_PERFORMERS = 4
 MAX_LIMBS = len(LIMBS) * MAX_PERFORMERS
 
 
 def limb_number(limb: str | int) -> int:
-    """The number of one of `LIMBS` of the first performer, or the number itself; raises ValueError for another name."""
+    """Return the number of a limb of the first performer by its name; a number is returned unchanged.
+
+    Raises ValueError for a name that is not in `LIMBS`.
+    """
     return limb if isinstance(limb, int) else LIMBS.index(limb)

@@ -1,7 +1,9 @@
-"""The messages of `bunraku.v1`: dataclasses to bytes and back (SPEC.md, Sockets).
+"""The messages of `bunraku.v1`: dataclasses to bytes and back (proto/messages.md).
 
-Names and units are SPEC.md's: times are integer microseconds on the clock or in the motion as each field says. A reader
-gets None for a type it does not know, and `MalformedMessage` for one it knows that is broken.
+Field names and units are those of the contract; a field that is None is left out of the map. The decoder returns None
+for an unknown message type and raises `MalformedMessage` for a known type whose content breaks the format.
+`proto/asyncapi.json` and the message types of the TypeScript client are generated from these classes by
+`python -m tests.vectors`: their docstrings and field descriptions appear there.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
 
 import msgpack
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
 
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.limbs import MAX_LIMBS
@@ -23,20 +25,63 @@ SUBPROTOCOL = "bunraku.v1"
 CLOCK_NAME = "unix"
 MAX_CLIENT_MESSAGE_BYTES = 1_024
 MAX_SERVER_MESSAGE_BYTES = 1 << 20
-LimbNumber = Annotated[int, Field(strict=True, ge=0, lt=MAX_LIMBS)]
-"""Limb l of performer k is 4 k + l."""
+
+Text = Annotated[str, Field(strict=True)]
+Flag = Annotated[bool, Field(strict=True)]
 SafeInteger = Annotated[int, Field(strict=True, ge=0, lt=1 << 53)]
-"""A count or a time: what JavaScript's numbers hold exactly."""
+"""A count or a time that a JavaScript number represents exactly."""
+ClockTime = Annotated[SafeInteger, Field(description="Clock time in microseconds.")]
+MotionTime = Annotated[SafeInteger, Field(description="Motion time in microseconds.")]
+Duration = Annotated[SafeInteger, Field(description="Duration in microseconds.")]
+MotionId = Annotated[Text, Field(description="Id of the motion.")]
+LimbNumber = Annotated[
+    int, Field(strict=True, ge=0, lt=MAX_LIMBS, description="Limb l of performer k has number 4 k + l.")
+]
+LimbEpoch = Annotated[SafeInteger, Field(description="Epoch of the grant.")]
+Tracks = Annotated[
+    list[dict[str, Any]],
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": {
+                "title": "Track",
+                "type": "object",
+                "properties": {"type": {"type": "string"}},
+                "required": ["type"],
+            },
+            "description": "One map per track (proto/messages.md, 3.2).",
+        }
+    ),
+]
+PuppeteerEntries = Annotated[
+    list[dict[str, Any]],
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": {
+                "title": "PuppeteerPresence",
+                "type": "object",
+                "properties": {
+                    "id": {"type": "string"},
+                    "name": {"type": "string"},
+                    "colour": {"type": "integer", "minimum": 0, "maximum": 4},
+                },
+                "required": ["id", "name", "colour"],
+            },
+            "description": "Puppeteers in the order of joining.",
+        }
+    ),
+]
 
 
 class _MapMessage:
-    """A message of one type byte and a MessagePack map of the fields that are not None."""
+    """Base of messages that are a type byte and a MessagePack map of the fields that are not None."""
 
     TYPE: ClassVar[int]
     __slots__ = ()
 
     def pack(self) -> bytes:
-        """The message as bytes."""
+        """Encode the message."""
         values = {name: getattr(self, name) for name in self.__dataclass_fields__}  # type: ignore[attr-defined]
         packed: bytes = msgpack.packb({k: v for k, v in values.items() if v is not None})
         return bytes([self.TYPE]) + packed
@@ -44,143 +89,148 @@ class _MapMessage:
 
 @dataclass(frozen=True, slots=True)
 class ChannelHeader(_MapMessage):
-    """What will come, the first message of a stream (paper 3): `now` clock time, `channels` the total of all tracks."""
+    """First message of a stream: version, clock and motion (paper, section 3)."""
 
     TYPE = 1
-    motion: str
-    now: SafeInteger
-    channels: SafeInteger
-    software: str
-    version: int = PROTOCOL_VERSION
-    clock: str = CLOCK_NAME
+    motion: MotionId
+    now: ClockTime
+    channels: Annotated[SafeInteger, Field(description="Sum of `channels` over all tracks.")]
+    software: Annotated[Text, Field(description="Version of the server's software.")]
+    version: Annotated[int, Field(description="Version of the contract.")] = PROTOCOL_VERSION
+    clock: Annotated[Text, Field(description="Name of the reference clock.")] = CLOCK_NAME
 
 
 @dataclass(frozen=True, slots=True)
 class Description(_MapMessage):
-    """The type of every track and what its blocks have in common (paper 3); of those from index `first` on, where that
-    is not None."""
+    """Constants of the tracks of a motion, before the first Data message of each (paper, section 3)."""
 
     TYPE = 2
-    motion: str
-    tracks: list[dict[str, Any]]
-    first: SafeInteger | None = None
+    motion: MotionId
+    tracks: Tracks
+    first: Annotated[SafeInteger | None, Field(description="Index of the first of `tracks`; absent: 0.")] = None
 
 
 @dataclass(frozen=True, slots=True)
 class TimelineState(_MapMessage):
-    """Where the stage stands: at clock time `clock` at `position` of the motion. Times in microseconds."""
+    """Timeline of the stage: at clock time `clock` it stands at motion time `position`."""
 
     TYPE = 4
-    epoch: SafeInteger
-    motion: str
-    clock: SafeInteger
-    position: SafeInteger
-    playing: bool
-    loop: bool
-    duration: SafeInteger
+    epoch: Annotated[SafeInteger, Field(description="A higher epoch replaces a lower one.")]
+    motion: MotionId
+    clock: ClockTime
+    position: MotionTime
+    playing: Flag
+    loop: Flag
+    duration: Duration
 
 
 @dataclass(frozen=True, slots=True)
 class Presence(_MapMessage):
-    """Who is here and who holds what: `limbs` has the holder's id or None for each of `LIMBS` of each performer, `asks`
-    the ids of those who ask for it, first come first."""
+    """Viewers, puppeteers, holders of the limbs and pending requests for held limbs.
+
+    `limbs` has an id or None for each limb. `asks` has a list of ids for each limb, in the order of the requests; if it
+    is empty it is replaced by an empty list for each limb.
+    """
 
     TYPE = 6
     viewers: SafeInteger
-    puppeteers: list[dict[str, Any]]
-    limbs: list[str | None]
-    asks: list[list[str]] = field(default_factory=list)
+    puppeteers: PuppeteerEntries
+    limbs: Annotated[list[Text | None], Field(description="Per limb the id of its holder, or nil.")]
+    asks: Annotated[
+        list[list[Text]], Field(description="Per limb the ids that request it, oldest first; absent: none.")
+    ] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Left out, nobody asks for any of them."""
         if not self.asks:
             object.__setattr__(self, "asks", [[] for _ in self.limbs])
+        elif len(self.asks) != len(self.limbs):
+            raise ValueError(f"asks has {len(self.asks)} lists, expected one for each of {len(self.limbs)} limbs")
 
 
 @dataclass(frozen=True, slots=True)
 class Problem(_MapMessage):
-    """Why the socket is about to be closed."""
+    """Reason for which the server closes the connection after this message."""
 
     TYPE = 8
-    title: str
-    detail: str
+    title: Text
+    detail: Text
 
 
 @dataclass(frozen=True, slots=True)
 class Welcome(_MapMessage):
-    """A puppeteer's id, colour (0-4) and the lead of overlays over now, microseconds."""
+    """Identity of a puppeteer, the first message of a control connection."""
 
     TYPE = 9
-    id: str
-    colour: SafeInteger
-    lead: SafeInteger
+    id: Text
+    colour: Annotated[SafeInteger, Field(description="0 to 4, the least used one when the puppeteer joins.")]
+    lead: Annotated[SafeInteger, Field(description="Lead of overlays over the current clock time, microseconds.")]
 
 
 @dataclass(frozen=True, slots=True)
 class Grant(_MapMessage):
-    """The limb is yours; inputs carry `epoch`."""
+    """The limb is granted to this puppeteer; inputs for it carry `epoch`."""
 
     TYPE = 10
     limb: LimbNumber
-    epoch: SafeInteger
+    epoch: LimbEpoch
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal(_MapMessage):
-    """The limb is not, or no longer, yours; `reason` is `held`, `lost` or `unknown`."""
+    """The limb is not, or no longer, this puppeteer's."""
 
     TYPE = 11
     limb: LimbNumber
-    reason: str
-    holder: str | None = None
+    reason: Annotated[Text, Field(description="`held`, `lost` or `unknown`.")]
+    holder: Annotated[Text | None, Field(description="Id of the holder, if `reason` is `held`.")] = None
 
 
 @dataclass(frozen=True, slots=True)
 class Notice(_MapMessage):
-    """An input was not taken as it came: brought within `reach`, refused for want of an `owner`'s right, or dropped for
-    its `rate`; `reason` is one of these three words, `detail` says it to a person."""
+    """An input was changed or dropped."""
 
     TYPE = 12
     limb: LimbNumber
-    reason: str
-    detail: str
+    reason: Annotated[Text, Field(description="`reach`, `owner` or `rate`.")]
+    detail: Annotated[Text, Field(description="The reason for a person.")]
 
 
 @dataclass(frozen=True, slots=True)
 class Choice(_MapMessage):
-    """Which rate the server chose and why: `reason` is one of SPEC.md's words; `line` bit/s that a narrow line carries,
-    heads included, left out where it is not narrow."""
+    """Bitrate level of the motion that the server has chosen, and the reason."""
 
     TYPE = 13
-    rate: SafeInteger
-    reason: str
-    line: SafeInteger | None = None
+    rate: Annotated[SafeInteger, Field(description="Index into `rates` of the motion's track.")]
+    reason: Annotated[Text, Field(description="A reason of proto/messages.md, 3.8.")]
+    line: Annotated[
+        SafeInteger | None, Field(description="Throughput of a constrained link in bit/s, header overhead included.")
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)
 class Edit(_MapMessage):
-    """Edits of a viewer's private timeline; None leaves a thing as it is."""
+    """Edit of a viewer's private timeline; an absent field leaves its value unchanged."""
 
     TYPE = 65
-    playing: bool | None = None
-    position: SafeInteger | None = None
-    loop: bool | None = None
+    playing: Flag | None = None
+    position: MotionTime | None = None
+    loop: Flag | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Report(_MapMessage):
-    """How a viewer fares: microseconds ready ahead, to decode a block, to draw a frame; whether its tab is hidden."""
+    """Playback statistics of a viewer."""
 
     TYPE = 66
-    buffer: SafeInteger
-    decode: SafeInteger = 0
-    frame: SafeInteger = 0
-    hidden: bool = False
+    buffer: Annotated[SafeInteger, Field(description="Microseconds of motion ready ahead of the play position.")]
+    decode: Annotated[SafeInteger, Field(description="Microseconds to decode a block.")] = 0
+    frame: Annotated[SafeInteger, Field(description="Microseconds to draw a frame.")] = 0
+    hidden: Annotated[Flag, Field(description="True while the page is in the background.")] = False
 
 
 @dataclass(frozen=True, slots=True)
 class Claim(_MapMessage):
-    """Asks for a limb."""
+    """Request for a free limb."""
 
     TYPE = 67
     limb: LimbNumber
@@ -188,16 +238,16 @@ class Claim(_MapMessage):
 
 @dataclass(frozen=True, slots=True)
 class Release(_MapMessage):
-    """Lets a limb go."""
+    """Release of a held limb."""
 
     TYPE = 68
     limb: LimbNumber
-    epoch: SafeInteger
+    epoch: LimbEpoch
 
 
 @dataclass(frozen=True, slots=True)
 class Alive(_MapMessage):
-    """Still holding `limbs` with nothing new to say."""
+    """Heartbeat for limbs that are held without a new input."""
 
     TYPE = 69
     limbs: Annotated[list[LimbNumber], Field(max_length=MAX_LIMBS)] = field(default_factory=list)
@@ -205,16 +255,16 @@ class Alive(_MapMessage):
 
 @dataclass(frozen=True, slots=True)
 class Ask(_MapMessage):
-    """Asks the holder of a limb for it, or no longer."""
+    """Request for a limb that another puppeteer holds, or the end of that request."""
 
     TYPE = 71
     limb: LimbNumber
-    wanted: Annotated[bool, Field(strict=True)]
+    wanted: Flag
 
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """Block `index` (below 2^21) of one track at one rate."""
+    """One block: block `index` (below 2^21) of a track at one bitrate level."""
 
     TYPE: ClassVar[int] = 3
     track: int
@@ -223,13 +273,13 @@ class Data:
     block: bytes
 
     def pack(self) -> bytes:
-        """The message as bytes: 3 to 5 and the block."""
+        """Encode the message: 3 to 5 bytes and the block."""
         low = [self.index >> shift & 127 | 128 for shift in (0, 7) if self.index >> shift + 7]
         return bytes([self.TYPE, self.track << 4 | self.rate, *low, self.index >> 7 * len(low)]) + self.block
 
     @classmethod
     def unpack(cls, data: bytes) -> Data:
-        """The message of `pack`."""
+        """Decode a message; raises `MalformedMessage`."""
         index, end = 0, 2
         for shift in (0, 7, 14):
             if end < len(data):
@@ -237,12 +287,12 @@ class Data:
                 end += 1
                 if data[end - 1] < 128:
                     return cls(data[1] >> 4, data[1] & 15, index, data[end:])
-        raise MalformedMessage("Data has a track and rate, an index of 1 to 3 bytes, and a block")
+        raise MalformedMessage("Data ends within its header, or its index has more than 3 bytes")
 
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """Asks for the time; `sent` is the sender's own clock. As long as its answer, so that both ways cost the same."""
+    """Clock request. It has the size of the answer, so that both directions take equally long to transmit."""
 
     TYPE: ClassVar[int] = 64
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<B3xIQ16x")
@@ -250,19 +300,19 @@ class Ping:
     sent: int
 
     def pack(self) -> bytes:
-        """The message as bytes: 32."""
+        """Encode the message: 32 bytes."""
         return self.LAYOUT.pack(self.TYPE, self.sequence, self.sent)
 
     @classmethod
     def unpack(cls, data: bytes) -> Ping:
-        """The message of `pack`."""
+        """Decode a message; raises `MalformedMessage`."""
         _, sequence, sent = _unpack_fixed(cls.LAYOUT, data, "Ping")
         return cls(sequence, sent)
 
 
 @dataclass(frozen=True, slots=True)
 class Pong:
-    """The answer to a Ping: its `sequence` and `sent`, and the clock times when it came and when this left."""
+    """Answer to a Ping: its `sequence` and `sent`, and the clock times of its arrival and of this answer."""
 
     TYPE: ClassVar[int] = 7
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<B3xIQQQ")
@@ -272,19 +322,19 @@ class Pong:
     answered: int
 
     def pack(self) -> bytes:
-        """The message as bytes: 32."""
+        """Encode the message: 32 bytes."""
         return self.LAYOUT.pack(self.TYPE, self.sequence, self.sent, self.received, self.answered)
 
     @classmethod
     def unpack(cls, data: bytes) -> Pong:
-        """The message of `pack`."""
+        """Decode a message; raises `MalformedMessage`."""
         _, *values = _unpack_fixed(cls.LAYOUT, data, "Pong")
         return cls(*values)
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """One sample of the 14 inputs (paper 5): `kind` 0 a velocity of -1..1, 1 a target; `values` as SPEC.md says."""
+    """One sample of a limb's inputs (paper, section 5): a velocity (`kind` 0) or a target (`kind` 1)."""
 
     TYPE: ClassVar[int] = 70
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<BBBxIIQ3f")
@@ -298,18 +348,20 @@ class Input:
     values: tuple[float, float, float]
 
     def pack(self) -> bytes:
-        """The message as bytes: 32."""
+        """Encode the message: 32 bytes."""
         head = (self.TYPE, self.limb, self.kind, self.epoch, self.sequence, self.sampled)
         return self.LAYOUT.pack(*head, *self.values)
 
     @classmethod
     def unpack(cls, data: bytes) -> Input:
-        """The message of `pack`; numbers that are not finite are malformed."""
+        """Decode a message; raises `MalformedMessage`, also for a value that is not finite."""
         _, limb, kind, epoch, sequence, sampled, *values = _unpack_fixed(cls.LAYOUT, data, "Input")
         if limb >= MAX_LIMBS or kind > cls.TARGET:
-            raise MalformedMessage(f"Input names limb {limb}, kind {kind}; there are {MAX_LIMBS} limbs and 2 kinds")
+            raise MalformedMessage(
+                f"Input has limb {limb} and kind {kind}, expected a limb of 0..{MAX_LIMBS - 1} and kind 0 or 1"
+            )
         if not all(map(math.isfinite, values)):
-            raise MalformedMessage("Input holds a number that is not finite")
+            raise MalformedMessage("Input has a value that is not finite")
         return cls(limb, kind, epoch, sequence, sampled, (values[0], values[1], values[2]))
 
 
@@ -318,30 +370,30 @@ Message = (
     | Notice | Choice | Ping | Edit | Report | Claim | Release | Alive | Ask | Input
 )  # fmt: skip
 
-_FIXED_MESSAGES = {kind.TYPE: kind for kind in (Data, Overlay, Ping, Pong, Input)} | {
-    Overlay.MULTI_PERFORMER_TYPE: Overlay
-}
-_MAP_ADAPTERS: dict[int, TypeAdapter[Any]] = {
-    kind.TYPE: TypeAdapter(kind)
-    for kind in (
-        ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Choice, Edit,
-        Report, Claim, Release, Alive, Ask,
-    )
-}  # fmt: skip
+FIXED_MESSAGES = (Data, Overlay, Ping, Pong, Input)
+"""Messages of fixed layout."""
+MAP_MESSAGES = (
+    ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Choice, Edit, Report,
+    Claim, Release, Alive, Ask,
+)  # fmt: skip
+"""Messages that are a MessagePack map."""
+
+_FIXED_BY_TYPE = {kind.TYPE: kind for kind in FIXED_MESSAGES} | {Overlay.MULTI_PERFORMER_TYPE: Overlay}
+_MAP_ADAPTERS: dict[int, TypeAdapter[Any]] = {kind.TYPE: TypeAdapter(kind) for kind in MAP_MESSAGES}
 
 
 def _unpack_fixed(layout: struct.Struct, data: bytes, name: str) -> tuple[Any, ...]:
     if len(data) != layout.size:
-        raise MalformedMessage(f"{name} has {layout.size} bytes, not {len(data)}")
+        raise MalformedMessage(f"{name} has {len(data)} bytes, expected {layout.size} bytes")
     return layout.unpack(data)
 
 
 def unpack(data: bytes) -> Message | None:
-    """The message in `data`, None where the type is not known here; raises `MalformedMessage`."""
+    """Decode a message, or return None if its type is unknown; raises `MalformedMessage`."""
     if not data:
-        raise MalformedMessage("an empty message has no type")
-    if data[0] in _FIXED_MESSAGES:
-        return _FIXED_MESSAGES[data[0]].unpack(data)
+        raise MalformedMessage("message is empty, expected a type byte")
+    if data[0] in _FIXED_BY_TYPE:
+        return _FIXED_BY_TYPE[data[0]].unpack(data)
     if data[0] not in _MAP_ADAPTERS:
         return None
     try:
@@ -350,7 +402,7 @@ def unpack(data: bytes) -> Message | None:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "map"
-        raise MalformedMessage(f"type {data[0]}, {where}: {first['msg']}") from None
+        raise MalformedMessage(f"message of type {data[0]}, field {where}: {first['msg']}") from None
     except (ValueError, TypeError, msgpack.UnpackException) as error:
-        raise MalformedMessage(f"type {data[0]} is not a MessagePack map: {error}") from None
+        raise MalformedMessage(f"message of type {data[0]} is not a MessagePack map: {error}") from None
     return message

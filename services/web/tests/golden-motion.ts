@@ -1,17 +1,17 @@
-/** The golden blocks of `proto/vectors/blocks.json` and their tracks. */
+/** Motion blocks of `proto/vectors/blocks.json` and their tracks. */
 
 import { MotionTrack } from "../src/codec/motion-track";
 import { decodeBase64, loadVectors } from "./golden-vectors";
 
 export interface BlockVectors {
-  /** The first has three blocks of 30, 30 and 18 frames: the first four valid blocks are 0 at two rates, 1 and 2. */
+  /** The first track has blocks of 30, 30 and 18 frames; the first four valid blocks are 0 at two levels, 1 and 2. */
   tracks: {
     fps: number;
     frames: number;
     block_frames: number;
     first_frames: number;
     dancer: string;
-    /** What the dancer says: offsets (54) and tips (54) in metres, reference rotations (72, the root's first). */
+    /** Decoded from `dancer`: offsets (54) and tips (54) in metres, reference rotations (72, root first). */
     offsets: number[];
     tips: number[];
     reference: number[];
@@ -27,11 +27,11 @@ export interface BlockVectors {
     q: number[];
     poses: { instant: number; root: number[]; rotations: number[] }[];
   }[];
-  /** Of the first track. */
+  /** Invalid blocks of the first track. */
   invalid: { why: string; block: string }[];
 }
 
-/** A golden track as a Description's map has it. */
+/** Returns a golden track as the map of a Description. */
 export function goldenDescription(which = 0): { type: string } & Record<string, unknown> {
   const { fps, frames, block_frames, first_frames, dancer } = loadVectors<BlockVectors>("blocks").tracks[which];
   return {
@@ -50,7 +50,7 @@ export function goldenDescription(which = 0): { type: string } & Record<string, 
   };
 }
 
-/** A track of the golden blocks. */
+/** Returns a track of the golden blocks. */
 export function goldenTrack(which = 0): MotionTrack {
   return MotionTrack.fromDescription(goldenDescription(which));
 }

@@ -1,30 +1,30 @@
-/** What becomes of damaged and hostile bytes: they are read, or refused with the one error type of their room. */
+/** Counts of damaged and hostile inputs: each is read, or rejected with the package's error type. */
 export class HostileInputCounts {
   private read = 0;
-  private refused = 0;
+  private rejected = 0;
   private slowest = 0;
 
-  /** @param refusal the error type */
-  constructor(private readonly refusal: new (message: string) => Error) {}
+  /** @param rejection the error type of rejected inputs */
+  constructor(private readonly rejection: new (message: string) => Error) {}
 
-  /** Runs `attempt`; anything else that it throws is a fault. */
+  /** Run `attempt`. Errors of any other type are rethrown. */
   run(attempt: () => void): void {
     const start = performance.now();
     try {
       attempt();
       this.read++;
     } catch (error) {
-      if (!(error instanceof this.refusal)) throw error;
-      this.refused++;
+      if (!(error instanceof this.rejection)) throw error;
+      this.rejected++;
     }
     this.slowest = Math.max(this.slowest, performance.now() - start);
   }
 
-  /** Prints the counts. */
-  print(what: string): void {
-    const { read, refused, slowest } = this;
+  /** Print the counts. */
+  print(label: string): void {
+    const { read, rejected, slowest } = this;
     console.log(
-      `hostile ${what}: ${read + refused} inputs, ${read} read, ${refused} refused, the slowest in ${slowest.toFixed(1)} ms`,
+      `hostile ${label}: ${read + rejected} inputs, ${read} read, ${rejected} rejected, ${slowest.toFixed(1)} ms at most`,
     );
   }
 }

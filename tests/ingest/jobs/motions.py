@@ -1,4 +1,4 @@
-"""Two dances and logs of sessions over them."""
+"""Stored motions and logs of sessions that played them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SECOND_US = 1_000_000
 
 
 def make_stored_motion(name: str, seconds: float, seed: int) -> StoredMotion:
-    """A dance as the library has it."""
+    """Return a motion as the motion store returns it."""
     motion = random_motion(seconds, 30.0, seed)
     calm = Motion(motion.figure, 30.0, motion.root * 0.1 + [0, 0.85, 0], motion.rotations)
     encoded = encode_motion(calm, error_bounds_mm=(30.0, 3.0), grade="live")
@@ -38,7 +38,7 @@ MOTIONS = {
 
 
 def make_log(*states: TimelineState) -> bytes:
-    """The log of a session that had these timelines, and nobody pulled."""
+    """Return the log of a session with these timelines and no input."""
     log = InputLog()
     for state in states:
         log.add_timeline(state)

@@ -27,16 +27,16 @@ def stored() -> StoredMotion:
 
 
 def add_sound(stored: StoredMotion, path: Path, motion: str = "two") -> tuple[StoredMotion, JobResult]:
-    made = add_audio(motion, stored, path)
-    assert isinstance(made, JobResult), made
-    return container.unpack_motion(motion, made.packed), made
+    result = add_audio(motion, stored, path)
+    assert isinstance(result, JobResult), result
+    return container.unpack_motion(motion, result.packed), result
 
 
-def test_all_else_stays_the_same_bytes(stored: StoredMotion, tmp_path: Path) -> None:
-    new, made = add_sound(stored, write_audio(tmp_path / "a.wav", make_click(2.0, 44_100, 1.25, 2), 44_100, "stereo"))
-    assert made.description["tracks"] == ["motion", "camera", "audio"]
-    assert made.description["made_from"] == "one"
-    assert (made.description["audio"]["seconds"], made.description["audio"]["channels"]) == (2.0, 2)
+def test_other_tracks_keep_their_bytes(stored: StoredMotion, tmp_path: Path) -> None:
+    new, result = add_sound(stored, write_audio(tmp_path / "a.wav", make_click(2.0, 44_100, 1.25, 2), 44_100, "stereo"))
+    assert result.description["tracks"] == ["motion", "camera", "audio"]
+    assert result.description["made_from"] == "one"
+    assert (result.description["audio"]["seconds"], result.description["audio"]["channels"]) == (2.0, 2)
     assert new.packets[:2] == stored.packets
     before, after = (msgpack.unpackb(motion.description[1:]) for motion in (stored, new))
     assert after["tracks"][:2] == before["tracks"]
@@ -52,41 +52,41 @@ def test_all_else_stays_the_same_bytes(stored: StoredMotion, tmp_path: Path) -> 
         assert abs(find_onset(played[:, 0]) - find_onset(make_click(2.0, 48_000, 1.25)[:, 0])) < 1e-3
 
 
-def test_another_sound_takes_the_place_of_the_first(stored: StoredMotion, tmp_path: Path) -> None:
+def test_second_sound_replaces_the_first(stored: StoredMotion, tmp_path: Path) -> None:
     first, _ = add_sound(stored, write_audio(tmp_path / "a.flac", make_tone(2.0, 48_000), 48_000))
-    second, made = add_sound(
+    second, result = add_sound(
         first, write_audio(tmp_path / "b.flac", make_tone(1.0, 48_000, 2), 48_000, "stereo"), "three"
     )
-    assert made.description["tracks"] == ["motion", "camera", "audio"]
-    assert made.description["made_from"] == "two"
+    assert result.description["tracks"] == ["motion", "camera", "audio"]
+    assert result.description["made_from"] == "two"
     assert len(second.packets) == 3
     assert second.packets[2] != first.packets[2]
     assert second.tracks[2] != first.tracks[2]
 
 
-@pytest.mark.parametrize(("seconds", "kept"), [(0.3, 14_400), (1.0, 48_000), (2.0, 96_000), (30.0, 96_000)])
-def test_a_shorter_sound_ends_in_silence_and_a_longer_one_with_the_motion(
-    stored: StoredMotion, tmp_path: Path, seconds: float, kept: int
+@pytest.mark.parametrize(("seconds", "samples"), [(0.3, 14_400), (1.0, 48_000), (2.0, 96_000), (30.0, 96_000)])
+def test_sound_is_padded_or_cut_to_the_motion(
+    stored: StoredMotion, tmp_path: Path, seconds: float, samples: int
 ) -> None:
     shares: list[float] = []
     path = write_audio(tmp_path / "a.mp3", make_tone(seconds, 48_000), 48_000)
-    made = add_audio("two", stored, path, shares.append)
-    assert isinstance(made, JobResult)
-    new = container.unpack_motion("two", made.packed)
+    result = add_audio("two", stored, path, shares.append)
+    assert isinstance(result, JobResult)
+    new = container.unpack_motion("two", result.packed)
     track = new.tracks[2]
     assert isinstance(track, AudioTrack)
-    assert track.samples == kept
+    assert track.samples == samples
     assert len(new.packets[2][0]) == track.block_count == 3
     blocks = [unpack_audio_block(Data.unpack(packet).block) for packet in new.packets[2][0]]
-    assert [bool(block) for block in blocks] == [track.start_us(n) * 48 // 1000 < kept for n in range(3)]
+    assert [bool(block) for block in blocks] == [track.start_us(n) * 48 // 1000 < samples for n in range(3)]
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
 
 
-def test_what_cannot_be_heard_is_refused(stored: StoredMotion, tmp_path: Path) -> None:
+def test_unreadable_sound_is_rejected(stored: StoredMotion, tmp_path: Path) -> None:
     path = tmp_path / "a.wav"
-    path.write_bytes(b"no sound at all")
-    refused = add_audio("two", stored, path)
-    assert isinstance(refused, JobRejection)
-    assert refused.title == "Not a sound"
-    assert refused.hint
+    path.write_bytes(b"not a sound")
+    rejected = add_audio("two", stored, path)
+    assert isinstance(rejected, JobRejection)
+    assert rejected.title == "Not a sound"
+    assert rejected.hint

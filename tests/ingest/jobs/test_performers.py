@@ -25,7 +25,7 @@ from tests.vectors.blocks import random_motion
 
 
 def make_walk(name: str, metres: float, facing: float) -> StoredMotion:
-    """A dance that goes `metres` to its left and back, about (3, -2), and faces `facing`."""
+    """Return a motion that moves `metres` to its left and back, around (3, -2), facing `facing` radians."""
     motion = random_motion(2.0, 30.0, 31)
     turn = rotation.from_coordinate_axis(1, np.full(60, facing))
     along = rotation.rotate(
@@ -40,30 +40,30 @@ def make_walk(name: str, metres: float, facing: float) -> StoredMotion:
 
 
 def stage_positions(motion: StoredMotion) -> list[np.ndarray]:
-    """Of each performer the root's places, (frames, 3)."""
-    found = []
-    for dance in motion.performers:
-        packets = enumerate(dance.packets[-1])
+    """Return each performer's root positions on the stage, (frames, 3)."""
+    positions = []
+    for performer in motion.performers:
+        packets = enumerate(performer.packets[-1])
         blocks = [
-            decode_motion_block(dance.track, Data.unpack(packet).block).pose_at(
-                np.arange(float(dance.track.frames_in(index)))
+            decode_motion_block(performer.track, Data.unpack(packet).block).pose_at(
+                np.arange(float(performer.track.frames_in(index)))
             )
             for index, packet in packets
         ]
         root, rotations = (np.concatenate(part) for part in zip(*blocks, strict=True))
-        root, rotations = dance.placement.apply(root, rotations)
+        root, rotations = performer.placement.apply(root, rotations)
         forward = rotation.rotate(rotations[:, 0], np.array([0.0, 0.0, 1.0])).mean(axis=0)
         assert np.arctan2(forward[0], forward[2]) == pytest.approx(0.0, abs=0.05)
-        found.append(root)
-    return found
+        positions.append(root)
+    return positions
 
 
-def test_they_stand_in_a_row_as_near_as_their_dances_let_them_and_face_one_way() -> None:
+def test_row_is_as_close_as_the_movements_allow() -> None:
     still, wide = make_walk("still", 0.0, 2.0), make_walk("wide", 1.5, -1.0)
-    made = combine_performers("three", still, [wide, still], None)
-    assert isinstance(made, JobResult)
-    assert made.description == {"tracks": ["motion"] * 3, "performers": 3, "made_from": "still"}
-    roots = stage_positions(container.unpack_motion("three", made.packed))
+    result = combine_performers("three", still, [wide, still], None)
+    assert isinstance(result, JobResult)
+    assert result.description == {"tracks": ["motion"] * 3, "performers": 3, "made_from": "still"}
+    roots = stage_positions(container.unpack_motion("three", result.packed))
     for left, right in pairwise(roots):
         assert (right[:, 0] - left[:, 0]).min() == pytest.approx(PERFORMER_SPACING_M, abs=0.15)
     middles = [(root[:, 0].min() + root[:, 0].max()) / 2 for root in roots]
@@ -72,39 +72,39 @@ def test_they_stand_in_a_row_as_near_as_their_dances_let_them_and_face_one_way()
         assert abs(root[:, 2]).max() < 0.1
 
 
-def test_who_dance_the_same_keep_step_side_by_side() -> None:
+def test_equal_motions_get_the_minimum_spacing() -> None:
     wide = make_walk("wide", 3.0, 1.0)
-    made = combine_performers("two", wide, [wide], None)
-    assert isinstance(made, JobResult)
-    left, right = stage_positions(container.unpack_motion("two", made.packed))
+    result = combine_performers("two", wide, [wide], None)
+    assert isinstance(result, JobResult)
+    left, right = stage_positions(container.unpack_motion("two", result.packed))
     assert right[:, 0] - left[:, 0] == pytest.approx(PERFORMER_SPACING_M, abs=1e-6)
 
 
-def test_who_walks_across_the_floor_is_not_given_all_of_it() -> None:
+def test_extra_spacing_is_limited() -> None:
     far, still = make_walk("far", 30.0, 0.0), make_walk("still", 0.0, 0.0)
     left, right = place_side_by_side([far.performers[0], still.performers[0]])
     middles = [place.x + 3.0 + half for place, half in ((left, 15.0), (right, 0.0))]
     assert middles[1] - middles[0] == pytest.approx(PERFORMER_SPACING_M + MAX_EXTRA_SPACING_M, abs=0.6)
 
 
-def test_places_may_be_given_and_there_are_as_many_as_performers() -> None:
+def test_given_placements_must_match_the_performers() -> None:
     places = [Placement(0.0, 1.0, 0.0), Placement(0.5, -1.0, 3.0)]
-    made = combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], places)
-    assert isinstance(made, JobResult)
-    assert [dance.placement for dance in container.unpack_motion("m", made.packed).performers] == places
-    refused = combine_performers("m", MOTIONS["one"], [MOTIONS["both"]], places)
-    assert isinstance(refused, JobRejection)
-    assert refused.field == "places"
+    result = combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], places)
+    assert isinstance(result, JobResult)
+    assert [performer.placement for performer in container.unpack_motion("m", result.packed).performers] == places
+    rejected = combine_performers("m", MOTIONS["one"], [MOTIONS["both"]], places)
+    assert isinstance(rejected, JobRejection)
+    assert rejected.field == "places"
 
 
-def test_more_than_four_are_refused() -> None:
-    refused = combine_performers("m", MOTIONS["both"], [MOTIONS["both"], MOTIONS["one"]], None)
-    assert isinstance(refused, JobRejection)
-    assert (refused.title, refused.field) == ("Too many performers", "motions")
-    assert "this would have 5" in refused.detail
+def test_more_than_four_performers_are_rejected() -> None:
+    rejected = combine_performers("m", MOTIONS["both"], [MOTIONS["both"], MOTIONS["one"]], None)
+    assert isinstance(rejected, JobRejection)
+    assert (rejected.title, rejected.field) == ("Too many performers", "motions")
+    assert "this would have 5" in rejected.detail
 
 
-def test_it_says_how_far_it_is() -> None:
-    told: list[float] = []
-    combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], None, told.append)
-    assert told == [0.5, 1.0]
+def test_progress_is_reported_per_performer() -> None:
+    reports: list[float] = []
+    combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], None, reports.append)
+    assert reports == [0.5, 1.0]

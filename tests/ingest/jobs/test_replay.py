@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay
-from bunraku.marionette.input_log import InputLog, LoggedMarionettes
+from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.ownership import LimbGrant, LimbInput
 from bunraku.motion.skeleton import Figure
@@ -22,13 +22,13 @@ TICK_US = 16_667
 
 
 class SimulatedSession:
-    """A session with one viewer, frame by frame, as the session service drives it."""
+    """Session with one viewer, driven tick by tick as the session service does."""
 
     def __init__(self, motion: str) -> None:
-        self.log = InputLog()
+        self.log = InputLog(motion)
         self.state = timeline.start(motion, MOTIONS[motion].first_track.duration_us, START_CLOCK_US)
         self.log.add_timeline(self.state)
-        self.marionettes = LoggedMarionettes(Marionettes(figures_of(motion)), motion, self.log)
+        self.marionettes = Marionettes(figures_of(motion), recorder=self.log)
         self.clock = START_CLOCK_US
         self._viewer_overlays = OverlayBuffer()
         self._was_at_rest = True
@@ -36,14 +36,15 @@ class SimulatedSession:
         self.seen_poses: list[tuple[int, list[Pose]]] = []
 
     def run(self, seconds: float) -> Iterator[int]:
-        """Each tick's clock time, before its overlay is made; what the viewer is shown of it is noted."""
+        """Yield the clock time of each tick before its overlay is computed; record the poses that the viewer sees."""
         for _ in range(round(seconds * 1e6 / TICK_US)):
             yield self.clock
             self._overlay()
             poses = self._replay().motion_poses_at(self.clock)
             assert poses is not None
             shown = [
-                (root, self._viewer_overlays.apply(turned, self.clock, nth)) for nth, (root, turned) in enumerate(poses)
+                (root, self._viewer_overlays.apply(turned, self.clock, index))
+                for index, (root, turned) in enumerate(poses)
             ]
             self.seen_poses.append((self.clock, shown))
             self.clock += TICK_US
@@ -56,28 +57,28 @@ class SimulatedSession:
         return SessionReplay(self.log, MOTIONS)
 
     def _overlay(self) -> None:
-        if self.marionettes.marionettes.is_at_rest:
+        if self.marionettes.ownership.is_at_rest:
             self._was_at_rest = True
             return
         for back in (2 * TICK_US, TICK_US) if self._was_at_rest else ():
             before = self._replay().motion_poses_at(self.clock + OVERLAY_LEAD_US - back)
             assert before is not None
             self.marionettes.observe_poses(
-                [rotations for _, rotations in before], self.clock + OVERLAY_LEAD_US - back, self.clock - back
+                [rotations for _, rotations in before], self.clock - back, self.clock + OVERLAY_LEAD_US - back
             )
         self._was_at_rest = False
         poses = self._replay().motion_poses_at(self.clock + OVERLAY_LEAD_US)
         assert poses is not None
-        laid = self.marionettes.compute_overlay(
-            [rotations for _, rotations in poses], self.clock + OVERLAY_LEAD_US, self.clock
+        overlay = self.marionettes.compute_overlay(
+            [rotations for _, rotations in poses], self.clock, self.clock + OVERLAY_LEAD_US
         )
-        limbs = {limb: pack_joints(joints) for limb, joints in laid.items()}
+        limbs = {limb: pack_joints(joints) for limb, joints in overlay.items()}
         self._sequence += 1
         self._viewer_overlays.put(Overlay(self._sequence, self.clock + OVERLAY_LEAD_US, limbs))
 
 
 def figures_of(motion: str) -> list[Figure]:
-    return [dance.track.figure for dance in MOTIONS[motion].performers]
+    return [performer.track.figure for performer in MOTIONS[motion].performers]
 
 
 def assert_same_poses(one: list[Pose], other: list[Pose]) -> None:
@@ -87,30 +88,30 @@ def assert_same_poses(one: list[Pose], other: list[Pose]) -> None:
 
 
 def session_controlled_twice(motion: str, second: tuple[int, ...] = (1, 2)) -> SimulatedSession:
-    """A hand is pulled, let go, and after a rest the `second` limbs."""
+    """Run a session in which a hand is controlled and released, and after a pause the `second` limbs."""
     stage = SimulatedSession(motion)
     for _ in stage.run(0.5):
         pass
     for limbs, seconds in (((0,), 1.2), (second, 0.7)):
-        grants = [stage.marionettes.claim(limb, "ada", stage.clock) for limb in limbs]
+        grants = [stage.marionettes.ownership.claim(limb, "ada", stage.clock) for limb in limbs]
         for number, now in enumerate(stage.run(seconds)):
             for grant in grants:
                 assert isinstance(grant, LimbGrant)
                 values = (0.5 + 0.3 * np.sin(number / 9), 0.2, 0.4) if grant.limb % 4 < 2 else (0.6, 0.0, 0.0)
-                stage.marionettes.apply_input(
+                stage.marionettes.ownership.apply_input(
                     "ada", LimbInput(grant.limb, 1, grant.epoch, number + 1, now, values), now
                 )
         for grant in grants:
             assert isinstance(grant, LimbGrant)
-            assert stage.marionettes.release(grant.limb, "ada", grant.epoch, stage.clock)
+            assert stage.marionettes.ownership.release(grant.limb, "ada", grant.epoch, stage.clock)
         for _ in stage.run(1.5):
             pass
-        assert stage.marionettes.marionettes.is_at_rest
+        assert stage.marionettes.ownership.is_at_rest
     return stage
 
 
 @pytest.mark.parametrize(("motion", "second"), [("one", (1, 2)), ("both", (1, 5, 6))])
-def test_it_shows_again_what_a_viewer_saw_from_any_instant_on(motion: str, second: tuple[int, ...]) -> None:
+def test_replay_from_any_time_equals_what_the_viewer_saw(motion: str, second: tuple[int, ...]) -> None:
     stage = session_controlled_twice(motion, second)
     log = InputLog.unpack(stage.log.pack())
     plain = SessionReplay(log, MOTIONS)
@@ -119,23 +120,26 @@ def test_it_shows_again_what_a_viewer_saw_from_any_instant_on(motion: str, secon
         shown = list(SessionReplay(log, MOTIONS).replay_poses([clock for clock, _ in part]))
         moved = np.zeros(len(figures_of(motion)))
         for (clock, seen), again in zip(part, shown, strict=True):
-            dances = plain.motion_poses_at(clock)
+            motion_poses = plain.motion_poses_at(clock)
             assert again is not None
-            assert dances is not None
+            assert motion_poses is not None
             assert_same_poses(again, seen)
-            off = [np.abs(turned - alone).max() for (_, turned), (_, alone) in zip(again, dances, strict=True)]
+            off = [
+                np.abs(turned - motion_pose).max()
+                for (_, turned), (_, motion_pose) in zip(again, motion_poses, strict=True)
+            ]
             moved = np.maximum(moved, off)
         assert min(moved) > 0.1
 
 
-def test_it_shows_again_what_was_pulled_through_a_pause_a_seek_and_another_dance() -> None:
+def test_replay_follows_pause_seek_and_motion_change() -> None:
     stage = SimulatedSession("one")
-    grant = stage.marionettes.claim(1, "ada", stage.clock)
+    grant = stage.marionettes.ownership.claim(1, "ada", stage.clock)
     assert isinstance(grant, LimbGrant)
     changed = 0
     for number, now in enumerate(stage.run(4.0)):
         values = (0.5 + 0.3 * np.sin(number / 9), 0.2, 0.4)
-        stage.marionettes.apply_input("ada", LimbInput(1, 1, grant.epoch, number + 1, now, values), now)
+        stage.marionettes.ownership.apply_input("ada", LimbInput(1, 1, grant.epoch, number + 1, now, values), now)
         if number == 40:
             stage.edit(timeline.edit(stage.state, now + OVERLAY_LEAD_US, playing=False))
         elif number == 70:
@@ -155,33 +159,33 @@ def test_it_shows_again_what_was_pulled_through_a_pause_a_seek_and_another_dance
             assert_same_poses(again, seen)
 
 
-def test_timelines_hold_from_when_they_are_due() -> None:
+def test_timelines_apply_from_their_clock_time() -> None:
     one = timeline.start("one", 3 * SECOND_US, START_CLOCK_US)
     sought = timeline.edit(one, START_CLOCK_US + SECOND_US, position=2 * SECOND_US)
     two = timeline.change_motion(sought, START_CLOCK_US + 2 * SECOND_US, "two", 2 * SECOND_US)
-    showing = SessionReplay(InputLog.unpack(make_log(one, sought, two)), MOTIONS)
-    assert showing.timeline_at(START_CLOCK_US - 1) is None
-    assert showing.motion_poses_at(START_CLOCK_US - 1) is None
-    assert [showing.timeline_at(START_CLOCK_US + t) for t in (0, SECOND_US - 1, SECOND_US, 2 * SECOND_US)] == [
+    replay = SessionReplay(InputLog.unpack(make_log(one, sought, two)), MOTIONS)
+    assert replay.timeline_at(START_CLOCK_US - 1) is None
+    assert replay.motion_poses_at(START_CLOCK_US - 1) is None
+    assert [replay.timeline_at(START_CLOCK_US + t) for t in (0, SECOND_US - 1, SECOND_US, 2 * SECOND_US)] == [
         one,
         one,
         sought,
         two,
     ]
-    assert list(showing.replay_poses([START_CLOCK_US - 5, START_CLOCK_US - 1])) == [None, None]
+    assert list(replay.replay_poses([START_CLOCK_US - 5, START_CLOCK_US - 1])) == [None, None]
 
 
-def test_a_dance_that_was_removed_is_missed() -> None:
+def test_removed_motion_is_reported() -> None:
     one = timeline.start("one", 3 * SECOND_US, START_CLOCK_US)
     with pytest.raises(MissingMotion, match="one was removed"):
         list(SessionReplay(InputLog.unpack(make_log(one)), {}).replay_poses([START_CLOCK_US]))
 
 
-def test_nothing_pulled_is_the_dance_alone() -> None:
+def test_replay_without_input_equals_the_motion() -> None:
     one = timeline.start("one", 3 * SECOND_US, START_CLOCK_US)
-    showing = SessionReplay(InputLog.unpack(make_log(one)), MOTIONS)
-    (poses,) = showing.replay_poses([START_CLOCK_US + SECOND_US])
-    alone = showing.motion_poses_at(START_CLOCK_US + SECOND_US)
+    replay = SessionReplay(InputLog.unpack(make_log(one)), MOTIONS)
+    (poses,) = replay.replay_poses([START_CLOCK_US + SECOND_US])
+    motion_pose = replay.motion_poses_at(START_CLOCK_US + SECOND_US)
     assert poses is not None
-    assert alone is not None
-    np.testing.assert_array_equal(poses[0][1], alone[0][1])
+    assert motion_pose is not None
+    np.testing.assert_array_equal(poses[0][1], motion_pose[0][1])

@@ -34,7 +34,7 @@ def light_keyframe(time: int, intensity: float) -> LightKeyframe:
 
 
 @given(st.lists(st.integers(0, 3_000_000), min_size=1, max_size=6, unique=True), st.sampled_from(["linear", "smooth"]))
-def test_it_is_at_each_keyframe_in_its_time_and_never_beyond(times: list[int], ease: str) -> None:
+def test_samples_pass_through_the_keyframes_without_overshoot(times: list[int], ease: str) -> None:
     keyframes = [camera_keyframe(time, float(n % 3), ease) for n, time in enumerate(sorted(times))]
     scene = sample_keyframes("camera", keyframes, 2_300_000)
     assert len(scene.values) == round(2.3 * SCENE_FPS)
@@ -47,7 +47,7 @@ def test_it_is_at_each_keyframe_in_its_time_and_never_beyond(times: list[int], e
     assert np.all(x[: max(int(keyframes[0].time * SCENE_FPS / 1e6), 0)] == x[0])
 
 
-def test_smooth_keyframes_are_come_to_at_rest() -> None:
+def test_smooth_keyframes_have_zero_velocity() -> None:
     for ease, slow in (("linear", False), ("smooth", True)):
         x = sample_keyframes(
             "camera", [camera_keyframe(0, 0.0), camera_keyframe(1_000_000, 1.0, ease)], 1_000_000
@@ -56,15 +56,15 @@ def test_smooth_keyframes_are_come_to_at_rest() -> None:
         assert x[15] == pytest.approx(0.5, abs=1e-6)
 
 
-def test_camera_and_lights_lie_beside_the_dance_and_are_replaced_by_others(bare: StoredMotion) -> None:
-    asked = Staging(
+def test_camera_and_lights_are_added_and_replaced(bare: StoredMotion) -> None:
+    staging = Staging(
         camera=[camera_keyframe(0, 0.0), camera_keyframe(2_000_000, 1.0)],
         lights=[[light_keyframe(0, 90.0)], [light_keyframe(0, 10.0)]],
     )
-    made = add_scene("one", bare, asked)
-    assert isinstance(made, JobResult)
-    assert made.description == {"tracks": ["motion", "camera", "light", "light"], "made_from": "bare"}
-    stored = unpack_motion("one", made.packed)
+    result = add_scene("one", bare, staging)
+    assert isinstance(result, JobResult)
+    assert result.description == {"tracks": ["motion", "camera", "light", "light"], "made_from": "bare"}
+    stored = unpack_motion("one", result.packed)
     assert stored.first_packets == bare.first_packets
     track = stored.tracks[1]
     assert isinstance(track, SceneTrack)
@@ -78,17 +78,17 @@ def test_camera_and_lights_lie_beside_the_dance_and_are_replaced_by_others(bare:
     )
     np.testing.assert_allclose(shown[:, 0], np.clip(np.arange(69) / 60.0, 0.0, 1.0), atol=3e-3)
 
-    dark = add_scene("two", stored, Staging(lights=[]))
-    assert isinstance(dark, JobResult)
-    assert dark.description["tracks"] == ["motion", "camera"]
-    again = add_scene("three", unpack_motion("two", dark.packed), Staging(camera=[camera_keyframe(0, 2.0)]))
+    unlit = add_scene("two", stored, Staging(lights=[]))
+    assert isinstance(unlit, JobResult)
+    assert unlit.description["tracks"] == ["motion", "camera"]
+    again = add_scene("three", unpack_motion("two", unlit.packed), Staging(camera=[camera_keyframe(0, 2.0)]))
     assert isinstance(again, JobResult)
     assert again.description["tracks"] == ["motion", "camera"]
     assert unpack_motion("three", again.packed).packets[1] != stored.packets[1]
 
 
-def test_more_tracks_than_can_be_numbered_are_refused(bare: StoredMotion, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_tracks_are_rejected(bare: StoredMotion, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bunraku.codec.container.MAX_TRACKS", 2)
-    refused = add_scene("one", bare, Staging(lights=[[light_keyframe(0, 1.0)]] * 2))
-    assert isinstance(refused, JobRejection)
-    assert (refused.title, refused.field) == ("Too many tracks", "lights")
+    rejected = add_scene("one", bare, Staging(lights=[[light_keyframe(0, 1.0)]] * 2))
+    assert isinstance(rejected, JobRejection)
+    assert (rejected.title, rejected.field) == ("Too many tracks", "lights")

@@ -1,1 +1,1 @@
-"""Work of ingest jobs, run in a process of its own: one module per operation."""
+"""Work of ingest jobs in separate processes, one module per operation."""

@@ -1,4 +1,4 @@
-"""What a job does to add sound to a motion: the same motion anew, with an audio track beside its others."""
+"""Job that adds the sound of a file to a motion as an audio track."""
 
 from __future__ import annotations
 
@@ -13,31 +13,33 @@ from bunraku.ingest.result import JobRejection, JobResult
 
 
 def add_audio(
-    motion_id: str, stored: StoredMotion, path: Path, progress: Callable[[float], None] = lambda _: None
+    motion_id: str, stored: StoredMotion, path: Path, on_progress: Callable[[float], None] = lambda _: None
 ) -> JobResult | JobRejection:
-    """The motion `stored` with the sound of the file at `path`, as the motion of this new id; what lies beyond the
-    motion's end is left out. `progress` is told the share encoded, 0..1."""
-    most = max_samples(stored.first_track)
+    """Return a copy of `stored` with the new id and the sound of a file; sound beyond the motion's end is cut.
+
+    `on_progress` receives the encoded share, 0..1.
+    """
+    limit = max_samples(stored.first_track)
     try:
         with SoundFile(path) as sound:
-            expected = most if sound.duration_s is None else min(most, sound.duration_s * SAMPLE_RATE)
-            told = _report_progress(sound.read_samples(most), expected, progress)
-            encoded = encode_audio(told, stored.first_track, sound.channels)
+            expected = limit if sound.duration_s is None else min(limit, sound.duration_s * SAMPLE_RATE)
+            samples = _report_progress(sound.read_samples(limit), expected, on_progress)
+            encoded = encode_audio(samples, stored.first_track, sound.channels)
     except UnreadableSound as error:
         return JobRejection(error.title, error.detail, hint=error.hint)
     try:
-        packed, kinds = add_audio_track(motion_id, stored, encoded)
+        packed, track_kinds = add_audio_track(motion_id, stored, encoded)
     except ValueError as error:
         return JobRejection("Too many tracks", str(error))
-    described = encoded.describe()
+    audio = encoded.describe()
     return JobResult(
         packed,
         {
-            "tracks": kinds,
+            "tracks": track_kinds,
             "audio": {
                 "seconds": encoded.track.samples / SAMPLE_RATE,
-                "channels": described["channels"],
-                "rates": described["rates"],
+                "channels": audio["channels"],
+                "rates": audio["rates"],
             },
             "made_from": stored.id,
         },
@@ -45,11 +47,11 @@ def add_audio(
 
 
 def _report_progress(
-    samples: Iterator[Samples], expected_samples: float, progress: Callable[[float], None]
+    chunks: Iterator[Samples], expected_samples: float, on_progress: Callable[[float], None]
 ) -> Iterator[Samples]:
-    heard = 0
-    progress(0.0)
-    for piece in samples:
-        yield piece
-        heard += len(piece)
-        progress(min(heard / expected_samples, 1.0) if expected_samples > 0 else 1.0)
+    sample_count = 0
+    on_progress(0.0)
+    for chunk in chunks:
+        yield chunk
+        sample_count += len(chunk)
+        on_progress(min(sample_count / expected_samples, 1.0) if expected_samples > 0 else 1.0)

@@ -1,4 +1,4 @@
-"""What a job does: a file to an encoded motion. Importing this loads all that a job uses, the compiled code too."""
+"""Job that encodes a motion file. Importing this module loads and compiles everything that a job uses."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.errors import UnreadableMotion
 
 FIRST_BLOCK_S = 0.5
-"""Of the first block, so that a dance starts soon on a narrow line."""
+"""Duration of the first block, short so that playback starts early on a constrained link."""
 MAX_BEST_GRADE_FRAMES = 6_000
-"""Longer motions are encoded in one pass: no one waits minutes for a few per cent."""
+"""Longer motions are encoded in one pass: the second pass saves a few per cent and would take minutes."""
 
 _MINIMAL_BVH = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xrotation } MOTION Frames: 1 Frame Time: 0.1 0"
 
@@ -30,10 +30,9 @@ parse_bvh(_MINIMAL_BVH)
 
 
 def encode_file(
-    motion_id: str, path: Path, progress: Callable[[float], None] = lambda _: None
+    motion_id: str, path: Path, on_progress: Callable[[float], None] = lambda _: None
 ) -> JobResult | JobRejection:
-    """Read, analyse and encode the file at `path` as the motion of this id; `progress` is told the share encoded, 0..1,
-    from where encoding begins."""
+    """Parse, analyse and encode the file at `path`; `on_progress` receives the encoded share, 0..1."""
     try:
         analysis = analyse(parse_bvh(path.read_bytes()))
         for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
@@ -41,29 +40,27 @@ def encode_file(
     except UnreadableMotion as error:
         return JobRejection(error.title, error.detail, error.line, error.field, error.hint or None)
     except ProportionsError as error:
-        return JobRejection(
-            "No puppet's arms", f"its arms cannot be pulled: {error}", field=error.field, hint=error.hint
-        )
+        detail = f"the arms of this skeleton cannot be controlled: {error}"
+        return JobRejection("No puppet's arms", detail, field=error.field, hint=error.hint)
     grade: EncodingGrade = "best" if analysis.motion.frame_count <= MAX_BEST_GRADE_FRAMES else "live"
-    progress(0.0)
-    telling = Lock()
+    on_progress(0.0)
+    progress_lock = Lock()
 
-    def told(share: float) -> None:
-        with telling:
-            progress(share)
+    def report_progress(share: float) -> None:
+        with progress_lock:
+            on_progress(share)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         encoded = encode_motion(
-            analysis.motion, first_seconds=FIRST_BLOCK_S, grade=grade, on_progress=told, map_levels=pool.map
+            analysis.motion, first_seconds=FIRST_BLOCK_S, grade=grade, on_progress=report_progress, map_levels=pool.map
         )
-    track = encoded.track
     return JobResult(
         pack_motion(motion_id, encoded),
         {
             "duration": analysis.motion.duration,
             "fps": analysis.motion.fps,
             "frames": analysis.motion.frame_count,
-            "blocks": track.block_count,
+            "blocks": encoded.track.block_count,
             "profile": analysis.profile,
             "joints": analysis.source_joints,
             "rest_pose": analysis.rest_pose,

@@ -1,4 +1,4 @@
-"""Sound to Opus packets at several rates at once (RFC 6716, through FFmpeg's libopus)."""
+"""Encoding of sound as Opus at several bitrates (RFC 6716, with FFmpeg's libopus)."""
 
 from __future__ import annotations
 
@@ -19,50 +19,52 @@ BITRATE_LADDERS: dict[int, tuple[tuple[float, int], ...]] = {
     1: ((9.0, 1), (20.0, 1), (40.0, 1)),
     2: ((9.0, 1), (24.0, 2), (64.0, 2)),
 }
-"""By the sound's channels: kbit/s and channels of each rate, lowest first (NOTES.md says why)."""
+"""Bitrate (kbit/s) and channels of each level, lowest first, by channels of the sound (`proto/NOTES.md`)."""
 _ENCODER_OPTIONS = {
     "frame_duration": "60",
-    # its transform alone, which is kinder to music at few bits than the model of a voice, and starts sooner
+    # CELT only: better than the speech model for music at low bitrates, and with a shorter pre-skip
     "application": "lowdelay",
-    # a narrow line feels every peak
+    # no bitrate peaks, which delay other data on a constrained link
     "vbr": "constrained",
 }
 _CHANNEL_LAYOUTS = {1: "mono", 2: "stereo"}
 
 
-def encode_audio(pieces: Iterable[Samples], timing: Timing, channels: int) -> EncodedAudio:
-    """The sound, samples (n, channels) piece by piece, as the audio track of a motion of this `timing`, which it is no
-    longer than. Raises ValueError for a sound without a sample."""
-    encoders = [_OpusEncoder(kbps, out) for kbps, out in BITRATE_LADDERS[channels]]
+def encode_audio(chunks: Iterable[Samples], timing: Timing, channels: int) -> EncodedAudio:
+    """Encode chunks of samples, (n, channels), as the audio track of a motion with this `timing`.
+
+    The sound must not be longer than the motion. Raise ValueError for a sound without samples.
+    """
+    encoders = [_OpusEncoder(kbps, level_channels) for kbps, level_channels in BITRATE_LADDERS[channels]]
     samples = 0
-    for packet in _split_into_packets(pieces):
+    for packet in _split_into_packets(chunks):
         samples += len(packet)
         for encoder in encoders:
             encoder.encode(packet)
     if samples == 0:
-        raise ValueError("a sound has one sample at least")
+        raise ValueError("the sound must have at least one sample")
     track = create_audio_track(timing, channels, encoders[0].pre_skip, samples)
     return EncodedAudio(track, [pack_audio_level(track, encoder.flush()) for encoder in encoders])
 
 
-def _split_into_packets(samples: Iterable[Samples]) -> Iterator[Samples]:
-    """The same sound in pieces of a packet, the last perhaps shorter."""
-    waiting: list[Samples] = []
+def _split_into_packets(chunks: Iterable[Samples]) -> Iterator[Samples]:
+    """Split the sound into chunks of one packet; the last may be shorter."""
+    pending: list[Samples] = []
     size = 0
-    for piece in samples:
-        waiting.append(piece)
-        size += len(piece)
+    for chunk in chunks:
+        pending.append(chunk)
+        size += len(chunk)
         if size >= PACKET_SAMPLES:
-            joined = np.concatenate(waiting)
-            whole = size - size % PACKET_SAMPLES
-            yield from np.split(joined[:whole], whole // PACKET_SAMPLES)
-            waiting, size = [joined[whole:]], size - whole
+            joined = np.concatenate(pending)
+            complete = size - size % PACKET_SAMPLES
+            yield from np.split(joined[:complete], complete // PACKET_SAMPLES)
+            pending, size = [joined[complete:]], size - complete
     if size:
-        yield np.concatenate(waiting)
+        yield np.concatenate(pending)
 
 
 class _OpusEncoder:
-    """One rate: packets of 60 ms, `channels` of them from whatever comes."""
+    """Encoder of one bitrate level, with packets of 60 ms and a mono or stereo mix of the input."""
 
     def __init__(self, kbps: float, channels: int) -> None:
         context: Any = av.CodecContext.create("libopus", "w")
@@ -73,7 +75,7 @@ class _OpusEncoder:
         context.bit_rate = round(kbps * 1000)
         context.options = _ENCODER_OPTIONS
         context.open()
-        # RFC 7845, section 5.1: its identification header
+        # identification header (RFC 7845, section 5.1)
         (self.pre_skip,) = struct.unpack_from("<H", bytes(context.extradata or b""), 10)
         self._context = context
         self._channels = channels
@@ -81,7 +83,7 @@ class _OpusEncoder:
         self._sent_samples = 0
 
     def encode(self, samples: Samples) -> None:
-        """Encode the samples of one packet; of the last there may be fewer."""
+        """Encode the samples of one packet; only the last may have fewer."""
         mixed = samples.mean(axis=1, keepdims=True) if self._channels < samples.shape[1] else samples
         frame = AudioFrame.from_ndarray(
             np.ascontiguousarray(mixed, dtype=np.float32).reshape(1, -1), "flt", _CHANNEL_LAYOUTS[self._channels]
@@ -92,6 +94,6 @@ class _OpusEncoder:
         self._packets += map(bytes, self._context.encode(frame))
 
     def flush(self) -> list[bytes]:
-        """All packets, the last filled up with silence."""
+        """Return all packets, the last one padded with silence."""
         self._packets += map(bytes, self._context.encode(None))
         return self._packets

@@ -1,4 +1,4 @@
-"""What a job does to bring performers together: a motion anew, with those of others beside its own."""
+"""Job that combines the performers of several motions in one."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from bunraku.motion.rotation import Array
 from bunraku.wire.messages import Data
 
 PERFORMER_SPACING_M = 1.6
-"""Metres between the roots of two who dance side by side: an arm of each, and a little."""
+"""Distance between the roots of neighbours, in metres: an arm of each and a margin."""
 MAX_EXTRA_SPACING_M = 2.0
-"""Metres more, at most, that two are given who go towards each other: who walks further meets the other."""
+"""Maximum extra distance for neighbours that move towards each other; beyond it they may meet."""
 POSITION_PERCENTILES = 2.0, 98.0
-"""Percentiles of a dance's places between which it counts as being."""
+"""Percentiles of the root's positions that bound the area of a performer."""
 SAMPLE_INTERVAL_S = 0.1
-"""Seconds between two looks at where they are."""
+"""Interval at which the positions of performers are compared, in seconds."""
 
 
 def combine_performers(
@@ -30,49 +30,49 @@ def combine_performers(
     stored: StoredMotion,
     others: Sequence[StoredMotion],
     placements: Sequence[Placement] | None,
-    progress: Callable[[float], None] = lambda _: None,
+    on_progress: Callable[[float], None] = lambda _: None,
 ) -> JobResult | JobRejection:
-    """The motion `stored` with the performers of `others` beside its own, as the motion of this new id: at `places`,
-    one for each performer, or side by side. `progress` is told the share done, 0..1."""
-    dances = [dance for one in (stored, *others) for dance in one.performers]
+    """Return a copy of `stored` with the new id and the performers of `others` beside its own.
+
+    `placements` has one item per performer; None places them in a row. `on_progress` receives the completed share,
+    0..1.
+    """
+    performers = [performer for motion in (stored, *others) for performer in motion.performers]
     if placements is None:
-        placements = place_side_by_side(dances, progress)
-    if len(placements) != len(dances):
-        return JobRejection(
-            "Invalid request",
-            f"{len(dances)} performers have {len(dances)} places, not {len(placements)}",
-            field="places",
-        )
+        placements = place_side_by_side(performers, on_progress)
+    if len(placements) != len(performers):
+        detail = f"{len(performers)} performers need {len(performers)} places, not {len(placements)}"
+        return JobRejection("Invalid request", detail, field="places")
     try:
-        packed, kinds = add_performers(motion_id, stored, others, placements)
+        packed, track_kinds = add_performers(motion_id, stored, others, placements)
     except ValueError as error:
         return JobRejection("Too many performers", str(error), field="motions")
-    return JobResult(packed, {"tracks": kinds, "performers": len(dances), "made_from": stored.id})
+    return JobResult(packed, {"tracks": track_kinds, "performers": len(performers), "made_from": stored.id})
 
 
 def place_side_by_side(
-    performers: Sequence[PerformerTracks], progress: Callable[[float], None] = lambda _: None
+    performers: Sequence[PerformerTracks], on_progress: Callable[[float], None] = lambda _: None
 ) -> list[Placement]:
-    """Places in a row, all facing z, as near as two may be who go where their dances take them at the same time."""
+    """Return placements in a row, all facing z, as close as simultaneous movements allow."""
     times = np.arange(0.0, max(performers[0].track.duration_us * 1e-6, SAMPLE_INTERVAL_S), SAMPLE_INTERVAL_S)
-    middles: list[Array] = []
-    across: list[Array] = []
-    for nth, dance in enumerate(performers):
-        floor, turn = _root_trajectory(dance), rotation.from_coordinate_axis(1, np.array(-dance.front))
-        turned = rotation.rotate(turn, floor)
-        middle = np.percentile(turned, POSITION_PERCENTILES, axis=0).mean(axis=0)
-        middles.append(rotation.rotate(rotation.conjugate(turn), middle)[[0, 2]])
-        # one that is over stands still
-        frames = np.minimum((times * dance.track.fps).astype(int), len(floor) - 1)
-        across.append(turned[frames, 0] - middle[0])
-        progress((nth + 1) / len(performers))
-    towards = [np.percentile(left - right, POSITION_PERCENTILES[1]) for left, right in pairwise(across)]
-    apart = [PERFORMER_SPACING_M + float(np.clip(nearer, 0.0, MAX_EXTRA_SPACING_M)) for nearer in towards]
-    return place_in_row(middles, apart, [-dance.front for dance in performers])
+    centres: list[Array] = []
+    lateral: list[Array] = []
+    for index, performer in enumerate(performers):
+        roots, turn = _root_trajectory(performer), rotation.from_coordinate_axis(1, np.array(-performer.front))
+        turned = rotation.rotate(turn, roots)
+        centre = np.percentile(turned, POSITION_PERCENTILES, axis=0).mean(axis=0)
+        centres.append(rotation.rotate(rotation.conjugate(turn), centre)[[0, 2]])
+        # a performer whose motion has ended stands still
+        frames = np.minimum((times * performer.track.fps).astype(int), len(roots) - 1)
+        lateral.append(turned[frames, 0] - centre[0])
+        on_progress((index + 1) / len(performers))
+    approaches = [np.percentile(left - right, POSITION_PERCENTILES[1]) for left, right in pairwise(lateral)]
+    distances = [PERFORMER_SPACING_M + float(np.clip(metres, 0.0, MAX_EXTRA_SPACING_M)) for metres in approaches]
+    return place_in_row(centres, distances, [-performer.front for performer in performers])
 
 
 def _root_trajectory(performer: PerformerTracks) -> Array:
-    """Where the root is, (frames, 3) metres, by the blocks of the lowest rate."""
+    """Return the root's positions, (frames, 3) metres, decoded from the lowest bitrate level."""
     return np.concatenate(
         [
             decode_motion_block(performer.track, Data.unpack(packet).block).pose_at(

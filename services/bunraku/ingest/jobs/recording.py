@@ -1,4 +1,4 @@
-"""What a job does to keep a session: its log, replayed over the dance, to an encoded motion of its own."""
+"""Job that records a session: replays its log over the played motion and encodes the result."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from threading import Lock
 
 import numpy as np
 
-from bunraku.codec.container import StoredMotion, pack_motion
+from bunraku.codec.container import PerformerTracks, StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import EncodedMotion, EncodingGrade, encode_motion
 from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
@@ -25,84 +25,92 @@ from bunraku.motion.skeleton import Motion
 def encode_recording(
     motion_id: str,
     request: RecordingRequest,
-    log: bytes,
+    packed_log: bytes,
     motions: dict[str, StoredMotion],
-    progress: Callable[[float], None] = lambda _: None,
+    on_progress: Callable[[float], None] = lambda _: None,
 ) -> JobResult | JobRejection:
-    """Replay `log` as `order` says and encode what was seen as the motion of this id; `dances` are those that the log
-    is over, by id. A session that changed its dance meanwhile is kept from where its last one came on.
+    """Replay a session log as requested and encode what viewers saw.
 
-    `progress` is told the share encoded, 0..1.
+    `motions` are the motions that the session played, by id. If the session changed its motion in the interval, the
+    recording begins at the last change. `on_progress` receives the encoded share, 0..1.
     """
-    replayed = InputLog.unpack(log)
-    showing = SessionReplay(replayed, motions)
-    times = [request.begin + round(number * 1e6 / RECORDING_FPS) for number in range(request.frame_count)]
-    states = [showing.timeline_at(time) for time in times]
-    last = states[-1]
-    if last is None:
-        return JobRejection("Nothing to keep", "no dance was on the stage in this interval", field="seconds")
-    times = times[1 + max((n for n, s in enumerate(states) if s is None or s.motion != last.motion), default=-1) :]
-    if replayed.complete_from_us > times[0]:
-        seconds = max(request.end - replayed.complete_from_us, 0) * 1e-6
+    log = InputLog.unpack(packed_log)
+    session = SessionReplay(log, motions)
+    times = [request.begin + round(frame * 1e6 / RECORDING_FPS) for frame in range(request.frame_count)]
+    states = [session.timeline_at(time) for time in times]
+    last_state = states[-1]
+    if last_state is None:
+        return JobRejection("Nothing to keep", "the session played no motion in this interval", field="seconds")
+    is_other_motion = [state is None or state.motion != last_state.motion for state in states]
+    times = times[1 + max((frame for frame, is_other in enumerate(is_other_motion) if is_other), default=-1) :]
+    if log.complete_from_us > times[0]:
+        seconds = max(request.end - log.complete_from_us, 0) * 1e-6
         return JobRejection(
             "Too long ago",
-            f"limbs were held for so long that only the last {seconds:.0f} s of this session can be kept",
+            f"limbs were controlled for so long that only the last {seconds:.0f} s of this session can be recorded",
             field="seconds",
-            hint="let all limbs go for a moment: from there on it is remembered",
+            hint="release all limbs for a moment: the log is complete from then on",
         )
     try:
-        poses = list(showing.replay_poses(times))
+        # each of these times has a timeline and thus poses
+        poses = [pose for pose in session.replay_poses(times) if pose is not None]
     except (MissingMotion, CorruptInputLog) as error:
         return JobRejection("Cannot be replayed", str(error))
-    dance = motions[last.motion]
-    # every one of these instants has a timeline and its dances
-    shown = [pose for pose in poses if pose is not None]
-    performed = [
-        Motion(one.track.figure, float(RECORDING_FPS), *(np.stack(part) for part in zip(*seen, strict=True)))
-        for one, seen in zip(dance.performers, zip(*shown, strict=True), strict=True)
+    played = motions[last_state.motion]
+    recorded = [
+        Motion(performer.track.figure, float(RECORDING_FPS), *(np.stack(part) for part in zip(*each, strict=True)))
+        for performer, each in zip(played.performers, zip(*poses, strict=True), strict=True)
     ]
-    kept = performed[0]
-    grade: EncodingGrade = "best" if kept.frame_count * len(performed) <= MAX_BEST_GRADE_FRAMES else "live"
-    telling, before = Lock(), 0.0
-
-    def told(share: float) -> None:
-        with telling:
-            progress(before + share / len(performed))
-
     try:
         scenes = (
             [encode_scene(sample_camera(request.camera, times), first_seconds=FIRST_BLOCK_S)] if request.camera else []
         )
     except ValueError as error:
         return JobRejection("Invalid camera", str(error), field="camera")
-    each: list[EncodedMotion] = []
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for one, danced in zip(dance.performers, performed, strict=True):
-            before = len(each) / len(performed)
-            encoded = encode_motion(
-                danced, first_seconds=FIRST_BLOCK_S, grade=grade, on_progress=told, map_levels=pool.map
-            )
-            # the dance's front: a hand that was pulled turns no stage
-            each.append(replace(encoded, front=one.front, placement=one.placement))
-    encoded, *others = each
+    encoded, *others = _encode_performers(played.performers, recorded, on_progress)
+    first = recorded[0]
     return JobResult(
         pack_motion(motion_id, encoded, scenes, others),
         {
-            "duration": kept.duration,
-            "fps": kept.fps,
-            "frames": kept.frame_count,
+            "duration": first.duration,
+            "fps": first.fps,
+            "frames": first.frame_count,
             "blocks": encoded.track.block_count,
-            "tracks": [*(["motion"] * len(each)), *(scene.track.kind for scene in scenes)],
-            **({"performers": len(each)} if others else {}),
+            "tracks": [*(["motion"] * len(recorded)), *(scene.track.kind for scene in scenes)],
+            **({"performers": len(recorded)} if others else {}),
             "rates": encoded.describe()["rates"],
-            "kept_from": dance.id,
+            "kept_from": played.id,
         },
     )
 
 
+def _encode_performers(
+    performers: Sequence[PerformerTracks], motions: Sequence[Motion], on_progress: Callable[[float], None]
+) -> list[EncodedMotion]:
+    frame_count = sum(motion.frame_count for motion in motions)
+    grade: EncodingGrade = "best" if frame_count <= MAX_BEST_GRADE_FRAMES else "live"
+    progress_lock = Lock()
+    encoded: list[EncodedMotion] = []
+
+    def report_progress(share: float) -> None:
+        with progress_lock:
+            on_progress((len(encoded) + share) / len(motions))
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for performer, motion in zip(performers, motions, strict=True):
+            each = encode_motion(
+                motion, first_seconds=FIRST_BLOCK_S, grade=grade, on_progress=report_progress, map_levels=pool.map
+            )
+            # the front of the played motion: control of a hand does not turn the performer
+            encoded.append(replace(each, front=performer.front, placement=performer.placement))
+    return encoded
+
+
 def sample_camera(keyframes: Sequence[KeyframeValues], times: Sequence[int]) -> SceneSamples:
-    """The camera of `keyframes` at clock `times`: linear between two of them, still before the first and after the
-    last. Raises ValueError where it is no camera."""
+    """Sample a camera at clock `times`: linear between keyframes, constant before the first and after the last.
+
+    Raise ValueError for invalid values.
+    """
     keys = np.array(keyframes, dtype=np.float64)
     values = np.stack([np.interp(np.array(times, dtype=np.float64), keys[:, 0], column) for column in keys.T[1:]], 1)
     return SceneSamples("camera", float(RECORDING_FPS), values)

@@ -1,4 +1,4 @@
-"""What a session's stage showed at any clock time: the dances, and what was pulled laid over them as viewers saw it."""
+"""Replay of a session: the poses that viewers saw at any clock time, with overlays of controlled limbs."""
 
 from __future__ import annotations
 
@@ -17,67 +17,73 @@ from bunraku.wire.messages import Data, TimelineState
 from bunraku.wire.overlay import Overlay
 
 OVERLAY_LEAD_US = 100_000
-"""Overlays are made so long before they are due, microseconds: no viewer knows of one sooner."""
+"""Lead time with which overlays are computed before they are due, in microseconds: no viewer gets them earlier."""
 
 
 class MissingMotion(ValueError):
-    """A dance that a session was over and that is no longer in the library."""
+    """A motion that a session played and that has been removed."""
 
 
 class SessionReplay:
-    """The stage of one session, by its log and the dances it was over, by id."""
+    """Stage of one session, from its log and the motions that it played, by id."""
 
     def __init__(self, log: InputLog, motions: Mapping[str, StoredMotion]) -> None:
         self._log = log
         self._states = sorted(log.timelines, key=lambda state: state.epoch)
         self._clocks = [state.clock for state in self._states]
         self._performers_by_motion = {
-            motion: [_PerformerPlayback(dance) for dance in stored.performers] for motion, stored in motions.items()
+            motion: [_PerformerPlayback(performer) for performer in stored.performers]
+            for motion, stored in motions.items()
         }
 
     def timeline_at(self, clock: int) -> TimelineState | None:
-        """The timeline that held at a clock time, None before there was one."""
+        """Return the timeline at a clock time, None before the first."""
         index = bisect_right(self._clocks, clock)
         return self._states[index - 1] if index else None
 
     def motion_poses_at(self, clock: int) -> list[Pose] | None:
-        """The pose of each performer's dance at a clock time, None where there was none; raises `MissingDance`."""
+        """Return each performer's pose in the stored motion, None before the first timeline; raise `MissingMotion`."""
         state = self.timeline_at(clock)
         if state is None:
             return None
         position = position_at(state, clock)
-        # every block is there
-        poses = (dance.pose_at(position, state.loop, state.duration) for dance in self._performers_of(state.motion))
+        poses = (
+            performer.pose_at(position, state.loop, state.duration) for performer in self._performers_of(state.motion)
+        )
+        # never None, as every block is stored
         return [pose for pose in poses if pose is not None]
 
     def replay_poses(self, times: Iterable[int]) -> Iterator[list[Pose] | None]:
-        """What was seen of each performer at clock `times`, ascending: None where there was no dance. Raises
-        `MissingDance`, and `DamagedLog` where the log cannot be replayed."""
-        overlays, following, sequence = OverlayBuffer(), None, 0
-        replayed = None
+        """Yield each performer's pose with overlays at ascending clock `times`, None before the first timeline.
+
+        Raise `MissingMotion`, and `CorruptInputLog` if the log cannot be replayed.
+        """
+        overlays, sequence = OverlayBuffer(), 0
+        replayed, upcoming = None, None
         for clock in times:
             if replayed is None:
                 replayed = self._log.replay(self._figures_of, self._rotations_at, clock - OVERLAY_HOLD_US)
-                following = next(replayed, None)
-            while following is not None and following[0] <= clock + OVERLAY_LEAD_US:
-                due, laid = following
-                overlays.put(Overlay(sequence, due, {limb: pack_joints(joints) for limb, joints in laid.items()}))
+                upcoming = next(replayed, None)
+            while upcoming is not None and upcoming[0] <= clock + OVERLAY_LEAD_US:
+                due, joints_by_limb = upcoming
+                packed = {limb: pack_joints(joints) for limb, joints in joints_by_limb.items()}
+                overlays.put(Overlay(sequence, due, packed))
                 sequence = (sequence + 1) & 0xFFFF
-                following = next(replayed, None)
+                upcoming = next(replayed, None)
             poses = self.motion_poses_at(clock)
             yield (
                 None
                 if poses is None
-                else [(root, overlays.apply(rotations, clock, nth)) for nth, (root, rotations) in enumerate(poses)]
+                else [(root, overlays.apply(rotations, clock, index)) for index, (root, rotations) in enumerate(poses)]
             )
 
     def _performers_of(self, motion: str) -> list[_PerformerPlayback]:
         if motion not in self._performers_by_motion:
-            raise MissingMotion(f"the dance {motion} was removed from the library")
+            raise MissingMotion(f"the motion {motion} was removed from the library")
         return self._performers_by_motion[motion]
 
     def _figures_of(self, motion: str) -> list[Figure]:
-        return [dance.track.figure for dance in self._performers_of(motion)]
+        return [performer.track.figure for performer in self._performers_of(motion)]
 
     def _rotations_at(self, clock: int) -> list[Array] | None:
         poses = self.motion_poses_at(clock)
@@ -85,7 +91,7 @@ class SessionReplay:
 
 
 class _PerformerPlayback:
-    """A dance at its best rate, decoded where it is shown."""
+    """A performer's motion at the highest bitrate level, decoded on demand."""
 
     def __init__(self, performer: PerformerTracks) -> None:
         self.track, self._packets = performer.track, performer.packets[-1]

@@ -1,4 +1,4 @@
-"""What a job does to give a motion a camera and lights: keyframes to tracks beside its others."""
+"""Job that adds a camera and lights to a motion as scene tracks."""
 
 from __future__ import annotations
 
@@ -16,50 +16,55 @@ from bunraku.motion.easing import minimum_jerk
 from bunraku.motion.rotation import Array
 
 SCENE_FPS = 30.0
-"""Frames a second that keyframes are made into; between them a client shows any instant."""
+"""Frame rate at which keyframes are sampled; clients interpolate between frames."""
+
+Keyframes = Sequence[CameraKeyframe] | Sequence[LightKeyframe]
 
 
-def sample_keyframes(
-    kind: SceneKind, keyframes: Sequence[CameraKeyframe] | Sequence[LightKeyframe], duration: int
-) -> SceneSamples:
-    """The scene of keyframes over a motion of `duration` microseconds: still before the first and after the last.
+def sample_keyframes(kind: SceneKind, keyframes: Keyframes, duration_us: int) -> SceneSamples:
+    """Sample keyframes over the duration of a motion, constant before the first and after the last.
 
-    Raises ValueError where it is none.
+    Raise ValueError for invalid values.
     """
-    at = np.array([key.time for key in keyframes], dtype=np.float64)
+    key_times = np.array([key.time for key in keyframes], dtype=np.float64)
     values = np.array([key.scene_values for key in keyframes])
-    smooth = np.array([key.ease == "smooth" for key in keyframes])
-    time = np.arange(max(round(duration * SCENE_FPS / 1e6), 1)) * 1e6 / SCENE_FPS
-    after = np.clip(np.searchsorted(at, time, side="right"), 1, max(len(at) - 1, 1))
-    if len(at) == 1:
-        return SceneSamples(kind, SCENE_FPS, np.tile(values, (len(time), 1)))
-    share: Array = np.clip((time - at[after - 1]) / (at[after] - at[after - 1]), 0.0, 1.0)
-    share = np.where(smooth[after], minimum_jerk(share), share)[:, None]
-    return SceneSamples(kind, SCENE_FPS, values[after - 1] + share * (values[after] - values[after - 1]))
+    is_smooth = np.array([key.ease == "smooth" for key in keyframes])
+    times = np.arange(max(round(duration_us * SCENE_FPS / 1e6), 1)) * 1e6 / SCENE_FPS
+    if len(key_times) == 1:
+        return SceneSamples(kind, SCENE_FPS, np.tile(values, (len(times), 1)))
+    following = np.clip(np.searchsorted(key_times, times, side="right"), 1, len(key_times) - 1)
+    start = key_times[following - 1]
+    share: Array = np.clip((times - start) / (key_times[following] - start), 0.0, 1.0)
+    share = np.where(is_smooth[following], minimum_jerk(share), share)[:, None]
+    return SceneSamples(kind, SCENE_FPS, values[following - 1] + share * (values[following] - values[following - 1]))
 
 
 def add_scene(
-    motion_id: str, stored: StoredMotion, staging: Staging, progress: Callable[[float], None] = lambda _: None
+    motion_id: str, stored: StoredMotion, staging: Staging, on_progress: Callable[[float], None] = lambda _: None
 ) -> JobResult | JobRejection:
-    """The motion `stored` with what is `asked` for, as the motion of this new id. `progress` is told the share encoded,
-    0..1."""
-    duration = stored.first_track.duration_us
-    wanted: list[tuple[SceneKind, Sequence[CameraKeyframe] | Sequence[LightKeyframe]]] = []
+    """Return a copy of `stored` with the new id and the camera and lights of `staging`.
+
+    `on_progress` receives the encoded share, 0..1.
+    """
+    duration_us = stored.first_track.duration_us
+    new_tracks: list[tuple[SceneKind, Keyframes]] = []
+    replaced_kinds: set[str] = set()
     if staging.camera is not None:
-        wanted.append(("camera", staging.camera))
-    wanted += [("light", light) for light in staging.lights or []]
+        new_tracks.append(("camera", staging.camera))
+        replaced_kinds.add("camera")
+    if staging.lights is not None:
+        new_tracks += [("light", light) for light in staging.lights]
+        replaced_kinds.add("light")
     scenes = []
-    progress(0.0)
-    for nth, (kind, keyframes) in enumerate(wanted):
+    on_progress(0.0)
+    for index, (kind, keyframes) in enumerate(new_tracks):
         try:
-            scenes.append(encode_scene(sample_keyframes(kind, keyframes, duration), first_seconds=FIRST_BLOCK_S))
+            scenes.append(encode_scene(sample_keyframes(kind, keyframes, duration_us), first_seconds=FIRST_BLOCK_S))
         except ValueError as error:
             return JobRejection(f"No {kind}", str(error), field=kind)
-        progress((nth + 1) / len(wanted))
-    replaced: set[str] = {"camera"} if staging.camera is not None else set()
-    replaced |= {"light"} if staging.lights is not None else set()
+        on_progress((index + 1) / len(new_tracks))
     try:
-        packed, kinds = replace_scene_tracks(motion_id, stored, scenes, replaced)
+        packed, track_kinds = replace_scene_tracks(motion_id, stored, scenes, replaced_kinds)
     except ValueError as error:
         return JobRejection("Too many tracks", str(error), field="lights")
-    return JobResult(packed, {"tracks": kinds, "made_from": stored.id})
+    return JobResult(packed, {"tracks": track_kinds, "made_from": stored.id})

@@ -1,4 +1,4 @@
-"""What Alembic runs to migrate: on the connection that `bunraku.storage.migration` gives, in its transaction."""
+"""Alembic environment: migrate on the connection and in the transaction of `bunraku.storage.migration`."""
 
 from alembic import context
 

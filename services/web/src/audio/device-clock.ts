@@ -1,35 +1,38 @@
 /**
- * Which frame of the audio device is heard at an instant of the page's clock. The device tells of it now and then, a little wrong
- * each time: the median of the last tellings counts, and what is told by it never steps. Pure; times are milliseconds.
+ * Relation between the audio device's frames and the page's clock. The device reports its time occasionally and with
+ * small errors: the median of the last samples is used, and the derived time never steps. Pure; times in milliseconds.
  */
 
 import { Slew } from "../playout/slew";
 import { FRAMES_PER_SECOND } from "./speaker";
 
 const MAX_SAMPLES = 7;
-/** A telling this soon after another says nothing new. */
+/** Samples this soon after another carry no new information, in milliseconds. */
 const MIN_SAMPLE_INTERVAL_MS = 12;
-/** Time constant with which a device that stood still is followed, microseconds. */
+/** Time constant with which a device that paused is followed, in microseconds. */
 const SLEW_TIME_CONSTANT_US = 50e3;
 const FRAMES_PER_MS = FRAMES_PER_SECOND / 1000;
 
 export class DeviceClock {
   private readonly offsets: number[] = [];
   private lastSampleMs = -Infinity;
-  /** The page's clock minus the device's, microseconds. */
+  /** Page clock minus device clock, in microseconds. */
   private readonly offset = new Slew(SLEW_TIME_CONSTANT_US);
 
-  /** Whether the device has told of anything yet. */
+  /** True if there is a sample. */
   get hasSample(): boolean {
     return this.offsets.length > 0;
   }
 
-  /** Whether what the device would tell at `nowMs` counts: to ask it takes time. */
+  /** Return whether a sample at `nowMs` would be used: querying the device takes time. */
   isSampleDue(nowMs: number): boolean {
     return nowMs - this.lastSampleMs >= MIN_SAMPLE_INTERVAL_MS;
   }
 
-  /** At `pageMs` of the page's clock the device puts out what is at `contextSeconds` of its own; told at `nowMs`. */
+  /**
+   * Add a sample taken at `nowMs`: at `pageMs` of the page's clock the device plays the frame at `contextSeconds` of
+   * its own.
+   */
   addSample(contextSeconds: number, pageMs: number, nowMs: number): void {
     if (!this.isSampleDue(nowMs)) return;
     this.lastSampleMs = nowMs;
@@ -42,17 +45,17 @@ export class DeviceClock {
     else this.offset.slewTo(median, nowMs * 1000);
   }
 
-  /** The frame that is heard at `nowMs`, any real. */
+  /** Return the frame that is heard at `nowMs`, fractional. */
   frameAt(nowMs: number): number {
     return (nowMs - this.offset.at(nowMs * 1000) / 1000) * FRAMES_PER_MS;
   }
 
-  /** When frame `frame` is heard, by what is known at `nowMs`. */
+  /** Return the time at which a frame is heard, from the samples up to `nowMs`, in milliseconds. */
   timeOfFrame(frame: number, nowMs: number): number {
     return frame / FRAMES_PER_MS + this.offset.at(nowMs * 1000) / 1000;
   }
 
-  /** The device was stopped: what it told says nothing about later. */
+  /** Remove all samples after the device was suspended. */
   clear(): void {
     this.offsets.length = 0;
     this.lastSampleMs = -Infinity;

@@ -1,40 +1,40 @@
-/** The sound of the packets about the play position, decoded as they are wanted (`proto/SPEC.md`, Audio block, Decoding). */
+/** Cache of decoded packets around the play position, decoded on demand (`proto/SPEC.md`, Audio block, Decoding). */
 
 import { PACKET_SAMPLES } from "../codec/audio";
 import type { DecoderFactory, PacketDecoder } from "./packet-decoder";
 
-/** Packets that are kept decoded: some eight seconds, 3 MB in stereo. */
+/** Maximum number of decoded packets: about 8 s, 3 MB in stereo. */
 const MAX_CACHED_PACKETS = 128;
 
-/** So many packets before the first are decoded and not played, so that the decoder knows what went before. */
+/** Packets decoded before the first one and discarded, to bring the decoder into the right state. */
 const WARM_UP_PACKETS = 2;
 
 export type ChannelPlanes = readonly Float32Array<ArrayBuffer>[];
 
 export class DecodedPacketCache {
-  /** By packet, the oldest first; null where one could not be decoded. */
+  /** By packet number, the oldest first; null if a packet could not be decoded. */
   private readonly packets = new Map<number, ChannelPlanes | null>();
-  /** Packets on their way, and through which decoder. */
+  /** Packets being decoded, and by which decoder. */
   private readonly pending = new Map<number, PacketDecoder>();
   private decoder: PacketDecoder | null = null;
-  /** The packet that would follow in the decoder. */
+  /** Number of the packet that would follow in the decoder. */
   private next = -1;
 
   /**
-   * @param createPacketDecoder makes a decoder
-   * @param packet the bytes of a packet, null where they are not here
+   * @param createPacketDecoder creates a decoder
+   * @param packet returns the bytes of a packet, or null if they have not arrived
    */
   constructor(
     private readonly createPacketDecoder: DecoderFactory,
     private readonly packet: (number: number) => Uint8Array | null,
   ) {}
 
-  /** What packet `number` sounds like, a plane of `PACKET` samples for each channel; null where it is not decoded. */
+  /** Return the samples of a packet, `PACKET_SAMPLES` per channel; null if it is not decoded. */
   get(number: number): ChannelPlanes | null {
     return this.packets.get(number) ?? null;
   }
 
-  /** Decodes these packets, in the order in which they will be heard, as far as they are here. */
+  /** Decode these packets, in the order in which they will be heard, as far as they have arrived. */
   decode(numbers: Iterable<number>): void {
     for (const number of numbers) {
       const bytes = this.packet(number);
@@ -46,34 +46,33 @@ export class DecodedPacketCache {
     }
   }
 
-  /** Ends decoding. */
   close(): void {
     this.decoder?.close();
     this.decoder = null;
   }
 
-  /** A decoder made anew, to go on with packet `first`. What the one before still decodes is kept. */
+  /** Create a decoder that continues with packet `first`. Packets that the last one is still decoding are kept. */
   private createDecoder(first: number): PacketDecoder {
     this.decoder?.close();
-    const before: [number, Uint8Array][] = [];
+    const warmUp: [number, Uint8Array][] = [];
     for (let number = Math.max(first - WARM_UP_PACKETS, 0); number < first; number++) {
       const bytes = this.packets.get(number) === null ? null : this.packet(number);
-      if (bytes) before.push([number, bytes]);
+      if (bytes) warmUp.push([number, bytes]);
     }
-    const knows = before.length === Math.min(WARM_UP_PACKETS, first);
+    const isWarmedUp = warmUp.length === Math.min(WARM_UP_PACKETS, first);
     const decoder = this.createPacketDecoder((number, planes) => {
       if (!planes) this.discardPending(decoder);
       else if (number < first) return;
       this.pending.delete(number);
-      this.store(number, number === first && !knows && planes ? planes.map(fadeIn) : planes);
+      this.store(number, number === first && !isWarmedUp && planes ? planes.map(fadeIn) : planes);
     });
-    if (knows) for (const [number, bytes] of before) decoder.decode(number, bytes);
+    if (isWarmedUp) for (const [number, bytes] of warmUp) decoder.decode(number, bytes);
     return decoder;
   }
 
-  /** A decoder came upon what it cannot decode: it may be done for, and what else it was given is decoded by another. */
+  /** Handle a decoding error: the decoder may be unusable, so another one decodes its remaining packets. */
   private discardPending(decoder: PacketDecoder): void {
-    for (const [number, by] of this.pending) if (by === decoder) this.pending.delete(number);
+    for (const [number, owner] of this.pending) if (owner === decoder) this.pending.delete(number);
     if (decoder === this.decoder) this.next = -1;
   }
 

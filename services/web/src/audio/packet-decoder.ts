@@ -1,23 +1,17 @@
-/** What turns Opus packets into sound, whichever it is in this browser. */
+/** Interface of the Opus decoders. */
 
 /**
- * What packet `number` sounds like, `PACKET` samples for each channel; null where it cannot be decoded. After that a decoder may
- * be done for, and nothing more come out of it.
+ * Receives the samples of packet `number`, `PACKET_SAMPLES` per channel; null if it cannot be decoded. After an error a
+ * decoder may be unusable and emit nothing more.
  */
 export type PacketHandler = (number: number, channels: Float32Array<ArrayBuffer>[] | null) => void;
 
 export interface PacketDecoder {
-  /** Decodes a packet, which follows the one before. */
+  /** Decode the packet that follows the last one. */
   decode(number: number, packet: Uint8Array): void;
-  /** No more will follow; what was given comes out still. */
+  /** End the input; packets already passed are still emitted. */
   close(): void;
 }
 
-/** Makes a decoder anew, that knows of no packet before. */
+/** Creates a decoder without state. */
 export type DecoderFactory = (emit: PacketHandler) => PacketDecoder;
-
-/** The decoder of this browser for `channels` (1 or 2): its own if it can Opus, else one that is fetched. */
-export async function findDecoder(channels: number): Promise<DecoderFactory> {
-  const { findWebCodecsDecoder: webCodecsDecoder } = await import("./webcodecs-decoder");
-  return (await webCodecsDecoder(channels)) ?? (await import("./wasm-decoder")).createWasmDecoder(channels);
-}

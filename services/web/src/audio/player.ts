@@ -1,4 +1,4 @@
-/** Puts the sound of a motion out, in step with the stage, and tells at which stage time it is heard. */
+/** Plays the sound of a motion in sync with the stage, and reports the stage time that is heard. */
 
 import type { AudioBlockStore } from "../playout/audio-store";
 import type { LeaderTime } from "../playout/presentation-clock";
@@ -11,28 +11,31 @@ import { renderSlot, requiredPackets, type SlotBoundary, silentBoundary } from "
 import { Schedule, SLOT_FRAMES, SLOT_US, SLOTS_PER_SECOND, type Slot, stageTimeAtEnd } from "./schedule";
 import { FRAMES_PER_SECOND } from "./speaker";
 
-/** How often it is seen to, milliseconds. */
+/** Interval of the scheduling, in milliseconds. */
 const PUMP_INTERVAL_MS = 50;
-/** Seconds that are put out ahead, so that nothing is heard of a page that is busy, or hidden and called once a second. */
+/**
+ * Sound is scheduled this far ahead, in seconds, so that it continues while the page is busy, or is in the background
+ * and called once per second.
+ */
 const LEAD_TIME_S = 1.5;
-/** Further ahead than this a slot waits for its packets, seconds; nearer it is silent where they are missing. */
+/** Lead time in seconds above which a slot waits for missing packets; below it they are silent. */
 const MAX_WAIT_LEAD_S = 0.12;
-/** Nearer than this nothing is put out any more, seconds. */
+/** Minimum lead time of a slot, in seconds. */
 const MIN_LEAD_S = 0.03;
-/** Seconds for which what was put out is remembered: no device is later with it. */
+/** Time for which played slots are remembered, in seconds: no device has more latency. */
 const HISTORY_S = 3;
-/** Microseconds that make no difference between two places. */
+/** Tolerance in comparing positions, in microseconds. */
 const POSITION_TOLERANCE_US = 10;
-/** Time constant with which a sound is cut, seconds. */
+/** Time constant of a cut, in seconds. */
 const FADE_TIME_CONSTANT_S = 0.003;
 
-/** What is played, and by which clock. */
+/** Source of the sound, and its clock. */
 export interface PlaybackSource {
   readonly store: AudioBlockStore;
   readonly timelines: TimelineHistory;
-  /** Whether the stage time is known well enough to begin by. */
+  /** True if the stage time is known well enough to start. */
   isClockSettled(): boolean;
-  /** The stage time that would be shown without sound at local `nowMs`, microseconds. */
+  /** Return the stage time that the viewer would show without sound at local `nowMs`, in microseconds. */
   viewerTime(nowMs: number): number;
 }
 
@@ -41,50 +44,50 @@ export class AudioPlayer {
   private readonly deviceClock = new DeviceClock();
   private readonly packetCache: DecodedPacketCache;
   private readonly timer: ReturnType<typeof setInterval>;
-  /** What was put out and may have to be taken back, by slot. */
+  /** Scheduled sources that may have to be cancelled, by slot. */
   private readonly sources = new Map<number, AudioBufferSourceNode>();
-  /** What was put out, by slot: where in the motion it is, and how the sound stands at its end. */
+  /** Scheduled slots: their spans of the motion, and the state of the sound at their end. */
   private readonly renderedSlots = new Map<
     number,
-    { spans: readonly TimelineSpan[]; joint: SlotBoundary; silent: boolean }
+    { spans: readonly TimelineSpan[]; boundary: SlotBoundary; isSilent: boolean }
   >();
   private bus: GainNode;
-  /** The slot to be put out next, -1 where any may be. */
+  /** Next slot to schedule, -1 if any. */
   private nextSlot = -1;
 
   /**
-   * @param context runs at `FRAMES_A_SECOND`
-   * @param output what it is put out through
+   * @param context runs at `FRAMES_PER_SECOND`
+   * @param output destination of the sound
    */
   constructor(
     private readonly context: AudioContext,
     private readonly output: AudioNode,
     private readonly playback: PlaybackSource,
-    make: DecoderFactory,
+    createPacketDecoder: DecoderFactory,
     private readonly now: () => number = () => performance.now(),
   ) {
-    this.packetCache = new DecodedPacketCache(make, (number) => playback.store.packet(number));
+    this.packetCache = new DecodedPacketCache(createPacketDecoder, (number) => playback.store.packet(number));
     this.bus = this.createBus();
     this.timer = setInterval(() => this.scheduleSlots(), PUMP_INTERVAL_MS);
   }
 
-  /** The stage time that is heard at `nowMs`; null while nothing is put out. */
+  /** Return the stage time that is heard at `nowMs`; null while nothing is playing. */
   leadAt(nowMs: number): LeaderTime | null {
     if (this.context.state !== "running") return null;
     this.sampleDeviceClock();
     return this.deviceClock.hasSample ? this.schedule.stageAt(this.deviceClock.frameAt(nowMs)) : null;
   }
 
-  /** Puts out what has come, as far ahead as is needed. */
+  /** Schedule all slots that can be played, up to the lead time. */
   scheduleSlots(): void {
-    const { context, deviceClock: heard, schedule } = this;
+    const { context, deviceClock, schedule } = this;
     if (context.state !== "running") {
       this.clear();
       return;
     }
     this.sampleDeviceClock();
-    if (!heard.hasSample || (!schedule.last && !this.playback.isClockSettled())) return;
-    // what comes too late for its slot is passed over
+    if (!deviceClock.hasSample || (!schedule.last && !this.playback.isClockSettled())) return;
+    // Skip slots that are too late.
     this.nextSlot = Math.max(this.nextSlot, Math.ceil((context.currentTime + MIN_LEAD_S) * SLOTS_PER_SECOND));
     const end = Math.floor((context.currentTime + LEAD_TIME_S) * SLOTS_PER_SECOND);
     this.decodeUntil(end);
@@ -94,35 +97,34 @@ export class AudioPlayer {
     for (const index of this.renderedSlots.keys()) if (index < past) this.renderedSlots.delete(index);
   }
 
-  /** The timeline changed: what was put out for later and is elsewhere in the motion now is taken back. */
+  /** Cancel and reschedule the slots whose position in the motion has changed with the timeline. */
   retime(): void {
-    const { context, schedule, playback: played, sources, renderedSlots: done } = this;
-    const heard = this.deviceClock.hasSample ? Math.floor(this.deviceClock.frameAt(this.now()) / SLOT_FRAMES) : 0;
-    const stale = [...done].find(
-      ([index, { spans }]) => index >= heard && !equalSpans(spans, this.spansOf(schedule.slot(index))),
+    const { context, schedule, playback, sources, renderedSlots } = this;
+    const heardSlot = this.deviceClock.hasSample ? Math.floor(this.deviceClock.frameAt(this.now()) / SLOT_FRAMES) : 0;
+    const stale = [...renderedSlots].find(
+      ([index, { spans }]) => index >= heardSlot && !equalSpans(spans, this.spansOf(schedule.slot(index))),
     )?.[0];
     if (stale === undefined) return;
-    const soonest = Math.floor((context.currentTime + MIN_LEAD_S / 2) * SLOTS_PER_SECOND) + 1;
-    const from = Math.max(stale, soonest);
+    const earliest = Math.floor((context.currentTime + MIN_LEAD_S / 2) * SLOTS_PER_SECOND) + 1;
+    const from = Math.max(stale, earliest);
     for (const [index, source] of sources) if (index >= from) source.stop();
-    for (const index of done.keys()) if (index >= from) done.delete(index);
+    for (const index of renderedSlots.keys()) if (index >= from) renderedSlots.delete(index);
     if (stale < from) {
-      // it has begun already: it is cut off in the middle, and what follows begins from silence
+      // The slot is already playing: fade it out at the change; what follows starts from silence.
       const slot = schedule.slot(stale)!;
-      const into = (played.timelines.newest!.clock - slot.stageTime) / slot.speed / 1e6;
+      const offset = (playback.timelines.newest!.clock - slot.stageTime) / slot.speed / 1e6;
       this.bus.gain.setTargetAtTime(
         0,
-        Math.max(slot.index / SLOTS_PER_SECOND + into, context.currentTime),
+        Math.max(slot.index / SLOTS_PER_SECOND + offset, context.currentTime),
         FADE_TIME_CONSTANT_S,
       );
       this.bus = this.createBus();
-      done.delete(from - 1);
+      renderedSlots.delete(from - 1);
     }
     this.nextSlot = Math.min(this.nextSlot, from);
     this.scheduleSlots();
   }
 
-  /** Ends it. */
   close(): void {
     clearInterval(this.timer);
     this.clear();
@@ -130,7 +132,7 @@ export class AudioPlayer {
     this.bus.disconnect();
   }
 
-  /** Asks the device what it puts out now. */
+  /** Sample the device's clock. */
   private sampleDeviceClock(): void {
     const now = this.now();
     if (!this.deviceClock.isSampleDue(now)) return;
@@ -138,7 +140,7 @@ export class AudioPlayer {
     if (contextTime > 0 && performanceTime > 0) this.deviceClock.addSample(contextTime, performanceTime, now);
   }
 
-  /** Forgets all that was put out for later, as the device stands still. */
+  /** Cancel everything that is scheduled, since the device is suspended. */
   private clear(): void {
     for (const source of this.sources.values()) source.stop();
     this.renderedSlots.clear();
@@ -157,37 +159,39 @@ export class AudioPlayer {
     return slot ? spansBetween(this.playback.timelines, slot.stageTime, stageTimeAtEnd(slot)) : [];
   }
 
-  /** The stage time that the viewer's own clock will show when slot `index` is first heard. */
+  /** Return the stage time that the viewer's clock will show when slot `index` is first heard, in microseconds. */
   private viewerTimeAtSlot(index: number): number {
     return this.playback.viewerTime(this.deviceClock.timeOfFrame(index * SLOT_FRAMES, this.now()));
   }
 
-  /** Decodes what the slots from the next one up to `end` will need. */
+  /** Decode what the slots from the next one up to `end` need. */
   private decodeUntil(end: number): void {
-    const { playback: played, schedule, nextSlot: next } = this;
-    const before = schedule.slot(next - 1);
-    const from = schedule.slot(next)?.stageTime ?? (before ? stageTimeAtEnd(before) : this.viewerTimeAtSlot(next));
-    const spans = spansBetween(played.timelines, from, from + (end - next + 1) * SLOT_US);
-    this.packetCache.decode(requiredPackets(played.store.track, spans));
+    const { playback, schedule, nextSlot: next } = this;
+    const previous = schedule.slot(next - 1);
+    const from = schedule.slot(next)?.stageTime ?? (previous ? stageTimeAtEnd(previous) : this.viewerTimeAtSlot(next));
+    const spans = spansBetween(playback.timelines, from, from + (end - next + 1) * SLOT_US);
+    this.packetCache.decode(requiredPackets(playback.store.track, spans));
   }
 
-  /** Puts slot `index` out; false where it can wait for packets that are not decoded yet. */
+  /** Schedule slot `index`. Return false if it can wait for packets that are not decoded yet. */
   private playSlot(index: number): boolean {
-    const { context, playback: played, schedule, packetCache: decoded } = this;
-    const { track } = played.store;
-    const before = this.renderedSlots.get(index - 1) ?? { joint: silentBoundary(track.channels), silent: true };
-    const slot = schedule.slot(index) ?? schedule.add(index, this.viewerTimeAtSlot(index), before.silent);
+    const { context, playback, schedule, packetCache } = this;
+    const { track } = playback.store;
+    const previous = this.renderedSlots.get(index - 1) ?? { boundary: silentBoundary(track.channels), isSilent: true };
+    const slot = schedule.slot(index) ?? schedule.add(index, this.viewerTimeAtSlot(index), previous.isSilent);
     const spans = this.spansOf(slot);
     const begin = index / SLOTS_PER_SECOND;
-    const complete = requiredPackets(track, spans).every((number) => decoded.get(number));
-    if (!complete && begin - context.currentTime > MAX_WAIT_LEAD_S) return false;
-    const {
-      planes,
-      isSilent: silent,
-      boundary: joint,
-    } = renderSlot(track, (number) => decoded.get(number), slot, spans, before.joint);
-    this.renderedSlots.set(index, { spans, joint, silent });
-    if (silent) return true;
+    const isComplete = requiredPackets(track, spans).every((number) => packetCache.get(number));
+    if (!isComplete && begin - context.currentTime > MAX_WAIT_LEAD_S) return false;
+    const { planes, isSilent, boundary } = renderSlot(
+      track,
+      (number) => packetCache.get(number),
+      slot,
+      spans,
+      previous.boundary,
+    );
+    this.renderedSlots.set(index, { spans, boundary, isSilent });
+    if (isSilent) return true;
     const buffer = context.createBuffer(planes.length, SLOT_FRAMES, FRAMES_PER_SECOND);
     planes.forEach((plane, channel) => buffer.copyToChannel(plane, channel));
     const source = context.createBufferSource();
@@ -203,7 +207,7 @@ export class AudioPlayer {
   }
 }
 
-/** Whether spans of the same slot are the same pieces of the motion. */
+/** Return whether spans of the same slot are the same parts of the motion. */
 function equalSpans(some: readonly TimelineSpan[], others: readonly TimelineSpan[]): boolean {
   return (
     some.length === others.length &&

@@ -1,12 +1,12 @@
-/** Samples between samples: a sinc of 16 taps under a Kaiser window (Smith, Digital Audio Resampling, CCRMA). Pure. */
+/** Fractional resampling: a 16-tap sinc under a Kaiser window (Smith, Digital Audio Resampling, CCRMA). Pure. */
 
-/** Samples that are needed before and after the place that is asked for. */
+/** Samples needed before and after a position. */
 export const HALF_TAPS = 8;
 const TAPS = 2 * HALF_TAPS;
 const PHASES = 256;
 const KAISER_BETA = 8;
 
-/** Modified Bessel function of the first kind, order 0. */
+/** Return the modified Bessel function of the first kind, order 0. */
 function besselI0(x: number): number {
   let sum = 1;
   for (let k = 1, term = 1; term > sum * 1e-12; k++) {
@@ -16,7 +16,7 @@ function besselI0(x: number): number {
   return sum;
 }
 
-/** Weights [phase 0..PHASES][tap], of each phase with a sum of one. */
+/** Weights [phase 0..PHASES][tap]; the weights of each phase sum to one. */
 const kernel = Float64Array.from({ length: (PHASES + 1) * TAPS });
 for (let phase = 0; phase <= PHASES; phase++) {
   const row = kernel.subarray(phase * TAPS, (phase + 1) * TAPS);
@@ -30,8 +30,8 @@ for (let phase = 0; phase <= PHASES; phase++) {
 }
 
 /**
- * Writes `out[first..end)`: what `samples` are at the places `at`, `at + speed`, ... A place counts from `samples[HALF - 1]`, so
- * that the samples before and after are there: `samples` has `HALF - 1` before place 0 and `HALF` beyond the last place.
+ * Write `out[first..end)`: the samples at the positions `at`, `at + speed`, ... Position 0 is `samples[HALF_TAPS - 1]`,
+ * so that `samples` has `HALF_TAPS - 1` samples before it, and must have `HALF_TAPS` after the last position.
  */
 export function resample(
   samples: Float32Array,
@@ -42,11 +42,11 @@ export function resample(
   end: number,
 ): void {
   for (let frame = first; frame < end; frame++) {
-    const place = at + (frame - first) * speed;
-    const whole = Math.floor(place);
-    const phase = (place - whole) * PHASES;
+    const position = at + (frame - first) * speed;
+    const wholeSample = Math.floor(position);
+    const phase = (position - wholeSample) * PHASES;
     if (phase === 0) {
-      out[frame] = samples[whole + HALF_TAPS - 1];
+      out[frame] = samples[wholeSample + HALF_TAPS - 1];
       continue;
     }
     const row = Math.floor(phase);
@@ -54,7 +54,7 @@ export function resample(
     let low = 0,
       high = 0;
     for (let tap = 0, weight = row * TAPS; tap < TAPS; tap++, weight++) {
-      const sample = samples[whole + tap];
+      const sample = samples[wholeSample + tap];
       low += sample * kernel[weight];
       high += sample * kernel[weight + TAPS];
     }

@@ -1,3 +1,3 @@
-/** What decodes and plays, in one piece, fetched when a motion with sound is to be heard. */
-export { findDecoder } from "./packet-decoder";
+/** Decoding and playback in one chunk, loaded when a motion with sound is to be heard. */
+export { findDecoder } from "./decoder-selection";
 export { AudioPlayer } from "./player";

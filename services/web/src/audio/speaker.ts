@@ -1,26 +1,26 @@
-/** One audio device: how loud, and whether it may be heard yet. */
+/** The audio device: volume and autoplay state. */
 
 export const FRAMES_PER_SECOND = 48_000;
 
-/** Time constant of changes of loudness, seconds. */
+/** Time constant of volume changes, in seconds. */
 const VOLUME_TIME_CONSTANT_S = 0.015;
 
 export class Speaker {
   readonly context = new AudioContext({ sampleRate: FRAMES_PER_SECOND, latencyHint: "interactive" });
   readonly output: GainNode = this.context.createGain();
 
-  /** `changed` is told when it begins or ends to be heard. */
-  constructor(changed: () => void) {
+  /** `onChange` is called when playback becomes possible or impossible. */
+  constructor(onChange: () => void) {
     this.output.gain.value = 0;
     this.output.connect(this.context.destination);
-    this.context.addEventListener("statechange", changed);
+    this.context.addEventListener("statechange", onChange);
   }
 
   get heard(): boolean {
     return this.context.state === "running";
   }
 
-  /** Is heard from now on, where the browser lets it: most want a gesture of the person before. */
+  /** Start playback if the browser allows it: most require a user gesture first. */
   resume(): void {
     void this.context.resume();
   }
@@ -29,12 +29,12 @@ export class Speaker {
     void this.context.suspend();
   }
 
-  /** Gives the device back, for good. */
+  /** Close the device permanently. */
   close(): void {
     void this.context.close();
   }
 
-  /** How loud, 0 to 1 as it is heard; loudness goes with about the square root of the amplitude. */
+  /** Perceived volume, 0 to 1; loudness is about the square root of the amplitude. */
   set volume(volume: number) {
     this.output.gain.setTargetAtTime(volume ** 2, this.context.currentTime, VOLUME_TIME_CONSTANT_S);
   }

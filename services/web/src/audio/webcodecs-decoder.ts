@@ -1,20 +1,20 @@
-/** Opus by the browser's own decoder (W3C WebCodecs, and its registration of Opus). */
+/** Opus decoding by the browser (W3C WebCodecs and its Opus registration). */
 
 import { SAMPLE_RATE } from "../codec/audio";
 import type { DecoderFactory } from "./packet-decoder";
 
-/** Microseconds of a packet. */
+/** Duration of a packet, in microseconds. */
 const PACKET_US = 60_000;
 
-/** What makes decoders for `channels` (1 or 2), null where this browser cannot. */
+/** Return a factory of decoders for `channels` (1 or 2), or null if the browser has none. */
 export async function findWebCodecsDecoder(channels: number): Promise<DecoderFactory | null> {
   if (typeof AudioDecoder === "undefined") return null;
-  // without the head of an Ogg file, so nothing is cut off at the beginning
+  // Without the header of an Ogg file, so that no pre-skip is cut off.
   const config: AudioDecoderConfig = { codec: "opus", sampleRate: SAMPLE_RATE, numberOfChannels: channels };
-  const able = await AudioDecoder.isConfigSupported(config).catch(() => null);
-  if (!able?.supported) return null;
+  const support = await AudioDecoder.isConfigSupported(config).catch(() => null);
+  if (!support?.supported) return null;
   return (emit) => {
-    const waiting = new Set<number>();
+    const pending = new Set<number>();
     const decoder = new AudioDecoder({
       output(data) {
         const number = Math.round(data.timestamp / PACKET_US);
@@ -24,13 +24,13 @@ export async function findWebCodecsDecoder(channels: number): Promise<DecoderFac
           return plane;
         });
         data.close();
-        waiting.delete(number);
+        pending.delete(number);
         emit(number, planes);
       },
-      // it is closed by that: nothing more comes out
+      // The error closes the decoder: it emits nothing more.
       error(error) {
-        console.warn(`sound could not be decoded: ${error.message}`);
-        const [first] = waiting;
+        console.warn(`The browser could not decode the sound: ${error.message}`);
+        const [first] = pending;
         if (first !== undefined) emit(first, null);
       },
     });
@@ -41,8 +41,8 @@ export async function findWebCodecsDecoder(channels: number): Promise<DecoderFac
           emit(number, null);
           return;
         }
-        waiting.add(number);
-        // Opus has no packets that need another: where decoding starts is for the caller to say
+        pending.add(number);
+        // Opus packets have no key frames: the caller chooses where decoding starts.
         decoder.decode(
           new EncodedAudioChunk({ type: "key", timestamp: number * PACKET_US, duration: PACKET_US, data: packet }),
         );

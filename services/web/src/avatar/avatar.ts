@@ -1,8 +1,9 @@
 /**
- * A person's own figure in the puppet's place. Its limbs point where the dancer's of the stream point, whatever pose its file
- * rests in: bone by bone the direction at rest is laid on the dancer's, and the stream's turns are told in the file's own axes.
- * It is as large as the dancer by the lengths of trunk and limbs; its way over the floor is scaled by the ratio of the hips'
- * heights, and its lowest foot is as high as the dancer's, so that feet neither slide nor sink.
+ * A user's own figure in the puppet's place. Its limbs point in the same directions as the streamed figure's, whatever
+ * pose its file rests in: the rest direction of each bone is aligned with the figure's, and streamed rotations are
+ * converted to the file's axes. Its size follows the lengths of trunk and limbs; its path over the floor is scaled by
+ * the ratio of the hips' heights, and its lowest foot is at the height of the figure's, so that feet neither slide nor
+ * sink.
  */
 import { Group, Matrix4, type Object3D, Quaternion, Vector3 } from "three";
 import { BONES, createHumanoidPose, toHumanoid, tPoseFigure } from "../motion/humanoid";
@@ -14,7 +15,7 @@ import { SimpleMaterials } from "./materials";
 import type { AvatarModel } from "./model";
 import { drivenParent } from "./rest-pose";
 
-/** The bone whose place says where one points at rest; the others stay as the file has them. */
+/** Bone whose position gives the rest direction of another; other bones keep the file's orientation. */
 const NEXT_BONE: Readonly<Record<string, string>> = Object.fromEntries(
   ["left", "right"].flatMap((side) => [
     [`${side}UpperArm`, `${side}LowerArm`],
@@ -24,19 +25,19 @@ const NEXT_BONE: Readonly<Record<string, string>> = Object.fromEntries(
     [`${side}LowerLeg`, `${side}Foot`],
   ]),
 );
-/** Of a hand's length from the wrist, where it is held. */
+/** Position of the handle on the hand, as a share of its length from the wrist. */
 const PALM_SHARE = 0.4;
-/** Of the forearm, as long as a hand is whose mesh does not tell. */
+/** Length of a hand whose mesh does not show it, as a share of the forearm. */
 const DEFAULT_HAND_SHARE = 0.65;
-/** The limbs' bones: shoulder or hip, elbow or knee, wrist or ankle; and the joint of the contract that carries the handle. */
+/** Bones of the limbs: shoulder or hip, elbow or knee, wrist or ankle. */
 const LIMB_BONES = ["left", "right"]
   .map((side) => [`${side}UpperArm`, `${side}LowerArm`, `${side}Hand`])
   .concat(["left", "right"].map((side) => [`${side}UpperLeg`, `${side}LowerLeg`, `${side}Foot`]));
 
-/** How a node is turned: first its own rest, then the stream's turn, then into the frame it hangs in. */
+/** Rotation of a node: its own rest, then the streamed rotation, then into its parent's frame. */
 interface BoneDrive {
   node: Object3D;
-  /** Of the rotations of the humanoid pose. */
+  /** Offset into the rotations of the humanoid pose. */
   rotationOffset: number;
   preRotation: Quaternion;
   postRotation: Quaternion;
@@ -54,10 +55,10 @@ export class Avatar implements Performer {
   readonly #streamedWorld = createWorldTransforms();
   readonly #joints: ReadonlyMap<string, Matrix4>;
   readonly #ankleHeight: number;
-  /** Height of this one's hips to the dancer's. */
+  /** Ratio of the avatar's hip height to the figure's. */
   readonly #rootScale: number;
-  /** Where each limb is held: a node and the place in its frame; and the dancer's metres for a metre of this one's. */
-  readonly #handles: readonly { node: Object3D; at: Vector3; told: number }[];
+  /** Handle of each limb: a node, a position in its frame, and the figure's metres per metre of the avatar. */
+  readonly #handles: readonly { node: Object3D; at: Vector3; distanceScale: number }[];
 
   constructor(model: AvatarModel, figure: Figure) {
     this.#model = model;
@@ -66,30 +67,33 @@ export class Avatar implements Performer {
     this.#joints = new Map(JOINTS.map((name) => [name, new Matrix4()]));
     this.#materials = new SimpleMaterials(model.root);
     this.group.add(model.root);
-    const { bones, soleHeight: sole, handLengths: hands } = model.rest;
-    const place = (bone: string) => (bones.get(bone) as { position: Vector3 }).position;
-    const between = (a: string, b: string) => place(a).distanceTo(place(b));
-    const size =
+    const { bones, soleHeight, handLengths } = model.rest;
+    const positionOf = (bone: string) => (bones.get(bone) as { position: Vector3 }).position;
+    const distance = (a: string, b: string) => positionOf(a).distanceTo(positionOf(b));
+    const avatarScale =
       totalLimbLength(figure) /
-      (between("leftUpperLeg", "leftLowerLeg") +
-        between("leftLowerLeg", "leftFoot") +
-        between("leftUpperLeg", "leftUpperArm") +
-        between("leftUpperArm", "leftLowerArm") +
-        between("leftLowerArm", "leftHand"));
-    model.root.scale.setScalar(size);
+      (distance("leftUpperLeg", "leftLowerLeg") +
+        distance("leftLowerLeg", "leftFoot") +
+        distance("leftUpperLeg", "leftUpperArm") +
+        distance("leftUpperArm", "leftLowerArm") +
+        distance("leftLowerArm", "leftHand"));
+    model.root.scale.setScalar(avatarScale);
     this.#alignBones(figure);
 
     const rest = restPositions(figure);
     const joint = (name: string) => rest.get(name) as Vector3;
     this.#ankleHeight = joint("l_ankle").y - joint("l_midtarsal").y;
-    // legs hang straight in both, as the dancer stands
-    const standing =
-      size *
-      (between("leftUpperLeg", "leftLowerLeg") + between("leftLowerLeg", "leftFoot") + place("leftFoot").y - sole);
-    const leg = joint("l_hip").distanceTo(joint("l_knee")) + joint("l_knee").distanceTo(joint("l_ankle"));
-    this.#rootScale = standing / (leg + this.#ankleHeight + SOLE_HEIGHT_M * this.scale);
+    // The legs are straight in both, as at rest.
+    const avatarHipHeight =
+      avatarScale *
+      (distance("leftUpperLeg", "leftLowerLeg") +
+        distance("leftLowerLeg", "leftFoot") +
+        positionOf("leftFoot").y -
+        soleHeight);
+    const legLength = joint("l_hip").distanceTo(joint("l_knee")) + joint("l_knee").distanceTo(joint("l_ankle"));
+    this.#rootScale = avatarHipHeight / (legLength + this.#ankleHeight + SOLE_HEIGHT_M * this.scale);
     this.#handles = LIMB_BONES.map(([first, second, third], limb) => {
-      const hand = hands.get(third) || DEFAULT_HAND_SHARE * between(second, third);
+      const hand = handLengths.get(third) || DEFAULT_HAND_SHARE * distance(second, third);
       const node = model.nodes.get(limb < 2 ? third : second) as Object3D;
       const side = limb % 2 === 0 ? "l" : "r";
       const tip = new Vector3().fromArray(figure.tips, JOINTS.indexOf(`${side}_wrist`) * 3).length();
@@ -97,9 +101,14 @@ export class Avatar implements Performer {
         joint(`${side}_shoulder`).distanceTo(joint(`${side}_elbow`)) +
         joint(`${side}_elbow`).distanceTo(joint(`${side}_wrist`)) +
         tip;
-      const own = limb < 2 ? between(first, second) + between(second, third) + hand : between(first, second);
-      const dancers = limb < 2 ? arm : joint(`${side}_hip`).distanceTo(joint(`${side}_knee`));
-      return { node, at: this.#handleOffset(limb, third, hand), told: dancers / (own * size) };
+      const avatarLength =
+        limb < 2 ? distance(first, second) + distance(second, third) + hand : distance(first, second);
+      const figureLength = limb < 2 ? arm : joint(`${side}_hip`).distanceTo(joint(`${side}_knee`));
+      return {
+        node,
+        at: this.#handleOffset(limb, third, hand),
+        distanceScale: figureLength / (avatarLength * avatarScale),
+      };
     });
   }
 
@@ -123,32 +132,32 @@ export class Avatar implements Performer {
         p = positions;
       matrix.compose(
         scratch.set(p[k * 3], p[k * 3 + 1], p[k * 3 + 2]),
-        turn.set(q[k * 4 + 1], q[k * 4 + 2], q[k * 4 + 3], q[k * 4]),
+        scratchRotation.set(q[k * 4 + 1], q[k * 4 + 2], q[k * 4 + 3], q[k * 4]),
         ONE,
       );
       k++;
     }
     const { rotations } = toHumanoid(figure, pose, this.#humanoidPose);
-    for (const { node, rotationOffset: at, preRotation: outside, postRotation: inside } of this.#drives) {
+    for (const { node, rotationOffset: at, preRotation, postRotation } of this.#drives) {
       node.quaternion
         .set(rotations[at + 1], rotations[at + 2], rotations[at + 3], rotations[at])
-        .premultiply(outside)
-        .multiply(inside);
+        .premultiply(preRotation)
+        .multiply(postRotation);
     }
     group.position.set(0, 0, 0);
     group.updateMatrixWorld(true);
-    const hips = this.#hipCentre(middle);
-    const dancers = scratch
+    const hips = this.#hipCentre(scratchCentre);
+    const figureHips = scratch
       .setFromMatrixPosition(this.joint("l_hip"))
-      .add(turned.setFromMatrixPosition(this.joint("r_hip")))
+      .add(scratchB.setFromMatrixPosition(this.joint("r_hip")))
       .multiplyScalar(0.5);
     group.position.set(
-      this.#rootScale * dancers.x - hips.x,
+      this.#rootScale * figureHips.x - hips.x,
       this.#streamedLowestY() - this.#avatarLowestY(),
-      this.#rootScale * dancers.z - hips.z,
+      this.#rootScale * figureHips.z - hips.z,
     );
     group.updateMatrixWorld(true);
-    this.root.copy(this.joint("humanoid_root")).setPosition(this.#hipCentre(middle));
+    this.root.copy(this.joint("humanoid_root")).setPosition(this.#hipCentre(scratchCentre));
     const { vrm } = this.#model;
     if (vrm && seconds === 0) vrm.springBoneManager?.reset();
     vrm?.update(seconds);
@@ -162,78 +171,79 @@ export class Avatar implements Performer {
   readonly joint = (name: string): Matrix4 => this.#joints.get(name) as Matrix4;
 
   /**
-   * The dancer's handle is to go from where it is as this one's has to go, in the measure of their limbs: what differs between
-   * the two figures is so told anew with each frame, and a hand that follows arrives.
+   * The figure's handle is to move from its position as the avatar's has to, scaled by the ratio of their limbs. The
+   * difference between the two figures is compensated anew in each frame, so that a hand that follows arrives.
    */
   toStreamedHandle(limb: number, to: Vector3, out: Vector3): Vector3 {
-    const way = to.clone().sub(this.handle(limb, turned)).multiplyScalar(this.#handles[limb].told);
-    return handlePosition(this, limb, out).add(way);
+    const offset = to.clone().sub(this.handle(limb, scratchB)).multiplyScalar(this.#handles[limb].distanceScale);
+    return handlePosition(this, limb, out).add(offset);
   }
 
-  /** The model itself stays, to dance again for another dancer's lengths. */
+  /** The model stays and can perform with other limb lengths. */
   dispose(): void {
     this.#materials.dispose();
     this.group.removeFromParent();
     this.#model.root.removeFromParent();
   }
 
-  /** Lays each limb's direction at rest on the dancer's, and prepares how its nodes are turned from there. */
+  /** Align each limb's rest direction with the figure's, and prepare the rotations of its nodes. */
   #alignBones(figure: Figure): void {
     const { bones } = this.#model.rest;
     const { offsets, tips } = tPoseFigure(figure);
-    const laid = new Map<string, Quaternion>();
+    const alignments = new Map<string, Quaternion>();
     BONES.forEach((bone, at) => {
       const rest = bones.get(bone);
-      const above = drivenParent(bone);
-      const parent = (above && laid.get(above)) || new Quaternion();
-      let lay = new Quaternion();
+      const parentBone = drivenParent(bone);
+      const parent = (parentBone && alignments.get(parentBone)) || new Quaternion();
+      let alignment = new Quaternion();
       const target = bones.get(NEXT_BONE[bone] ?? "");
       if (rest && target) {
         const next = BONES.indexOf(NEXT_BONE[bone]);
-        const wanted = next < 0 ? new Vector3().fromArray(tips, at * 3) : new Vector3().fromArray(offsets, next * 3);
+        const figureDirection =
+          next < 0 ? new Vector3().fromArray(tips, at * 3) : new Vector3().fromArray(offsets, next * 3);
         const direction = target.position.clone().sub(rest.position);
-        if (wanted.lengthSq() > 0 && direction.lengthSq() > 0)
-          lay.setFromUnitVectors(direction.normalize(), wanted.normalize());
+        if (figureDirection.lengthSq() > 0 && direction.lengthSq() > 0)
+          alignment.setFromUnitVectors(direction.normalize(), figureDirection.normalize());
       } else if (bone.endsWith("Hand")) {
-        lay = parent.clone();
+        alignment = parent.clone();
       }
-      laid.set(bone, lay);
+      alignments.set(bone, alignment);
       const node = this.#model.nodes.get(bone);
       if (!rest || !node) return;
       this.#drives.push({
         node,
         rotationOffset: at * 4,
         preRotation: parent.clone().multiply(rest.parentRotation).invert(),
-        postRotation: lay.clone().multiply(rest.rotation),
+        postRotation: alignment.clone().multiply(rest.rotation),
       });
     });
   }
 
-  /** Where a limb is held, in the frame of its node at rest: in the palm, or on the knee. */
+  /** Return the handle's position in the frame of its node at rest: in the palm, or on the knee. */
   #handleOffset(limb: number, hand: string, length: number): Vector3 {
     const { bones } = this.#model.rest;
     const bone = LIMB_BONES[limb][limb < 2 ? 2 : 1];
-    const { position: place, rotation } = bones.get(bone) as { position: Vector3; rotation: Quaternion };
+    const { position, rotation } = bones.get(bone) as { position: Vector3; rotation: Quaternion };
     if (limb >= 2) return new Vector3();
-    const from = bones.get(LIMB_BONES[limb][1]) as { position: Vector3 };
+    const previous = bones.get(LIMB_BONES[limb][1]) as { position: Vector3 };
     const fingers = bones.get(NEXT_BONE[hand]);
-    const along = fingers ? fingers.position.clone().sub(place) : place.clone().sub(from.position);
+    const direction = fingers ? fingers.position.clone().sub(position) : position.clone().sub(previous.position);
     const node = this.#model.nodes.get(bone) as Object3D;
-    // from the file's metres into the node's own
-    const metre = node.getWorldScale(new Vector3()).x / this.#model.root.getWorldScale(new Vector3()).x;
-    return along.setLength((PALM_SHARE * length) / metre).applyQuaternion(rotation.clone().invert());
+    // From the file's metres to the node's units.
+    const metresPerUnit = node.getWorldScale(new Vector3()).x / this.#model.root.getWorldScale(new Vector3()).x;
+    return direction.setLength((PALM_SHARE * length) / metresPerUnit).applyQuaternion(rotation.clone().invert());
   }
 
-  /** The middle of the hips' joints as they stand, world. */
+  /** Return the centre of the hip joints in the world frame. */
   #hipCentre(out: Vector3): Vector3 {
     const { nodes } = this.#model;
     out.setFromMatrixPosition((nodes.get("leftUpperLeg") as Object3D).matrixWorld);
     return out
-      .add(turned.setFromMatrixPosition((nodes.get("rightUpperLeg") as Object3D).matrixWorld))
+      .add(scratchB.setFromMatrixPosition((nodes.get("rightUpperLeg") as Object3D).matrixWorld))
       .multiplyScalar(0.5);
   }
 
-  /** Height of what is lowest of the dancer: a sole, a knee or a wrist. */
+  /** Return the height of the figure's lowest point: a sole, a knee or a wrist. */
   #streamedLowestY(): number {
     let lowest = this.ground;
     for (const name of ["l_knee", "r_knee", "l_wrist", "r_wrist"])
@@ -241,7 +251,7 @@ export class Avatar implements Performer {
     return lowest;
   }
 
-  /** The same of this one, as it stands now. */
+  /** Return the same height for the avatar. */
   #avatarLowestY(): number {
     const { nodes, rest } = this.#model;
     let lowest = Infinity;
@@ -257,6 +267,6 @@ export class Avatar implements Performer {
 const ONE = new Vector3(1, 1, 1);
 const scratch = new Vector3();
 const solePosition = new Vector3();
-const turned = new Vector3();
-const middle = new Vector3();
-const turn = new Quaternion();
+const scratchB = new Vector3();
+const scratchCentre = new Vector3();
+const scratchRotation = new Quaternion();

@@ -1,12 +1,12 @@
-/** Which node of a plain glTF file is which bone of a humanoid, by the names that the usual tools give them. Pure. */
+/** Assignment of the nodes of a plain glTF file to humanoid bones, by the names that common tools use. Pure. */
 
-/** A node's name as the file has it, and the index of its parent; -1 for a root. */
+/** A node's name in the file, and the index of its parent; -1 for a root. */
 export interface NamedNode {
   name: string;
   parent: number;
 }
 
-/** The bones an avatar must have: what the stream moves, but for the toes. VRM asks for the same. */
+/** Bones that an avatar must have: those that the stream moves, except the toes. VRM requires the same. */
 export const REQUIRED_BONES: readonly string[] = [
   "hips",
   "spine",
@@ -25,7 +25,7 @@ export const REQUIRED_BONES: readonly string[] = [
   "rightFoot",
 ];
 
-/** Words for a bone, the likeliest first: without side, case, numbers and what stands between. */
+/** Words for a bone, the likeliest first, without side, case, numbers and separators. */
 type BoneWords = Readonly<Record<string, readonly string[]>>;
 
 const CENTRE_WORDS: BoneWords = {
@@ -45,13 +45,13 @@ const COMMON_WORDS: BoneWords = {
   Toes: ["toebase", "toes", "toe", "ball"],
 };
 
-/** What the limbs are called: the same word is the upper arm in one school and the collar bone in another. */
+/** Words for the limbs: the same word is the upper arm in one naming scheme and the collar bone in another. */
 const NAMING_SCHEMES: readonly BoneWords[] = [
-  // VRoid, Unreal, Unity, 3ds Max, Blender
+  // VRoid, Unreal, Unity, 3ds Max, Blender.
   COMMON_WORDS,
-  // Mixamo
+  // Mixamo.
   { ...COMMON_WORDS, UpperArm: ["arm"], LowerLeg: ["leg"] },
-  // H-Anim, and whatever names joints, not bones
+  // H-Anim, and others that name joints instead of bones.
   {
     ...COMMON_WORDS,
     UpperArm: ["shoulder"],
@@ -62,7 +62,7 @@ const NAMING_SCHEMES: readonly BoneWords[] = [
     Foot: ["ankle"],
     Toes: ["midtarsal", "toebase", "toes", "toe", "ball"],
   },
-  // VRChat's tools
+  // Tools of VRChat.
   {
     ...COMMON_WORDS,
     UpperArm: ["arm"],
@@ -74,7 +74,7 @@ const NAMING_SCHEMES: readonly BoneWords[] = [
   },
 ];
 
-/** What each bone hangs from, at any depth. */
+/** Ancestor of each bone, at any depth. */
 const PARENT_BONE: Readonly<Record<string, string>> = {
   spine: "hips",
   head: "spine",
@@ -88,14 +88,16 @@ const PARENT_BONE: Readonly<Record<string, string>> = {
   Toes: "Foot",
 };
 
-/** Said of the tool or of the skeleton, not of the bone. */
+/** Words that name the tool or the skeleton, not the bone. */
 const NOISE_PATTERN =
   /^(mixamorig|bip|valvebiped|hanim|def|org|armature|character|skeleton|rig|cc|base|j|jnt|joint|bone|c|center|b)\d*$/;
 const SIDES: Readonly<Record<string, Side>> = { l: "left", left: "left", r: "right", right: "right" };
 
 type Side = "left" | "right" | "";
 
-/** A bone's word and side, of a node's name: "mixamorig:LeftForeArm" is the left "forearm", "spine_01" is "spine". */
+/**
+ * Return the word and the side in a node's name: "mixamorig:LeftForeArm" is the left "forearm", "spine_01" is "spine".
+ */
 export function parseNodeName(name: string): { word: string; side: Side } {
   const local = name.split(/[:|]/).at(-1) ?? "";
   const parts = local
@@ -109,35 +111,41 @@ export function parseNodeName(name: string): { word: string; side: Side } {
   return { word: word === "vl5" ? word : word.replace(/\d+$/, ""), side };
 }
 
-/** Index of the node of each bone that is found, by VRM's names of bones; of several that would do the one nearest to the root. */
+/**
+ * Return the node index of each bone found, by VRM bone name. Of several candidates the one nearest to the root is
+ * chosen.
+ */
 export function findBones(nodes: readonly NamedNode[]): Map<string, number> {
-  const known = nodes.map(({ name }) => parseNodeName(name));
+  const parsedNames = nodes.map(({ name }) => parseNodeName(name));
   let best = new Map<string, number>();
-  for (const school of NAMING_SCHEMES) {
+  for (const scheme of NAMING_SCHEMES) {
     const found = new Map<string, number>();
     const find = (words: BoneWords, side: Side) => {
-      for (const [bone, said] of Object.entries(words)) {
-        const above = PARENT_BONE[bone];
-        const from = above === undefined ? null : found.get(above in CENTRE_WORDS ? above : boneName(side, above));
-        if (from === undefined) continue;
-        const candidates = said.flatMap((word) =>
-          known
+      for (const [bone, candidateWords] of Object.entries(words)) {
+        const ancestor = PARENT_BONE[bone];
+        const ancestorNode =
+          ancestor === undefined ? null : found.get(ancestor in CENTRE_WORDS ? ancestor : boneName(side, ancestor));
+        if (ancestorNode === undefined) continue;
+        const candidates = candidateWords.flatMap((word) =>
+          parsedNames
             .flatMap((one, node) => (one.word === word && one.side === side ? [node] : []))
             .sort((a, b) => depth(nodes, a) - depth(nodes, b)),
         );
-        const fit = candidates.find((node) => from === null || (node !== from && isBelow(nodes, node, from)));
+        const fit = candidates.find(
+          (node) => ancestorNode === null || (node !== ancestorNode && isBelow(nodes, node, ancestorNode)),
+        );
         if (fit !== undefined) found.set(boneName(side, bone), fit);
       }
     };
     find(CENTRE_WORDS, "");
-    find(school, "left");
-    find(school, "right");
+    find(scheme, "left");
+    find(scheme, "right");
     if (found.size > best.size) best = found;
   }
   return best;
 }
 
-/** Which of the required bones are not there, in plain words: "left lower arm". */
+/** Return the missing required bones in plain words: "left lower arm". */
 export function missingBones(bones: ReadonlyMap<string, unknown>): string[] {
   return REQUIRED_BONES.filter((bone) => !bones.has(bone)).map((bone) =>
     bone.replace(/[A-Z]/g, (letter) => ` ${letter.toLowerCase()}`),
@@ -154,8 +162,9 @@ function depth(nodes: readonly NamedNode[], node: number): number {
   return levels;
 }
 
-function isBelow(nodes: readonly NamedNode[], node: number, above: number): boolean {
+function isBelow(nodes: readonly NamedNode[], node: number, ancestor: number): boolean {
   let steps = 0;
-  for (let at = node; at >= 0 && steps <= nodes.length; at = nodes[at].parent, steps++) if (at === above) return true;
+  for (let at = node; at >= 0 && steps <= nodes.length; at = nodes[at].parent, steps++)
+    if (at === ancestor) return true;
   return false;
 }

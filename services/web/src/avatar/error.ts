@@ -1,12 +1,12 @@
-/** What is wrong with a file that was brought to dance, apart from what finds it: the page tells it before all that is there. */
+/** Errors of avatar files, separate from the code that detects them: the page shows them before that code is loaded. */
 import { translate } from "../i18n/translator";
 
-/** Bytes of the largest file that is taken. */
+/** Size limit of a file, in bytes. */
 export const MAX_FILE_BYTES = 100e6;
 
-/** Why a file cannot dance, in words for the person who brought it. */
+/** Reason why a file cannot be used as an avatar, for the user. */
 export class AvatarError extends Error {
-  override readonly name = "AvatarProblem";
+  override readonly name = "AvatarError";
 
   constructor(
     readonly title: string,
@@ -17,24 +17,24 @@ export class AvatarError extends Error {
   }
 }
 
-/** What helps with most files. */
+/** Return the hint that helps with most files. */
 export function exportAgainHint(): string {
-  return translate("Export it anew, or try another file.");
+  return translate("Export it again, or try another file.");
 }
 
-/** Of a file of so many bytes. */
+/** Return the error for a file of this size in bytes. */
 export function fileTooLarge(bytes: number): AvatarError {
   return new AvatarError(
-    translate("It is too large"),
-    translate("it has {size} MB, and {most} MB are the most", {
+    translate("File too large"),
+    translate("{size} MB; the limit is {max} MB", {
       size: Math.ceil(bytes / 1e6),
-      most: MAX_FILE_BYTES / 1e6,
+      max: MAX_FILE_BYTES / 1e6,
     }),
     translate("Export it with smaller textures."),
   );
 }
 
-/** Of a file that fails while its meshes and pictures are read. */
+/** Return the error for a file whose meshes or textures cannot be read. */
 export function fileBroken(detail: string): AvatarError {
-  return new AvatarError(translate("It is broken"), detail, exportAgainHint());
+  return new AvatarError(translate("File damaged"), detail, exportAgainHint());
 }

@@ -1,4 +1,7 @@
-/** Reads a GLB's description and judges whether its figure can dance. Pure: the drawing parts of it are read elsewhere. */
+/**
+ * Reads the JSON chunk of a GLB file and checks whether its figure can perform. Pure: meshes and textures are read
+ * elsewhere.
+ */
 import { joinList, translate } from "../i18n/translator";
 import { findBones, missingBones, type NamedNode } from "./bone-names";
 import { AvatarError, exportAgainHint, fileBroken, fileTooLarge, MAX_FILE_BYTES } from "./error";
@@ -8,7 +11,7 @@ const JSON_CHUNK = 0x4e4f534a;
 const HEADER_BYTES = 12;
 const CHUNK_HEADER_BYTES = 8;
 
-/** Compressions of glTF that need decoders of their own, and what people call them. */
+/** glTF compressions that need separate decoders, with their common names. */
 const COMPRESSION_EXTENSIONS: Readonly<Record<string, string>> = {
   KHR_draco_mesh_compression: "Draco",
   EXT_meshopt_compression: "meshopt",
@@ -18,14 +21,14 @@ const COMPRESSION_EXTENSIONS: Readonly<Record<string, string>> = {
 
 const EXPORT_AS_GLB = "Export it as one binary glTF file, .glb or .vrm.";
 
-/** What a file is: the humanoid's bones as indices of its nodes, and the name its maker gave it, if any. */
+/** Content of a file: bones as node indices, and the author's name for it, if any. */
 export interface AvatarFile {
   vrm: boolean;
   name: string | null;
   bones: ReadonlyMap<string, number>;
 }
 
-/** The description of the figure in a file's bytes. Throws AvatarProblem where it cannot be used, saying why. */
+/** Parse the description of a figure from a file's bytes. Throw AvatarError if it cannot be used. */
 export function parseAvatarFile(bytes: ArrayBuffer): AvatarFile {
   if (bytes.byteLength > MAX_FILE_BYTES) throw fileTooLarge(bytes.byteLength);
   const json = asRecord(parseJsonChunk(bytes));
@@ -33,75 +36,73 @@ export function parseAvatarFile(bytes: ArrayBuffer): AvatarFile {
     const compression = COMPRESSION_EXTENSIONS[String(required)];
     if (compression)
       throw new AvatarError(
-        translate("It is compressed"),
-        translate("this page does not read {compression}", { compression }),
+        translate("Unsupported compression"),
+        translate("{compression} is not supported", { compression }),
         translate("Export it without {compression}.", { compression }),
       );
   }
-  const elsewhere = [
+  const externalCandidates = [
     ...asList(json.buffers),
     ...asList(json.images).filter((image) => !asText(asRecord(image).uri)?.startsWith("data:image/")),
   ];
-  for (const uri of elsewhere.map((part) => asText(asRecord(part).uri))) {
+  for (const uri of externalCandidates.map((part) => asText(asRecord(part).uri))) {
     if (uri)
       throw new AvatarError(
-        translate("It is not all in one file"),
-        translate('it refers to "{address}"', { address: uri.slice(0, 60) }),
+        translate("Not a single file"),
+        translate("it refers to the external file {address}", { address: uri.slice(0, 60) }),
         translate(EXPORT_AS_GLB),
       );
   }
   const nodes = parseNodes(json);
-  const told = vrmBones(json);
-  const bones = told ? new Map([...told.bones].filter(([, node]) => node in nodes)) : findBones(nodes);
-  const gone = missingBones(bones);
-  if (gone.length > 0) {
+  const vrmDeclaration = vrmBones(json);
+  const bones = vrmDeclaration
+    ? new Map([...vrmDeclaration.bones].filter(([, node]) => node in nodes))
+    : findBones(nodes);
+  const missing = missingBones(bones);
+  if (missing.length > 0) {
     const detail =
       bones.size === 0
-        ? translate("no humanoid bones were found in it")
-        : translate("these bones were not found: {bones}", { bones: joinList(gone) });
+        ? translate("no humanoid bones found")
+        : translate("missing bones: {bones}", { bones: joinList(missing) });
     throw new AvatarError(
-      translate("It is no humanoid that can dance"),
+      translate("No usable humanoid"),
       detail,
-      translate("Bones are known in VRM files, and by the names of Mixamo, VRoid, Unreal, Unity and H-Anim."),
+      translate("Bones are found in VRM files and by the names of Mixamo, VRoid, Unreal, Unity and H-Anim."),
     );
   }
   if (asList(json.meshes).length === 0)
-    throw new AvatarError(
-      translate("There is nothing to see"),
-      translate("it has bones, but no mesh"),
-      exportAgainHint(),
-    );
-  return { vrm: told !== null, name: told?.name ?? null, bones };
+    throw new AvatarError(translate("Nothing to draw"), translate("it has bones, but no mesh"), exportAgainHint());
+  return { vrm: vrmDeclaration !== null, name: vrmDeclaration?.name ?? null, bones };
 }
 
 function parseJsonChunk(bytes: ArrayBuffer): unknown {
   const view = new DataView(bytes);
   if (bytes.byteLength < HEADER_BYTES || view.getUint32(0, true) !== MAGIC)
     throw new AvatarError(
-      translate("It is no GLB"),
-      translate("it does not begin as binary glTF does"),
+      translate("Not a GLB file"),
+      translate("it does not start like binary glTF"),
       translate(EXPORT_AS_GLB),
     );
   if (view.getUint32(4, true) !== 2)
     throw new AvatarError(
-      translate("It is of another age"),
-      translate("it is glTF of version {version}, and 2 is read here", { version: view.getUint32(4, true) }),
+      translate("Unsupported glTF version"),
+      translate("version {version}; only version 2 is supported", { version: view.getUint32(4, true) }),
       exportAgainHint(),
     );
   if (bytes.byteLength < HEADER_BYTES + CHUNK_HEADER_BYTES || view.getUint32(8, true) > bytes.byteLength)
-    throw fileBroken(translate("it ends before it should"));
+    throw fileBroken(translate("the file is truncated"));
   const length = view.getUint32(HEADER_BYTES, true);
   const begin = HEADER_BYTES + CHUNK_HEADER_BYTES;
   if (view.getUint32(HEADER_BYTES + 4, true) !== JSON_CHUNK || begin + length > bytes.byteLength)
-    throw fileBroken(translate("its description is not where it should be"));
+    throw fileBroken(translate("the JSON chunk is missing or too long"));
   try {
     return JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, begin, length)));
   } catch {
-    throw fileBroken(translate("its description cannot be read"));
+    throw fileBroken(translate("the JSON chunk cannot be parsed"));
   }
 }
 
-/** The bones that a VRM file itself names, of version 1 or 0; null where the file is none. */
+/** Return the bones that a VRM file (version 1 or 0) declares; null if it is not a VRM file. */
 function vrmBones(json: Record<string, unknown>): { name: string | null; bones: Map<string, number> } | null {
   const extensions = asRecord(json.extensions);
   if (extensions.VRMC_vrm) {

@@ -1,4 +1,4 @@
-/** How an avatar's materials take the stage's light. */
+/** Adaptation of an avatar's materials to the stage's lights. */
 import type { MToonMaterial } from "@pixiv/three-vrm";
 import {
   type Material,
@@ -9,11 +9,14 @@ import {
   type Object3D,
 } from "three";
 
-/** Of a cartoon's colours, in the light and in the shade. */
+/** Scale of MToon colours, lit and shaded. */
 const LIT_COLOUR_SCALE = 0.55;
 const SHADE_COLOUR_SCALE = 0.15;
 
-/** Cartoons (MToon) take all of a light wherever it comes from, from behind as shade: before the stage's four they would be washed out. */
+/**
+ * Darken MToon (cartoon) materials: they take the full intensity of a light from any direction, from behind as shade,
+ * so that four lights would overexpose them.
+ */
 export function dimMToonMaterials(materials: Iterable<Material>): void {
   for (const material of materials) {
     if (!("isMToonMaterial" in material)) continue;
@@ -23,10 +26,13 @@ export function dimMToonMaterials(materials: Iterable<Material>): void {
   }
 }
 
-/** What is left to see of clear glass, as an opacity. */
+/** Opacity that stands for clear glass. */
 const GLASS_OPACITY = 0.25;
 
-/** Materials as the stage can draw them: without what its shaders were freed of (`lean-three.ts`), with which they would be drawn wrongly or not at all. Glass is thin. */
+/**
+ * Remove material features that the stage does not render: bump, light, alpha and displacement maps, iridescence,
+ * dispersion, and transmission, which would need another render pass. Clear glass becomes transparent instead.
+ */
 export function simplifyMaterials(materials: Iterable<Material>): void {
   for (const material of materials) {
     if (material instanceof MeshStandardMaterial)
@@ -41,7 +47,7 @@ export function simplifyMaterials(materials: Iterable<Material>): void {
   }
 }
 
-/** Plain materials for machines that draw in software: colours and light, without gloss, bumps and reflections. */
+/** Simple materials for software rendering: colours and light, without gloss, bumps and reflections. */
 export class SimpleMaterials {
   readonly #originals = new Map<Mesh, Material | Material[]>();
   readonly #simple = new Map<Material, Material>();
@@ -52,23 +58,23 @@ export class SimpleMaterials {
     });
   }
 
-  /** Puts the model's own materials on it, or plain ones in the place of those that shade physically. */
-  useSimple(plain: boolean): void {
-    const wanted = (material: Material) => (plain ? this.#simpleOf(material) : material);
+  /** Switch between the model's own materials and simple replacements of those with physical shading. */
+  useSimple(simple: boolean): void {
+    const select = (material: Material) => (simple ? this.#simpleOf(material) : material);
     for (const [mesh, material] of this.#originals)
-      mesh.material = Array.isArray(material) ? material.map(wanted) : wanted(material);
+      mesh.material = Array.isArray(material) ? material.map(select) : select(material);
   }
 
   dispose(): void {
     this.useSimple(false);
-    for (const [material, plain] of this.#simple) if (plain !== material) plain.dispose();
+    for (const [material, simple] of this.#simple) if (simple !== material) simple.dispose();
     this.#simple.clear();
   }
 
   #simpleOf(material: Material): Material {
-    let plain = this.#simple.get(material);
-    if (!plain) {
-      plain = material;
+    let simple = this.#simple.get(material);
+    if (!simple) {
+      simple = material;
       if (material instanceof MeshStandardMaterial) {
         const {
           name,
@@ -85,7 +91,7 @@ export class SimpleMaterials {
           alphaTest,
           depthWrite,
         } = material;
-        plain = new MeshLambertMaterial({
+        simple = new MeshLambertMaterial({
           name,
           color,
           map,
@@ -101,8 +107,8 @@ export class SimpleMaterials {
           depthWrite,
         });
       }
-      this.#simple.set(material, plain);
+      this.#simple.set(material, simple);
     }
-    return plain;
+    return simple;
   }
 }

@@ -1,35 +1,37 @@
-/** How a model stands before it dances: which way it faces, where its bones are, and what of it touches the floor. */
+/** Measurements of a model's rest pose: facing, bone positions, and the points that touch the floor. */
 import { type BufferAttribute, type Group, Mesh, type Object3D, Quaternion, SkinnedMesh, Vector3 } from "three";
 import { BONE_PARENTS, BONES } from "../motion/humanoid";
 
 const UP = new Vector3(0, 1, 0);
-/** Beside the driven bones, the one that says where a hand points. */
+/** Bones that give the direction of a hand, besides the driven ones. */
 const FINGER_BONES = ["leftMiddleProximal", "rightMiddleProximal"];
-/** Of the ankle's way to the front of the foot, where the ball is in a foot without toes. */
+/** Position of the ball in a foot without toes, as a share of the way from ankle to front. */
 const BALL_SHARE = 0.7;
 
-/** A bone at rest, in the frame of the model turned to face z with y up; lengths are the file's. */
+/** A bone at rest, in the frame of the model facing z with y up; lengths are the file's. */
 export interface RestBone {
   position: Vector3;
-  /** Of its node. */
+  /** Orientation of its node. */
   rotation: Quaternion;
-  /** Of the node it hangs from in the file, whatever that is. */
+  /** Orientation of the node's parent in the file. */
   parentRotation: Quaternion;
 }
 
 export interface RestMeasurements {
-  /** Turns the file's frame to facing z, y up. */
+  /** Rotation from the file's frame to facing z, y up. */
   facing: Quaternion;
   bones: ReadonlyMap<string, RestBone>;
   /** Height of the soles. */
   soleHeight: number;
-  /** For each foot's bone the places under heel and ball, in its node's frame. */
+  /** Points under heel and ball for each foot bone, in its node's frame. */
   solePoints: ReadonlyMap<string, readonly Vector3[]>;
-  /** From each hand's bone to the tips of its fingers, as far as its mesh goes. */
+  /** Length from each hand bone to the finger tips, as far as its mesh reaches. */
   handLengths: ReadonlyMap<string, number>;
 }
 
-/** Measures the model in `stand`, which stands at the origin and is turned by this; `nodes` are those of the humanoid's bones. */
+/**
+ * Measure the model in `stand`, which is at the origin and is rotated by this function; `nodes` are the bones' nodes.
+ */
 export function measureRest(stand: Group, nodes: ReadonlyMap<string, Object3D>): RestMeasurements {
   stand.quaternion.identity();
   stand.updateMatrixWorld(true);
@@ -66,7 +68,7 @@ export function measureRest(stand: Group, nodes: ReadonlyMap<string, Object3D>):
   };
 }
 
-/** Which of our bones each driven bone hangs from; null for the hips. */
+/** Return the parent of a driven bone; null for the hips. */
 export function drivenParent(bone: string): string | null {
   const parent = BONE_PARENTS[BONES.indexOf(bone)];
   return parent < 0 ? null : BONES[parent];
@@ -75,11 +77,14 @@ export function drivenParent(bone: string): string | null {
 const SIDES = ["left", "right"] as const;
 type Side = (typeof SIDES)[number];
 
-/** From the left of the hips and the way up to the head: some files face away, lie on their back or look aside. */
+/**
+ * Derived from the left side of the hips and the direction to the head: some files face away, lie on the back or
+ * sideways.
+ */
 function facingOf(nodes: ReadonlyMap<string, Object3D>): Quaternion {
   const at = (bone: string) => positionOf(nodes.get(bone) as Object3D);
-  const rise = at("head").sub(at("hips"));
-  const up = nearestAxis(rise);
+  const upward = at("head").sub(at("hips"));
+  const up = nearestAxis(upward);
   const upright = new Quaternion().setFromUnitVectors(up, UP);
   const left = at("leftUpperLeg")
     .sub(at("rightUpperLeg"))
@@ -91,8 +96,8 @@ function facingOf(nodes: ReadonlyMap<string, Object3D>): Quaternion {
 
 function nearestAxis({ x, y, z }: Vector3): Vector3 {
   const size = [x, y, z].map(Math.abs);
-  const most = size.indexOf(Math.max(...size));
-  return new Vector3().setComponent(most, Math.sign([x, y, z][most]) || 1);
+  const largest = size.indexOf(Math.max(...size));
+  return new Vector3().setComponent(largest, Math.sign([x, y, z][largest]) || 1);
 }
 
 function solePointsOf(
@@ -115,7 +120,7 @@ function handLength(side: Side, nodes: ReadonlyMap<string, Object3D>, cloud: rea
   return Math.max(0, ...cloud.map((place) => place.distanceTo(hand)));
 }
 
-/** The vertices of hands and feet as they stand, by the humanoid's bone that carries most of each. */
+/** Return the vertices of hands and feet in the rest pose, by the bone with the largest weight. */
 function collectVertices(stand: Group, nodes: ReadonlyMap<string, Object3D>): Map<string, Vector3[]> {
   const bones = new Map(
     [...nodes].filter(([bone]) => (BONES as readonly string[]).includes(bone)).map(([bone, node]) => [node, bone]),
@@ -144,11 +149,11 @@ function collectVertices(stand: Group, nodes: ReadonlyMap<string, Object3D>): Ma
   return clouds;
 }
 
-/** Index of the bone that carries most of a vertex. */
+/** Return the index of the bone with the largest weight on a vertex. */
 function dominantBone(indices: BufferAttribute, weights: BufferAttribute, vertex: number): number {
-  let most = 0;
-  for (let k = 1; k < 4; k++) if (weights.getComponent(vertex, k) > weights.getComponent(vertex, most)) most = k;
-  return indices.getComponent(vertex, most);
+  let largest = 0;
+  for (let k = 1; k < 4; k++) if (weights.getComponent(vertex, k) > weights.getComponent(vertex, largest)) largest = k;
+  return indices.getComponent(vertex, largest);
 }
 
 function positionOf(node: Object3D): Vector3 {

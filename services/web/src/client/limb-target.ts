@@ -7,19 +7,22 @@
  * (`marionette/limb_target.py`). Times are local milliseconds.
  */
 
-import { clampThigh, MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD } from "../marionette/leg";
+import {
+  MAX_HAND_SPEED,
+  MAX_LEG_SPEED,
+  MAX_TARGET_DURATION_US,
+  MAX_THIGH_ANGLE_RAD,
+  MIN_THIGH_ANGLE_RAD,
+} from "../marionette/constants";
+import { clampThigh } from "../marionette/leg";
 import { limbWithinPerformer } from "../wire/limbs";
 
-/** Full speed of a hand along each axis, arm lengths per second. */
-export const MAX_HAND_SPEED = 1;
-/** Full speed of a leg, radians per second. */
-export const MAX_LEG_SPEED = 2;
 /** Maximum distance of a hand target from the shoulder, arm lengths. */
 export const MAX_TARGET_REACH = 1;
 /** Range of thigh angles, radians forwards from straight down. */
 export const THIGH_RANGE: readonly [number, number] = [MIN_THIGH_ANGLE_RAD, MAX_THIGH_ANGLE_RAD];
 /** Maximum time to approach a target. */
-const MAX_TARGET_DURATION_MS = 33;
+const MAX_TARGET_DURATION_MS = MAX_TARGET_DURATION_US / 1000;
 
 /** Target of one limb. */
 export class LimbTarget {

@@ -1,11 +1,12 @@
 /** Puppeteer of a session: claims limbs and sends their targets. */
 
+import { MAX_HAND_SPEED, MAX_LEG_SPEED } from "../marionette/constants";
 import { LIMBS } from "../motion/skeleton";
 import { limbNumber, MAX_LIMBS } from "../wire/limbs";
 import type { Grant, Message, Notice, Presence, Refusal } from "../wire/messages";
 import { type Access, pageAccess } from "./access";
 import { INPUT_INTERVAL_MS, type InputValues, LimbHold } from "./limb-hold";
-import { MAX_HAND_SPEED, MAX_LEG_SPEED, MAX_TARGET_REACH, THIGH_RANGE } from "./limb-target";
+import { MAX_TARGET_REACH, THIGH_RANGE } from "./limb-target";
 import type { LimbPredictor } from "./performer-view";
 import type { PredictionFrame } from "./predicted-limb";
 import { ReconnectingConnection } from "./reconnecting-connection";

@@ -1,4 +1,4 @@
-/** Motion as BVH, as the Python room's `motion/writers.py` writes it. */
+/** BVH export, equivalent to `motion/bvh_writer.py` in Python. */
 
 import { applyPlacement } from "../motion/placement";
 import { JOINT_COUNT, JOINTS, PARENTS, restPose, TIP_JOINTS } from "../motion/skeleton";
@@ -10,9 +10,9 @@ const DEGREES_PER_RADIAN = 180 / Math.PI;
 const encoder = new TextEncoder();
 
 /**
- * `dance` as BVH in centimetres, y up, facing z, with H-Anim joint names and its I-pose as the rest pose. The root has six
- * channels, whose positions are absolute: on the stage that all dancers share, so that the files of several stand beside each
- * other. All joints turn in the order z, x, y. Lengths and angles have 6 decimals.
+ * Write a motion as BVH in centimetres, y up, facing z, with H-Anim joint names and the I-pose as rest pose. The root
+ * has six channels with absolute positions on the shared stage, so that the files of several performers stand side by
+ * side. All joints rotate in the order z, x, y. Lengths and angles have 6 decimals.
  */
 export function* writeBvh(motion: SampledMotion): IncrementalTask<Uint8Array<ArrayBuffer>[]> {
   const { fps, frames, placement: place } = motion;
@@ -39,8 +39,8 @@ export function* writeBvh(motion: SampledMotion): IncrementalTask<Uint8Array<Arr
 }
 
 /**
- * Angles in degrees of a unit quaternion, to be turned about z, then x, then y, each about the axis the ones before have
- * turned; the one about x lies within 90 degrees. Where x is at 90, y is zero.
+ * Write the Euler angles of a unit quaternion, in degrees: about z, then x, then y, each about the axis rotated by the
+ * ones before. The angle about x is within 90 degrees; at 90 the angle about y is zero.
  */
 export function toEulerZxy(out: Float64Array, outAt: number, q: Float64Array, at: number): void {
   const w = q[at],

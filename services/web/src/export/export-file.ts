@@ -1,4 +1,4 @@
-/** Dances as a file, made beside a page that stays alive. */
+/** Export of motions as a file, computed in time slices so that the page stays responsive. */
 
 import { type Figure, figureKey } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
@@ -16,7 +16,7 @@ const MEDIA_TYPES: Readonly<Record<ExportFormat, string>> = {
   vrma: "model/gltf-binary",
 };
 
-/** What only the stage knows, asked for where a file shows the puppet: its mesh, and its face as PNG. */
+/** Parts that only the stage can make, for files that show the puppet: its mesh and its face as PNG. */
 export interface PuppetModelSource {
   createModel(figure: Figure): PuppetModel;
   renderFacePng(): Promise<Uint8Array<ArrayBuffer>>;
@@ -28,52 +28,61 @@ export interface ExportOptions {
   signal?: AbortSignal;
 }
 
-/** Of a dancer the blocks, and how many of their frames are danced. */
+/** Blocks of a performer, and the number of frames to export. */
 export interface ExportSource {
   store: MotionBlockStore;
   frames: number;
 }
 
 /**
- * The dances of `sources` as one file: of all of them as GLB; BVH and VRMA are of one figure by their nature, and so of the
- * first. Given up by `signal`, it rejects with the signal's reason.
+ * Export the motions of `sources` as one file: GLB contains all of them; BVH and VRMA hold one figure and contain the
+ * first. Reject with the signal's reason if aborted.
  */
 export async function exportFile(
   format: ExportFormat,
   name: string,
   sources: readonly ExportSource[],
-  { puppets: looks, onProgress: told, signal }: ExportOptions,
+  { puppets, onProgress, signal }: ExportOptions,
 ): Promise<Blob> {
-  const ease = (from: number, to: number) => ({
-    told: (share: number) => told?.(from + (to - from) * share),
+  const sliceOptions = (from: number, to: number) => ({
+    onProgress: (share: number) => onProgress?.(from + (to - from) * share),
     ...(signal ? { signal } : {}),
   });
-  const dances: SampledMotion[] = [];
-  const part = 0.5 / sources.length;
+  const motions: SampledMotion[] = [];
+  const sampleShare = 0.5 / sources.length;
   for (const { store, frames } of sources)
-    dances.push(await runInSlices(sampleMotion(store, frames), ease(dances.length * part, (dances.length + 1) * part)));
+    motions.push(
+      await runInSlices(
+        sampleMotion(store, frames),
+        sliceOptions(motions.length * sampleShare, (motions.length + 1) * sampleShare),
+      ),
+    );
   const write = async () => {
-    if (format === "bvh") return writeBvh(dances[0]);
-    if (format === "vrma") return writeVrma(dances[0], name);
-    return writeGlb(await runInSlices(createModels(dances, looks), ease(0.5, 0.5)), name, await looks.renderFacePng());
+    if (format === "bvh") return writeBvh(motions[0]);
+    if (format === "vrma") return writeVrma(motions[0], name);
+    return writeGlb(
+      await runInSlices(createModels(motions, puppets), sliceOptions(0.5, 0.5)),
+      name,
+      await puppets.renderFacePng(),
+    );
   };
-  const parts = await runInSlices(await write(), ease(0.5, 1));
+  const parts = await runInSlices(await write(), sliceOptions(0.5, 1));
   return new Blob(parts, { type: MEDIA_TYPES[format] });
 }
 
-/** Who is seen to dance: those of equal lengths are made once. */
+/** Build the models; performers of equal limb lengths share one. */
 function* createModels(
-  dances: readonly SampledMotion[],
-  { createModel: model }: PuppetModelSource,
+  motions: readonly SampledMotion[],
+  { createModel }: PuppetModelSource,
 ): IncrementalTask<AnimatedPuppet[]> {
   const models = new Map<string, PuppetModel>();
-  const danced: AnimatedPuppet[] = [];
-  for (const dance of dances) {
-    const lengths = figureKey(dance.figure);
-    const made = models.get(lengths) ?? model(dance.figure);
-    models.set(lengths, made);
-    danced.push({ motion: dance, model: made });
-    yield danced.length / dances.length;
+  const animated: AnimatedPuppet[] = [];
+  for (const motion of motions) {
+    const key = figureKey(motion.figure);
+    const puppetModel = models.get(key) ?? createModel(motion.figure);
+    models.set(key, puppetModel);
+    animated.push({ motion, model: puppetModel });
+    yield animated.length / motions.length;
   }
-  return danced;
+  return animated;
 }

@@ -1,18 +1,23 @@
-/** File names that every system takes. Pure. */
+/** File names that are valid on all systems. Pure. */
 
-/** Characters are counted, not bytes. */
+/** Limit in characters, not bytes. */
 const MAX_NAME_CHARACTERS = 80;
-/** Not allowed somewhere: what separates folders, what shells and Windows read as something else, and what is not seen. */
+/**
+ * Characters that some system forbids: path separators, characters special to shells and Windows, and invisible ones.
+ */
 const UNSAFE_CHARACTERS = /[\\/:*?"<>|\p{Cc}\p{Cf}\p{Cs}]+/gu;
-/** Devices of Windows, whatever their ending. */
+/** Device names of Windows, with any extension. */
 const WINDOWS_DEVICE = /^(con|prn|aux|nul|com\d|lpt\d)$/i;
 
-/** `name` as a file's, with this ending (without a dot); letters of all scripts stay. `part`, of which file of several it is, is kept whole behind it. */
+/**
+ * Return `name` as a file name with this extension (without a dot); letters of all scripts stay. `suffix`, the number
+ * of a file among several, is never truncated.
+ */
 export function fileName(name: string, extension: string, suffix = ""): string {
-  const plain = name.normalize("NFC").replace(UNSAFE_CHARACTERS, " ").replace(/\s+/g, " ");
-  const short = [...plain]
+  const cleaned = name.normalize("NFC").replace(UNSAFE_CHARACTERS, " ").replace(/\s+/g, " ");
+  const truncated = [...cleaned]
     .slice(0, MAX_NAME_CHARACTERS)
     .join("")
     .replace(/^[\s.]+|[\s.]+$/g, "");
-  return `${short === "" || WINDOWS_DEVICE.test(short) ? `dance${short && ` ${short}`}` : short}${suffix}.${extension}`;
+  return `${truncated === "" || WINDOWS_DEVICE.test(truncated) ? `dance${truncated && ` ${truncated}`}` : truncated}${suffix}.${extension}`;
 }

@@ -1,25 +1,30 @@
-/** Motion as GLB: the puppets themselves, their joints under their H-Anim names, and the dance. For Blender, viewers and engines. */
+/**
+ * GLB export: the puppets, their joints under H-Anim names, and the animation, for Blender, viewers and game engines.
+ */
 
 import type { Placement } from "../motion/placement";
 import { type Figure, JOINT_COUNT, JOINTS, PARENTS, type Pose, restPose } from "../motion/skeleton";
 import { frameTimes, type GltfArray, GltfBuilder, writeRotation } from "./gltf";
 import { FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
 
-/** The puppet of one dancer as a mesh in its rest pose, and how its two sleeves hang. */
+/** The puppet of one performer as a mesh in its rest pose, and the movement of its two sleeves. */
 export interface PuppetModel {
-  /** Of each vertex the place (metres), the normal and the colour (linear RGB). */
+  /** Per vertex: position (metres), normal and colour (linear RGB). */
   positions: Float32Array<ArrayBuffer>;
   normals: Float32Array<ArrayBuffer>;
   colours: Float32Array<ArrayBuffer>;
-  /** Of each vertex four of the joints (0-17) and sleeves (18, 19), and their weights. */
+  /** Per vertex: four joints (0-17) or sleeves (18, 19) and their weights. */
   bones: Uint8Array<ArrayBuffer>;
   weights: Float32Array<ArrayBuffer>;
-  /** Of each vertex the place on the face's picture, from its upper left corner. */
+  /** Per vertex: position on the face texture, from its upper left corner. */
   faceUvs: Float32Array<ArrayBuffer>;
-  /** Triangles that the face's picture is painted on, and all others. */
+  /** Triangles with the face texture, and all others. */
   face: Uint32Array<ArrayBuffer>;
   body: Uint32Array<ArrayBuffer>;
-  /** The sleeves' turns (8, w x y z) in their shoulders' frames as `pose` is taken `seconds` after the one before, 0 for the first. */
+  /**
+   * Write the sleeves' rotations (8, w x y z) in their shoulders' frames for `pose`, `seconds` after the last one; 0
+   * for the first.
+   */
   poseSleeves(pose: Pose, seconds: number, out: Float64Array): void;
 }
 
@@ -28,15 +33,16 @@ const SLEEVES = ["l_sleeve", "r_sleeve"] as const;
 const BONE_COUNT = JOINT_COUNT + SLEEVES.length;
 const PBR_MATERIAL = { metallicFactor: 0, roughnessFactor: 0.6 };
 
-/** A dance, and who is seen to dance it; where one model dances several, its mesh is written once. */
+/** A motion and its puppet; a model used several times is written once. */
 export interface AnimatedPuppet {
   motion: SampledMotion;
   model: PuppetModel;
 }
 
 /**
- * All of `danced` as one scene and one animation of this `name`. Each hangs from a node of its own, "dancer 1" and so on, which
- * stands in its place on the stage; one alone in the middle needs none. `face` is the picture of their faces, PNG, white without.
+ * Write all puppets as one scene with one animation of this name. Each hangs from its own node, "dancer 1" and so on,
+ * at its placement on the stage; a single one at the centre needs none. `face` is the face texture as PNG; without it
+ * faces are white.
  */
 export function* writeGlb(
   puppets: readonly AnimatedPuppet[],
@@ -45,39 +51,36 @@ export function* writeGlb(
 ): IncrementalTask<Uint8Array<ArrayBuffer>[]> {
   const asset = new GltfBuilder();
   const { bones, roots } = addPuppets(asset, puppets, face);
-  for (const [nth, one] of puppets.entries()) {
-    for (const share of addAnimation(asset, bones[nth], one)) yield (nth + share) / puppets.length;
+  for (const [index, puppet] of puppets.entries()) {
+    for (const share of addAnimation(asset, bones[index], puppet)) yield (index + share) / puppets.length;
   }
   return asset.build(roots, name);
 }
 
-/** Has the joints and sleeves that are the nodes from `first` on dance. */
-function* addAnimation(
-  asset: GltfBuilder,
-  first: number,
-  { motion: dance, model }: AnimatedPuppet,
-): IncrementalTask<void> {
-  const { fps, frames, roots } = dance;
-  const turns = Array.from({ length: BONE_COUNT }, () => new Float32Array(frames * 4));
+/** Animate the joints and sleeves, which are the nodes from `first` on. */
+function* addAnimation(asset: GltfBuilder, first: number, { motion, model }: AnimatedPuppet): IncrementalTask<void> {
+  const { fps, frames, roots } = motion;
+  const rotations = Array.from({ length: BONE_COUNT }, () => new Float32Array(frames * 4));
   const pose = restPose(),
-    hanging = new Float64Array(8);
+    sleeveRotations = new Float64Array(8);
   for (let frame = 0; frame < frames; frame++) {
-    poseAt(dance, frame, pose);
-    model.poseSleeves(pose, frame === 0 ? 0 : 1 / fps, hanging);
-    for (let joint = 0; joint < JOINT_COUNT; joint++) writeRotation(turns[joint], frame * 4, pose.rotations, joint * 4);
+    poseAt(motion, frame, pose);
+    model.poseSleeves(pose, frame === 0 ? 0 : 1 / fps, sleeveRotations);
+    for (let joint = 0; joint < JOINT_COUNT; joint++)
+      writeRotation(rotations[joint], frame * 4, pose.rotations, joint * 4);
     for (let sleeve = 0; sleeve < SLEEVES.length; sleeve++)
-      writeRotation(turns[JOINT_COUNT + sleeve], frame * 4, hanging, sleeve * 4);
+      writeRotation(rotations[JOINT_COUNT + sleeve], frame * 4, sleeveRotations, sleeve * 4);
     if (frame % FRAMES_PER_STEP === 0) yield frame / frames;
   }
   const times = asset.addAccessor(frameTimes(frames, fps), "SCALAR", { bounded: true });
   asset.addChannel(first, "translation", times, Float32Array.from(roots));
-  turns.forEach((turn, bone) => asset.addChannel(first + bone, "rotation", times, turn));
+  rotations.forEach((turn, bone) => asset.addChannel(first + bone, "rotation", times, turn));
 }
 
-/** Puts up the puppets at rest. The first node of each one's bones, and the roots of the scene. */
+/** Add the puppets at rest. Return the first bone's node of each, and the roots of the scene. */
 function addPuppets(
   asset: GltfBuilder,
-  danced: readonly AnimatedPuppet[],
+  puppets: readonly AnimatedPuppet[],
   face: Uint8Array<ArrayBuffer> | null,
 ): { bones: number[]; roots: number[] } {
   const { nodes } = asset;
@@ -85,25 +88,28 @@ function addPuppets(
     skins: object[] = [],
     bones: number[] = [],
     roots: number[] = [];
-  const made = new Map<PuppetModel, { mesh: number; inverseBindMatrices: number }>();
-  danced.forEach(({ motion: { figure, placement: place }, model }, nth) => {
+  const shared = new Map<PuppetModel, { mesh: number; inverseBindMatrices: number }>();
+  puppets.forEach(({ motion: { figure, placement: place }, model }, index) => {
     const first = nodes.length;
-    const at = addBones(asset, figure);
-    let shape = made.get(model);
-    if (!shape) {
-      shape = { mesh: meshes.push(addMesh(asset, model)) - 1, inverseBindMatrices: addInverseBindMatrices(asset, at) };
-      made.set(model, shape);
+    const positions = addBones(asset, figure);
+    let sharedParts = shared.get(model);
+    if (!sharedParts) {
+      sharedParts = {
+        mesh: meshes.push(addMesh(asset, model)) - 1,
+        inverseBindMatrices: addInverseBindMatrices(asset, positions),
+      };
+      shared.set(model, sharedParts);
     }
-    const { mesh, inverseBindMatrices } = shape;
+    const { mesh, inverseBindMatrices } = sharedParts;
     skins.push({
       joints: Array.from({ length: BONE_COUNT }, (_, bone) => first + bone),
       skeleton: first,
       inverseBindMatrices,
     });
-    const placed = danced.length > 1 || place.x !== 0 || place.z !== 0 || place.turn !== 0;
-    // a skin moves its mesh by the bones alone, so the mesh hangs from nothing
-    const puppet = nodes.push({ name: placed ? `puppet ${nth + 1}` : "puppet", mesh, skin: nth }) - 1;
-    roots.push(placed ? addPlacementNode(asset, `dancer ${nth + 1}`, place, first) : first, puppet);
+    const needsNode = puppets.length > 1 || place.x !== 0 || place.z !== 0 || place.turn !== 0;
+    // A skin moves its mesh by the bones alone, so the mesh has no parent.
+    const puppet = nodes.push({ name: needsNode ? `puppet ${index + 1}` : "puppet", mesh, skin: index }) - 1;
+    roots.push(needsNode ? addPlacementNode(asset, `dancer ${index + 1}`, place, first) : first, puppet);
     bones.push(first);
   });
   const painted = face ? { baseColorTexture: { index: 0 } } : {};
@@ -121,7 +127,10 @@ function addPuppets(
   return { bones, roots };
 }
 
-/** The joints and sleeves of a dancer as nodes at rest; where they are from the dancer's own middle (60), metres. */
+/**
+ * Add the joints and sleeves of a figure as nodes at rest. Return their positions relative to the figure's origin (60),
+ * in metres.
+ */
 function addBones({ nodes }: GltfBuilder, { offsets }: Figure): Float64Array {
   const first = nodes.length;
   const places = new Float64Array(BONE_COUNT * 3);
@@ -143,7 +152,7 @@ function addBones({ nodes }: GltfBuilder, { offsets }: Figure): Float64Array {
   return places;
 }
 
-/** A node in `place` that node `child` hangs from; its index. */
+/** Add a node at `placement` with one child. Return its index. */
 function addPlacementNode({ nodes }: GltfBuilder, name: string, { x, z, turn }: Placement, child: number): number {
   return (
     nodes.push({
@@ -155,7 +164,7 @@ function addPlacementNode({ nodes }: GltfBuilder, name: string, { x, z, turn }: 
   );
 }
 
-/** The puppet's mesh, for skins of its bones. */
+/** Return the puppet's mesh, for skins with its bones. */
 function addMesh(asset: GltfBuilder, model: PuppetModel): object {
   const vertices = (values: GltfArray, type: "VEC2" | "VEC3" | "VEC4", bounded = false) =>
     asset.addAccessor(values, type, { target: "vertices", bounded });
@@ -175,12 +184,12 @@ function addMesh(asset: GltfBuilder, model: PuppetModel): object {
   return { name: "figure", primitives };
 }
 
-/** Index of an accessor of what brings a mesh into the frames of bones that stand at `places` at rest. */
+/** Add the matrices from the mesh to the frames of the bones at rest. Return the accessor's index. */
 function addInverseBindMatrices(asset: GltfBuilder, places: Float64Array): number {
-  const unbind = new Float32Array(BONE_COUNT * 16);
+  const matrices = new Float32Array(BONE_COUNT * 16);
   for (let bone = 0; bone < BONE_COUNT; bone++) {
-    for (let i = 0; i < 4; i++) unbind[bone * 16 + i * 5] = 1;
-    for (let axis = 0; axis < 3; axis++) unbind[bone * 16 + 12 + axis] = -places[bone * 3 + axis];
+    for (let i = 0; i < 4; i++) matrices[bone * 16 + i * 5] = 1;
+    for (let axis = 0; axis < 3; axis++) matrices[bone * 16 + 12 + axis] = -places[bone * 3 + axis];
   }
-  return asset.addAccessor(unbind, "MAT4");
+  return asset.addAccessor(matrices, "MAT4");
 }

@@ -1,4 +1,4 @@
-/** A glTF 2.0 asset put together piece by piece, and its one file, GLB (Khronos, glTF 2.0 specification). */
+/** Builder of a glTF 2.0 asset and its GLB file (Khronos, glTF 2.0 specification). */
 
 const COMPONENT_TYPES = new Map<unknown, number>([
   [Uint8Array, 5121],
@@ -7,7 +7,7 @@ const COMPONENT_TYPES = new Map<unknown, number>([
   [Float32Array, 5126],
 ]);
 const COMPONENTS_PER_ELEMENT = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 } as const;
-/** What a view of the buffer is for. */
+/** Purposes of buffer views. */
 const BUFFER_TARGETS = { vertices: 34962, indices: 34963 } as const;
 
 export type GltfArray =
@@ -29,7 +29,7 @@ export interface GltfNode {
 type ChannelPath = "translation" | "rotation";
 
 export class GltfBuilder {
-  /** What else the asset says: meshes, materials, skins, extensions. */
+  /** Further properties of the asset: meshes, materials, skins, extensions. */
   readonly extraProperties: Record<string, unknown> = {};
   readonly nodes: GltfNode[] = [];
   readonly #accessors: Record<string, unknown>[] = [];
@@ -39,7 +39,7 @@ export class GltfBuilder {
   readonly #channels: Record<string, unknown>[] = [];
   #length = 0;
 
-  /** Index of a new view of the buffer with these bytes. */
+  /** Add a buffer view of these bytes. Return its index. */
   addBufferView(values: GltfArray, target?: keyof typeof BUFFER_TARGETS): number {
     const bytes = new Uint8Array(values.buffer, values.byteOffset, values.byteLength);
     this.#views.push({
@@ -52,18 +52,21 @@ export class GltfBuilder {
     return this.#views.length - 1;
   }
 
-  /** Index of a new accessor of these values; `bounded` ones say their least and most, as positions and times must. */
+  /**
+   * Add an accessor of these values. Return its index. `bounded` adds minimum and maximum, which positions and times
+   * require.
+   */
   addAccessor(
     values: GltfArray,
     type: keyof typeof COMPONENTS_PER_ELEMENT,
     { target, bounded = false }: { target?: keyof typeof BUFFER_TARGETS; bounded?: boolean } = {},
   ): number {
     const width = COMPONENTS_PER_ELEMENT[type];
-    const each = (of: (...numbers: number[]) => number) =>
+    const each = (combine: (...numbers: number[]) => number) =>
       Array.from({ length: width }, (_, part) => {
-        let found = values[part];
-        for (let at = part + width; at < values.length; at += width) found = of(found, values[at]);
-        return found;
+        let bound = values[part];
+        for (let at = part + width; at < values.length; at += width) bound = combine(bound, values[at]);
+        return bound;
       });
     const bounds = bounded ? { min: each(Math.min), max: each(Math.max) } : {};
     this.#accessors.push({
@@ -76,7 +79,7 @@ export class GltfBuilder {
     return this.#accessors.length - 1;
   }
 
-  /** Moves a node along straight lines between `values` at the times of an accessor. */
+  /** Add a channel that moves a node linearly between `values` at the times of an accessor. */
   addChannel(node: number, path: ChannelPath, times: number, values: Float32Array<ArrayBuffer>): void {
     this.#samplers.push({
       input: times,
@@ -86,7 +89,7 @@ export class GltfBuilder {
     this.#channels.push({ sampler: this.#samplers.length - 1, target: { node, path } });
   }
 
-  /** The file, in parts: `roots` are the nodes of its scene, `dance` is its animation's name. */
+  /** Return the file in parts. `roots` are the nodes of its scene. */
   build(roots: readonly number[], animationName: string): Uint8Array<ArrayBuffer>[] {
     const json = {
       asset: { version: "2.0", generator: "Bunraku" },
@@ -100,13 +103,13 @@ export class GltfBuilder {
       ...this.extraProperties,
     };
     const text = new TextEncoder().encode(JSON.stringify(json));
-    const said = new Uint8Array(Math.ceil(text.length / 4) * 4).fill(0x20);
-    said.set(text);
-    const whole = 12 + 8 + said.length + 8 + this.#length;
+    const paddedJson = new Uint8Array(Math.ceil(text.length / 4) * 4).fill(0x20);
+    paddedJson.set(text);
+    const totalBytes = 12 + 8 + paddedJson.length + 8 + this.#length;
     return [
-      uint32Bytes(0x46546c67, 2, whole),
-      uint32Bytes(said.length, 0x4e4f534a),
-      said,
+      uint32Bytes(0x46546c67, 2, totalBytes),
+      uint32Bytes(paddedJson.length, 0x4e4f534a),
+      paddedJson,
       uint32Bytes(this.#length, 0x004e4942),
       ...this.#parts,
     ];
@@ -114,33 +117,35 @@ export class GltfBuilder {
 
   #append(bytes: Uint8Array<ArrayBuffer>, filler: number): void {
     this.#parts.push(bytes);
-    const missing = (4 - (bytes.length % 4)) % 4;
-    if (missing > 0) this.#parts.push(new Uint8Array(missing).fill(filler));
-    this.#length += bytes.length + missing;
+    const padding = (4 - (bytes.length % 4)) % 4;
+    if (padding > 0) this.#parts.push(new Uint8Array(padding).fill(filler));
+    this.#length += bytes.length + padding;
   }
 }
 
-/** Whole numbers of 32 bits, little-endian on every machine. */
+/** Return 32-bit integers in little-endian order. */
 function uint32Bytes(...numbers: number[]): Uint8Array<ArrayBuffer> {
   const view = new DataView(new ArrayBuffer(numbers.length * 4));
   numbers.forEach((number, at) => view.setUint32(at * 4, number, true));
   return new Uint8Array(view.buffer);
 }
 
-/** The times of `frames` frames, seconds. */
+/** Return the times of `frames` frames, in seconds. */
 export function frameTimes(frames: number, fps: number): Float32Array<ArrayBuffer> {
   return Float32Array.from({ length: frames }, (_, frame) => frame / fps);
 }
 
 /**
- * The quaternion w x y z at `at` written as glTF's x y z w at `outAt`, of its two signs the one nearer to that before it: a
- * reader that does not look for the shorter way finds it too.
+ * Write the quaternion w x y z at `at` as glTF's x y z w at `outAt`. Of its two signs the one nearer to the last
+ * rotation is used, for readers that do not take the shorter way.
  */
 export function writeRotation(out: Float32Array, outAt: number, q: Float64Array, at: number): void {
   const [w, x, y, z] = [q[at], q[at + 1], q[at + 2], q[at + 3]];
-  const before = outAt - 4;
+  const previous = outAt - 4;
   const sign =
-    before >= 0 && out[before] * x + out[before + 1] * y + out[before + 2] * z + out[before + 3] * w < 0 ? -1 : 1;
+    previous >= 0 && out[previous] * x + out[previous + 1] * y + out[previous + 2] * z + out[previous + 3] * w < 0
+      ? -1
+      : 1;
   const scale = sign / Math.hypot(w, x, y, z);
   out[outAt] = x * scale;
   out[outAt + 1] = y * scale;

@@ -1,32 +1,32 @@
-/** Long work done beside a page that stays alive: a few milliseconds at a time, until it is done or given up. */
+/** Runs long tasks in slices of a few milliseconds, so that the page stays responsive. */
 import type { IncrementalTask } from "./sampled-motion";
 
-/** Milliseconds of work between two breaths: less than a frame. */
+/** Duration of a slice, in milliseconds: less than a frame. */
 const SLICE_MS = 8;
 
 export interface SliceOptions {
-  /** Told of the share done, 0..1, at each breath. */
+  /** Called with the share done, 0..1, after each slice. */
   onProgress?: (share: number) => void;
   signal?: AbortSignal;
-  /** The time in milliseconds, and what lets others go first. */
+  /** Clock in milliseconds, and a function that lets other tasks run. */
   now?: () => number;
   yieldToEventLoop?: () => Promise<unknown>;
 }
 
-/** What `work` makes. Given up by `signal`, it rejects with the signal's reason. */
+/** Return the result of `work`. Reject with the signal's reason if aborted. */
 export async function runInSlices<T>(
   work: IncrementalTask<T>,
-  { onProgress: told, signal, now = () => performance.now(), yieldToEventLoop: breathe = nextTask }: SliceOptions = {},
+  { onProgress, signal, now = () => performance.now(), yieldToEventLoop = nextTask }: SliceOptions = {},
 ): Promise<T> {
-  let until = now() + SLICE_MS;
+  let sliceEnd = now() + SLICE_MS;
   for (;;) {
     signal?.throwIfAborted();
     const { done, value } = work.next();
     if (done) return value;
-    if (now() < until) continue;
-    told?.(value);
-    await breathe();
-    until = now() + SLICE_MS;
+    if (now() < sliceEnd) continue;
+    onProgress?.(value);
+    await yieldToEventLoop();
+    sliceEnd = now() + SLICE_MS;
   }
 }
 

@@ -1,4 +1,7 @@
-/** Motion as VRM Animation, which moves any VRM avatar (https://github.com/vrm-c/vrm-specification, VRMC_vrm_animation-1.0). */
+/**
+ * VRM Animation export, which animates any VRM avatar (https://github.com/vrm-c/vrm-specification,
+ * VRMC_vrm_animation-1.0).
+ */
 
 import { BONE_COUNT, BONE_PARENTS, BONES, createHumanoidPose, toHumanoid, tPoseFigure } from "../motion/humanoid";
 import { restPose } from "../motion/skeleton";
@@ -8,9 +11,9 @@ import { FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } fro
 const EXTENSION = "VRMC_vrm_animation";
 
 /**
- * `dance` of this `name` as the turns of a humanoid's bones from its T-pose, and where its hips are, metres. The place on the
- * stage is left out: a file is of one avatar about where that stands, and its player measures the hips' way by the avatar's
- * height, so that dancers would come nearer to each other as their avatars are smaller.
+ * Write a motion as rotations of humanoid bones from the T-pose and positions of the hips, in metres. The placement on
+ * the stage is left out: a file is for one avatar at its own position, and players scale the hips' path by the avatar's
+ * height, which would move several performers closer together the smaller their avatars are.
  */
 export function* writeVrma(motion: SampledMotion, name: string): IncrementalTask<Uint8Array<ArrayBuffer>[]> {
   const { figure, fps, frames } = motion;
@@ -25,18 +28,19 @@ export function* writeVrma(motion: SampledMotion, name: string): IncrementalTask
     });
   });
   const hips = new Float32Array(frames * 3);
-  const turns = BONES.map(() => new Float32Array(frames * 4));
+  const rotations = BONES.map(() => new Float32Array(frames * 4));
   const pose = restPose(),
     humanoid = createHumanoidPose();
   for (let frame = 0; frame < frames; frame++) {
     toHumanoid(figure, poseAt(motion, frame, pose), humanoid);
     hips.set(humanoid.hips, frame * 3);
-    for (let bone = 0; bone < BONE_COUNT; bone++) writeRotation(turns[bone], frame * 4, humanoid.rotations, bone * 4);
+    for (let bone = 0; bone < BONE_COUNT; bone++)
+      writeRotation(rotations[bone], frame * 4, humanoid.rotations, bone * 4);
     if (frame % FRAMES_PER_STEP === 0) yield frame / frames;
   }
   const times = asset.addAccessor(frameTimes(frames, fps), "SCALAR", { bounded: true });
   asset.addChannel(0, "translation", times, hips);
-  turns.forEach((turn, bone) => asset.addChannel(bone, "rotation", times, turn));
+  rotations.forEach((turn, bone) => asset.addChannel(bone, "rotation", times, turn));
   asset.extraProperties.extensionsUsed = [EXTENSION];
   asset.extraProperties.extensions = {
     [EXTENSION]: {

@@ -1,19 +1,20 @@
 /**
- * The 14 inputs of a puppeteer's hands (paper 5; SPEC, Ownership), by name. Pure.
+ * The 14 inputs of a puppeteer (paper, section 5; SPEC, Ownership) by name. Pure.
  *
- * A hand has six, plus and minus along x, y and z; a leg has one, its angle: 2 x 6 + 2 x 1 = 14. A hand's inputs are buttons as they stand. A leg's one input
- * goes both ways, so as buttons it is a pair: 16 digital inputs for the 14. Here a digital input also has a strength, 0 to 1: a button has one of the two, a
- * stick or trigger anything between. Directions are the audience's: x to its right, y up, z nearer to it.
+ * A hand has six inputs, plus and minus along x, y and z; a leg has one, its angle: 2 x 6 + 2 x 1 = 14. A hand's inputs
+ * are buttons. A leg's input goes both ways and takes two buttons, so that 16 digital inputs stand for the 14. Each
+ * digital input has a strength, 0 to 1: a button has one of the two, a stick or trigger any value between. Directions
+ * are the audience's: x to the right, y up, z towards the audience.
  */
 import { LIMBS } from "../motion/skeleton";
 
 type Side = "left" | "right";
 type Sign = "+" | "-";
 export type DigitalInput = `${Side}_hand_${"x" | "y" | "z"}${Sign}` | `${Side}_leg${Sign}`;
-/** The same for whichever limb is selected, so that six keys can serve all four. */
+/** Inputs of the selected limb, so that six keys serve all four limbs. */
 export type SelectedLimbInput = `held_${"x" | "y" | "z"}${Sign}`;
 
-/** To the audience's right, up, nearer to it; -1 to 1 of full speed each. */
+/** Right, up and towards the audience; -1 to 1 of full speed each. */
 export type Direction = readonly [right: number, up: number, nearer: number];
 
 const HANDS = LIMBS.filter((limb) => limb.endsWith("hand"));
@@ -22,16 +23,16 @@ const AXES = ["x", "y", "z"] as const;
 const SIGNS = ["+", "-"] as const;
 const directionInputs = (limb: string) => AXES.flatMap((axis) => SIGNS.map((sign) => `${limb}_${axis}${sign}`));
 
-/** The paper's 14. */
+/** The 14 inputs of the paper. */
 export const PAPER_INPUTS: readonly string[] = [...HANDS.flatMap(directionInputs), ...LEGS];
-/** The same as buttons: a leg's is a pair. */
+/** The 14 inputs as buttons: two per leg. */
 export const DIGITAL_INPUTS = [
   ...HANDS.flatMap(directionInputs),
   ...LEGS.flatMap((leg) => SIGNS.map((sign) => `${leg}${sign}`)),
 ] as readonly DigitalInput[];
 export const SELECTED_LIMB_INPUTS = directionInputs("held") as readonly SelectedLimbInput[];
 
-/** What an input does: of which limb (null for the selected one), along which axis, which way. */
+/** Effect of an input: limb (null for the selected one), axis and direction. */
 export interface InputEffect {
   limb: number | null;
   axis: 0 | 1 | 2;
@@ -41,7 +42,7 @@ export interface InputEffect {
 const EFFECTS = new Map<string, InputEffect>(
   [...DIGITAL_INPUTS, ...SELECTED_LIMB_INPUTS].map((input) => {
     const limb = LIMBS.findIndex((name) => input.startsWith(name));
-    // a leg's angle goes up and down
+    // A leg's angle is the vertical axis.
     const axis = Math.max(
       AXES.findIndex((one) => input.slice(0, -1).endsWith(`_${one}`)),
       input.includes("leg") ? 1 : 0,
@@ -59,23 +60,23 @@ export function effectOf(input: DigitalInput | SelectedLimbInput): InputEffect {
 }
 
 /**
- * The direction of inputs held at strengths of 0 to 1, all of one limb: opposite ones cancel, the same one held twice counts once, and a slant is no faster
- * than a straight line.
+ * Return the direction of the inputs of one limb, held at strengths of 0 to 1. Opposite inputs cancel, repeated ones
+ * count once, and a diagonal is no faster than a straight line.
  */
 export function combineDirections(
   pressed: Iterable<readonly [input: DigitalInput | SelectedLimbInput, strength: number]>,
 ): Direction {
-  const most: [number, number][] = [
+  const strengths: [number, number][] = [
     [0, 0],
     [0, 0],
     [0, 0],
   ];
   for (const [input, strength] of pressed) {
     const { axis, sign } = effectOf(input);
-    const way = sign > 0 ? 0 : 1;
-    most[axis][way] = Math.max(most[axis][way], Math.min(Math.max(strength, 0), 1));
+    const index = sign > 0 ? 0 : 1;
+    strengths[axis][index] = Math.max(strengths[axis][index], Math.min(Math.max(strength, 0), 1));
   }
-  const sum = most.map(([plus, minus]) => plus - minus);
+  const sum = strengths.map(([plus, minus]) => plus - minus);
   const length = Math.max(1, Math.hypot(...sum));
   return [sum[0] / length, sum[1] / length, sum[2] / length];
 }

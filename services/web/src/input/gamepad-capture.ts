@@ -1,4 +1,4 @@
-/** Hears which control of a gamepad somebody means: one alone, or one with a button held. Pure. */
+/** Detection of the gamepad control that the user wants to bind: one alone, or one with a button held. Pure. */
 import { PRESS_THRESHOLD } from "./gamepad-state";
 import type { Control } from "./mapping";
 
@@ -6,7 +6,10 @@ export class GamepadCapture {
   #wasReleased = false;
   #modifier: Control | null = null;
 
-  /** Given all that is pressed (0 to 1) once a frame: the control meant, once that is clear. What was down before the first rest does not count. */
+  /**
+   * Pass all pressed controls (0 to 1) once per frame. Return the chosen control once it is unambiguous. Controls
+   * pressed before everything was released are ignored.
+   */
   update(pressed: ReadonlyMap<Control, number>): Control | null {
     const down = [...pressed].filter(([, strength]) => strength > PRESS_THRESHOLD).map(([control]) => control);
     if (!this.#wasReleased) {
@@ -18,7 +21,7 @@ export class GamepadCapture {
     if (first === null) return other ?? null;
     if (other !== undefined) return `${first} ${other}`;
     this.#modifier = first;
-    // a button alone is meant when it comes up alone
+    // A button counts alone when it is released alone.
     return down.length === 0 ? first : null;
   }
 }

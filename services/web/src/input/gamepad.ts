@@ -1,16 +1,19 @@
-/** Polls the first standard gamepad and carries out what its controls are bound to. */
+/** Polls the first standard gamepad and dispatches the commands of its controls. */
 import type { CommandDispatcher } from "./command-dispatcher";
 import { resolveControls } from "./gamepad-state";
 import { type Control, isPadControl, type Mapping } from "./mapping";
 import { OneEuro, smoothingSettings } from "./one-euro";
 
-/** Of the smoothing of a stick, Hz for each full push a second: a flick is followed within a frame or two. */
+/** Beta of the stick filter, in Hz per full deflection per second: a flick is followed within one or two frames. */
 const STICK_BETA = 3;
 
 export interface GamepadInput {
-  /** The pad in use, for the picture of it; null when none is there. */
+  /** The gamepad in use, for its picture; null if there is none. */
   readonly pad: Gamepad | null;
-  /** Reads the pad. Once a frame, with a time that never runs backwards, milliseconds. Not `acting`, it only looks which pad there is. */
+  /**
+   * Read the gamepad, once per frame. `now` is in milliseconds and never decreases. If not `enabled`, only detect the
+   * gamepad.
+   */
   update(now: number, enabled?: boolean): void;
 }
 
@@ -21,9 +24,9 @@ export function createGamepadInput(
 ): GamepadInput {
   const filters = [0, 1].map(() => new OneEuro(2, { minCutoff: 1, beta: STICK_BETA, derivativeCutoff: 1 }));
   let pad: Gamepad | null = null;
-  let before: readonly Control[] = [];
+  let pressedBefore: readonly Control[] = [];
 
-  /** The axes, the sticks among them without their noise. One at rest is at rest: nothing of its movement lingers on. */
+  /** Return the axes with smoothed sticks. A stick at rest resets its filter, so that no movement lingers. */
   const smooth = (axes: readonly number[], { deadZone, stickSmoothing }: Mapping, now: number): number[] => {
     const settings = smoothingSettings(stickSmoothing, STICK_BETA);
     const smoothed = [...axes];
@@ -43,18 +46,18 @@ export function createGamepadInput(
     get pad() {
       return pad;
     },
-    update(now, acting = true) {
-      pad = pads().find((one) => one?.connected && one.mapping === "standard") ?? null;
-      if (!pad || !acting) {
+    update(now, enabled = true) {
+      pad = pads().find((candidate) => candidate?.connected && candidate.mapping === "standard") ?? null;
+      if (!pad || !enabled) {
         commands.releaseAll(isPadControl);
-        before = [];
+        pressedBefore = [];
         return;
       }
-      const asked = resolveControls({ axes: smooth(pad.axes, mapping(), now), buttons: pad.buttons }, mapping());
-      const down = asked.map(({ control }) => control);
-      for (const control of before) if (!down.includes(control)) commands.release(control, now);
-      for (const { control, commands: wanted, strength } of asked) commands.press(control, wanted, strength, now);
-      before = down;
+      const inputs = resolveControls({ axes: smooth(pad.axes, mapping(), now), buttons: pad.buttons }, mapping());
+      const pressed = inputs.map(({ control }) => control);
+      for (const control of pressedBefore) if (!pressed.includes(control)) commands.release(control, now);
+      for (const { control, commands: bound, strength } of inputs) commands.press(control, bound, strength, now);
+      pressedBefore = pressed;
     },
   };
 }

@@ -1,16 +1,16 @@
-/** Everything by keyboard alone: what keys are bound to, and Escape and ? that are fixed. */
+/** Keyboard input: the bound keys, and the fixed keys Escape and ?. */
 import type { CommandDispatcher } from "./command-dispatcher";
 import { isPadControl, type Mapping } from "./mapping";
 import type { VelocityInputs } from "./velocity-input";
 
 export interface KeyboardActions {
-  /** Shows what the keys do. */
+  /** Show the key bindings. */
   showKeys(): void;
-  /** Escape with nothing held: shut what is open. */
+  /** Close the open panel, on Escape with no limb held. */
   onEscape(): void;
 }
 
-/** Listens to the keys of a window, or of an element that has the focus or something in it that has. */
+/** Listen to the keys of a window, or of an element that contains the focus. */
 export function listenToKeyboard(
   target: GlobalEventHandlers,
   commands: CommandDispatcher,
@@ -44,7 +44,7 @@ export function listenToKeyboard(
       actions.showKeys();
       return true;
     }
-    // a button or link that has the focus is pressed by these two
+    // These two keys activate a focused button or link.
     const onControl = event.target instanceof Element && event.target.closest("button, a, [role=slider]") !== null;
     if (onControl && (code === "Space" || code === "Enter")) return false;
     return commands.press(code, mapping().bindings[code] ?? [], 1, event.timeStamp);

@@ -1,9 +1,10 @@
 /**
- * Which physical control does what, as data. Pure.
+ * Mapping from physical controls to commands, as data. Pure.
  *
- * A control is a key's place (`KeyboardEvent.code`), a further button of the mouse (`mouse:1`, as `MouseEvent.button`) or its wheel (`wheel:+`, towards oneself), or
- * of a gamepad of the W3C standard layout a button (`button:7`) or half an axis (`axis:0+`). Two words are a control while a button is held (`button:4 axis:1-`):
- * then what the control does alone does not count, and with an empty list it does nothing.
+ * A control is a key position (`KeyboardEvent.code`), an additional mouse button (`mouse:1`, as `MouseEvent.button`),
+ * the wheel (`wheel:+`, towards the user), or on a gamepad of the W3C standard layout a button (`button:7`) or half an
+ * axis (`axis:0+`). Two words are a control with a button held (`button:4 axis:1-`): it replaces the bindings of the
+ * control alone, and an empty list disables the control.
  */
 import { LIMBS } from "../motion/skeleton";
 import { DIGITAL_INPUTS, type DigitalInput, SELECTED_LIMB_INPUTS, type SelectedLimbInput } from "./digital-input";
@@ -33,9 +34,9 @@ export type Command = DigitalInput | SelectedLimbInput | Action;
 
 export interface Mapping {
   readonly bindings: Readonly<Record<Control, readonly Command[]>>;
-  /** Sticks nearer their middle than this rest, 0 to `DEAD_ZONE_MOST`. */
+  /** Dead zone of the sticks, 0 to `MAX_DEAD_ZONE`. */
   readonly deadZone: number;
-  /** How much a stick and a pointer are smoothed, 0 (not at all) to 1. */
+  /** Smoothing of sticks and pointers, 0 (none) to 1. */
   readonly stickSmoothing: number;
   readonly pointerSmoothing: number;
 }
@@ -46,7 +47,7 @@ const ALL_COMMANDS: ReadonlySet<unknown> = new Set<Command>([...DIGITAL_INPUTS, 
 const CONTROL_PATTERN =
   /^(button:\d{1,2} )?(button:\d{1,2}|axis:\d{1,2}[+-])$|^(mouse:[1-4]|wheel:[+-])$|^[A-Z][A-Za-z0-9]{0,31}$/;
 
-/** A key takes a limb and six move it; a stick moves a hand, and with its shoulder button held a leg. */
+/** One key claims a limb and six keys move it; a stick moves a hand, or a leg while its shoulder button is held. */
 export const DEFAULT_MAPPING: Mapping = {
   bindings: {
     Digit1: ["take_right_hand"],
@@ -113,7 +114,7 @@ export const DEFAULT_MAPPING: Mapping = {
   pointerSmoothing: 0,
 };
 
-/** The limb that a command takes, or null. */
+/** Return the limb that a command claims, or null. */
 export function limbOfCommand(command: Command): number | null {
   const limb = command.startsWith("take_") ? (LIMBS as readonly string[]).indexOf(command.slice("take_".length)) : -1;
   return limb < 0 ? null : limb;
@@ -127,51 +128,54 @@ export function isPadControl(control: Control): boolean {
   return /^(button|axis):/.test(control);
 }
 
-/** What a control means just now: while a string is held what it does with that, if anything; else the rest. */
+/** Return the commands of a control that apply now: those of the selected limb if there is one, else the others. */
 export function activeCommands(commands: readonly Command[], isLimbSelected: boolean): readonly Command[] {
   const held = commands.filter(isSelectedLimbInput);
   return isLimbSelected && held.length > 0 ? held : commands.filter((command) => !isSelectedLimbInput(command));
 }
 
-/** The controls of a command, in the mapping's order. */
+/** Return the controls bound to a command, in the mapping's order. */
 export function controlsOf({ bindings }: Mapping, command: Command): Control[] {
   return Object.keys(bindings).filter((control) => bindings[control].includes(command));
 }
 
-/** What else a control does at the same time. A command of the selected limb goes before the others, so these never meet. */
+/**
+ * Return the other commands that a control triggers at the same time. Commands of the selected limb exclude all others,
+ * so the two kinds never conflict.
+ */
 export function conflictsOf({ bindings }: Mapping, control: Control, command: Command): Command[] {
   return (bindings[control] ?? []).filter(
     (other) => other !== command && isSelectedLimbInput(other) === isSelectedLimbInput(command),
   );
 }
 
-/** The mapping with one more binding. */
+/** Return the mapping with an additional binding. */
 export function bind(mapping: Mapping, control: Control, command: Command): Mapping {
-  const there = mapping.bindings[control] ?? [];
-  if (there.includes(command)) return mapping;
-  return { ...mapping, bindings: { ...mapping.bindings, [control]: [...there, command] } };
+  const existing = mapping.bindings[control] ?? [];
+  if (existing.includes(command)) return mapping;
+  return { ...mapping, bindings: { ...mapping.bindings, [control]: [...existing, command] } };
 }
 
-/** The mapping with one binding less. */
+/** Return the mapping without a binding. */
 export function unbind(mapping: Mapping, control: Control, command: Command): Mapping {
   const rest = (mapping.bindings[control] ?? []).filter((one) => one !== command);
   const { [control]: _, ...others } = mapping.bindings;
-  // a control with a button held stays, so that what it does alone stays silent
+  // A control with a button held stays, so that the bindings of the control alone remain disabled.
   return { ...mapping, bindings: rest.length > 0 || control.includes(" ") ? { ...others, [control]: rest } : others };
 }
 
-/** The mapping that a value read from somewhere is, or null where it is none. */
+/** Return a mapping from unvalidated data, or null if it is invalid. */
 export function parseMapping(value: unknown): Mapping | null {
   if (!isRecord(value) || !isRecord(value.bindings)) return null;
   const { deadZone, stickSmoothing, pointerSmoothing } = value;
   if (!isInRange(deadZone, MAX_DEAD_ZONE) || !isInRange(stickSmoothing, 1) || !isInRange(pointerSmoothing, 1))
     return null;
   const entries = Object.entries(value.bindings);
-  const good = entries.every(
+  const isValid = entries.every(
     ([control, commands]) =>
       CONTROL_PATTERN.test(control) && Array.isArray(commands) && commands.every((one) => ALL_COMMANDS.has(one)),
   );
-  if (!good || entries.length > MAX_CONTROLS) return null;
+  if (!isValid || entries.length > MAX_CONTROLS) return null;
   const bindings = Object.fromEntries(
     entries.map(([control, commands]) => [control, [...new Set(commands as Command[])]]),
   );

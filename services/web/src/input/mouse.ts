@@ -1,14 +1,17 @@
-/** The mouse's further buttons and its wheel on the stage: what they are bound to. The first button drags and turns (`pointer.ts`). */
+/**
+ * Additional mouse buttons and the wheel on the stage, with their bindings. The primary button drags and turns
+ * (`pointer.ts`).
+ */
 import type { CommandDispatcher } from "./command-dispatcher";
 import type { Control, Mapping } from "./mapping";
 
-/** A notch of the wheel counts as a press of this length, milliseconds. */
+/** Duration of the press that a notch of the wheel stands for, in milliseconds. */
 const WHEEL_NOTCH_MS = 120;
 
-/** The control of a mouse event, or null: the first button is none. */
+/** Return the control of a mouse event, or null for the primary button. */
 export function controlOfEvent(event: MouseEvent): Control | null {
   if (event.type === "wheel") {
-    // with Ctrl it is the browser's, and a pinch of a touchpad
+    // With Ctrl the event is the browser's zoom or a touchpad pinch.
     const { deltaY } = event as WheelEvent;
     return deltaY === 0 || event.ctrlKey ? null : `wheel:${deltaY > 0 ? "+" : "-"}`;
   }
@@ -21,8 +24,8 @@ export function listenToMouse(
   commands: CommandDispatcher,
   mapping: () => Mapping,
 ): void {
-  let turning: ReturnType<typeof setTimeout> | undefined;
-  let turned: Control | null = null;
+  let wheelTimer: ReturnType<typeof setTimeout> | undefined;
+  let wheelControl: Control | null = null;
   const press = (event: MouseEvent): Control | null => {
     const control = controlOfEvent(event);
     const bound = control === null ? undefined : mapping().bindings[control];
@@ -30,10 +33,10 @@ export function listenToMouse(
     event.preventDefault();
     return control;
   };
-  const rest = (now: number) => {
-    clearTimeout(turning);
-    if (turned) commands.release(turned, now);
-    turned = null;
+  const releaseWheel = (now: number) => {
+    clearTimeout(wheelTimer);
+    if (wheelControl) commands.release(wheelControl, now);
+    wheelControl = null;
   };
   canvas.addEventListener("mousedown", press);
   window.addEventListener("mouseup", (event) => {
@@ -43,10 +46,10 @@ export function listenToMouse(
   canvas.addEventListener(
     "wheel",
     (event) => {
-      if (turned && turned !== controlOfEvent(event)) rest(event.timeStamp);
-      turned = press(event) ?? turned;
-      clearTimeout(turning);
-      turning = setTimeout(() => rest(event.timeStamp + WHEEL_NOTCH_MS), WHEEL_NOTCH_MS);
+      if (wheelControl && wheelControl !== controlOfEvent(event)) releaseWheel(event.timeStamp);
+      wheelControl = press(event) ?? wheelControl;
+      clearTimeout(wheelTimer);
+      wheelTimer = setTimeout(() => releaseWheel(event.timeStamp + WHEEL_NOTCH_MS), WHEEL_NOTCH_MS);
     },
     { passive: false },
   );

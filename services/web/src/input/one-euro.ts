@@ -1,18 +1,19 @@
 /**
- * The One-Euro filter (Casiez, Roussel, Vogel: "1€ Filter", CHI 2012) of vectors: slow movement is smoothed, fast movement is followed. Pure. The cutoff grows
- * with the speed of the whole vector, so that a smoothed movement keeps its direction. `client/one_euro.py` is the same in Python.
+ * One-Euro filter of vectors (Casiez, Roussel, Vogel: "1€ Filter", CHI 2012): slow movement is smoothed, fast movement
+ * is followed. Pure. The cutoff grows with the speed of the whole vector, so that movements keep their direction.
+ * `client/one_euro.py` is the same filter in Python.
  */
 
 export interface OneEuroSettings {
-  /** Hz, at rest: lower is steadier. */
+  /** Cutoff at rest in Hz: lower is steadier. */
   minCutoff: number;
-  /** Hz for each unit a second of speed: higher lags less. */
+  /** Cutoff added per unit of speed, in Hz per unit per second: higher lags less. */
   beta: number;
-  /** Hz, of the speed's own smoothing. */
+  /** Cutoff of the smoothing of the speed, in Hz. */
   derivativeCutoff: number;
 }
 
-/** Samples nearer in time than this are of one time, seconds. */
+/** Samples closer than this have the same time, in seconds. */
 const MIN_INTERVAL_S = 1e-6;
 
 interface FilterState {
@@ -31,15 +32,15 @@ export class OneEuro {
   ) {}
 
   /**
-   * The smoothed value of a sample at a time. The first comes through as it is, and so does a constant. Times may be irregular; of several samples of one
-   * time, or of an earlier one, the last counts as if it were the only one.
+   * Return the filtered value of a sample. The first sample and constant values pass unchanged. Times may be irregular;
+   * of several samples with the same or an earlier time, the last replaces the others.
    *
-   * @throws RangeError for another number of values, or one that is not finite
+   * @throws RangeError if the number of values is wrong or one is not finite
    */
   filter(values: ArrayLike<number>, seconds: number): Float64Array {
     if (values.length !== this.dimensions || !Array.from(values).every(Number.isFinite) || !Number.isFinite(seconds)) {
       throw new RangeError(
-        `a sample is ${this.dimensions} finite numbers and a time, not ${Array.from(values).join(", ")} at ${seconds}`,
+        `A sample needs ${this.dimensions} finite numbers and a time: ${Array.from(values).join(", ")} at ${seconds}.`,
       );
     }
     if (this.#current && seconds - this.#current.seconds >= MIN_INTERVAL_S) this.#previous = this.#current;
@@ -50,33 +51,35 @@ export class OneEuro {
     return this.#current.value.slice();
   }
 
-  /** Forgets what came: the next sample is the first. */
+  /** Forget all samples: the next one is the first. */
   reset(): void {
     this.#previous = this.#current = null;
   }
 
-  #step(before: FilterState, values: ArrayLike<number>, seconds: number): FilterState {
+  #step(previous: FilterState, values: ArrayLike<number>, seconds: number): FilterState {
     const { minCutoff, beta, derivativeCutoff } = this.settings;
-    const passed = seconds - before.seconds;
-    const slow = lowPassWeight(derivativeCutoff, passed);
-    const speed = before.speed.map((old, axis) => old + slow * ((values[axis] - before.value[axis]) / passed - old));
-    const much = lowPassWeight(minCutoff + beta * Math.hypot(...speed), passed);
-    // written so that a constant comes through to the last bit
-    const value = before.value.map((old, axis) => old + much * (values[axis] - old));
+    const interval = seconds - previous.seconds;
+    const speedWeight = lowPassWeight(derivativeCutoff, interval);
+    const speed = previous.speed.map(
+      (old, axis) => old + speedWeight * ((values[axis] - previous.value[axis]) / interval - old),
+    );
+    const valueWeight = lowPassWeight(minCutoff + beta * Math.hypot(...speed), interval);
+    // In this form a constant passes bit for bit.
+    const value = previous.value.map((old, axis) => old + valueWeight * (values[axis] - old));
     return { seconds, value, speed };
   }
 }
 
-/** What a new sample weighs in a low-pass of a cutoff in Hz, after some seconds. */
+/** Return the weight of a new sample in a low-pass filter with a cutoff in Hz after an interval in seconds. */
 function lowPassWeight(cutoff: number, interval: number): number {
-  const turned = 2 * Math.PI * cutoff * interval;
-  return turned / (turned + 1);
+  const omega = 2 * Math.PI * cutoff * interval;
+  return omega / (omega + 1);
 }
 
-/** Cutoffs at rest of the least and the most smoothing, Hz. */
+/** Cutoffs at rest of the least and the most smoothing, in Hz. */
 const REST_CUTOFFS_HZ = [8, 0.6] as const;
 
-/** A person's wish for smoothness, 0 (none) to 1, as settings; `beta` depends on the unit. Null for none. */
+/** Return the settings for an amount of smoothing, 0 (none) to 1; `beta` depends on the unit. Null for none. */
 export function smoothingSettings(amount: number, beta: number): OneEuroSettings | null {
   if (!(amount > 0)) return null;
   return {

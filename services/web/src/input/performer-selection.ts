@@ -1,18 +1,18 @@
-/** Which of several performers this page's keys, pad and buttons act on. */
+/** Selection of the performer that this page's keys, gamepad and buttons act on. */
 import { limbNumber } from "../wire/limbs";
 
 export class PerformerSelection {
   #performer = 0;
   #count = 1;
 
-  /** `changed` is told of another choice, and of another number of performers. */
+  /** `onChange` is called when the selection or the number of performers changes. */
   constructor(private readonly onChange: () => void = () => undefined) {}
 
   get performer(): number {
     return this.#performer;
   }
 
-  /** How many performers there are to choose from, one at least. */
+  /** Number of performers, at least one. */
   get count(): number {
     return this.#count;
   }
@@ -30,7 +30,10 @@ export class PerformerSelection {
     this.onChange();
   }
 
-  /** The number of the chosen performer's limb; `part` counts as `LIMBS`. Here, and nowhere else, do keys and pad come to know whose limb they mean. */
+  /**
+   * Return the number of a limb of the selected performer; `part` indexes `LIMBS`. Only here do keys and gamepad learn
+   * which performer they control.
+   */
   limb(part: number): number {
     return limbNumber(this.#performer, part);
   }

@@ -1,25 +1,30 @@
-/** Mouse and touch on the stage: a ring or hand is dragged, anything else turns the view. */
+/** Mouse and touch on the stage: dragging a handle pulls its limb, dragging anything else turns the view. */
 import { Vector3 } from "three";
 import type { Stage } from "../stage/stage";
 import { limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
 import type { LimbController } from "./limb-controller";
 import { OneEuro, smoothingSettings } from "./one-euro";
 
-/** How near a handle a pointer takes hold, CSS pixels, whatever size the ring is drawn. */
+/** Distance within which a pointer grabs a handle, in CSS pixels, whatever the size of its ring. */
 export const GRAB_RADIUS_PX = 44;
 const ORBIT_RAD_PER_PX = 0.005;
-/** Of the smoothing of what is pulled, Hz for each metre a second. */
+/** Beta of the smoothing of the pull target, in Hz per metre per second. */
 const PULL_BETA = 12;
-/** Full speed nearer and further, metres a second, and how far the limb may lag behind it, metres. */
+/**
+ * Full speed towards and away from the audience in metres per second, and how far the limb may lag behind, in metres.
+ */
 const DEPTH_SPEED_M_PER_S = 0.7;
 const MAX_DEPTH_LAG_M = 0.15;
 
 export interface PointerInput {
-  /** The limb under the pointer, lit; null for none. */
+  /** Limb under the pointer, highlighted; null for none. */
   readonly hoveredLimb: number | null;
-  /** Whether a limb is being dragged. */
+  /** True if a limb is being dragged. */
   readonly isDragging: boolean;
-  /** Pulls again what is held: the dance moves under a resting pointer. Once a frame, with the time of events, milliseconds. */
+  /**
+   * Renew the pull targets, once per frame: the performer moves under a resting pointer. `now` is on the clock of
+   * events, in milliseconds.
+   */
   update(now: number): void;
 }
 
@@ -27,20 +32,21 @@ interface Drag {
   limb: number;
   x: number;
   y: number;
-  /** From the pointer to the handle when it was taken, pixels. */
+  /** Offset from the pointer to the handle when it was grabbed, in pixels. */
   dx: number;
   dy: number;
-  /** Of the place it is pulled to. */
+  /** Filter of the pull target. */
   filter: OneEuro;
-  /** How much nearer to the audience than the handle it is pulled, metres, and when that was, milliseconds. */
+  /** Offset of the target from the handle towards the audience, in metres. */
   depthLead: number;
-  /** How near that is, metres towards the audience. */
+  /** Depth of the target towards the audience, in metres, and the time of its last update, in milliseconds. */
   depth: number;
   updatedAt: number;
 }
 
 /**
- * Whether a limb can be taken, and who is told when not, and when it was; how much a pull is smoothed, 0 to 1; how fast a limb goes nearer meanwhile, -1 to 1, by keys or wheel.
+ * Callbacks: whether a limb can be claimed, notification of a refused and a successful claim, smoothing of a pull (0 to
+ * 1), and the speed of a limb towards the audience during it, by keys or wheel (-1 to 1).
  */
 export interface PointerOptions {
   canClaim(limb: number): boolean;
@@ -54,33 +60,33 @@ export function createPointerInput(
   canvas: HTMLCanvasElement,
   stage: Stage,
   limbController: LimbController,
-  { canClaim: may, onRefused: refused, onClaimed: taken, smoothing, depthInput: nearer }: PointerOptions,
+  { canClaim, onRefused, onClaimed, smoothing, depthInput }: PointerOptions,
 ): PointerInput {
   const drags = new Map<number, Drag>();
-  let near: number | null = null;
+  let hoveredLimb: number | null = null;
   let orbiting: { id: number; x: number; y: number } | null = null;
   const handle = new Vector3();
   const handleAt = (limb: number) => stage.performers[performerOfLimb(limb)].handle(limbWithinPerformer(limb), handle);
 
-  /** Where in the picture an event is, CSS pixels: the canvas may stand anywhere in a page. */
-  const placeOf = (event: PointerEvent): { x: number; y: number } => {
+  /** Return the position of an event in the picture, in CSS pixels: the canvas may be anywhere in the page. */
+  const positionOf = (event: PointerEvent): { x: number; y: number } => {
     const { left, top } = canvas.getBoundingClientRect();
     return { x: event.clientX - left, y: event.clientY - top };
   };
-  const nearest = (x: number, y: number): number | null => {
-    let best: number | null = null;
-    let least = GRAB_RADIUS_PX;
+  const limbNear = (x: number, y: number): number | null => {
+    let nearestLimb: number | null = null;
+    let minDistance = GRAB_RADIUS_PX;
     stage.performers.forEach(({ group }, k) => {
       for (let limb = limbNumber(k, 0); group.visible && limb < limbNumber(k + 1, 0); limb++) {
         const at = stage.toScreen(handleAt(limb));
-        const away = Math.hypot(at.x - x, at.y - y);
-        if (away < least) [best, least] = [limb, away];
+        const distance = Math.hypot(at.x - x, at.y - y);
+        if (distance < minDistance) [nearestLimb, minDistance] = [limb, distance];
       }
     });
-    return best;
+    return nearestLimb;
   };
-  const light = (limb: number | null) => {
-    near = limb;
+  const highlight = (limb: number | null) => {
+    hoveredLimb = limb;
     if (limb === null) delete canvas.dataset.near;
     else canvas.dataset.near = "";
   };
@@ -88,7 +94,7 @@ export function createPointerInput(
     const { limb, x, y, dx, dy, filter } = drag;
     if (!stage.performers[performerOfLimb(limb)]) return;
     handleAt(limb);
-    deepen(drag, now);
+    updateDepth(drag, now);
     const place = stage.fromScreen(x + dx, y + dy, handle.addScaledVector(stage.back(), drag.depthLead));
     if (!place) return;
     const settings = smoothingSettings(smoothing(), PULL_BETA);
@@ -99,12 +105,14 @@ export function createPointerInput(
     limbController.pullTo(limb, place);
   };
 
-  /** Goes nearer or further at a speed, whose start is where the handle is; at rest the handle's own depth is kept. */
-  const deepen = (drag: Drag, now: number) => {
-    const speed = nearer(drag.limb) * DEPTH_SPEED_M_PER_S;
+  /**
+   * Move the target towards or away from the audience, starting at the handle; at rest the handle's own depth is kept.
+   */
+  const updateDepth = (drag: Drag, now: number) => {
+    const speed = depthInput(drag.limb) * DEPTH_SPEED_M_PER_S;
     const depth = handle.dot(stage.back());
-    const from = drag.depthLead === 0 ? depth : drag.depth;
-    drag.depth = from + (speed * Math.max(now - drag.updatedAt, 0)) / 1000;
+    const startDepth = drag.depthLead === 0 ? depth : drag.depth;
+    drag.depth = startDepth + (speed * Math.max(now - drag.updatedAt, 0)) / 1000;
     drag.depthLead = speed === 0 ? 0 : Math.min(MAX_DEPTH_LAG_M, Math.max(-MAX_DEPTH_LAG_M, drag.depth - depth));
     drag.depth = depth + drag.depthLead;
     drag.updatedAt = now;
@@ -113,19 +121,19 @@ export function createPointerInput(
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     const { pointerId } = event;
-    const { x, y } = placeOf(event);
-    const limb = nearest(x, y);
+    const { x, y } = positionOf(event);
+    const limb = limbNear(x, y);
     canvas.setPointerCapture(pointerId);
     if (limb === null) {
       orbiting ??= { id: pointerId, x, y };
       return;
     }
-    if (!may(limb)) {
-      refused(limb);
+    if (!canClaim(limb)) {
+      onRefused(limb);
       return;
     }
     if (!limbController.claim(limb, "pointer")) return;
-    taken(limb);
+    onClaimed(limb);
     const at = stage.toScreen(handleAt(limb));
     drags.set(pointerId, {
       limb,
@@ -143,7 +151,7 @@ export function createPointerInput(
   canvas.addEventListener("pointermove", (event) => {
     const drag = drags.get(event.pointerId);
     if (drag) {
-      Object.assign(drag, placeOf(event));
+      Object.assign(drag, positionOf(event));
       pull(drag, event.timeStamp);
     } else if (orbiting?.id === event.pointerId) {
       stage.audience.orbit(
@@ -152,8 +160,8 @@ export function createPointerInput(
       );
       orbiting = { id: event.pointerId, x: event.clientX, y: event.clientY };
     } else if (event.pointerType !== "touch") {
-      const { x, y } = placeOf(event);
-      light(nearest(x, y));
+      const { x, y } = positionOf(event);
+      highlight(limbNear(x, y));
     }
   });
   const end = (event: PointerEvent) => {
@@ -165,10 +173,10 @@ export function createPointerInput(
   };
   canvas.addEventListener("pointerup", end);
   canvas.addEventListener("pointercancel", end);
-  canvas.addEventListener("pointerleave", () => light(null));
+  canvas.addEventListener("pointerleave", () => highlight(null));
   return {
     get hoveredLimb() {
-      return near;
+      return hoveredLimb;
     },
     get isDragging() {
       return drags.size > 0;

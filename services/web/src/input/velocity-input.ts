@@ -1,25 +1,25 @@
 /**
- * Moves limbs by speed: every key, pad control and button of the page that is held down stands here with the input it means. The first press takes the limb,
- * several at once add up, opposite ones cancel (`directionOf`).
+ * Velocity control of limbs: collects the inputs of all pressed keys, gamepad controls and buttons. The first press
+ * claims the limb; several add up and opposite ones cancel (`combineDirections`).
  */
 import { MAX_LIMBS, performerOfLimb } from "../wire/limbs";
 import { combineDirections, type DigitalInput, effectOf, type SelectedLimbInput } from "./digital-input";
 import type { LimbController } from "./limb-controller";
 import { PerformerSelection } from "./performer-selection";
 
-/** A limb taken by a push alone, all its inputs at rest for this long, is let go, and the dance has it back. Milliseconds. */
+/** A limb claimed by a push is released after this time without input, in milliseconds. */
 const RELEASE_DELAY_MS = 700;
-/** A limb that another held is tried again no sooner than this after it came free. Milliseconds. */
+/** Minimum time between attempts to claim a limb that another puppeteer held, in milliseconds. */
 const CLAIM_RETRY_MS = 300;
-/** The first of these that is held of the chosen performer is selected. */
+/** The first held limb in this order is selected. */
 const SELECTION_ORDER = [1, 0, 3, 2];
 
 export interface VelocityActions {
-  /** Takes a limb for these inputs; false, and the person is told why, when it cannot be had. */
+  /** Claim a limb for these inputs. Return false if it is not available; the user has been told why. */
   claim(limb: number): boolean;
-  /** Whether nobody holds a limb. */
+  /** True if no puppeteer holds a limb. */
   isFree(limb: number): boolean;
-  /** Whose limbs the inputs move; left out, the first's. */
+  /** Performer whose limbs the inputs move; the first by default. */
   selection?: PerformerSelection;
 }
 
@@ -28,12 +28,12 @@ type LimbInputs = [DigitalInput | SelectedLimbInput, number][];
 
 interface LimbMotion {
   isActive: boolean;
-  /** When it was last active, and last tried for, milliseconds. */
+  /** Times of the last input and of the last attempt to claim, in milliseconds. */
   movedAt: number;
   triedAt: number;
-  /** Taken by a push, and let go by rest. */
+  /** True if the limb was claimed by a push and is released by rest. */
   isMomentary: boolean;
-  /** Lost or let go while the push goes on: it has to rest before it takes again. */
+  /** True if the limb was lost or released during a push: it must rest before the next claim. */
   needsRest: boolean;
 }
 
@@ -50,46 +50,46 @@ export class VelocityInputs {
     needsRest: false,
   }));
   #lastSelectedLimb: number | null = null;
-  /** What is held of each limb since the last frame. */
+  /** Inputs of each limb in the last frame. */
   #limbInputs: LimbInputs[] = emptyLimbInputs();
 
-  constructor(hands: LimbController, actions: VelocityActions) {
-    this.#limbController = hands;
+  constructor(limbController: LimbController, actions: VelocityActions) {
+    this.#limbController = limbController;
     this.#actions = actions;
     this.#selection = actions.selection ?? new PerformerSelection();
   }
 
-  /** The chosen performer's limb of this name: `part` counts as `LIMBS`. */
-  limb(part: number): number {
-    return this.#selection.limb(part);
+  /** Return the number of a limb of the selected performer; `part` indexes `LIMBS`. */
+  limb(index: number): number {
+    return this.#selection.limb(index);
   }
 
-  /** The limb of the chosen performer that the inputs of "whichever is held" move: one that a pointer pulls before the one taken last; null for none. */
+  /** Limb that inputs for "the held limb" move: one that a pointer pulls, else the one claimed last; null for none. */
   get selectedLimb(): number | null {
-    const own = SELECTION_ORDER.map((part) => this.limb(part));
+    const ownLimbs = SELECTION_ORDER.map((index) => this.limb(index));
     const last = this.#lastSelectedLimb;
     if (last === null || performerOfLimb(last) !== this.#selection.performer || !this.holds(last))
-      this.#lastSelectedLimb = own.find((limb) => this.holds(limb)) ?? null;
-    return own.find((limb) => this.#limbController.source(limb) === "pointer") ?? this.#lastSelectedLimb;
+      this.#lastSelectedLimb = ownLimbs.find((limb) => this.holds(limb)) ?? null;
+    return ownLimbs.find((limb) => this.#limbController.source(limb) === "pointer") ?? this.#lastSelectedLimb;
   }
 
-  /** How fast a limb that a pointer pulls over the screen is moved nearer to the audience, -1 to 1: what a pointer cannot say. */
+  /** Return the speed towards the audience, -1 to 1, of a limb that a pointer pulls: a pointer cannot set the depth. */
   depthInput(limb: number): number {
     return combineDirections(this.#limbInputs[limb])[2];
   }
 
-  /** Presses an input by a control (any name), or changes how strongly; 0 lets it up. */
+  /** Set the strength of an input by a control (any name); 0 releases it. */
   set(control: string, input: DigitalInput | SelectedLimbInput, strength: number): void {
     if (strength > 0) this.#pressed.set(`${control} ${input}`, { input, strength });
     else this.#pressed.delete(`${control} ${input}`);
   }
 
-  /** Whether a limb is held until it is let go, and not by a push alone. */
+  /** Return whether a limb is held until its release, not only by a push. */
   holds(limb: number): boolean {
     return this.#limbController.source(limb) === "velocity" && !this.#motions[limb].isMomentary;
   }
 
-  /** Holds a limb until it is let go, and selects it. False when it cannot be had. */
+  /** Hold a limb until its release and select it. Return false if it is not available. */
   hold(limb: number): boolean {
     if (this.#limbController.source(limb) !== "velocity" && !this.#actions.claim(limb)) return false;
     this.#motions[limb].isMomentary = false;
@@ -104,7 +104,7 @@ export class VelocityInputs {
     this.#limbController.release(limb);
   }
 
-  /** Lets go whatever is held until it is let go, of all performers; whether anything was, or is pulled by a pointer. */
+  /** Release all limbs held by velocity, of all performers. Return whether any was held, or is pulled by a pointer. */
   releaseAll(): boolean {
     let held = false;
     for (let limb = 0; limb < MAX_LIMBS; limb++) {
@@ -114,13 +114,15 @@ export class VelocityInputs {
     return held;
   }
 
-  /** Takes, moves and lets go as the inputs say. Once a frame, with a time that never runs backwards, milliseconds. */
+  /**
+   * Claim, move and release limbs by the current inputs, once per frame. `now` is in milliseconds and never decreases.
+   */
   update(now: number): void {
     const selected = this.selectedLimb;
     const held = emptyLimbInputs();
     for (const { input, strength } of this.#pressed.values()) {
-      const part = effectOf(input).limb;
-      const limb = part === null ? selected : this.limb(part);
+      const index = effectOf(input).limb;
+      const limb = index === null ? selected : this.limb(index);
       if (limb !== null) held[limb].push([input, strength]);
     }
     this.#limbInputs = held;
@@ -129,7 +131,7 @@ export class VelocityInputs {
 
   #updateLimb(limb: number, inputs: LimbInputs, now: number): void {
     const motion = this.#motions[limb];
-    const fresh = inputs.length > 0 && !motion.isActive;
+    const isNewPush = inputs.length > 0 && !motion.isActive;
     if (motion.isMomentary && this.#limbController.source(limb) !== "velocity") {
       motion.isMomentary = false;
       motion.needsRest = true;
@@ -137,8 +139,8 @@ export class VelocityInputs {
     motion.isActive = inputs.length > 0;
     if (motion.isActive) motion.movedAt = now;
     else motion.needsRest = false;
-    const again = !motion.needsRest && now - motion.triedAt >= CLAIM_RETRY_MS && this.#actions.isFree(limb);
-    if (motion.isActive && this.#limbController.source(limb) === null && (fresh || again)) {
+    const canRetry = !motion.needsRest && now - motion.triedAt >= CLAIM_RETRY_MS && this.#actions.isFree(limb);
+    if (motion.isActive && this.#limbController.source(limb) === null && (isNewPush || canRetry)) {
       motion.triedAt = now;
       motion.isMomentary = this.#actions.claim(limb);
     }

@@ -1,38 +1,30 @@
 /**
- * The potential-based arm (paper 4), closed exactly. Upper arm, forearm and hand hang in a plane; the table holds where
- * between its limits gravity leaves the wrist bend, and the other joints close on the hand tip.
+ * The potential-based arm (paper 4), closed exactly. Upper arm, forearm and hand hang in a plane; the bend table
+ * holds the wrist bend of least energy relative to its limits, and the other joints close on the hand tip.
  *
- * In the plane: x outwards, y up; angles t0, t1, t2 of the links from x towards y, radians; lengths in arm lengths. In
- * space y is up, and the azimuth of the plane is from z (forwards) towards x. The Python rooms `marionette/arm.py` (angles)
- * and `marionette/arms.py` (places) give the same numbers.
+ * In the plane x points outwards and y up; angles t0, t1, t2 of the links are from x towards y, radians; lengths
+ * are in arm lengths. In space y is up, and the azimuth of the plane is from z (forwards) towards x. Python:
+ * `marionette/arm.py` (angles) and `marionette/arm_batch.py` (positions) return the same numbers.
  */
 
 import type { Numbers } from "../motion/rotation";
-import {
-  MAX_ELBOW_BEND_RAD,
-  MAX_TIP_DISTANCE,
-  MAX_WRIST_BEND_RAD,
-  minTipDistance,
-  type Proportions,
-} from "./proportions";
+import { MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD, MIN_TARGET_DISTANCE, TABLE_SIDE } from "./constants";
+import { minTipDistance, type Proportions } from "./proportions";
 
-const TABLE_SIDE = 64;
 /** Sine of half the wrist's limit. */
 const MAX_HALF_BEND_SINE = Math.sin(MAX_WRIST_BEND_RAD / 2);
-/** A target nearer to the shoulder than this has no direction to keep. */
-const MIN_TARGET_DISTANCE = 1e-12;
-/** A level distance is 0 below this: far under any that matters, far above where a square loses digits. */
+/** Horizontal distance below which the tip counts as on the axis: far below any that matters. */
 const MIN_HORIZONTAL_DISTANCE = 1e-150;
 
-/** Bytes of a table as it is served. */
+/** Size of a packed table. */
 export const TABLE_BYTES = TABLE_SIDE * TABLE_SIDE * 2;
-/** Numbers that `solve` writes: sine and cosine of the azimuth, then elbow, wrist and tip. */
+/** Numbers per arm of `solveArms`: sine and cosine of the azimuth, then elbow, wrist and tip. */
 export const NUMBERS_PER_ARM = 11;
 
-/** The table in `bytes` (64 x 64 float16, little-endian). Throws `RangeError` if it is not one. */
+/** Parse a table (64 x 64 float16, little-endian). Throws `RangeError` for invalid bytes. */
 export function parseBendTable(bytes: Uint8Array): Float64Array {
   if (bytes.length !== TABLE_BYTES) {
-    throw new RangeError(`a table of an arm has ${TABLE_BYTES} bytes, not ${bytes.length}`);
+    throw new RangeError(`bend table rejected: ${bytes.length} bytes, expected ${TABLE_BYTES}`);
   }
   const table = new Float64Array(TABLE_SIDE * TABLE_SIDE);
   for (let i = 0; i < table.length; i++) {
@@ -41,7 +33,7 @@ export function parseBendTable(bytes: Uint8Array): Float64Array {
       fraction = (bits & 1023) / 1024;
     const value = exponent === 0 ? fraction * 2 ** -14 : (1 + fraction) * 2 ** (exponent - 15);
     // a sign, an infinity or a NaN is above 1 too
-    if (!(value <= 1)) throw new RangeError("a table of an arm has values in 0..1 only");
+    if (!(value <= 1)) throw new RangeError("bend table rejected: a value is outside 0..1");
     table[i] = value;
   }
   return table;
@@ -51,20 +43,20 @@ function clampedAcos(x: number): number {
   return Math.acos(Math.min(Math.max(x, -1), 1));
 }
 
-/** One arm's shape and table. */
+/** One arm with its bend table. */
 export class Arm {
-  /** The nearest to the shoulder that a hand tip is solved for. */
+  /** Smallest solved distance of the hand tip. */
   readonly minTipDistance: number;
   private readonly inverseDistanceRange: number;
-  /** With the elbow straight, and with it bent to its limit: 1 / (4 x distance of the wrist x hand). */
+  /** 1 / (4 x distance of the wrist x hand), with the elbow straight and with the elbow at its limit. */
   private readonly straightElbowFactor: number;
   private readonly foldedElbowFactor: number;
-  /** The bent elbow: distance of the wrist, and the angle from the line to it to the forearm (negative). */
+  /** With the elbow at its limit: distance of the wrist, and angle from there to the forearm (negative). */
   private readonly foldedWristDistance: number;
   private readonly foldedLean: number;
   private readonly halfLeanSine: number;
   private readonly halfLeanCosine: number;
-  /** Squares of the nearest and the farthest that this elbow reaches, and of where it does with the wrist straight. */
+  /** Squares of the smallest and largest distance with this elbow, and of the one with a straight wrist. */
   private readonly foldedNearSquared: number;
   private readonly foldedFarSquared: number;
   private readonly foldedStraightWristSquared: number;
@@ -91,12 +83,12 @@ export class Arm {
       distance * distance + hand * hand + 2 * distance * hand * Math.cos(this.foldedLean);
   }
 
-  /** The nearest distance that is solved for. */
+  /** Return the nearest solved distance. */
   clampDistance(r: number): number {
     return clampDistance(r, this.minTipDistance);
   }
 
-  /** Least and greatest wrist bend (2), radians, that reach `r` (clamped) with elbow and wrist within their limits. */
+  /** Write the smallest and largest wrist bend (2), radians, that reach `r` (clamped) within the joint limits. */
   bendLimits(out: Numbers, outAt: number, r: number): void {
     const { upper, forearm: fore, hand } = this.proportions;
     const straight = upper + fore,
@@ -110,7 +102,7 @@ export class Arm {
     out[outAt + 1] = high;
   }
 
-  /** The wrist bend, radians, at which gravity leaves an arm with its tip at (`r`, `beta`), from the table. */
+  /** Return the wrist bend of least energy, radians, with the tip at (`r`, `beta`). */
   gravityBend(r: number, beta: number): number {
     const { bendRange: limit } = this;
     this.bendLimits(limit, 0, r);
@@ -126,8 +118,8 @@ export class Arm {
   }
 
   /**
-   * t0, t1, t2 that bring the tip to (`r`, `beta`) with the wrist bent by `bend`, elbow below. Exact for any `bend` within
-   * `limits`; beyond them the arm does not reach, or a joint breaks its limit.
+   * Write t0, t1, t2 with the tip at (`r`, `beta`), the wrist bent by `bend`, and the elbow below. Exact for any
+   * `bend` within `bendLimits`; beyond them the arm does not reach, or a joint exceeds its limit.
    */
   closeChain(out: Numbers, outAt: number, r: number, beta: number, bend: number): void {
     const { upper, forearm: fore, hand } = this.proportions;
@@ -141,18 +133,19 @@ export class Arm {
     out[outAt + 2] = t1 + bend;
   }
 
-  /** t0, t1, t2 for a tip at distance `r` (already clamped) and elevation `beta`, -pi/2..pi/2. */
+  /** Write t0, t1, t2 for a tip at distance `r` (clamped) and elevation `beta`, -pi/2..pi/2. */
   solveAngles(out: Numbers, outAt: number, r: number, beta: number): void {
     this.closeChain(out, outAt, r, beta, this.gravityBend(r, beta));
   }
 
   /**
-   * The arms whose tips are at `count` targets (x, y, z each, from `targetsAt` on), in the vertical plane: `SOLVED` numbers
-   * each into `out`. A target out of reach is brought in with its direction kept; the shoulder's own place counts as
-   * straight below.
+   * Solve the arms with their tips at `count` targets (x, y, z each), in the vertical plane. Writes
+   * `NUMBERS_PER_ARM` numbers each. A target out of reach is moved into reach along its direction; the shoulder
+   * itself counts as straight below.
    *
-   * Square roots alone: a place in the plane is a complex number, and joints turn by multiplying. First all bends, then all
-   * arms: one arm's numbers wait for each other, and shorter chains let the processor work at more arms at once.
+   * Only square roots: a position in the plane is a complex number, and joints rotate by multiplication. The first
+   * loop computes the bends and the second the arms: shorter dependency chains let the processor overlap several
+   * arms.
    */
   solveArms(out: Numbers, outAt: number, targets: Numbers, targetsAt: number, count = 1): void {
     const { upper, forearm: fore, hand } = this.proportions;
@@ -204,7 +197,7 @@ export class Arm {
       if (greatest > MAX_HALF_BEND_SINE) greatest = MAX_HALF_BEND_SINE;
       let least = 0;
       if (square < fold) {
-        // half of an angle sum: the folded elbow's lean, and the bend that reaches so far from there
+        // half of an angle sum: the lean of the folded elbow and the bend that reaches this distance
         const bendSine = Math.sqrt(Math.min((far - square) * folded, 1));
         const bendCosine = Math.sqrt(Math.max((square - near) * folded, 0));
         least = Math.min(Math.max(leanSine * bendCosine + leanCosine * bendSine, 0), greatest);
@@ -226,7 +219,7 @@ export class Arm {
         halfSquare = half * half;
       const cosBend = 1 - 2 * halfSquare,
         sinBend = 2 * half * Math.sqrt(1 - halfSquare);
-      // the rest of the arm, seen along the forearm, and the triangle it makes with the upper arm
+      // the rest of the arm in the frame of the forearm, and its triangle with the upper arm
       const restX = fore + hand * cosBend,
         restY = hand * sinBend,
         rest = whole - part * halfSquare;
@@ -259,14 +252,14 @@ export class Arm {
   }
 }
 
-/** `reach` within what is solved for. */
+/** Clamp a distance to the solved range. */
 function clampDistance(reach: number, inner: number): number {
   return reach < inner ? inner : reach > MAX_TIP_DISTANCE ? MAX_TIP_DISTANCE : reach;
 }
 
 /**
- * The table's value, `slack` being the root of the share of its reach that an arm has left, for a tip in the direction of `level`
- * (not below zero) and `up`.
+ * Interpolate the table. `slack` is the square root of the share of the reach that is left; the tip is in the
+ * direction of `level` (at least zero) and `up`.
  */
 function interpolateTable(table: Float64Array, slack: number, level: number, up: number): number {
   const u = (1 - slack) * (1 + 0.75 * slack) * (TABLE_SIDE - 1);

@@ -1,9 +1,8 @@
 /**
- * An arm between the dance's way of reaching its hand tip and the marionette's. Both arms are seen in the frame of their chord,
- * the line from shoulder to tip with the plane of the elbow about it. There they differ by little, and mixing their joints moves
- * the tip by little; the arm is then closed on the target again, so that the tip is exact all the way. What is left of jumps turns
- * nothing but the elbow about the chord, or links about themselves, and is gone through at a bounded speed. As
- * `marionette/blend.py`.
+ * Blend of an arm between the stored motion's joints and the solver's. Both are expressed in the frame of their
+ * chord, the segment from shoulder to tip with the plane of the elbow, where they differ little. The arm is then
+ * closed on the target again, so that the tip is exact throughout. The remaining jumps affect only the swivel of
+ * the elbow and the twist of the bones, and both change at a bounded speed. Python: `marionette/blend.py`.
  */
 
 import { conjugate, multiply, type Numbers, rotate, slerp } from "../motion/rotation";
@@ -21,18 +20,14 @@ import {
   setVector,
   unit,
 } from "../motion/vector";
+import { DISTANCE_WEIGHT, MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S, SWIVEL_RESET_WEIGHT } from "./constants";
 import type { ArmRig } from "./limb-rig";
-import { FULL_TURN_RAD, MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S, TwistLimiter } from "./twist";
+import { FULL_TURN_RAD, TwistLimiter } from "./twist";
 
-/** Up to this weight the elbow takes the shortest way round anew: what it came by is hardly seen any more. */
-const SWIVEL_RESET_WEIGHT = 0.05;
-/** An arm whose tip is half an arm length (1 / `AWAY`) from the dance's may be turned quite otherwise, at any weight. */
-const DISTANCE_WEIGHT = 2;
-
-/** One arm on its way. It remembers which way round the elbow swings, and how far its links are turned. */
+/** Blend of one arm, with the state of the swivel and of the twist. */
 export class ArmBlend {
   private swivelRad: number | null = null;
-  /** Radians about the chord that the elbow is shown ahead of its way, and goes back. */
+  /** Decaying offset about the chord that hides a change of the way round. */
   private swivelOffsetRad = 0;
   private readonly twistLimiter: TwistLimiter;
   private readonly own = new Float64Array(3);
@@ -51,7 +46,7 @@ export class ArmBlend {
     this.twistLimiter = new TwistLimiter(rig.bones);
   }
 
-  /** Forgets the way it went. */
+  /** Forget the state. */
   reset(): void {
     this.swivelRad = null;
     this.swivelOffsetRad = 0;
@@ -59,13 +54,13 @@ export class ArmBlend {
   }
 
   /**
-   * The joints (12) at `weight`, `seconds` after the last: 0 gives back the dance's, 1 the bent arm's in the plane of `normal`,
-   * both as soon as the links have come round.
+   * Write the joints (12) at `weight`, `seconds` after the last call: 0 gives the motion's joints and 1 the
+   * solver's in the plane of `normal`, once no bone's twist lags.
    *
-   * `dance` (12 at `danceAt`) are the pose's joints, `bent` (12) those of `ArmRig.bend` for the `target` (3, arm lengths, axes of
-   * vl5); `turn` (4) brings the direction of the dance's own hand to the target's, and `normal` is a unit vector (3) square to
-   * that. Between, the elbow goes to the nearest place from which forearm and hand reach the target; where the mixed wrist
-   * leaves none, the tip comes as near as it can.
+   * `solvedJoints` (12) are those of `ArmRig.bendJoints` for the `target` (3, arm lengths, axes of vl5).
+   * `alignment` (4) rotates the direction of the motion's hand to the target's; `normal` (3) is a unit vector
+   * perpendicular to the target. In between, the elbow is at the nearest position from which forearm and hand
+   * reach the target.
    */
   blend(
     out: Numbers,
@@ -82,7 +77,7 @@ export class ArmBlend {
     const { rig, own, direction, frame, carried } = this;
     rig.targetDirection(direction, 0, target, 0);
     rig.tipTarget(own, 0, motionJoints, motionJointsAt);
-    // nothing is left of the memory when the limb is the dance's again, so that it is let go without a jump
+    // offset and lag vanish with the weight, so that the release of the limb is no jump
     const share = Math.min(Math.max(Math.cbrt(weight), DISTANCE_WEIGHT * distanceBetween(target, 0, own, 0)), 1);
     const most = Math.min(Math.abs(this.swivelOffsetRad), FULL_TURN_RAD * share);
     this.swivelOffsetRad = Math.sign(this.swivelOffsetRad) * Math.max(most - MAX_TWIST_SPEED_RAD_S * seconds, 0);
@@ -101,7 +96,7 @@ export class ArmBlend {
     this.twistLimiter.limit(out, outAt, share, seconds);
   }
 
-  /** The joints (12) below weight 1, the directions of the target and of the dance's own hand being known. */
+  /** Write the joints (12) below weight 1; `direction` and `own` hold the directions of target and motion. */
   private blendJoints(
     out: Numbers,
     outAt: number,
@@ -124,7 +119,7 @@ export class ArmBlend {
       const onwards = swivel + FULL_TURN_RAD * Math.round((this.swivelRad - swivel) / FULL_TURN_RAD);
       if (weight > SWIVEL_RESET_WEIGHT && Math.abs(onwards) <= MAX_TWIST_LAG_RAD) swivel = onwards;
       else {
-        // the other way round from here on; it is shown where it was, and comes over
+        // the other way round from here on: the offset keeps the shown elbow in place and decays
         this.swivelOffsetRad += weight * (onwards - swivel);
         this.swivelOffsetRad -= FULL_TURN_RAD * Math.round(this.swivelOffsetRad / FULL_TURN_RAD);
       }
@@ -150,7 +145,7 @@ export class ArmBlend {
     normalise(out, outAt);
   }
 
-  /** Turns shoulder and elbow by as little as brings the tip to `reach` arm lengths along the chord. */
+  /** Rotate shoulder and elbow least so that the tip is at `reach` arm lengths along the chord. */
   private closeOnTip(joints: Numbers, at: number, reach: number): void {
     const { rig, rest, place, goal, turn, before, side: mixed } = this;
     const { bones: links } = rig;
@@ -162,8 +157,7 @@ export class ArmBlend {
     const along = Math.min(Math.max((near * near + chord * chord - far * far) / (2 * chord), -near), near);
     const off = Math.sqrt(Math.max(near * near - along * along, 0));
     rotate(mixed, 0, joints, at, links, 0);
-    // where the elbow has to go farther off the chord, it goes to the side of -y: a straight arm leaves open which, and that of
-    // the bent arm is there
+    // an elbow that must move away from the chord moves towards -y, where the elbow of the bent arm is
     setVector(place, 0, 0, mixed[1] - Math.max(off - Math.hypot(mixed[1], mixed[2]), 0), mixed[2]);
     if (!unit(place, 0, place, 0)) setVector(place, 0, 0, -1, 0);
     setVector(place, 0, along, off * place[1], off * place[2]);
@@ -172,7 +166,7 @@ export class ArmBlend {
     for (let i = 0; i < 3; i++) mixed[i] /= near;
     rotationBetween(turn, 0, mixed, 0, goal, 0);
     multiply(joints, at, turn, 0, joints, at);
-    // what is below the elbow, as it lies and as it should
+    // the part below the elbow: its direction now, and the required one
     rotate(rest, 0, before, 0, rest, 0);
     if (!unit(rest, 0, rest, 0)) setVector(rest, 0, 1, 0, 0);
     setVector(goal, 0, chord - place[0], -place[1], -place[2]);

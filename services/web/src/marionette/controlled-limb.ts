@@ -1,34 +1,32 @@
 /**
- * One limb between the dance and a hand: taken, pulled, let go. Each frame the limb is first shown the dance (`see`), then,
- * while it is not wholly the dance's, pulled (`pull`). It remembers where it is and how fast it goes, and is moved on by the time
- * between frames, in seconds. Places (3) are hand tips in the shoulder's frame in arm lengths; of a leg the thigh's angle, first
- * of three. Poses are 18 rotations, joints 12 numbers. As `marionette/pulled.py`.
+ * One limb between the stored motion and a puppeteer, from claim to return. Each frame the limb first observes the
+ * motion (`observePose`), then, while it is controlled, its joints are solved (`solveJoints`). A position (3) is a
+ * hand tip in the shoulder's frame in arm lengths, or a thigh angle, the first of three. Poses are 18 rotations,
+ * joints 12 numbers. Python: `marionette/controlled_limb.py`.
  */
 
 import type { Numbers } from "../motion/rotation";
 import type { Figure } from "../motion/skeleton";
 import { addScaled, distanceBetween, length } from "../motion/vector";
 import { ArmBlend } from "./blend";
+import {
+  ARRIVAL_TOLERANCE,
+  HAND_ACCELERATION,
+  MAX_HAND_RETURN_ACCELERATION,
+  MAX_REACH,
+  MAX_TIP_DISTANCE,
+  MIN_REACH,
+  MIN_SOLVE_WEIGHT,
+  THIGH_ACCELERATION,
+} from "./constants";
 import { Elbow, liftAngle } from "./elbow";
 import { Follower } from "./follower";
-import { DirectionAlignment, HAND_ACCELERATION, JointBlend, returnAcceleration, THIGH_ACCELERATION } from "./handover";
+import { DirectionAlignment, JointBlend, returnAcceleration } from "./handover";
 import { ArmRig, LegRig } from "./limb-rig";
-import { MAX_TIP_DISTANCE } from "./proportions";
-
-/** Arm lengths: a pulled arm is never quite locked, so that its elbow leaves the line at a bounded speed. */
-export const MAX_REACH = 0.9995;
-/** Arm lengths from the shoulder that a hand is pulled to at least: nearer in, the elbow would have to whirl. */
-export const MIN_REACH = 0.15;
-/** Arm lengths per second squared, against the dance, that a hand let go comes back with at most. */
-const MAX_HAND_RETURN_ACCELERATION = 79;
-/** Arm lengths, or radians, within which a limb is the dance's again. */
-const ARRIVAL_TOLERANCE = 1e-6;
-/** A limb on its last way home is still solved for. */
-const MIN_WEIGHT = 1e-9;
 
 const ZERO_VELOCITY = new Float64Array(3);
 
-/** What hands and legs have in common: how the dance has the limb, and how it moves. */
+/** Common part of hands and legs: the position in the motion and the moving limb. */
 export abstract class ControlledLimb {
   protected readonly motionPosition = new Float64Array(3);
   protected readonly velocity = new Float64Array(3);
@@ -39,12 +37,12 @@ export abstract class ControlledLimb {
   private readonly previousPosition = new Float64Array(3);
   private readonly previousVelocity = new Float64Array(3);
 
-  /** Where the limb is (3); live storage. */
+  /** Shown position (3); live storage. */
   get position(): Float64Array {
     return this.follower ? this.follower.position : this.motionPosition;
   }
 
-  /** The dance's pose, `seconds` after the last. */
+  /** Observe a pose of the motion, `seconds` after the last one. */
   observePose(rotations: Numbers, seconds: number): void {
     const { motionPosition: own, previousPosition: before, currentPosition: now, velocity } = this;
     this.positionInPose(now, rotations);
@@ -55,22 +53,22 @@ export abstract class ControlledLimb {
     this.hasPose = true;
   }
 
-  /** The limb is wholly the dance's. */
+  /** Return to the motion at once and forget the state. */
   reset(): void {
     this.follower = null;
     this.returnAcceleration = null;
   }
 
-  /** The limb is taken where another pose than the dance has it, standing. */
+  /** Start from another pose than the motion's, at rest. */
   startFrom(rotations: Numbers): void {
     this.positionInPose(this.currentPosition, rotations);
     this.follower = new Follower(this.currentPosition, ZERO_VELOCITY);
   }
 
   /**
-   * Writes the limb's joints, `seconds` after the last, in the pose that was seen just now; false, nothing written, once it is
-   * back. It is on its way to `wanted` (3), or, where that is null, back to the dance; `weight` (0..1) says how far it has gone
-   * over from the dance's way of reaching a place to the marionette's.
+   * Write the limb's joints, `seconds` after the last call, for the last observed pose. Returns false and writes
+   * nothing once the limb is back. The limb moves towards `goal` (3), or back to the motion if that is null.
+   * `weight` (0..1) is the weight of the solver's joints.
    */
   abstract solveJoints(
     out: Numbers,
@@ -81,15 +79,15 @@ export abstract class ControlledLimb {
     seconds: number,
   ): boolean;
 
-  /** Where a pose has the limb (3). */
+  /** Write the position (3) of the limb in a pose. */
   protected abstract positionInPose(out: Numbers, rotations: Numbers): void;
 
-  /** What moves the limb; it starts from where the dance had it a frame ago, at the speed it had. */
+  /** Return the follower, which starts with the position and velocity of the motion a frame ago. */
   protected ensureFollower(): Follower {
     return (this.follower ??= new Follower(this.previousPosition, this.previousVelocity));
   }
 
-  /** The acceleration on the way back to the dance, settled when the limb is let go. */
+  /** Return the acceleration of the return, chosen once when the limb is released. */
   protected chooseReturnAcceleration(maxAcceleration: number): number {
     if (this.returnAcceleration !== null) return this.returnAcceleration;
     const { position: place, velocity } = this.ensureFollower();
@@ -117,7 +115,7 @@ export class ControlledHand extends ControlledLimb {
   private readonly places = new Float64Array(9);
   private readonly bent = new Float64Array(12);
 
-  /** `limb` is 0 (left hand) or 1 (right hand), `table` what `readTable` gave for the arm's proportions. */
+  /** `limb` is 0 (left hand) or 1 (right hand), `table` the parsed bend table of the arm's proportions. */
   constructor(figure: Figure, limb: 0 | 1, table: Float64Array) {
     super();
     this.rig = new ArmRig(figure, limb, table);
@@ -152,7 +150,7 @@ export class ControlledHand extends ControlledLimb {
       for (let i = 0; i < 3; i++) this.clampedGoal[i] *= reach;
       follower.step(this.clampedGoal, seconds, HAND_ACCELERATION, inner, MAX_TIP_DISTANCE);
     } else {
-      // the dance may have its hand nearer to the shoulder than one is pulled
+      // the motion may have its hand nearer to the shoulder than a controlled one goes
       follower.step(
         own,
         seconds,
@@ -173,11 +171,22 @@ export class ControlledHand extends ControlledLimb {
     rig.localUp(up, 0, rotations);
     const { tip, normal, bend } = elbow.step(direction, length(hand, 0), up, seconds);
     rig.bendJoints(bent, 0, length(tip, 0), bend);
-    // the dance may hold its arms where the marionette's shoulders do not go: what they allow comes in with the weight
+    // the motion may hold an arm where the shoulder's limit forbids it: the limit comes in with the weight
     addScaled(target, 0, tip, 0, hand, 0, -1);
     addScaled(target, 0, hand, 0, target, 0, weight);
     this.alignment.update(around, 0, own, target, weight);
-    this.blend.blend(out, outAt, rotations, at, bent, target, around, normal, Math.max(weight, MIN_WEIGHT), seconds);
+    this.blend.blend(
+      out,
+      outAt,
+      rotations,
+      at,
+      bent,
+      target,
+      around,
+      normal,
+      Math.max(weight, MIN_SOLVE_WEIGHT),
+      seconds,
+    );
     return true;
   }
 
@@ -222,7 +231,7 @@ export class ControlledLeg extends ControlledLimb {
       if (weight <= 0 && Math.abs(thigh[0] - own[0]) < ARRIVAL_TOLERANCE) return false;
     }
     rig.solve(hung, 0, thigh[0], rotations);
-    this.blend.blend(out, outAt, rotations, 4 * rig.firstJointIndex, hung, 0, Math.max(weight, MIN_WEIGHT));
+    this.blend.blend(out, outAt, rotations, 4 * rig.firstJointIndex, hung, 0, Math.max(weight, MIN_SOLVE_WEIGHT));
     return true;
   }
 

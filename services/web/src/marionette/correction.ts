@@ -1,30 +1,30 @@
 /**
- * From one account of a limb to another without a step: when what is shown changes over, the difference of the joints at that
- * instant stays laid over the new and is let in over `SECONDS` (inertialization: Bollo, GDC 2018, with a decay of our own).
+ * Transition between two sources of a limb without a step: the difference of the joints at the change decays over
+ * `CORRECTION_S` (inertialization: Bollo, GDC 2018, with a decay of our own design).
  */
 
 import { conjugate, multiply, type Numbers, slerp } from "../motion/rotation";
 import { normalise } from "../motion/vector";
 import { minimumJerk } from "./handover";
 
-/** Seconds in which a difference is let in. */
+/** Duration of the decay. */
 export const CORRECTION_S = 0.3;
 
 const IDENTITY = Float64Array.of(1, 0, 0, 0);
 
-/** The three joints of one limb: twelve numbers. */
+/** Correction of the three joints of one limb: twelve numbers. */
 export class Correction {
-  /** Of each joint the turn that is left at `passed` 0. */
+  /** Difference of each joint at the begin. */
   private readonly differences = new Float64Array(12);
   private elapsedS = CORRECTION_S;
   private readonly turn = new Float64Array(4);
 
-  /** Whether there is anything left of it. */
+  /** True if a difference is left. */
   get isActive(): boolean {
     return this.elapsedS < CORRECTION_S;
   }
 
-  /** What was shown as `from` (12 at `fromAt`, and what is left of this over it) is `to` (12 at `toAt`) from now on. */
+  /** Begin a transition from the shown joints `from` (12), including a running correction, to `to` (12). */
   begin(from: Numbers, fromAt: number, to: Numbers, toAt: number): void {
     const { differences, turn } = this;
     for (let at = 0; at < 12; at += 4) {
@@ -37,12 +37,12 @@ export class Correction {
     this.elapsedS = 0;
   }
 
-  /** `seconds` later. */
+  /** Advance by `seconds`. */
   advance(seconds: number): void {
     this.elapsedS = Math.min(this.elapsedS + seconds, CORRECTION_S);
   }
 
-  /** Lays what is left over the joints (12). */
+  /** Apply the remaining difference to the joints (12). */
   apply(joints: Numbers, at: number): void {
     if (!this.isActive) return;
     for (let joint = 0; joint < 12; joint += 4) {

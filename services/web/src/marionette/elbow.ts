@@ -1,10 +1,10 @@
 /**
- * Where the elbow goes: where gravity wants it, at a bounded speed, and never where no shoulder lets it.
+ * Elbow of one arm: where gravity puts it, at a bounded speed, within the limit of the shoulder.
  *
- * With the hand tip given, an arm is still free in two ways: it turns about the chord, the line from shoulder to tip, and it
- * trades the wrist's bend for the elbow's, which lifts the upper arm off the chord more or less. Both are remembered and
- * follow gravity's: so nothing is thrown across where the hand passes straight below the shoulder, and nothing snaps at full
- * stretch. As `marionette/elbow.py`, which says more.
+ * With the hand tip given, an arm has two freedoms: it turns about the chord, the segment from shoulder to tip,
+ * and it trades wrist bend for elbow bend, which lifts the upper arm off the chord. Both have a state that follows
+ * gravity, so that the elbow neither crosses over when the hand passes straight below the shoulder nor snaps at
+ * full stretch. Python: `marionette/elbow_step.py`, with more detail.
  */
 
 import { type Numbers, rotate } from "../motion/rotation";
@@ -22,29 +22,24 @@ import {
   unit,
 } from "../motion/vector";
 import type { Arm } from "./arm";
-import { MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD } from "./proportions";
+import {
+  CAP_CLEARANCE_RAD,
+  HALF_SWING_DISTANCE,
+  MAX_ELBOW_BEND_RAD,
+  MAX_ELBOW_SPEED,
+  MAX_LIFT_SPEED,
+  MAX_OFFSET_PER_SLACK,
+  MAX_SWING_SPEED_RAD_S,
+  MAX_TIP_DISTANCE,
+  MAX_WRIST_BEND_RAD,
+  MIN_SWING_SPEED,
+  SWING_HALF_LIFE_S,
+} from "./constants";
 import type { ShoulderLimit } from "./shoulder";
 
-/** Distance from the vertical axis, in arm lengths, at which the plane is drawn half as fast as far away. */
-const HALF_SWING_DISTANCE = 0.05;
-/** Seconds in which the swing left to do halves, far from the axis. */
-const SWING_HALF_LIFE_S = 0.08;
-/** Radians per second that the plane swings at most. */
-const MAX_SWING_SPEED_RAD_S = 2 * Math.PI;
-/** Arm lengths per second: what the hand's way and the change of bend leave of this is there for the swing. */
-export const MAX_ELBOW_SPEED = 1.68;
-/** Arm lengths that the elbow is off the chord at most, for each arm length that the tip is short of full stretch. */
-const MAX_OFFSET_PER_SLACK = 2.4;
-/** Arm lengths per second that are there for the swing in any case. */
-const MIN_SWING_SPEED = 0.1;
-/** Radians that an upper arm keeps from where no shoulder goes. */
-const CAP_CLEARANCE_RAD = 1e-7;
-/** Arm lengths per second that the elbow leaves or nears the chord beyond what the tip asks for. */
-const MAX_LIFT_SPEED = 1.2;
-
 /**
- * An arm's freedoms settled: where the `tip` (3) is, in arm lengths (not where it was asked to be only while the shoulder's
- * limit leaves no other way), the unit `normal` (3) of the arm's plane, square to it, and the wrist's `bend`.
+ * Solved arm. `tip` (3) is in arm lengths and differs from the target only while the shoulder's limit leaves no
+ * other way; `normal` (3) is the unit normal of the arm's plane; `bend` is the bend of the wrist.
  */
 export interface ArmConfiguration {
   readonly tip: Float64Array;
@@ -61,8 +56,8 @@ function clampedAcos(x: number): number {
 }
 
 /**
- * Normal (3) of the vertical plane through the unit `direction`; false, nothing written, within 1e-9 of the axis. Turning about
- * it by a positive angle raises the outer end: it is the axis of the elbow's bend.
+ * Write the normal (3) of the vertical plane through the unit `direction`; return false, writing nothing, within
+ * 1e-9 of the axis. A positive rotation about it raises the outer end: it is the axis of the elbow's bend.
  */
 export function verticalNormal(out: Numbers, direction: Numbers, up: Numbers): boolean {
   const [x, y, z] = out;
@@ -74,30 +69,30 @@ export function verticalNormal(out: Numbers, direction: Numbers, up: Numbers): b
 
 const level = new Float64Array(3);
 
-/** The angle of a unit vector (3) above the horizontal, radians, -pi/2..pi/2. */
+/** Return the angle of a unit vector (3) above the horizontal, radians, -pi/2..pi/2. */
 export function elevation(direction: Numbers, up: Numbers): number {
   rejectFrom(level, 0, direction, 0, up, 0);
   return Math.atan2(dot(direction, 0, up, 0), length(level, 0));
 }
 
-/** How far an elbow (3, from the shoulder, any length) is off the unit `direction` of the tip, radians. */
+/** Return the angle of an elbow (3, from the shoulder) off the unit `direction` of the tip, radians. */
 export function liftAngle(elbow: Numbers, direction: Numbers): number {
   const along = dot(elbow, 0, direction, 0);
   return Math.atan2(Math.sqrt(Math.max(dot(elbow, 0, elbow, 0) - along * along, 0)), along);
 }
 
-/** The angle between two unit vectors (3), radians; by the half chord, as the arc cosine loses small angles. */
+/** Return the angle between two unit vectors (3); from half the chord, because the arc cosine loses small angles. */
 export function angleBetween(a: Numbers, b: Numbers): number {
   return 2 * Math.asin(Math.min(0.5 * distanceBetween(a, 0, b, 0), 1));
 }
 
-/** One arm's elbow, in the shoulder's frame so that a turning body carries it. */
+/** State of one arm's elbow, in the shoulder's frame so that a turning body carries it. */
 export class Elbow {
   private readonly direction = new Float64Array(3);
   private readonly normal = Float64Array.of(1, 0, 0);
   private lift = 0;
   private isStarted = false;
-  /** Where the upper arm was shown last, and whether it was. */
+  /** Last shown direction of the upper arm, if there is one. */
   private readonly lastUpperArm = new Float64Array(3);
   private hasLastUpperArm = false;
   private readonly configuration: ArmConfiguration = { tip: new Float64Array(3), normal: new Float64Array(3), bend: 0 };
@@ -114,19 +109,19 @@ export class Elbow {
     private readonly shoulder: ShoulderLimit,
   ) {}
 
-  /** The next call of `begin` starts anew. */
+  /** Forget the state; `begin` must be called before the next step. */
   reset(): void {
     this.isStarted = this.hasLastUpperArm = false;
   }
 
-  /** Whether it has begun. */
+  /** True if `begin` was called since the last reset. */
   get hasBegun(): boolean {
     return this.isStarted;
   }
 
   /**
-   * Starts with the tip in the unit `direction`, the plane as near to `normal` as square to it allows, and the upper arm `lift`
-   * radians off the chord.
+   * Start with the tip in the unit `direction` and the upper arm `lift` radians off the chord. The normal is the
+   * part of `normal` perpendicular to the direction.
    */
   begin(direction: Numbers, normal: Numbers, lift: number): void {
     this.direction.set(direction);
@@ -136,8 +131,8 @@ export class Elbow {
   }
 
   /**
-   * The arm once the tip has come to the unit `direction` at `reach` arm lengths, `seconds` after the last. `up` is the world's
-   * up, a unit vector in the same frame. The storage is used again by the next call.
+   * Return the arm with its tip in the unit `direction` at `reach` arm lengths, `seconds` after the last step.
+   * `up` is the world's up in the same frame. The next call overwrites the result.
    */
   step(direction: Numbers, reach: number, up: Numbers, seconds: number): ArmConfiguration {
     const { arm, shoulder, normal, before, upperArm, configuration: hanging, wanted } = this;
@@ -148,7 +143,7 @@ export class Elbow {
     this.setNormal(normal, direction);
     this.direction.set(direction);
     let r = arm.clampDistance(reach);
-    // towards full stretch the lift ends anyhow: evenly, and not within the last frames
+    // the lift vanishes at full stretch: reduce it evenly, not within the last frames
     const goal = Math.min(
       this.liftForBend(r, arm.gravityBend(r, elevation(direction, up))),
       (MAX_OFFSET_PER_SLACK * (MAX_TIP_DISTANCE - r)) / upper,
@@ -163,7 +158,7 @@ export class Elbow {
     this.lift = lift;
     let turn = shoulder.minAllowedTurn(direction, normal, lift);
     if (turn === null) {
-      // no turn helps: more bend of the elbow may, and where it does not, a hand that is nearer
+      // no turn helps: bend the elbow more, and if that does not help, bring the hand nearer
       const away = shoulder.angleToAllowed(direction) + CAP_CLEARANCE_RAD;
       if (away > this.maxLift(r)) r = this.maxDistanceForLift(r, away);
       lift = Math.min(Math.max(lift, away), this.maxLift(r));
@@ -176,8 +171,7 @@ export class Elbow {
     const most = (moved + left) / upper;
     hanging.normal.set(normal);
     if (this.hasLastUpperArm && (turn === null || angleBetween(upperArm, this.lastUpperArm) > most)) {
-      // the shoulder's limit leaves one way only, and it is a long one: the hand waits for the elbow; where it leaves none,
-      // close to the shoulder, the elbow waits too
+      // the shoulder's limit leaves only a long way: the hand waits for the elbow; near the shoulder both wait
       if (turn !== null) shoulder.stepToward(this.lastUpperArm, this.lastUpperArm, upperArm, most);
       for (let i = 0; i < 3; i++) wanted[i] = direction[i] * reach;
       this.reachFromUpperArm(this.lastUpperArm, wanted);
@@ -195,13 +189,13 @@ export class Elbow {
     if (!unit(this.normal, 0, this.normal, 0)) anyPerpendicular(this.normal, 0, direction, 0);
   }
 
-  /** The unit vector (3) from the shoulder to the elbow. */
+  /** Write the unit vector (3) from the shoulder to the elbow. */
   private computeUpperArm(out: Numbers, direction: Numbers, normal: Numbers, lift: number): void {
     cross(this.side, 0, direction, 0, normal, 0);
     combine(out, 0, direction, 0, Math.cos(lift), this.side, 0, Math.sin(lift));
   }
 
-  /** Swings the normal about the chord towards the vertical plane's by as much as the elbow may move. */
+  /** Swing the normal about the chord towards that of the vertical plane, by at most the allowed elbow travel. */
   private swingNormal(
     direction: Numbers,
     up: Numbers,
@@ -231,7 +225,7 @@ export class Elbow {
     unit(normal, 0, normal, 0);
   }
 
-  /** What hangs, where forearm and hand come nearest to `target` from an upper arm that is on its way. */
+  /** Solve forearm and hand as near to `target` as this upper arm allows. */
   private reachFromUpperArm(upperArm: Numbers, target: Numbers): void {
     const { upper, forearm: fore, hand } = this.arm.proportions;
     const { configuration: hanging, side, along, before: way, wanted: direction } = this;
@@ -239,7 +233,7 @@ export class Elbow {
     addScaled(way, 0, target, 0, upperArm, 0, -upper);
     const shortest = Math.sqrt(fore * fore + hand * hand + 2 * fore * hand * Math.cos(MAX_WRIST_BEND_RAD));
     const reach = clamp(shortest, length(way, 0), fore + hand);
-    // where forearm and hand are straight, the cosine has lost the digits that tell the bend
+    // where forearm and hand are straight, the cosine has no digits left for the bend
     const bend = reach < fore + hand ? clampedAcos((reach * reach - fore * fore - hand * hand) / (2 * fore * hand)) : 0;
     const lean = Math.atan2(hand * Math.sin(bend), fore + hand * Math.cos(bend));
     rejectFrom(side, 0, way, 0, upperArm, 0);
@@ -258,7 +252,7 @@ export class Elbow {
     hanging.bend = clamp(this.limits[0], bend, this.limits[1]);
   }
 
-  /** The farthest tip, no farther than `r`, whose upper arm is lifted `away` radians off the chord. */
+  /** Return the largest distance up to `r` at which the upper arm can be `minLift` radians off the chord. */
   private maxDistanceForLift(r: number, minLift: number): number {
     let near = this.arm.minTipDistance,
       far = r;
@@ -270,13 +264,13 @@ export class Elbow {
     return near;
   }
 
-  /** The least lift that reaches `r` with elbow and wrist within their limits. */
+  /** Return the smallest lift that reaches `r` within the joint limits. */
   private minLift(r: number): number {
     this.arm.bendLimits(this.limits, 0, r);
     return this.liftForBend(r, this.limits[1]);
   }
 
-  /** The greatest. */
+  /** Return the largest lift that reaches `r` within the joint limits. */
   private maxLift(r: number): number {
     this.arm.bendLimits(this.limits, 0, r);
     return this.liftForBend(r, this.limits[0]);
@@ -290,7 +284,7 @@ export class Elbow {
 
   private bendForLift(r: number, lift: number): number {
     const { upper, forearm: fore, hand } = this.arm.proportions;
-    // at a limit the cosine has lost the digits that tell the bend
+    // at a limit the cosine has no digits left for the bend
     if (lift >= this.maxLift(r)) return this.limits[0];
     const square = upper * upper + r * r - 2 * upper * r * Math.cos(lift);
     return clamp(this.limits[0], clampedAcos((square - fore * fore - hand * hand) / (2 * fore * hand)), this.limits[1]);

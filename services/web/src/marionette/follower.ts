@@ -1,7 +1,8 @@
 /**
- * A limb on its way to where it is wanted, at a bounded acceleration: it speeds up, brakes in time and arrives without running
- * past (the time-optimal way of a mass with a bounded force, in discrete time; Han, From PID to Active Disturbance Rejection
- * Control, 2009). A target that moves evenly is kept up with and not run after. As `marionette/follow.py`.
+ * Controlled limb on its way to a target, at a bounded acceleration: it accelerates, brakes in time and arrives
+ * without overshoot (time-optimal control of a mass with a bounded force in discrete time; Han, From PID to Active
+ * Disturbance Rejection Control, 2009). A target at constant velocity is tracked without lag. Python:
+ * `marionette/follower_step.py`.
  */
 
 import type { Numbers } from "../motion/rotation";
@@ -15,23 +16,17 @@ import {
   setVector,
   unit,
 } from "../motion/vector";
-
-/** Arm lengths (radians, of a thigh) per second: a target that moved faster has jumped, and has no speed of its own. */
-const MAX_TARGET_SPEED = 4;
-/** Arm lengths (radians) per second: no hand or thigh is sent farther in a second than that. */
-const MAX_LIMB_SPEED = 5;
-/** Arm lengths from the shoulder within which a hand on its way elsewhere does not come: it goes round. */
-const SHOULDER_CLEARANCE = 0.35;
+import { MAX_LIMB_SPEED, MAX_TARGET_SPEED, SHOULDER_CLEARANCE } from "./constants";
 
 const FORWARDS = Float64Array.of(0, 0, 1);
 
-/** One hand (arm lengths) or thigh (radians in the first of three), where it is and how fast it goes. */
+/** Position and velocity of a hand (arm lengths) or a thigh (radians, the first of three). */
 export class Follower {
   readonly position: Float64Array;
   readonly velocity: Float64Array;
   private readonly previousTarget = new Float64Array(3);
   private readonly previousFrameVelocity = new Float64Array(3);
-  /** Whether there was a step before, and whether its ground moved. */
+  /** State of the last step: a target, and a moving frame of reference. */
   private hasPreviousTarget = false;
   private hadFrameVelocity = false;
   private readonly ahead = new Float64Array(3);
@@ -41,19 +36,19 @@ export class Follower {
   private readonly before = new Float64Array(3);
   private readonly aside = new Float64Array(3);
 
-  /** Starts at `place` (3) with `velocity` (3), which are copied. */
+  /** Start at `place` (3) with `velocity` (3), which are copied. */
   constructor(place: Numbers, velocity: Numbers) {
     this.position = place.slice();
     this.velocity = velocity.slice();
   }
 
   /**
-   * Moves `place` on by `seconds`, on the way to `wanted`.
+   * Move towards `target` for `seconds`.
    *
-   * `acceleration` (a second squared) bounds the change of velocity. With `carried`, the velocity of a moving ground (the
-   * dance's own limb), the bound is on the change against it: so the limb is back in the dance in a time that does not depend
-   * on what the dance does. A place nearer to the origin than `inner` or farther than `outer` is not taken, and the way round
-   * the origin keeps `CLEARANCE` where it can.
+   * `acceleration` (per second squared) bounds the change of velocity. With `frameVelocity`, the velocity of a
+   * moving frame of reference (the limb in the stored motion), it bounds the change relative to that frame, so
+   * that the time of the return does not depend on the motion. The distance from the origin stays within
+   * `minDistance` and `maxDistance`; a path past the origin keeps `SHOULDER_CLEARANCE` where it can.
    */
   step(
     target: Numbers,
@@ -78,14 +73,14 @@ export class Follower {
     this.previousTarget.set(target);
     this.hadFrameVelocity = frameVelocity !== null;
     if (frameVelocity) this.previousFrameVelocity.set(frameVelocity);
-    // what is left of the way when the target's own is taken off
+    // the remaining path without the part that the target itself will move
     addScaled(goal, 0, target, 0, ahead, 0, -seconds);
     const distance = this.findPath(goal, minDistance);
     const most = acceleration * seconds;
     // the speed from which whole steps of the bounded acceleration come to rest after `distance`
     let speed = most * (Math.sqrt(0.25 + (2 * distance) / (most * seconds)) - 0.5);
     speed = Math.min(speed, distance / seconds, MAX_LIMB_SPEED);
-    // with a moving ground all velocities are against it
+    // in a moving frame all velocities are relative to it
     for (let i = 0; i < 3; i++) {
       const had = velocity[i] - before[i];
       const aim = frameVelocity ? direction[i] * speed : ahead[i] + direction[i] * speed;
@@ -100,7 +95,10 @@ export class Follower {
     for (let i = 0; i < 3; i++) velocity[i] = (place[i] - before[i]) / seconds;
   }
 
-  /** How far it is to `wanted`, straight or past a point beside the origin; the unit vector to set out on into `direction`. */
+  /**
+   * Return the length of the path to `target`, straight or past a point beside the origin, and write its initial
+   * direction.
+   */
   private findPath(target: Numbers, minDistance: number): number {
     const { position: place, direction, aside } = this;
     addScaled(direction, 0, target, 0, place, 0, -1);
@@ -114,7 +112,7 @@ export class Follower {
     const along = -dot(place, 0, direction, 0);
     const near = Math.min(SHOULDER_CLEARANCE, length(place, 0), length(target, 0));
     if (!(along > 0 && along < distance)) return distance;
-    // the nearest that the straight way comes to the origin
+    // the point of the straight path nearest to the origin
     addScaled(aside, 0, place, 0, direction, 0, along);
     const off = length(aside, 0);
     if (off >= near) return distance;

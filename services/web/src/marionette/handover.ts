@@ -1,29 +1,23 @@
 /**
- * Between the dance and a puppeteer's hand: what keeps a limb from jumping when it is taken and let go. The *place* of the limb
- * goes over at a bounded acceleration (`follow`), then the limb is solved; over the same time the joints are brought from the
- * dance's way of reaching a place to the marionette's (`blend`), by the weight given here. As `marionette/handover.py`.
+ * Hand-over between the stored motion and a puppeteer, so that a limb never jumps. The target moves at a bounded
+ * acceleration (`follower`), then the limb is solved; at the same time the joints are blended (`blend`) with the
+ * weight computed here. Python: `marionette/handover.py`.
  */
 
 import { conjugate, multiply, type Numbers, rotate } from "../motion/rotation";
 import { dot, normalise, rotationBetween, setVector, unit } from "../motion/vector";
-
-/** Seconds from the dance's way of holding a limb to the marionette's. */
-export const BLEND_IN_S = 0.15;
-/** Seconds from the marionette's way to the dance's. */
-export const BLEND_OUT_S = 0.35;
-/** Arm lengths per second squared: a quarter of an arm is crossed in 0.11 s. */
-export const HAND_ACCELERATION = 79;
-/** Radians per second squared. */
-export const THIGH_ACCELERATION = 60;
-/** Seconds in which a limb let go comes back to the dance, where the acceleration that it takes is within the bounds. */
-const RETURN_DURATION_S = 0.28;
-/** Cosine of half the angle (of 270 degrees) that a joint goes round at most where the other way is shorter by now. */
-const MIN_HALF_ANGLE_COSINE = -0.7;
-const MIN_RETURN_ACCELERATION = 6;
+import {
+  BLEND_IN_S,
+  BLEND_OUT_S,
+  MIN_HALF_ANGLE_COSINE,
+  MIN_RETURN_ACCELERATION,
+  RETURN_DURATION_S,
+} from "./constants";
 
 /**
- * What brings a limb back in `RETURN` that is `distance` away and goes away at `speed`, by braking, speeding up and braking
- * again; within `LEAST_ACCELERATION` and `most`.
+ * Return the acceleration that brings a limb back in `RETURN_DURATION_S`. The limb is `distance` away and moves
+ * away at `speed`; it brakes, accelerates and brakes again. The result is within `MIN_RETURN_ACCELERATION` and
+ * `maxAcceleration`.
  */
 export function returnAcceleration(distance: number, speed: number, maxAcceleration: number): number {
   let low = MIN_RETURN_ACCELERATION,
@@ -37,21 +31,21 @@ export function returnAcceleration(distance: number, speed: number, maxAccelerat
   return high;
 }
 
-/** 0 to 1 for x from 0 to 1, with no speed and no acceleration at either end (Flash and Hogan 1985). */
+/** Ease x from 0 to 1 with zero speed and zero acceleration at both ends (Flash and Hogan 1985). */
 export function minimumJerk(x: number): number {
   return x * x * x * (10 + x * (6 * x - 15));
 }
 
-/** How far a limb is in its puppeteer's hands: `progress` 0 (the dance's) to 1, even in time. */
+/** Progress of a hand-over: 0 (stored motion) to 1 (puppeteer), linear in time. */
 export class Handover {
   progress = 0;
 
-  /** Of the marionette's way of holding the limb, 0..1. */
+  /** Weight of the solver's joints, 0..1. */
   get weight(): number {
     return minimumJerk(this.progress);
   }
 
-  /** `seconds` later, with the limb held or not. */
+  /** Advance by `seconds`, in the direction that depends on whether the limb is held. */
   advance(isHeld: boolean, seconds: number): void {
     const step = isHeld ? seconds / BLEND_IN_S : -seconds / BLEND_OUT_S;
     this.progress = Math.min(Math.max(this.progress + step, 0), 1);
@@ -59,8 +53,8 @@ export class Handover {
 }
 
 /**
- * The turn that brings the direction of the dance's hand to that of the pulled one, on a way round the shoulder. It is carried
- * on from call to call, so that two hands that pass opposite each other do not make it change sides.
+ * Rotation from the direction of the motion's hand to that of the controlled hand. It has a state, so that it does
+ * not change sides when the two pass opposite each other.
  */
 export class DirectionAlignment {
   private readonly rotation = new Float64Array(4);
@@ -70,15 +64,15 @@ export class DirectionAlignment {
   private readonly onwards = new Float64Array(4);
   private readonly shortest = new Float64Array(4);
 
-  /** Forgets the way it went. */
+  /** Forget the state. */
   reset(): void {
     this.hasRotation = false;
   }
 
   /**
-   * The turn (4) from the direction of `dance` (3) to that of `pulled` (3). What it turns about the arm itself, having gone
-   * round, is at most half a circle times `weight`: so it is the shortest turn when the hand is back. All the way there, at
-   * `weight` 1, it starts afresh from the shortest.
+   * Write the rotation (4) from the direction of `motionTarget` (3) to that of `controlledTarget` (3). Its twist
+   * about the arm, relative to the shortest rotation, is at most half a turn times `weight`. At `weight` 1 the
+   * state is reset.
    */
   update(out: Numbers, outAt: number, motionTarget: Numbers, controlledTarget: Numbers, weight: number): void {
     const { rotation: turn, here, there, onwards, shortest } = this;
@@ -111,20 +105,20 @@ export class DirectionAlignment {
 }
 
 /**
- * The joints of a limb between the dance's and the marionette's. Each turns on the way that it took first, as long as that is
- * not much the longer: by the shortest way it would be thrown across when the two come to be opposite each other.
+ * Blend of a limb's joints between the motion and the solver. Each joint keeps its way round unless it becomes
+ * much longer: with the shortest way, a joint would be thrown across when the two rotations become opposite.
  */
 export class JointBlend {
   private readonly previousRotations = new Float64Array(12);
   private readonly way = new Float64Array(4);
   private hasPreviousRotations = false;
 
-  /** Forgets the ways that were taken. */
+  /** Forget the state. */
   reset(): void {
     this.hasPreviousRotations = false;
   }
 
-  /** The joints (12) at `weight`; exactly either at 0 and 1, and all the way there it starts afresh. */
+  /** Write the joints (12) at `weight`: exactly the motion's at 0 and the solver's at 1, which resets the state. */
   blend(
     out: Numbers,
     outAt: number,

@@ -1,16 +1,16 @@
-/** The leg (paper 4): the thigh is lifted by an angle (radians) from straight down, the shank hangs, the ankle is fixed. */
+/**
+ * The leg (paper 4): the thigh is lifted by an angle (radians, from straight down), the shank hangs, the ankle is
+ * fixed.
+ */
 
-/** The farthest back a thigh is pulled. */
-export const MIN_THIGH_ANGLE_RAD = -Math.PI / 4;
-/** The farthest up a thigh is pulled. */
-export const MAX_THIGH_ANGLE_RAD = (2 * Math.PI) / 3;
+import { MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD } from "./constants";
 
-/** The nearest angle a thigh is pulled to. */
+/** Return the nearest angle within the limits of a thigh. */
 export function clampThigh(theta: number): number {
   return Math.min(Math.max(theta, MIN_THIGH_ANGLE_RAD), MAX_THIGH_ANGLE_RAD);
 }
 
-/** How far the knee bends so that the shank hangs; a thigh pulled back keeps it straight, as knees bend one way. */
+/** Return the bend of the knee with which the shank hangs; 0 for a thigh behind the vertical. */
 export function kneeBend(theta: number): number {
   return Math.max(0, theta);
 }

@@ -1,7 +1,8 @@
 /**
- * Limbs of a figure: from a target to the local rotations of three joints, and back. A hand's target is its tip in the
- * shoulder's frame (axes of vl5), in arm lengths; a leg's is the thigh's angle from straight down in the vertical plane
- * the hips face. Gravity is the world's. As `marionette/limbs.py`, without allocation once made.
+ * Limbs of a figure: from a target to the local rotations of three joints, and back. The target of a hand is its
+ * tip in the shoulder's frame (axes of vl5), in arm lengths; the target of a leg is the thigh's angle from
+ * straight down in the vertical plane that the hips face. Gravity is the world's. No method allocates. Python:
+ * `marionette/limb_rig.py`.
  */
 
 import { conjugate, multiply, type Numbers, rotate } from "../motion/rotation";
@@ -20,9 +21,10 @@ import {
   unit,
 } from "../motion/vector";
 import { Arm } from "./arm";
+import { MAX_WRIST_BEND_RAD } from "./constants";
 import { elevation, verticalNormal } from "./elbow";
 import { clampThigh, kneeBend } from "./leg";
-import { MAX_WRIST_BEND_RAD, type Proportions, proportionsFromLinks } from "./proportions";
+import { type Proportions, proportionsFromLinks } from "./proportions";
 import { ShoulderLimit } from "./shoulder";
 
 const SACROILIAC_INDEX = 1;
@@ -31,10 +33,10 @@ const FIRST_JOINT_INDICES = [12, 15, 2, 6] as const;
 const X = Float64Array.of(1, 0, 0);
 const UP = Float64Array.of(0, 1, 0);
 const FORWARDS = Float64Array.of(0, 0, 1);
-/** At rest, turning about this lifts an elbow's or a thigh's lower end forwards. */
+/** At rest, a rotation about this axis lifts the lower end of an elbow or a thigh forwards. */
 const BEND_AXIS = Float64Array.of(-1, 0, 0);
 
-/** Orientation (4) with x along `link` and z as near to the axis of the bend as square to it allows. */
+/** Write the orientation (4) with x along the bone and z the part of the bend axis perpendicular to it. */
 function boneFrame(out: Numbers, outAt: number, bone: Numbers, boneAt: number): void {
   const columns = new Float64Array(9);
   if (!unit(columns, 0, bone, boneAt)) setVector(columns, 0, 0, -1, 0);
@@ -44,7 +46,7 @@ function boneFrame(out: Numbers, outAt: number, bone: Numbers, boneAt: number): 
   fromColumns(out, outAt, columns, 0);
 }
 
-/** The links (9) of an arm at rest: upper arm, forearm, hand. */
+/** Return the bones (9) of an arm at rest: upper arm, forearm, hand. */
 function armBones(figure: Figure, limb: 0 | 1): Float64Array {
   const shoulder = FIRST_JOINT_INDICES[limb];
   const links = new Float64Array(9);
@@ -53,13 +55,13 @@ function armBones(figure: Figure, limb: 0 | 1): Float64Array {
   return links;
 }
 
-/** The proportions of a figure's arm (limb 0 or 1): their identity names the table to fetch. */
+/** Return the proportions of a figure's arm (limb 0 or 1); their identity names its bend table. */
 export function armProportions(figure: Figure, limb: 0 | 1): Proportions {
   const links = armBones(figure, limb);
   return proportionsFromLinks(length(links, 0), length(links, 3), length(links, 6));
 }
 
-/** One arm of a figure. Its joints are always twelve numbers: the local rotations of shoulder, elbow and wrist. */
+/** One arm of a figure. Joints are twelve numbers: the local rotations of shoulder, elbow and wrist. */
 export class ArmRig {
   /** Index of the first joint, the shoulder; elbow and wrist follow it. */
   readonly firstJointIndex: number;
@@ -77,7 +79,7 @@ export class ArmRig {
   private readonly place = new Float64Array(3);
   private readonly found = new Float64Array(9);
 
-  /** `limb` is 0 (left hand) or 1 (right hand), `table` what `readTable` gave for `armProportions(figure, limb)`. */
+  /** `limb` is 0 (left hand) or 1 (right hand), `table` the bend table of `armProportions(figure, limb)`. */
   constructor(figure: Figure, limb: 0 | 1, table: Float64Array) {
     this.firstJointIndex = FIRST_JOINT_INDICES[limb];
     this.bones = armBones(figure, limb);
@@ -88,14 +90,14 @@ export class ArmRig {
     this.palmTurnRad = limb === 0 ? Math.PI / 2 : -Math.PI / 2;
   }
 
-  /** The world's up (3) in the shoulder's frame, for a pose's 18 rotations. */
+  /** Write the world's up (3) in the shoulder's frame, for a pose's 18 rotations. */
   localUp(out: Numbers, outAt: number, rotations: Numbers): void {
     multiply(this.turn, 0, rotations, 0, rotations, 4 * VL5_INDEX);
     conjugate(this.turn, 0, this.turn, 0);
     rotate(out, outAt, this.turn, 0, UP, 0);
   }
 
-  /** Elbow, wrist and tip (9) from the shoulder, in metres on the axes of vl5. */
+  /** Write elbow, wrist and tip (9) relative to the shoulder, in metres on the axes of vl5. */
   jointPositions(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
     const { turn, place, bones: links } = this;
     for (let link = 0; link < 3; link++) {
@@ -107,7 +109,7 @@ export class ArmRig {
     }
   }
 
-  /** Where the hand tip is (3), in arm lengths: the target that asks for this place. */
+  /** Write the position (3) of the hand tip in arm lengths, which is the target for these joints. */
   tipTarget(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
     const { found, armLengthM: scale } = this;
     this.jointPositions(found, 0, joints, jointsAt);
@@ -115,8 +117,8 @@ export class ArmRig {
   }
 
   /**
-   * The normal (3) of the plane the arm lies in, not of unit length: from its bend, and where it is straight from the elbow's
-   * axis.
+   * Write the normal (3) of the arm's plane, not of unit length: from its bend, or from the elbow's axis for a
+   * straight arm.
    */
   planeNormal(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
     const { found, place, armLengthM: scale } = this;
@@ -126,12 +128,12 @@ export class ArmRig {
     combine(out, outAt, found, 0, 1 / (scale * scale), place, 0, 0.1);
   }
 
-  /** The unit vector (3) to a target; straight down for the shoulder itself. */
+  /** Write the unit vector (3) to a target; straight down for the shoulder itself. */
   targetDirection(out: Numbers, outAt: number, target: Numbers, targetAt: number): void {
     if (!unit(out, outAt, target, targetAt)) setVector(out, outAt, 0, -1, 0);
   }
 
-  /** The frame (4) of an arm's plane: x the unit `direction` to the tip, z the unit `normal`, square to it. */
+  /** Write the frame (4) with x the unit `direction` to the tip and z the unit `normal`, perpendicular to it. */
   chordFrame(out: Numbers, outAt: number, direction: Numbers, normal: Numbers): void {
     const { columns } = this;
     columns.set(direction, 0);
@@ -141,13 +143,13 @@ export class ArmRig {
   }
 
   /**
-   * The joints of an arm that reaches as far as `reach` (arm lengths) with its wrist bent by `bend` radians, in the frame of its
-   * chord: that frame times the first is the shoulder's rotation.
+   * Write the joints with the tip at distance `reach` (arm lengths) and the wrist bent by `bend` radians. The
+   * first is relative to the frame of the chord: that frame times it is the shoulder's rotation.
    */
   bendJoints(out: Numbers, outAt: number, reach: number, bend: number): void {
     const { restFrames: frames, angles, turn, palm } = this;
     this.arm.closeChain(angles, 0, reach, 0, bend);
-    // the more the wrist bends, the more the palm turns down: to the side a wrist bends little
+    // the palm turns down as the wrist bends, because a wrist bends little to the side
     const share = (angles[2] - angles[1]) / MAX_WRIST_BEND_RAD;
     fromCoordinateAxis(palm, 0, 0, this.palmTurnRad * share * share * (3 - 2 * share));
     const shoulder = outAt,
@@ -173,11 +175,11 @@ export class ArmRig {
   }
 
   /**
-   * The joints that bring the tip to `target` (3) as gravity alone has it, in the plane of `normal` (by default the vertical one,
-   * straight above and below the shoulder the one that faces forwards).
+   * Write the joints with the tip at `target` (3), bent by gravity alone in the plane of `normal`. By default this
+   * is the vertical plane; straight above and below the shoulder it faces forwards.
    *
-   * `up` is the world's up and `normal` the axis of the elbow's bend, unit vectors (3) on the axes of vl5; `normal` is square to
-   * the target. A target out of reach is brought in, its direction kept.
+   * `up` is the world's up and `normal` the axis of the elbow's bend, unit vectors (3) on the axes of vl5. A
+   * target out of reach is moved into reach along its direction.
    */
   solve(out: Numbers, outAt: number, target: Numbers, up: Numbers, normal: Numbers | null = null): void {
     const { turn } = this;
@@ -219,14 +221,17 @@ export class LegRig {
     this.thigh = figure.offsets.slice(3 * this.firstJointIndex + 3, 3 * this.firstJointIndex + 6);
     boneFrame(this.thighFrame, 0, this.thigh, 0);
     boneFrame(this.shankFrame, 0, figure.offsets, 3 * this.firstJointIndex + 6);
-    // the foot is level when the shank hangs plumb: fixed to the shank as standing has it
+    // the ankle is fixed as in standing: the foot is level when the shank is vertical
     fromColumns(this.turn, 0, Float64Array.of(0, -1, 0, 0, 0, 1, -1, 0, 0), 0);
     conjugate(this.turn, 0, this.turn, 0);
     multiply(this.ankle, 0, this.shankFrame, 0, this.turn, 0);
     normalise(this.ankle, 0);
   }
 
-  /** The hips' world orientation into `hips`; into `columns` the level direction they face, up, and their product. */
+  /**
+   * Compute the world orientation of the hips, and in `columns` the horizontal direction that they face, up, and
+   * their product.
+   */
   private computeHipFacing(rotations: Numbers): void {
     const { hips, columns, place } = this;
     multiply(hips, 0, rotations, 0, rotations, 4 * SACROILIAC_INDEX);
@@ -240,8 +245,8 @@ export class LegRig {
   }
 
   /**
-   * The thigh's angle in a pose (18 rotations), within its limits. A thigh that points beyond them is at the one it is on the way
-   * round from `near`, radians.
+   * Return the thigh's angle in a pose (18 rotations), within its limits. A thigh beyond them is at the limit that
+   * is nearer to `referenceAngle`, radians.
    */
   thighAngle(rotations: Numbers, referenceAngle = 0): number {
     this.computeHipFacing(rotations);
@@ -251,7 +256,7 @@ export class LegRig {
     return clampThigh(theta + 2 * Math.PI * Math.round((referenceAngle - theta) / (2 * Math.PI)));
   }
 
-  /** Rotations of hip, knee and ankle (12) with the thigh at `theta` radians and the shank hanging. */
+  /** Write the rotations of hip, knee and ankle (12) with the thigh at `theta` radians and the shank hanging. */
   solve(out: Numbers, outAt: number, theta: number, rotations: Numbers): void {
     const { turn } = this;
     this.computeHipFacing(rotations);

@@ -1,17 +1,18 @@
-/** The proportions of an arm, in arm lengths and parts of its mass, and the name by which its table is known. */
+/** Proportions of an arm, in arm lengths and fractions of its mass, and the identity of its bend table. */
 
-/** The elbow bends from 0 to this, radians. */
-export const MAX_ELBOW_BEND_RAD = (150 * Math.PI) / 180;
-/** The wrist bends from 0 to this, radians. */
-export const MAX_WRIST_BEND_RAD = (80 * Math.PI) / 180;
-/** The farthest a hand tip is solved for, in arm lengths. */
-export const MAX_TIP_DISTANCE = 1 - 1e-6;
+import {
+  ARM_LENGTH_RATIOS,
+  ARM_MASS_RATIOS,
+  MAX_ELBOW_BEND_RAD,
+  MAX_WRIST_BEND_DEG,
+  MIN_TIP_DISTANCE,
+  MIN_TIP_DISTANCE_FACTOR,
+} from "./constants";
 
 const TOTAL_PARTS = 10_000;
-/** Masses of upper arm, forearm and hand as parts of the body's (Winter), over their lengths as parts of its height. */
-const MASS_PER_LENGTH = [0.028 / 0.186, 0.016 / 0.146, 0.006 / 0.108];
+const MASS_PER_LENGTH = ARM_MASS_RATIOS.map((mass, link) => mass / ARM_LENGTH_RATIOS[link]);
 
-/** Lengths of upper arm, forearm and hand with sum 1, and the identity `L0-L1-L2-M0-M1-M2` of their table. */
+/** Lengths of upper arm, forearm and hand (sum 1), and the identity `L0-L1-L2-M0-M1-M2` of their table. */
 export interface Proportions {
   readonly upper: number;
   readonly forearm: number;
@@ -20,8 +21,8 @@ export interface Proportions {
 }
 
 /**
- * From lengths and masses in any unit; without masses each link weighs by its length what Winter's does. Throws
- * `RangeError` for an arm without length or mass.
+ * Return the proportions of links with these lengths and masses in any unit; by default each link has the mass per
+ * length of Winter's. Throws `RangeError` for an arm without length or mass.
  */
 export function proportionsFromLinks(
   upper: number,
@@ -42,7 +43,7 @@ export function proportionsFromLinks(
   return { upper: lengths[0], forearm: lengths[1], hand: lengths[2], identity };
 }
 
-/** From an identity, as the service knows it. Throws `RangeError` for text that is not one. */
+/** Parse an identity. Throws `RangeError` for an invalid one. */
 export function parseProportions(identity: string): Proportions {
   const parts = /^\d{1,4}(-\d{1,4}){5}$/.test(identity) ? identity.split("-").map(Number) : [];
   const whole = parts[0] + parts[1] + parts[2];
@@ -52,10 +53,10 @@ export function parseProportions(identity: string): Proportions {
   return { upper: parts[0] / whole, forearm: parts[1] / whole, hand: parts[2] / whole, identity };
 }
 
-/** The nearest to the shoulder that a tip is solved for: a quarter beyond what the joints allow, at least 0.1. */
+/** Return the smallest solved distance of the tip: 1.25 times the smallest that the joints allow, at least 0.1. */
 export function minTipDistance({ upper, forearm: fore, hand }: Proportions): number {
   let nearest = 1;
-  for (let degrees = 0; degrees <= 80; degrees++) {
+  for (let degrees = 0; degrees <= MAX_WRIST_BEND_DEG; degrees++) {
     const bend = (degrees * Math.PI) / 180;
     const x = fore + hand * Math.cos(bend),
       y = hand * Math.sin(bend);
@@ -64,10 +65,10 @@ export function minTipDistance({ upper, forearm: fore, hand }: Proportions): num
     const turn = Math.min(MAX_ELBOW_BEND_RAD, Math.PI - lean) + lean;
     nearest = Math.min(nearest, Math.hypot(upper + lower * Math.cos(turn), lower * Math.sin(turn)));
   }
-  return Math.max(0.1, 1.25 * nearest);
+  return Math.max(MIN_TIP_DISTANCE, MIN_TIP_DISTANCE_FACTOR * nearest);
 }
 
-/** Ten-thousandths that sum to 10,000, by the largest remainder. */
+/** Round to ten-thousandths with sum 10,000, by the largest remainder. */
 function apportion(shares: readonly number[]): number[] {
   const whole = shares.map((share) => Math.floor(share * TOTAL_PARTS + 1e-6));
   const order = [0, 1, 2].sort(

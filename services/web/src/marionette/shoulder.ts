@@ -1,42 +1,31 @@
 /**
- * How far a shoulder lets the upper arm go: a few round holes in the sphere of its directions (after Wilhelms and Van Gelder,
- * Fast and Easy Reach-Cone Joint Limits, 2001, as caps where no upper arm goes). Directions are unit vectors on the axes of vl5:
- * x to the left, y up, z forwards. As `marionette/shoulder.py`.
+ * Limit of the shoulder: spherical caps of directions that the upper arm cannot take (complement of the reach
+ * cones of Wilhelms and Van Gelder, Fast and Easy Reach-Cone Joint Limits, 2001). Directions are unit vectors on
+ * the axes of vl5: x to the left, y up, z forwards. Python: `marionette/shoulder.py`.
  */
 
 import { type Numbers, rotate } from "../motion/rotation";
 import { anyPerpendicular, combine, cross, dot, fromAxisAngle, length, rejectFrom, unit } from "../motion/vector";
+import { CAP_EDGE_MARGIN_RAD, LEFT_SHOULDER_CAPS } from "./constants";
 
-const EDGE_MARGIN_RAD = 1e-9;
 const FULL_TURN_RAD = 2 * Math.PI;
 
-/** Directions within `radius` radians of the unit vector `axis` (3), where no upper arm goes. */
+/** Excluded directions: those within `radius` radians of the unit vector `axis` (3). */
 export interface ExclusionCap {
   readonly axis: Float64Array;
   readonly radius: number;
 }
 
-function makeCap(side: number, up: number, forwards: number, degrees: number): ExclusionCap {
-  const axis = Float64Array.of(side, up, forwards);
-  unit(axis, 0, axis, 0);
-  return { axis, radius: (degrees * Math.PI) / 180 };
-}
-
-/** Where no left upper arm goes. Ranges: American Academy of Orthopaedic Surgeons, Joint Motion (1965), rounded out. */
-const LEFT_CAPS: readonly ExclusionCap[] = [
-  // straight back: extension ends at 60 degrees, horizontal abduction 45 to 50 behind the side
-  makeCap(0, 0.2, -1, 42),
-  // up and back: flexion and abduction end overhead, at 180 degrees
-  makeCap(0, 0.75, -0.85, 47),
-  // across the back: no farther than the arm's own side
-  makeCap(-1, -0.1, -0.75, 46),
-  // across the chest: horizontal adduction ends at 130 to 140 degrees from the side
-  makeCap(-1, 0.15, -0.05, 42),
-];
+/** Excluded directions of the left upper arm. */
+const LEFT_CAPS: readonly ExclusionCap[] = LEFT_SHOULDER_CAPS.map(({ axis, radius }) => {
+  const direction = Float64Array.from(axis);
+  unit(direction, 0, direction, 0);
+  return { axis: direction, radius };
+});
 
 const crossProduct = new Float64Array(3);
 
-/** The angle of two unit vectors (3), radians. */
+/** Return the angle between two unit vectors (3), radians. */
 function angleBetween(a: Numbers, b: Numbers): number {
   cross(crossProduct, 0, a, 0, b, 0);
   return Math.atan2(length(crossProduct, 0), dot(a, 0, b, 0));
@@ -51,11 +40,11 @@ function depthInCap({ axis, radius }: ExclusionCap, direction: Numbers): number 
   return radius - angleBetween(axis, direction);
 }
 
-/** Where the edges of two caps cross: none, or two unit vectors. */
+/** Return the two unit vectors where the edges of two caps cross, or none. */
 function capCorners(one: ExclusionCap, other: ExclusionCap): Float64Array[] {
   const d = dot(one.axis, 0, other.axis, 0);
   const square = 1 - d * d;
-  if (square < EDGE_MARGIN_RAD) return [];
+  if (square < CAP_EDGE_MARGIN_RAD) return [];
   const a = (Math.cos(one.radius) - d * Math.cos(other.radius)) / square;
   const b = (Math.cos(other.radius) - d * Math.cos(one.radius)) / square;
   const middle = new Float64Array(3),
@@ -68,11 +57,11 @@ function capCorners(one: ExclusionCap, other: ExclusionCap): Float64Array[] {
   return [off, -off].map((by) => middle.map((part, i) => part + side[i] * by));
 }
 
-/** One shoulder's limit. `Elbow` says where the elbow goes. */
+/** Limit of one shoulder. */
 export class ShoulderLimit {
   readonly caps: readonly ExclusionCap[];
   private readonly corners: readonly Float64Array[];
-  /** Turns that a cap closes: of each its middle and half its width. */
+  /** Blocked intervals of turns, one per cap: middle and half width. */
   private readonly blockedMiddles: Float64Array;
   private readonly blockedHalfWidths: Float64Array;
   private readonly edge = new Float64Array(3);
@@ -80,39 +69,42 @@ export class ShoulderLimit {
   private readonly step = new Float64Array(3);
   private readonly spin = new Float64Array(4);
 
-  /** The right shoulder's caps are the left one's, mirrored. */
+  /** The caps of the right shoulder mirror those of the left one. */
   constructor(right: boolean) {
     this.caps = right
       ? LEFT_CAPS.map(({ axis, radius }) => ({ axis: Float64Array.of(-axis[0], axis[1], axis[2]), radius }))
       : LEFT_CAPS;
     this.corners = this.caps
       .flatMap((one, i) => this.caps.slice(i + 1).flatMap((other) => capCorners(one, other)))
-      .filter((corner) => this.depthInCaps(corner) <= EDGE_MARGIN_RAD);
+      .filter((corner) => this.depthInCaps(corner) <= CAP_EDGE_MARGIN_RAD);
     this.blockedMiddles = new Float64Array(this.caps.length);
     this.blockedHalfWidths = new Float64Array(this.caps.length);
   }
 
-  /** How far a unit vector (3) is inside a cap, radians; not above zero where a shoulder goes. */
+  /** Return the largest depth of a unit vector (3) inside a cap, radians; at most zero for an allowed direction. */
   depthInCaps(direction: Numbers): number {
     let depth = -Infinity;
     for (const one of this.caps) depth = Math.max(depth, depthInCap(one, direction));
     return depth;
   }
 
-  /** The angle from a unit vector (3) to the nearest direction that a shoulder has, radians. */
+  /** Return the angle from a unit vector (3) to the nearest allowed direction, radians. */
   angleToAllowed(direction: Numbers): number {
     if (this.depthInCaps(direction) <= 0) return 0;
     let nearest = Infinity;
     for (const one of this.caps) {
       this.computeEdge(direction, one, one.radius);
-      if (this.depthInCaps(this.edge) <= EDGE_MARGIN_RAD)
+      if (this.depthInCaps(this.edge) <= CAP_EDGE_MARGIN_RAD)
         nearest = Math.min(nearest, angleBetween(this.edge, direction));
     }
     for (const corner of this.corners) nearest = Math.min(nearest, angleBetween(corner, direction));
     return nearest;
   }
 
-  /** Into `out` (3) the unit vector `most` radians from `begin` on a way to `end` round the caps; `end` where it is nearer. */
+  /**
+   * Write the unit vector (3) `maxAngle` radians from `begin` on a path to `end` round the caps; `end` if it is
+   * nearer.
+   */
   stepToward(out: Numbers, begin: Numbers, end: Numbers, maxAngle: number): void {
     if (angleBetween(begin, end) <= maxAngle) {
       out.set(end);
@@ -125,17 +117,17 @@ export class ShoulderLimit {
     rotate(step, 0, spin, 0, begin, 0);
     for (const one of this.caps) {
       if (!(depthInCap(one, step) > 0 && depthInCap(one, begin) <= 0)) continue;
-      // along the edge, to the side that leads on
-      this.computeEdge(step, one, one.radius + EDGE_MARGIN_RAD);
+      // along the edge, on the side that leads on
+      this.computeEdge(step, one, one.radius + CAP_EDGE_MARGIN_RAD);
       step.set(this.edge);
     }
-    // in a corner of two caps it stays where it is
+    // stay in a corner of two caps
     out.set(this.depthInCaps(step) <= Math.max(this.depthInCaps(begin), 0) ? step : begin);
   }
 
   /**
-   * The least turn about the unit `chord` from shoulder to tip, radians, that brings the upper arm where a shoulder goes; null
-   * where none does. The upper arm is `lift` radians off the chord, below it in the plane of the unit `normal` (square to it).
+   * Return the smallest turn about the unit `chord`, radians, that gives the upper arm an allowed direction; null
+   * for none. The upper arm is `lift` radians below the chord in the plane of the unit `normal`.
    */
   minAllowedTurn(chord: Numbers, normal: Numbers, lift: number): number | null {
     const { blockedMiddles: middles, blockedHalfWidths: halves, side } = this;
@@ -157,7 +149,7 @@ export class ShoulderLimit {
     let least: number | null = null;
     for (let i = 0; i < closed; i++) {
       for (const sign of [-1, 1]) {
-        const turn = wrapAngle(middles[i] + sign * (halves[i] + EDGE_MARGIN_RAD));
+        const turn = wrapAngle(middles[i] + sign * (halves[i] + CAP_EDGE_MARGIN_RAD));
         if (this.isAllowed(turn, closed) && (least === null || Math.abs(turn) < Math.abs(least))) least = turn;
       }
     }
@@ -171,7 +163,7 @@ export class ShoulderLimit {
     return true;
   }
 
-  /** Into `edge` the direction `radius` radians from the cap's axis, on the side of `direction`. */
+  /** Compute the direction `radius` radians from the cap's axis, on the side of `direction`. */
   private computeEdge(direction: Numbers, { axis }: ExclusionCap, radius: number): void {
     const { edge } = this;
     rejectFrom(edge, 0, direction, 0, axis, 0);

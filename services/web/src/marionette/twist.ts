@@ -1,23 +1,20 @@
 /**
- * The links of an arm turn about themselves at a bounded speed. Where a link lies says nothing about how far it is turned about
- * itself: an arm that is all but straight may have any plane, and a wrist that bends a little more may turn the palm over. So
- * each link remembers how it was turned, and what is asked of it beyond `FASTEST` it makes up for later: shoulder, elbow and
- * wrist trade that turn, and no place changes. As `marionette/spin.py`.
+ * Limit of the speed at which the bones of an arm turn about their own axes. The position of a bone does not
+ * determine its twist: an arm that is almost straight may lie in any plane, and a wrist that bends a little more
+ * may turn the palm over. So each bone has a shown twist that lags behind fast changes. Shoulder, elbow and wrist
+ * trade the difference, and no joint moves. Python: `marionette/twist_step.py`.
  */
 
 import { conjugate, multiply, type Numbers, rotate } from "../motion/rotation";
 import { dot, fromAxisAngle, normalise, rotationBetween, setVector, unit } from "../motion/vector";
+import { MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S } from "./constants";
 
-/** Radians per second that a link turns about itself at most. */
-export const MAX_TWIST_SPEED_RAD_S = 5 * Math.PI;
-/** Radians that a link is behind at most; beyond, it takes the other way round. */
-export const MAX_TWIST_LAG_RAD = 1.5 * Math.PI;
-/** Radians of a whole turn. */
+/** One full turn. */
 export const FULL_TURN_RAD = 2 * Math.PI;
 
-/** The three links of one arm. */
+/** Twist of the three bones of one arm. */
 export class TwistLimiter {
-  /** Radians (3), link by link, from what was wanted last to what was shown, within `FARTHEST` either way. */
+  /** Twist (3) of each shown bone relative to the requested one, within `MAX_TWIST_LAG_RAD` either way. */
   readonly lagRad = new Float64Array(3);
   private hasOrientations = false;
   private readonly directions = new Float64Array(9);
@@ -28,22 +25,22 @@ export class TwistLimiter {
   private readonly along = new Float64Array(3);
   private readonly before = new Float64Array(3);
 
-  /** `links` (9) are where their orientations are the identity, of any length. */
+  /** `links` (9) are the bones at rest, of any length. */
   constructor(links: Numbers) {
     for (let at = 0; at < 9; at += 3)
       if (!unit(this.directions, at, links, at)) setVector(this.directions, at, 0, -1, 0);
   }
 
-  /** The next call of `follow` starts anew. */
+  /** Forget the state. */
   reset(): void {
     this.hasOrientations = false;
     this.lagRad.fill(0);
   }
 
   /**
-   * Makes of joints (12) the nearest that the arm is shown with, `seconds` after the last. All places stay, and no link is turned
-   * about itself by more than `share` (0..1) of `FARTHEST` from what was given. The first time, and where all links keep up, the
-   * joints stay as they are.
+   * Change joints (12) to the shown ones, `seconds` after the last call. Joint positions stay, and no bone's twist
+   * changes by more than `share` (0..1) of `MAX_TWIST_LAG_RAD`. The joints stay unchanged at the first call and
+   * whenever no bone lags.
    */
   limit(joints: Numbers, at: number, share: number, seconds: number): void {
     const { wanted, orientations: shown, lagRad: behind, turn } = this;
@@ -64,7 +61,7 @@ export class TwistLimiter {
     }
   }
 
-  /** Shows a link as it is wanted, turned about itself by `most` radians at most, `step` less than if it stayed as it was. */
+  /** Limit the lag of one bone to `maxLag` radians, and reduce it by up to `maxStep` radians. */
   private limitBoneTwist(link: number, maxLag: number, maxStep: number): void {
     const { directions, wanted, orientations: shown, lagRad: behind, carried, turn, along, before } = this;
     rotate(along, 0, wanted, 0, directions, 3 * link);
@@ -74,7 +71,7 @@ export class TwistLimiter {
     conjugate(turn, 0, wanted, 0);
     multiply(turn, 0, carried, 0, turn, 0);
     let angle = 2 * Math.atan2(dot(turn, 1, along, 0), turn[0]);
-    // the way round that it took, unless that is much the longer by now
+    // keep the way round unless it is much longer by now
     angle += FULL_TURN_RAD * Math.round((behind[link] - angle) / FULL_TURN_RAD);
     if (Math.abs(angle) > MAX_TWIST_LAG_RAD) angle -= FULL_TURN_RAD * Math.round(angle / FULL_TURN_RAD);
     const left = Math.min(Math.max(Math.abs(angle) - maxStep, 0), maxLag);

@@ -1,33 +1,33 @@
 /**
- * Who dances, and where: each dance is told about the middle of a stage of its own, and stands in a place of the one stage that
- * all performers share (`proto/SPEC.md`, Track `motion`).
+ * Placement of performers: each motion has its own coordinates, and a placement moves them to the shared stage
+ * (`proto/SPEC.md`, Track `motion`).
  */
 
 import { multiply, rotate } from "./rotation";
 import type { Figure, Pose } from "./skeleton";
 import { fromCoordinateAxis } from "./vector";
 
-/** Turned by `turn` radians about y, from z towards x, and then moved by `x` and `z` metres. */
+/** Rotation by `turn` radians about y, from z towards x, then translation by `x` and `z` metres. */
 export interface Placement {
   readonly x: number;
   readonly z: number;
   readonly turn: number;
 }
 
-/** A dancer of a motion. */
+/** A performer of a motion. */
 export interface StagedPerformer {
   readonly figure: Figure;
-  /** Where the dance faces over its length as it stands on the stage, radians about y from z towards x. */
+  /** Mean facing of the motion as placed on the stage, in radians about y from z towards x. */
   readonly front: number;
   readonly placement: Placement;
 }
 
-/** Where a dance stands of which nothing else is said. */
+/** Default placement. */
 export const STAGE_CENTRE: Placement = { x: 0, z: 0, turn: 0 };
 
 const turnRotation = new Float64Array(4);
 
-/** Brings `pose` from the dance's own stage to its `place`; returned. */
+/** Transform `pose` from the motion's own stage to its placement, in place, and return it. */
 export function applyPlacement(pose: Pose, { x, z, turn }: Placement): Pose {
   const { root, rotations } = pose;
   if (turn !== 0) {

@@ -1,12 +1,12 @@
 /**
- * Rotations as unit quaternions, w x y z, in flat arrays; they turn column vectors. Every function writes into `out` at
- * `outAt` and may be given the same array for input and output, so that a frame is drawn without allocation. Names and
- * conventions are those of the Python room `motion/rotation.py`.
+ * Rotations as unit quaternions, w x y z, in flat arrays; they act on column vectors. Every function writes into `out`
+ * at `outAt` and may use the same array for input and output, so that a frame is drawn without allocation. Names and
+ * conventions are those of `motion/rotation.py` in Python.
  */
 
 export type Numbers = Float64Array;
 
-/** The rotation `b` followed by `a`. */
+/** Multiply: the rotation `b` followed by `a`. */
 export function multiply(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
   const aw = a[aAt],
     ax = a[aAt + 1],
@@ -22,7 +22,7 @@ export function multiply(out: Numbers, outAt: number, a: Numbers, aAt: number, b
   out[outAt + 3] = aw * bz + ax * by - ay * bx + az * bw;
 }
 
-/** The opposite rotation. */
+/** Invert a rotation. */
 export function conjugate(out: Numbers, outAt: number, q: Numbers, qAt: number): void {
   out[outAt] = q[qAt];
   out[outAt + 1] = -q[qAt + 1];
@@ -30,7 +30,7 @@ export function conjugate(out: Numbers, outAt: number, q: Numbers, qAt: number):
   out[outAt + 3] = -q[qAt + 3];
 }
 
-/** The vector `v` (3) turned by the quaternion `q`. */
+/** Rotate the vector `v` (3) by the quaternion `q`. */
 export function rotate(out: Numbers, outAt: number, q: Numbers, qAt: number, v: Numbers, vAt: number): void {
   const w = q[qAt],
     x = q[qAt + 1],
@@ -47,7 +47,7 @@ export function rotate(out: Numbers, outAt: number, q: Numbers, qAt: number, v: 
   out[outAt + 2] = c + w * tz + x * ty - y * tx;
 }
 
-/** The rotation as a matrix [3][3] (nine numbers); its columns are the turned axes. */
+/** Convert to a matrix [3][3] (nine numbers); its columns are the rotated axes. */
 export function toMatrix(out: Numbers, outAt: number, q: Numbers, qAt: number): void {
   const w = q[qAt],
     x = q[qAt + 1],
@@ -64,10 +64,10 @@ export function toMatrix(out: Numbers, outAt: number, q: Numbers, qAt: number): 
   out[outAt + 8] = 1 - 2 * (x * x + y * y);
 }
 
-/** Quaternion of a rotation vector (axis times angle, radians, of any length). */
+/** Convert from a rotation vector (axis times angle in radians, of any length). */
 export function fromRotationVector(out: Numbers, outAt: number, x: number, y: number, z: number): void {
   const angle = Math.sqrt(x * x + y * y + z * z);
-  // sin(a/2)/a, by its series where the quotient would lose digits
+  // sin(a/2)/a, by its series where the quotient would lose digits.
   const scale = angle < 1e-4 ? 0.5 - (angle * angle) / 48 : Math.sin(0.5 * angle) / angle;
   out[outAt] = Math.cos(0.5 * angle);
   out[outAt + 1] = scale * x;
@@ -75,7 +75,7 @@ export function fromRotationVector(out: Numbers, outAt: number, x: number, y: nu
   out[outAt + 3] = scale * z;
 }
 
-/** The shortest rotation vector (3), of at most pi radians, of a unit quaternion. */
+/** Convert a unit quaternion to its shortest rotation vector (3), at most pi radians long. */
 export function toRotationVector(out: Numbers, outAt: number, q: Numbers, qAt: number): void {
   const sign = q[qAt] < 0 ? -1 : 1;
   const x = q[qAt + 1],
@@ -88,14 +88,14 @@ export function toRotationVector(out: Numbers, outAt: number, q: Numbers, qAt: n
   out[outAt + 2] = scale * z;
 }
 
-/** From `a` at t = 0 to `b` at t = 1 by the shorter way, at even angular speed. */
+/** Interpolate from `a` at t = 0 to `b` at t = 1 by the shorter way, at constant angular speed. */
 export function slerp(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number, t: number): void {
   let dot = a[aAt] * b[bAt] + a[aAt + 1] * b[bAt + 1] + a[aAt + 2] * b[bAt + 2] + a[aAt + 3] * b[bAt + 3];
   const sign = dot < 0 ? -1 : 1;
   dot *= sign;
   let u = 1 - t,
     v = t;
-  // nearly the same rotation: a straight line differs by less than rounding, and the sine below would be zero
+  // Nearly the same rotation: linear interpolation differs by less than rounding, and the sine below would be zero.
   if (dot < 1 - 1e-12) {
     const angle = Math.acos(dot),
       sine = Math.sin(angle);

@@ -1,6 +1,6 @@
 /**
- * The H-Anim LOA-1 figure: a root and 17 joints (`proto/SPEC.md`, Conventions). Right-handed, metres, y up, z the way the
- * figure faces, x to its left; at rest every local rotation is the identity and the arms hang down.
+ * The H-Anim LOA-1 figure: a root and 17 joints (`proto/SPEC.md`, Conventions). Right-handed, metres, y up, facing z,
+ * its left at +x; at rest every local rotation is the identity and the arms hang down.
  */
 
 import { multiply, rotate } from "./rotation";
@@ -27,33 +27,36 @@ export const JOINTS: readonly string[] = [
   "r_wrist",
 ];
 
-/** Each joint's parent; -1 for the root. */
+/** Parent of each joint; -1 for the root. */
 export const PARENTS: readonly number[] = [-1, 0, 1, 2, 3, 4, 1, 6, 7, 8, 0, 10, 10, 12, 13, 10, 15, 16];
 
-/** The joints that carry a tip: crown, left hand, right hand, left toes, right toes. */
+/** Joints with a tip: crown, left hand, right hand, left toes, right toes. */
 export const TIP_JOINTS: readonly number[] = [11, 14, 17, 5, 9];
 
 export const JOINT_COUNT = 18;
 export const CHANNEL_COUNT = 19;
 
-/** The limbs people can hold, in the order of the contract. */
+/** Limbs that puppeteers can hold, in the order of the contract. */
 export const LIMBS: readonly string[] = ["left_hand", "right_hand", "left_leg", "right_leg"];
 
 /** First of the three joints of each limb; the others follow it: shoulder elbow wrist, or hip knee ankle. */
 export const LIMB_FIRST_JOINTS: readonly number[] = [12, 15, 2, 6];
 
-/** Lengths of one dancer, metres in the rest pose: each joint from its parent (54), each tip from its joint (54, zero where none). */
+/**
+ * Lengths of a performer in the rest pose, in metres: each joint from its parent (54), each tip from its joint (54,
+ * zero for none).
+ */
 export interface Figure {
   offsets: Float64Array;
   tips: Float64Array;
 }
 
-/** The same text for dancers of equal lengths, and for no others: what is made for one is made for all of them. */
+/** Return a key that is equal for figures of equal lengths, so that they share assets. */
 export function figureKey({ offsets, tips }: Figure): string {
   return `${offsets.join()} ${tips.join()}`;
 }
 
-/** One pose: the root's position (3) in metres, and a local rotation w x y z for each joint (72). */
+/** One pose: root position (3) in metres, and a local rotation w x y z per joint (72). */
 export interface Pose {
   root: Float64Array;
   rotations: Float64Array;
@@ -65,25 +68,25 @@ export interface WorldTransforms {
   orientations: Float64Array;
 }
 
-/** A pose at the origin, at rest. */
+/** Return the rest pose at the origin. */
 export function restPose(): Pose {
   const rotations = new Float64Array(JOINT_COUNT * 4);
   for (let joint = 0; joint < JOINT_COUNT; joint++) rotations[joint * 4] = 1;
   return { root: new Float64Array(3), rotations };
 }
 
-/** `from` written into `to`. */
+/** Copy a pose. */
 export function copyPose(from: Pose, to: Pose): void {
   to.root.set(from.root);
   to.rotations.set(from.rotations);
 }
 
-/** Storage for `world`. */
+/** Create storage for `worldTransforms`. */
 export function createWorldTransforms(): WorldTransforms {
   return { positions: new Float64Array(JOINT_COUNT * 3), orientations: new Float64Array(JOINT_COUNT * 4) };
 }
 
-/** World positions and orientations of `pose` on `figure`, written into `out` and returned. */
+/** Write the world positions and orientations of a pose into `out` and return it. */
 export function worldTransforms(figure: Figure, pose: Pose, out: WorldTransforms): WorldTransforms {
   const { positions, orientations } = out;
   for (let i = 0; i < 3; i++) positions[i] = pose.root[i];

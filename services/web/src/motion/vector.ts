@@ -1,21 +1,21 @@
 /**
- * What is needed beside `rotation`: directions and frames, in flat arrays (`out` at `outAt`), without
- * allocation. Input and output may be the same array.
+ * Vectors and frames, in addition to `rotation`: flat arrays (`out` at `outAt`), without allocation. Input and output
+ * may be the same array.
  */
 
 import type { Numbers } from "./rotation";
 
-/** Scalar product of two vectors (3). */
+/** Return the dot product of two vectors (3). */
 export function dot(a: Numbers, aAt: number, b: Numbers, bAt: number): number {
   return a[aAt] * b[bAt] + a[aAt + 1] * b[bAt + 1] + a[aAt + 2] * b[bAt + 2];
 }
 
-/** Euclidean length of a vector (3). */
+/** Return the Euclidean length of a vector (3). */
 export function length(a: Numbers, aAt: number): number {
   return Math.sqrt(dot(a, aAt, a, aAt));
 }
 
-/** The distance of two places (3). */
+/** Return the distance between two points (3). */
 export function distanceBetween(a: Numbers, aAt: number, b: Numbers, bAt: number): number {
   const x = a[aAt] - b[bAt],
     y = a[aAt + 1] - b[bAt + 1],
@@ -23,7 +23,7 @@ export function distanceBetween(a: Numbers, aAt: number, b: Numbers, bAt: number
   return Math.sqrt(x * x + y * y + z * z);
 }
 
-/** `a` and `factor` times `b` (3). */
+/** Write `a` plus `factor` times `b` (3). */
 export function addScaled(
   out: Numbers,
   outAt: number,
@@ -36,7 +36,7 @@ export function addScaled(
   for (let i = 0; i < 3; i++) out[outAt + i] = a[aAt + i] + b[bAt + i] * factor;
 }
 
-/** `a` times `factor` and `b` times `other` (3). */
+/** Write `factor` times `a` plus `other` times `b` (3). */
 export function combine(
   out: Numbers,
   outAt: number,
@@ -50,14 +50,14 @@ export function combine(
   for (let i = 0; i < 3; i++) out[outAt + i] = a[aAt + i] * factor + b[bAt + i] * other;
 }
 
-/** A vector from its parts. */
+/** Write a vector from its components. */
 export function setVector(out: Numbers, outAt: number, x: number, y: number, z: number): void {
   out[outAt] = x;
   out[outAt + 1] = y;
   out[outAt + 2] = z;
 }
 
-/** Vector product, right-handed. */
+/** Write the cross product, right-handed. */
 export function cross(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
   const ax = a[aAt],
     ay = a[aAt + 1],
@@ -68,7 +68,7 @@ export function cross(out: Numbers, outAt: number, a: Numbers, aAt: number, b: N
   setVector(out, outAt, ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
 }
 
-/** `a` at unit length; false, and nothing written, where it is shorter than `least`. */
+/** Normalise `a`. Return false, and write nothing, if it is not longer than `minLength`. */
 export function unit(out: Numbers, outAt: number, a: Numbers, aAt: number, minLength = 1e-12): boolean {
   const size = length(a, aAt);
   if (size <= minLength) return false;
@@ -76,7 +76,7 @@ export function unit(out: Numbers, outAt: number, a: Numbers, aAt: number, minLe
   return true;
 }
 
-/** The part of `a` square to the unit vector `axis`. */
+/** Write the component of `a` perpendicular to the unit vector `axis`. */
 export function rejectFrom(out: Numbers, outAt: number, a: Numbers, aAt: number, axis: Numbers, axisAt: number): void {
   const along = dot(a, aAt, axis, axisAt);
   setVector(
@@ -88,7 +88,9 @@ export function rejectFrom(out: Numbers, outAt: number, a: Numbers, aAt: number,
   );
 }
 
-/** Some unit vector square to the unit vector `axis`: its product with x, or with y where it lies along x. */
+/**
+ * Write a unit vector perpendicular to the unit vector `axis`: its cross product with x, or with y if it lies along x.
+ */
 export function anyPerpendicular(out: Numbers, outAt: number, axis: Numbers, axisAt: number): void {
   const x = axis[axisAt],
     y = axis[axisAt + 1],
@@ -98,20 +100,20 @@ export function anyPerpendicular(out: Numbers, outAt: number, axis: Numbers, axi
   unit(out, outAt, out, outAt);
 }
 
-/** A quaternion (4) at unit length. */
+/** Normalise a quaternion (4) in place. */
 export function normalise(q: Numbers, at: number): void {
   const size = Math.sqrt(q[at] ** 2 + q[at + 1] ** 2 + q[at + 2] ** 2 + q[at + 3] ** 2);
   for (let i = 0; i < 4; i++) q[at + i] /= size;
 }
 
-/** A turn by `angle` radians about an axis of the frame: 0, 1, 2 for x, y, z. */
+/** Write a rotation by `angle` radians about a coordinate axis: 0, 1, 2 for x, y, z. */
 export function fromCoordinateAxis(out: Numbers, outAt: number, axis: 0 | 1 | 2, angle: number): void {
   out[outAt] = Math.cos(0.5 * angle);
   setVector(out, outAt + 1, 0, 0, 0);
   out[outAt + 1 + axis] = Math.sin(0.5 * angle);
 }
 
-/** A turn (4) by `angle` radians about the unit vector `axis` (3). */
+/** Write a rotation (4) by `angle` radians about the unit vector `axis` (3). */
 export function fromAxisAngle(out: Numbers, outAt: number, axis: Numbers, axisAt: number, angle: number): void {
   const s = Math.sin(0.5 * angle);
   const x = axis[axisAt] * s,
@@ -121,7 +123,10 @@ export function fromAxisAngle(out: Numbers, outAt: number, axis: Numbers, axisAt
   setVector(out, outAt + 1, x, y, z);
 }
 
-/** The shortest rotation (4) from the unit vector `a` to the unit vector `b`; opposite ones turn about `across(a)`. */
+/**
+ * Write the shortest rotation (4) from the unit vector `a` to the unit vector `b`; opposite ones rotate about
+ * `anyPerpendicular(a)`.
+ */
 export function rotationBetween(out: Numbers, outAt: number, a: Numbers, aAt: number, b: Numbers, bAt: number): void {
   const w = 1 + dot(a, aAt, b, bAt);
   if (w < 1e-14) {
@@ -134,7 +139,7 @@ export function rotationBetween(out: Numbers, outAt: number, a: Numbers, aAt: nu
   normalise(out, outAt);
 }
 
-/** The rotation (4) that brings the axes to right-handed unit vectors, nine numbers at `at` (Shepperd 1978). */
+/** Write the rotation (4) that takes the axes to right-handed unit vectors, nine numbers at `at` (Shepperd 1978). */
 export function fromColumns(out: Numbers, outAt: number, c: Numbers, at: number): void {
   const xx = c[at],
     xy = c[at + 1],

@@ -1,27 +1,20 @@
-/** The stage: puppet, disc, floor, lights, strings and the seat in the audience. Draws what it is given; keeps no time. */
-import {
-  ACESFilmicToneMapping,
-  type IUniform,
-  PCFShadowMap,
-  Plane,
-  Raycaster,
-  Scene,
-  Vector2,
-  Vector3,
-  WebGLRenderer,
-} from "three";
+/**
+ * The stage: performers, backdrop, floor, lights, strings and the audience's camera. It draws what it is given and
+ * reads no clock.
+ */
+import { type IUniform, Scene, Vector3, type WebGLRenderer } from "three";
 import type { Figure, Pose } from "../motion/skeleton";
 import type { LightState } from "../playout/light-state";
 import { AudienceCamera, type Framing } from "./camera/audience-camera";
 import { CameraRecorder } from "./camera/camera-recorder";
 import { FollowRig } from "./camera/follow-rig";
-import { projectBox, type ScreenBox, type WorldExtent } from "./camera/screen-box";
+import type { ScreenBox, WorldExtent } from "./camera/screen-box";
+import { ScreenProjection } from "./camera/screen-projection";
 import type { Performer } from "./puppet/performer";
 import { type PerformerFactory, PerformerGroup } from "./puppet/performer-group";
-import { FrameFence } from "./rendering/frame-fence";
+import { FrameRenderer } from "./rendering/frame-renderer";
 import { type Graphics, openGraphics } from "./rendering/graphics";
-import { PictureRenderer, pictureSize } from "./rendering/picture";
-import { type AdaptiveQuality, QUALITY_LEVELS } from "./rendering/quality";
+import { QUALITY_LEVELS } from "./rendering/quality";
 import { applyLookToBackdrop, createBackdrop, createBackdropUniforms } from "./scenery/backdrop";
 import { createEnvironmentMap } from "./scenery/environment-map";
 import { createFloor, type Floor } from "./scenery/floor";
@@ -30,22 +23,25 @@ import { LOOKS, type Look, type Theme } from "./scenery/look";
 import { Scenery } from "./scenery/scenery";
 import { type StringState, Strings } from "./strings/strings";
 
-/** Pixel ratios above these cost more than they show. */
+/** Limits of the pixel ratio: higher ones cost more than they show. */
 const MAX_PIXEL_RATIO = { desktop: 2, phone: 1.75 };
-/** Pixels at the top that belong to the header and a bar's name, and the share of a low picture's height that they have at most. */
+/** Pixels at the top that the header and a bar's name take, and their maximum share of a low picture. */
 const HEADROOM_PX = 120;
 const HEADROOM_SHARE = 0.2;
 
-/** What a bar and a face take on the standard figure. */
+/** Extents of a control bar and a face on the standard figure. */
 const BAR_EXTENT: WorldExtent = { across: 0.17, up: 0.07, down: 0.05 };
 const FACE_EXTENT: WorldExtent = { across: 0.1, up: 0.16, down: 0.14 };
 
-/** How far to the side the lights reach that stand about one dancer, metres. */
+/** Half the width that the lights cover for one performer, in metres. */
 const LIT_HALF_WIDTH_M = 1.2;
 
-/** Movements of the stage's own take no longer step than this, seconds. */
+/** Longest step of the stage's own movements, in seconds. */
 const MAX_STEP_S = 0.1;
-/** The stage is drawn without a dancer only if none came on for so long, seconds: its picture would stand in the way of theirs. */
+/**
+ * The stage is drawn without performers only after this delay, in seconds: drawing it earlier would delay their first
+ * frame.
+ */
 const EMPTY_STAGE_DELAY_S = 1;
 
 export class Stage {
@@ -53,84 +49,77 @@ export class Stage {
   readonly rig = new FollowRig();
   readonly strings = new Strings();
   readonly audience = new AudienceCamera();
-  /** Where the audience's camera was, for keeping. */
+  /** Recorded path of the audience's camera. */
   readonly cameraRecorder = new CameraRecorder();
   readonly renderer: WebGLRenderer;
-  /** Whose strings are at hand, by whom a narrow picture of several is framed; null: all are to be seen. */
+  /** Performer that this page's inputs act on, which a narrow picture frames; null frames all. */
   selectedPerformer: number | null = null;
-  /** Whether the graphics are done with a frame that has a dancer in it. */
-  hasDrawnPerformer = false;
   readonly #performerGroup: PerformerGroup;
   readonly #scenery = new Scenery();
   readonly #backdrop = createBackdropUniforms();
   readonly #floor: Floor;
   readonly #lights = createLights();
   readonly #floorHeight: IUniform<number> = { value: 0 };
-  readonly #caster = new Raycaster();
+  readonly #projection = new ScreenProjection(this.audience.camera);
   #look: Look = LOOKS.night;
   #theme: Theme | null = null;
-  #width = 1;
-  #height = 1;
   #reducedMotion = false;
-  #pixelRatio = 1;
   #framing: Framing = "desktop";
-  readonly #quality: AdaptiveQuality;
-  readonly #frameFence: FrameFence;
-  readonly #pictures = new PictureRenderer();
-  #sinceDrawnS = 0;
+  readonly #frameRenderer: FrameRenderer;
   #emptyS = 0;
-  #hasRenderedPerformer = false;
-  #isTakingPicture = false;
+  /** Progress of the first frame with a performer. */
+  #firstFrame: "pending" | "submitted" | "complete" = "pending";
 
-  /** Draws on `canvas` with its `graphics`. Throws where the browser has no WebGL 2. */
-  constructor(canvas: HTMLCanvasElement, { context, quality }: Graphics = openGraphics(canvas)) {
-    this.#quality = quality;
-    const { simpleMaterials: plain } = quality.quality;
-    this.#floor = createFloor(this.#backdrop, this.#scenery.group, this.rig.floorOffset, plain);
-    this.renderer = new WebGLRenderer({ canvas, context });
-    this.#frameFence = new FrameFence(context);
-    this.renderer.toneMapping = ACESFilmicToneMapping;
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = PCFShadowMap;
+  /** Create a stage that draws on `canvas`. Throw if the browser has no WebGL 2. */
+  constructor(canvas: HTMLCanvasElement, graphics: Graphics = openGraphics(canvas)) {
+    this.#frameRenderer = new FrameRenderer(canvas, graphics);
+    this.renderer = this.#frameRenderer.renderer;
+    const { simpleMaterials } = this.#frameRenderer.quality;
+    this.#floor = createFloor(this.#backdrop, this.#scenery.group, this.rig.floorOffset, simpleMaterials);
     this.#scenery.group.add(createBackdrop(this.#backdrop), this.#floor.mesh);
     this.#performerGroup = new PerformerGroup(this.#floorHeight);
     this.rig.group.add(this.audience.camera, this.#lights.group);
     this.scene.add(this.rig.group, this.#performerGroup.group);
-    // drawn in software what is behind the dancers takes longer than they do, who come first then
-    if (!plain) this.#addScenery();
-    // three.js' own listener stands before this one: its side of the context is there again by then
+    // Software rendering shows the performers first: the scenery takes longer to draw than they do.
+    if (!simpleMaterials) this.#addScenery();
+    // three.js registered its listener earlier: its part of the context is restored by then.
     canvas.addEventListener("webglcontextrestored", () => this.#onContextRestored());
     this.#applyQuality();
   }
 
-  /** Who dance, in the order of the motion's tracks. */
+  /** True if the graphics processor has completed a frame with a performer. */
+  get hasDrawnPerformer(): boolean {
+    return this.#firstFrame === "complete";
+  }
+
+  /** Performers in the order of the motion's tracks. */
   get performers(): readonly Performer[] {
     return this.#performerGroup.performers;
   }
 
-  /** The first of them, the show's: the puppet, or an avatar in its place. */
+  /** The first performer: the puppet, or an avatar in its place. */
   get puppet(): Performer | null {
     return this.performers[0] ?? null;
   }
 
-  /** No easing, no swing: for people who asked for less motion. */
+  /** Disables easing and swing. */
   set reducedMotion(on: boolean) {
     this.#reducedMotion = on;
     this.audience.reducedMotion = on;
     this.strings.reducedMotion = on;
   }
 
-  /** Whether the motion on the stage has a camera of its own, the show's. */
+  /** True if the motion has a camera. */
   get hasMotionCamera(): boolean {
     return this.audience.hasMotionCamera;
   }
 
-  /** Whether the show's camera is followed, by choice or by default; false where there is none. */
+  /** True if the motion's camera is followed, by choice or by default; false if there is none. */
   get followsMotionCamera(): boolean {
     return this.audience.followsMotionCamera;
   }
 
-  /** Follows the show's camera where there is one, or returns to the audience's own seat; dragging the view does the latter. */
+  /** Follow the motion's camera, or return to the audience view; dragging the view also returns. */
   followMotionCamera(enabled: boolean): void {
     this.audience.followMotionCamera(enabled);
   }
@@ -149,14 +138,14 @@ export class Stage {
   }
 
   /**
-   * Takes the limb lengths of a motion's dancers, for whom puppets are carved, and turns to where the first one's dance faces (radians about y from z towards x). Those
-   * whose lengths are told again dance on, and the others come on beside them.
+   * Set the limb lengths of the motion's performers and turn to the front of the first (radians about y from z towards
+   * x). Performers with unchanged lengths stay, and others join them.
    */
   setFigures(figures: readonly Figure[], front = 0): void {
-    const before = this.performers.length;
-    const others = this.#performerGroup.setFigures(figures);
-    if (!others && this.performers.length === before) return;
-    if (others) {
+    const previousCount = this.performers.length;
+    const isReplaced = this.#performerGroup.setFigures(figures);
+    if (!isReplaced && this.performers.length === previousCount) return;
+    if (isReplaced) {
       this.audience.scale = this.puppet?.scale ?? 1;
       this.#placeDisc();
       this.rig.reset(front);
@@ -165,13 +154,16 @@ export class Stage {
     this.#compileShaders();
   }
 
-  /** Has the dance of a performer, by number, danced by whom `make` makes for a dancer's lengths, from now on; null: by the puppet. */
+  /** Set the factory of a performer (an index); null restores the puppet. */
   setPerformerFactory(factory: PerformerFactory | null, performer = 0): void {
     this.#performerGroup.setPerformerFactory(factory, performer);
     if (this.puppet) this.#compileShaders();
   }
 
-  /** CSS pixels; `sides` are those that something stands before to the left and to the right, between which several dancers are seen, and `below` a sheet's. */
+  /**
+   * Set the size of the canvas in CSS pixels, the widths covered at the left and right, between which several
+   * performers are framed, and the height of a sheet at the bottom.
+   */
   resize(
     width: number,
     height: number,
@@ -180,10 +172,9 @@ export class Stage {
     [left, right]: readonly [number, number] = [0, 0],
     sheetHeight = 0,
   ): void {
-    const sharpest = framing === "desktop" ? MAX_PIXEL_RATIO.desktop : MAX_PIXEL_RATIO.phone;
-    this.#width = width;
-    this.#height = height;
-    this.#pixelRatio = Math.min(pixelRatio, sharpest);
+    const maxPixelRatio = framing === "desktop" ? MAX_PIXEL_RATIO.desktop : MAX_PIXEL_RATIO.phone;
+    this.#frameRenderer.resize(width, height, Math.min(pixelRatio, maxPixelRatio));
+    Object.assign(this.#projection, { width, height });
     this.#framing = framing;
     this.#placeDisc();
     this.audience.setFraming(framing, height, sheetHeight);
@@ -192,9 +183,10 @@ export class Stage {
   }
 
   /**
-   * Moves everything on to the performers' poses (null: none yet) and their strings, by number of the limb, and draws it if the graphics are done with the frame
-   * before; `interval` is the seconds since the last call, `show` the seven numbers of the show's camera, null where there is
-   * none, `lights` are the show's, and `clock` the clock time of the poses in microseconds, by which the camera is remembered.
+   * Advance to the poses of the performers (null: none yet) and draw if the last frame is complete. `states` are the
+   * strings by limb number, `interval` the seconds since the last call, `motionCamera` the seven numbers of the
+   * motion's camera (null if there is none), `lights` those of the motion, and `clock` the clock time of the poses in
+   * microseconds, which the recorded camera refers to.
    */
   draw(
     poses: readonly (Pose | null)[],
@@ -207,76 +199,43 @@ export class Stage {
     const { audience, rig } = this;
     const seconds = Math.min(interval, MAX_STEP_S);
     this.#performerGroup.apply(poses, this.#reducedMotion ? 0 : seconds);
-    const { visiblePerformers: shown } = this.#performerGroup;
-    const posed = poses.some((pose) => pose !== null) && shown.length > 0;
-    if (posed) {
-      rig.follow(shown, seconds);
+    const { visiblePerformers } = this.#performerGroup;
+    const hasPose = poses.some((pose) => pose !== null) && visiblePerformers.length > 0;
+    if (hasPose) {
+      rig.follow(visiblePerformers, seconds);
       this.#floorHeight.value = rig.group.position.y;
     }
     rig.group.updateMatrixWorld(true);
-    const own = this.selectedPerformer === null ? -1 : shown.indexOf(this.performers[this.selectedPerformer]);
-    if (posed)
-      audience.placePerformers(
-        shown.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))),
-        own < 0 ? null : own,
-      );
-    audience.update(
-      seconds,
-      posed ? this.#handReach(audience.hidesPerformers ? [shown[own]] : shown) : 0,
-      motionCamera,
-    );
-    // what is about the dancers is as wide as the picture of them
-    const { distanceScale: wide } = audience;
-    this.#scenery.group.scale.setScalar(wide);
-    rig.widthScale = wide;
+    this.#updateAudience(hasPose ? visiblePerformers : [], seconds, motionCamera);
+    // The scenery is as wide as the picture of all performers.
+    const { distanceScale } = audience;
+    this.#scenery.group.scale.setScalar(distanceScale);
+    rig.widthScale = distanceScale;
     this.#lights.update(
       lights,
       this.#reducedMotion ? Infinity : seconds,
-      Math.max(wide, audience.maxSideOffset / LIT_HALF_WIDTH_M),
+      Math.max(distanceScale, audience.maxSideOffset / LIT_HALF_WIDTH_M),
     );
     this.scene.environmentIntensity = this.#look.environment * this.#lights.ambientLevel;
     this.#scenery.update(audience.view, audience.isAudienceView, seconds);
-    if (posed && clock !== null) this.cameraRecorder.add(clock, audience.view, audience.isCustomView);
-    if (posed) {
-      const seat = {
-        ground: this.#floorHeight.value,
-        ceiling: this.#ceilingHeight(),
-        right: this.right(),
-        distanceScale: wide,
-      };
-      this.strings.update(
-        this.performers.map((one) => (one.group.visible ? one : null)),
-        states,
-        this.#look,
-        seconds,
-        seat,
-      );
-    }
-    this.#sinceDrawnS += interval;
-    if (!this.#frameFence.isReady) return;
-    this.hasDrawnPerformer = this.#hasRenderedPerformer;
-    if (posed) this.#hasRenderedPerformer = true;
-    else if ((this.#emptyS += seconds) < EMPTY_STAGE_DELAY_S) return;
-    if (this.hasDrawnPerformer || !this.#hasRenderedPerformer) this.#addScenery();
-    this.#setSize();
-    this.renderer.render(this.scene, audience.camera);
-    this.#frameFence.insert();
-    const slow = posed && !this.#isTakingPicture && this.#quality.addFrameTime(this.#sinceDrawnS);
-    this.#sinceDrawnS = 0;
-    if (slow) this.#applyQuality();
+    if (hasPose && clock !== null) this.cameraRecorder.add(clock, audience.view, audience.isCustomView);
+    if (hasPose) this.#updateStrings(states, seconds);
+    if (!this.#frameRenderer.advance(interval)) return;
+    if (this.#firstFrame === "submitted") this.#firstFrame = "complete";
+    if (!hasPose && (this.#emptyS += seconds) < EMPTY_STAGE_DELAY_S) return;
+    if (hasPose && this.#firstFrame === "pending") this.#firstFrame = "submitted";
+    if (this.#firstFrame !== "submitted") this.#addScenery();
+    if (this.#frameRenderer.draw(this.scene, audience.camera, hasPose)) this.#applyQuality();
   }
 
-  /** Gives back all that the graphics hold; the stage and its canvas draw no more. */
+  /** Release all graphics resources; the stage cannot draw afterwards. */
   dispose(): void {
     this.#performerGroup.dispose();
     this.scene.environment?.dispose();
-    this.#pictures.dispose();
-    this.renderer.dispose();
-    // with the context goes what is in it; browsers keep a few only, and would take an old one from another stage
-    this.renderer.forceContextLoss();
+    this.#frameRenderer.dispose();
   }
 
-  /** The stage as it was last moved on to, strings and all, as PNG: in the best quality, whatever this machine draws otherwise. */
+  /** Return the stage with its strings as PNG, in the best quality, whatever this machine normally draws. */
   takePicture(): Promise<Blob> {
     const { mesh } = this.#floor;
     const glossy = createFloor(this.#backdrop, this.#scenery.group, this.rig.floorOffset, false);
@@ -284,14 +243,8 @@ export class Stage {
     this.#scenery.group.remove(mesh);
     this.#scenery.group.add(glossy.mesh);
     this.#applyQuality(QUALITY_LEVELS[0]);
-    this.#isTakingPicture = true;
     try {
-      return this.#pictures
-        .render(this.scene, this.audience.camera, this.#look, pictureSize(this.#width, this.#height))
-        .finally(() => {
-          this.#isTakingPicture = false;
-          this.#quality.restart();
-        });
+      return this.#frameRenderer.takePicture(this.scene, this.audience.camera, this.#look);
     } finally {
       this.#applyQuality();
       this.#scenery.group.remove(glossy.mesh);
@@ -300,35 +253,39 @@ export class Stage {
     }
   }
 
-  /** CSS pixels of a world place. */
+  /** Return the position on the screen, in CSS pixels, of a world position. */
   toScreen(at: Vector3): { x: number; y: number } {
-    const clip = at.clone().project(this.audience.camera);
-    return { x: (clip.x * 0.5 + 0.5) * this.#width, y: (0.5 - clip.y * 0.5) * this.#height };
+    return this.#projection.toScreen(at);
   }
 
-  /** Where a limb's bar is on the screen, CSS pixels; null while there is none. */
+  /** Return the box of a limb's control bar on the screen, in CSS pixels; null if there is none. */
   barBox(limb: number): ScreenBox | null {
     const at = this.strings.barPosition(limb);
-    // drawn larger from further away, as all of the strings
-    return at && this.#screenBox(at, BAR_EXTENT, Math.sqrt(this.audience.distanceScale));
+    // Strings are drawn larger at a distance.
+    const { scale, distanceScale } = this.audience;
+    return at && this.#projection.boxAt(at, BAR_EXTENT, scale * Math.sqrt(distanceScale));
   }
 
-  /** Where the faces are on the screen, CSS pixels. */
+  /** Boxes of the faces on the screen, in CSS pixels. */
   get faceBoxes(): ScreenBox[] {
     return this.#performerGroup.visiblePerformers.map((performer) =>
-      this.#screenBox(new Vector3().setFromMatrixPosition(performer.joint("skullbase")), FACE_EXTENT),
+      this.#projection.boxAt(
+        new Vector3().setFromMatrixPosition(performer.joint("skullbase")),
+        FACE_EXTENT,
+        this.audience.scale,
+      ),
     );
   }
 
-  /** World place under a pixel, on the plane through `through` that faces the camera; null behind the camera. */
+  /**
+   * Return the world position of a pixel on the plane through `through` that faces the camera; null if it is behind the
+   * camera.
+   */
   fromScreen(x: number, y: number, through: Vector3): Vector3 | null {
-    const { camera } = this.audience;
-    this.#caster.setFromCamera(new Vector2((x / this.#width) * 2 - 1, 1 - (y / this.#height) * 2), camera);
-    const facing = camera.getWorldDirection(new Vector3());
-    return this.#caster.ray.intersectPlane(new Plane().setFromNormalAndCoplanarPoint(facing, through), new Vector3());
+    return this.#projection.fromScreen(x, y, through);
   }
 
-  /** The camera's right, up and backward directions in the world. */
+  /** Return the camera's right, up or backward direction in the world frame. */
   right(): Vector3 {
     return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 0);
   }
@@ -341,7 +298,7 @@ export class Stage {
     return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 2);
   }
 
-  /** World place of the hand nearer to the audience. */
+  /** Return the world position of the hand nearer to the camera. */
   nearerHand(): Vector3 | null {
     const { puppet } = this;
     if (!puppet) return null;
@@ -350,19 +307,6 @@ export class Stage {
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
-  #screenBox(at: Vector3, { across, up, down }: WorldExtent, times = 1): ScreenBox {
-    const { camera } = this.audience;
-    const scale = this.audience.scale * times;
-    return projectBox(
-      at,
-      { across: across * scale, up: up * scale, down: down * scale },
-      camera,
-      this.#width,
-      this.#height,
-    );
-  }
-
-  /** Puts up what is about the dancers. */
   #addScenery(): void {
     if (this.#scenery.group.parent) return;
     this.rig.group.add(this.#scenery.group);
@@ -370,12 +314,36 @@ export class Stage {
     if (this.puppet) this.#compileShaders();
   }
 
+  /** Move the audience's camera; `posed` are the performers with a pose. */
+  #updateAudience(posed: readonly Performer[], seconds: number, motionCamera: ArrayLike<number> | null): void {
+    const { audience, rig, selectedPerformer } = this;
+    const selected = selectedPerformer === null ? -1 : posed.indexOf(this.performers[selectedPerformer]);
+    if (posed.length > 0)
+      audience.placePerformers(
+        posed.map(({ root }) => rig.group.worldToLocal(new Vector3().setFromMatrixPosition(root))),
+        selected < 0 ? null : selected,
+      );
+    const framed = audience.hidesPerformers && selected >= 0 ? [posed[selected]] : posed;
+    audience.update(seconds, posed.length > 0 ? this.#handReach(framed) : 0, motionCamera);
+  }
+
+  #updateStrings(states: readonly StringState[], seconds: number): void {
+    const view = {
+      ground: this.#floorHeight.value,
+      ceiling: this.#ceilingHeight(),
+      right: this.right(),
+      distanceScale: this.audience.distanceScale,
+    };
+    const performers = this.performers.map((performer) => (performer.group.visible ? performer : null));
+    this.strings.update(performers, states, this.#look, seconds, view);
+  }
+
   #compileShaders(): void {
-    // Every shader there will be, side by side: one after the other as they come into sight takes longer, and stutters.
+    // Compile all shaders together: one after the other, when first visible, takes longer and causes stutter.
     this.renderer.compile(this.scene, this.audience.camera);
   }
 
-  /** The disc keeps its proportion to the dancer. */
+  /** The disc keeps its proportion to the performer. */
   #placeDisc(): void {
     const [radius, height] = this.#framing === "phone" || this.#framing === "sheet" ? [0.98, 1.36] : [1.06, 1.3];
     this.#backdrop.discRadius.value = radius * this.audience.scale;
@@ -384,45 +352,35 @@ export class Stage {
 
   #updateEnvironment(): void {
     this.scene.environment?.dispose();
-    this.scene.environment = this.#quality.quality.simpleMaterials
+    this.scene.environment = this.#frameRenderer.quality.simpleMaterials
       ? null
       : createEnvironmentMap(this.renderer, this.#look);
   }
 
-  /** The graphics context was lost and is there again. What was uploaded is by three.js, but not what was drawn for later. */
+  /** Restore what three.js does not: it uploads resources again, but does not render the environment map again. */
   #onContextRestored(): void {
     this.#updateEnvironment();
-    this.#frameFence.reset();
-    this.#quality.restart();
-    this.#sinceDrawnS = 0;
+    this.#frameRenderer.reset();
   }
 
-  /** Just before a frame is drawn, as it empties the canvas: and only where it is another. */
-  #setSize(): void {
-    const ratio = this.#pixelRatio * this.#quality.quality.pixelRatioScale;
-    const size = this.renderer.getSize(new Vector2());
-    if (ratio === this.renderer.getPixelRatio() && size.x === this.#width && size.y === this.#height) return;
-    // both at once: each time that its size changes a canvas waits for the graphics
-    this.renderer.setDrawingBufferSize(this.#width, this.#height, ratio);
-  }
-
-  /** Only the lacquer of the night mirrors, and only where the machine is up to it. */
-  #applyQuality({ reflection, shadows, simpleMaterials: plain } = this.#quality.quality): void {
+  /** Only the lacquer of the night look reflects, and only in a quality that allows it. */
+  #applyQuality({ reflection, shadows, simpleMaterials } = this.#frameRenderer.quality): void {
     this.#lights.castsShadows = shadows;
-    this.#performerGroup.setQuality(this.#look.dark && reflection, plain);
+    this.#performerGroup.setQuality(this.#look.dark && reflection, simpleMaterials);
   }
 
-  #handReach(shown: readonly Performer[]): number {
+  #handReach(performers: readonly Performer[]): number {
     const at = new Vector3();
     return Math.max(
-      ...shown.flatMap((performer) =>
+      ...performers.flatMap((performer) =>
         [0, 1].map((limb) => Math.abs(performer.handle(limb, at).project(this.audience.camera).x)),
       ),
     );
   }
 
   #ceilingHeight(): number {
-    const middle = this.rig.group.localToWorld(new Vector3(0, 1, 0));
-    return this.fromScreen(this.#width / 2, Math.min(HEADROOM_PX, HEADROOM_SHARE * this.#height), middle)?.y ?? 2.2;
+    const { width, height } = this.#projection;
+    const centre = this.rig.group.localToWorld(new Vector3(0, 1, 0));
+    return this.fromScreen(width / 2, Math.min(HEADROOM_PX, HEADROOM_SHARE * height), centre)?.y ?? 2.2;
   }
 }

@@ -1,4 +1,4 @@
-/** Any message of `bunraku.v1` to bytes and back. */
+/** Encoder and decoder of all messages of `bunraku.v1` (`proto/messages.md`). */
 
 import { MalformedMessage } from "./errors";
 import {
@@ -24,7 +24,7 @@ const FIXED_UNPACKERS = new Map<number, (bytes: Uint8Array) => Message>([
   [MESSAGE_TYPES.Input, unpackInput],
 ]);
 
-/** The message as bytes. */
+/** Encodes a message. */
 export function pack(message: Message): Uint8Array<ArrayBuffer> {
   switch (message.name) {
     case "Data":
@@ -43,12 +43,12 @@ export function pack(message: Message): Uint8Array<ArrayBuffer> {
 }
 
 /**
- * The message in `bytes`, null where its type is not known here.
+ * Decodes a message; null if its type is unknown.
  *
- * @throws MalformedMessage where the type is known and the rest is broken
+ * @throws MalformedMessage if the type is known and the content breaks the format
  */
 export function unpack(bytes: Uint8Array): Message | null {
-  if (bytes.length === 0) throw new MalformedMessage("an empty message has no type");
+  if (bytes.length === 0) throw new MalformedMessage("message is empty, expected a type byte");
   const fixed = FIXED_UNPACKERS.get(bytes[0]);
   if (fixed) return fixed(bytes);
   return isMapType(bytes[0]) ? unpackMap(bytes) : null;

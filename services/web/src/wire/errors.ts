@@ -1,4 +1,4 @@
-/** A message of a known type that cannot be read; the text says what is wrong with it. */
+/** A message of a known type that breaks the format; the text names the type, the field and the rule. */
 export class MalformedMessage extends Error {
   override readonly name = "MalformedMessage";
 }

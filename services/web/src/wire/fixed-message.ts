@@ -1,18 +1,19 @@
-/** Messages of fixed layout, little-endian (`proto/SPEC.md`, Fixed messages): what is hot, to bytes and back. */
+/** Encoders and decoders of the messages of fixed layout (`proto/messages.md`, 3.4 to 3.6). */
 
 import { allocateMessage, dataViewOf, getU64, setU64 } from "./byte-layout";
 import { MalformedMessage } from "./errors";
 import { MAX_LIMBS } from "./limbs";
 import { type Data, INPUT_TARGET, type Input, MESSAGE_TYPES, type Ping, type Pong } from "./messages";
 
-/** Before the index of a block, which is LEB128 of three bytes at most. */
+/** Bytes before the index of a block. */
 const DATA_HEADER_BYTES = 2;
+/** Bytes of the index at most, LEB128. */
 const MAX_INDEX_BYTES = 3;
 const FIXED_MESSAGE_BYTES = 32;
 
 function viewOfFixedMessage(bytes: Uint8Array, name: string): DataView {
   if (bytes.length !== FIXED_MESSAGE_BYTES)
-    throw new MalformedMessage(`${name} has ${FIXED_MESSAGE_BYTES} bytes, not ${bytes.length}`);
+    throw new MalformedMessage(`${name} has ${bytes.length} bytes, expected ${FIXED_MESSAGE_BYTES} bytes`);
   return dataViewOf(bytes);
 }
 
@@ -47,7 +48,7 @@ export function unpackData(bytes: Uint8Array): Data {
       };
     }
   }
-  throw new MalformedMessage("Data has a track and rate, an index of 1 to 3 bytes, and a block");
+  throw new MalformedMessage("Data ends within its header, or its index has more than 3 bytes");
 }
 
 export function packPing(message: Ping): Uint8Array<ArrayBuffer> {
@@ -59,7 +60,7 @@ export function packPing(message: Ping): Uint8Array<ArrayBuffer> {
 
 export function unpackPing(bytes: Uint8Array): Ping {
   const view = viewOfFixedMessage(bytes, "Ping");
-  return { name: "Ping", sequence: view.getUint32(4, true), sent: getU64(view, 8, "Ping's time") };
+  return { name: "Ping", sequence: view.getUint32(4, true), sent: getU64(view, 8, "Ping, sent") };
 }
 
 export function packPong(message: Pong): Uint8Array<ArrayBuffer> {
@@ -73,7 +74,7 @@ export function packPong(message: Pong): Uint8Array<ArrayBuffer> {
 
 export function unpackPong(bytes: Uint8Array): Pong {
   const view = viewOfFixedMessage(bytes, "Pong");
-  const [sent, received, answered] = [8, 16, 24].map((at) => getU64(view, at, "Pong's time"));
+  const [sent, received, answered] = [8, 16, 24].map((at) => getU64(view, at, "Pong, a time"));
   return { name: "Pong", sequence: view.getUint32(4, true), sent, received, answered };
 }
 
@@ -92,21 +93,23 @@ export function unpackInput(bytes: Uint8Array): Input {
   const view = viewOfFixedMessage(bytes, "Input");
   const [, limb, kind] = bytes;
   if (limb >= MAX_LIMBS || kind > INPUT_TARGET) {
-    throw new MalformedMessage(`Input names limb ${limb}, kind ${kind}; there are ${MAX_LIMBS} limbs and 2 kinds`);
+    throw new MalformedMessage(
+      `Input has limb ${limb} and kind ${kind}, expected a limb of 0..${MAX_LIMBS - 1} and kind 0 or 1`,
+    );
   }
   const values: [number, number, number] = [
     view.getFloat32(20, true),
     view.getFloat32(24, true),
     view.getFloat32(28, true),
   ];
-  if (!values.every(Number.isFinite)) throw new MalformedMessage("Input holds a number that is not finite");
+  if (!values.every(Number.isFinite)) throw new MalformedMessage("Input has a value that is not finite");
   return {
     name: "Input",
     limb,
     kind,
     epoch: view.getUint32(4, true),
     sequence: view.getUint32(8, true),
-    sampled: getU64(view, 12, "Input's time"),
+    sampled: getU64(view, 12, "Input, sampled"),
     values,
   };
 }

@@ -1,22 +1,22 @@
-/** The limbs that are pulled, by number (`proto/SPEC.md`, Conventions): limb l of performer k is 4 k + l. */
+/** Limbs by number (`proto/SPEC.md`, 1.4): limb l of performer k is 4 k + l. */
 
 import { LIMBS } from "../motion/skeleton";
 
-/** Dancers of a motion, one for each of its first tracks `motion`. */
+/** Performers of a motion, one per track of type `motion`. */
 export const MAX_PERFORMERS = 4;
 export const MAX_LIMBS = LIMBS.length * MAX_PERFORMERS;
 
-/** The number of a performer's limb; `limb` counts as `LIMBS`. */
+/** Returns the number of a performer's limb; `limb` is an index into `LIMBS`. */
 export function limbNumber(performer: number, limb: number): number {
   return performer * LIMBS.length + limb;
 }
 
-/** Whose the limb of this number is. */
+/** Returns the index of the performer that the limb of this number belongs to. */
 export function performerOfLimb(number: number): number {
   return Math.floor(number / LIMBS.length);
 }
 
-/** Which limb of its performer it is, as in `LIMBS`. */
+/** Returns the index into `LIMBS` of the limb of this number. */
 export function limbWithinPerformer(number: number): number {
   return number % LIMBS.length;
 }

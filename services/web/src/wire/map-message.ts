@@ -1,21 +1,20 @@
-/** Messages of one MessagePack map (`proto/SPEC.md`, MessagePack messages): their fields, checked, to bytes and back. */
+/** Encoder and validating decoder of the messages that are one MessagePack map (`proto/messages.md`, 3.1). */
 
 import { decode, encode } from "@msgpack/msgpack";
 import { MalformedMessage } from "./errors";
 import { MAX_LIMBS } from "./limbs";
 import { MESSAGE_TYPES, type Message, type PuppeteerPresence, type Track } from "./messages";
 
-/** Reads a field's value, or throws what it should have been. */
+/** Returns a field's value, or throws MalformedMessage with the expected form. */
 type FieldParser = (value: unknown) => unknown;
 
-/** The messages of fixed layout are read elsewhere (`fixed.ts`). */
 type MapMessageName = Exclude<Message["name"], "Data" | "Overlay" | "Ping" | "Pong" | "Input">;
 
-/** More than any real message has, and little enough to read at once. */
+/** Bound on lists and maps: above any valid message, and fast to decode. */
 const MAX_ENTRIES = 100_000;
 
 function requireValid(isValid: boolean, expected: string): void {
-  if (!isValid) throw new MalformedMessage(`must be ${expected}`);
+  if (!isValid) throw new MalformedMessage(`expected ${expected}`);
 }
 
 const text: FieldParser = (value) => (requireValid(typeof value === "string", "text"), value);
@@ -40,7 +39,7 @@ const mapOf =
     requireValid(isMap(value), "a map");
     return read(value as Record<string, unknown>);
   };
-/** A field that may be nil or left out; it reads as null. */
+/** An optional field; absent or nil, it is null. */
 const optional =
   (field: FieldParser): FieldParser =>
   (value) =>
@@ -55,7 +54,7 @@ const puppeteer = mapOf(
   }),
 );
 
-/** Who asks for each of the `limbs` that were read before; left out by those who know of no asking. */
+/** Requests for each of the `limbs` read before; absent, there are none. */
 const asksPerLimb = (value: unknown, { limbs }: Readonly<Record<string, unknown>>): unknown => {
   const each = limbs as unknown[];
   if (value === undefined || value === null) return each.map(() => []);
@@ -63,11 +62,13 @@ const asksPerLimb = (value: unknown, { limbs }: Readonly<Record<string, unknown>
   return (requireValid(asks.length === each.length, "a list for each limb"), asks);
 };
 
-/** The fields of each message in the order in which they are read; one may look at those `before` it. */
+type FieldReader = (value: unknown, before: Readonly<Record<string, unknown>>) => unknown;
+
+/** A parser for every field of every message, in reading order; it gets the fields `before` it. */
 const MESSAGE_FIELDS: {
-  [name in MapMessageName]: Readonly<
-    Record<string, (value: unknown, before: Readonly<Record<string, unknown>>) => unknown>
-  >;
+  [name in MapMessageName]: {
+    readonly [field in Exclude<keyof Extract<Message, { name: name }>, "name">]: FieldReader;
+  };
 } = {
   ChannelHeader: { motion: text, now: count, channels: count, software: text, version: count, clock: text },
   Description: { motion: text, first: optional(count), tracks: list(track) },
@@ -99,12 +100,12 @@ const NAME_BY_TYPE = new Map(
   Object.keys(MESSAGE_FIELDS).map((name) => [MESSAGE_TYPES[name as MapMessageName], name as MapMessageName]),
 );
 
-/** Whether messages of type byte `type` are one map. */
+/** Returns true if messages of this type byte are a map. */
 export function isMapType(type: number): boolean {
   return NAME_BY_TYPE.has(type);
 }
 
-/** The message as bytes: the type, and the map of the fields that are not null. */
+/** Encodes a message: the type byte and the map of its fields that are not null. */
 export function packMap(message: Extract<Message, { name: MapMessageName }>): Uint8Array<ArrayBuffer> {
   const fields = Object.entries(message).filter(([key, value]) => key !== "name" && value !== null);
   const packed = encode(Object.fromEntries(fields));
@@ -114,7 +115,11 @@ export function packMap(message: Extract<Message, { name: MapMessageName }>): Ui
   return bytes;
 }
 
-/** The message in `bytes`, of a type for which `isMapType` holds. */
+/**
+ * Decodes a message of a type for which `isMapType` holds.
+ *
+ * @throws MalformedMessage
+ */
 export function unpackMap(bytes: Uint8Array): Message {
   const name = NAME_BY_TYPE.get(bytes[0])!;
   let values: unknown;
@@ -130,7 +135,7 @@ export function unpackMap(bytes: Uint8Array): Message {
   }
   if (!isMap(values)) throw new MalformedMessage(`${name} is not a MessagePack map`);
   const message: Record<string, unknown> = { name };
-  for (const [key, field] of Object.entries(MESSAGE_FIELDS[name])) {
+  for (const [key, field] of Object.entries<FieldReader>(MESSAGE_FIELDS[name])) {
     try {
       message[key] = field(values[key], message);
     } catch (error) {

@@ -1,29 +1,30 @@
-/** Messages 5 and 14: pulled limbs at an instant (`proto/SPEC.md`, Overlay), to bytes and back. */
+/** Messages 5 and 14: joints of controlled limbs at an instant (`proto/messages.md`, 3.5). */
 
 import { LIMBS } from "../motion/skeleton";
 import { allocateMessage, dataViewOf, getU64, setU64 } from "./byte-layout";
 import { MalformedMessage } from "./errors";
 import { MAX_LIMBS } from "./limbs";
 
-/** Pulled limbs at clock time `due`: for each limb its number and nine numbers, three rotation vectors in pi/32767. */
+/** Joints of the controlled limbs at clock time `due`. */
 export interface Overlay {
   name: "Overlay";
   sequence: number;
-  /** When the last frame is due. */
+  /** Clock time at which the last frame is due, microseconds. */
   due: number;
+  /** By limb number three rotation vectors, nine integers in units of pi/32767. */
   limbs: Map<number, Int16Array>;
-  /** The same limbs in the frames before, oldest first, `OVERLAY_FRAME` apart. */
+  /** Frames before this one with the same limbs, oldest first, `OVERLAY_FRAME_INTERVAL_US` apart. */
   earlier: Map<number, Int16Array>[];
 }
 
-/** Microseconds from one frame of an overlay to the next. */
+/** Interval between the frames of an overlay, microseconds. */
 export const OVERLAY_FRAME_INTERVAL_US = 16_667;
 
-/** The type byte where only limbs of the first performer are told of, and otherwise. */
+/** Type byte of an overlay with limbs of the first performer only, and of any other. */
 export const OVERLAY_TYPE = 5;
 export const MULTI_PERFORMER_OVERLAY_TYPE = 14;
 
-/** Bytes before the frames: the second has its mask behind the rest. */
+/** Bytes before the frames; the second header ends with the mask. */
 const SINGLE_PERFORMER_HEADER_BYTES = 12;
 const MULTI_PERFORMER_HEADER_BYTES = 14;
 const VALUES_PER_LIMB = 9;
@@ -51,7 +52,8 @@ export function packOverlay(message: Overlay): Uint8Array<ArrayBuffer> {
 export function unpackOverlay(bytes: Uint8Array): Overlay {
   const several = bytes[0] === MULTI_PERFORMER_OVERLAY_TYPE;
   const begin = several ? MULTI_PERFORMER_HEADER_BYTES : SINGLE_PERFORMER_HEADER_BYTES;
-  if (bytes.length < begin) throw new MalformedMessage(`Overlay has ${begin} bytes at least`);
+  if (bytes.length < begin)
+    throw new MalformedMessage(`Overlay has ${bytes.length} bytes, expected at least ${begin} bytes`);
   const view = dataViewOf(bytes);
   const mask = several ? view.getUint16(SINGLE_PERFORMER_HEADER_BYTES, true) : bytes[1] & 15;
   const held: number[] = [];
@@ -60,7 +62,7 @@ export function unpackOverlay(bytes: Uint8Array): Overlay {
   const size = begin + frames * held.length * VALUES_PER_LIMB * 2;
   if (bytes.length !== size) {
     throw new MalformedMessage(
-      `Overlay of ${frames} frames of ${held.length} limbs has ${size} bytes, not ${bytes.length}`,
+      `Overlay has ${bytes.length} bytes, expected ${size} bytes for ${frames} frames of ${held.length} limbs`,
     );
   }
   const earlier = Array.from({ length: frames }, (_, frame) => {
@@ -78,7 +80,7 @@ export function unpackOverlay(bytes: Uint8Array): Overlay {
   return {
     name: "Overlay",
     sequence: view.getUint16(2, true),
-    due: getU64(view, 4, "Overlay's due time"),
+    due: getU64(view, 4, "Overlay, due"),
     limbs,
     earlier,
   };

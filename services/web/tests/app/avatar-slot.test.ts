@@ -202,8 +202,8 @@ describe("errors", () => {
     await slot.load(file({ without: ["leftHand"] }, "handless.glb"));
     await slot.load(new File(["solid cube"], "cube.glb"));
     expect(browser.problems.map(([name, title, detail]) => [name, title, detail])).toEqual([
-      ["handless.glb", "It is no humanoid that can dance", "these bones were not found: left hand"],
-      ["cube.glb", "It is no GLB", "it does not begin as binary glTF does"],
+      ["handless.glb", "No usable humanoid", "missing bones: left hand"],
+      ["cube.glb", "Not a GLB file", "it does not start like binary glTF"],
     ]);
     expect([browser.shown, browser.files.get("avatar")?.name]).toEqual([
       { name: "sato.v2", active: true, loadingFile: null },

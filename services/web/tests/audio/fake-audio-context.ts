@@ -1,4 +1,4 @@
-/** An audio device in a test's hands: it stands where the browser's AudioContext would, and puts out what was scheduled as its time passes. */
+/** Fake AudioContext that plays scheduled sources as its time is advanced. */
 
 class FakeAudioNode {
   constructor(readonly device: FakeAudioContext) {}
@@ -7,7 +7,7 @@ class FakeAudioNode {
 }
 
 class FakeGainNode extends FakeAudioNode {
-  /** From here on nothing comes through, seconds. */
+  /** Time from which the output is muted, in seconds. */
   cut = Infinity;
   readonly gain = { value: 1, setTargetAtTime: (goal: number, when: number) => goal === 0 && (this.cut = when) };
 }
@@ -32,12 +32,12 @@ class FakeSourceNode extends EventTarget {
 
 export class FakeAudioContext {
   state: AudioContextState = "running";
-  /** Seconds; a render quantum ahead of what is put out. */
+  /** Time in seconds, one render quantum ahead of the output. */
   currentTime = 0;
-  /** What came out, by frame, and how many sources it came from. */
+  /** Output by frame, and the number of sources that contributed. */
   readonly output: { sample: number; sources: number }[] = [];
   readonly #sources: FakeSourceNode[] = [];
-  /** Page time minus device time, milliseconds, and how long what was rendered takes to be heard. */
+  /** Page time minus device time, in milliseconds, and the output latency. */
   constructor(
     readonly offset: number,
     readonly latency = 40,
@@ -65,7 +65,7 @@ export class FakeAudioContext {
       : { contextTime: 0, performanceTime: 0 };
   }
 
-  /** So many seconds pass: what is scheduled for them is put out, the first channel of it. */
+  /** Advance by `seconds` and play the first channel of all scheduled sources. */
   advance(seconds: number): void {
     const [from, to] = [this.currentTime, this.currentTime + seconds].map((time) => Math.round(time * 48_000));
     for (let frame = from; frame < to; frame++) {

@@ -9,8 +9,8 @@ import type { TimelineState } from "../../src/wire/messages";
 import { createTrack, packetSamples, toneSample } from "./tone";
 
 const STAGE = 1_774_000_000_000_000;
-/** A joint is over after so many frames. */
-const JOINT = 384;
+/** Frames of the crossfade after a discontinuity. */
+const CROSSFADE_FRAMES = 384;
 
 function timelines(duration: number, change: Partial<TimelineState> = {}): TimelineHistory {
   const all = new TimelineHistory();
@@ -28,7 +28,7 @@ function timelines(duration: number, change: Partial<TimelineState> = {}): Timel
   return all;
 }
 
-/** The sound of so many slots from `STAGE` on, one after the other; the slots, and the planes put together. */
+/** Render consecutive slots from `STAGE` on; return the slots and the joined planes. */
 function play(
   track: AudioTrack,
   all: TimelineHistory,
@@ -44,46 +44,48 @@ function play(
   };
   const out = Array.from({ length: track.channels }, () => new Float32Array(SLOT_FRAMES * speeds.length));
   const slots: Slot[] = [];
-  let joint = silentBoundary(track.channels);
+  let boundary = silentBoundary(track.channels);
   let stage = from;
   speeds.forEach((speed, index) => {
     const slot: Slot = { index, stageTime: stage, speed, run: 1 };
     const spans = spansBetween(all, slot.stageTime, stageTimeAtEnd(slot));
-    const sounding = renderSlot(track, sound, slot, spans, joint);
-    joint = sounding.boundary;
+    const rendered = renderSlot(track, sound, slot, spans, boundary);
+    boundary = rendered.boundary;
     stage = stageTimeAtEnd(slot);
-    sounding.planes.forEach((plane, channel) => out[channel].set(plane, index * SLOT_FRAMES));
+    rendered.planes.forEach((plane, channel) => out[channel].set(plane, index * SLOT_FRAMES));
     slots.push(slot);
   });
   return { out, slots };
 }
 
-/** Where in the track frame `frame` is, samples, where nothing jumps. */
-function placeOf(slots: readonly Slot[], frame: number): number {
+/** Return the position of a frame in the track, in samples, without discontinuities. */
+function positionOf(slots: readonly Slot[], frame: number): number {
   const slot = slots[Math.floor(frame / SLOT_FRAMES)];
   return ((slot.stageTime - STAGE + (frame - slot.index * SLOT_FRAMES) * (slot.speed / 48_000) * 1e6) * 48_000) / 1e6;
 }
 
-/** The largest step from a frame to the next. */
-function step(plane: Float32Array, from = 1, to = plane.length): number {
-  let most = 0;
-  for (let frame = from; frame < to; frame++) most = Math.max(most, Math.abs(plane[frame] - plane[frame - 1]));
-  return most;
+/** Return the largest step between consecutive frames. */
+function maxStep(plane: Float32Array, from = 1, to = plane.length): number {
+  let max = 0;
+  for (let frame = from; frame < to; frame++) max = Math.max(max, Math.abs(plane[frame] - plane[frame - 1]));
+  return max;
 }
 
-/** No two samples of the tones differ by more. */
-const STEEP = 0.055;
+/** Upper bound of the difference between two samples of the tones. */
+const MAX_SAMPLE_STEP = 0.055;
 
-test("slots at speed one are the sound, sample by sample, in every channel", () => {
+test("slots at speed 1 reproduce the sound exactly in every channel", () => {
   const track = createTrack(4, 2);
   const { out } = play(track, timelines(4e6), new Array<number>(20).fill(1));
   out.forEach((plane, channel) => {
-    const errors = plane.map((sample, frame) => (frame < JOINT ? 0 : Math.abs(sample - toneSample(frame, channel))));
+    const errors = plane.map((sample, frame) =>
+      frame < CROSSFADE_FRAMES ? 0 : Math.abs(sample - toneSample(frame, channel)),
+    );
     expect(Math.max(...errors)).toBeLessThan(1e-5);
   });
 });
 
-test("through changes of speed the sound goes on without a click, where the slots say", () => {
+test("changes of speed are continuous and follow the slots", () => {
   const speeds = fc.array(
     fc.integer({ min: -10, max: 10 }).map((halves) => 1 + halves * 0.0005),
     { minLength: 4, maxLength: 10 },
@@ -94,36 +96,36 @@ test("through changes of speed the sound goes on without a click, where the slot
         out: [plane],
         slots,
       } = play(createTrack(4), timelines(4e6), all);
-      for (let frame = JOINT; frame < plane.length; frame += 7)
-        expect(Math.abs(plane[frame] - toneSample(placeOf(slots, frame)))).toBeLessThan(3e-3);
-      expect(step(plane)).toBeLessThan(STEEP);
+      for (let frame = CROSSFADE_FRAMES; frame < plane.length; frame += 7)
+        expect(Math.abs(plane[frame] - toneSample(positionOf(slots, frame)))).toBeLessThan(3e-3);
+      expect(maxStep(plane)).toBeLessThan(MAX_SAMPLE_STEP);
     }),
     { numRuns: 20 },
   );
 });
 
-describe("where the sound jumps", () => {
-  test("a loop begins anew with the motion, and does not click", () => {
-    // of a length at which the tones do not meet
+describe("discontinuities", () => {
+  test("a loop restarts with the motion without a click", () => {
+    // A duration at which the tones do not join.
     const track = createTrack(1.03);
     const {
       out: [plane],
     } = play(track, timelines(1_030_000), new Array<number>(40).fill(1));
-    expect(step(plane)).toBeLessThan(STEEP);
+    expect(maxStep(plane)).toBeLessThan(MAX_SAMPLE_STEP);
     const again = 1.03 * 48_000;
-    for (let frame = JOINT; frame < 40_000; frame += 11)
+    for (let frame = CROSSFADE_FRAMES; frame < 40_000; frame += 11)
       expect(Math.abs(plane[frame + again] - toneSample(frame))).toBeLessThan(1e-5);
   });
 
-  test("packets that are missing are silent, with soft ends", () => {
+  test("missing packets are silent, with soft edges", () => {
     const track = createTrack(4);
     const {
       out: [plane],
     } = play(track, timelines(4e6), new Array<number>(16).fill(1), (number) => number !== 5 && number !== 6);
-    expect(step(plane)).toBeLessThan(STEEP);
+    expect(maxStep(plane)).toBeLessThan(MAX_SAMPLE_STEP);
     const [first, end] = [track.firstSample(5), track.firstSample(7)];
-    expect(plane.subarray(first + JOINT, end - 1).every((sample) => sample === 0)).toBe(true);
-    for (const frame of [first - 20, end + JOINT])
+    expect(plane.subarray(first + CROSSFADE_FRAMES, end - 1).every((sample) => sample === 0)).toBe(true);
+    for (const frame of [first - 20, end + CROSSFADE_FRAMES])
       expect(Math.abs(plane[frame] - toneSample(frame))).toBeLessThan(1e-3);
   });
 
@@ -143,8 +145,8 @@ describe("where the sound jumps", () => {
     const {
       out: [ended],
     } = play(track, longer, new Array<number>(24).fill(1));
-    expect(ended.subarray(48_000 + JOINT).every((sample) => sample === 0)).toBe(true);
-    expect(step(ended)).toBeLessThan(STEEP);
+    expect(ended.subarray(48_000 + CROSSFADE_FRAMES).every((sample) => sample === 0)).toBe(true);
+    expect(maxStep(ended)).toBeLessThan(MAX_SAMPLE_STEP);
     const edited = timelines(4e6);
     edited.put({
       name: "TimelineState",
@@ -160,12 +162,12 @@ describe("where the sound jumps", () => {
       out: [paused],
     } = play(createTrack(4), edited, new Array<number>(8).fill(1));
     expect(Math.abs(paused[9_599] - toneSample(9_599))).toBeLessThan(1e-5);
-    expect(paused.subarray(9_600 + JOINT).every((sample) => sample === 0)).toBe(true);
-    expect(step(paused)).toBeLessThan(STEEP);
+    expect(paused.subarray(9_600 + CROSSFADE_FRAMES).every((sample) => sample === 0)).toBe(true);
+    expect(maxStep(paused)).toBeLessThan(MAX_SAMPLE_STEP);
   });
 });
 
-test("what is silent is said to be", () => {
+test("silence is reported", () => {
   const track = createTrack(1);
   const slot: Slot = { index: 0, stageTime: STAGE, speed: 1, run: 1 };
   const still: TimelineSpan[] = [{ start: STAGE, end: STAGE + SLOT_US, position: 0, isMoving: false }];
@@ -181,7 +183,7 @@ test("what is silent is said to be", () => {
   ).toBe(false);
 });
 
-test("the packets that a stretch needs are those that are heard in it, and what lies about them", () => {
+test("required packets are those heard in a span, with a margin", () => {
   const track = createTrack(1);
   const span = (position: number, length: number): TimelineSpan => ({
     start: 0,

@@ -4,12 +4,12 @@ import { HALF_TAPS, resample } from "../../src/audio/resample";
 
 const FRAMES = 400;
 
-/** A sine of so many cycles a sample, so that sample `HALF - 1` is its place 0. */
+/** Return a sine with this many cycles per sample; sample `HALF_TAPS - 1` is position 0. */
 function sine(cycles: number, size: number): Float32Array {
   return Float32Array.from({ length: size }, (_, at) => Math.sin(2 * Math.PI * cycles * (at - (HALF_TAPS - 1))));
 }
 
-test("at whole places samples are as they are", () => {
+test("integer positions return the samples unchanged", () => {
   const samples = sine(0.21, FRAMES + 2 * HALF_TAPS);
   const out = new Float32Array(FRAMES).fill(9);
   resample(samples, 3, 1, out, 10, FRAMES - 10);
@@ -17,7 +17,7 @@ test("at whole places samples are as they are", () => {
   expect(out.subarray(10, FRAMES - 10)).toEqual(samples.subarray(HALF_TAPS - 1 + 3, HALF_TAPS - 1 + 3 + FRAMES - 20));
 });
 
-test("between samples music is what it was, to -55 dB at 14 kHz and -70 dB below 10", () => {
+test("fractional positions are accurate to -55 dB at 14 kHz, -70 dB below 10", () => {
   fc.assert(
     fc.property(
       fc.double({ min: 0, max: 14_000, noNaN: true }),

@@ -1,15 +1,15 @@
 import { afterEach, describe, expect, test, vi } from "vitest";
 import { findWebCodecsDecoder } from "../../src/audio/webcodecs-decoder";
 
-/** A browser's decoder in a test's hands: what is given to it comes out when the test says. */
-class Decoder {
-  static made: Decoder[] = [];
+/** Fake AudioDecoder that emits its output when the test asks. */
+class FakeAudioDecoder {
+  static made: FakeAudioDecoder[] = [];
   static able = true;
-  static isConfigSupported = async () => ({ supported: Decoder.able });
+  static isConfigSupported = async () => ({ supported: FakeAudioDecoder.able });
   state = "unconfigured";
   readonly given: { timestamp: number; duration: number; type: string }[] = [];
   constructor(readonly init: { output(data: unknown): void; error(error: Error): void }) {
-    Decoder.made.push(this);
+    FakeAudioDecoder.made.push(this);
   }
   configure(): void {
     this.state = "configured";
@@ -21,7 +21,7 @@ class Decoder {
   close(): void {
     this.state = "closed";
   }
-  /** The chunk given first comes out, of so many channels. */
+  /** Emit the first chunk with this many channels. */
   put(channels = 2): void {
     const { timestamp } = this.given.shift()!;
     const copyTo = (plane: Float32Array, { planeIndex }: { planeIndex: number }) => plane.fill(planeIndex + 1);
@@ -30,9 +30,9 @@ class Decoder {
 }
 
 function install(able = true): void {
-  Decoder.made = [];
-  Decoder.able = able;
-  vi.stubGlobal("AudioDecoder", Decoder);
+  FakeAudioDecoder.made = [];
+  FakeAudioDecoder.able = able;
+  vi.stubGlobal("AudioDecoder", FakeAudioDecoder);
   vi.stubGlobal(
     "EncodedAudioChunk",
     class {
@@ -45,14 +45,14 @@ function install(able = true): void {
 
 afterEach(() => void vi.unstubAllGlobals());
 
-test("a browser that has none, or that cannot Opus, has no such decoder", async () => {
+test("is not available without AudioDecoder or without Opus", async () => {
   expect(await findWebCodecsDecoder(2)).toBeNull();
   install(false);
   expect(await findWebCodecsDecoder(2)).toBeNull();
 });
 
 describe("packets", () => {
-  test("are told by their numbers, a plane for each channel, though fewer should come", async () => {
+  test("are emitted by number, with a plane per channel even if fewer arrive", async () => {
     install();
     const out: [number, number[]][] = [];
     const decoder = (await findWebCodecsDecoder(2))!((number, planes) =>
@@ -60,31 +60,31 @@ describe("packets", () => {
     );
     decoder.decode(40, Uint8Array.of(1));
     decoder.decode(41, Uint8Array.of(2));
-    const [inside] = Decoder.made;
-    expect(inside.given.map(({ timestamp, duration, type }) => [timestamp, duration, type])).toEqual([
+    const [fake] = FakeAudioDecoder.made;
+    expect(fake.given.map(({ timestamp, duration, type }) => [timestamp, duration, type])).toEqual([
       [2_400_000, 60_000, "key"],
       [2_460_000, 60_000, "key"],
     ]);
-    inside.put();
-    inside.put(1);
+    fake.put();
+    fake.put(1);
     expect(out).toEqual([
       [40, [1, 2]],
       [41, [1, 1]],
     ]);
     decoder.close();
-    await expect.poll(() => inside.state).toBe("closed");
+    await expect.poll(() => fake.state).toBe("closed");
   });
 
-  test("it fails at one: that is told as such, and no other", async () => {
+  test("a failed one is reported as such, and no other", async () => {
     install();
     vi.spyOn(console, "warn").mockReturnValue();
     const out: [number, unknown][] = [];
     const decoder = (await findWebCodecsDecoder(1))!((number, planes) => out.push([number, planes]));
     decoder.decode(0, Uint8Array.of(1));
     decoder.decode(1, Uint8Array.of(1));
-    const [inside] = Decoder.made;
-    inside.close();
-    inside.init.error(new Error("no Opus"));
+    const [fake] = FakeAudioDecoder.made;
+    fake.close();
+    fake.init.error(new Error("no Opus"));
     decoder.decode(2, Uint8Array.of(1));
     expect(out).toEqual([
       [0, null],

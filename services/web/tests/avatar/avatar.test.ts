@@ -8,7 +8,7 @@ import { SOLE_HEIGHT_M, jointPosition as standing } from "../../src/stage/puppet
 import { createOtherFigure, createStandardFigure } from "../stage/puppet/figures";
 import { createFigureFile, type FigureOptions, mixamoName } from "./figure-files";
 
-/** What a limb's bone is, and the joints of the dancer that it lies between. */
+/** Bones of the limbs, and the joints of the figure at both ends. */
 const LIMBS: readonly (readonly [bone: string, next: string, joint: string, after: string])[] = [
   ["leftUpperArm", "leftLowerArm", "l_shoulder", "l_elbow"],
   ["leftLowerArm", "leftHand", "l_elbow", "l_wrist"],
@@ -37,8 +37,8 @@ async function read(options: FigureOptions): Promise<AvatarModel> {
   return AvatarModel.parse(createFigureFile(options).buffer, "boxes");
 }
 
-/** A pose of a dance: turned, leaning, every joint somewhere. `time` in seconds. */
-function dancing(time: number): Pose {
+/** Return a pose with every joint moved; `time` in seconds. */
+function poseAt(time: number): Pose {
   const pose = restPose();
   standing("humanoid_root")
     .add(new Vector3(0.8 * Math.sin(time), 0.03 * Math.sin(3 * time), 0.5 * Math.cos(time)))
@@ -52,13 +52,13 @@ function dancing(time: number): Pose {
   return pose;
 }
 
-function stand(): Pose {
+function standingPose(): Pose {
   const pose = restPose();
   standing("humanoid_root").toArray(pose.root);
   return pose;
 }
 
-/** Height of the lowest vertex of an avatar's mesh. */
+/** Return the height of the lowest vertex of an avatar's mesh. */
 function lowest(avatar: Avatar): number {
   let least = Infinity;
   avatar.group.updateMatrixWorld(true);
@@ -82,20 +82,20 @@ describe.each(Object.entries(FILES))("%s", (_, options) => {
     model = await read(options);
   });
 
-  test("points its limbs where the dancer's point, within a degree", () => {
+  test("points its limbs as the figure does, within a degree", () => {
     const avatar = new Avatar(model, figure);
     for (let time = 0; time < 6; time += 0.37) {
-      avatar.apply(dancing(time), 0);
+      avatar.apply(poseAt(time), 0);
       for (const [bone, next, joint, after] of LIMBS) {
-        const own = at(model.nodes.get(next) as Object3D).sub(at(model.nodes.get(bone) as Object3D));
-        expect(degrees(own, of(avatar, after).sub(of(avatar, joint)))).toBeLessThan(1);
+        const direction = at(model.nodes.get(next) as Object3D).sub(at(model.nodes.get(bone) as Object3D));
+        expect(degrees(direction, of(avatar, after).sub(of(avatar, joint)))).toBeLessThan(1);
       }
     }
   });
 
-  test("faces where the dancer faces, head up, palms as the dancer's", () => {
+  test("faces as the figure does, head up, with the figure's palms", () => {
     const avatar = new Avatar(model, figure);
-    const pose = stand();
+    const pose = standingPose();
     const yaw = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), 1);
     pose.rotations.set([yaw.w, yaw.x, yaw.y, yaw.z]);
     avatar.apply(pose, 0);
@@ -109,20 +109,20 @@ describe.each(Object.entries(FILES))("%s", (_, options) => {
     expect(place("head").y).toBeGreaterThan(place("hips").y + 0.3);
   });
 
-  test("is of the dancer's size and stands on the dancer's floor", () => {
+  test("has the figure's size and stands on its floor", () => {
     const avatar = new Avatar(model, figure);
-    avatar.apply(stand(), 0);
+    avatar.apply(standingPose(), 0);
     expect(Math.abs(lowest(avatar) - avatar.ground)).toBeLessThan(0.01);
     const height = at(model.nodes.get("head") as Object3D).y - avatar.ground;
     expect(height).toBeGreaterThan(0.75 * of(avatar, "skullbase").y);
     expect(height).toBeLessThan(1.25 * of(avatar, "skullbase").y);
   });
 
-  test("keeps a foot on the floor through a dance, neither sunk nor floating, without jumps", () => {
+  test("keeps a foot on the floor throughout a motion, without jumps", () => {
     const avatar = new Avatar(model, figure);
     let before: number | null = null;
     for (let time = 0; time < 4; time += 1 / 60) {
-      avatar.apply(dancing(time), 0);
+      avatar.apply(poseAt(time), 0);
       const sole = Math.min(
         ...[...model.rest.solePoints].flatMap(([foot, soles]) =>
           soles.map((place) => place.clone().applyMatrix4((model.nodes.get(foot) as Object3D).matrixWorld).y),
@@ -135,12 +135,12 @@ describe.each(Object.entries(FILES))("%s", (_, options) => {
     }
   });
 
-  test("a hand told by what it is pulled to arrives there when the dancer's does as told", () => {
+  test("reaches a pull target when the figure's hand reaches its own", () => {
     const avatar = new Avatar(model, figure);
-    const [pose, limb] = [dancing(0.4), 0];
+    const [pose, limb] = [poseAt(0.4), 0];
     avatar.apply(pose, 0);
-    // A pull to where the hand comes to when the dancer's arm does what it then does.
-    const raised = dancing(0.4);
+    // Pull to where the hand is when the figure's arm is raised.
+    const raised = poseAt(0.4);
     const turn = new Quaternion(
       ...(([1, 2, 3, 0] as const).map((k) => raised.rotations[JOINTS.indexOf("l_shoulder") * 4 + k]) as [
         number,
@@ -153,35 +153,35 @@ describe.each(Object.entries(FILES))("%s", (_, options) => {
     raised.rotations.set([turn.w, turn.x, turn.y, turn.z], JOINTS.indexOf("l_shoulder") * 4);
     avatar.apply(raised, 0);
     const to = avatar.handle(limb, new Vector3());
-    const wanted = handlePosition(avatar, limb, new Vector3());
-    expect(avatar.toStreamedHandle(limb, to, new Vector3()).distanceTo(wanted)).toBeLessThan(1e-9);
+    const expected = handlePosition(avatar, limb, new Vector3());
+    expect(avatar.toStreamedHandle(limb, to, new Vector3()).distanceTo(expected)).toBeLessThan(1e-9);
     avatar.apply(pose, 0);
-    // from afar already nearly so: the rest is told as the hand comes nearer
-    expect(avatar.toStreamedHandle(limb, to, new Vector3()).distanceTo(wanted)).toBeLessThan(0.12);
+    // Nearly exact from a distance: the rest is corrected as the hand approaches.
+    expect(avatar.toStreamedHandle(limb, to, new Vector3()).distanceTo(expected)).toBeLessThan(0.12);
   });
 });
 
 describe("an avatar", () => {
-  test("goes as far over the floor as its legs do", async () => {
+  test("travels in proportion to its legs", async () => {
     const model = await read({ vrm: 1, legLength: 0.6 });
     const avatar = new Avatar(model, createStandardFigure());
-    const way = (pose: Pose) => {
+    const toesAfter = (pose: Pose) => {
       avatar.apply(pose, 0);
       return at(model.nodes.get("leftToes") as Object3D);
     };
-    const from = way(stand());
-    const moved = stand();
+    const from = toesAfter(standingPose());
+    const moved = standingPose();
     moved.root[2] += 1;
     const hips = standing("l_hip").y - standing("l_midtarsal").y + SOLE_HEIGHT_M;
-    const own = at(model.nodes.get("leftUpperLeg") as Object3D).y - avatar.ground;
-    expect(way(moved).z - from.z).toBeCloseTo(own / hips, 1);
-    expect(own / hips).toBeLessThan(0.85);
+    const direction = at(model.nodes.get("leftUpperLeg") as Object3D).y - avatar.ground;
+    expect(toesAfter(moved).z - from.z).toBeCloseTo(direction / hips, 1);
+    expect(direction / hips).toBeLessThan(0.85);
   });
 
-  test("holds and knees are where they are seen, for hands in the palm", async () => {
+  test("has handles in the palms and on the knees", async () => {
     const model = await read({ name: mixamoName, unit: 0.01, askew: true });
     const avatar = new Avatar(model, createStandardFigure());
-    avatar.apply(dancing(1), 0);
+    avatar.apply(poseAt(1), 0);
     for (const [limb, bone, next] of [
       [0, "leftHand", "leftMiddleProximal"],
       [1, "rightHand", "rightMiddleProximal"],
@@ -194,25 +194,25 @@ describe("an avatar", () => {
     );
   });
 
-  test("has a tail that swings while it dances, and is still where stillness is asked for", async () => {
+  test("has a tail that swings, and stops with reduced motion", async () => {
     const model = await read({ vrm: 1, tail: true });
     const avatar = new Avatar(model, createStandardFigure());
     const tail = model.root.getObjectByName("tail") as Object3D;
-    avatar.apply(stand(), 0);
+    avatar.apply(standingPose(), 0);
     const still = tail.quaternion.clone();
-    for (let time = 0; time < 1; time += 1 / 60) avatar.apply(dancing(3 * time), 1 / 60);
+    for (let time = 0; time < 1; time += 1 / 60) avatar.apply(poseAt(3 * time), 1 / 60);
     expect(tail.quaternion.angleTo(still)).toBeGreaterThan(0.05);
-    avatar.apply(dancing(3), 0);
+    avatar.apply(poseAt(3), 0);
     expect(tail.quaternion.angleTo(still)).toBeLessThan(1e-6);
   });
 
-  test("danced for one dancer it can dance for another", async () => {
+  test("can perform with other limb lengths afterwards", async () => {
     const model = await read({ vrm: 1 });
     const heights = [1, 0.5].map((size) => {
       const figure: Figure = createStandardFigure(size);
       const avatar = new Avatar(model, figure);
       new Group().add(avatar.group);
-      const pose = stand();
+      const pose = standingPose();
       for (let axis = 0; axis < 3; axis++) pose.root[axis] *= size;
       avatar.apply(pose, 0);
       const height = at(model.nodes.get("head") as Object3D).y;

@@ -2,13 +2,13 @@ import { describe, expect, test } from "vitest";
 import { findBones, missingBones, type NamedNode, parseNodeName, REQUIRED_BONES } from "../../src/avatar/bone-names";
 import { SKELETONS } from "./skeletons";
 
-/** Names of the nodes that are found for some bones. */
-function found(nodes: readonly NamedNode[], ...bones: string[]): (string | undefined)[] {
+/** Return the node names found for bones. */
+function namesOf(nodes: readonly NamedNode[], ...bones: string[]): (string | undefined)[] {
   const all = findBones(nodes);
   return bones.map((bone) => nodes[all.get(bone) ?? -1]?.name);
 }
 
-describe("words of names", () => {
+describe("node names", () => {
   test.each([
     ["mixamorig:LeftForeArm", "forearm", "left"],
     ["mixamorigRightUpLeg", "upleg", "right"],
@@ -26,7 +26,7 @@ describe("words of names", () => {
   });
 });
 
-describe("bones by their names", () => {
+describe("bones", () => {
   test.each(Object.entries(SKELETONS))("of %s are all found, each on its side", (_, nodes) => {
     const bones = findBones(nodes);
     expect(missingBones(bones)).toEqual([]);
@@ -38,24 +38,24 @@ describe("bones by their names", () => {
     expect(bones.has("leftToes") && bones.has("rightToes")).toBe(true);
   });
 
-  test("an arm is the upper arm and not the collar bone, a leg the lower leg where there is a thigh", () => {
-    expect(found(SKELETONS["Mixamo"], "leftUpperArm", "leftLowerLeg", "spine", "leftMiddleProximal")).toEqual([
+  test("distinguish upper arm and collar bone, lower leg and thigh", () => {
+    expect(namesOf(SKELETONS["Mixamo"], "leftUpperArm", "leftLowerLeg", "spine", "leftMiddleProximal")).toEqual([
       "mixamorig:LeftArm",
       "mixamorig:LeftLeg",
       "mixamorig:Spine",
       "mixamorig:LeftHandMiddle1",
     ]);
-    expect(found(SKELETONS["VRChat"], "leftUpperArm", "leftLowerLeg", "rightFoot")).toEqual([
+    expect(namesOf(SKELETONS["VRChat"], "leftUpperArm", "leftLowerLeg", "rightFoot")).toEqual([
       "Left arm",
       "Left knee",
       "Right ankle",
     ]);
-    expect(found(SKELETONS["H-Anim"], "hips", "spine", "rightUpperArm")).toEqual([
+    expect(namesOf(SKELETONS["H-Anim"], "hips", "spine", "rightUpperArm")).toEqual([
       "humanoid_root",
       "vl5",
       "r_shoulder",
     ]);
-    expect(found(SKELETONS["Unreal"], "hips", "leftHand", "rightFoot", "leftLowerArm")).toEqual([
+    expect(namesOf(SKELETONS["Unreal"], "hips", "leftHand", "rightFoot", "leftLowerArm")).toEqual([
       "pelvis",
       "hand_l",
       "foot_r",
@@ -63,13 +63,13 @@ describe("bones by their names", () => {
     ]);
   });
 
-  test("what hangs elsewhere than on its limb is none of it", () => {
-    expect(found(SKELETONS["3ds Max"], "leftUpperLeg")).toEqual(["Bip01 L Thigh"]);
+  test("outside their limb are ignored", () => {
+    expect(namesOf(SKELETONS["3ds Max"], "leftUpperLeg")).toEqual(["Bip01 L Thigh"]);
     const loose = SKELETONS["Unreal"].map((node) => (node.name === "hand_l" ? { ...node, parent: 0 } : node));
     expect(missingBones(findBones(loose))).toEqual(["left hand"]);
   });
 
-  test("what is missing is told in plain words", () => {
+  test("that are missing are listed in plain words", () => {
     const armless = SKELETONS["Mixamo"]
       .filter(({ name }) => !/(?:LeftForeArm|LeftHand)/.test(name))
       .map(({ name }, _, all) => {
@@ -80,7 +80,7 @@ describe("bones by their names", () => {
     expect(missingBones(findBones([{ name: "Cube", parent: -1 }]))).toHaveLength(REQUIRED_BONES.length);
   });
 
-  test("a file whose nodes go in a ring is read to its end", () => {
+  test("are searched in cyclic files without hanging", () => {
     expect(
       missingBones(
         findBones([

@@ -1,47 +1,47 @@
-/** Figures of boxes on bones, written as GLB and VRM files: in a T-pose or an A-pose, in any axes and units, named as one likes. */
+/** Writer of GLB and VRM files with figures of boxes on bones, in various rest poses, axes, units and names. */
 import { Euler, Matrix4, Quaternion, Vector3 } from "three";
 
 export interface FigureOptions {
-  /** How far the arms hang from level, degrees, and the legs stand apart. */
+  /** Angle of the arms below level and of the legs from vertical, in degrees. */
   arms?: number;
   legs?: number;
-  /** Which way it faces: turned about y from z, degrees. */
+  /** Facing, as a rotation about y from z in degrees. */
   facing?: number;
-  /** What of the file's unit is a metre: 0.01 of centimetres, in a node over all as tools leave it. */
+  /** Metres per unit of the file: 0.01 for centimetres, with a scaled root node as tools write it. */
   unit?: number;
-  /** Bones whose own axes lie anyhow. */
+  /** Give bones arbitrary local axes. */
   askew?: boolean;
-  /** Length of the legs and of the forearms against a grown-up's. */
+  /** Length of legs and forearms relative to an adult's. */
   legLength?: number;
   forearm?: number;
-  /** The name of each bone's node. */
+  /** Return the name of a bone's node. */
   name?: (bone: string) => string;
   vrm?: 1 | 0;
   without?: readonly string[];
-  /** A tail that swings, in VRM 1. */
+  /** Add a tail with spring bones (VRM 1). */
   tail?: boolean;
-  /** A picture on it, and drawn as cartoons are (MToon) where the file is a VRM. */
+  /** Add a texture, and MToon materials if the file is a VRM. */
   dressed?: boolean;
-  /** On its back, as files of tools whose z is up may be. */
+  /** Lay the figure on its back, as tools with z up may. */
   lying?: boolean;
 }
 
 interface Bone {
   name: string;
   parent: string | null;
-  /** From the parent in the T-pose, metres. */
+  /** From the parent in the T-pose, in metres. */
   offset: Vector3;
-  /** Where its box ends, from it. */
+  /** End of its box, relative to it. */
   end: Vector3;
 }
 
 const at = (x: number, y: number, z: number) => new Vector3(x, y, z);
 
-/** A picture of two by two pixels, PNG. */
+/** Image of two by two pixels, PNG. */
 const PNG_BASE64 =
   "iVBORw0KGgoAAAANSUhEUgAAAAIAAAACCAYAAABytg0kAAAAEUlEQVR42mOIWnDiPwgzwBgAXwgLBRyxh08AAAAASUVORK5CYII=";
 
-/** Bones of a grown-up of 1.65 m in the T-pose, facing z; parents first. */
+/** Return the bones of an adult of 1.65 m in the T-pose, facing z; parents first. */
 function bonesOf({ legLength = 1, forearm = 1, without = [], tail = false }: FigureOptions): Bone[] {
   const bones: Bone[] = [
     { name: "hips", parent: null, offset: at(0, 0.06 + 0.86 * legLength, 0), end: at(0, 0.1, 0) },
@@ -91,14 +91,14 @@ function bonesOf({ legLength = 1, forearm = 1, without = [], tail = false }: Fig
     .map((bone) => ({ ...bone, parent: bone.parent && without.includes(bone.parent) ? "hips" : bone.parent }));
 }
 
-/** How far a bone and what hangs from it is turned from the T-pose, about z, radians. */
+/** Return the rotation of a bone from the T-pose about z, in radians. */
 function bend(name: string, { arms = 0, legs = 0 }: FigureOptions): number {
   const sign = name.startsWith("left") ? 1 : -1;
   if (/UpperArm|LowerArm|Hand|MiddleProximal/.test(name)) return (-sign * arms * Math.PI) / 180;
   return /UpperLeg|LowerLeg/.test(name) ? (sign * legs * Math.PI) / 180 : 0;
 }
 
-/** The bytes of a GLB or VRM file. */
+/** Return the bytes of a GLB or VRM file. */
 export function createFigureFile(options: FigureOptions = {}): Uint8Array<ArrayBuffer> {
   const {
     facing = options.vrm === 0 ? 180 : 0,
@@ -133,7 +133,7 @@ export function createFigureFile(options: FigureOptions = {}): Uint8Array<ArrayB
     const from = places.get(bone.name) as Vector3;
     const thickness = bone.name === "head" ? 0.09 : /hips|spine|chest/.test(bone.name) ? 0.1 : 0.03;
     const tip = from.clone().add(bone.end.clone().applyQuaternion(about(bone.name)));
-    // the sole is level at the height 0 with the box of the foot ending there
+    // The sole is level at height 0: the box of the foot ends there.
     box(from, tip, thickness, positions, normals, indices, /Foot|Toes/.test(bone.name) ? 0 : null);
     for (let i = joints.length / 4; i < positions.length / 3; i++) {
       joints.push(index, 0, 0, 0);
@@ -245,7 +245,7 @@ export function createFigureFile(options: FigureOptions = {}): Uint8Array<ArrayB
   return container(json, buffer);
 }
 
-/** VRM 0 tells of its materials beside them. */
+/** VRM 0 describes materials separately. */
 const OLD_CARTOON = {
   name: "cloth",
   shader: "VRM/MToon",
@@ -266,7 +266,7 @@ const OLD_CARTOON = {
   vectorProperties: { _Color: [1, 1, 1, 1], _ShadeColor: [0.6, 0.5, 0.6, 1], _OutlineColor: [0.1, 0.1, 0.1, 1] },
 };
 
-/** Puts the picture on the figure, and cartoon colours on that of VRM 1. */
+/** Add the texture, and MToon colours for VRM 1. */
 function addMaterials(json: Record<string, unknown>, vrm: 0 | 1 | undefined): void {
   json.images = [{ bufferView: (json.bufferViews as unknown[]).length - 1, mimeType: "image/png" }];
   json.textures = [{ source: 0 }];
@@ -288,7 +288,7 @@ function addMaterials(json: Record<string, unknown>, vrm: 0 | 1 | undefined): vo
     };
 }
 
-/** A box about the line between two places; with `floor` it goes down to that height. */
+/** Add a box around the segment between two points; with `floor` it extends down to that height. */
 function box(
   from: Vector3,
   to: Vector3,
@@ -334,7 +334,7 @@ type Part = readonly [
 
 const WIDTHS = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
 
-/** The parts one after another, and behind them a picture, which only has a view. */
+/** Concatenate the parts, followed by an image that has a view only. */
 function pack(
   parts: readonly Part[],
   picture: Uint8Array,
@@ -382,7 +382,7 @@ function container(json: unknown, buffer: Uint8Array): Uint8Array<ArrayBuffer> {
   return bytes;
 }
 
-/** Names of Mixamo's bones. */
+/** Return the name of a Mixamo bone. */
 export function mixamoName(bone: string): string {
   const side = bone.startsWith("left") ? "Left" : bone.startsWith("right") ? "Right" : "";
   const words: Record<string, string> = {

@@ -13,7 +13,7 @@ import {
 import { expect, test } from "vitest";
 import { dimMToonMaterials, SimpleMaterials, simplifyMaterials } from "../../src/avatar/materials";
 
-test("physical materials are plain where they have to be, with their colours, and themselves again", () => {
+test("physical materials can be replaced by simple ones and restored", () => {
   const [glossy, flat] = [
     new MeshStandardMaterial({ color: "#336699", transparent: true, opacity: 0.5 }),
     new MeshBasicMaterial(),
@@ -33,7 +33,7 @@ test("physical materials are plain where they have to be, with their colours, an
   expect([one.material, several.material]).toEqual([glossy, [flat, glossy]]);
 });
 
-test("they are the model's own again when nobody dances in it", () => {
+test("disposing restores the model's own materials", () => {
   const mesh = new Mesh(new BoxGeometry(), new MeshStandardMaterial());
   const own = mesh.material;
   const materials = new SimpleMaterials(mesh);
@@ -42,7 +42,7 @@ test("they are the model's own again when nobody dances in it", () => {
   expect(mesh.material).toBe(own);
 });
 
-test("cartoons are dimmed, shades more than what is lit, and nothing else is", () => {
+test("MToon materials are dimmed, shades more than lit colours", () => {
   const cartoon = new MToonMaterial();
   cartoon.color = new Color(1, 1, 1);
   cartoon.shadeColorFactor = new Color(1, 1, 1);
@@ -53,7 +53,7 @@ test("cartoons are dimmed, shades more than what is lit, and nothing else is", (
   expect(other.color.r).toBe(1);
 });
 
-test("what the stage's shaders have not is taken away: glass is thin, gloss and pictures stay", () => {
+test("expensive features are removed, gloss and textures stay", () => {
   const picture = new Texture();
   const glass = new MeshPhysicalMaterial({ transmission: 1, iridescence: 1, dispersion: 2, clearcoat: 0.5 });
   const rough = new MeshStandardMaterial({ bumpMap: picture, map: picture, normalMap: picture, opacity: 0.5 });

@@ -4,8 +4,8 @@ import { AvatarError } from "../../src/avatar/error";
 import { AvatarModel } from "../../src/avatar/model";
 import { createFigureFile } from "./figure-files";
 
-describe("a file that is read", () => {
-  test("has its maker's name for it, or the file's, and a node for each bone", async () => {
+describe("a parsed model", () => {
+  test("has the author's name or the file's, and a node per bone", async () => {
     const [vrm, old, plain] = await Promise.all(
       [{ vrm: 1 }, { vrm: 0 }, {}].map((options) =>
         AvatarModel.parse(createFigureFile(options as { vrm?: 0 | 1 }).buffer, "mine"),
@@ -16,7 +16,7 @@ describe("a file that is read", () => {
     for (const model of [vrm, old, plain]) expect(model.nodes.get("leftHand")?.name).toBe("leftHand");
   });
 
-  test("throws and takes shadows, and is drawn wherever it dances", async () => {
+  test("casts and receives shadows and is never culled", async () => {
     const { root: stand } = await AvatarModel.parse(createFigureFile().buffer, "mine");
     const meshes: Object3D[] = [];
     stand.traverse((object) => object instanceof Mesh && meshes.push(object));
@@ -25,23 +25,23 @@ describe("a file that is read", () => {
     ).toEqual([[true, true, false]]);
   });
 
-  test("whose meshes cannot be read is told to be broken", async () => {
+  test("with unreadable meshes is rejected as broken", async () => {
     const whole = createFigureFile();
     const view = new DataView(whole.buffer);
-    // the description stands, and what it describes is gone
+    // The description is intact, but its binary chunk is missing.
     const end = 20 + view.getUint32(12, true);
     const cut = whole.slice(0, end);
     new DataView(cut.buffer).setUint32(8, end, true);
     await expect(AvatarModel.parse(cut.buffer, "mine")).rejects.toMatchObject({
-      name: "AvatarProblem",
-      title: "It is broken",
+      name: "AvatarError",
+      title: "File damaged",
     });
     await expect(AvatarModel.parse(new ArrayBuffer(8), "mine")).rejects.toBeInstanceOf(AvatarError);
   });
 
-  test("whose limbs have no length cannot dance", async () => {
+  test("whose limbs have no length is rejected", async () => {
     await expect(AvatarModel.parse(createFigureFile({ forearm: 0 }).buffer, "mine")).rejects.toThrow(
-      /leftLowerArm and leftHand are in one place/,
+      /leftLowerArm and leftHand are at the same position/,
     );
   });
 });

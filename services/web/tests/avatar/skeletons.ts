@@ -1,42 +1,52 @@
-/** Skeletons as the usual tools name them: each node's name, with its parent's; "" for a root. */
+/** Skeletons with the names that common tools use. */
 import type { NamedNode } from "../../src/avatar/bone-names";
 
 type Chains = readonly string[];
 
-/** Nodes of chains like "a > b > c"; a name that was there before is the same node. */
+/** Create nodes from chains like "a > b > c"; a repeated name is the same node. */
 function skeleton(...chains: Chains): NamedNode[] {
   const nodes: NamedNode[] = [];
   for (const chain of chains) {
     let parent = -1;
     for (const name of chain.split(" > ")) {
-      const known = nodes.findIndex((node) => node.name === name);
-      parent = known >= 0 ? known : nodes.push({ name, parent }) - 1;
+      const existing = nodes.findIndex((node) => node.name === name);
+      parent = existing >= 0 ? existing : nodes.push({ name, parent }) - 1;
     }
   }
   return nodes;
 }
 
-const both = (left: string, right: string, make: (side: string) => Chains) => [...make(left), ...make(right)];
+const both = (left: string, right: string, chainsOf: (side: string) => Chains) => [
+  ...chainsOf(left),
+  ...chainsOf(right),
+];
 
 export const SKELETONS: Readonly<Record<string, readonly NamedNode[]>> = {
   Mixamo: skeleton(
-    "Armature > mixamorig:Hips > mixamorig:Spine > mixamorig:Spine1 > mixamorig:Spine2 > mixamorig:Neck > mixamorig:Head > mixamorig:HeadTop_End",
+    "Armature > mixamorig:Hips > mixamorig:Spine > mixamorig:Spine1 > mixamorig:Spine2",
+    "mixamorig:Spine2 > mixamorig:Neck > mixamorig:Head > mixamorig:HeadTop_End",
     ...both("Left", "Right", (side) => [
-      `mixamorig:Spine2 > mixamorig:${side}Shoulder > mixamorig:${side}Arm > mixamorig:${side}ForeArm > mixamorig:${side}Hand > mixamorig:${side}HandMiddle1 > mixamorig:${side}HandMiddle2`,
-      `mixamorig:Hips > mixamorig:${side}UpLeg > mixamorig:${side}Leg > mixamorig:${side}Foot > mixamorig:${side}ToeBase > mixamorig:${side}Toe_End`,
+      `mixamorig:Spine2 > mixamorig:${side}Shoulder > mixamorig:${side}Arm > mixamorig:${side}ForeArm`,
+      `mixamorig:${side}ForeArm > mixamorig:${side}Hand > mixamorig:${side}HandMiddle1 > mixamorig:${side}HandMiddle2`,
+      `mixamorig:Hips > mixamorig:${side}UpLeg > mixamorig:${side}Leg > mixamorig:${side}Foot`,
+      `mixamorig:${side}Foot > mixamorig:${side}ToeBase > mixamorig:${side}Toe_End`,
     ]),
   ),
   "Mixamo, numbered": skeleton(
     "_rootJoint > mixamorig1:Hips_01 > mixamorig1:Spine_02 > mixamorig1:Neck_03 > mixamorig1:Head_04",
     ...both("Left", "Right", (side) => [
-      `mixamorig1:Spine_02 > mixamorig1:${side}Shoulder_0 > mixamorig1:${side}Arm_00 > mixamorig1:${side}ForeArm_09 > mixamorig1:${side}Hand_010`,
-      `mixamorig1:Hips_01 > mixamorig1:${side}UpLeg_055 > mixamorig1:${side}Leg_056 > mixamorig1:${side}Foot_057 > mixamorig1:${side}ToeBase_058`,
+      `mixamorig1:Spine_02 > mixamorig1:${side}Shoulder_0 > mixamorig1:${side}Arm_00`,
+      `mixamorig1:${side}Arm_00 > mixamorig1:${side}ForeArm_09 > mixamorig1:${side}Hand_010`,
+      `mixamorig1:Hips_01 > mixamorig1:${side}UpLeg_055 > mixamorig1:${side}Leg_056`,
+      `mixamorig1:${side}Leg_056 > mixamorig1:${side}Foot_057 > mixamorig1:${side}ToeBase_058`,
     ]),
   ),
   VRoid: skeleton(
-    "Root > J_Bip_C_Hips > J_Bip_C_Spine > J_Bip_C_Chest > J_Bip_C_UpperChest > J_Bip_C_Neck > J_Bip_C_Head > J_Sec_Hair1_01",
+    "Root > J_Bip_C_Hips > J_Bip_C_Spine > J_Bip_C_Chest > J_Bip_C_UpperChest",
+    "J_Bip_C_UpperChest > J_Bip_C_Neck > J_Bip_C_Head > J_Sec_Hair1_01",
     ...both("L", "R", (side) => [
-      `J_Bip_C_UpperChest > J_Bip_${side}_Shoulder > J_Bip_${side}_UpperArm > J_Bip_${side}_LowerArm > J_Bip_${side}_Hand > J_Bip_${side}_Middle1 > J_Bip_${side}_Middle2`,
+      `J_Bip_C_UpperChest > J_Bip_${side}_Shoulder > J_Bip_${side}_UpperArm > J_Bip_${side}_LowerArm`,
+      `J_Bip_${side}_LowerArm > J_Bip_${side}_Hand > J_Bip_${side}_Middle1 > J_Bip_${side}_Middle2`,
       `J_Bip_C_Hips > J_Bip_${side}_UpperLeg > J_Bip_${side}_LowerLeg > J_Bip_${side}_Foot > J_Bip_${side}_ToeBase`,
     ]),
   ),
@@ -64,7 +74,8 @@ export const SKELETONS: Readonly<Record<string, readonly NamedNode[]>> = {
   "3ds Max": skeleton(
     "Bip01 > Bip01 Pelvis > Bip01 Spine > Bip01 Spine1 > Bip01 Neck > Bip01 Head > Bip01 HeadNub",
     ...both("L", "R", (side) => [
-      `Bip01 Neck > Bip01 ${side} Clavicle > Bip01 ${side} UpperArm > Bip01 ${side} Forearm > Bip01 ${side} Hand > Bip01 ${side} Finger0`,
+      `Bip01 Neck > Bip01 ${side} Clavicle > Bip01 ${side} UpperArm > Bip01 ${side} Forearm`,
+      `Bip01 ${side} Forearm > Bip01 ${side} Hand > Bip01 ${side} Finger0`,
       `Bip01 Spine > Bip01 ${side} Thigh0`,
       `Bip01 Pelvis > Bip01 ${side} Thigh > Bip01 ${side} Calf > Bip01 ${side} Foot > Bip01 ${side} Toe0`,
     ]),

@@ -2,17 +2,14 @@
  * One round of `make bench-ik` in Node: JSON on standard input. Ours, three.js's `CCDIKSolver` and `closed-chain-ik` take turns on the
  * same targets, all warm. The last line printed is one JSON object.
  */
+
 import { readFileSync } from "node:fs";
 import { Goal, Joint, Link, Solver } from "closed-chain-ik/src/core/index.js";
 import { Bone, BufferGeometry, MeshBasicMaterial, Skeleton, SkinnedMesh, Vector3 } from "three";
 import { CCDIKSolver } from "three/examples/jsm/animation/CCDIKSolver.js";
 import { Arm, NUMBERS_PER_ARM, parseBendTable } from "../../src/marionette/arm";
-import {
-  MAX_ELBOW_BEND_RAD,
-  MAX_WRIST_BEND_RAD,
-  type Proportions,
-  parseProportions,
-} from "../../src/marionette/proportions";
+import { MAX_ELBOW_BEND_RAD, MAX_WRIST_BEND_RAD } from "../../src/marionette/constants";
+import { type Proportions, parseProportions } from "../../src/marionette/proportions";
 
 interface Asked {
   /** Arms, and hand tips (x y z each) for which the other language solves too. */

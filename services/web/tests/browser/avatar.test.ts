@@ -80,7 +80,7 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     await drop(page, "armless.glb", { without: ["leftLowerArm", "leftHand", "leftMiddleProximal"] });
     await page.getByRole("alert").getByText("these bones were not found: left lower arm, left hand").waitFor();
     await dropBytes(page, "cube.glb", [1, 2, 3]);
-    await page.getByRole("alert").getByText("cube.glb: It is no GLB").waitFor();
+    await page.getByRole("alert").getByText("cube.glb: Not a GLB file").waitFor();
     expect(await page.evaluate(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined)).toBe(
       true,
     );

@@ -10,49 +10,52 @@ import { goldenMotion, joinParts, jointPositions, maxJointError, runToCompletion
 const BESIDE = { x: 1.3, z: -0.4, turn: 2.2 };
 const REPOSITORY = resolve(import.meta.dirname, "../../../..");
 
-async function written(dance: SampledMotion): Promise<string> {
-  return new TextDecoder().decode(await joinParts(runToCompletion(writeBvh(dance))));
+async function writtenText(motion: SampledMotion): Promise<string> {
+  return new TextDecoder().decode(await joinParts(runToCompletion(writeBvh(motion))));
 }
 
 test.each([
   ["turning", turningMotion()],
-  ["of another build", turningMotion({ figure: createOtherFigure() })],
+  ["differently proportioned", turningMotion({ figure: createOtherFigure() })],
   ["golden", goldenMotion()],
-  ["of a second dancer in its place", goldenMotion(1, BESIDE)],
-])("three.js reads a dance %s as it is", async (_, dance) => {
-  const { skeleton, clip } = new BVHLoader().parse(await written(dance));
+  ["placed", goldenMotion(1, BESIDE)],
+])("three.js reads a %s motion unchanged", async (_, motion) => {
+  const { skeleton, clip } = new BVHLoader().parse(await writtenText(motion));
   expect(skeleton.bones[0].name).toBe("humanoid_root");
-  expect(maxJointError(dance, skeleton.bones[0], clip, 0.01)).toBeLessThan(1e-4);
+  expect(maxJointError(motion, skeleton.bones[0], clip, 0.01)).toBeLessThan(1e-4);
 });
 
-/** Reads BVH with our reader and says where all joints are, and writes the same motion with our writer. */
+/** Parse BVH with the Python reader, and write the same motion with the Python writer. */
 const PYTHON = `
 import json, sys
 import numpy as np
-from bunraku.motion import bvh
-from bunraku.motion.bvh_kinematics import pose
-from bunraku.motion.placement import Place
+from bunraku.motion.bvh import parse_bvh
+from bunraku.motion.bvh_kinematics import forward_kinematics
+from bunraku.motion.placement import Placement
 from bunraku.motion.skeleton import JOINTS, Figure, Motion
 from bunraku.motion.bvh_writer import write_bvh
-asked = json.load(sys.stdin)
-figure = Figure(np.array(asked["offsets"]).reshape(18, 3), np.array(asked["tips"]).reshape(18, 3))
-frames = asked["frames"]
-place = Place(**asked["place"])
-motion = Motion(figure, asked["fps"], *place.bring(np.array(asked["roots"]).reshape(frames, 3), np.array(asked["rotations"]).reshape(frames, 18, 4)))
-read = bvh.read(asked["text"].encode())
-order = [read.names.index(name) for name in JOINTS]
-position, _ = pose(read, order)
-json.dump({"fps": read.fps, "places": position[:, order].ravel().tolist(), "text": write_bvh(motion).decode()}, sys.stdout)
+request = json.load(sys.stdin)
+figure = Figure(np.array(request["offsets"]).reshape(18, 3), np.array(request["tips"]).reshape(18, 3))
+frames = request["frames"]
+placement = Placement(**request["place"])
+roots = np.array(request["roots"]).reshape(frames, 3)
+rotations = np.array(request["rotations"]).reshape(frames, 18, 4)
+motion = Motion(figure, request["fps"], *placement.apply(roots, rotations))
+parsed = parse_bvh(request["text"].encode())
+order = [parsed.names.index(name) for name in JOINTS]
+positions, _ = forward_kinematics(parsed, order)
+result = {"fps": parsed.fps, "places": positions[:, order].ravel().tolist(), "text": write_bvh(motion).decode()}
+json.dump(result, sys.stdout)
 `;
 
 test.each([
   ["turning", turningMotion()],
   ["golden", goldenMotion()],
-  ["of a second dancer in its place", turningMotion({ place: BESIDE })],
-])("our own reader reads a dance %s as it is, and our Python writer writes it alike", async (_, dance) => {
-  const text = await written(dance);
-  const { figure, fps, frames, roots, rotations } = dance;
-  const asked = {
+  ["placed", turningMotion({ place: BESIDE })],
+])("the Python reader reads a %s motion, and the Python writer agrees", async (_, motion) => {
+  const text = await writtenText(motion);
+  const { figure, fps, frames, roots, rotations } = motion;
+  const request = {
     text,
     fps,
     frames,
@@ -60,35 +63,35 @@ test.each([
     tips: [...figure.tips],
     roots: [...roots],
     rotations: [...rotations],
-    place: dance.placement,
+    place: motion.placement,
   };
   const python = spawnSync(join(REPOSITORY, ".venv/bin/python"), ["-c", PYTHON], {
-    input: JSON.stringify(asked),
+    input: JSON.stringify(request),
     encoding: "utf8",
     cwd: REPOSITORY,
     maxBuffer: 1e8,
   });
   expect(python.stderr).toBe("");
-  const said = JSON.parse(python.stdout) as { fps: number; places: number[]; text: string };
-  expect(said.fps).toBeCloseTo(fps, 6);
+  const result = JSON.parse(python.stdout) as { fps: number; places: number[]; text: string };
+  expect(result.fps).toBeCloseTo(fps, 6);
   for (let frame = 0; frame < frames; frame++) {
-    jointPositions(dance, frame).forEach((value, i) =>
-      expect(Math.abs(said.places[frame * 54 + i] * 0.01 - value)).toBeLessThan(1e-6),
+    jointPositions(motion, frame).forEach((value, i) =>
+      expect(Math.abs(result.places[frame * 54 + i] * 0.01 - value)).toBeLessThan(1e-6),
     );
   }
-  const words = (of: string) => of.split(/[ \n]/);
-  const [ours, theirs] = [words(text), words(said.text)];
+  const words = (content: string) => content.split(/[ \n]/);
+  const [ours, theirs] = [words(text), words(result.text)];
   expect(ours.length).toBe(theirs.length);
-  // the last of six decimals may be rounded the other way
+  // The last of six decimals may be rounded differently.
   ours.forEach(
     (word, i) => word === theirs[i] || expect(Math.abs(Number(word) - Number(theirs[i]))).toBeLessThan(1.5e-6),
   );
 });
 
-test("a joint that is turned a quarter about x, where two angles are one, is read as it is", async () => {
-  const dance = turningMotion();
-  for (let frame = 0; frame < dance.frames; frame++)
-    dance.rotations.set([Math.SQRT1_2, Math.SQRT1_2, 0, 0], (frame * 18 + 12) * 4);
-  const { skeleton, clip } = new BVHLoader().parse(await written(dance));
-  expect(maxJointError(dance, skeleton.bones[0], clip, 0.01)).toBeLessThan(1e-4);
+test("a joint in gimbal lock is read correctly", async () => {
+  const motion = turningMotion();
+  for (let frame = 0; frame < motion.frames; frame++)
+    motion.rotations.set([Math.SQRT1_2, Math.SQRT1_2, 0, 0], (frame * 18 + 12) * 4);
+  const { skeleton, clip } = new BVHLoader().parse(await writtenText(motion));
+  expect(maxJointError(motion, skeleton.bones[0], clip, 0.01)).toBeLessThan(1e-4);
 });

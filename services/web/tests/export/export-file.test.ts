@@ -5,45 +5,45 @@ import { createPuppetModel } from "../../src/stage/puppet/puppet-model";
 import { goldenStore } from "./motions";
 
 const source = { store: goldenStore(), frames: 78 };
-/** A second dancer, cut where the first is done. */
+/** A second performer, cut at the end of the first. */
 const second = { store: goldenStore(1, { x: 1, z: 0, turn: 0.5 }), frames: 40 };
-// eight bytes that stand for a picture
+// Eight bytes that stand for an image.
 const picture = Uint8Array.of(0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10);
-const looks = { createModel: createPuppetModel, renderFacePng: async () => picture };
+const puppets = { createModel: createPuppetModel, renderFacePng: async () => picture };
 
 test.each([
   ["bvh", "HIERARCHY"],
   ["glb", "glTF"],
   ["vrma", "glTF"],
-] as const)("a dance as %s", async (format, beginning) => {
+] as const)("a motion is exported as %s", async (format, beginning) => {
   const shares: number[] = [];
   const file = await exportFile(format, "a dance", [source], {
-    puppets: looks,
+    puppets,
     onProgress: (share) => shares.push(share),
   });
   expect((await file.text()).startsWith(beginning)).toBe(true);
   expect(shares).toEqual([...shares].sort((a, b) => a - b));
 });
 
-test("the puppet's face is in its GLB", async () => {
-  const file = Buffer.from(await (await exportFile("glb", "a dance", [source], { puppets: looks })).arrayBuffer());
+test("the puppet's face texture is in its GLB", async () => {
+  const file = Buffer.from(await (await exportFile("glb", "a dance", [source], { puppets })).arrayBuffer());
   const json = jsonOf(file);
   const { byteOffset, byteLength } = json.bufferViews[json.images[0].bufferView];
   const buffer = file.subarray(20 + file.readUInt32LE(12) + 8);
   expect([...buffer.subarray(byteOffset, byteOffset + byteLength)]).toEqual([...picture]);
 });
 
-test("of several dancers all are in one GLB, those of equal lengths with one mesh, and each as long as it is danced", async () => {
-  const made: unknown[] = [];
+test("one GLB holds several performers, with a mesh per figure", async () => {
+  const figures: unknown[] = [];
   const shares: number[] = [];
-  const counting = { ...looks, createModel: (figure: Figure) => (made.push(figure), createPuppetModel(figure)) };
+  const counting = { ...puppets, createModel: (figure: Figure) => (figures.push(figure), createPuppetModel(figure)) };
   const again = { store: goldenStore(0, { x: -1, z: 0, turn: 0 }), frames: 78 };
   const file = await exportFile("glb", "a dance", [source, second, again], {
     puppets: counting,
     onProgress: (share) => shares.push(share),
   });
   const json = jsonOf(Buffer.from(await file.arrayBuffer()));
-  expect([made.length, json.meshes.length, json.skins.length]).toEqual([2, 2, 3]);
+  expect([figures.length, json.meshes.length, json.skins.length]).toEqual([2, 2, 3]);
   expect(json.nodes.filter(({ name }) => name.startsWith("dancer")).map(({ name }) => name)).toEqual([
     "dancer 1",
     "dancer 2",
@@ -54,12 +54,12 @@ test("of several dancers all are in one GLB, those of equal lengths with one mes
   expect(shares).toEqual([...shares].sort((a, b) => a - b));
 });
 
-test("what is given up is not made", async () => {
+test("an aborted export is not made", async () => {
   const reason = new Error("given up");
   for (const format of ["bvh", "glb", "vrma"] satisfies ExportFormat[]) {
-    await expect(
-      exportFile(format, "a dance", [source], { puppets: looks, signal: AbortSignal.abort(reason) }),
-    ).rejects.toBe(reason);
+    await expect(exportFile(format, "a dance", [source], { puppets, signal: AbortSignal.abort(reason) })).rejects.toBe(
+      reason,
+    );
   }
 });
 
@@ -73,7 +73,7 @@ interface Described {
   bufferViews: { byteOffset: number; byteLength: number }[];
 }
 
-/** What a GLB says of itself. */
+/** Return the JSON chunk of a GLB. */
 function jsonOf(file: Buffer): Described {
   return JSON.parse(file.subarray(20, 20 + file.readUInt32LE(12)).toString()) as Described;
 }

@@ -12,9 +12,9 @@ test.each([
   ["...", "dance.bvh"],
   ["CON", "dance CON.bvh"],
   ["\ud83d", "dance.bvh"],
-])("%j is %j", (name, file) => expect(fileName(name, "bvh")).toBe(file));
+])("%j becomes %j", (name, file) => expect(fileName(name, "bvh")).toBe(file));
 
-test("long names are cut between characters", () => {
+test("long names are truncated between characters", () => {
   expect(fileName("🎭".repeat(200), "glb")).toBe(`${"🎭".repeat(80)}.glb`);
   expect(fileName("🎭".repeat(200), "bvh", ", Dancer 2")).toBe(`${"🎭".repeat(80)}, Dancer 2.bvh`);
 });

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { frameTimes, GltfBuilder, writeRotation } from "../../src/export/gltf";
 import { joinParts } from "./motions";
 
-test("a file has its length, its JSON and its bytes where GLB has them, each part at a multiple of four", async () => {
+test("a GLB has its length, JSON and data where the format requires", async () => {
   const asset = new GltfBuilder();
   asset.nodes.push({ name: "only" });
   const bytes = asset.addAccessor(Uint8Array.of(1, 2, 3), "SCALAR");
@@ -26,7 +26,7 @@ test("a file has its length, its JSON and its bytes where GLB has them, each par
   expect(file.getFloat32(28 + length + 4 + 8, true)).toBe(1);
 });
 
-test("a rotation is given the sign that lies nearer to the one before", () => {
+test("a rotation gets the sign nearer to the last one", () => {
   const out = new Float32Array(8);
   writeRotation(out, 0, Float64Array.of(1, 0, 0, 0), 0);
   writeRotation(out, 4, Float64Array.of(-2, 0.2, 0, 0), 0);

@@ -1,4 +1,4 @@
-/** Dances to be written, and how far what was read of them is from what they are. */
+/** Motions for export tests, and measurement of the error of parsed files. */
 import { type AnimationClip, AnimationMixer, type Object3D, Vector3 } from "three";
 import { expect } from "vitest";
 import { MotionTrack } from "../../src/codec/motion-track";
@@ -18,7 +18,10 @@ import { type BlockVectors, goldenDescription } from "../golden-motion";
 import { decodeBase64, loadVectors } from "../golden-vectors";
 import { createStandardFigure } from "../stage/puppet/figures";
 
-/** Forty frames in which every joint turns, each in its own way, and the root goes off; the sacroiliac stays `straight` or not. */
+/**
+ * Create forty frames in which every joint rotates and the root travels; with `straight` the sacroiliac does not
+ * rotate.
+ */
 export function turningMotion({
   straight = false,
   figure = createStandardFigure(),
@@ -29,7 +32,7 @@ export function turningMotion({
   place?: Placement;
 } = {}): SampledMotion {
   const frames = 40;
-  const dance = {
+  const motion = {
     figure,
     placement: place,
     fps: 30,
@@ -38,59 +41,64 @@ export function turningMotion({
     rotations: new Float64Array(frames * JOINT_COUNT * 4),
   };
   for (let frame = 0; frame < frames; frame++) {
-    dance.roots.set([0.02 * frame, 0.9 + 0.1 * Math.sin(frame / 5), -0.01 * frame], frame * 3);
+    motion.roots.set([0.02 * frame, 0.9 + 0.1 * Math.sin(frame / 5), -0.01 * frame], frame * 3);
     for (let joint = 0; joint < JOINT_COUNT; joint++) {
       const size = straight && joint === 1 ? 0 : 1;
       const [x, y, z] = [0.3, 0.5, 0.7].map((speed, axis) => size * 1.1 * Math.sin(speed * (frame / 4) + joint + axis));
-      fromRotationVector(dance.rotations, (frame * JOINT_COUNT + joint) * 4, x, joint === 0 ? frame / 6 : y, z);
+      fromRotationVector(motion.rotations, (frame * JOINT_COUNT + joint) * 4, x, joint === 0 ? frame / 6 : y, z);
     }
   }
-  return dance;
+  return motion;
 }
 
-/** The golden motion, or another of them, at the best rate there is of each block; standing at a place. */
-export function goldenMotion(which = 0, { x, z, turn }: Placement = STAGE_CENTRE): SampledMotion {
-  return runToCompletion(sampleMotion(goldenStore(which, { x, z, turn })));
+/** Return a golden motion at the best bitrate level of each block, at a placement. */
+export function goldenMotion(motionIndex = 0, { x, z, turn }: Placement = STAGE_CENTRE): SampledMotion {
+  return runToCompletion(sampleMotion(goldenStore(motionIndex, { x, z, turn })));
 }
 
-/** Its blocks. */
-export function goldenStore(which = 0, { x, z, turn }: Placement = STAGE_CENTRE): MotionBlockStore {
-  const store = new MotionBlockStore(MotionTrack.fromDescription({ ...goldenDescription(which), place: [x, z, turn] }));
-  const blocks = loadVectors<BlockVectors>("blocks").valid.filter(({ track }) => track === which);
-  // the first is there at two rates of the first motion
-  const indices = which === 0 ? [0, 0, 1, 2] : [0, 1, 2];
-  indices.forEach((index, nth) => store.put(index, nth, decodeBase64(blocks[nth].block)));
+/** Return a store with its blocks. */
+export function goldenStore(motionIndex = 0, { x, z, turn }: Placement = STAGE_CENTRE): MotionBlockStore {
+  const store = new MotionBlockStore(
+    MotionTrack.fromDescription({ ...goldenDescription(motionIndex), place: [x, z, turn] }),
+  );
+  const blocks = loadVectors<BlockVectors>("blocks").valid.filter(({ track }) => track === motionIndex);
+  // The first motion has two bitrate levels of the first block.
+  const indices = motionIndex === 0 ? [0, 0, 1, 2] : [0, 1, 2];
+  indices.forEach((index, blockIndex) => store.put(index, blockIndex, decodeBase64(blocks[blockIndex].block)));
   return store;
 }
 
-/** What a work makes, without a pause; it says rising shares on its way. */
+/** Run a task to completion and check that its progress rises. */
 export function runToCompletion<T>(work: IncrementalTask<T>): T {
-  for (let before = 0; ; ) {
+  for (let last = 0; ; ) {
     const { done, value } = work.next();
     if (done) return value;
-    expect(value).toBeGreaterThanOrEqual(before);
+    expect(value).toBeGreaterThanOrEqual(last);
     expect(value).toBeLessThanOrEqual(1);
-    before = value;
+    last = value;
   }
 }
 
-/** The bytes of a file in parts. */
+/** Join the parts of a file. */
 export async function joinParts(parts: Uint8Array<ArrayBuffer>[]): Promise<ArrayBuffer> {
   return new Blob(parts).arrayBuffer();
 }
 
-/** World places of the joints in a frame (54) on the stage that all dancers share, metres. */
-export function jointPositions(dance: SampledMotion, frame: number): Float64Array {
+/** Return the world positions of the joints in a frame (54) on the shared stage, in metres. */
+export function jointPositions(motion: SampledMotion, frame: number): Float64Array {
   return worldTransforms(
-    dance.figure,
-    applyPlacement(poseAt(dance, frame, restPose()), dance.placement),
+    motion.figure,
+    applyPlacement(poseAt(motion, frame, restPose()), motion.placement),
     createWorldTransforms(),
   ).positions.slice();
 }
 
-/** Plays `clip` on `root`, frame by frame, and says how far a joint that is found by its name is from the dance's at most, metres. */
+/**
+ * Play `clip` on `root` frame by frame; return the largest distance of a joint, found by name, from the motion's, in
+ * metres.
+ */
 export function maxJointError(
-  dance: SampledMotion,
+  motion: SampledMotion,
   root: Object3D,
   clip: AnimationClip,
   unit = 1,
@@ -99,19 +107,19 @@ export function maxJointError(
   const mixer = new AnimationMixer(root);
   mixer.clipAction(clip).play();
   const at = new Vector3();
-  let most = 0;
-  for (let frame = 0; frame < dance.frames; frame++) {
-    // the last frame is the end of the loop, where it begins again
-    mixer.setTime(Math.min(frame / dance.fps, clip.duration - 1e-6));
+  let maxError = 0;
+  for (let frame = 0; frame < motion.frames; frame++) {
+    // The last frame is the end of the loop, where it restarts.
+    mixer.setTime(Math.min(frame / motion.fps, clip.duration - 1e-6));
     root.updateMatrixWorld(true);
-    const places = jointPositions(dance, frame);
+    const places = jointPositions(motion, frame);
     for (const name of JOINTS) {
       const joint = find(name);
-      if (!joint) throw new Error(`no ${name} in what was read`);
+      if (!joint) throw new Error(`The file has no joint ${name}.`);
       at.setFromMatrixPosition(joint.matrixWorld).multiplyScalar(unit);
       const k = JOINTS.indexOf(name) * 3;
-      most = Math.max(most, Math.hypot(at.x - places[k], at.y - places[k + 1], at.z - places[k + 2]));
+      maxError = Math.max(maxError, Math.hypot(at.x - places[k], at.y - places[k + 1], at.z - places[k + 2]));
     }
   }
-  return most;
+  return maxError;
 }

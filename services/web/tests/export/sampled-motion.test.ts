@@ -7,9 +7,9 @@ import { type BlockVectors, goldenTrack } from "../golden-motion";
 import { decodeBase64, loadVectors } from "../golden-vectors";
 import { goldenMotion, goldenStore, runToCompletion } from "./motions";
 
-test("each frame is the best block's pose at that frame", () => {
-  const dance = goldenMotion();
-  expect(dance).toMatchObject({ fps: goldenTrack().fps, frames: 78 });
+test("each frame is the pose of the best block at that frame", () => {
+  const motion = goldenMotion();
+  expect(motion).toMatchObject({ fps: goldenTrack().fps, frames: 78 });
   const { valid } = loadVectors<BlockVectors>("blocks");
   const pose = restPose();
   let compared = 0;
@@ -19,7 +19,7 @@ test("each frame is the best block's pose at that frame", () => {
     [3, 60],
   ]) {
     for (const { instant, root, rotations } of valid[block].poses.filter((one) => Number.isInteger(one.instant))) {
-      poseAt(dance, first + instant, pose);
+      poseAt(motion, first + instant, pose);
       root.forEach((value, i) => expect(pose.root[i]).toBeCloseTo(value, 8));
       rotations.forEach((value, i) => expect(pose.rotations[i]).toBeCloseTo(value, 8));
       compared++;
@@ -28,18 +28,18 @@ test("each frame is the best block's pose at that frame", () => {
   expect(compared).toBeGreaterThan(2);
 });
 
-test("as many frames are taken as are danced, without the blocks that come after them", () => {
+test("a limited number of frames does not need the blocks after them", () => {
   const whole = goldenStore(),
     part = new MotionBlockStore(goldenTrack());
   for (const index of [0, 1])
     part.put(index, 1, decodeBase64(loadVectors<BlockVectors>("blocks").valid[index + 1].block));
-  const dance = runToCompletion(sampleMotion(part, 45));
-  expect([dance.frames, dance.roots.length, dance.placement]).toEqual([45, 135, STAGE_CENTRE]);
-  expect(poseAt(dance, 44, restPose())).toEqual(poseAt(runToCompletion(sampleMotion(whole)), 44, restPose()));
+  const motion = runToCompletion(sampleMotion(part, 45));
+  expect([motion.frames, motion.roots.length, motion.placement]).toEqual([45, 135, STAGE_CENTRE]);
+  expect(poseAt(motion, 44, restPose())).toEqual(poseAt(runToCompletion(sampleMotion(whole)), 44, restPose()));
 });
 
-test("a motion of which a block is missing is not made up", () => {
+test("a motion with a missing block is not sampled", () => {
   expect(() => runToCompletion(sampleMotion(new MotionBlockStore(goldenTrack())))).toThrow(
-    "the block of frame 0 is not here",
+    "the block of frame 0 is not loaded",
   );
 });

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import type { IncrementalTask } from "../../src/export/sampled-motion";
 import { runInSlices } from "../../src/export/time-slice";
 
-/** Ten steps of three milliseconds on a clock of their own. */
+/** Create a task of ten steps of 3 ms on a fake clock. */
 function steps(): { work: IncrementalTask<string>; now: () => number; taken: () => number } {
   let time = 0;
   let taken = 0;
@@ -16,21 +16,21 @@ function steps(): { work: IncrementalTask<string>; now: () => number; taken: () 
   return { work: work(), now: () => time, taken: () => taken };
 }
 
-test("pauses after every few milliseconds of work, and tells how far it is", async () => {
+test("yields after every few milliseconds and reports progress", async () => {
   const { work, now } = steps();
   const shares: number[] = [];
   let pauses = 0;
-  const made = await runInSlices(work, {
+  const result = await runInSlices(work, {
     now,
     onProgress: (share) => shares.push(share),
     yieldToEventLoop: async () => void pauses++,
   });
-  expect(made).toBe("done");
+  expect(result).toBe("done");
   expect(shares).toEqual([0.2, 0.5, 0.8]);
   expect(pauses).toBe(3);
 });
 
-test("does nothing more once it is given up", async () => {
+test("stops when aborted", async () => {
   const { work, now, taken } = steps();
   const abort = new AbortController();
   const reason = new Error("given up");
@@ -40,6 +40,6 @@ test("does nothing more once it is given up", async () => {
   expect(taken()).toBe(2);
 });
 
-test("takes the browser's own clock and pauses where none are given", async () => {
+test("uses the browser's clock and event loop by default", async () => {
   expect(await runInSlices(steps().work)).toBe("done");
 });

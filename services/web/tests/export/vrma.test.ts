@@ -9,15 +9,15 @@ import { BONE_PARENTS, BONES, tPoseFigure } from "../../src/motion/humanoid";
 import { createWorldTransforms, restPose, worldTransforms } from "../../src/motion/skeleton";
 import { goldenMotion, joinParts, runToCompletion, turningMotion } from "./motions";
 
-async function read(dance: SampledMotion): Promise<VRMAnimation> {
+async function read(motion: SampledMotion): Promise<VRMAnimation> {
   const loader = new GLTFLoader();
   loader.register((parser) => new VRMAnimationLoaderPlugin(parser));
-  const { userData } = await loader.parseAsync(await joinParts(runToCompletion(writeVrma(dance, "a dance"))), "");
+  const { userData } = await loader.parseAsync(await joinParts(runToCompletion(writeVrma(motion, "a dance"))), "");
   const [animation] = userData.vrmAnimations as VRMAnimation[];
   return animation;
 }
 
-/** An avatar of the dancer's own build, in the T-pose, its bones under names of their own. */
+/** Create an avatar with the figure's proportions in the T-pose, with its own bone names. */
 function avatar({ figure }: SampledMotion): VRMCore {
   const { offsets } = tPoseFigure(figure);
   const scene = new Group();
@@ -40,62 +40,64 @@ describe.each([
   ["turning", turningMotion()],
   ["with a straight sacroiliac", turningMotion({ straight: true })],
   ["golden", goldenMotion()],
-  ["of a second dancer", goldenMotion(1, { x: 1.3, z: -0.4, turn: 2.2 })],
-])("a dance %s", (_, dance) => {
-  test("moves an avatar of the dancer's build through three-vrm as the dancer moves", async () => {
-    const animation = await read(dance);
+  ["placed", goldenMotion(1, { x: 1.3, z: -0.4, turn: 2.2 })],
+])("a %s motion", (_, motion) => {
+  test("moves an avatar of the same proportions like the figure", async () => {
+    const animation = await read(motion);
     expect(animation.humanoidTracks.rotation.size).toBe(BONES.length);
     expect(animation.humanoidTracks.translation.has("hips")).toBe(true);
-    const vrm = avatar(dance);
+    const vrm = avatar(motion);
     const clip = createVRMAnimationClip(animation, vrm);
     const mixer = new AnimationMixer(vrm.scene);
     mixer.clipAction(clip).play();
-    const ours = createWorldTransforms(),
+    const figureWorld = createWorldTransforms(),
       pose = restPose();
     const at = new Vector3(),
       expected = new Vector3(),
       shift = new Vector3(),
       turn = new Quaternion();
-    const laid = new Quaternion();
-    for (let frame = 0; frame < dance.frames; frame++) {
-      mixer.setTime(Math.min(frame / dance.fps, clip.duration - 1e-6));
+    const restRotation = new Quaternion();
+    for (let frame = 0; frame < motion.frames; frame++) {
+      mixer.setTime(Math.min(frame / motion.fps, clip.duration - 1e-6));
       vrm.update(0);
       vrm.scene.updateMatrixWorld(true);
-      worldTransforms(dance.figure, poseAt(dance, frame, pose), ours);
+      worldTransforms(motion.figure, poseAt(motion, frame, pose), figureWorld);
       shift.set(0, 0, 0);
       BONES.forEach((name, bone) => {
         const node = vrm.humanoid.getRawBoneNode(name as "hips") as Object3D;
         at.setFromMatrixPosition(node.matrixWorld);
-        expected.fromArray(ours.positions, (bone + 1) * 3);
-        // the spine hangs from the hips there, and from the root here: what is above it goes with it
+        expected.fromArray(figureWorld.positions, (bone + 1) * 3);
+        // The avatar's spine hangs from the hips, the figure's from the root: everything above is shifted.
         if (bone === FROM_SPINE) shift.subVectors(at, expected);
         expect(at.distanceTo(expected.add(shift))).toBeLessThan(1e-4);
-        const [w, x, y, z] = ours.orientations.subarray((bone + 1) * 4);
-        laid.identity();
+        const [w, x, y, z] = figureWorld.orientations.subarray((bone + 1) * 4);
+        restRotation.identity();
         if (/Arm|Hand/.test(name))
-          laid.setFromAxisAngle(new Vector3(0, 0, 1), (name.startsWith("left") ? -1 : 1) * (Math.PI / 2));
-        expect(node.getWorldQuaternion(turn).angleTo(new Quaternion(x, y, z, w).multiply(laid))).toBeLessThan(1e-3);
+          restRotation.setFromAxisAngle(new Vector3(0, 0, 1), (name.startsWith("left") ? -1 : 1) * (Math.PI / 2));
+        expect(node.getWorldQuaternion(turn).angleTo(new Quaternion(x, y, z, w).multiply(restRotation))).toBeLessThan(
+          1e-3,
+        );
       });
     }
   });
 });
 
-test("a second dancer's is told about where its avatar stands, wherever that is on the stage", async () => {
-  const bytes = async (dance: SampledMotion) =>
-    new Uint8Array(await joinParts(runToCompletion(writeVrma(dance, "a dance"))));
+test("the placement is left out", async () => {
+  const bytes = async (motion: SampledMotion) =>
+    new Uint8Array(await joinParts(runToCompletion(writeVrma(motion, "a dance"))));
   expect(await bytes(goldenMotion(1, { x: 1.3, z: -0.4, turn: 2.2 }))).toEqual(await bytes(goldenMotion(1)));
 });
 
 test("with a straight sacroiliac nothing is shifted", async () => {
-  const dance = turningMotion({ straight: true });
-  const vrm = avatar(dance);
-  const clip = createVRMAnimationClip(await read(dance), vrm);
+  const motion = turningMotion({ straight: true });
+  const vrm = avatar(motion);
+  const clip = createVRMAnimationClip(await read(motion), vrm);
   const mixer = new AnimationMixer(vrm.scene);
   mixer.clipAction(clip).play();
-  mixer.setTime(20 / dance.fps);
+  mixer.setTime(20 / motion.fps);
   vrm.update(0);
   vrm.scene.updateMatrixWorld(true);
-  const ours = worldTransforms(dance.figure, poseAt(dance, 20, restPose()), createWorldTransforms());
+  const figureWorld = worldTransforms(motion.figure, poseAt(motion, 20, restPose()), createWorldTransforms());
   const hand = new Vector3().setFromMatrixPosition((vrm.humanoid.getRawBoneNode("leftHand") as Object3D).matrixWorld);
-  expect(hand.distanceTo(new Vector3().fromArray(ours.positions, 14 * 3))).toBeLessThan(1e-4);
+  expect(hand.distanceTo(new Vector3().fromArray(figureWorld.positions, 14 * 3))).toBeLessThan(1e-4);
 });

@@ -9,54 +9,54 @@ import { recordPageActions } from "./page-actions";
 
 const LEFT_HAND = 0;
 
-let hands: LimbController;
+let limbController: LimbController;
 let velocity: VelocityInputs;
 let commands: CommandDispatcher;
 let session: FakePuppeteer;
-let told: string[];
-let chosen: PerformerSelection;
+let actions: string[];
+let selection: PerformerSelection;
 
 beforeEach(() => {
   session = new FakePuppeteer();
-  hands = createLimbController(createStandingPuppet(), session);
-  told = [];
-  chosen = new PerformerSelection();
-  velocity = new VelocityInputs(hands, {
-    claim: (limb) => hands.claim(limb, "velocity"),
-    isFree: (limb) => hands.source(limb) === null,
-    selection: chosen,
+  limbController = createLimbController(createStandingPuppet(), session);
+  actions = [];
+  selection = new PerformerSelection();
+  velocity = new VelocityInputs(limbController, {
+    claim: (limb) => limbController.claim(limb, "velocity"),
+    isFree: (limb) => limbController.source(limb) === null,
+    selection,
   });
-  commands = new CommandDispatcher(hands, velocity, recordPageActions(told));
+  commands = new CommandDispatcher(limbController, velocity, recordPageActions(actions));
 });
 
-describe("a control that takes a limb", () => {
-  test("tapped holds it, and the next tap lets it go", () => {
+describe("a control that claims a limb", () => {
+  test("holds it after a tap and releases it with the next", () => {
     commands.press("Digit2", ["take_left_hand"], 1, 0);
     commands.release("Digit2", 100);
     expect(velocity.holds(LEFT_HAND)).toBe(true);
     commands.press("Digit2", ["take_left_hand"], 1, 1000);
     expect(velocity.holds(LEFT_HAND)).toBe(true);
     commands.release("Digit2", 1100);
-    expect(hands.source(LEFT_HAND)).toBe(null);
+    expect(limbController.source(LEFT_HAND)).toBe(null);
   });
 
-  test("takes it of the chosen performer, and lets go what it took though another is chosen meanwhile", () => {
-    chosen.count = 2;
-    chosen.select(1);
+  test("claims for the selected performer and releases the limb it claimed", () => {
+    selection.count = 2;
+    selection.select(1);
     commands.press("Digit2", ["take_left_hand"], 1, 0);
-    chosen.select(0);
-    expect(hands.source(4 + LEFT_HAND)).toBe("velocity");
+    selection.select(0);
+    expect(limbController.source(4 + LEFT_HAND)).toBe("velocity");
     commands.release("Digit2", 500);
-    expect(hands.isHoldingAny).toBe(false);
+    expect(limbController.isHoldingAny).toBe(false);
   });
 
-  test("held long holds it for as long as it lasts", () => {
+  test("held long releases the limb with the control", () => {
     commands.press("Digit2", ["take_left_hand"], 1, 0);
     commands.release("Digit2", 401);
-    expect(hands.source(LEFT_HAND)).toBe(null);
+    expect(limbController.source(LEFT_HAND)).toBe(null);
   });
 
-  test("tapped makes one that a push took stay", () => {
+  test("tapped keeps a limb that a push claimed", () => {
     commands.press("axis:0+", ["left_hand_x+"], 1, 0);
     velocity.update(0);
     commands.press("Digit2", ["take_left_hand"], 1, 10);
@@ -66,28 +66,28 @@ describe("a control that takes a limb", () => {
     expect(velocity.holds(LEFT_HAND)).toBe(true);
   });
 
-  test("leaves to the pointer what it holds", () => {
-    hands.claim(LEFT_HAND, "pointer");
+  test("does not release a limb that a pointer holds", () => {
+    limbController.claim(LEFT_HAND, "pointer");
     commands.press("Digit2", ["take_left_hand"], 1, 0);
     commands.release("Digit2", 1000);
-    expect(hands.source(LEFT_HAND)).toBe("pointer");
+    expect(limbController.source(LEFT_HAND)).toBe("pointer");
   });
 });
 
-test("an action is done once a press, and seeking with every repeat", () => {
+test("an action runs once per press, and seeking with every repeat", () => {
   commands.press("Space", ["play"], 1, 0);
   commands.press("Space", ["play"], 1, 16);
   commands.repeat("Space");
-  expect(told).toEqual(["play"]);
+  expect(actions).toEqual(["play"]);
   commands.press("ArrowRight", ["forward"], 1, 0);
   commands.repeat("ArrowRight");
   commands.repeat("ArrowRight");
   commands.release("ArrowRight", 100);
   commands.repeat("ArrowRight");
-  expect(told).toEqual(["play", "forward", "forward", "forward"]);
+  expect(actions).toEqual(["play", "forward", "forward", "forward"]);
 });
 
-test("inputs go as strongly as they are pressed, until they come up or are forgotten", () => {
+test("inputs have the strength of the press until released or cleared", () => {
   commands.press("axis:0+", ["left_hand_x+"], 0.25, 0);
   commands.press("axis:0+", ["left_hand_x+"], 0.5, 16);
   commands.press("KeyU", ["right_leg-"], 1, 16);

@@ -9,7 +9,7 @@ import {
   SELECTED_LIMB_INPUTS,
 } from "../../src/input/digital-input";
 
-test("there are the paper's 14: six of each hand, one of each leg; as buttons a leg's is a pair", () => {
+test("there are the paper's 14 inputs, or 16 buttons", () => {
   expect(PAPER_INPUTS).toHaveLength(14);
   expect(new Set(PAPER_INPUTS).size).toBe(14);
   expect(PAPER_INPUTS.slice(0, 6)).toEqual([
@@ -25,7 +25,7 @@ test("there are the paper's 14: six of each hand, one of each leg; as buttons a 
   expect(new Set(DIGITAL_INPUTS.map((input) => input.replace(/(leg)[+-]$/, "$1")))).toEqual(new Set(PAPER_INPUTS));
 });
 
-test("each does one thing: its limb, its axis, its way", () => {
+test("each input has its own limb, axis and sign", () => {
   expect(effectOf("left_hand_x-")).toEqual({ limb: 0, axis: 0, sign: -1 });
   expect(effectOf("right_hand_z+")).toEqual({ limb: 1, axis: 2, sign: 1 });
   expect(effectOf("left_leg+")).toEqual({ limb: 2, axis: 1, sign: 1 });
@@ -36,11 +36,11 @@ test("each does one thing: its limb, its axis, its way", () => {
   expect(["left_hand_x", "play", ""].map(isLimbInput)).toEqual([false, false, false]);
 });
 
-describe("a direction", () => {
+describe("directions", () => {
   const strength = fc.double({ min: 0, max: 1, noNaN: true });
   const held = fc.array(fc.tuple(fc.constantFrom(...DIGITAL_INPUTS.slice(0, 6)), strength), { maxLength: 8 });
 
-  test("opposite inputs cancel, a slant is no faster, the same one held twice counts once", () => {
+  test("cancel opposite inputs, and count repeated ones once", () => {
     expect(combineDirections([["left_hand_x+", 1]])).toEqual([1, 0, 0]);
     expect(
       combineDirections([
@@ -68,7 +68,7 @@ describe("a direction", () => {
     expect(combineDirections([])).toEqual([0, 0, 0]);
   });
 
-  test("is never faster than full speed, whatever is held in whatever order", () => {
+  test("never exceed full speed, in any order of inputs", () => {
     fc.assert(
       fc.property(held, (inputs) => {
         const direction = combineDirections(inputs);
@@ -78,7 +78,7 @@ describe("a direction", () => {
     );
   });
 
-  test("of a leg is up or down", () => {
+  test("of a leg are up or down", () => {
     expect(combineDirections([["left_leg+", 1]])).toEqual([0, 1, 0]);
     expect(combineDirections([["right_leg-", 0.25]])).toEqual([0, -0.25, 0]);
   });

@@ -1,4 +1,4 @@
-/** The session's end and the stage as hands see them: what is asked of the one is written down, the other is a puppet and a seat. */
+/** Fakes of the session connection, which records calls, and of the stage. */
 import { Vector3 } from "three";
 import type { Puppeteer } from "../../src/client/puppeteer";
 import { LimbController } from "../../src/input/limb-controller";
@@ -8,7 +8,7 @@ import type { Stage } from "../../src/stage/stage";
 export type PuppeteerCall = [asked: "claim" | "release" | "target" | "velocity", limb: number, ...values: number[]];
 
 export class FakePuppeteer {
-  ended = false;
+  isClosed = false;
   readonly calls: PuppeteerCall[] = [];
   claim(limb: number): void {
     this.calls.push(["claim", limb]);
@@ -23,13 +23,13 @@ export class FakePuppeteer {
     this.calls.push(["velocity", limb, x, y, z]);
   }
 
-  /** Forgets what was said, and gives it. */
+  /** Return the recorded calls and clear them. */
   takeCalls(): PuppeteerCall[] {
     return this.calls.splice(0);
   }
 }
 
-/** Hands of one who sits before a puppet, or several, looking along -z, in `session`. */
+/** Create a limb controller with a camera along -z in front of one or several puppets. */
 export function createLimbController(
   puppets: Puppet | readonly Puppet[] | null,
   puppeteer: FakePuppeteer | null,
@@ -40,7 +40,7 @@ export function createLimbController(
     up: () => new Vector3(0, 1, 0),
     back: () => new Vector3(0, 0, 1),
   };
-  const hands = new LimbController(stage as unknown as Stage);
-  hands.puppeteer = puppeteer as unknown as Puppeteer | null;
-  return hands;
+  const limbController = new LimbController(stage as unknown as Stage);
+  limbController.puppeteer = puppeteer as unknown as Puppeteer | null;
+  return limbController;
 }

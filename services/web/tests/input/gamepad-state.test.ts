@@ -6,15 +6,15 @@ import { createGamepad } from "./gamepads";
 
 const axis = fc.double({ min: -1, max: 1, noNaN: true });
 const [L1, L2, A, CROSS_LEFT] = [4, 6, 0, 14];
-const asked = (...of: Parameters<typeof createGamepad>) =>
+const inputsOf = (...of: Parameters<typeof createGamepad>) =>
   Object.fromEntries(
     resolveControls(createGamepad(...of), DEFAULT_MAPPING).flatMap(({ commands, strength }) =>
-      commands.map((one): [Command, number] => [one, strength]),
+      commands.map((command): [Command, number] => [command, strength]),
     ),
   );
 
-describe("a stick", () => {
-  test("rests within the dead zone, rises from nothing at its edge, never passes 1, and keeps its direction", () => {
+describe("sticks and buttons", () => {
+  test("a stick has a dead zone, then rises to 1 with its direction kept", () => {
     fc.assert(
       fc.property(axis, axis, fc.double({ min: 0, max: 0.5, noNaN: true }), (x, y, deadZone) => {
         const [a, b] = applyDeadZone(x, y, deadZone);
@@ -28,7 +28,7 @@ describe("a stick", () => {
     expect(applyDeadZone(1, 0, 0.2)).toEqual([1, 0]);
   });
 
-  test("and buttons are named as controls, each with how far it is pushed", () => {
+  test("all are named as controls with their strength", () => {
     const pushed = pressedControls(createGamepad([1, 0, 0, -1], { [L2]: 0.5, [A]: 1 }), 0.16);
     expect([...pushed].sort()).toEqual([
       ["axis:0+", 1],
@@ -46,24 +46,28 @@ describe("a stick", () => {
 });
 
 describe("under the default mapping", () => {
-  test("the left stick moves the left hand, up is up; its trigger brings it nearer", () => {
-    expect(asked([1, 0, 0, -1], { [L2]: 0.5 })).toEqual({ "left_hand_x+": 1, "left_hand_z+": 0.5, "right_hand_y+": 1 });
+  test("the left stick moves the left hand and its trigger the depth", () => {
+    expect(inputsOf([1, 0, 0, -1], { [L2]: 0.5 })).toEqual({
+      "left_hand_x+": 1,
+      "left_hand_z+": 0.5,
+      "right_hand_y+": 1,
+    });
   });
 
-  test("its shoulder button gives the stick to the leg and turns the trigger outwards", () => {
-    expect(Object.keys(asked([0.5, -1, 0, 0], { [L1]: 1, [L2]: 1 })).sort()).toEqual(["left_hand_z-", "left_leg+"]);
+  test("the shoulder button moves the leg and reverses the trigger", () => {
+    expect(Object.keys(inputsOf([0.5, -1, 0, 0], { [L1]: 1, [L2]: 1 })).sort()).toEqual(["left_hand_z-", "left_leg+"]);
   });
 
-  test("play and seek are pressed from half way on", () => {
-    expect(asked([0, 0, 0, 0], { [A]: 1, [CROSS_LEFT]: 1 })).toEqual({ play: 1, back: 1 });
-    expect(asked([0, 0, 0, 0], { [A]: 0.4 })).toEqual({});
+  test("play and seek need more than half a press", () => {
+    expect(inputsOf([0, 0, 0, 0], { [A]: 1, [CROSS_LEFT]: 1 })).toEqual({ play: 1, back: 1 });
+    expect(inputsOf([0, 0, 0, 0], { [A]: 0.4 })).toEqual({});
   });
 });
 
-test("any control can be bound to anything", () => {
+test("any control can be bound to any command", () => {
   const mapping = bind(bind(DEFAULT_MAPPING, "button:1", "left_leg+"), "axis:2+", "keep");
   const commands = (...of: Parameters<typeof createGamepad>) =>
-    resolveControls(createGamepad(...of), mapping).map(({ control, commands: does }) => [control, ...does]);
+    resolveControls(createGamepad(...of), mapping).map(({ control, commands: bound }) => [control, ...bound]);
   expect(commands([0, 0, 0, 0], { 1: 0.2 })).toEqual([["button:1", "left_leg+"]]);
   expect(commands([0, 0, 1, 0])).toEqual([["axis:2+", "right_hand_x+", "keep"]]);
 });

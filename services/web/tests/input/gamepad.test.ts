@@ -13,25 +13,25 @@ const LEFT_HAND = 0;
 const [A, LEFT, RIGHT] = [0, 14, 15];
 
 let session: FakePuppeteer;
-let hands: LimbController;
+let limbController: LimbController;
 let velocity: VelocityInputs;
 let pads: (Gamepad | null)[];
 let input: GamepadInput;
-let told: string[];
+let actions: string[];
 let mapping: Mapping;
 
 beforeEach(() => {
   session = new FakePuppeteer();
-  hands = createLimbController(createStandingPuppet(), session);
+  limbController = createLimbController(createStandingPuppet(), session);
   pads = [];
-  told = [];
+  actions = [];
   mapping = DEFAULT_MAPPING;
-  velocity = new VelocityInputs(hands, {
-    claim: (limb) => hands.claim(limb, "velocity"),
-    isFree: (limb) => hands.source(limb) === null,
+  velocity = new VelocityInputs(limbController, {
+    claim: (limb) => limbController.claim(limb, "velocity"),
+    isFree: (limb) => limbController.source(limb) === null,
   });
   input = createGamepadInput(
-    new CommandDispatcher(hands, velocity, recordPageActions(told)),
+    new CommandDispatcher(limbController, velocity, recordPageActions(actions)),
     () => mapping,
     () => pads,
   );
@@ -42,7 +42,7 @@ function frame(now: number, acting = true): void {
   velocity.update(now);
 }
 
-test("a stick that is moved takes its hand and moves it, and at rest it stops at once", () => {
+test("a pushed stick claims and moves its hand, and stops at once at rest", () => {
   pads = [createGamepad([1, 0, 0, 0])];
   frame(0);
   expect(session.takeCalls()).toEqual([
@@ -55,28 +55,28 @@ test("a stick that is moved takes its hand and moves it, and at rest it stops at
   expect(session.calls.at(-1)).toEqual(["velocity", LEFT_HAND, 0, 0, 0]);
 });
 
-test("a trembling stick is steadied, the more the more that is wished", () => {
+test("a trembling stick is smoothed by the chosen amount", () => {
   const shake = (stickSmoothing: number) => {
     mapping = { ...DEFAULT_MAPPING, stickSmoothing };
-    const said: number[] = [];
+    const strengths: number[] = [];
     for (let i = 0; i < 200; i++) {
       pads = [createGamepad([0.6 + 0.1 * (i % 2), 0, 0, 0])];
       frame(i * 16);
-      said.push(session.takeCalls().at(-1)?.[2] as number);
+      strengths.push(session.takeCalls().at(-1)?.[2] as number);
     }
     pads = [createGamepad()];
     frame(200 * 16);
-    const steady = said.slice(100);
+    const steady = strengths.slice(100);
     return Math.max(...steady) - Math.min(...steady);
   };
   expect(shake(0)).toBeGreaterThan(0.1);
   expect(shake(1)).toBeLessThan(0.04);
 });
 
-test("pulled out, its limbs come to rest and are given back", () => {
+test("a disconnected gamepad stops its limbs and releases them", () => {
   pads = [createGamepad([1, 0, -1, 0])];
   frame(0);
-  expect([hands.source(0), hands.source(1)]).toEqual(["velocity", "velocity"]);
+  expect([limbController.source(0), limbController.source(1)]).toEqual(["velocity", "velocity"]);
   pads = [null];
   frame(16);
   expect(session.calls.slice(-2)).toEqual([
@@ -84,31 +84,31 @@ test("pulled out, its limbs come to rest and are given back", () => {
     ["velocity", 1, 0, 0, 0],
   ]);
   frame(1000);
-  expect([hands.source(0), hands.source(1), input.pad]).toEqual([null, null, null]);
+  expect([limbController.source(0), limbController.source(1), input.pad]).toEqual([null, null, null]);
 });
 
-test("the first pad of the standard mapping that is connected is read", () => {
-  const gone = { ...createGamepad([1, 0, 0, 0]), connected: false } as Gamepad;
+test("the first connected standard gamepad is read", () => {
+  const disconnected = { ...createGamepad([1, 0, 0, 0]), connected: false } as Gamepad;
   const standard = createGamepad();
-  pads = [null, gone, createGamepad([1, 0, 0, 0], { [A]: 1 }, ""), standard, createGamepad([1, 0, 0, 0])];
+  pads = [null, disconnected, createGamepad([1, 0, 0, 0], { [A]: 1 }, ""), standard, createGamepad([1, 0, 0, 0])];
   frame(0);
   expect(input.pad).toBe(standard);
-  expect([told, session.calls]).toEqual([[], []]);
+  expect([actions, session.calls]).toEqual([[], []]);
 });
 
-test("a button held down plays and seeks once", () => {
+test("a held button plays and seeks once", () => {
   pads = [createGamepad([0, 0, 0, 0], { [A]: 1, [LEFT]: 1 })];
   frame(0);
   frame(16);
-  expect(told).toEqual(["play", "back"]);
+  expect(actions).toEqual(["play", "back"]);
   pads = [createGamepad()];
   frame(32);
   pads = [createGamepad([0, 0, 0, 0], { [RIGHT]: 1 })];
   frame(48);
-  expect(told).toEqual(["play", "back", "forward"]);
+  expect(actions).toEqual(["play", "back", "forward"]);
 });
 
-test("what a button does is the mapping's to say, and nothing while one is being bound", () => {
+test("a button does what the mapping says, and nothing while disabled", () => {
   mapping = bind(DEFAULT_MAPPING, "button:1", "right_leg+");
   pads = [createGamepad([0, 0, 0, 0], { 1: 1 })];
   frame(0, false);
@@ -120,7 +120,7 @@ test("what a button does is the mapping's to say, and nothing while one is being
   ]);
 });
 
-test("pressing the shoulder button gives a pushed stick from the hand to the leg", () => {
+test("the shoulder button moves a pushed stick from the hand to the leg", () => {
   pads = [createGamepad([0, -1, 0, 0])];
   frame(0);
   session.takeCalls();

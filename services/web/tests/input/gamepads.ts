@@ -1,4 +1,4 @@
-/** Gamepads as the browser tells of them. */
+/** Create a gamepad as the Gamepad API reports it. */
 export function createGamepad(
   axes = [0, 0, 0, 0],
   pressed: Readonly<Record<number, number>> = {},

@@ -10,7 +10,7 @@ import { recordPageActions } from "./page-actions";
 
 const LEFT_HAND = 0;
 
-/** As much of an element as is asked of the one with the focus. */
+/** Minimal element that can have the focus. */
 class Focused extends EventTarget {
   isContentEditable = false;
   constructor(private readonly kind: string) {
@@ -25,14 +25,14 @@ class Focused extends EventTarget {
 }
 
 let target: EventTarget;
-let hands: LimbController;
+let limbController: LimbController;
 let velocity: VelocityInputs;
 let session: FakePuppeteer;
-let told: string[];
+let actions: string[];
 let dialog: boolean;
 let mapping: Mapping;
 
-/** A key goes down; whether it was taken from the browser. */
+/** Press a key; return whether its default action was prevented. */
 function down(code: string, more: Record<string, unknown> = {}): boolean {
   const event = Object.assign(
     new Event("keydown", { cancelable: true }),
@@ -60,27 +60,27 @@ beforeEach(() => {
   vi.stubGlobal("document", { querySelector: () => (dialog ? {} : null) });
   target = new EventTarget();
   session = new FakePuppeteer();
-  hands = createLimbController(createStandingPuppet(), session);
-  told = [];
+  limbController = createLimbController(createStandingPuppet(), session);
+  actions = [];
   dialog = false;
   mapping = DEFAULT_MAPPING;
-  velocity = new VelocityInputs(hands, {
-    claim: (limb) => hands.claim(limb, "velocity"),
-    isFree: (limb) => hands.source(limb) === null,
+  velocity = new VelocityInputs(limbController, {
+    claim: (limb) => limbController.claim(limb, "velocity"),
+    isFree: (limb) => limbController.source(limb) === null,
   });
-  const actions = { showKeys: () => told.push("keys"), onEscape: () => told.push("escape") };
+  const keyboardActions = { showKeys: () => actions.push("keys"), onEscape: () => actions.push("escape") };
   listenToKeyboard(
     target as unknown as Window,
-    new CommandDispatcher(hands, velocity, recordPageActions(told)),
+    new CommandDispatcher(limbController, velocity, recordPageActions(actions)),
     velocity,
     () => mapping,
-    actions,
+    keyboardActions,
   );
 });
 afterEach(() => vi.unstubAllGlobals());
 
-describe("with no string held", () => {
-  test("arrows seek, letters open panels, other keys are the browser's", () => {
+describe("with no limb held", () => {
+  test("arrows seek, letters open panels, other keys are left to the browser", () => {
     expect(["ArrowRight", "KeyS", "KeyK", "Space", "KeyZ", "KeyW"].map(tap)).toEqual([
       true,
       true,
@@ -89,31 +89,31 @@ describe("with no string held", () => {
       false,
       false,
     ]);
-    expect(told).toEqual(["forward", "strings", "keep", "play"]);
+    expect(actions).toEqual(["forward", "strings", "keep", "play"]);
   });
 
-  test("a held arrow seeks on, a held letter opens once", () => {
+  test("a held arrow keeps seeking, a held letter opens once", () => {
     down("ArrowLeft");
     down("ArrowLeft", { repeat: true });
     down("KeyL");
     down("KeyL", { repeat: true });
-    expect(told).toEqual(["back", "back", "library"]);
+    expect(actions).toEqual(["back", "back", "library"]);
   });
 
-  test("Escape shuts, ? shows the keys", () => {
+  test("Escape closes panels, ? shows the keys", () => {
     tap("Escape");
     down("Slash", { key: "?" });
-    expect(told).toEqual(["escape", "keys"]);
+    expect(actions).toEqual(["escape", "keys"]);
   });
 });
 
-describe("with a string held", () => {
+describe("with a limb held", () => {
   beforeEach(() => {
     tap("Digit2");
     session.takeCalls();
   });
 
-  test("the same keys pull it, at once and several together, until they come up", () => {
+  test("the same keys move it, combined, until released", () => {
     expect([down("KeyS"), down("ArrowRight")]).toEqual([true, true]);
     velocity.update(0);
     const [[, limb, right, upwards]] = session.takeCalls();
@@ -128,11 +128,11 @@ describe("with a string held", () => {
     target.dispatchEvent(new Event("blur"));
     velocity.update(32);
     expect(session.takeCalls()).toEqual([["velocity", LEFT_HAND, 0, 0, 0]]);
-    expect(told).toEqual([]);
+    expect(actions).toEqual([]);
   });
 
-  test("of an element they are up when the focus leaves it", () => {
-    const commands = new CommandDispatcher(hands, velocity, recordPageActions(told));
+  test("keys of an element are released when it loses the focus", () => {
+    const commands = new CommandDispatcher(limbController, velocity, recordPageActions(actions));
     target = Object.assign(new EventTarget(), { tagName: "DIV" });
     listenToKeyboard(target as unknown as HTMLElement, commands, velocity, () => mapping, {
       showKeys: () => undefined,
@@ -146,18 +146,18 @@ describe("with a string held", () => {
     expect(session.takeCalls()).toEqual([["velocity", LEFT_HAND, 0, 0, 0]]);
   });
 
-  test("Escape lets go and shuts nothing; a key still down does nothing else then", () => {
+  test("Escape releases it and closes nothing; held keys do nothing then", () => {
     down("KeyS");
     tap("Escape");
     down("KeyS", { repeat: true });
-    expect([hands.source(LEFT_HAND), told]).toEqual([null, []]);
+    expect([limbController.source(LEFT_HAND), actions]).toEqual([null, []]);
     up("KeyS");
     tap("KeyS");
-    expect(told).toEqual(["strings"]);
+    expect(actions).toEqual(["strings"]);
   });
 });
 
-test("keys are the browser's in a text, with Ctrl, in a dialog, and Space on a button", () => {
+test("keys are left to text fields, Ctrl, dialogs, and Space to buttons", () => {
   expect(down("KeyL", { focus: new Focused("input") })).toBe(false);
   expect(down("KeyL", { ctrlKey: true })).toBe(false);
   expect(down("Space", { focus: new Focused("button") })).toBe(false);
@@ -165,10 +165,10 @@ test("keys are the browser's in a text, with Ctrl, in a dialog, and Space on a b
   expect(down("KeyL")).toBe(false);
   dialog = false;
   expect(down("KeyL", { focus: new Focused("button") })).toBe(true);
-  expect(told).toEqual(["library"]);
+  expect(actions).toEqual(["library"]);
 });
 
-test("a key bound anew takes its limb by a push", () => {
+test("a newly bound key claims its limb by a push", () => {
   mapping = bind(DEFAULT_MAPPING, "KeyU", "right_leg+");
   down("KeyU");
   velocity.update(0);

@@ -12,168 +12,168 @@ const ARM = ["l_shoulder", "l_elbow", "l_wrist"]
   .concat(LEFT_FINGER_TIP)
   .reduce((sum, at, i, all) => sum + (i ? at.distanceTo(all[i - 1]) : 0), 0);
 
-function close(actual: readonly unknown[], wanted: readonly number[]): void {
-  expect(actual).toHaveLength(wanted.length);
-  wanted.forEach((value, i) => expect(actual[i]).toBeCloseTo(value, 6));
+function expectClose(actual: readonly unknown[], expected: readonly number[]): void {
+  expect(actual).toHaveLength(expected.length);
+  expected.forEach((value, i) => expect(actual[i]).toBeCloseTo(value, 6));
 }
 
-describe("taking and letting go", () => {
-  test("a limb is claimed once, however many ways of holding it follow, and released once", () => {
+describe("claim and release", () => {
+  test("a limb is claimed once and released once, whatever holds it", () => {
     const session = new FakePuppeteer();
-    const hands = createLimbController(null, session);
-    let told = 0;
-    hands.onChange = () => told++;
-    expect(hands.claim(LEFT_HAND, "velocity")).toBe(true);
-    expect(hands.claim(LEFT_HAND, "pointer")).toBe(true);
-    expect(hands.source(LEFT_HAND)).toBe("pointer");
-    hands.release(LEFT_HAND);
-    hands.release(LEFT_HAND);
-    expect(hands.source(LEFT_HAND)).toBe(null);
+    const limbController = createLimbController(null, session);
+    let changes = 0;
+    limbController.onChange = () => changes++;
+    expect(limbController.claim(LEFT_HAND, "velocity")).toBe(true);
+    expect(limbController.claim(LEFT_HAND, "pointer")).toBe(true);
+    expect(limbController.source(LEFT_HAND)).toBe("pointer");
+    limbController.release(LEFT_HAND);
+    limbController.release(LEFT_HAND);
+    expect(limbController.source(LEFT_HAND)).toBe(null);
     expect(session.calls).toEqual([
       ["claim", LEFT_HAND],
       ["release", LEFT_HAND],
     ]);
-    expect(told).toBe(3);
+    expect(changes).toBe(3);
   });
 
-  test("nothing can be held without a session, or in one that has ended", () => {
-    const hands = createLimbController(null, null);
-    expect(hands.claim(LEFT_HAND, "velocity")).toBe(false);
+  test("nothing is held without a session or with a closed one", () => {
+    const limbController = createLimbController(null, null);
+    expect(limbController.claim(LEFT_HAND, "velocity")).toBe(false);
     const session = new FakePuppeteer();
-    session.ended = true;
-    hands.puppeteer = session as unknown as Puppeteer;
-    expect(hands.claim(LEFT_HAND, "velocity")).toBe(false);
-    expect([hands.source(LEFT_HAND), session.calls]).toEqual([null, []]);
+    session.isClosed = true;
+    limbController.puppeteer = session as unknown as Puppeteer;
+    expect(limbController.claim(LEFT_HAND, "velocity")).toBe(false);
+    expect([limbController.source(LEFT_HAND), session.calls]).toEqual([null, []]);
   });
 
-  test("a refused limb is not released, since it was never had", () => {
+  test("a refused limb is not released", () => {
     const session = new FakePuppeteer();
-    const hands = createLimbController(null, session);
-    hands.claim(LEFT_HAND, "velocity");
-    hands.onRefused(LEFT_HAND);
-    hands.release(LEFT_HAND);
-    expect(hands.source(LEFT_HAND)).toBe(null);
+    const limbController = createLimbController(null, session);
+    limbController.claim(LEFT_HAND, "velocity");
+    limbController.onRefused(LEFT_HAND);
+    limbController.release(LEFT_HAND);
+    expect(limbController.source(LEFT_HAND)).toBe(null);
     expect(session.calls).toEqual([["claim", LEFT_HAND]]);
   });
 
-  test("all that is held is let go together, and nothing else", () => {
+  test("all held limbs are released together, and no others", () => {
     const session = new FakePuppeteer();
-    const hands = createLimbController(null, session);
-    hands.claim(LEFT_HAND, "velocity");
-    hands.claim(RIGHT_LEG, "velocity");
+    const limbController = createLimbController(null, session);
+    limbController.claim(LEFT_HAND, "velocity");
+    limbController.claim(RIGHT_LEG, "velocity");
     session.takeCalls();
-    hands.releaseAll();
+    limbController.releaseAll();
     expect(session.calls).toEqual([
       ["release", LEFT_HAND],
       ["release", RIGHT_LEG],
     ]);
   });
 
-  test("another session knows nothing of what was held in the one before", () => {
-    const hands = createLimbController(createStandingPuppet(), new FakePuppeteer());
-    hands.claim(LEFT_HAND, "pointer");
-    hands.pullTo(LEFT_HAND, new Vector3(1, 1, 1));
+  test("another session starts without the limbs held before", () => {
+    const limbController = createLimbController(createStandingPuppet(), new FakePuppeteer());
+    limbController.claim(LEFT_HAND, "pointer");
+    limbController.pullTo(LEFT_HAND, new Vector3(1, 1, 1));
     const next = new FakePuppeteer();
-    hands.puppeteer = next as unknown as Puppeteer;
-    expect([hands.source(LEFT_HAND), hands.pullTarget(LEFT_HAND)]).toEqual([null, null]);
-    hands.release(LEFT_HAND);
+    limbController.puppeteer = next as unknown as Puppeteer;
+    expect([limbController.source(LEFT_HAND), limbController.pullTarget(LEFT_HAND)]).toEqual([null, null]);
+    limbController.release(LEFT_HAND);
     expect(next.calls).toEqual([]);
   });
 });
 
-describe("pulling", () => {
-  test("a limb that is not held stays", () => {
+describe("pull", () => {
+  test("a limb that is not held does not move", () => {
     const session = new FakePuppeteer();
-    const hands = createLimbController(createStandingPuppet(), session);
-    hands.pullTo(LEFT_HAND, new Vector3(1, 1, 1));
-    hands.move(LEFT_HAND, 1, 0, 0);
-    expect([hands.pullTarget(LEFT_HAND), session.calls]).toEqual([null, []]);
+    const limbController = createLimbController(createStandingPuppet(), session);
+    limbController.pullTo(LEFT_HAND, new Vector3(1, 1, 1));
+    limbController.move(LEFT_HAND, 1, 0, 0);
+    expect([limbController.pullTarget(LEFT_HAND), session.calls]).toEqual([null, []]);
   });
 
-  test("a ring pulled to where it is asks for the hand where it is, in arm lengths from the shoulder", () => {
+  test("a handle pulled to its own position targets the hand there", () => {
     const session = new FakePuppeteer();
     const puppet = createStandingPuppet();
-    const hands = createLimbController(puppet, session);
-    hands.claim(LEFT_HAND, "pointer");
+    const limbController = createLimbController(puppet, session);
+    limbController.claim(LEFT_HAND, "pointer");
     session.takeCalls();
     const ring = puppet.handle(LEFT_HAND, new Vector3());
-    hands.pullTo(LEFT_HAND, ring);
+    limbController.pullTo(LEFT_HAND, ring);
     const tip = LEFT_FINGER_TIP.clone().sub(jointPosition("l_shoulder")).divideScalar(ARM);
     const [[asked, limb, ...at]] = session.takeCalls();
     expect([asked, limb]).toEqual(["target", LEFT_HAND]);
-    close(at, [...tip]);
-    // What is pulled is where it was pulled to, not wherever the caller's vector goes next.
+    expectClose(at, [...tip]);
+    // The target does not change with the caller's vector.
     ring.set(9, 9, 9);
-    expect(hands.pullTarget(LEFT_HAND)?.y).toBeLessThan(2);
+    expect(limbController.pullTarget(LEFT_HAND)?.y).toBeLessThan(2);
   });
 
-  test("the ring's way is the hand's way, in the axes of a chest that faces elsewhere", () => {
+  test("a pull is expressed in the axes of a turned chest", () => {
     const session = new FakePuppeteer();
     const puppet = createStandingPuppet(Math.PI / 2);
-    const hands = createLimbController(puppet, session);
-    hands.claim(LEFT_HAND, "pointer");
+    const limbController = createLimbController(puppet, session);
+    limbController.claim(LEFT_HAND, "pointer");
     session.takeCalls();
     const ring = puppet.handle(LEFT_HAND, new Vector3());
-    hands.pullTo(LEFT_HAND, ring);
-    // The dancer faces x: a pull along x is forwards, z in the chest.
-    hands.pullTo(LEFT_HAND, ring.clone().add(new Vector3(0.2, 0.1, 0)));
+    limbController.pullTo(LEFT_HAND, ring);
+    // The performer faces x: a pull along x is forwards, z in the chest.
+    limbController.pullTo(LEFT_HAND, ring.clone().add(new Vector3(0.2, 0.1, 0)));
     const [[, , ...from], [, , ...to]] = session.takeCalls();
-    close(
+    expectClose(
       to.map((value, axis) => value - from[axis]),
       [0, 0.1 / ARM, 0.2 / ARM],
     );
   });
 
-  test("a knee pulled to the hip's height asks for a level thigh", () => {
+  test("a knee pulled to the hip's height targets a level thigh", () => {
     const session = new FakePuppeteer();
-    const hands = createLimbController(createStandingPuppet(), session);
-    hands.claim(RIGHT_LEG, "pointer");
+    const limbController = createLimbController(createStandingPuppet(), session);
+    limbController.claim(RIGHT_LEG, "pointer");
     session.takeCalls();
-    hands.pullTo(RIGHT_LEG, jointPosition("r_hip").add(new Vector3(0, 0, 0.4)));
+    limbController.pullTo(RIGHT_LEG, jointPosition("r_hip").add(new Vector3(0, 0, 0.4)));
     const [[asked, limb, ...angle]] = session.takeCalls();
     expect([asked, limb]).toEqual(["target", RIGHT_LEG]);
-    close(angle, [Math.PI / 2, 0, 0]);
+    expectClose(angle, [Math.PI / 2, 0, 0]);
   });
 });
 
-describe("moving", () => {
-  test("the audience's right, up and nearer arrive in the axes of the chest", () => {
+describe("move", () => {
+  test("directions are converted to the axes of the chest", () => {
     const session = new FakePuppeteer();
-    const hands = createLimbController(createStandingPuppet(Math.PI / 2), session);
-    hands.claim(LEFT_HAND, "velocity");
+    const limbController = createLimbController(createStandingPuppet(Math.PI / 2), session);
+    limbController.claim(LEFT_HAND, "velocity");
     session.takeCalls();
-    hands.move(LEFT_HAND, 1, 0.5, 0);
-    hands.move(LEFT_HAND, 0, 0, 1);
+    limbController.move(LEFT_HAND, 1, 0.5, 0);
+    limbController.move(LEFT_HAND, 0, 0, 1);
     const [[, , ...right], [, , ...nearer]] = session.takeCalls();
-    close(right, [0, 0.5, 1]);
-    close(nearer, [-1, 0, 0]);
+    expectClose(right, [0, 0.5, 1]);
+    expectClose(nearer, [-1, 0, 0]);
   });
 
-  test("of a leg only up counts", () => {
+  test("a leg uses the vertical direction alone", () => {
     const session = new FakePuppeteer();
-    const hands = createLimbController(createStandingPuppet(), session);
-    hands.claim(RIGHT_LEG, "velocity");
-    hands.move(RIGHT_LEG, 1, -0.5, 1);
+    const limbController = createLimbController(createStandingPuppet(), session);
+    limbController.claim(RIGHT_LEG, "velocity");
+    limbController.move(RIGHT_LEG, 1, -0.5, 1);
     expect(session.calls.at(-1)).toEqual(["velocity", RIGHT_LEG, -0.5, 0, 0]);
   });
 
-  test("a chest that only breathes makes no new input of a steady stick", () => {
-    const said = [0, 0.004].map((yaw) => {
+  test("small movements of the chest do not change the input", () => {
+    const inputs = [0, 0.004].map((yaw) => {
       const session = new FakePuppeteer();
-      const hands = createLimbController(createStandingPuppet(yaw), session);
-      hands.claim(LEFT_HAND, "velocity");
-      hands.move(LEFT_HAND, 0.7, 0.3, 0);
+      const limbController = createLimbController(createStandingPuppet(yaw), session);
+      limbController.claim(LEFT_HAND, "velocity");
+      limbController.move(LEFT_HAND, 0.7, 0.3, 0);
       return session.calls.at(-1)?.map((value) => (value === 0 ? 0 : value));
     });
-    expect(said[1]).toEqual(said[0]);
+    expect(inputs[1]).toEqual(inputs[0]);
   });
 
-  test("forgets the place it was pulled to", () => {
-    const hands = createLimbController(createStandingPuppet(), new FakePuppeteer());
-    hands.claim(LEFT_HAND, "pointer");
-    hands.pullTo(LEFT_HAND, new Vector3(0, 1, 0));
-    expect(hands.pullTarget(LEFT_HAND)).not.toBe(null);
-    hands.move(LEFT_HAND, 0, 1, 0);
-    expect(hands.pullTarget(LEFT_HAND)).toBe(null);
+  test("clears the pull target", () => {
+    const limbController = createLimbController(createStandingPuppet(), new FakePuppeteer());
+    limbController.claim(LEFT_HAND, "pointer");
+    limbController.pullTo(LEFT_HAND, new Vector3(0, 1, 0));
+    expect(limbController.pullTarget(LEFT_HAND)).not.toBe(null);
+    limbController.move(LEFT_HAND, 0, 1, 0);
+    expect(limbController.pullTarget(LEFT_HAND)).toBe(null);
   });
 });

@@ -3,18 +3,18 @@ import { bind, DEFAULT_MAPPING } from "../../src/input/mapping";
 import { loadMapping, saveMapping } from "../../src/input/mapping-store";
 import { forbidStorage, stubStorage } from "../storage/storage-stub";
 
-let kept: Map<string, string>;
+let storage: Map<string, string>;
 
-beforeEach(() => void (kept = stubStorage("localStorage")));
+beforeEach(() => void (storage = stubStorage("localStorage")));
 afterEach(() => void vi.unstubAllGlobals());
 
-test("what is kept comes back; the default is kept by keeping nothing", () => {
-  const mine = { ...bind(DEFAULT_MAPPING, "KeyZ", "keep"), deadZone: 0.3 };
+test("a stored mapping is loaded; the default is stored as nothing", () => {
+  const custom = { ...bind(DEFAULT_MAPPING, "KeyZ", "keep"), deadZone: 0.3 };
   expect(loadMapping()).toBe(DEFAULT_MAPPING);
-  saveMapping(mine);
-  expect(loadMapping()).toEqual(mine);
+  saveMapping(custom);
+  expect(loadMapping()).toEqual(custom);
   saveMapping(DEFAULT_MAPPING);
-  expect([loadMapping(), kept.size]).toEqual([DEFAULT_MAPPING, 0]);
+  expect([loadMapping(), storage.size]).toEqual([DEFAULT_MAPPING, 0]);
 });
 
 test.each([
@@ -29,13 +29,13 @@ test.each([
   '{"version":1,"mapping":{"bindings":{"KeyW":["fly"]}}}',
   JSON.stringify({ version: 2, mapping: DEFAULT_MAPPING }),
   JSON.stringify(DEFAULT_MAPPING),
-])("what cannot be read is the default: %s", (content) => {
+])("unreadable content gives the default: %s", (content) => {
   saveMapping(bind(DEFAULT_MAPPING, "KeyZ", "keep"));
-  for (const key of kept.keys()) kept.set(key, content);
+  for (const key of storage.keys()) storage.set(key, content);
   expect(loadMapping()).toBe(DEFAULT_MAPPING);
 });
 
-test("storage that is forbidden is no error", () => {
+test("forbidden storage is not an error", () => {
   forbidStorage("localStorage");
   expect(loadMapping()).toBe(DEFAULT_MAPPING);
   expect(() => saveMapping({ ...DEFAULT_MAPPING })).not.toThrow();

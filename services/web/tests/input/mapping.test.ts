@@ -19,32 +19,32 @@ const ALL: readonly Command[] = [...DIGITAL_INPUTS, ...SELECTED_LIMB_INPUTS, ...
 const command = fc.constantFrom(...ALL);
 const control = fc.constantFrom("KeyZ", "KeyW", "Digit1", "button:1", "axis:0+", "button:4 button:1", "F2");
 
-describe("the default", () => {
-  test("survives being written and read", () => {
+describe("the default mapping", () => {
+  test("survives serialisation", () => {
     expect(parseMapping(JSON.parse(JSON.stringify(DEFAULT_MAPPING)))).toEqual(DEFAULT_MAPPING);
   });
 
-  test("has no conflicts: keys of the held string give way to what they do without one", () => {
-    for (const [one, commands] of Object.entries(DEFAULT_MAPPING.bindings)) {
-      for (const does of commands) expect(conflictsOf(DEFAULT_MAPPING, one, does), `${one} ${does}`).toEqual([]);
+  test("has no conflicts", () => {
+    for (const [key, commands] of Object.entries(DEFAULT_MAPPING.bindings)) {
+      for (const does of commands) expect(conflictsOf(DEFAULT_MAPPING, key, does), `${key} ${does}`).toEqual([]);
     }
   });
 
-  test("reaches every hand and leg from the gamepad, and all limbs and actions from the keyboard", () => {
+  test("reaches all limbs by gamepad, and all limbs and actions by keyboard", () => {
     for (const input of DIGITAL_INPUTS) expect(controlsOf(DEFAULT_MAPPING, input).some(isPadControl), input).toBe(true);
-    for (const one of [...SELECTED_LIMB_INPUTS, ...ACTIONS])
+    for (const key of [...SELECTED_LIMB_INPUTS, ...ACTIONS])
       expect(
-        controlsOf(DEFAULT_MAPPING, one).some((key) => !isPadControl(key)),
-        one,
+        controlsOf(DEFAULT_MAPPING, key).some((key) => !isPadControl(key)),
+        key,
       ).toBe(true);
   });
 });
 
 describe("editing", () => {
-  test("what is bound is found, what is unbound is gone, and nothing else changes", () => {
+  test("binds and unbinds one command and changes nothing else", () => {
     fc.assert(
       fc.property(fc.array(fc.tuple(control, command), { maxLength: 12 }), control, command, (before, at, does) => {
-        const mapping = before.reduce((sum, [one, other]) => bind(sum, one, other), DEFAULT_MAPPING);
+        const mapping = before.reduce((sum, [key, other]) => bind(sum, key, other), DEFAULT_MAPPING);
         const bound = bind(mapping, at, does);
         expect(controlsOf(bound, does)).toContain(at);
         expect(parseMapping(JSON.parse(JSON.stringify(bound)))).toEqual(bound);
@@ -64,15 +64,15 @@ describe("editing", () => {
     expect(conflictsOf(bind(DEFAULT_MAPPING, "KeyW", "held_x+"), "KeyW", "held_x+")).toEqual(["held_y+"]);
   });
 
-  test("with a button held, a control that does nothing any more stays silent; alone it is forgotten", () => {
+  test("an unbound chord stays silent, an unbound single control is removed", () => {
     expect(unbind(DEFAULT_MAPPING, "button:4 button:6", "left_hand_z-").bindings["button:4 button:6"]).toEqual([]);
     expect("KeyK" in unbind(DEFAULT_MAPPING, "KeyK", "keep").bindings).toBe(false);
   });
 });
 
-describe("a mapping from elsewhere", () => {
+describe("unvalidated data", () => {
   const broken: [string, unknown][] = [
-    ["nothing", null],
+    ["null", null],
     ["a number", 7],
     ["a list", []],
     ["no bindings", { ...DEFAULT_MAPPING, bindings: undefined }],
@@ -84,20 +84,20 @@ describe("a mapping from elsewhere", () => {
       "too many controls",
       { ...DEFAULT_MAPPING, bindings: Object.fromEntries(Array.from({ length: 401 }, (_, i) => [`K${i}`, []])) },
     ],
-    ["a dead zone of all", { ...DEFAULT_MAPPING, deadZone: 1 }],
+    ["a dead zone of 1", { ...DEFAULT_MAPPING, deadZone: 1 }],
     ["no dead zone", { ...DEFAULT_MAPPING, deadZone: undefined }],
-    ["smoothing below none", { ...DEFAULT_MAPPING, stickSmoothing: -0.1 }],
-    ["smoothing in words", { ...DEFAULT_MAPPING, pointerSmoothing: "much" }],
+    ["negative smoothing", { ...DEFAULT_MAPPING, stickSmoothing: -0.1 }],
+    ["smoothing as text", { ...DEFAULT_MAPPING, pointerSmoothing: "much" }],
   ];
-  test.each(broken)("is none: %s", (_, value) => {
+  test.each(broken)("is rejected: %s", (_, value) => {
     expect(parseMapping(value)).toBeNull();
   });
 
-  test("is a mapping or null, never an error, whatever it is", () => {
+  test("gives a mapping or null, never an error", () => {
     fc.assert(
       fc.property(fc.anything(), fc.anything(), (value, bindings) => {
-        for (const one of [value, { ...DEFAULT_MAPPING, bindings }]) {
-          const read: Mapping | null = parseMapping(one);
+        for (const key of [value, { ...DEFAULT_MAPPING, bindings }]) {
+          const read: Mapping | null = parseMapping(key);
           if (read) expect(parseMapping(read)).toEqual(read);
         }
       }),
@@ -105,7 +105,7 @@ describe("a mapping from elsewhere", () => {
   });
 });
 
-test("four actions take a limb each", () => {
+test("four actions claim one limb each", () => {
   expect(ACTIONS.map(limbOfCommand).filter((limb) => limb !== null)).toEqual([1, 0, 3, 2]);
   expect(limbOfCommand("held_x+")).toBeNull();
 });

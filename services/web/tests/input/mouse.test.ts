@@ -12,42 +12,42 @@ const LEFT_HAND = 0;
 
 let canvas: EventTarget;
 let window: EventTarget;
-let hands: LimbController;
+let limbController: LimbController;
 let velocity: VelocityInputs;
 let session: FakePuppeteer;
-let told: string[];
+let actions: string[];
 let mapping: Mapping;
 
 beforeEach(() => {
   vi.useFakeTimers();
-  [canvas, window, session, told, mapping] = [
+  [canvas, window, session, actions, mapping] = [
     new EventTarget(),
     new EventTarget(),
     new FakePuppeteer(),
     [],
     DEFAULT_MAPPING,
   ];
-  hands = createLimbController(createStandingPuppet(), session);
-  velocity = new VelocityInputs(hands, {
-    claim: (limb) => hands.claim(limb, "velocity"),
-    isFree: (limb) => hands.source(limb) === null,
+  limbController = createLimbController(createStandingPuppet(), session);
+  velocity = new VelocityInputs(limbController, {
+    claim: (limb) => limbController.claim(limb, "velocity"),
+    isFree: (limb) => limbController.source(limb) === null,
   });
   listenToMouse(
     canvas as HTMLElement,
     window,
-    new CommandDispatcher(hands, velocity, recordPageActions(told)),
+    new CommandDispatcher(limbController, velocity, recordPageActions(actions)),
     () => mapping,
   );
 });
 afterEach(() => vi.useRealTimers());
 
-function send(type: string, of: { button?: number; deltaY?: number }): boolean {
-  const event = Object.assign(new Event(type, { cancelable: true }), { button: 0, ...of });
+function send(type: string, properties: { button?: number; deltaY?: number }): boolean {
+  const event = Object.assign(new Event(type, { cancelable: true }), { button: 0, ...properties });
   (type === "mouseup" ? window : canvas).dispatchEvent(event);
   return event.defaultPrevented;
 }
 
-test("a notch of the wheel moves the held string a little nearer or further, and is the page's own with none", () => {
+test("a notch of the wheel moves the held limb, and scrolls without one", () => {
   expect(send("wheel", { deltaY: 100 })).toBe(false);
   velocity.hold(LEFT_HAND);
   session.takeCalls();
@@ -71,24 +71,28 @@ test("a notch of the wheel moves the held string a little nearer or further, and
   ]);
 });
 
-test("moves nearer what a pointer pulls", () => {
-  hands.claim(LEFT_HAND, "pointer");
+test("the wheel moves the depth of a limb that a pointer pulls", () => {
+  limbController.claim(LEFT_HAND, "pointer");
   send("wheel", { deltaY: 100 });
   velocity.update(0);
-  expect([velocity.depthInput(LEFT_HAND), velocity.depthInput(1), hands.source(LEFT_HAND)]).toEqual([1, 0, "pointer"]);
+  expect([velocity.depthInput(LEFT_HAND), velocity.depthInput(1), limbController.source(LEFT_HAND)]).toEqual([
+    1,
+    0,
+    "pointer",
+  ]);
   vi.advanceTimersByTime(120);
   velocity.update(16);
   expect(velocity.depthInput(LEFT_HAND)).toBe(0);
 });
 
-test("further buttons do what they are bound to, once a press; the first is the pointer's", () => {
+test("additional buttons run their bindings, the primary one does not", () => {
   mapping = bind(bind(DEFAULT_MAPPING, "mouse:2", "keep"), "mouse:1", "left_leg+");
   expect([
     send("mousedown", { button: 2 }),
     send("mousedown", { button: 0 }),
     send("mousedown", { button: 3 }),
   ]).toEqual([true, false, false]);
-  expect([told, send("contextmenu", { button: 2 })]).toEqual([["keep"], true]);
+  expect([actions, send("contextmenu", { button: 2 })]).toEqual([["keep"], true]);
   send("mousedown", { button: 1 });
   velocity.update(0);
   send("mouseup", { button: 1 });

@@ -9,11 +9,11 @@ interface Golden {
 }
 
 const SETTINGS = { minCutoff: 1.5, beta: 0.7, derivativeCutoff: 1 };
-// no negative zero: it is filtered to the other one
+// No negative zero: it is filtered to positive zero.
 const value = fc.double({ min: -100, max: 100, noNaN: true }).map((one) => one + 0);
 const step = fc.double({ min: 0, max: 0.5, noNaN: true });
 
-/** Numbers of mean 0 and variance 1, always the same. */
+/** Return reproducible numbers of mean 0 and variance 1. */
 function noise(count: number): number[] {
   let seed = 12345;
   const uniform = () => (seed = (seed * 1103515245 + 12345) % 2147483648) / 2147483648;
@@ -25,7 +25,7 @@ function noise(count: number): number[] {
 
 const variance = (values: number[]) => values.reduce((sum, one) => sum + one * one, 0) / values.length;
 
-test.each(loadVectors<Golden[]>("one_euro"))("golden numbers with %o", ({ settings, samples }) => {
+test.each(loadVectors<Golden[]>("one_euro"))("reproduces golden values with %o", ({ settings, samples }) => {
   const { min_cutoff, beta, derivative_cutoff } = settings;
   const filter = new OneEuro(samples[0].values.length, {
     minCutoff: min_cutoff,
@@ -38,17 +38,17 @@ test.each(loadVectors<Golden[]>("one_euro"))("golden numbers with %o", ({ settin
 });
 
 describe("the One-Euro filter", () => {
-  test("lets a constant through to the last bit, at any times", () => {
+  test("passes a constant bit for bit at any times", () => {
     fc.assert(
       fc.property(fc.tuple(value, value, value), fc.array(step, { maxLength: 30 }), (constant, steps) => {
         const filter = new OneEuro(3, SETTINGS);
         let seconds = 0;
-        for (const passed of steps) expect([...filter.filter(constant, (seconds += passed))]).toEqual(constant);
+        for (const interval of steps) expect([...filter.filter(constant, (seconds += interval))]).toEqual(constant);
       }),
     );
   });
 
-  test("takes most of the noise away from what rests, and more the lower its cutoff", () => {
+  test("removes most noise at rest, and more with a lower cutoff", () => {
     const samples = noise(4000);
     const left = [4, 1, 0.25].map((minCutoff) => {
       const filter = new OneEuro(1, { minCutoff, beta: 0, derivativeCutoff: 1 });
@@ -60,7 +60,7 @@ describe("the One-Euro filter", () => {
     expect(left[2]).toBeLessThan(0.03);
   });
 
-  test("follows a step without passing it, and has it within a thousandth after seven time constants", () => {
+  test("follows a step without overshoot within seven time constants", () => {
     fc.assert(
       fc.property(
         value,
@@ -72,8 +72,8 @@ describe("the One-Euro filter", () => {
           filter.filter([from], 0);
           let [seconds, last] = [0, from];
           const settled = 7 / (2 * Math.PI * minCutoff);
-          for (const passed of [...steps, ...Array.from({ length: 200 }, () => settled / 200)]) {
-            const [now] = filter.filter([to], (seconds += passed));
+          for (const interval of [...steps, ...Array.from({ length: 200 }, () => settled / 200)]) {
+            const [now] = filter.filter([to], (seconds += interval));
             expect(Math.abs(to - now)).toBeLessThanOrEqual(Math.abs(to - last) + 1e-12);
             expect((to - now) * (to - from)).toBeGreaterThanOrEqual(-1e-9);
             last = now;
@@ -84,7 +84,7 @@ describe("the One-Euro filter", () => {
     );
   });
 
-  test("lags less the faster it goes, when beta says so", () => {
+  test("lags less at higher speed if beta is positive", () => {
     const lag = (beta: number) => {
       const filter = new OneEuro(1, { minCutoff: 1, beta, derivativeCutoff: 1 });
       return 2 - Array.from({ length: 121 }, (_, i) => filter.filter([i / 60], i / 60)[0])[120];
@@ -92,7 +92,7 @@ describe("the One-Euro filter", () => {
     expect(lag(10)).toBeLessThan(0.25 * lag(0));
   });
 
-  test("keeps the direction of a movement: what goes along a line stays on it", () => {
+  test("keeps the direction of a movement", () => {
     const filter = new OneEuro(2, SETTINGS);
     for (const [i, one] of noise(200).entries()) {
       const [x, y] = filter.filter([3 * one, 4 * one], i / 60);
@@ -100,7 +100,7 @@ describe("the One-Euro filter", () => {
     }
   });
 
-  test("of samples of one time, or an earlier one, the last counts as if it were the only one", () => {
+  test("replaces samples with the same or an earlier time", () => {
     fc.assert(
       fc.property(
         fc.array(fc.tuple(value, value, fc.double({ min: 1e-3, max: 0.2, noNaN: true })), {
@@ -110,17 +110,17 @@ describe("the One-Euro filter", () => {
         (samples) => {
           const [twice, once] = [new OneEuro(1, SETTINGS), new OneEuro(1, SETTINGS)];
           let seconds = 0;
-          for (const [stale, fresh, passed] of samples) {
-            seconds += passed;
+          for (const [stale, fresh, interval] of samples) {
+            seconds += interval;
             twice.filter([stale], seconds);
-            expect(twice.filter([fresh], seconds - passed / 2)).toEqual(once.filter([fresh], seconds));
+            expect(twice.filter([fresh], seconds - interval / 2)).toEqual(once.filter([fresh], seconds));
           }
         },
       ),
     );
   });
 
-  test("forgets when told to, and refuses what is no sample", () => {
+  test("forgets on reset, and rejects invalid samples", () => {
     const filter = new OneEuro(2, SETTINGS);
     filter.filter([1, 1], 0);
     filter.reset();
@@ -132,7 +132,7 @@ describe("the One-Euro filter", () => {
   });
 });
 
-test("a wish for smoothness is none at 0, and steadier the more of it", () => {
+test("the amount of smoothing is none at 0 and lowers the cutoff", () => {
   expect(smoothingSettings(0, 1)).toBeNull();
   expect(smoothingSettings(NaN, 1)).toBeNull();
   const cutoffs = [0.01, 0.5, 1, 2].map((wish) => smoothingSettings(wish, 1)?.minCutoff ?? 0);

@@ -1,4 +1,4 @@
-/** What the page would do, written down. */
+/** Create page actions that record their names. */
 import type { PageActions } from "../../src/input/command-dispatcher";
 
 export function recordPageActions(calls: string[]): PageActions {

@@ -8,13 +8,13 @@ import { createStandingPuppet } from "../stage/puppet/figures";
 import { createLimbController, FakePuppeteer } from "./fake-puppeteer";
 
 const LEFT_HAND = 0;
-/** Pixels of a metre: the stage is seen from far away along z. */
+/** Pixels per metre: the camera is far away along z. */
 const SCALE = 200;
 
-/** A canvas as far as a pointer needs one. */
+/** Minimal canvas for pointer events. */
 class Canvas extends EventTarget {
   dataset: Record<string, string> = {};
-  /** Where it stands in the page, pixels. */
+  /** Position in the page, in pixels. */
   corner = { left: 0, top: 0 };
   setPointerCapture(): void {}
   getBoundingClientRect(): { left: number; top: number } {
@@ -23,19 +23,19 @@ class Canvas extends EventTarget {
 }
 
 let canvas: Canvas;
-let hands: LimbController;
+let limbController: LimbController;
 let session: FakePuppeteer;
 let pointer: PointerInput;
 let puppet: Puppet;
 let free: boolean;
 let refused: number[];
-let taken: number[];
+let claimed: number[];
 let performers: Puppet[];
 let smoothing: number;
-let nearer: number;
+let depthInput: number;
 
 beforeEach(() => {
-  [canvas, session, puppet, free, refused, taken, smoothing, nearer] = [
+  [canvas, session, puppet, free, refused, claimed, smoothing, depthInput] = [
     new Canvas(),
     new FakePuppeteer(),
     createStandingPuppet(),
@@ -53,13 +53,13 @@ beforeEach(() => {
     back: () => new Vector3(0, 0, 1),
     audience: { orbit: () => undefined },
   };
-  hands = createLimbController(performers, session);
-  pointer = createPointerInput(canvas as unknown as HTMLCanvasElement, stage as unknown as Stage, hands, {
+  limbController = createLimbController(performers, session);
+  pointer = createPointerInput(canvas as unknown as HTMLCanvasElement, stage as unknown as Stage, limbController, {
     canClaim: () => free,
     onRefused: (limb) => refused.push(limb),
-    onClaimed: (limb) => taken.push(limb),
+    onClaimed: (limb) => claimed.push(limb),
     smoothing: () => smoothing,
-    depthInput: () => nearer,
+    depthInput: () => depthInput,
   });
 });
 
@@ -76,7 +76,7 @@ function send(type: string, x: number, y: number, timeStamp: number): void {
 }
 
 const ring = () => puppet.handle(LEFT_HAND, new Vector3());
-const pulled = () => hands.pullTarget(LEFT_HAND) as Vector3;
+const pullTarget = () => limbController.pullTarget(LEFT_HAND) as Vector3;
 
 function grab(): { x: number; y: number } {
   const at = { x: ring().x * SCALE + 3, y: -ring().y * SCALE - 2 };
@@ -84,21 +84,21 @@ function grab(): { x: number; y: number } {
   return at;
 }
 
-test("a ring follows the pointer that took it, from where it was taken, and is let go with it", () => {
+test("a handle follows the pointer that grabbed it, and is released with it", () => {
   const at = grab();
-  expect([hands.source(LEFT_HAND), taken]).toEqual(["pointer", [LEFT_HAND]]);
+  expect([limbController.source(LEFT_HAND), claimed]).toEqual(["pointer", [LEFT_HAND]]);
   send("pointermove", at.x + 20, at.y - 40, 16);
-  const wanted = ring().add(new Vector3(0.1, 0.2, 0));
-  expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
+  const expected = ring().add(new Vector3(0.1, 0.2, 0));
+  expect(pullTarget().distanceTo(expected)).toBeLessThan(1e-9);
   pointer.update(32);
-  expect(pulled().distanceTo(wanted)).toBeLessThan(1e-9);
+  expect(pullTarget().distanceTo(expected)).toBeLessThan(1e-9);
   expect(pointer.isDragging).toBe(true);
   send("pointerup", at.x + 20, at.y - 40, 48);
-  expect(hands.source(LEFT_HAND)).toBe(null);
+  expect(limbController.source(LEFT_HAND)).toBe(null);
   expect(pointer.isDragging).toBe(false);
 });
 
-test("of several performers the nearest ring is taken, whosever it is, but of none who is not seen", () => {
+test("the nearest visible handle of several performers is grabbed", () => {
   const second = createStandingPuppet();
   second.group.position.x = 1;
   second.handle = (limb, out) => puppet.handle(limb, out).add(second.group.position);
@@ -106,49 +106,49 @@ test("of several performers the nearest ring is taken, whosever it is, but of no
   const at = { x: ring().x * SCALE + SCALE, y: -ring().y * SCALE };
   second.group.visible = false;
   send("pointerdown", at.x, at.y, 0);
-  expect(taken).toEqual([]);
+  expect(claimed).toEqual([]);
   send("pointerup", at.x, at.y, 0);
   second.group.visible = true;
   send("pointerdown", at.x, at.y, 0);
-  expect([taken, session.calls[0]]).toEqual([[4 + LEFT_HAND], ["claim", 4 + LEFT_HAND]]);
+  expect([claimed, session.calls[0]]).toEqual([[4 + LEFT_HAND], ["claim", 4 + LEFT_HAND]]);
   send("pointermove", at.x + 20, at.y, 16);
-  expect(hands.pullTarget(4 + LEFT_HAND)?.x).toBeCloseTo(ring().x + 1.1, 9);
-  expect(hands.pullTarget(LEFT_HAND)).toBe(null);
+  expect(limbController.pullTarget(4 + LEFT_HAND)?.x).toBeCloseTo(ring().x + 1.1, 9);
+  expect(limbController.pullTarget(LEFT_HAND)).toBe(null);
 });
 
-test("a ring that another holds is refused, and so is nothing far from any ring", () => {
+test("a handle that cannot be claimed is refused", () => {
   free = false;
   grab();
-  expect([refused, hands.source(LEFT_HAND)]).toEqual([[LEFT_HAND], null]);
+  expect([refused, limbController.source(LEFT_HAND)]).toEqual([[LEFT_HAND], null]);
   send("pointerdown", 5000, 5000, 10);
   expect(refused).toEqual([LEFT_HAND]);
 });
 
-test("the picture may stand anywhere in a page", () => {
+test("the canvas may be anywhere in the page", () => {
   canvas.corner = { left: 300, top: 1200 };
   const [x, y] = [ring().x * SCALE + 300, -ring().y * SCALE + 1200];
   send("pointermove", x, y, 0);
   expect(pointer.hoveredLimb).toBe(LEFT_HAND);
   send("pointerdown", x, y, 0);
   send("pointermove", x + 50, y - 30, 16);
-  expect(pulled().x).toBeCloseTo(ring().x + 50 / SCALE, 9);
-  expect(pulled().y).toBeCloseTo(ring().y + 30 / SCALE, 9);
+  expect(pullTarget().x).toBeCloseTo(ring().x + 50 / SCALE, 9);
+  expect(pullTarget().y).toBeCloseTo(ring().y + 30 / SCALE, 9);
 });
 
-test("a trembling hand is steadied when that is wished, and still arrives", () => {
-  const spread = (wish: number) => {
-    smoothing = wish;
+test("a trembling pointer is smoothed by the chosen amount and converges", () => {
+  const spread = (amount: number) => {
+    smoothing = amount;
     const at = grab();
     const seen: number[] = [];
     for (let i = 1; i <= 120; i++) {
       send("pointermove", at.x + (i % 2) * 4, at.y, i * 16);
-      seen.push(pulled().x);
+      seen.push(pullTarget().x);
     }
     for (let i = 121; i <= 240; i++) {
       send("pointermove", at.x + 60, at.y, i * 16);
       pointer.update(i * 16 + 8);
     }
-    expect(pulled().x).toBeCloseTo(ring().x + 60 / SCALE, 4);
+    expect(pullTarget().x).toBeCloseTo(ring().x + 60 / SCALE, 4);
     send("pointerup", at.x, at.y, 4000);
     const steady = seen.slice(60);
     return Math.max(...steady) - Math.min(...steady);
@@ -157,17 +157,17 @@ test("a trembling hand is steadied when that is wished, and still arrives", () =
   expect(spread(1)).toBeLessThan(1 / SCALE);
 });
 
-test("keys and wheel bring nearer what is dragged, no further ahead than the limb can follow", () => {
+test("keys and wheel move the depth of a pull within what the limb follows", () => {
   grab();
   const depth = ring().z;
-  nearer = 1;
+  depthInput = 1;
   pointer.update(100);
-  expect(pulled().z - depth).toBeCloseTo(0.07, 9);
+  expect(pullTarget().z - depth).toBeCloseTo(0.07, 9);
   pointer.update(150);
-  expect(pulled().z - depth).toBeCloseTo(0.105, 9);
+  expect(pullTarget().z - depth).toBeCloseTo(0.105, 9);
   for (let now = 150; now < 2000; now += 16) pointer.update(now);
-  expect(pulled().z - depth).toBeCloseTo(0.15, 9);
-  nearer = 0;
+  expect(pullTarget().z - depth).toBeCloseTo(0.15, 9);
+  depthInput = 0;
   pointer.update(2016);
-  expect(pulled().z).toBeCloseTo(depth, 9);
+  expect(pullTarget().z).toBeCloseTo(depth, 9);
 });

@@ -11,7 +11,7 @@ const rotation = fc
   .map((q) => new Quaternion(...q).normalize());
 
 describe("targets in the figure's frames", () => {
-  test("a hand target turns and scales back to the place it was made from", () => {
+  test("a hand target converts back to its world position", () => {
     fc.assert(
       fc.property(vector, vector, rotation, (tip, shoulder, chest) => {
         const back = toShoulderFrame(tip, shoulder, chest, 0.7)
@@ -23,7 +23,7 @@ describe("targets in the figure's frames", () => {
     );
   });
 
-  test("the thigh's angle puts the knee at the height it was pulled to, whatever way the pelvis leans", () => {
+  test("the thigh's angle puts the knee at its height for any pelvis", () => {
     fc.assert(
       fc.property(fc.double({ min: 0.01, max: 2, noNaN: true }), rotation, vector, (angle, pelvis, hip) => {
         const knee = new Vector3(0, -Math.cos(angle), Math.sin(angle))
@@ -35,7 +35,7 @@ describe("targets in the figure's frames", () => {
     );
   });
 
-  test("straight down is zero; below it the leg goes back, without a jump", () => {
+  test("straight down is zero; below it the leg goes back continuously", () => {
     const at = (y: number) => solveThighAngle(new Vector3(0, y, 0), new Vector3(), new Quaternion(), 0.4);
     expect(at(-0.4)).toBe(0);
     expect(at(-0.42)).toBeLessThan(0);

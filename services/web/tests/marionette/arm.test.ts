@@ -1,12 +1,8 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import { Arm, NUMBERS_PER_ARM, parseBendTable, TABLE_BYTES } from "../../src/marionette/arm";
-import {
-  MAX_ELBOW_BEND_RAD,
-  MAX_TIP_DISTANCE,
-  MAX_WRIST_BEND_RAD,
-  parseProportions,
-} from "../../src/marionette/proportions";
+import { MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, MAX_WRIST_BEND_RAD } from "../../src/marionette/constants";
+import { parseProportions } from "../../src/marionette/proportions";
 import { decodeBase64 } from "../golden-vectors";
 import { golden } from "./golden";
 

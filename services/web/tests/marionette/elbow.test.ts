@@ -1,7 +1,8 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
+import { MAX_ELBOW_SPEED } from "../../src/marionette/constants";
 import { ControlledHand } from "../../src/marionette/controlled-limb";
-import { angleBetween, Elbow, liftAngle, MAX_ELBOW_SPEED, verticalNormal } from "../../src/marionette/elbow";
+import { angleBetween, Elbow, liftAngle, verticalNormal } from "../../src/marionette/elbow";
 import { ArmRig } from "../../src/marionette/limb-rig";
 import { restPose } from "../../src/motion/skeleton";
 import { combine, cross, distanceBetween, dot, length, unit } from "../../src/motion/vector";

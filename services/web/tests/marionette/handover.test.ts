@@ -1,8 +1,7 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
+import { BLEND_IN_S, BLEND_OUT_S } from "../../src/marionette/constants";
 import {
-  BLEND_IN_S,
-  BLEND_OUT_S,
   DirectionAlignment,
   Handover,
   JointBlend,

@@ -1,6 +1,7 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
-import { clampThigh, kneeBend, MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD } from "../../src/marionette/leg";
+import { MAX_THIGH_ANGLE_RAD, MIN_THIGH_ANGLE_RAD } from "../../src/marionette/constants";
+import { clampThigh, kneeBend } from "../../src/marionette/leg";
 import { LegRig } from "../../src/marionette/limb-rig";
 import { conjugate, multiply, rotate } from "../../src/motion/rotation";
 import { golden } from "./golden";

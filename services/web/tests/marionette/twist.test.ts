@@ -1,7 +1,8 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
+import { MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S } from "../../src/marionette/constants";
 import { ArmRig } from "../../src/marionette/limb-rig";
-import { MAX_TWIST_LAG_RAD, MAX_TWIST_SPEED_RAD_S, TwistLimiter } from "../../src/marionette/twist";
+import { TwistLimiter } from "../../src/marionette/twist";
 import { conjugate, multiply } from "../../src/motion/rotation";
 import { distanceBetween, fromAxisAngle, normalise, unit } from "../../src/motion/vector";
 import { figure, table } from "./figure";

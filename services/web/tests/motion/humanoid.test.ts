@@ -26,7 +26,7 @@ const humanoid = tPoseFigure(figure);
 const boneIndex = (name: string) => BONES.indexOf(name);
 const boneOfJoint = (name: string) => BONES[JOINTS.indexOf(name) - 1];
 
-/** World positions (51) and orientations (68) of a humanoid with our T-pose, by the rules of glTF nodes. */
+/** Return world positions (51) and orientations (68) of a humanoid in the T-pose, by the rules of glTF nodes. */
 function humanoidWorld(pose: HumanoidPose): { positions: Float64Array; orientations: Float64Array } {
   const positions = new Float64Array(BONE_COUNT * 3),
     orientations = pose.rotations.slice();
@@ -58,7 +58,7 @@ function expectNear(some: ArrayLike<number>, others: ArrayLike<number>): void {
   for (let i = 0; i < some.length; i++) expect(Math.abs(some[i] - others[i])).toBeLessThan(1e-12);
 }
 
-test("bones are the contract's joints under VRM's names, and hang from each other as VRM has it", () => {
+test("bones are the contract's joints with VRM's names and hierarchy", () => {
   expect(BONES).toHaveLength(BONE_COUNT);
   expect(
     [
@@ -97,18 +97,18 @@ test("bones are the contract's joints under VRM's names, and hang from each othe
   expect(BONE_PARENTS[0]).toBe(-1);
 });
 
-test("in the T-pose the arms point to the sides as they hang at our rest", () => {
+test("in the T-pose the arms point sideways", () => {
   const [left, right] = ["leftLowerArm", "rightLowerArm"].map((name) =>
     humanoid.offsets.subarray(boneIndex(name) * 3, boneIndex(name) * 3 + 3),
   );
-  const ours = figure.offsets.subarray(JOINTS.indexOf("l_elbow") * 3);
-  expectNear(left, [-ours[1], ours[0], ours[2]]);
-  expectNear(right, [ours[1], ours[0], ours[2]]);
+  const figureWorld = figure.offsets.subarray(JOINTS.indexOf("l_elbow") * 3);
+  expectNear(left, [-figureWorld[1], figureWorld[0], figureWorld[2]]);
+  expectNear(right, [figureWorld[1], figureWorld[0], figureWorld[2]]);
   expect(left[0]).toBeGreaterThan(0.25);
   expect(humanoid.tips[boneIndex("rightHand") * 3]).toBeLessThan(-0.15);
 });
 
-test("arms that we lift to the sides are a humanoid at its rest", () => {
+test("arms lifted to the sides are the humanoid's rest pose", () => {
   const pose = restPose();
   for (const [name, sign] of [
     ["l_shoulder", 1],
@@ -120,21 +120,22 @@ test("arms that we lift to the sides are a humanoid at its rest", () => {
   for (let b = 0; b < BONE_COUNT; b++) expectNear(rotations.subarray(b * 4, b * 4 + 4), [1, 0, 0, 0]);
 });
 
-test("any pose: hips and legs stand where ours do; above the spine's foot all is ours from there, tips too", () => {
+test("hips and legs match in any pose; the spine is shifted as a whole", () => {
   fc.assert(
     fc.property(anyPose, (pose) => {
-      const ours = worldTransforms(figure, pose, createWorldTransforms());
-      const theirs = humanoidWorld(toHumanoid(figure, pose, createHumanoidPose()));
+      const figureWorld = worldTransforms(figure, pose, createWorldTransforms());
+      const humanoidTransforms = humanoidWorld(toHumanoid(figure, pose, createHumanoidPose()));
       const spine = boneIndex("spine");
       const [shift, tip, theirTip] = [new Float64Array(3), new Float64Array(3), new Float64Array(3)];
-      for (let i = 0; i < 3; i++) shift[i] = theirs.positions[spine * 3 + i] - ours.positions[(spine + 1) * 3 + i];
+      for (let i = 0; i < 3; i++)
+        shift[i] = humanoidTransforms.positions[spine * 3 + i] - figureWorld.positions[(spine + 1) * 3 + i];
       for (let b = 0; b < BONE_COUNT; b++) {
         const moved = b < spine ? [0, 0, 0] : shift;
-        const at = [0, 1, 2].map((i) => ours.positions[(b + 1) * 3 + i] + moved[i]);
-        expectNear(theirs.positions.subarray(b * 3, b * 3 + 3), at);
+        const at = [0, 1, 2].map((i) => figureWorld.positions[(b + 1) * 3 + i] + moved[i]);
+        expectNear(humanoidTransforms.positions.subarray(b * 3, b * 3 + 3), at);
         if (!TIP_JOINTS.includes(b + 1)) continue;
-        rotate(tip, 0, ours.orientations, (b + 1) * 4, figure.tips, (b + 1) * 3);
-        rotate(theirTip, 0, theirs.orientations, b * 4, humanoid.tips, b * 3);
+        rotate(tip, 0, figureWorld.orientations, (b + 1) * 4, figure.tips, (b + 1) * 3);
+        rotate(theirTip, 0, humanoidTransforms.orientations, b * 4, humanoid.tips, b * 3);
         expectNear(theirTip, tip);
       }
     }),
@@ -142,18 +143,21 @@ test("any pose: hips and legs stand where ours do; above the spine's foot all is
   );
 });
 
-test("where the sacroiliac is straight every joint stands where ours does", () => {
+test("with a straight sacroiliac all joints match", () => {
   fc.assert(
     fc.property(anyPose, (pose) => {
       pose.rotations.set([1, 0, 0, 0], JOINTS.indexOf("sacroiliac") * 4);
-      const ours = worldTransforms(figure, pose, createWorldTransforms());
-      expectNear(humanoidWorld(toHumanoid(figure, pose, createHumanoidPose())).positions, ours.positions.subarray(3));
+      const figureWorld = worldTransforms(figure, pose, createWorldTransforms());
+      expectNear(
+        humanoidWorld(toHumanoid(figure, pose, createHumanoidPose())).positions,
+        figureWorld.positions.subarray(3),
+      );
     }),
     { numRuns: 50 },
   );
 });
 
-test("the figure given stays as it was", () => {
+test("the figure is not modified", () => {
   const before = figure.offsets.slice();
   tPoseFigure(figure);
   expect(figure.offsets).toEqual(before);

@@ -4,7 +4,7 @@ import { fromRotationVector } from "../../src/motion/rotation";
 import { copyPose, createWorldTransforms, restPose, worldTransforms } from "../../src/motion/skeleton";
 import { goldenTrack } from "../golden-motion";
 
-/** A pose that is bent in every joint, off the middle. */
+/** Return a pose with every joint bent, off the centre. */
 function bentPose() {
   const pose = restPose();
   pose.root.set([1, 0.9, 4]);
@@ -13,16 +13,16 @@ function bentPose() {
   return pose;
 }
 
-test("a quarter turn brings what is along z along x, and then it is moved", () => {
+test("a placement rotates and then translates", () => {
   const pose = restPose();
   pose.root.set([1, 0.9, 4]);
   expect(applyPlacement(pose, { x: 2, z: -3, turn: Math.PI / 2 })).toBe(pose);
-  // (1, 4) turned from z towards x is (4, -1)
+  // (1, 4) rotated from z towards x is (4, -1).
   [6, 0.9, -4].forEach((value, i) => expect(pose.root[i]).toBeCloseTo(value, 12));
   [Math.SQRT1_2, 0, Math.SQRT1_2, 0].forEach((value, i) => expect(pose.rotations[i]).toBeCloseTo(value, 12));
 });
 
-test("the whole figure is where the turn and the way bring each of its joints", () => {
+test("all joints of a figure move with its placement", () => {
   const { figure } = goldenTrack(),
     pose = bentPose();
   const before = worldTransforms(figure, pose, createWorldTransforms());
@@ -30,12 +30,12 @@ test("the whole figure is where the turn and the way bring each of its joints", 
   const after = worldTransforms(figure, applyPlacement(pose, { x, z, turn }), createWorldTransforms());
   for (let joint = 0; joint < 18; joint++) {
     const [ax, ay, az] = before.positions.subarray(joint * 3, joint * 3 + 3);
-    const wanted = [x + Math.cos(turn) * ax + Math.sin(turn) * az, ay, z + Math.cos(turn) * az - Math.sin(turn) * ax];
-    wanted.forEach((value, i) => expect(after.positions[joint * 3 + i]).toBeCloseTo(value, 12));
+    const expected = [x + Math.cos(turn) * ax + Math.sin(turn) * az, ay, z + Math.cos(turn) * az - Math.sin(turn) * ax];
+    expected.forEach((value, i) => expect(after.positions[joint * 3 + i]).toBeCloseTo(value, 12));
   }
 });
 
-test("in the middle a pose stays as it is, bit for bit", () => {
+test("the stage's centre does not change a pose, bit for bit", () => {
   const pose = bentPose(),
     before = restPose();
   copyPose(pose, before);

@@ -18,16 +18,16 @@ const turn = vector.map((v) => {
   return q;
 });
 
-function expectNear(got: ArrayLike<number>, wanted: ArrayLike<number>, by = 1e-12): void {
-  for (let i = 0; i < wanted.length; i++) expect(Math.abs(got[i] - wanted[i])).toBeLessThan(by);
+function expectNear(actual: ArrayLike<number>, expected: ArrayLike<number>, tolerance = 1e-12): void {
+  for (let i = 0; i < expected.length; i++) expect(Math.abs(actual[i] - expected[i])).toBeLessThan(tolerance);
 }
 
-/** Whether two quaternions are one rotation: their signs may differ. */
-function expectSameRotation(a: Float64Array, b: Float64Array, by = 1e-9): void {
-  expect(1 - Math.abs(a.reduce((sum, value, i) => sum + value * b[i], 0))).toBeLessThan(by);
+/** Expect two quaternions to be the same rotation: their signs may differ. */
+function expectSameRotation(a: Float64Array, b: Float64Array, tolerance = 1e-9): void {
+  expect(1 - Math.abs(a.reduce((sum, value, i) => sum + value * b[i], 0))).toBeLessThan(tolerance);
 }
 
-test("a quarter turn about y brings z to x", () => {
+test("a quarter turn about y takes z to x", () => {
   const q = new Float64Array(4),
     out = new Float64Array(3);
   fromRotationVector(q, 0, 0, Math.PI / 2, 0);
@@ -35,7 +35,7 @@ test("a quarter turn about y brings z to x", () => {
   expectNear(out, [1, 0, 0]);
 });
 
-test("multiply turns by the second, then by the first, also in place", () => {
+test("multiply applies the second, then the first, also in place", () => {
   fc.assert(
     fc.property(turn, turn, vector, (a, b, v) => {
       const both = a.slice(),
@@ -50,7 +50,7 @@ test("multiply turns by the second, then by the first, also in place", () => {
   );
 });
 
-test("a rotation and its conjugate are none", () => {
+test("a rotation and its conjugate cancel", () => {
   fc.assert(
     fc.property(turn, (q) => {
       const back = new Float64Array(4);
@@ -61,7 +61,7 @@ test("a rotation and its conjugate are none", () => {
   );
 });
 
-test("a matrix turns as its quaternion", () => {
+test("a matrix rotates like its quaternion", () => {
   fc.assert(
     fc.property(turn, vector, (q, v) => {
       const m = new Float64Array(9),
@@ -77,7 +77,7 @@ test("a matrix turns as its quaternion", () => {
   );
 });
 
-test("rotation vectors come back as the shortest of their rotation", () => {
+test("rotation vectors are the shortest of their rotation", () => {
   fc.assert(
     fc.property(turn, (q) => {
       const v = new Float64Array(3),
@@ -90,7 +90,7 @@ test("rotation vectors come back as the shortest of their rotation", () => {
   );
 });
 
-test("tiny rotation vectors keep their digits", () => {
+test("tiny rotation vectors keep their precision", () => {
   const q = new Float64Array(4),
     v = new Float64Array(3);
   for (const x of [0, 1e-200, 1e-12, 9.9e-5, 1.01e-4]) {
@@ -102,7 +102,7 @@ test("tiny rotation vectors keep their digits", () => {
 });
 
 describe("slerp", () => {
-  test("starts and ends where it should, at unit length between", () => {
+  test("starts and ends at its arguments, with unit length between", () => {
     fc.assert(
       fc.property(turn, turn, fc.double({ min: 0, max: 1, noNaN: true }), (a, b, t) => {
         const out = new Float64Array(4);
@@ -116,7 +116,7 @@ describe("slerp", () => {
     );
   });
 
-  test("goes evenly, by the shorter way", () => {
+  test("has constant speed by the shorter way", () => {
     const a = Float64Array.of(1, 0, 0, 0),
       b = new Float64Array(4),
       out = new Float64Array(4),

@@ -18,7 +18,7 @@ import {
 const figure = { offsets: new Float64Array(JOINT_COUNT * 3), tips: new Float64Array(JOINT_COUNT * 3) };
 for (let joint = 0; joint < JOINT_COUNT; joint++) figure.offsets[joint * 3 + 1] = -1;
 
-test("parents come before their children, and limbs and tips are the contract's", () => {
+test("parents come before children, and limbs and tips match the contract", () => {
   expect(JOINTS).toHaveLength(18);
   PARENTS.forEach((parent, joint) => expect(parent).toBeLessThan(joint));
   expect(LIMBS.map((_, limb) => [0, 1, 2].map((nth) => JOINTS[LIMB_FIRST_JOINTS[limb] + nth]))).toEqual([
@@ -36,7 +36,7 @@ test("parents come before their children, and limbs and tips are the contract's"
   ]);
 });
 
-test("at rest all hangs below the root", () => {
+test("at rest all joints hang below the root", () => {
   const pose = restPose();
   pose.root.set([1, 10, 2]);
   const { positions, orientations } = worldTransforms(figure, pose, createWorldTransforms());
@@ -44,10 +44,10 @@ test("at rest all hangs below the root", () => {
   expect([...orientations.subarray(56, 60)]).toEqual([1, 0, 0, 0]);
 });
 
-test("a joint turns what hangs from it, and nothing else", () => {
+test("a joint rotates its descendants only", () => {
   const pose = restPose();
   const elbow = JOINTS.indexOf("l_elbow");
-  // lifts the forearm forwards
+  // Lifts the forearm forwards.
   fromRotationVector(pose.rotations, elbow * 4, -Math.PI / 2, 0, 0);
   const at = (joint: string) =>
     [...worldTransforms(figure, pose, createWorldTransforms()).positions.subarray(JOINTS.indexOf(joint) * 3)].slice(
@@ -59,7 +59,7 @@ test("a joint turns what hangs from it, and nothing else", () => {
   expect(at("r_wrist")).toEqual([0, -4, 0]);
 });
 
-test("a pose is copied whole", () => {
+test("copying a pose copies all of it", () => {
   const from = restPose(),
     to = restPose();
   from.root[1] = 3;
@@ -69,11 +69,14 @@ test("a pose is copied whole", () => {
   expect(to.root).not.toBe(from.root);
 });
 
-test("dancers of equal lengths are told apart from all others", () => {
-  const dancer = () => ({ offsets: Float64Array.from({ length: 54 }, (_, k) => k / 3), tips: new Float64Array(54) });
-  expect(figureKey(dancer())).toBe(figureKey(dancer()));
-  const [taller, longer] = [dancer(), dancer()];
+test("figure keys are equal only for equal lengths", () => {
+  const createFigure = () => ({
+    offsets: Float64Array.from({ length: 54 }, (_, k) => k / 3),
+    tips: new Float64Array(54),
+  });
+  expect(figureKey(createFigure())).toBe(figureKey(createFigure()));
+  const [taller, longer] = [createFigure(), createFigure()];
   taller.offsets[53] += 1e-12;
   longer.tips[0] = 0.2;
-  expect(new Set([dancer(), taller, longer].map(figureKey)).size).toBe(3);
+  expect(new Set([createFigure(), taller, longer].map(figureKey)).size).toBe(3);
 });

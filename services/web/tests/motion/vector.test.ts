@@ -24,7 +24,7 @@ const quaternion = fc
   .filter((q) => Math.hypot(...q) > 0.05)
   .map((q) => Float64Array.from(q, (x) => x / Math.hypot(...q)));
 
-test("between brings one direction to the other, opposite ones too", () => {
+test("rotationBetween takes one direction to the other, even opposite", () => {
   const q = new Float64Array(4),
     out = new Float64Array(3);
   fc.assert(
@@ -43,7 +43,7 @@ test("between brings one direction to the other, opposite ones too", () => {
       rotate(out, 0, q, 0, a, 0);
       for (let i = 0; i < 3; i++) expect(Math.abs(out[i] + a[i])).toBeLessThan(1e-6);
     }),
-    // all but opposite
+    // Almost opposite.
     {
       examples: [1.3e-6, 1.5e-7, 1.3e-7].map((angle) => [
         Float64Array.of(0, 1, 0),
@@ -53,7 +53,7 @@ test("between brings one direction to the other, opposite ones too", () => {
   );
 });
 
-test("columns give the rotation back", () => {
+test("fromColumns recovers the rotation", () => {
   const columns = new Float64Array(9),
     again = new Float64Array(4);
   fc.assert(
@@ -71,7 +71,7 @@ test("columns give the rotation back", () => {
   );
 });
 
-test("square and across are square, unit is unit", () => {
+test("rejectFrom and anyPerpendicular are perpendicular, unit is unit", () => {
   const out = new Float64Array(3);
   fc.assert(
     fc.property(direction, direction, (a, b) => {
@@ -87,7 +87,7 @@ test("square and across are square, unit is unit", () => {
   expect(unit(out, 0, new Float64Array(3), 0)).toBe(false);
 });
 
-test("a turn about an axis", () => {
+test("normalised axis rotations rotate as expected", () => {
   const q = new Float64Array(4),
     out = new Float64Array(3);
   fromCoordinateAxis(q, 0, 2, Math.PI / 2);

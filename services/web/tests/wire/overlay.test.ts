@@ -19,7 +19,7 @@ const overlays = fc.uniqueArray(fc.nat(15)).chain((limbs) =>
     }),
 );
 
-test("an overlay of any performers comes back frame by frame, and of the first alone is the shorter message", () => {
+test("an overlay reads back unchanged; one of the first performer has the shorter header", () => {
   fc.assert(
     fc.property(overlays, (overlay) => {
       const bytes = packOverlay(overlay);
@@ -32,7 +32,7 @@ test("an overlay of any performers comes back frame by frame, and of the first a
   );
 });
 
-test("one that is cut short or too long is refused with its size", () => {
+test("an overlay of the wrong size is refused with the expected size", () => {
   const limbs = new Map([
     [5, new Int16Array(9)],
     [0, new Int16Array(9)],
@@ -40,8 +40,8 @@ test("one that is cut short or too long is refused with its size", () => {
   const bytes = packOverlay({ name: "Overlay", sequence: 1, due: 2, limbs, earlier: [limbs] });
   expect(bytes).toHaveLength(14 + 72);
   for (const size of [13, 14, 50, 85]) expect(() => unpackOverlay(bytes.subarray(0, size))).toThrow(MalformedMessage);
-  expect(() => unpackOverlay(bytes.subarray(0, 13))).toThrow("Overlay has 14 bytes at least");
+  expect(() => unpackOverlay(bytes.subarray(0, 13))).toThrow("Overlay has 13 bytes, expected at least 14 bytes");
   expect(() => unpackOverlay(Uint8Array.of(...bytes, 0))).toThrow(
-    "Overlay of 2 frames of 2 limbs has 86 bytes, not 87",
+    "Overlay has 87 bytes, expected 86 bytes for 2 frames of 2 limbs",
   );
 });

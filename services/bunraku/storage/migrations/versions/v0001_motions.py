@@ -1,4 +1,4 @@
-"""The table of motions, as catalogues had it before there were versions."""
+"""Table of motions, as in catalogues from before schema versions."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -8,7 +8,7 @@ down_revision = None
 
 
 def upgrade() -> None:
-    """Make the table."""
+    """Create the table."""
     op.create_table(
         "motions",
         sa.Column("id", sa.String(32), primary_key=True),

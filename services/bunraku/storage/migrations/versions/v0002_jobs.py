@@ -1,4 +1,4 @@
-"""The table of jobs: uploads that are received and not yet motions."""
+"""Table of jobs: uploaded files that are not yet motions."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -8,7 +8,7 @@ down_revision = "0001"
 
 
 def upgrade() -> None:
-    """Make the table."""
+    """Create the table."""
     op.create_table(
         "jobs",
         sa.Column("id", sa.String(64), primary_key=True),

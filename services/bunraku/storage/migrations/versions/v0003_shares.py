@@ -1,4 +1,4 @@
-"""Links for viewers; and of motions whose they are and how large, which quotas count."""
+"""Table of viewer links; subject and size of motions, for quotas."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -8,7 +8,7 @@ down_revision = "0002"
 
 
 def upgrade() -> None:
-    """Make the table, and the columns."""
+    """Create the table and add the columns."""
     op.create_table(
         "shares",
         sa.Column("id", sa.String(32), primary_key=True),

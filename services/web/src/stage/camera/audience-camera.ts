@@ -1,14 +1,17 @@
 /**
- * The audience's camera: a seat of one's own, framed by layout, as far back as several dancers need, with a small orbit that springs back and a step back when hands
- * reach far; or the show's camera, where the motion has one and it is followed.
+ * Camera of the audience view: framed by the layout, as far back as several performers need, with a small orbit that
+ * springs back and a step back when hands reach far. It blends to the camera of the motion if the motion has one and it
+ * is followed.
  */
 import { MathUtils, PerspectiveCamera } from "three";
 import { type CameraView, createView, fovForAspect, interpolateViews, viewFromNumbers } from "./view";
 
-/** `sideways`: a phone on its side. `alone`: a stage without a page about it, so that nothing stands before it. */
+/**
+ * Layout that the picture is framed for. `sideways`: a phone in landscape. `alone`: a stage without a page around it.
+ */
 export type Framing = "desktop" | "phone" | "sheet" | "sideways" | "alone";
 
-/** Visible height and the height looked at, metres for the standard figure. */
+/** Visible height and the height that the camera looks at, in metres for the standard figure. */
 const FRAMING_VIEWS: Readonly<Record<Framing, readonly [visible: number, look: number]>> = {
   desktop: [3.1, 1.005],
   phone: [3.95, 0.81],
@@ -16,70 +19,88 @@ const FRAMING_VIEWS: Readonly<Record<Framing, readonly [visible: number, look: n
   sideways: [3.1, 1.005],
   alone: [3.1, 1.005],
 };
-/** Pixels from the bottom that the transport takes, and the window height the desktop framing was drawn for. */
+/**
+ * Height of the transport at the bottom, in pixels, and its share of the window height that the desktop framing was
+ * designed for.
+ */
 const TRANSPORT_HEIGHT_PX: Partial<Record<Framing, number>> = { desktop: 110, sideways: 76 };
 const REFERENCE_TRANSPORT_SHARE = 110 / 900;
-/** Pixels of the header over a phone's sheet; how high the standard figure is with some room over it, and without, metres; of the height, what is between its feet and the sheet; and what is seen at most, metres. */
+/**
+ * Framing above a sheet: height of the header on a phone in pixels; height of the standard figure with headroom and
+ * without, in metres; share of the picture between feet and sheet; limit of the visible height.
+ */
 const HEADER_HEIGHT_PX = 80;
-const [ROOMY, TALL] = [2, 1.75];
+const [HEIGHT_WITH_HEADROOM_M, STANDING_HEIGHT_M] = [2, 1.75];
 const FOOT_MARGIN_SHARE = 0.03;
 const MAX_VISIBLE_HEIGHT_M = 9;
 const HALF_FOV_RAD = (13 * Math.PI) / 180;
 const EYE_OFFSET_M = 0.08;
-/** How far is seen from before one dancer, metres. */
+/** Far clipping plane for one performer, in metres. */
 const FAR_PLANE_M = 40;
-/** Metres that the standard figure takes to either side of its place, where there are several. */
+/** Half the width that a standard figure takes among several performers, in metres. */
 const PERFORMER_HALF_WIDTH_M = 0.9;
-/** What a narrow picture shows to either side where one of several is chosen, metres for the standard figure: it, one beside it, and some of the next. */
+/**
+ * Half the width that a narrow picture shows around the selected performer, in metres for the standard figure: the
+ * performer, one neighbour and part of the next.
+ */
 const NARROW_HALF_WIDTH_M = 2.1;
-/** Of the picture's width, what dancers have at least, whatever stands before it. */
+/** Minimum share of the picture's width left to the performers, whatever covers the sides. */
 const MIN_FREE_SHARE = 0.4;
-/** What stands before so much of it from a side covers one alone, who is in the middle else. */
+/** A single performer moves out of the centre only if a side covers more than this share of the width. */
 const MAX_COVERED_SHARE = 0.35;
 const MAX_YAW_RAD = (25 * Math.PI) / 180;
 const MIN_PITCH_RAD = (-5 * Math.PI) / 180;
 const MAX_PITCH_RAD = (15 * Math.PI) / 180;
 const FRAMING_EASE_S = 0.6;
 const ORBIT_RETURN_DELAY_S = 4;
-/** Seconds that going over between one's own seat and the show's camera takes. */
+/** Duration of the blend between the audience view and the motion's camera, in seconds. */
 const CAMERA_BLEND_S = 0.9;
-/** A view turned by less than this is not turned, radians. */
+/** Orbit angles below this count as not turned, in radians. */
 const MIN_ORBIT_RAD = 1e-3;
 
 export class AudienceCamera {
   readonly camera = new PerspectiveCamera(26, 1, 0.1, FAR_PLANE_M);
-  /** What is seen, world frame, whatever the window's shape. */
+  /** Current view in the world frame, independent of the window's shape. */
   readonly view: CameraView = createView();
   reducedMotion = false;
   scale = 1;
-  /** How many times further back the seat is than one dancer needs. */
+  /** Distance from the performers, as a multiple of what one performer needs. */
   distanceScale = 1;
-  /** The furthest that dancers were to a side, and nearer, since the last cut, metres: the seat goes back for them, and not forth again. */
+  /**
+   * Largest offsets of performers to a side and towards the camera since the last cut, in metres. They only grow: the
+   * camera moves back for performers, but not forward again.
+   */
   #maxSideOffset = 0;
   #maxDepth = 0;
-  /** Where the chosen one is of whom a narrow picture is, to the side; null where it is of all. And how far the seat is to be to the side for it, and is. */
+  /**
+   * Lateral position of the selected performer in a narrow picture, null if all are framed; then the target and the
+   * current lateral offset of the camera.
+   */
   #selectedX: number | null = null;
   #isNarrow = false;
   #targetSideOffset = 0;
   #sideOffset = 0;
-  /** Of the picture's width, what they have, and how far the middle of that is from the picture's: and where one alone is. */
+  /**
+   * Share of the picture's width that is uncovered and the offset of its centre from the picture's, then the offset for
+   * a single performer.
+   */
   #freeShare = 1;
   #freeCentre = 0;
   #soloShift = 0;
   #viewShift = 0;
   #appliedShift = 0;
-  /** Whether the seat is still to be taken for the first time since the last cut. */
+  /** True until the first update after a cut: the camera takes its place without easing. */
   #isFirstFrame = true;
   readonly #audienceView = createView();
   readonly #motionView = createView();
   #hasMotionCamera = false;
-  /** What was chosen; null while nothing was. */
+  /** Choice of the user; null until they choose. */
   #followChoice: boolean | null = null;
-  /** Whether the view was dragged away from the show's camera. */
-  #dragged = false;
-  /** Of the way over to the show's camera, 0..1. */
+  /** True if the user has dragged the view away from the motion's camera. */
+  #isDragged = false;
+  /** Progress of the blend to the motion's camera, 0..1. */
   #blendShare = 0;
-  /** Whether this motion's camera was seen yet: at first there is a cut to it. */
+  /** True if this motion's camera has been used: the first time there is a cut to it. */
   #hasSeenMotionCamera = false;
   #targetFraming: readonly [visible: number, look: number] = FRAMING_VIEWS.desktop;
   #visibleHeight = FRAMING_VIEWS.desktop[0];
@@ -90,26 +111,29 @@ export class AudienceCamera {
   #sinceOrbitS = ORBIT_RETURN_DELAY_S;
 
   /**
-   * What of a picture `width` pixels wide stands before it to the left and to the right, pixels: several dancers are seen between. One alone is in the middle where
-   * that is free.
+   * Pixels that the page covers at the left and the right of a picture `width` pixels wide. Several performers are
+   * framed between them; a single one is centred if the centre is free.
    */
   set coveredSides({ left, right, width }: { left: number; right: number; width: number }) {
-    const free = 1 - (left + right) / width;
-    const narrow = free < MIN_FREE_SHARE;
-    this.#freeShare = narrow ? 1 : free;
-    this.#freeCentre = narrow ? 0 : (left - right) / 2 / width;
+    const freeShare = 1 - (left + right) / width;
+    const isTooNarrow = freeShare < MIN_FREE_SHARE;
+    this.#freeShare = isTooNarrow ? 1 : freeShare;
+    this.#freeCentre = isTooNarrow ? 0 : (left - right) / 2 / width;
     this.#soloShift = Math.max(left, right) / width > MAX_COVERED_SHARE ? this.#freeCentre : 0;
   }
 
-  /** Changes the framing, eased over 0.6 s. In a window of few pixels the transport takes a larger share, as does a sheet `below`, pixels, where that is told: the puppet makes room. */
+  /**
+   * Change the framing, eased over 0.6 s. A low window, or a sheet `sheetHeight` pixels high, hides a larger share of
+   * the picture at the bottom: the puppet is framed above it.
+   */
   setFraming(framing: Framing, height: number, sheetHeight = 0): void {
     const [visible, look] = FRAMING_VIEWS[framing];
-    const lost = Math.max(0, (TRANSPORT_HEIGHT_PX[framing] ?? 0) / height - REFERENCE_TRANSPORT_SHARE);
+    const coveredShare = Math.max(0, (TRANSPORT_HEIGHT_PX[framing] ?? 0) / height - REFERENCE_TRANSPORT_SHARE);
     this.#isNarrow = framing === "phone" || framing === "sheet";
     this.#targetFraming =
       framing === "sheet" && sheetHeight > 0
         ? framingAboveSheet(visible, sheetHeight / height, HEADER_HEIGHT_PX / height)
-        : [visible / (1 - lost), look - (visible / (1 - lost)) * (lost / 2)];
+        : [visible / (1 - coveredShare), look - (visible / (1 - coveredShare)) * (coveredShare / 2)];
   }
 
   resize(aspect: number): void {
@@ -117,35 +141,37 @@ export class AudienceCamera {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Whether the motion has a camera of its own. */
   get hasMotionCamera(): boolean {
     return this.#hasMotionCamera;
   }
 
-  /** Whether the show's camera is followed: where there is one, unless told otherwise or less motion is asked for. */
+  /**
+   * True if the motion's camera is followed: by default if there is one, unless the user chose otherwise or prefers
+   * reduced motion.
+   */
   get followsMotionCamera(): boolean {
-    return this.#hasMotionCamera && !this.#dragged && (this.#followChoice ?? !this.reducedMotion);
+    return this.#hasMotionCamera && !this.#isDragged && (this.#followChoice ?? !this.reducedMotion);
   }
 
-  /** Whether the view is all from one's own seat. */
+  /** True if the view is entirely the audience's. */
   get isAudienceView(): boolean {
     return this.#blendShare === 0;
   }
 
-  /** Whether the view is another than one has who touches nothing: turned, or the show's camera's. */
+  /** True if the view differs from that of a user who touches nothing: turned, or the motion's camera. */
   get isCustomView(): boolean {
     return !this.isAudienceView || Math.abs(this.#yaw) > MIN_ORBIT_RAD || Math.abs(this.#pitch) > MIN_ORBIT_RAD;
   }
 
-  /** Follows the show's camera, or returns to one's own seat; kept until told otherwise. */
+  /** Follow the motion's camera, or return to the audience view. The choice holds until the next call. */
   followMotionCamera(enabled: boolean): void {
     this.#followChoice = enabled;
-    this.#dragged = false;
+    this.#isDragged = false;
   }
 
-  /** Another motion: its camera is met with a cut, and followed though the one before was dragged away from. */
+  /** Start another motion: cut to its camera, and follow it even if the user dragged away from the one before. */
   cut(): void {
-    this.#dragged = false;
+    this.#isDragged = false;
     this.#hasSeenMotionCamera = false;
     this.#hasMotionCamera = false;
     this.#blendShare = 0;
@@ -154,17 +180,17 @@ export class AudienceCamera {
     this.#isFirstFrame = true;
   }
 
-  /** How far to the side dancers are seen, metres; 0 where there is one alone. */
+  /** Largest lateral extent of several performers, in metres; 0 for a single one. */
   get maxSideOffset(): number {
     return this.#maxSideOffset;
   }
 
-  /** Whether some of several dancers are out of the picture, which is of the chosen one. */
+  /** True if some performers are outside the picture, which then shows the selected one. */
   get hidesPerformers(): boolean {
     return this.#visibleSideOffset < this.#maxSideOffset;
   }
 
-  /** As far to the side as dancers are seen. */
+  /** Lateral extent that is framed, in metres. */
   get #visibleSideOffset(): number {
     return this.#isNarrow && this.#selectedX !== null
       ? Math.min(this.#maxSideOffset, NARROW_HALF_WIDTH_M * this.scale)
@@ -172,8 +198,9 @@ export class AudienceCamera {
   }
 
   /**
-   * Where the dancers are, metres in the frame of the camera's parent. One alone has its picture; several have all theirs together, but in a narrow window, where they would
-   * be small: there it is of the `chosen` one and its neighbours, and goes to the side only where that one is not all in it.
+   * Set the positions of the performers, in metres in the frame of the camera's parent. A single performer fills the
+   * picture and several share it, except in a narrow window, where they would be too small: it shows the selected
+   * performer and its neighbours, and moves sideways only to keep the selected one in view.
    */
   placePerformers(performers: readonly { x: number; z: number }[], selected: number | null = null): void {
     this.#selectedX = (selected === null ? null : performers[selected]?.x) ?? null;
@@ -186,17 +213,19 @@ export class AudienceCamera {
     this.#maxDepth = Math.max(this.#maxDepth, ...performers.map(({ z }) => z));
   }
 
-  /** Turns the view by a drag, radians, in one's own seat; it springs back after 4 s untouched. Leaves the show's camera. */
+  /**
+   * Turn the audience view by a drag, in radians. It springs back 4 s after the last drag. Leave the motion's camera.
+   */
   orbit(yaw: number, pitch: number): void {
-    this.#dragged ||= this.followsMotionCamera;
+    this.#isDragged ||= this.followsMotionCamera;
     this.#yaw = Math.min(MAX_YAW_RAD, Math.max(-MAX_YAW_RAD, this.#yaw + yaw));
     this.#pitch = Math.min(MAX_PITCH_RAD, Math.max(MIN_PITCH_RAD, this.#pitch + pitch));
     this.#sinceOrbitS = 0;
   }
 
   /**
-   * Moves on by `seconds`. `reach` is how far out the hands are, 0 the middle to 1 the edge of the picture; `show` the seven
-   * numbers of the show's camera, null where there is none.
+   * Advance by `seconds`. `reach` is the distance of the hands from the centre of the picture (0) to its edge (1);
+   * `motionCamera` the seven numbers of the motion's camera, null if there is none.
    */
   update(seconds: number, reach: number, motionCamera: ArrayLike<number> | null = null): void {
     this.#updateAudienceView(seconds, this.isAudienceView ? reach : 0);
@@ -211,28 +240,30 @@ export class AudienceCamera {
     this.#applyView();
   }
 
-  /** One's own seat, world frame. */
+  /** Update the audience view, in the world frame. */
   #updateAudienceView(seconds: number, reach: number): void {
     const [visible, look] = this.#targetFraming;
     const share = this.reducedMotion ? 1 : 1 - Math.exp((-4 / FRAMING_EASE_S) * seconds);
-    // as far back as shows the dancers at the sides, and as far from the nearest as from one alone
-    const one = ((visible / 2) * this.scale) / Math.tan(HALF_FOV_RAD);
-    const aside = this.#visibleSideOffset;
-    const wide =
-      (Math.max(one, aside / (Math.tan(HALF_FOV_RAD) * this.camera.aspect * this.#freeShare)) + this.#maxDepth) / one;
-    this.distanceScale += (wide - this.distanceScale) * (this.#isFirstFrame ? 1 : share);
+    // As far back as the outer performers need, and as far from the nearest as from a single one.
+    const soloDistance = ((visible / 2) * this.scale) / Math.tan(HALF_FOV_RAD);
+    const visibleOffset = this.#visibleSideOffset;
+    const distanceGoal =
+      (Math.max(soloDistance, visibleOffset / (Math.tan(HALF_FOV_RAD) * this.camera.aspect * this.#freeShare)) +
+        this.#maxDepth) /
+      soloDistance;
+    this.distanceScale += (distanceGoal - this.distanceScale) * (this.#isFirstFrame ? 1 : share);
     const shift = this.#maxSideOffset > 0 ? this.#freeCentre : this.#soloShift;
     this.#viewShift += (shift - this.#viewShift) * (this.#isFirstFrame && this.#maxSideOffset > 0 ? 1 : share);
-    // the whole of the chosen one, and no further than the dancers are
-    const [chosen, within, most] = [
+    // Keep the selected performer fully in view, and stay within the performers' extent.
+    const [selectedX, halfWindow, maxOffset] = [
       this.#selectedX ?? 0,
-      aside - PERFORMER_HALF_WIDTH_M * this.scale,
-      this.#maxSideOffset - aside,
+      visibleOffset - PERFORMER_HALF_WIDTH_M * this.scale,
+      this.#maxSideOffset - visibleOffset,
     ];
     this.#targetSideOffset = MathUtils.clamp(
-      MathUtils.clamp(this.#targetSideOffset, chosen - within, chosen + within),
-      -most,
-      most,
+      MathUtils.clamp(this.#targetSideOffset, selectedX - halfWindow, selectedX + halfWindow),
+      -maxOffset,
+      maxOffset,
     );
     this.#sideOffset += (this.#targetSideOffset - this.#sideOffset) * (this.#isFirstFrame ? 1 : share);
     this.#isFirstFrame &&= this.#maxSideOffset === 0;
@@ -244,11 +275,11 @@ export class AudienceCamera {
       this.#yaw -= this.#yaw * home;
       this.#pitch -= this.#pitch * home;
     }
-    // Reach is measured through the camera as it stands; undo the step back already taken before judging it.
-    const wanted = Math.min(0.12, Math.max(0, (reach * (1 + this.#stepBack)) / 0.92 - 1));
+    // Reach is measured through the camera as it is now: undo the current step back before judging it.
+    const targetStepBack = Math.min(0.12, Math.max(0, (reach * (1 + this.#stepBack)) / 0.92 - 1));
     this.#stepBack +=
-      (wanted - this.#stepBack) *
-      (this.reducedMotion ? 1 : 1 - Math.exp((wanted > this.#stepBack ? -3 : -0.7) * seconds));
+      (targetStepBack - this.#stepBack) *
+      (this.reducedMotion ? 1 : 1 - Math.exp((targetStepBack > this.#stepBack ? -3 : -0.7) * seconds));
 
     const { position, gaze } = this.#audienceView;
     const scale = this.scale * this.distanceScale;
@@ -265,7 +296,7 @@ export class AudienceCamera {
     this.#audienceView.fov = 2 * HALF_FOV_RAD;
   }
 
-  /** Points the camera as the view says. One's own seat is framed for the window's shape already; the show's is not. */
+  /** Apply the view to the camera. The audience view is already framed for the window's shape; the motion's is not. */
   #applyView(): void {
     const { camera, view } = this;
     const share = MathUtils.smootherstep(this.#blendShare, 0, 1);
@@ -288,13 +319,19 @@ export class AudienceCamera {
   }
 }
 
-/** The visible height, `least` or more, and the height looked at, metres, that show a dancer between a header and a sheet of such shares of the picture; where that is too little, the head. */
+/**
+ * Return the visible height (at least `minVisible`) and the height to look at, in metres, that show a performer between
+ * a header and a sheet, given as shares of the picture. If there is too little room, the head is kept in view.
+ */
 function framingAboveSheet(
   minVisible: number,
   sheet: number,
   header: number,
 ): readonly [visible: number, look: number] {
   const foot = 1 - sheet - FOOT_MARGIN_SHARE;
-  const visible = Math.min(MAX_VISIBLE_HEIGHT_M, Math.max(minVisible, ROOMY / Math.max(foot - header, 1e-3)));
-  return [visible, Math.max(visible * (foot - 0.5), TALL - visible * (0.5 - header))];
+  const visible = Math.min(
+    MAX_VISIBLE_HEIGHT_M,
+    Math.max(minVisible, HEIGHT_WITH_HEADROOM_M / Math.max(foot - header, 1e-3)),
+  );
+  return [visible, Math.max(visible * (foot - 0.5), STANDING_HEIGHT_M - visible * (0.5 - header))];
 }

@@ -1,23 +1,24 @@
 /**
- * Where the audience's camera was during the last ten minutes, as sparse keyframes: straight lines between them are as near to
- * all that was seen as `NEAR` and `NEAR_ANGLE` say (the swing filter: the slopes that a line from the last keyframe may have are
- * narrowed by every sample, and the first that none of them reaches ends it).
+ * Recorder of the audience's camera over the last ten minutes, as sparse keyframes. The segments between keyframes stay
+ * within `POSITION_TOLERANCE_M` and `FOV_TOLERANCE_RAD` of every sample. Method: swing filter. Each sample narrows the
+ * range of slopes that a segment from the last keyframe may have; the first sample outside that range starts a new
+ * segment.
  */
 import type { CameraKeyframe } from "../../client/api";
 import { RowQueue } from "./row-queue";
 import type { CameraView } from "./view";
 
-/** How far a line may be off the camera's position, and off the point it gazes at, metres. */
+/** Tolerance of the camera's position and of the point it looks at, in metres. */
 export const POSITION_TOLERANCE_M = 0.002;
-/** How far off its field of view, radians. */
+/** Tolerance of the field of view, in radians. */
 export const FOV_TOLERANCE_RAD = (0.2 * Math.PI) / 180;
-/** Microseconds that are remembered. */
+/** Age after which keyframes are dropped, in microseconds. */
 export const MAX_AGE_US = 600e6;
-/** More keyframes than this are never held: as many as a kept session may have. */
+/** Maximum number of keyframes: as many as a recording may have. */
 export const MAX_KEYFRAMES = 36_000;
 
 const CAMERA_NUMBERS = 7;
-/** Of each number, so that three of them together are within the bound. */
+/** Per coordinate, so that three together stay within the tolerance. */
 const TOLERANCES = [0, 1, 2, 3, 4, 5].map(() => POSITION_TOLERANCE_M / Math.sqrt(3)).concat(FOV_TOLERANCE_RAD);
 
 /** Clock time, then the seven numbers of a camera. */
@@ -27,18 +28,18 @@ const SAMPLE_LENGTH = 1 + CAMERA_NUMBERS;
 
 export class CameraRecorder {
   readonly #keyframes = new RowQueue(SAMPLE_LENGTH);
-  /** The last of them, where the line that goes on begins. */
+  /** Last keyframe, where the current segment begins. */
   #lastKeyframe: Sample | null = null;
-  /** The newest sample, where a line from the last keyframe may end. */
+  /** Newest sample, where the current segment may end. */
   #newest: Sample | null = null;
-  /** When the view was moved last. */
+  /** Clock time of the last view that the user had changed. */
   #lastMovedUs = -Infinity;
   readonly #minSlopes = new Float64Array(CAMERA_NUMBERS);
   readonly #maxSlopes = new Float64Array(CAMERA_NUMBERS);
 
   /**
-   * Notes the view at clock time `time`, microseconds, and whether it is `moved`: other than what everyone sees who touches
-   * nothing. A time that is not after the last is passed over.
+   * Record the view at clock time `time`, in microseconds. `isCustomView` marks a view that the user changed. Samples
+   * that are not later than the last are ignored.
    */
   add(time: number, { position, gaze, fov }: CameraView, isCustomView = true): void {
     const sample = Float64Array.of(time, position.x, position.y, position.z, gaze.x, gaze.y, gaze.z, fov);
@@ -57,10 +58,11 @@ export class CameraRecorder {
   }
 
   /**
-   * Keyframes between two clock times, and those next to them on either side, so that the camera is known all along; ascending.
+   * Return the keyframes between two clock times and the neighbours on both sides, so that the camera is known
+   * throughout, in ascending order.
    */
   keyframes(begin = -Infinity, end = Infinity): CameraKeyframe[] {
-    const all = Array.from({ length: this.#keyframes.length }, (_, nth) => this.#keyframes.at(nth) as Sample);
+    const all = Array.from({ length: this.#keyframes.length }, (_, index) => this.#keyframes.at(index) as Sample);
     if (this.#newest) all.push(this.#newest);
     const first = Math.max(
       0,
@@ -70,7 +72,7 @@ export class CameraRecorder {
     return all.slice(first, after < 0 ? all.length : after + 1).map(toKeyframe);
   }
 
-  /** As `keyframes`, but none where the camera was not moved since `begin`: then there is nothing to keep of it. */
+  /** Return the keyframes as `keyframes` does, but none if the user has not changed the view since `begin`. */
   movedKeyframes(begin = -Infinity, end = Infinity): CameraKeyframe[] {
     return this.#lastMovedUs > begin ? this.keyframes(begin, end) : [];
   }
@@ -81,20 +83,19 @@ export class CameraRecorder {
     this.#lastMovedUs = -Infinity;
   }
 
-  /** A line starts here. */
   #startSegment(key: Sample): Sample {
     this.#lastKeyframe = key;
     this.#keyframes.push(key);
     this.#newest = null;
     this.#minSlopes.fill(-Infinity);
     this.#maxSlopes.fill(Infinity);
-    // the one before the oldest that is remembered is where its line comes from
+    // Keep the keyframe before the oldest remembered time: its segment starts there.
     const before = this.#keyframes.countUpTo(key[0] - MAX_AGE_US) - 1;
     this.#keyframes.drop(Math.max(before, this.#keyframes.length - MAX_KEYFRAMES, 0));
     return key;
   }
 
-  /** Whether a line from the last keyframe to `sample` passes near all samples since. */
+  /** Return whether a segment from the last keyframe to `sample` is within the tolerance of all samples between. */
   #isWithinTolerance(key: Sample, sample: Sample): boolean {
     const span = sample[0] - key[0];
     for (let n = 0; n < CAMERA_NUMBERS; n++) {
@@ -114,7 +115,7 @@ export class CameraRecorder {
   }
 }
 
-/** Tenths of millimetres and of milliradians are enough. */
+/** Rounds to 0.1 mm and 0.1 mrad. */
 function toKeyframe(sample: Sample): CameraKeyframe {
   const [x, y, z, gx, gy, gz, fov] = Array.from(sample.subarray(1), (value) => Math.round(value * 1e4) / 1e4);
   return { time: Math.round(sample[0]), position: [x, y, z], gaze: [gx, gy, gz], fov };

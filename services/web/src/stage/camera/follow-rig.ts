@@ -1,26 +1,27 @@
 /**
- * The rig carries camera, lights, backdrop and floor after the dancer, of several after the middle between them, so that joints stay where the dance puts them. Mocap
- * walks off, faces anywhere and stands on a floor a few centimetres from zero: the rig takes all three up, calmly.
+ * Rig that carries camera, lights, backdrop and floor along with the performers, so that joints stay where the motion
+ * puts them. Motion capture walks off, faces any direction and stands on a floor a few centimetres from zero: the rig
+ * follows position, facing and height smoothly.
  */
 import { Box3, Group, type Matrix4, Quaternion, Vector2, Vector3 } from "three";
 import type { Performer } from "../puppet/performer";
 
-/** The rig follows once the dancer is this far from its middle, metres, and this quickly, 1/s. */
+/** Distance from the rig's centre at which it starts to follow, in metres, and its rate in 1/s. */
 const FOLLOW_DISTANCE_M = 0.25;
 const FOLLOW_RATE = 2.5;
-/** A dancer further away than this was put there by a seek or a new motion: cut, do not travel. */
+/** A performer further away than this was moved by a seek or a new motion: cut instead of travelling. */
 const CUT_DISTANCE_M = 1.2;
 /**
- * Facing is averaged over so many seconds, and followed only beyond this angle and once watched for a while: a pirouette
- * turns no stage, nor does a back that is turned as one comes in: the dance itself says where its front is.
+ * Facing is averaged over this time, and followed only beyond this angle and after a minimum time: a pirouette does not
+ * turn the stage, nor does a performer who enters with the back turned. The motion itself says where its front is.
  */
 const FACING_WINDOW_S = 8;
 const FACING_TOLERANCE_RAD = Math.PI / 3;
 const MIN_FACING_TIME_S = 2.5;
 const TURN_RATE = 0.8;
 /**
- * The floor sinks to a foot below it and rises to feet above it, 1/s: slowly enough that a foot that dips for a moment at a
- * low rate takes it nowhere, and never to a jump, metres.
+ * Rates at which the floor sinks to a foot below it and rises to feet above it, in 1/s: slow enough that a foot that
+ * dips briefly at a low bitrate does not move it. The floor does not rise to a jump, in metres.
  */
 const SINK_RATE = 2.5;
 const RISE_RATE = 0.6;
@@ -28,9 +29,9 @@ const JUMP_HEIGHT_M = 0.15;
 
 export class FollowRig {
   readonly group = new Group();
-  /** What the rig has gone in x and z, in the measures of the floor: its boards stay while it moves. */
+  /** Distance travelled in x and z, in units of the floor: the boards stay in place while the rig moves. */
   readonly floorOffset = new Vector2();
-  /** How many times wider than for one dancer what stands about them is. */
+  /** Width of the scenery as a multiple of what one performer needs. */
   widthScale = 1;
   readonly #facing = new Vector2();
   #initialFacing = 0;
@@ -41,24 +42,24 @@ export class FollowRig {
     this.group.name = "rig";
   }
 
-  /** The next dancer is met with a cut, from where the dance faces over its length (radians about y from z towards x). */
+  /** Cut to the next performer. `front` is the mean facing of the motion, in radians about y from z towards x. */
   reset(front = 0): void {
     this.#isPlaced = false;
     this.#initialFacing = front;
   }
 
-  /** Moves on by `seconds` after these dancers, one at least. */
+  /** Advance by `seconds`, following these performers (at least one). */
   follow(performers: readonly Pick<Performer, "root" | "ground">[], seconds: number): void {
     const { position, rotation } = this.group;
-    const root = new Box3()
-      .setFromPoints(performers.map((dancer) => new Vector3().setFromMatrixPosition(dancer.root)))
+    const centre = new Box3()
+      .setFromPoints(performers.map((performer) => new Vector3().setFromMatrixPosition(performer.root)))
       .getCenter(new Vector3());
     const facing = performers
-      .reduce((sum, dancer) => sum.add(facingOf(dancer.root)), new Vector2())
+      .reduce((sum, performer) => sum.add(facingOf(performer.root)), new Vector2())
       .divideScalar(performers.length);
-    const ground = Math.min(...performers.map((dancer) => dancer.ground));
-    const away = Math.hypot(root.x - position.x, root.z - position.z);
-    if (!this.#isPlaced || away > CUT_DISTANCE_M) {
+    const ground = Math.min(...performers.map((performer) => performer.ground));
+    const distance = Math.hypot(centre.x - position.x, centre.z - position.z);
+    if (!this.#isPlaced || distance > CUT_DISTANCE_M) {
       if (!this.#isPlaced) {
         position.y = ground;
         this.#facing.set(Math.sin(this.#initialFacing), Math.cos(this.#initialFacing));
@@ -66,26 +67,26 @@ export class FollowRig {
         rotation.y = this.#initialFacing;
       }
       this.#isPlaced = true;
-      position.set(root.x, position.y, root.z);
+      position.set(centre.x, position.y, centre.z);
       return;
     }
-    // A plain mean at first, then a fading one.
+    // Arithmetic mean at first, then an exponential one.
     this.#facingTimeS += seconds;
     this.#facing.lerp(facing, seconds / Math.min(Math.max(this.#facingTimeS, seconds, 1e-3), FACING_WINDOW_S));
     const turn = Math.atan2(this.#facing.x, this.#facing.y) - rotation.y;
-    const off = Math.atan2(Math.sin(turn), Math.cos(turn));
-    // A dancer who turns about has no one front: the mean is then short, and the stage stays as it is.
+    const facingError = Math.atan2(Math.sin(turn), Math.cos(turn));
+    // A performer who keeps turning has no front: the mean is short, and the stage does not turn.
     if (this.#facingTimeS > MIN_FACING_TIME_S && this.#facing.length() > 0.5) {
-      const beyond = Math.sign(off) * Math.max(0, Math.abs(off) - FACING_TOLERANCE_RAD);
-      rotation.y += beyond * (1 - Math.exp(-TURN_RATE * seconds));
+      const excess = Math.sign(facingError) * Math.max(0, Math.abs(facingError) - FACING_TOLERANCE_RAD);
+      rotation.y += excess * (1 - Math.exp(-TURN_RATE * seconds));
     }
 
     const lift = ground - position.y;
     if (lift < 0) position.y += lift * (1 - Math.exp(-SINK_RATE * seconds));
     else if (lift < JUMP_HEIGHT_M) position.y += lift * (1 - Math.exp(-RISE_RATE * seconds));
-    if (away > FOLLOW_DISTANCE_M) {
-      const share = ((away - FOLLOW_DISTANCE_M) / away) * (1 - Math.exp(-FOLLOW_RATE * seconds));
-      const step = new Vector3((root.x - position.x) * share, 0, (root.z - position.z) * share);
+    if (distance > FOLLOW_DISTANCE_M) {
+      const share = ((distance - FOLLOW_DISTANCE_M) / distance) * (1 - Math.exp(-FOLLOW_RATE * seconds));
+      const step = new Vector3((centre.x - position.x) * share, 0, (centre.z - position.z) * share);
       position.add(step);
       step.applyAxisAngle(new Vector3(0, 1, 0), -rotation.y);
       this.floorOffset.add(new Vector2(step.x, step.z).divideScalar(this.widthScale));
@@ -93,9 +94,9 @@ export class FollowRig {
   }
 }
 
-/** Where the pelvis faces on the floor, as (x, z). */
-function facingOf(root: Matrix4): Vector2 {
-  const forward = new Vector3(0, 0, 1).applyQuaternion(new Quaternion().setFromRotationMatrix(root));
+/** Return the direction of the pelvis on the floor as (x, z). */
+function facingOf(centre: Matrix4): Vector2 {
+  const forward = new Vector3(0, 0, 1).applyQuaternion(new Quaternion().setFromRotationMatrix(centre));
   const flat = new Vector2(forward.x, forward.z);
   return flat.lengthSq() > 1e-4 ? flat.normalize() : flat.set(0, 1);
 }

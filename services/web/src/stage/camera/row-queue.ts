@@ -1,6 +1,6 @@
-/** A queue of rows of numbers in one piece of memory, the oldest first: each as an array of its own would take several times as much. */
+/** Queue of rows of numbers in one array: an array per row would take several times the memory. */
 
-/** Rows that there is room for at first; there is twice as much whenever that is full. */
+/** Rows allocated at first; the capacity doubles when it is exceeded. */
 const INITIAL_CAPACITY = 64;
 
 export class RowQueue {
@@ -8,7 +8,7 @@ export class RowQueue {
   #first = 0;
   #length = 0;
 
-  /** Of `width` numbers each. */
+  /** Create a queue of rows with `width` numbers each. */
   constructor(readonly width: number) {
     this.#numbers = new Float64Array(INITIAL_CAPACITY * width);
   }
@@ -17,16 +17,18 @@ export class RowQueue {
     return this.#length;
   }
 
-  /** The row at `index`, from the end where that is below zero; null where there is none. It is the live array, until the next `push`. */
+  /**
+   * Return the row at `index` (counted from the end if negative), or null. The array is valid until the next `push`.
+   */
   at(index: number): Float64Array | null {
     const { width } = this;
-    const nth = index < 0 ? this.#length + index : index;
-    if (nth < 0 || nth >= this.#length) return null;
-    const begin = (this.#first + nth) * width;
+    const row = index < 0 ? this.#length + index : index;
+    if (row < 0 || row >= this.#length) return null;
+    const begin = (this.#first + row) * width;
     return this.#numbers.subarray(begin, begin + width);
   }
 
-  /** How many of the first rows begin with a number of at most `most`; these ascend. */
+  /** Return how many leading rows have a first number of at most `max`; first numbers ascend. */
   countUpTo(max: number): number {
     let [low, high] = [0, this.#length];
     while (low < high) {
@@ -37,7 +39,7 @@ export class RowQueue {
     return low;
   }
 
-  /** A copy of `row` is the last one from now on. */
+  /** Append a copy of `row`. */
   push(row: ArrayLike<number>): void {
     const { width } = this;
     if ((this.#first + this.#length + 1) * width > this.#numbers.length) this.#reserve();
@@ -45,20 +47,20 @@ export class RowQueue {
     this.#length++;
   }
 
-  /** Forgets the first `count`. */
+  /** Remove the first `count` rows. */
   drop(count: number): void {
-    const gone = Math.min(count, this.#length);
-    this.#first += gone;
-    this.#length -= gone;
+    const removed = Math.min(count, this.#length);
+    this.#first += removed;
+    this.#length -= removed;
   }
 
-  /** Forgets all, and gives the memory back. */
+  /** Remove all rows and release the memory. */
   clear(): void {
     this.#numbers = new Float64Array(INITIAL_CAPACITY * this.width);
     this.#first = this.#length = 0;
   }
 
-  /** Moves the rows to the beginning: of the same memory where at least half of it is free, else of twice as much. */
+  /** Move the rows to the start of the same array if at least half of it is free, else of one twice as large. */
   #reserve(): void {
     const { width } = this;
     const begin = this.#first * width;

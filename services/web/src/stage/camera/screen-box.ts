@@ -1,7 +1,7 @@
-/** Where things of the stage are on the screen. */
+/** Boxes on the screen around objects of the stage. */
 import type { Camera, Vector3 } from "three";
 
-/** CSS pixels, y down. */
+/** Bounds in CSS pixels, y down. */
 export interface ScreenBox {
   left: number;
   top: number;
@@ -9,14 +9,14 @@ export interface ScreenBox {
   bottom: number;
 }
 
-/** World metres to all sides of a place, as the camera sees them. */
+/** Extent around a world position as the camera sees it, in metres. */
 export interface WorldExtent {
   across: number;
   up: number;
   down: number;
 }
 
-/** The box on a screen of `width` by `height` about the world place `at`. */
+/** Return the box on a screen of `width` by `height` pixels around a world position. */
 export function projectBox(
   position: Vector3,
   { across, up, down }: WorldExtent,
@@ -26,13 +26,18 @@ export function projectBox(
 ): ScreenBox {
   const clip = position.clone().project(camera);
   const [x, y] = [(clip.x * 0.5 + 0.5) * width, (0.5 - clip.y * 0.5) * height];
-  // pixels of a metre that stands up to the camera at this depth
+  // Pixels per metre, perpendicular to the view, at this depth.
   const depth = -position.clone().applyMatrix4(camera.matrixWorldInverse).z;
-  const metre = (camera.projectionMatrix.elements[5] * height) / 2 / depth;
-  return { left: x - across * metre, top: y - up * metre, right: x + across * metre, bottom: y + down * metre };
+  const pixelsPerMetre = (camera.projectionMatrix.elements[5] * height) / 2 / depth;
+  return {
+    left: x - across * pixelsPerMetre,
+    top: y - up * pixelsPerMetre,
+    right: x + across * pixelsPerMetre,
+    bottom: y + down * pixelsPerMetre,
+  };
 }
 
-/** Whether two boxes share any area, or would with `room` between them. */
+/** Return whether two boxes overlap, or would if they were closer by `margin`. */
 export function overlaps(a: ScreenBox, b: ScreenBox, margin = 0): boolean {
   return (
     a.left - margin < b.right && b.left < a.right + margin && a.top - margin < b.bottom && b.top < a.bottom + margin

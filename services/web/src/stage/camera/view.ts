@@ -1,38 +1,38 @@
-/** Where a camera stands, what it looks at and how wide: going from one view to another, and one view in any window. */
+/** Camera views: interpolation, and adaptation to the window's shape. */
 import { Vector3 } from "three";
 
-/** World metres; `fov` is the vertical field of view in radians, up is y. */
+/** Position and target in world metres; `fov` is the vertical field of view in radians. Up is y. */
 export interface CameraView {
   readonly position: Vector3;
   readonly gaze: Vector3;
   fov: number;
 }
 
-/** Width over height below which a view is widened: what it shows from side to side at this shape is not cut off. */
+/** Aspect ratio below which the field of view is widened, so that the sides of the view at this ratio stay visible. */
 export const MIN_ASPECT = 4 / 5;
 
-/** Nearer than this a camera and what it looks at have no direction, metres. */
+/** Minimum distance between a camera and its target, in metres: nearer, there is no direction. */
 const MIN_DISTANCE_M = 1e-3;
 
 export function createView(): CameraView {
   return { position: new Vector3(0, 1, 4), gaze: new Vector3(0, 1, 0), fov: 0.5 };
 }
 
-/** The seven numbers of a camera (`proto/SPEC.md`, Scene block) as a view. */
+/** Write the seven numbers of a camera (`proto/SPEC.md`, Scene block) into a view. */
 export function viewFromNumbers(numbers: ArrayLike<number>, out: CameraView): void {
   out.position.set(numbers[0], numbers[1], numbers[2]);
   out.gaze.set(numbers[3], numbers[4], numbers[5]);
   out.fov = numbers[6];
 }
 
-/** The vertical field of view, radians, in a window of `aspect` (width over height): as recorded, but on narrow ones wider. */
+/** Return the vertical field of view, in radians, for an aspect ratio: as recorded, or wider in narrow windows. */
 export function fovForAspect(fov: number, aspect: number): number {
   return 2 * Math.atan(Math.tan(fov / 2) * Math.max(1, MIN_ASPECT / aspect));
 }
 
 /**
- * The view at `share` (0..1) of the way from `a` to `b`: the camera swings about what it looks at, the shorter way round and
- * never over the top, so that it does not pass through the dancer; nearing and zooming are even.
+ * Write the view at `share` (0..1) of the way from `a` to `b`. The camera swings around its target by the shorter way
+ * and never over the top, so that it does not pass through a performer; distance and zoom change evenly.
  */
 export function interpolateViews(a: CameraView, b: CameraView, share: number, out: CameraView): void {
   const [from, to] = [toSpherical(a), toSpherical(b)];
@@ -48,7 +48,7 @@ export function interpolateViews(a: CameraView, b: CameraView, share: number, ou
 }
 
 function toSpherical({ position, gaze }: CameraView): { azimuth: number; elevation: number; distance: number } {
-  const away = position.clone().sub(gaze);
-  const elevation = Math.atan2(away.y, Math.hypot(away.x, away.z));
-  return { azimuth: Math.atan2(away.x, away.z), elevation, distance: Math.max(away.length(), MIN_DISTANCE_M) };
+  const offset = position.clone().sub(gaze);
+  const elevation = Math.atan2(offset.y, Math.hypot(offset.x, offset.z));
+  return { azimuth: Math.atan2(offset.x, offset.z), elevation, distance: Math.max(offset.length(), MIN_DISTANCE_M) };
 }

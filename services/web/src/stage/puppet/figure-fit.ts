@@ -1,13 +1,14 @@
 /**
- * Carries the parts from the standard figure to a dancer's: limbs keep their turned profiles and take the dancer's lengths,
- * the torso follows hips, shoulders and head. Both figures are in the I-pose; on the standard figure itself nothing moves.
+ * Maps the puppet's parts from the standard figure to a performer's: limbs keep their turned profiles and take the
+ * performer's lengths, and the torso follows hips, shoulders and head. Both figures are in the I-pose; on the standard
+ * figure itself nothing moves.
  */
 import { Matrix3, Matrix4, Quaternion, Vector3 } from "three";
 import { type Figure, JOINTS, PARENTS } from "../../motion/skeleton";
 import type { FitVertex } from "./geometry-builder";
 import { CROWN, HEAD_CENTRE, jointPosition, LEFT_FINGER_TIP, SIDES, SOLE_HEIGHT_M } from "./standard-figure";
 
-/** Rest places of the dancer's joints, metres, by name; the root is where the figure puts it. */
+/** Return the rest positions of a figure's joints by name, in metres; the root is at the figure's offset. */
 export function restPositions(figure: Figure): Map<string, Vector3> {
   const places = new Map<string, Vector3>();
   JOINTS.forEach((name, k) => {
@@ -24,7 +25,7 @@ function clampedRatio(length: number, standard: number, min: number, max: number
   return Number.isFinite(value) ? Math.min(max, Math.max(min, value)) : 1;
 }
 
-/** Metres of a left leg, the left side of the trunk and a left arm to the wrist, together. */
+/** Return the summed length of the left leg, the left side of the trunk and the left arm to the wrist, in metres. */
 export function totalLimbLength(figure: Figure): number {
   const rest = restPositions(figure);
   return sumSegments((name) => rest.get(name) as Vector3);
@@ -41,7 +42,7 @@ function sumSegments(places: (name: string) => Vector3): number {
   );
 }
 
-/** How much larger than the standard figure a dancer is, from legs, torso and arms; the girth of everything follows it. */
+/** Return the size relative to the standard figure, from legs, trunk and arms. All girths scale with it. */
 export function figureScale(figure: Figure): number {
   return clampedRatio(totalLimbLength(figure), sumSegments(jointPosition), 0.2, 5);
 }
@@ -78,17 +79,17 @@ export function fitToFigure(figure: Figure): FitVertex {
     const hand = clampedRatio(tip(`${side}_wrist`).length(), fingerTip.distanceTo(wrist), 0.8 * scale, 1.25 * scale);
     maps.set(`${side}_wrist`, similarityTransform(wrist, fingerTip, positionOf(rest, `${side}_wrist`), handTip, hand));
 
-    // A foot keeps its sole flat: height and length scale, nothing turns.
+    // The foot keeps its sole flat: height and length scale, nothing rotates.
     const [ankle, midtarsal] = [jointPosition(`${side}_ankle`), jointPosition(`${side}_midtarsal`)];
     const [ankleAt, midtarsalAt] = [positionOf(rest, `${side}_ankle`), positionOf(rest, `${side}_midtarsal`)];
-    const high = clampedRatio(
+    const heightScale = clampedRatio(
       ankleAt.y - midtarsalAt.y + SOLE_HEIGHT_M * scale,
       ankle.y - midtarsal.y + SOLE_HEIGHT_M,
       0.6 * scale,
       1.8 * scale,
     );
-    const long = clampedRatio(midtarsalAt.z - ankleAt.z, midtarsal.z - ankle.z, 0.7 * scale, 1.6 * scale);
-    const foot = new Matrix4().makeScale(scale, high, long);
+    const lengthScale = clampedRatio(midtarsalAt.z - ankleAt.z, midtarsal.z - ankle.z, 0.7 * scale, 1.6 * scale);
+    const foot = new Matrix4().makeScale(scale, heightScale, lengthScale);
     maps.set(`${side}_ankle`, transformAbout(ankle, foot, ankleAt));
     maps.set(`${side}_midtarsal`, transformAbout(midtarsal, new Matrix4().makeScale(scale, scale, scale), midtarsalAt));
   }
@@ -140,7 +141,7 @@ function positionOf(rest: ReadonlyMap<string, Vector3>, name: string): Vector3 {
   return rest.get(name) as Vector3;
 }
 
-/** Applies `linear` about `from` and carries that point to `to`. */
+/** Return the map that applies `linear` about `from` and moves that point to `to`. */
 function transformAbout(from: Vector3, linear: Matrix4, to: Vector3): Matrix4 {
   return new Matrix4()
     .makeTranslation(to)
@@ -148,7 +149,7 @@ function transformAbout(from: Vector3, linear: Matrix4, to: Vector3): Matrix4 {
     .multiply(new Matrix4().makeTranslation(from.clone().negate()));
 }
 
-/** Turns a bone to its new direction, stretches it along itself, and scales its girth. */
+/** Return the map that turns a bone to its new direction, stretches it lengthwise and scales its girth. */
 function boneTransform(from: Vector3, end: Vector3, to: Vector3, toEnd: Vector3, girth: number): Matrix4 {
   const axis = end.clone().sub(from);
   const target = toEnd.clone().sub(to);
@@ -176,7 +177,10 @@ function similarityTransform(from: Vector3, end: Vector3, to: Vector3, toEnd: Ve
   );
 }
 
-/** Heights of hips, shoulders and head go to the dancer's, linear between; widths go from the hips' to the shoulders'. */
+/**
+ * Return the map of the torso: heights of hips, shoulders and head become the performer's, linear between; half widths
+ * go from those of the hips to those of the shoulders.
+ */
 function createTorsoMap(rest: ReadonlyMap<string, Vector3>, head: Vector3, scale: number): (p: Vector3) => Vector3 {
   const middle = (name: string) =>
     positionOf(rest, `l_${name}`)
@@ -184,19 +188,19 @@ function createTorsoMap(rest: ReadonlyMap<string, Vector3>, head: Vector3, scale
       .add(positionOf(rest, `r_${name}`))
       .multiplyScalar(0.5);
   const standard = [jointPosition("l_hip").setX(0), jointPosition("l_shoulder").setX(0), HEAD_CENTRE.clone().setX(0)];
-  const dancer = [middle("hip"), middle("shoulder"), head];
+  const performer = [middle("hip"), middle("shoulder"), head];
   const half = (name: string) => positionOf(rest, `l_${name}`).distanceTo(positionOf(rest, `r_${name}`)) / 2;
   const hips = clampedRatio(half("hip"), jointPosition("l_hip").x, 0.85 * scale, 1.2 * scale);
   const shoulders = clampedRatio(half("shoulder"), jointPosition("l_shoulder").x, 0.8 * scale, 1.25 * scale);
   return (p) => {
     const k = p.y < standard[1].y ? 0 : 1;
     const t = (p.y - standard[k].y) / (standard[k + 1].y - standard[k].y);
-    // Below the hips everything keeps the dancer's scale; between landmarks it stretches with them.
+    // Below the hips everything has the performer's scale; between landmarks it stretches with them.
     const along = Math.min(1, Math.max(0, t));
     const beyond = (t - along) * (standard[k + 1].y - standard[k].y) * scale;
     const middleZ = standard[k].z + (standard[k + 1].z - standard[k].z) * along;
-    const wide = k === 0 ? hips + (shoulders - hips) * along : shoulders + (scale - shoulders) * along;
-    const centre = dancer[k].clone().lerp(dancer[k + 1], along);
-    return p.set(centre.x + p.x * wide, centre.y + beyond, centre.z + (p.z - middleZ) * scale);
+    const widthScale = k === 0 ? hips + (shoulders - hips) * along : shoulders + (scale - shoulders) * along;
+    const centre = performer[k].clone().lerp(performer[k + 1], along);
+    return p.set(centre.x + p.x * widthScale, centre.y + beyond, centre.z + (p.z - middleZ) * scale);
   };
 }

@@ -1,6 +1,6 @@
-/** What the puppet is made of: the finishes of the art direction, section 3. One shader, these values per vertex. */
+/** Finishes of the puppet's materials: one shader, with these values per vertex. */
 
-/** Pattern laid over the colour in the shader. */
+/** Pattern that the shader adds to the colour. */
 export const PATTERN = { plain: 0, face: 1, asanoha: 2, weave: 3, stripe: 4 } as const;
 
 export interface Finish {
@@ -9,7 +9,7 @@ export interface Finish {
   roughness: number;
   metalness?: number;
   clearcoat?: number;
-  /** 0..1: how strongly wood grain shows. */
+  /** Strength of the wood grain, 0..1. */
   wood?: number;
   pattern?: number;
 }

@@ -1,16 +1,16 @@
-/** Collects the parts into one rigid-skinned geometry (art direction, section 2). */
+/** Builder that joins the puppet's parts into one skinned geometry. */
 import { BufferGeometry, Color, Float32BufferAttribute, Uint16BufferAttribute, Vector3 } from "three";
 import { type Finish, PATTERN } from "./finish";
 import { HEAD_CENTRE } from "./standard-figure";
 import type { Surface } from "./surface";
 
-/** Which bones carry a vertex, as a function of its place on the standard figure. Weights need not sum to one. */
+/** Bones of a vertex by its position on the standard figure. Weights need not sum to one. */
 export type VertexWeights = (at: Vector3) => readonly (readonly [bone: string, weight: number])[];
 
-/** Moves a vertex and its normal from the standard figure to the dancer's, given its bones. */
+/** Moves a vertex and its normal from the standard figure to the performer's, given its bones. */
 export type FitVertex = (position: Vector3, normal: Vector3, weights: readonly (readonly [string, number])[]) => void;
 
-/** Planar window of the face paint, metres, and the growth of the head about its neck. */
+/** Size of the planar projection of the face paint in metres, and the enlargement of the head about the chin. */
 const FACE_WINDOW_M = [0.2, 0.26] as const;
 const HEAD_SCALE = 1.07;
 const CHIN_OFFSET_M = 0.11;
@@ -32,7 +32,7 @@ export class GeometryBuilder {
     this.#fit = fit;
   }
 
-  /** Adds one part on one bone, or on several by `weights`. `inward` turns a lining's face to the inside. */
+  /** Add a part on one bone, or on several by weights. `facesInward` turns a lining's faces to the inside. */
   add(surface: Surface, bones: string | VertexWeights, finish: Finish, facesInward = false): void {
     orientOutward(surface, facesInward);
     const first = this.#positions.length / 3;
@@ -70,7 +70,10 @@ export class GeometryBuilder {
     for (const index of surface.indices) this.#indices.push(index + first);
   }
 
-  /** The geometry of all parts, with attributes `finish` (roughness, metalness, clearcoat, wood) and `pattern` (u, v, kind). */
+  /**
+   * Return the geometry of all parts, with attributes `finish` (roughness, metalness, clearcoat, wood) and `pattern`
+   * (u, v, kind).
+   */
   build(): BufferGeometry {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new Float32BufferAttribute(this.#positions, 3));
@@ -86,7 +89,7 @@ export class GeometryBuilder {
 
   #boneIndex(bone: string): number {
     const index = this.#bones.get(bone);
-    if (index === undefined) throw new Error(`the puppet has no bone ${bone}`);
+    if (index === undefined) throw new Error(`The puppet has no bone "${bone}".`);
     return index;
   }
 }
@@ -102,7 +105,7 @@ function normaliseWeights(weights: readonly (readonly [string, number])[]): (rea
   return kept.map(([bone, weight]) => [bone, weight / sum] as const);
 }
 
-/** Winds triangles outwards (by signed volume about the centroid) and points the normals the same way. */
+/** Wind triangles outwards (by signed volume about the centroid) and make the normals agree. */
 function orientOutward(surface: Surface, facesInward: boolean): void {
   const { positions, normals, indices } = surface;
   const centre = new Vector3();

@@ -1,4 +1,4 @@
-/** The puppet's one material: three's physical shading with finish, pattern and wood taken from vertex attributes. */
+/** The puppet's material: three.js's physical shading, with finish, pattern and wood from vertex attributes. */
 import { BackSide, type IUniform, MeshLambertMaterial, MeshPhysicalMaterial, type Texture } from "three";
 import { NOISE_GLSL } from "../scenery/noise";
 
@@ -12,7 +12,7 @@ uniform sampler2D facePaint; uniform sampler2D hempLeaf;
 ${NOISE_GLSL}
 `;
 
-/** Year rings, fibres and pores from the place in the rest pose; `vSeed` makes each bone a timber of its own. */
+/** Growth rings, fibres and pores from the position in the rest pose; `vSeed` gives each bone a different timber. */
 const WOOD_GLSL = /* glsl */ `
 #ifndef PLAIN
 if (vFinish.w > 0.) {
@@ -22,14 +22,15 @@ if (vFinish.w > 0.) {
   ring = smoothstep(0., .75, ring) * smoothstep(1., .86, ring);
   float fibre = noise3(q * vec3(520., 14., 520.));
   float pore = smoothstep(.74, .9, noise3(q * vec3(300., 9., 300.)));
-  diffuseColor.rgb = mix(diffuseColor.rgb, diffuseColor.rgb * vec3(.62, .50, .40), vFinish.w * (.46 * ring + .25 * pore));
+  diffuseColor.rgb = mix(diffuseColor.rgb, diffuseColor.rgb * vec3(.62, .50, .40),
+    vFinish.w * (.46 * ring + .25 * pore));
   diffuseColor.rgb *= 1. + vFinish.w * .14 * (fibre - .5);
   roughen = vFinish.w * (.10 * ring + .15 * pore);
 }
 #endif
 `;
 
-/** Kinds of PATTERN in finish.ts: 1 face, 2 asanoha, 3 weave, 4 stripe. */
+/** Values of PATTERN in finish.ts: 1 face, 2 asanoha, 3 weave, 4 stripe. */
 const COLOUR_GLSL = /* glsl */ `
 #include <color_fragment>
 float roughen = 0.;
@@ -56,18 +57,18 @@ if (vPattern.z > 3.5) {
 ${WOOD_GLSL}
 `;
 
-/** The figure for machines that draw in software: colours, patterns and light, without lacquer, grain or reflections. */
-export function createSimpleFigureMaterial(paint: PuppetTextures): MeshLambertMaterial {
+/** Create the material for software rendering: colours, patterns and light, without lacquer, grain or reflections. */
+export function createSimpleFigureMaterial(textures: PuppetTextures): MeshLambertMaterial {
   const material = new MeshLambertMaterial({ vertexColors: true });
   material.defines = { PLAIN: "" };
-  material.customProgramCacheKey = () => "figure-plain";
+  material.customProgramCacheKey = () => "figure-simple";
   material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, { facePaint: { value: paint.face }, hempLeaf: { value: paint.asanoha } });
+    Object.assign(shader.uniforms, { facePaint: { value: textures.face }, hempLeaf: { value: textures.asanoha } });
     patchVertexShader(shader);
     shader.fragmentShader = shader.fragmentShader
       .replace("#include <common>", `#include <common>\n${FRAGMENT_HEADER_GLSL}`)
       .replace("#include <color_fragment>", COLOUR_GLSL)
-      // What the studio's panes would have given is put in as a little light of its own.
+      // A little emission replaces the light of the environment map.
       .replace("#include <emissivemap_fragment>", "totalEmissiveRadiance = diffuseColor.rgb * .16;");
   };
   return material;
@@ -78,7 +79,8 @@ function patchVertexShader(shader: { vertexShader: string }): void {
     .replace("#include <common>", `#include <common>\n${VERTEX_HEADER_GLSL}`)
     .replace(
       "#include <begin_vertex>",
-      "#include <begin_vertex>\nvFinish = finish; vPattern = pattern; vRest = position; vSeed = skinIndex.x; vFront = normal.z;",
+      `#include <begin_vertex>
+vFinish = finish; vPattern = pattern; vRest = position; vSeed = skinIndex.x; vFront = normal.z;`,
     );
 }
 
@@ -88,10 +90,10 @@ export interface PuppetTextures {
 }
 
 /**
- * The figure's material; with `mirrorAt` the one that draws the same mesh upside down below a floor at that height (an
- * object holding it, shared with the floor) and fades it with the distance to the floor.
+ * Create the figure's material. With `mirrorHeight` it draws the mesh upside down below a floor at that height (a
+ * uniform shared with the floor) and fades with the distance to the floor.
  */
-export function createFigureMaterial(paint: PuppetTextures, mirrorHeight?: IUniform<number>): MeshPhysicalMaterial {
+export function createFigureMaterial(textures: PuppetTextures, mirrorHeight?: IUniform<number>): MeshPhysicalMaterial {
   const material = new MeshPhysicalMaterial({
     vertexColors: true,
     roughness: 1,
@@ -105,7 +107,7 @@ export function createFigureMaterial(paint: PuppetTextures, mirrorHeight?: IUnif
   }
   material.customProgramCacheKey = () => (mirrorHeight ? "figure-mirrored" : "figure");
   material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, { facePaint: { value: paint.face }, hempLeaf: { value: paint.asanoha } });
+    Object.assign(shader.uniforms, { facePaint: { value: textures.face }, hempLeaf: { value: textures.asanoha } });
     if (mirrorHeight) shader.uniforms.floorAt = mirrorHeight;
     patchVertexShader(shader);
     shader.fragmentShader = shader.fragmentShader

@@ -1,4 +1,4 @@
-/** Who is on the stage: for each dancer of the motion a puppet, or an avatar in its place. */
+/** Performers on the stage: a puppet, or an avatar in its place, for each performer of the motion. */
 import { Group, type IUniform } from "three";
 import type { Figure, Pose } from "../../motion/skeleton";
 import type { Performer } from "./performer";
@@ -6,44 +6,46 @@ import { Puppet } from "./puppet";
 import { PuppetAssets } from "./puppet-assets";
 import { createAsanohaTexture, createFaceTexture } from "./texture";
 
-/** Makes who dances for the lengths of the dancer that the stream tells of. */
+/** Creates a performer for the limb lengths that the stream describes. */
 export type PerformerFactory = (figure: Figure) => Performer;
 
 export class PerformerGroup {
   readonly group = new Group();
   readonly #performers: Performer[] = [];
-  /** By number of the performer; none for a puppet. */
+  /** Index: performer. Null or missing: a puppet. */
   readonly #factories: (PerformerFactory | null)[] = [];
   #assets: PuppetAssets | null = null;
   #showsReflection = false;
   #usesSimpleMaterials = false;
 
-  /** `floorAt` holds the height of the floor that reflects. */
+  /** `floorHeight` is the height of the reflecting floor. */
   constructor(private readonly floorHeight: IUniform<number>) {
-    this.group.name = "troupe";
+    this.group.name = "performers";
   }
 
-  /** All who dance, in the order of the motion's tracks. */
+  /** Performers in the order of the motion's tracks. */
   get performers(): readonly Performer[] {
     return this.#performers;
   }
 
-  /** Those of whom there was a pose. */
+  /** Performers that have had a pose. */
   get visiblePerformers(): readonly Performer[] {
     return this.#performers.filter(({ group }) => group.visible);
   }
 
-  /** Comes on, a performer for each of the dancers' lengths. Returns whether they are others than before; false where more joined at most. */
+  /**
+   * Set one performer per figure. Return whether the existing performers were replaced; false if others at most joined.
+   */
   setFigures(figures: readonly Figure[]): boolean {
-    const stay = this.#performers.length > 0 && this.#performers.every(({ figure }, k) => figure === figures[k]);
-    if (!stay) for (const performer of this.#performers.splice(0)) performer.dispose();
+    const isUnchanged = this.#performers.length > 0 && this.#performers.every(({ figure }, k) => figure === figures[k]);
+    if (!isUnchanged) for (const performer of this.#performers.splice(0)) performer.dispose();
     for (let k = this.#performers.length; k < figures.length; k++)
       this.#performers.push(this.#createPerformer(figures[k], k));
     this.#assets?.retainOnly(figures);
-    return !stay;
+    return !isUnchanged;
   }
 
-  /** Has the dance of a performer, by number, danced by whom `make` makes, from now on and in every motion; null: by the puppet. */
+  /** Set the factory of a performer (an index), for this and later motions; null restores the puppet. */
   setPerformerFactory(factory: PerformerFactory | null, performer = 0): void {
     this.#factories[performer] = factory;
     const before = this.#performers[performer];
@@ -52,7 +54,10 @@ export class PerformerGroup {
     this.#performers[performer] = this.#createPerformer(before.figure, performer);
   }
 
-  /** Takes a pose for each; one without stands as it stood. `seconds` let what hangs loose swing, 0 sets it still. */
+  /**
+   * Apply one pose per performer; without one it keeps its last. `seconds` advances the swing of loose parts; 0 stops
+   * it.
+   */
   apply(poses: readonly (Pose | null)[], seconds: number): void {
     this.#performers.forEach((performer, k) => {
       const pose = poses[k];
@@ -62,9 +67,9 @@ export class PerformerGroup {
     });
   }
 
-  /** Shows reflections, and draws with plain materials, as of now for all who come on too. */
-  setQuality(reflected: boolean, plain: boolean): void {
-    [this.#showsReflection, this.#usesSimpleMaterials] = [reflected, plain];
+  /** Set reflections and simple materials, also for performers that join later. */
+  setQuality(showsReflection: boolean, usesSimpleMaterials: boolean): void {
+    [this.#showsReflection, this.#usesSimpleMaterials] = [showsReflection, usesSimpleMaterials];
     for (const performer of this.#performers) this.#applyQuality(performer);
   }
 

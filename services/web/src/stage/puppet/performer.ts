@@ -1,38 +1,38 @@
-/** Who dances on the stage, as the stage, the strings and the hands on them know it: the puppet, or an avatar in its place. */
+/** A performer as stage, strings and limb controls see it: the puppet, or an avatar in its place. */
 import { type Group, type Matrix4, Vector3 } from "three";
 import type { Figure, Pose } from "../../motion/skeleton";
 import { SIDES, SOLE_HEIGHT_M } from "./standard-figure";
 
 export interface Performer {
-  /** What is drawn, in the world's frame. */
+  /** Drawn objects, in the world frame. */
   readonly group: Group;
-  /** The lengths of the dancer that the stream tells of: whoever performs, pulls are told in its measures. */
+  /** Limb lengths from the stream: pull targets are expressed in its measures, whoever performs. */
   readonly figure: Figure;
-  /** Size against the standard figure of 1.75 m. */
+  /** Size relative to the standard figure of 1.75 m. */
   readonly scale: number;
-  /** World matrix of the pelvis, as it is shown: what the stage follows. */
+  /** World matrix of the pelvis as drawn: the stage follows it. */
   readonly root: Matrix4;
-  /** Height of the floor that the lower foot would stand on, world metres. */
+  /** Height of the floor under the lower foot, in world metres. */
   readonly ground: number;
-  /** Shows the reflection, which only the lacquer of the night has. */
+  /** Shows the reflection in the floor, which only the night look has. */
   showsReflection: boolean;
-  /** Draws with plain materials, for machines without a graphics processor. */
+  /** Uses materials for machines without a graphics processor. */
   usesSimpleMaterials: boolean;
-  /** Takes a pose; `seconds` since the one before lets what hangs loose swing, 0 sets it still. */
+  /** Apply a pose. `seconds` since the last one advances the swing of loose parts; 0 stops it. */
   apply(pose: Pose, seconds: number): void;
-  /** World place where a limb is seen and held (0 left hand, 1 right hand, 2 left knee, 3 right knee), written into `out`. */
+  /** Write the world position of a limb's handle into `out` (0 left hand, 1 right hand, 2 left knee, 3 right knee). */
   handle(limb: number, out: Vector3): Vector3;
-  /** World matrix of a joint of the dancer that the stream tells of. */
+  /** Return the world matrix of a joint of the streamed figure. */
   joint(name: string): Matrix4;
-  /** Where the handle of the dancer that the stream tells of has to go, world, for this one's to come to `to`; into `out`. */
+  /** Write into `out` the world position of the streamed figure's handle that moves this performer's handle to `to`. */
   toStreamedHandle(limb: number, to: Vector3, out: Vector3): Vector3;
   dispose(): void;
 }
 
-/** A dancer as far as its joints tell: world matrices by H-Anim's names, and the size against the standard figure. */
+/** Joints of a performer (world matrices by H-Anim name) and its size relative to the standard figure. */
 export type JointSource = Pick<Performer, "joint" | "scale">;
 
-/** Places people hold, in the order of the limbs of the contract: joint, and place in its frame on the standard figure. */
+/** Handles in the order of the contract's limbs: joint, and position in its frame on the standard figure. */
 const HANDLE_OFFSETS: readonly (readonly [joint: string, at: readonly [number, number, number]])[] = [
   ["l_wrist", [0.004, -0.075, 0.004]],
   ["r_wrist", [-0.004, -0.075, 0.004]],
@@ -40,7 +40,7 @@ const HANDLE_OFFSETS: readonly (readonly [joint: string, at: readonly [number, n
   ["r_knee", [0, 0, 0.008]],
 ];
 
-/** World place of a limb's handle on a dancer's own joints, written into `out`. */
+/** Write the world position of a limb's handle, from the performer's own joints, into `out`. */
 export function handlePosition({ joint, scale }: JointSource, limb: number, out: Vector3): Vector3 {
   const [name, at] = HANDLE_OFFSETS[limb];
   return out
@@ -49,13 +49,16 @@ export function handlePosition({ joint, scale }: JointSource, limb: number, out:
     .applyMatrix4(joint(name));
 }
 
-/** Height of the floor that the lower foot would stand on: ball or heel, less the sole. `ankleHeight` is the ankle's over the ball at rest, metres. */
+/**
+ * Return the height of the floor under the lower foot: ball or heel, less the sole. `ankleHeight` is the height of the
+ * ankle above the ball at rest, in metres.
+ */
 export function floorHeight({ joint, scale }: JointSource, ankleHeight: number): number {
   const at = new Vector3();
   let lowest = Infinity;
   for (const { side } of SIDES) {
     const ball = at.setFromMatrixPosition(joint(`${side}_midtarsal`)).y;
-    // under the ankle, as high as the ball of the foot is at rest
+    // The heel is under the ankle, as high as the ball of the foot at rest.
     const heel = at.set(0, -ankleHeight, -0.045 * scale).applyMatrix4(joint(`${side}_ankle`)).y;
     lowest = Math.min(lowest, ball, heel);
   }

@@ -1,4 +1,4 @@
-/** Where puppets are carved and dressed: those of one stage share their materials, and those of equal lengths their mesh. */
+/** Shared assets of the puppets of one stage: materials for all, one mesh for equal limb lengths. */
 import type { BufferGeometry, IUniform, Material } from "three";
 import { type Figure, figureKey, JOINTS } from "../../motion/skeleton";
 import { fitToFigure } from "./figure-fit";
@@ -14,47 +14,47 @@ import { addSleeves } from "./parts/sleeves";
 /** Bones in the order of the geometry's skin indices: the joints of the contract, then the two sleeves. */
 export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
 
-/** All parts on one dancer's figure, in its rest pose. Pure: takes no graphics context. */
+/** Build all parts on a figure in its rest pose. Needs no graphics context. */
 export function buildPuppetGeometry(figure: Figure): BufferGeometry {
-  const assembly = new GeometryBuilder(BONES, fitToFigure(figure));
-  for (const add of [addLegs, addArms, addHead, addBodice, addHakama, addSleeves]) add(assembly);
-  return assembly.build();
+  const builder = new GeometryBuilder(BONES, fitToFigure(figure));
+  for (const add of [addLegs, addArms, addHead, addBodice, addHakama, addSleeves]) add(builder);
+  return builder.build();
 }
 
 export class PuppetAssets {
   readonly material: Material;
-  /** Of the reflection. */
+  /** Material of the reflection. */
   readonly mirroredMaterial: Material;
   readonly #textures: PuppetTextures;
   #simpleMaterial: Material | null = null;
   readonly #geometries = new Map<string, BufferGeometry>();
 
-  /** `floorAt` holds the height of the floor that reflects. */
-  constructor(paint: PuppetTextures, floorAt: IUniform<number>) {
-    this.#textures = paint;
-    this.material = createFigureMaterial(paint);
-    this.mirroredMaterial = createFigureMaterial(paint, floorAt);
+  /** `floorAt` is the height of the reflecting floor. */
+  constructor(textures: PuppetTextures, floorHeight: IUniform<number>) {
+    this.#textures = textures;
+    this.material = createFigureMaterial(textures);
+    this.mirroredMaterial = createFigureMaterial(textures, floorHeight);
   }
 
-  /** For machines without a graphics processor. */
+  /** Material for machines without a graphics processor. */
   get simpleMaterial(): Material {
     return (this.#simpleMaterial ??= createSimpleFigureMaterial(this.#textures));
   }
 
-  /** The mesh of a dancer's lengths, carved once. */
+  /** Return the mesh for a figure, built once per set of limb lengths. */
   geometryFor(figure: Figure): BufferGeometry {
     const key = figureKey(figure);
-    let shape = this.#geometries.get(key);
-    if (!shape) this.#geometries.set(key, (shape = buildPuppetGeometry(figure)));
-    return shape;
+    let geometry = this.#geometries.get(key);
+    if (!geometry) this.#geometries.set(key, (geometry = buildPuppetGeometry(figure)));
+    return geometry;
   }
 
-  /** Gives back the meshes of all lengths but these. */
+  /** Dispose of the meshes of all other figures. */
   retainOnly(figures: readonly Figure[]): void {
-    const kept = new Set(figures.map(figureKey));
-    for (const [key, shape] of this.#geometries) {
-      if (kept.has(key)) continue;
-      shape.dispose();
+    const keysToKeep = new Set(figures.map(figureKey));
+    for (const [key, geometry] of this.#geometries) {
+      if (keysToKeep.has(key)) continue;
+      geometry.dispose();
       this.#geometries.delete(key);
     }
   }

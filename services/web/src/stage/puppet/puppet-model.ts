@@ -1,4 +1,4 @@
-/** The puppet as a mesh for files: what it looks like at rest, and how its sleeves hang in a dance. */
+/** The puppet as a mesh for export: its rest shape, and the swing of its sleeves. */
 import { Matrix4, Quaternion, type SkinnedMesh, Texture, Vector3 } from "three";
 import type { PuppetModel } from "../../export/glb";
 import { type Figure, JOINTS } from "../../motion/skeleton";
@@ -8,12 +8,12 @@ import { PuppetAssets } from "./puppet-assets";
 import { SIDES } from "./standard-figure";
 import { createFaceTexture } from "./texture";
 
-/** Triangles whose normals look less forward than this have no face painted on them. */
+/** Minimum z of a triangle's normals for it to carry the face paint. */
 const MIN_FACE_NORMAL_Z = 0.2;
 
-/** The puppet of this `figure`. Takes no graphics context. */
+/** Create the model of a figure. Needs no graphics context. */
 export function createPuppetModel(figure: Figure): PuppetModel {
-  // a file has no use for the paint of the stage
+  // Files do not use the textures of the stage.
   const unpainted = { face: new Texture(), asanoha: new Texture() };
   const puppet = new Puppet(figure, new PuppetAssets(unpainted, { value: 0 }));
   const { geometry } = puppet.group.getObjectByName("figure") as SkinnedMesh;
@@ -49,19 +49,19 @@ export function createPuppetModel(figure: Figure): PuppetModel {
   };
 }
 
-/** The face as a picture, PNG. */
+/** Return the face texture as PNG. */
 export async function renderFacePng(): Promise<Uint8Array<ArrayBuffer>> {
   const texture = createFaceTexture();
   const canvas = texture.image as HTMLCanvasElement;
   const picture = await new Promise<Blob | null>((done) => canvas.toBlob(done, "image/png"));
   texture.dispose();
-  if (!picture) throw new Error("this browser makes no picture of the face");
+  if (!picture) throw new Error("The browser could not encode the puppet's face as PNG.");
   return new Uint8Array(await picture.arrayBuffer());
 }
 
 /**
- * How a sleeve hangs, as a turn. On the stage the bag leans against the arm as no turn does: the turn keeps it along the arm,
- * and falling to the same side of it.
+ * Rotation of a sleeve. On the stage the bag shears against the arm, which no rotation does: this rotation keeps it
+ * along the arm and hanging to the same side.
  */
 class SleeveRotation {
   readonly #shoulder: Matrix4;
@@ -76,7 +76,7 @@ class SleeveRotation {
     this.#rest = armFrame(this.#along.clone(), BAG_DIRECTION.clone()).invert();
   }
 
-  /** Its turn in the shoulder's frame as the puppet stands now, w x y z. */
+  /** Write the rotation in the shoulder's frame, for the puppet's current pose, as w x y z. */
   write(out: Float64Array, at: number): void {
     const hanging = armFrame(
       this.#along.clone().transformDirection(this.#sleeve),
@@ -87,10 +87,10 @@ class SleeveRotation {
   }
 }
 
-/** Where the bag is drawn to hang at rest. */
+/** Direction in which the bag hangs at rest. */
 const BAG_DIRECTION = new Vector3(0, 0, -1);
 
-/** The turn to axes along `arm`, and across it towards `fall`. */
+/** Return the rotation to axes along `arm`, and perpendicular to it towards `fall`. */
 function armFrame(arm: Vector3, fall: Vector3): Quaternion {
   fall.addScaledVector(arm, -fall.dot(arm)).normalize();
   return new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(arm, fall, arm.clone().cross(fall)));

@@ -1,4 +1,4 @@
-/** The puppet: bones named as H-Anim names the joints, one skinned mesh over them, and by night its reflection. */
+/** The puppet: bones named like the H-Anim joints, one skinned mesh, and a reflection in the night look. */
 import {
   Bone,
   type BufferGeometry,
@@ -21,7 +21,7 @@ export class Puppet implements Performer {
   readonly group = new Group();
   readonly figure: Figure;
   readonly scale: number;
-  /** How far the ankle stands above the ball of the foot at rest, metres. */
+  /** Height of the ankle above the ball of the foot at rest, in metres. */
   readonly #ankleHeight: number;
   readonly #bones: Bone[];
   readonly #sleeves: SleeveBone[];
@@ -29,9 +29,9 @@ export class Puppet implements Performer {
   readonly #mesh: SkinnedMesh<BufferGeometry, Material>;
   readonly #reflection: SkinnedMesh<BufferGeometry, Material>;
 
-  constructor(figure: Figure, workshop: PuppetAssets) {
+  constructor(figure: Figure, assets: PuppetAssets) {
     this.figure = figure;
-    this.#assets = workshop;
+    this.#assets = assets;
     this.scale = figureScale(figure);
     this.#ankleHeight = -figure.offsets[JOINTS.indexOf("l_midtarsal") * 3 + 1];
     this.group.name = "puppet";
@@ -39,17 +39,17 @@ export class Puppet implements Performer {
     this.group.add(this.#bone("humanoid_root"), this.#bone("l_sleeve"), this.#bone("r_sleeve"));
     this.group.updateMatrixWorld(true);
     const skeleton = new Skeleton(this.#bones);
-    const shape = workshop.geometryFor(figure);
-    this.#mesh = new SkinnedMesh(shape, workshop.material);
+    const geometry = assets.geometryFor(figure);
+    this.#mesh = new SkinnedMesh(geometry, assets.material);
     this.#mesh.name = "figure";
     this.#mesh.castShadow = true;
     this.#mesh.receiveShadow = true;
-    this.#reflection = new SkinnedMesh(shape, workshop.mirroredMaterial);
+    this.#reflection = new SkinnedMesh(geometry, assets.mirroredMaterial);
     this.#reflection.renderOrder = -1;
     for (const mesh of [this.#mesh, this.#reflection]) {
       mesh.bind(skeleton, new Matrix4());
       mesh.frustumCulled = false;
-      // else three.js bends all of it to find where it is among what it sorts
+      // Without a bounding sphere three.js skins the whole mesh to find its depth for sorting.
       mesh.boundingSphere = new Sphere();
     }
     this.group.add(this.#mesh);
@@ -74,7 +74,7 @@ export class Puppet implements Performer {
   }
 
   set showsReflection(on: boolean) {
-    // Taken away, not hidden: what is hidden has its shader compiled all the same.
+    // Removed, not hidden: the shader of a hidden mesh is compiled all the same.
     if (on) this.group.add(this.#reflection);
     else this.#reflection.removeFromParent();
   }
@@ -99,12 +99,11 @@ export class Puppet implements Performer {
 
   readonly joint = (name: string): Matrix4 => this.#bone(name).matrixWorld;
 
-  /** The puppet is the dancer of the stream. */
   toStreamedHandle(_limb: number, to: Vector3, out: Vector3): Vector3 {
     return out.copy(to);
   }
 
-  /** What it is made of is its workshop's. */
+  /** Geometry and materials belong to the shared assets. */
   dispose(): void {
     this.#mesh.skeleton.dispose();
     this.group.removeFromParent();

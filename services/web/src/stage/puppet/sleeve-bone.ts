@@ -1,11 +1,11 @@
-/** Hangs a sleeve's bag from the arm: gravity, never nearer than 25 degrees to the arm, with a damped swing (section 2). */
+/** Bone of a sleeve's bag: it hangs by gravity with a damped swing, never closer than 25 degrees to the arm. */
 import { type Bone, Matrix4, Vector3 } from "three";
 import type { Side } from "./standard-figure";
 
 const MIN_SIN = 0.42;
 const SWING_RAD_PER_S = 2 * Math.PI * 1.6;
 const DAMPING_RATIO = 0.35;
-/** A longer step than this is a jump, not a swing. Seconds. */
+/** Longer steps are jumps, not swings, in seconds. */
 const MAX_STEP_S = 0.1;
 
 export interface SleeveJoints {
@@ -23,7 +23,7 @@ export class SleeveBone {
   readonly #speed = new Vector3();
   #isInitialised = false;
 
-  /** `along` is the upper arm's direction in the rest pose; there the bag is drawn hanging to the back. */
+  /** `along` is the upper arm's direction in the rest pose, in which the bag hangs to the back. */
   constructor(bone: Bone, side: Side, joints: SleeveJoints, along: Vector3) {
     this.#bone = bone;
     this.#joints = joints;
@@ -35,7 +35,7 @@ export class SleeveBone {
     bone.matrixWorldAutoUpdate = false;
   }
 
-  /** Places the bone for the pose that the other bones hold now; `seconds` since the last call, 0 for no swing. */
+  /** Place the bone for the current pose. `seconds` is the time since the last call; 0 stops the swing. */
   update(seconds: number): void {
     const from = new Vector3().setFromMatrixPosition(this.#joints.shoulder.matrixWorld);
     const arm = new Vector3().setFromMatrixPosition(this.#joints.elbow.matrixWorld).sub(from).normalize();
@@ -51,9 +51,9 @@ export class SleeveBone {
     across.normalize();
     const cosine = Math.sign(along) * Math.sqrt(Math.max(0, 1 - sine * sine));
     const fall = arm.clone().multiplyScalar(cosine).addScaledVector(across, sine);
-    // Down the arm x to the back is the figure's left: the right side keeps its mirrored basis, or the cloth turns inside out.
-    const outside = arm.clone().cross(across).multiplyScalar(this.#sign);
-    this.#bone.matrixWorld.makeBasis(arm, fall, outside).multiply(this.#bindInverse).setPosition(from);
+    // Arm x back points to the figure's left: the right side keeps its mirrored basis, else the cloth turns inside out.
+    const lateral = arm.clone().cross(across).multiplyScalar(this.#sign);
+    this.#bone.matrixWorld.makeBasis(arm, fall, lateral).multiply(this.#bindInverse).setPosition(from);
     this.#bone.matrix.copy(this.#bone.matrixWorld);
   }
 

@@ -1,6 +1,7 @@
 /**
- * The figure the puppet's parts are drawn on: the joint centres of H-Anim's LOA-1 example (ISO/IEC 19774-1), metres, y up,
- * facing z, its left at x. Every recipe in `parts/` uses these places; `fit.ts` then carries the parts over to a dancer.
+ * Figure on which the puppet's parts are modelled: the joint centres of H-Anim's LOA-1 example (ISO/IEC 19774-1), in
+ * metres, y up, facing z, its left at +x. The modules in `parts/` use these positions; `figure-fit.ts` maps the parts
+ * to a performer.
  */
 import { Vector3 } from "three";
 
@@ -23,25 +24,25 @@ const CENTRE_JOINTS: Record<string, readonly [number, number, number]> = {
 
 export type Side = "l" | "r";
 
-/** The two sides, with the sign of x on each. */
+/** The two sides, with the sign of x. */
 export const SIDES: readonly { side: Side; sign: 1 | -1 }[] = [
   { side: "l", sign: 1 },
   { side: "r", sign: -1 },
 ];
 
-/** Centre of a joint of the standard figure, a fresh vector. Throws on a name H-Anim does not know. */
+/** Return the centre of a joint as a new vector. Throw if H-Anim has no joint of that name. */
 export function jointPosition(name: string): Vector3 {
   const centre = CENTRE_JOINTS[name];
   if (centre) return new Vector3(...centre);
   const left = LEFT_JOINTS[name.slice(2)];
-  if (!left) throw new Error(`no joint ${name} in the standard figure`);
+  if (!left) throw new Error(`The standard figure has no joint "${name}".`);
   return new Vector3(name.startsWith("r_") ? -left[0] : left[0], left[1], left[2]);
 }
 
-/** Tips of the standard figure: crown and finger tips (toe tips are drawn from the midtarsal on). */
+/** Tips of the standard figure: crown and finger tips (toes are modelled from the midtarsal joint). */
 export const CROWN = new Vector3(0.005, 1.7504, 0.0055);
 export const LEFT_FINGER_TIP = new Vector3(0.2056, 0.6743, -0.0482);
-/** Height of the sole below a midtarsal joint. */
+/** Height of the midtarsal joint above the sole. */
 export const SOLE_HEIGHT_M = 0.0141;
-/** Centre of the head the face is drawn about. */
+/** Centre of the head. */
 export const HEAD_CENTRE = new Vector3(0.002, 1.634, 0.02);

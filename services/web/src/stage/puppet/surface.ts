@@ -1,7 +1,7 @@
-/** Parametric surfaces as plain vertex lists: what every part of the puppet is turned, lofted or bent from. Metres. */
+/** Parametric surfaces as vertex lists, from which all parts of the puppet are made. Metres. */
 import { CatmullRomCurve3, Quaternion, Vector3 } from "three";
 
-/** One part before it is put on the figure. Three numbers a vertex, two for `uvs`; triangles in `indices`. */
+/** Vertices and triangles of a part: three numbers per vertex, two for `uvs`; triangles in `indices`. */
 export interface Surface {
   positions: number[];
   normals: number[];
@@ -15,20 +15,20 @@ export type UvFunction = (u: number, v: number, at: Vector3) => readonly [number
 const DOWN = new Vector3(0, -1, 0);
 const DERIVATIVE_STEP = 1e-3;
 
-/** Smooth step from 0 at `from` to 1 at `to`; works downwards too. */
+/** Return a smooth step from 0 at `from` to 1 at `to`, which may be smaller than `from`. */
 export function smoothStep(from: number, to: number, x: number): number {
   const t = Math.min(1, Math.max(0, (x - from) / (to - from)));
   return t * t * (3 - 2 * t);
 }
 
-/** x raised to a power, sign kept: the coordinate of a superellipse. */
+/** Return x raised to a power with its sign kept: the coordinate of a superellipse. */
 export function signedPower(x: number, power: number): number {
   return Math.sign(x) * Math.abs(x) ** power;
 }
 
 /**
- * Cubic Hermite curve through rows `[t, ...values]` with rising t; clamped to the ends. The array returned is the same one
- * every time: take the values out at once.
+ * Return a cubic Hermite curve through rows `[t, ...values]` with rising t, clamped to its ends. Each call returns the
+ * same array: copy the values at once.
  */
 export function curve(keys: readonly (readonly number[])[]): (t: number) => readonly number[] {
   const last = keys.length - 1;
@@ -54,8 +54,8 @@ export function curve(keys: readonly (readonly number[])[]): (t: number) => read
 }
 
 /**
- * A grid of `columns` x `rows` cells over `at(u, v)`, u and v in 0..1. Normals are finite differences of the surface, so
- * that a seam (u = 0 and u = 1) shades as one; `at` must take u a little outside 0..1.
+ * Return a grid of `columns` x `rows` cells over `at(u, v)`, u and v in 0..1. Normals are finite differences of the
+ * surface, so that a seam (u = 0 and u = 1) shades evenly; `at` must accept u slightly outside 0..1.
  */
 export function grid(at: SurfaceFunction, columns: number, rows: number, uv?: UvFunction): Surface {
   const surface: Surface = { positions: [], normals: [], uvs: [], indices: [] };
@@ -65,7 +65,7 @@ export function grid(at: SurfaceFunction, columns: number, rows: number, uv?: Uv
       const v = j / rows;
       const point = at(u, v);
       let normal = surfaceNormal(at, u, v);
-      // At a pole the ring has no width: take the normal a little inside.
+      // At a pole the tangent vanishes: take the normal a little further in.
       if (normal.lengthSq() < 1e-16) normal = surfaceNormal(at, u, v < 0.5 ? v + 0.02 : v - 0.02);
       normal.normalize();
       surface.positions.push(point.x, point.y, point.z);
@@ -90,7 +90,7 @@ function surfaceNormal(at: SurfaceFunction, u: number, v: number): Vector3 {
 }
 
 export interface LatheOptions {
-  /** Scale of the radius sideways and in depth. */
+  /** Scale of the radius in width and in depth. */
   widthScale?: number;
   depthScale?: number;
   columns?: number;
@@ -98,7 +98,9 @@ export interface LatheOptions {
   uv?: UvFunction;
 }
 
-/** Turned wood from `from` to `to`: `profile` rows are (place, radius), both in fractions of the length. */
+/**
+ * Return a solid of revolution from `from` to `to`; `profile` rows are (position, radius) in fractions of the length.
+ */
 export function lathe(
   from: Vector3,
   to: Vector3,
@@ -126,7 +128,7 @@ export function lathe(
   );
 }
 
-/** A ball, or an ellipsoid with `stretch`. */
+/** Return a sphere, or an ellipsoid with `stretch`. */
 export function ball(
   centre: Vector3,
   radius: number,
@@ -150,7 +152,7 @@ export function ball(
   );
 }
 
-/** A torus around `axis`: the gold rings of the joints, the piping of the cuffs. */
+/** Return a torus around `axis`: rings of the joints, piping of the cuffs. */
 export function ring(centre: Vector3, axis: Vector3, radius: number, tube: number, wide = 1, deep = 1): Surface {
   const turn = new Quaternion().setFromUnitVectors(DOWN, axis.clone().normalize());
   return grid(
@@ -166,7 +168,7 @@ export function ring(centre: Vector3, axis: Vector3, radius: number, tube: numbe
   );
 }
 
-/** A rod with round ends: fingers, the tails of a cord. */
+/** Return a rod with round ends: fingers, ends of a cord. */
 export function capsule(from: Vector3, to: Vector3, radius: number, endRadius = radius): Surface {
   const length = from.distanceTo(to);
   const [a, b] = [radius / length, endRadius / length];
@@ -183,7 +185,10 @@ export function capsule(from: Vector3, to: Vector3, radius: number, endRadius = 
   return lathe(from, to, profile, { columns: 6, rows: 6 });
 }
 
-/** Superellipse sections stacked in y: rows are (y, centre z, half width, half depth, power). `lift` swells it. */
+/**
+ * Return superellipse sections stacked in y: rows are (y, centre z, half width, half depth, power). `lift` enlarges
+ * them.
+ */
 export function loft(sections: readonly (readonly number[])[], columns: number, rows: number, lift = 0): Surface {
   const section = curve(sections);
   const [low, high] = [sections[0][0], sections[sections.length - 1][0]];
@@ -204,7 +209,7 @@ export function loft(sections: readonly (readonly number[])[], columns: number, 
   );
 }
 
-/** A tube along a smooth line; `radius` rows are (place, radius), `stretch` squeezes it across the line's x, y, z. */
+/** Return a tube along a smooth line; `radius` rows are (position, radius), `stretch` scales it in x, y and z. */
 export function tube(
   line: readonly Vector3[],
   radius: readonly (readonly number[])[],
@@ -230,7 +235,7 @@ export function tube(
   );
 }
 
-/** A box turned about z, with flat faces: knots and bows of stiff cloth. */
+/** Return a flat-faced box rotated about z: knots and bows of stiff cloth. */
 export function box(centre: Vector3, size: readonly [number, number, number], turnZ: number): Surface {
   const surface: Surface = { positions: [], normals: [], uvs: [], indices: [] };
   const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), turnZ);

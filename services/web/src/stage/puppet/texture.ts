@@ -1,4 +1,6 @@
-/** The two painted textures: the face, and the asanoha (hemp leaf) of the cloth. Drawn once on a canvas. */
+/**
+ * The two textures of the puppet, drawn once on a canvas: the face, and the asanoha (hemp leaf) pattern of the cloth.
+ */
 import { CanvasTexture, RepeatWrapping, SRGBColorSpace } from "three";
 
 type Point = readonly [x: number, y: number];
@@ -6,18 +8,18 @@ type Point = readonly [x: number, y: number];
 function createCanvas(size: number): CanvasRenderingContext2D {
   const element = document.createElement("canvas");
   element.width = element.height = size;
-  // painted without the graphics, which have the stage to make ready meanwhile
+  // In software, since the graphics processor is preparing the stage at that time.
   const context = element.getContext("2d", { willReadFrequently: true });
-  if (!context) throw new Error("this browser gives no 2D canvas to paint the puppet's face on");
+  if (!context) throw new Error("The browser has no 2D canvas context for the puppet's textures.");
   return context;
 }
 
 const FACE_TEXTURE_PX = 1024;
-/** Metres on the mask to pixels; the window is 0.20 x 0.26 m about the middle of the face. */
+/** From metres on the mask to pixels; the projection is 0.20 x 0.26 m around the centre of the face. */
 const toPixelX = (x: number) => (x / 0.2 + 0.5) * FACE_TEXTURE_PX;
 const toPixelY = (y: number) => (0.5 - y / 0.26) * FACE_TEXTURE_PX;
 
-/** One brush stroke along a quadratic curve, its half width given at start, middle and end. */
+/** Draw a brush stroke along a quadratic curve, with half widths at start, middle and end. */
 function drawStroke(
   context: CanvasRenderingContext2D,
   [a, b, c]: readonly [Point, Point, Point],
@@ -56,7 +58,7 @@ function drawBlush(
   context.fillRect(toPixelX(x) - radius, toPixelY(y) - radius, 2 * radius, 2 * radius);
 }
 
-/** The painted face, a colour to multiply the gofun with. */
+/** Create the face texture, which multiplies the colour of the gofun. */
 export function createFaceTexture(): CanvasTexture {
   const context = createCanvas(FACE_TEXTURE_PX);
   context.fillStyle = "#fff";
@@ -165,7 +167,7 @@ function drawLips(context: CanvasRenderingContext2D): void {
   );
 }
 
-/** White hemp-leaf lines on black; one tile repeats. */
+/** Create a tile of white hemp-leaf lines on black. */
 export function createAsanohaTexture(): CanvasTexture {
   const context = createCanvas(512);
   context.fillStyle = "#000";

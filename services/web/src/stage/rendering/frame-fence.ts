@@ -1,6 +1,7 @@
 /**
- * Lets a frame be drawn only when the one before is done. A browser queues frames and then stands still until the graphics
- * catch up; on a slow machine that would stop the network's timers too, and a held limb would be taken for lost.
+ * Fence that allows a new frame only after the last one is complete. A browser queues frames and then blocks until the
+ * graphics processor catches up; on a slow machine that would also block the network timers, and a held limb would time
+ * out.
  */
 export class FrameFence {
   readonly #context: WebGL2RenderingContext;
@@ -10,7 +11,7 @@ export class FrameFence {
     this.#context = context;
   }
 
-  /** Whether the frame before has been drawn, and one can be. */
+  /** True if the last frame is complete and another can be drawn. */
   get isReady(): boolean {
     const gl = this.#context;
     if (gl.isContextLost()) return false;
@@ -21,12 +22,12 @@ export class FrameFence {
     return true;
   }
 
-  /** The context was lost and is there again: what was waited for went with it. */
+  /** Discard the fence after the context was lost and restored. */
   reset(): void {
     this.#fence = null;
   }
 
-  /** Call right after drawing. */
+  /** Insert a fence. Call it right after drawing. */
   insert(): void {
     const gl = this.#context;
     this.#fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);

@@ -1,11 +1,11 @@
-/** How much the stage draws, stepped down where frames come slowly. Pure: it is told the frame times. */
+/** Rendering quality, reduced when frames are slow. Pure: frame times are arguments. */
 
 export interface Quality {
   /** Share of the pixel ratio. */
   pixelRatioScale: number;
   reflection: boolean;
   shadows: boolean;
-  /** The figure without lacquer and grain. */
+  /** Draws the figure without lacquer and grain. */
   simpleMaterials: boolean;
 }
 
@@ -17,16 +17,19 @@ export const QUALITY_LEVELS: readonly Quality[] = [
   { pixelRatioScale: 0.35, reflection: false, shadows: false, simpleMaterials: true },
 ];
 
-/** Frames slower than this, several together, step down. Seconds: 24 frames a second. */
+/** The quality is reduced if the median frame is slower than this, in seconds (24 frames per second). */
 const SLOW_FRAME_S = 1 / 24;
-/** Frames looked at together; few, as where they are slow they also come seldom. */
+/** Frames per median; few, since slow frames are also rare. */
 const WINDOW_FRAMES = 6;
-/** One frame this slow says enough, seconds; one slower still is a hidden tab or a sleeping machine. */
+/**
+ * A single frame this slow reduces the quality, in seconds. An even longer one is a page in the background or a
+ * suspended machine.
+ */
 const VERY_SLOW_FRAME_S = 0.4;
 const PAUSE_S = 8;
-/** The first frames compile shaders and are no measure. */
+/** The first frames compile shaders and are not measured. */
 const WARM_UP_FRAMES = 3;
-/** Where to start on a machine that draws without a graphics processor. */
+/** Initial level on a machine without a graphics processor. */
 const SOFTWARE_LEVEL = 3;
 
 export class AdaptiveQuality {
@@ -36,7 +39,7 @@ export class AdaptiveQuality {
 
   readonly #pinned: boolean;
 
-  /** `renderer` is the graphics driver's name for itself; `pinned` keeps the best quality, however slow. */
+  /** `renderer` is the name of the graphics driver; `pinned` keeps the best quality, however slow. */
   constructor(renderer: string, pinned: boolean) {
     this.#pinned = pinned;
     this.#level = !pinned && /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer) ? SOFTWARE_LEVEL : 0;
@@ -46,13 +49,13 @@ export class AdaptiveQuality {
     return QUALITY_LEVELS[this.#level];
   }
 
-  /** The next frames are no measure: the machine was busy with something else, or shaders are compiled anew. */
+  /** Skip the next frames: the machine was busy with something else, or shaders are compiled again. */
   restart(): void {
     this.#frameTimes.length = 0;
     this.#framesToSkip = WARM_UP_FRAMES;
   }
 
-  /** Takes the seconds since the frame before; true when the quality has just been stepped down. Never steps up by itself. */
+  /** Add the seconds since the last frame. Return whether the quality was reduced. It is never raised automatically. */
   addFrameTime(seconds: number): boolean {
     if (this.#pinned) return false;
     if (seconds > PAUSE_S) {
@@ -69,7 +72,7 @@ export class AdaptiveQuality {
     this.#frameTimes.length = 0;
     const median = seconds < VERY_SLOW_FRAME_S ? sorted[WINDOW_FRAMES >> 1] : seconds;
     if (median <= SLOW_FRAME_S || this.#level === QUALITY_LEVELS.length - 1) return false;
-    // Twice as slow as need be: two steps at once, so that a weak machine is not kept waiting.
+    // At a third of the frame rate, reduce by two levels at once, so that a weak machine recovers sooner.
     this.#level = Math.min(QUALITY_LEVELS.length - 1, this.#level + (median > 3 * SLOW_FRAME_S ? 2 : 1));
     this.#framesToSkip = 1;
     return true;

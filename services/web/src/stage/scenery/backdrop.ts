@@ -1,9 +1,11 @@
-/** The disc of gold leaf on its ground, one plane behind the stage; the floor reflects the same function of the place. */
+/**
+ * Backdrop: the disc of gold leaf on its ground, a plane behind the stage. The floor reflects the same GLSL function.
+ */
 import { Color, type IUniform, Mesh, PlaneGeometry, ShaderMaterial, Vector2 } from "three";
 import type { Look } from "./look";
 import { NOISE_GLSL } from "./noise";
 
-/** Where the plane stands, metres before the middle of the stage. */
+/** Position of the plane, in metres along z from the centre of the stage. */
 export const BACKDROP_Z_M = -2.6;
 
 export interface BackdropUniforms {
@@ -12,7 +14,7 @@ export interface BackdropUniforms {
   discRadius: IUniform<number>;
 }
 
-/** GLSL: uniforms, and `vec3 backdrop(vec2 place, float blur)`, linear colour at metres on the plane. */
+/** GLSL: uniforms, and `vec3 backdrop(vec2 at, float blur)`, the linear colour at a position on the plane in metres. */
 export const BACKDROP_GLSL = /* glsl */ `
 uniform vec3 groundLow, groundMiddle, groundTop, leafDeep, leafBright;
 uniform float leafStrength, dark, discRadius;
@@ -26,7 +28,7 @@ vec3 backdrop(vec2 at, float blur) {
 
   vec2 fromCentre = at - discCentre;
   float away = length(fromCentre);
-  // Fine detail is for the disc itself; its blurred image in the floor has none.
+  // The disc itself has fine detail; its blurred reflection in the floor has none.
   if (blur < .05) away += .003 * (noise2(at * 9.) - .5) + .0025 * (noise2(at * 41.) - .5);
   float inside = 1. - smoothstep(discRadius - .004 - blur, discRadius + .004 + blur, away);
   vec3 halo = leafDeep * exp(-2.2 * max(away - discRadius, 0.)) * (1. - inside) * .055 * dark;
@@ -37,7 +39,8 @@ vec3 backdrop(vec2 at, float blur) {
   float seam = smoothstep(.47, .497, max(edge.x, edge.y));
   float tone = .34 * hash2(floor(square) + 7.) - .17;
   float cloud = .7 * noise2(at * 2.1 + 3.) + .3 * noise2(at * 9.);
-  vec3 leaf = mix(leafDeep, leafBright, clamp(.15 + .7 * cloud + tone, 0., 1.)) * (1. + (blur < .05 ? .07 * seam * dark : 0.));
+  vec3 leaf = mix(leafDeep, leafBright, clamp(.15 + .7 * cloud + tone, 0., 1.))
+    * (1. + (blur < .05 ? .07 * seam * dark : 0.));
   leaf *= mix(1., smoothstep(1.9, .1, length(fromCentre - vec2(-.35, .45))), .75 * dark);
   leaf *= mix(1., smoothstep(-.2, 1.1, at.y), .55 * dark);
   return mix(ground, leaf, inside * leafStrength) + halo;
@@ -68,14 +71,20 @@ export function applyLookToBackdrop(uniforms: BackdropUniforms, look: Look): voi
   uniforms.dark.value = look.dark ? 1 : 0;
 }
 
-/** The plane, in the frame of the rig that follows the dancer. Paper is not tone mapped by day: the film curve greys it. */
+/**
+ * Create the plane, in the frame of the rig that follows the performers. In the day look it is not tone mapped: the
+ * film curve would grey the paper.
+ */
 export function createBackdrop(uniforms: BackdropUniforms): Mesh {
   const material = new ShaderMaterial({
     uniforms,
     depthWrite: false,
     vertexShader: /* glsl */ `
       varying vec2 vAt;
-      void main() { vAt = position.xy + vec2(0., 5.); gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.); }`,
+      void main() {
+        vAt = position.xy + vec2(0., 5.);
+        gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
+      }`,
     fragmentShader: /* glsl */ `
       ${BACKDROP_GLSL}
       varying vec2 vAt;

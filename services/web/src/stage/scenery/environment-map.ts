@@ -1,4 +1,4 @@
-/** A studio for the lacquer and the hair to gleam with (art direction, section 4). */
+/** Environment map: a studio of light panes that lacquer and hair reflect. */
 import {
   Color,
   DoubleSide,
@@ -36,19 +36,19 @@ const DAY_PANES: readonly LightPane[] = [
   ["#efe2cc", 1, 14, 14, [0, -1.2, 0]],
 ];
 
-/** Prefiltered studio of light panes, built by code. The caller disposes of it. */
+/** Render the prefiltered environment map. The caller disposes of it. */
 export function createEnvironmentMap(renderer: WebGLRenderer, look: Look): Texture {
-  const room = new Scene();
-  room.background = new Color(look.dark ? "#07080d" : "#b9b0a2");
+  const studio = new Scene();
+  studio.background = new Color(look.dark ? "#07080d" : "#b9b0a2");
   for (const [colour, strength, width, height, at] of look.dark ? NIGHT_PANES : DAY_PANES) {
     const material = new MeshBasicMaterial({ color: new Color(colour).multiplyScalar(strength), side: DoubleSide });
     const pane = new Mesh(new PlaneGeometry(width, height), material);
     pane.position.set(...at);
     pane.lookAt(new Vector3(0, 1, 0));
-    room.add(pane);
+    studio.add(pane);
   }
   const generator = new PMREMGenerator(renderer);
-  const { texture } = generator.fromScene(room, 0.035);
+  const { texture } = generator.fromScene(studio, 0.035);
   generator.dispose();
   return texture;
 }

@@ -1,6 +1,7 @@
 /**
- * The stage floor. By night black lacquer: planks, and an analytic mirror of the backdrop (the view ray is mirrored and the
- * backdrop evaluated where it lands), so that no second render is needed. By day paper-pale wood that melts into the ground.
+ * Stage floor. Night: black lacquer planks with an analytic mirror of the backdrop (the view ray is reflected, and the
+ * backdrop is evaluated where it lands), so that no second render pass is needed. Day: pale wood that fades into the
+ * ground.
  */
 import {
   type IUniform,
@@ -53,7 +54,10 @@ export interface Floor {
   dispose(): void;
 }
 
-/** `plain` leaves out gloss, for machines that draw in software; `rig` is the frame the floor lies in; `travelled` how far that has gone, for the boards. */
+/**
+ * Create the floor. `rig` is the frame that it lies in, `offset` the distance that the rig has travelled, for the
+ * boards, and `simple` leaves out the gloss for software rendering.
+ */
 export function createFloor(backdrop: BackdropUniforms, rig: Object3D, offset: Vector2, simple: boolean): Floor {
   const material = simple
     ? new MeshLambertMaterial({ transparent: true })
@@ -68,7 +72,9 @@ export function createFloor(backdrop: BackdropUniforms, rig: Object3D, offset: V
     shader.fragmentShader = shader.fragmentShader
       .replace(
         "#include <common>",
-        `#include <common>\nvarying vec3 vPlace; uniform vec2 travelled; uniform mat4 intoRig; uniform float opacityNear;\n${BACKDROP_GLSL}`,
+        `#include <common>
+varying vec3 vPlace; uniform vec2 travelled; uniform mat4 intoRig; uniform float opacityNear;
+${BACKDROP_GLSL}`,
       )
       .replace("#include <opaque_fragment>", SHADE_GLSL)
       .replace("#include <tonemapping_fragment>", HORIZON_GLSL);

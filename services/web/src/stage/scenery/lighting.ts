@@ -1,33 +1,37 @@
-/** One shadow-casting key, a fill and two rims (art direction, section 4); a show's own lights take their places. */
+/** Stage lights: a shadow-casting key, a fill and two rims. The lights of a motion replace them. */
 import { Color, DirectionalLight, Group, LinearSRGBColorSpace, MathUtils, SpotLight, Vector3 } from "three";
 import type { LightState } from "../../playout/light-state";
 import type { Look } from "./look";
 
-/** Seconds in which a show's lights come on or go. */
+/** Duration of the blend to and from a motion's lights, in seconds. */
 const LIGHT_BLEND_S = 0.9;
-/** What the fill and the studio keep of their light where the show is dark: the puppet is never lost from sight. */
+/**
+ * Share of the fill and the environment that remains when the motion's lights are dark: the puppet always stays
+ * visible.
+ */
 const MIN_FILL_SHARE = 0.2;
-/** Depth about the dancer that the key's shadows have, metres: towards the light and away. */
+/** Depth of the key's shadows around the performers, in metres: towards the light and away from it. */
 const SHADOW_DEPTH_M = [3.4, 3.6] as const;
-/** No spot is wider, radians, and none nearer to the dancer, metres. */
+/** Limits of the motion's spots: largest angle in radians, and smallest distance from the performer in metres. */
 const MAX_SPOT_ANGLE_RAD = 1.2;
 const MIN_SPOT_DISTANCE_M = 0.8;
 
 export interface Lights {
   readonly group: Group;
   castsShadows: boolean;
-  /** How much light there is beside the spots, `DARKEST`..1 of the look's own. */
+  /** Level of the light other than the spots, `MIN_FILL_SHARE`..1 of the look's own. */
   readonly ambientLevel: number;
   applyLook(look: Look): void;
   /**
-   * Moves on by `seconds`. The first of a show's `lights` stands for the key, the second for the warm rim, the third for the cool
-   * one; full, each throws on the dancer what the look's own does, from its own place and in its own colour. The group's world
-   * matrix is up to date. What is lit is `wide` times wider than one dancer's.
+   * Advance by `seconds`. The motion's first light replaces the key, the second the warm rim, the third the cool one.
+   * At full intensity each gives the performer as much light as the look's own, from its own position and in its own
+   * colour. The world matrix of the group must be up to date. The lit area is `widthScale` times as wide as for one
+   * performer.
    */
   update(lights: readonly LightState[], seconds: number, widthScale?: number): void;
 }
 
-/** A spot as the look has it, and as it stands in for a light of the show. */
+/** A spot of the look, and the motion's light that replaces it. */
 interface SpotRole {
   readonly light: SpotLight;
   readonly position: Vector3;
@@ -35,14 +39,14 @@ interface SpotRole {
   readonly distance: number;
   readonly colour: Color;
   intensity: number;
-  /** The show's: where, in which colour, and how much of full. */
+  /** The motion's light: position, colour and share of its full intensity. */
   readonly motionLight: { place: Vector3; colour: Color; share: number };
-  /** Of the way over to the show's, 0..1. */
+  /** Progress of the blend to the motion's light, 0..1. */
   blendShare: number;
 }
 
 export function createLights(): Lights {
-  const role = (angle: number, penumbra: number, from: [number, number, number], height: number): SpotRole => {
+  const createRole = (angle: number, penumbra: number, from: [number, number, number], height: number): SpotRole => {
     const light = new SpotLight("#fff", 1, 0, angle, penumbra, 2);
     const place = new Vector3(...from);
     light.position.copy(place);
@@ -60,9 +64,9 @@ export function createLights(): Lights {
     };
   };
   const roles = [
-    role(0.36, 0.7, [-1.9, 3.9, 4.1], 0.9),
-    role(0.5, 0.8, [2.6, 3, -2.3], 1.05),
-    role(0.5, 0.8, [-2.9, 1.6, -2], 1),
+    createRole(0.36, 0.7, [-1.9, 3.9, 4.1], 0.9),
+    createRole(0.5, 0.8, [2.6, 3, -2.3], 1.05),
+    createRole(0.5, 0.8, [-2.9, 1.6, -2], 1),
   ];
   const key = roles[0].light;
   key.castShadow = true;
@@ -74,16 +78,16 @@ export function createLights(): Lights {
   fill.position.set(2.6, 1.5, 3.6);
   const group = new Group();
   for (const light of [key, fill, roles[1].light, roles[2].light]) group.add(light, light.target);
-  let filled = 1;
+  let fillIntensity = 1;
   let level = 1;
-  let wide = 1;
+  let currentWidth = 1;
   const apply = () => {
-    for (const one of roles) blendSpot(one, level, wide);
-    fill.intensity = filled * level;
+    for (const createRole of roles) blendSpot(createRole, level, currentWidth);
+    fill.intensity = fillIntensity * level;
     const { camera } = key.shadow;
     const distance = key.position.distanceTo(key.target.position);
-    camera.near = Math.max(distance - SHADOW_DEPTH_M[0] * wide, 0.2);
-    camera.far = distance + SHADOW_DEPTH_M[1] * wide;
+    camera.near = Math.max(distance - SHADOW_DEPTH_M[0] * currentWidth, 0.2);
+    camera.far = distance + SHADOW_DEPTH_M[1] * currentWidth;
     camera.updateProjectionMatrix();
   };
   return {
@@ -99,54 +103,59 @@ export function createLights(): Lights {
     },
     applyLook(look) {
       fill.color.set(look.fill[0]);
-      filled = look.fill[1];
+      fillIntensity = look.fill[1];
       [look.key, look.warmRim, look.coolRim].forEach(([colour, intensity], at) => {
         roles[at].colour.set(colour);
         roles[at].intensity = intensity;
       });
       apply();
     },
-    update(lights, seconds, times = 1) {
-      wide = times;
-      roles.forEach((one, at) => {
-        const told = lights[at];
-        if (told) readLightState(told, one, group);
+    update(lights, seconds, widthScale = 1) {
+      currentWidth = widthScale;
+      roles.forEach((createRole, at) => {
+        const state = lights[at];
+        if (state) readLightState(state, createRole, group);
         const step = seconds / LIGHT_BLEND_S;
-        one.blendShare = told ? Math.min(one.blendShare + step, 1) : Math.max(one.blendShare - step, 0);
+        createRole.blendShare = state
+          ? Math.min(createRole.blendShare + step, 1)
+          : Math.max(createRole.blendShare - step, 0);
       });
       const brightest = Math.max(
-        ...roles.map(({ blendShare: over, motionLight: shown }) => (over > 0 ? shown.share : 0)),
+        ...roles.map(({ blendShare, motionLight }) => (blendShare > 0 ? motionLight.share : 0)),
       );
-      const over = MathUtils.smoothstep(Math.max(...roles.map((one) => one.blendShare)), 0, 1);
-      level = MathUtils.lerp(1, MathUtils.lerp(MIN_FILL_SHARE, 1, Math.min(brightest, 1)), over);
+      const blendShare = MathUtils.smoothstep(Math.max(...roles.map((createRole) => createRole.blendShare)), 0, 1);
+      level = MathUtils.lerp(1, MathUtils.lerp(MIN_FILL_SHARE, 1, Math.min(brightest, 1)), blendShare);
       apply();
     },
   };
 }
 
-/** Takes in what a light of the show is: its numbers are in the world's frame, a role's place is in the group's. */
-function readLightState({ full, numbers }: LightState, { motionLight: shown, light }: SpotRole, group: Group): void {
-  shown.place.set(numbers[0], numbers[1], numbers[2]);
-  group.worldToLocal(shown.place);
-  const away = shown.place.clone().sub(light.target.position);
+/** Read a motion's light: its numbers are in the world frame, a role's position is in the group's. */
+function readLightState({ full, numbers }: LightState, { motionLight, light }: SpotRole, group: Group): void {
+  motionLight.place.set(numbers[0], numbers[1], numbers[2]);
+  group.worldToLocal(motionLight.place);
+  const away = motionLight.place.clone().sub(light.target.position);
   if (away.length() < MIN_SPOT_DISTANCE_M)
-    shown.place
+    motionLight.place
       .copy(light.target.position)
       .add(away.lengthSq() > 0 ? away.setLength(MIN_SPOT_DISTANCE_M) : away.set(0, MIN_SPOT_DISTANCE_M, 0));
-  shown.colour.setRGB(numbers[3], numbers[4], numbers[5], LinearSRGBColorSpace);
-  shown.share = numbers[6] / full;
+  motionLight.colour.setRGB(numbers[3], numbers[4], numbers[5], LinearSRGBColorSpace);
+  motionLight.share = numbers[6] / full;
 }
 
-/** Between the look's own light, of which `level` is left, from `wide` times further away, and the show's. From any distance as much light and as wide a cone reach the dancers. */
+/**
+ * Blend the look's own light, dimmed to `level` and moved `widthScale` times further away, with the motion's. At any
+ * distance the same light and the same cone width reach the performers.
+ */
 function blendSpot(
-  { light, position: place, angle, distance, colour, intensity, motionLight: shown, blendShare: over }: SpotRole,
+  { light, position: place, angle, distance, colour, intensity, motionLight, blendShare }: SpotRole,
   level: number,
   widthScale: number,
 ): void {
-  const share = MathUtils.smoothstep(over, 0, 1);
-  light.position.copy(place).multiplyScalar(widthScale).lerp(shown.place, share);
+  const share = MathUtils.smoothstep(blendShare, 0, 1);
+  light.position.copy(place).multiplyScalar(widthScale).lerp(motionLight.place, share);
   const nearer = distance / Math.max(light.position.distanceTo(light.target.position), MIN_SPOT_DISTANCE_M);
-  light.color.lerpColors(colour, shown.colour, share);
-  light.intensity = (intensity * MathUtils.lerp(level, shown.share, share)) / nearer ** 2;
+  light.color.lerpColors(colour, motionLight.colour, share);
+  light.intensity = (intensity * MathUtils.lerp(level, motionLight.share, share)) / nearer ** 2;
   light.angle = Math.min(Math.atan(Math.tan(angle) * nearer * widthScale), MAX_SPOT_ANGLE_RAD);
 }

@@ -1,4 +1,4 @@
-/** The two looks of the stage, night and day: colours and lights of the art direction, sections 1, 3 and 4. */
+/** The two looks of the stage, night and day: colours and lights. */
 
 export type Theme = "night" | "day";
 
@@ -14,12 +14,12 @@ export interface Look {
   fill: readonly [string, number];
   warmRim: readonly [string, number];
   coolRim: readonly [string, number];
-  /** Free strings and rings, and what a held thread is lit towards. */
+  /** Free strings and rings, and the colour that a held thread is lit towards. */
   threadColour: string;
   threadOpacity: number;
   ringColour: string;
   ringOpacity: number;
-  /** The puppeteers' colours in the order of joining. */
+  /** Colours of the puppeteers in the order of joining. */
   puppeteerColours: readonly string[];
 }
 

@@ -1,4 +1,4 @@
-/** The puppeteers' cross bars of turned wood, with a gold hook the thread hangs from; one instanced mesh. */
+/** The puppeteers' crossbars of turned wood, with a gold hook that the thread hangs from, as one instanced mesh. */
 import {
   BufferGeometry,
   Color,
@@ -14,7 +14,7 @@ import { MAX_LIMBS } from "../../wire/limbs";
 import { lathe, ring, type Surface } from "../puppet/surface";
 
 const MAX_BARS = MAX_LIMBS;
-/** A turned rod: (place, radius) in fractions of its length. */
+/** A turned rod: (position, radius) in fractions of its length. */
 const ROD_PROFILE = [
   [0, 0.0001],
   [0.004, 0.0152],
@@ -33,22 +33,25 @@ const ROD_PROFILE = [
 
 export interface ControlBar {
   position: Vector3;
-  /** Radians: roll about the view, lean adds to it. */
+  /** Rotation about the view direction, in radians. */
   roll: number;
   size: number;
 }
 
-/** Where the thread meets the hook, below a bar's middle, metres. */
+/** Distance of the hook below the bar's centre, in metres. */
 export const HOOK_OFFSET_M = 0.028;
 
 function createGeometry(): BufferGeometry {
-  const across = lathe(new Vector3(-0.15, 0, 0), new Vector3(0.15, 0, 0), ROD_PROFILE, { columns: 10, rows: 26 });
-  const along = lathe(new Vector3(0, 0.008, -0.1), new Vector3(0, 0.008, 0.1), ROD_PROFILE, { columns: 10, rows: 26 });
+  const crossRod = lathe(new Vector3(-0.15, 0, 0), new Vector3(0.15, 0, 0), ROD_PROFILE, { columns: 10, rows: 26 });
+  const mainRod = lathe(new Vector3(0, 0.008, -0.1), new Vector3(0, 0.008, 0.1), ROD_PROFILE, {
+    columns: 10,
+    rows: 26,
+  });
   const binding = ring(new Vector3(0, 0.012, 0), new Vector3(0, 1, 0), 0.017, 0.0032);
   const hook = ring(new Vector3(0, -0.018, 0), new Vector3(0, 0, 1), 0.01, 0.0022);
   const parts: [Surface, string][] = [
-    [across, "#b98653"],
-    [along, "#8b5a33"],
+    [crossRod, "#b98653"],
+    [mainRod, "#8b5a33"],
     [binding, "#d2a656"],
     [hook, "#d2a656"],
   ];
@@ -57,7 +60,7 @@ function createGeometry(): BufferGeometry {
     const first = positions.length / 3;
     const { r, g, b } = new Color(hex);
     positions.push(...part.positions);
-    // These surfaces run the other way round than outwards.
+    // These surfaces are wound inwards.
     normals.push(...part.normals.map((x) => -x));
     for (let i = 0; i < part.positions.length; i += 3) colours.push(r, g, b);
     for (let i = 0; i < part.indices.length; i += 3)

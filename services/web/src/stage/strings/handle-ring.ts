@@ -1,4 +1,4 @@
-/** The rings people take hold of, four of each performer: one instanced billboard, drawn over everything (section 5). */
+/** Rings around the limbs' handles, four per performer: one instanced billboard, drawn over everything. */
 import {
   Color,
   InstancedBufferAttribute,
@@ -15,7 +15,7 @@ const MAX_RINGS = MAX_LIMBS;
 export interface HandleRing {
   colour: string;
   alpha: number;
-  /** Radius in metres, and the line's share of it. */
+  /** Radius in metres, and the stroke width as a share of it. */
   radius: number;
   lineShare: number;
   glow: number;
@@ -68,7 +68,6 @@ export class HandleRings {
     this.mesh.renderOrder = 8;
   }
 
-  /** How many there are. */
   set count(count: number) {
     this.mesh.geometry.instanceCount = count;
   }

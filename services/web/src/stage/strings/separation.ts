@@ -1,27 +1,27 @@
-/** Keeps things on a line from covering each other. Pure. */
+/** Separation of objects along one dimension. Pure. */
 
 /**
- * The places nearest to `places` (in the sum of squares) that are `least` apart at least, in their order on the line: sorted neighbours that are too near go apart
- * together about their middle (isotonic regression by pooling, Ayer et al. 1955).
+ * Return the positions nearest to `positions` (least squares) that are at least `minDistance` apart, in the same order:
+ * neighbours that are too close move apart around their mean (isotonic regression by pooling, Ayer et al. 1955).
  */
 export function separate(positions: readonly number[], minDistance: number): number[] {
-  const order = positions.map((_, nth) => nth).sort((a, b) => positions[a] - positions[b]);
-  // with their least distances taken away they only have to be in order
+  const order = positions.map((_, index) => index).sort((a, b) => positions[a] - positions[b]);
+  // Without the minimum distances the positions only have to ascend.
   const pools: { sum: number; count: number }[] = [];
-  order.forEach((nth, rank) => {
-    let pool = { sum: positions[nth] - rank * minDistance, count: 1 };
+  order.forEach((index, rank) => {
+    let pool = { sum: positions[index] - rank * minDistance, count: 1 };
     for (
-      let before = pools.at(-1);
-      before && before.sum / before.count > pool.sum / pool.count;
-      before = pools.at(-1)
+      let previous = pools.at(-1);
+      previous && previous.sum / previous.count > pool.sum / pool.count;
+      previous = pools.at(-1)
     ) {
-      pool = { sum: pool.sum + before.sum, count: pool.count + before.count };
+      pool = { sum: pool.sum + previous.sum, count: pool.count + previous.count };
       pools.pop();
     }
     pools.push(pool);
   });
   const means = pools.flatMap(({ sum, count }) => Array<number>(count).fill(sum / count));
-  const found = [...positions];
-  order.forEach((nth, rank) => (found[nth] = means[rank] + rank * minDistance));
-  return found;
+  const separated = [...positions];
+  order.forEach((index, rank) => (separated[index] = means[rank] + rank * minDistance));
+  return separated;
 }

@@ -1,4 +1,4 @@
-/** What the audience sees of the strings: rings, threads and bars, from who holds what (section 5). */
+/** The strings as the audience sees them: rings, threads and control bars. */
 import { Group, Vector3 } from "three";
 import { LIMBS } from "../../motion/skeleton";
 import { limbNumber, MAX_LIMBS } from "../../wire/limbs";
@@ -10,37 +10,40 @@ import { separate } from "./separation";
 import { Threads } from "./thread";
 
 export interface StringState {
-  /** Index of the holder's colour, or null when the limb is free. */
+  /** Index of the puppeteer's colour, or null if the limb is free. */
   puppeteer: number | null;
-  /** The pointer is near, or the control has the focus. */
+  /** True if the pointer is near or the control has the focus. */
   isHighlighted: boolean;
-  /** Where the holder pulls to, world metres; null when unknown (another's hand, keys, a stick). */
+  /** Target of the pull, in world metres; null if unknown (another client, keyboard, gamepad). */
   pullTarget: Vector3 | null;
-  /** Of a performer that this page's keys do not act on just now: it keeps to the background. */
+  /** True if the performer is not the selected one: its strings are dimmed. */
   isDimmed?: boolean;
 }
 
-/** How the strings are looked at. */
+/** View of the strings. */
 export interface StringsView {
-  /** Height of the floor, and what bars stay under, world metres. */
+  /** Height of the floor, and the highest position of bars, in world metres. */
   ground: number;
   ceiling: number;
-  /** The camera's right, world. */
+  /** The camera's right in the world frame. */
   right: Vector3;
-  /** How many times further away than from one dancer. */
+  /** Distance of the camera as a multiple of what one performer needs. */
   distanceScale: number;
 }
 
 const FREE_STRING: StringState = { puppeteer: null, isHighlighted: false, pullTarget: null };
-/** What is left of the rings and silk of those behind. */
+/** Remaining opacity of dimmed rings and threads. */
 const DIMMED_SHARE = 0.42;
 const HIDDEN_POSITION = new Vector3();
 
-/** Pull error that draws a thread fully taut, metres. */
+/** Pull error at which a thread is fully taut, in metres. */
 const TAUT_ERROR_M = 0.25;
-/** Heights over the floor that bars keep at least: of hands, of legs. Metres for the standard figure. */
+/** Minimum heights of bars above the floor, for hands and legs, in metres for the standard figure. */
 const MIN_BAR_HEIGHT_M = [2.14, 1.98];
-/** Bars at heights nearer than this hang as far apart as this, so that none covers another. Metres for the standard figure. */
+/**
+ * Bars at heights closer than this are kept this far apart, so that none covers another. Metres for the standard
+ * figure.
+ */
 const SAME_HEIGHT_M = 0.2;
 const MIN_BAR_DISTANCE_M = 0.36;
 const MAX_LEAN_RAD = (12 * Math.PI) / 180;
@@ -54,21 +57,21 @@ interface StringAnimation {
   shake: number;
 }
 
-/** One string just now: its handle, and where its bar is to hang, null where it is free. */
+/** Layout of a string: its handle, and the target of its bar, null if it is free. */
 interface StringLayout {
   state: StringState;
-  /** Which limb of its performer it is, 0..3. */
+  /** Limb of its performer, 0..3. */
   limb: number;
   handle: Vector3;
   barTarget: Vector3 | null;
-  /** Of its performer, and of what is to be seen from where one looks. */
+  /** Scale of the performer, and of its string at this distance. */
   scale: number;
   size: number;
 }
 
 export class Strings {
   readonly group = new Group();
-  /** No easing, no shake. */
+  /** Disables easing and shaking. */
   reducedMotion = false;
   readonly #threads = new Threads();
   readonly #rings = new HandleRings();
@@ -89,17 +92,20 @@ export class Strings {
     }));
   }
 
-  /** The ring of a limb that another holds shakes its head. */
+  /** Shake the ring of a limb that another puppeteer holds. */
   shakeRing(limb: number): void {
     if (!this.reducedMotion) this.#animations[limb].shake = 1;
   }
 
-  /** Where a limb's bar is, for its name tag; null while there is none. */
+  /** Return the position of a limb's bar, for its name tag; null if there is none. */
   barPosition(limb: number): Vector3 | null {
     return this.#animations[limb].held > 0.5 ? this.#animations[limb].bar : null;
   }
 
-  /** Draws four strings for each performer, none where that is null; `states` by number of the limb, free where there is none. */
+  /**
+   * Draw four strings per performer, none for null. `states` is indexed by limb number; without a state the limb is
+   * free.
+   */
   update(
     performers: readonly (Pick<Performer, "handle" | "scale"> | null)[],
     states: readonly StringState[],
@@ -112,14 +118,15 @@ export class Strings {
     this.#threads.count = this.#rings.count = performers.length * LIMBS.length;
     const strings = performers.flatMap((performer, k) =>
       LIMBS.map(
-        (_, part) => performer && layOutString(performer, part, states[limbNumber(k, part)] ?? FREE_STRING, view),
+        (_, limbIndex) =>
+          performer && layOutString(performer, limbIndex, states[limbNumber(k, limbIndex)] ?? FREE_STRING, view),
       ),
     );
-    const there = strings.filter((string) => string !== null);
+    const visible = strings.filter((string) => string !== null);
     separateBars(
-      there.flatMap(({ barTarget: goal }) => goal ?? []),
+      visible.flatMap(({ barTarget: goal }) => goal ?? []),
       view.right,
-      Math.max(...there.map(({ size }) => size)),
+      Math.max(...visible.map(({ size }) => size)),
     );
     const bars = strings.map((string, limb) =>
       string ? this.#drawString(limb, string, look, seconds, view.right) : this.#hideString(limb),
@@ -127,10 +134,10 @@ export class Strings {
     this.#bars.set(bars.filter((bar) => bar !== null));
   }
 
-  /** Draws a string, but for its bar, which it returns. */
+  /** Draw a string except for its bar, which is returned. */
   #drawString(
     limb: number,
-    { state, limb: part, handle, barTarget: goal, scale, size }: StringLayout,
+    { state, limb: limbIndex, handle, barTarget: goal, scale, size }: StringLayout,
     look: Look,
     seconds: number,
     right: Vector3,
@@ -145,17 +152,17 @@ export class Strings {
     motion.highlight = this.#approach(motion.highlight, state.isHighlighted ? 1 : 0, seconds, 0.16);
     motion.shake = this.#approach(motion.shake, 0, seconds, 0.4);
     const shake = motion.shake > 0 ? Math.sin(motion.shake * 4 * Math.PI) * 0.01 * size : 0;
-    const shown = handle.clone().addScaledVector(right, shake);
+    const ringPosition = handle.clone().addScaledVector(right, shake);
     const tension = state.pullTarget
       ? Math.min(1, 0.35 + state.pullTarget.distanceTo(handle) / TAUT_ERROR_M)
       : held
         ? 0.75
         : 0;
-    const bar = motion.held > 0.01 ? this.#animateBar(motion, goal, part, seconds, size) : null;
-    this.#drawRing(limb, shown, motion, state, look, size);
+    const bar = motion.held > 0.01 ? this.#animateBar(motion, goal, limbIndex, seconds, size) : null;
+    this.#drawRing(limb, ringPosition, motion, state, look, size);
     if (held) {
       const hook = motion.bar.clone().setY(motion.bar.y - HOOK_OFFSET_M * (size / scale));
-      this.#threads.set(limb, shown, hook, {
+      this.#threads.set(limb, ringPosition, hook, {
         colour: look.puppeteerColours[motion.puppeteer],
         alpha: 1,
         tension,
@@ -163,9 +170,9 @@ export class Strings {
         fadesOut: false,
       });
     } else {
-      const top = shown.clone().setY(shown.y + (part < 2 ? 0.62 : 0.26) * scale);
+      const top = ringPosition.clone().setY(ringPosition.y + (limbIndex < 2 ? 0.62 : 0.26) * scale);
       const alpha = look.threadOpacity * (state.isDimmed ? DIMMED_SHARE : 1);
-      this.#threads.set(limb, shown, top, {
+      this.#threads.set(limb, ringPosition, top, {
         colour: look.threadColour,
         alpha,
         tension: 0,
@@ -189,8 +196,14 @@ export class Strings {
     return null;
   }
 
-  /** `goal` is where the bar is to hang; null where it was let go, and rises. */
-  #animateBar(motion: StringAnimation, goal: Vector3 | null, part: number, seconds: number, size: number): ControlBar {
+  /** `goal` is the target of the bar, or null after a release: the bar rises. */
+  #animateBar(
+    motion: StringAnimation,
+    goal: Vector3 | null,
+    limbIndex: number,
+    seconds: number,
+    size: number,
+  ): ControlBar {
     const held = goal !== null;
     const before = motion.bar.x;
     motion.bar.lerp(
@@ -201,7 +214,7 @@ export class Strings {
       seconds > 0 && !this.reducedMotion
         ? Math.max(-MAX_LEAN_RAD, Math.min(MAX_LEAN_RAD, -0.16 * ((motion.bar.x - before) / seconds)))
         : 0;
-    motion.roll += ((part % 2 === 0 ? -0.1 : 0.1) + lean - motion.roll) * Math.min(1, 8 * seconds || 1);
+    motion.roll += ((limbIndex % 2 === 0 ? -0.1 : 0.1) + lean - motion.roll) * Math.min(1, 8 * seconds || 1);
     return { position: motion.bar.clone(), roll: motion.roll, size: (held ? 1.1 : motion.held * 1.1) * size };
   }
 
@@ -227,39 +240,39 @@ export class Strings {
 
 function layOutString(
   performer: Pick<Performer, "handle" | "scale">,
-  part: number,
+  limbIndex: number,
   state: StringState,
   view: StringsView,
 ): StringLayout {
   const { scale } = performer;
-  const handle = performer.handle(part, new Vector3());
-  const goal = state.puppeteer === null ? null : barTarget(state, handle, part, view, scale);
-  // from far away small things are drawn larger, though not as large as from near
-  return { state, limb: part, handle, barTarget: goal, scale, size: scale * Math.sqrt(view.distanceScale) };
+  const handle = performer.handle(limbIndex, new Vector3());
+  const goal = state.puppeteer === null ? null : barTarget(state, handle, limbIndex, view, scale);
+  // Small objects are drawn larger at a distance, but not as large as close up.
+  return { state, limb: limbIndex, handle, barTarget: goal, scale, size: scale * Math.sqrt(view.distanceScale) };
 }
 
-/** Where a held limb's bar hangs by itself. */
+/** Return the target of a held limb's bar, before separation. */
 function barTarget(
   { pullTarget: pull }: StringState,
   handle: Vector3,
-  part: number,
+  limbIndex: number,
   { ground, ceiling }: StringsView,
   scale: number,
 ): Vector3 {
   const goal = handle.clone();
-  goal.x += (part % 2 === 0 ? 1 : -1) * (part < 2 ? 0.08 : 0.16) * scale;
-  // Above the head, so that neither bar nor name stands before the face.
+  goal.x += (limbIndex % 2 === 0 ? 1 : -1) * (limbIndex < 2 ? 0.08 : 0.16) * scale;
+  // Above the head, so that neither bar nor name covers the face.
   const clear = Math.max(
-    handle.y + (part < 2 ? 0.32 : 0.5) * scale,
-    ground + MIN_BAR_HEIGHT_M[part < 2 ? 0 : 1] * scale,
+    handle.y + (limbIndex < 2 ? 0.32 : 0.5) * scale,
+    ground + MIN_BAR_HEIGHT_M[limbIndex < 2 ? 0 : 1] * scale,
   );
   goal.y = Math.min(Math.max(clear, pull ? pull.y : -Infinity), ceiling);
-  // A bar never meets the hand; where the picture ends too soon it slips above the edge instead.
+  // A bar never meets the hand; near the top of the picture it moves above the edge instead.
   goal.y = Math.max(goal.y, handle.y + 0.12 * scale);
   return goal;
 }
 
-/** Moves bars of about one height aside along the camera's `right`. */
+/** Move bars of similar height apart along the camera's `right`. */
 function separateBars(goals: readonly Vector3[], right: Vector3, scale: number): void {
   const level: Vector3[][] = [];
   for (const goal of [...goals].sort((a, b) => a.y - b.y)) {
@@ -268,9 +281,9 @@ function separateBars(goals: readonly Vector3[], right: Vector3, scale: number):
     else level.push([goal]);
   }
   for (const bars of level) {
-    const places = bars.map((bar) => bar.dot(right));
-    separate(places, MIN_BAR_DISTANCE_M * scale).forEach((place, nth) =>
-      bars[nth].addScaledVector(right, place - places[nth]),
+    const positions = bars.map((bar) => bar.dot(right));
+    separate(positions, MIN_BAR_DISTANCE_M * scale).forEach((position, index) =>
+      bars[index].addScaledVector(right, position - positions[index]),
     );
   }
 }

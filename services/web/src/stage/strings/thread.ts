@@ -1,4 +1,4 @@
-/** The silk threads, four of each performer, in one draw: ribbons that face the camera, lit by how hard they are pulled (section 5). */
+/** The silk threads, four per performer, in one draw call: ribbons that face the camera, lit by their tension. */
 import {
   Color,
   CustomBlending,
@@ -23,9 +23,9 @@ export interface Thread {
   alpha: number;
   /** 0 slack .. 1 taut and lit. */
   tension: number;
-  /** Metres the middle hangs through. */
+  /** Sag of the middle, in metres. */
   sag: number;
-  /** The upper end dissolves (a free string). */
+  /** True if the upper end fades out (a free string). */
   fadesOut: boolean;
 }
 
@@ -95,12 +95,11 @@ export class Threads {
     this.mesh.material.uniforms.dark.value = on ? 1 : 0;
   }
 
-  /** How many there are. */
   set count(count: number) {
     this.mesh.geometry.instanceCount = count;
   }
 
-  /** Draws thread `index` from a handle up to its other end, world metres. */
+  /** Draw thread `index` from a handle to its other end, in world metres. */
   set(index: number, from: Vector3, to: Vector3, { colour, alpha, tension, sag, fadesOut: fading }: Thread): void {
     const { foot, top, tint, shape } = this.#attributes;
     const { r, g, b } = this.#colour.set(colour);

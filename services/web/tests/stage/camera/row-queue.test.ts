@@ -2,7 +2,7 @@ import * as fc from "fast-check";
 import { expect, test } from "vitest";
 import { RowQueue } from "../../../src/stage/camera/row-queue";
 
-test("rows are those of a list that is pushed to, dropped from and cleared", () => {
+test("rows equal those of a list that is pushed to, dropped from and cleared", () => {
   const step = fc.oneof(
     { weight: 8, arbitrary: fc.record({ push: fc.nat(300) }) },
     { weight: 2, arbitrary: fc.record({ drop: fc.nat(200) }) },
@@ -13,29 +13,29 @@ test("rows are those of a list that is pushed to, dropped from and cleared", () 
       const rows = new RowQueue(2);
       let list: number[][] = [];
       let next = 0;
-      for (const one of steps) {
-        if ("push" in one) {
-          for (let n = 0; n < one.push; n++, next += 2) {
+      for (const operation of steps) {
+        if ("push" in operation) {
+          for (let n = 0; n < operation.push; n++, next += 2) {
             rows.push([next, -next]);
             list.push([next, -next]);
           }
-        } else if ("drop" in one) {
-          rows.drop(one.drop);
-          list = list.slice(one.drop);
+        } else if ("drop" in operation) {
+          rows.drop(operation.drop);
+          list = list.slice(operation.drop);
         } else {
           rows.clear();
           list = [];
         }
         expect(rows.length).toBe(list.length);
-        expect(Array.from({ length: rows.length }, (_, nth) => [...(rows.at(nth) ?? [])])).toEqual(list);
-        for (const most of [-1, next / 2, next / 2 + 1, next])
-          expect(rows.countUpTo(most)).toBe(list.filter(([first]) => first <= most).length);
+        expect(Array.from({ length: rows.length }, (_, index) => [...(rows.at(index) ?? [])])).toEqual(list);
+        for (const max of [-1, next / 2, next / 2 + 1, next])
+          expect(rows.countUpTo(max)).toBe(list.filter(([first]) => first <= max).length);
       }
     }),
   );
 });
 
-test("from the end they are counted below zero, and beyond there is none", () => {
+test("negative indices count from the end, and missing rows are null", () => {
   const rows = new RowQueue(1);
   expect([rows.at(0), rows.at(-1)]).toEqual([null, null]);
   for (const number of [1, 2, 3]) rows.push([number]);
@@ -48,14 +48,14 @@ test("from the end they are counted below zero, and beyond there is none", () =>
   ]);
 });
 
-test("a queue that goes through it for long takes no more than twice what is in it at once", () => {
+test("a long-running queue takes at most twice its content's memory", () => {
   const rows = new RowQueue(8);
-  let most = 0;
+  let max = 0;
   for (let n = 0; n < 100_000; n++) {
     rows.push(new Float64Array(8).fill(n));
     if (rows.length > 1000) rows.drop(1);
-    most = Math.max(most, rows.at(0)?.buffer.byteLength ?? 0);
+    max = Math.max(max, rows.at(0)?.buffer.byteLength ?? 0);
   }
   expect([rows.at(0)?.[0], rows.at(-1)?.[7]]).toEqual([99_000, 99_999]);
-  expect(most).toBeLessThanOrEqual(2048 * 8 * 8);
+  expect(max).toBeLessThanOrEqual(2048 * 8 * 8);
 });

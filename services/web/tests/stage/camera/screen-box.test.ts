@@ -2,17 +2,17 @@ import { PerspectiveCamera, Vector3 } from "three";
 import { expect, test } from "vitest";
 import { overlaps, projectBox } from "../../../src/stage/camera/screen-box";
 
-test("a box is as large on the screen as it is in the world at its depth", () => {
+test("a box has the size on the screen that its extent has at its depth", () => {
   const camera = new PerspectiveCamera(90, 2, 0.1, 100);
   camera.position.set(0, 1, 5);
   camera.updateMatrixWorld();
-  // five metres away a right angle sees ten metres of height: 100 pixels a metre
+  // At 5 m a right angle covers a height of 10 m: 100 pixels per metre.
   const box = projectBox(new Vector3(1, 2, 0), { across: 0.5, up: 0.2, down: 0.1 }, camera, 2000, 1000);
-  const wanted = { left: 1050, top: 380, right: 1150, bottom: 410 };
-  for (const side of ["left", "top", "right", "bottom"] as const) expect(box[side]).toBeCloseTo(wanted[side], 6);
+  const expected = { left: 1050, top: 380, right: 1150, bottom: 410 };
+  for (const side of ["left", "top", "right", "bottom"] as const) expect(box[side]).toBeCloseTo(expected[side], 6);
 });
 
-test("boxes overlap that share area, or would with room between them", () => {
+test("boxes overlap if they share area, or would with a margin", () => {
   const box = { left: 10, top: 10, right: 20, bottom: 20 };
   const beside = { left: 20, top: 12, right: 30, bottom: 18 };
   const below = { left: 10, top: 23, right: 20, bottom: 30 };

@@ -11,12 +11,12 @@ import {
 } from "../../../src/stage/camera/view";
 
 function view(position: number[], gaze: number[], fov: number): CameraView {
-  const made = createView();
-  viewFromNumbers([...position, ...gaze, fov], made);
-  return made;
+  const out = createView();
+  viewFromNumbers([...position, ...gaze, fov], out);
+  return out;
 }
 
-function mixed(a: CameraView, b: CameraView, share: number): CameraView {
+function interpolate(a: CameraView, b: CameraView, share: number): CameraView {
   const out = createView();
   interpolateViews(a, b, share, out);
   return out;
@@ -30,32 +30,32 @@ const views = fc
   })
   .map(([position, gaze, fov]) => view(position, gaze, fov));
 
-describe("going over", () => {
-  test("begins at the one and ends at the other", () => {
+describe("interpolation", () => {
+  test("starts at one view and ends at the other", () => {
     fc.assert(
       fc.property(views, views, (a, b) => {
-        for (const [share, wanted] of [
+        for (const [share, expected] of [
           [0, a],
           [1, b],
         ] as const) {
-          const got = mixed(a, b, share);
-          expect(got.position.distanceTo(wanted.position)).toBeLessThan(1e-9);
-          expect(got.gaze.distanceTo(wanted.gaze)).toBeLessThan(1e-9);
-          expect(got.fov).toBeCloseTo(wanted.fov, 9);
+          const actual = interpolate(a, b, share);
+          expect(actual.position.distanceTo(expected.position)).toBeLessThan(1e-9);
+          expect(actual.gaze.distanceTo(expected.gaze)).toBeLessThan(1e-9);
+          expect(actual.fov).toBeCloseTo(expected.fov, 9);
         }
       }),
     );
   });
 
-  test("never comes nearer to what is looked at than the nearer of the two, nor goes over the top", () => {
+  test("keeps the distance and elevation between those of the two views", () => {
     fc.assert(
       fc.property(views, views, fc.double({ min: 0, max: 1, noNaN: true }), (a, b, share) => {
-        const got = mixed(a, b, share);
+        const actual = interpolate(a, b, share);
         const distances = [a, b].map(({ position, gaze }) => position.distanceTo(gaze));
-        const distance = got.position.distanceTo(got.gaze);
+        const distance = actual.position.distanceTo(actual.gaze);
         expect(distance).toBeGreaterThan(Math.min(...distances) - 1e-9);
         expect(distance).toBeLessThan(Math.max(...distances) + 1e-9);
-        const rises = [a, b, got].map(({ position, gaze }) =>
+        const rises = [a, b, actual].map(({ position, gaze }) =>
           Math.asin(Math.min(1, Math.max(-1, (position.y - gaze.y) / position.distanceTo(gaze)))),
         );
         expect(rises[2]).toBeGreaterThan(Math.min(rises[0], rises[1]) - 1e-6);
@@ -64,17 +64,17 @@ describe("going over", () => {
     );
   });
 
-  test("goes round the dancer the shorter way, not through", () => {
+  test("goes around the performer by the shorter way", () => {
     const [right, left] = [2.8, -2.8].map((azimuth) =>
       view([3 * Math.sin(azimuth), 1, 3 * Math.cos(azimuth)], [0, 1, 0], 0.5),
     );
-    const half = mixed(right, left, 0.5);
+    const half = interpolate(right, left, 0.5);
     expect(half.position.distanceTo(new Vector3(0, 1, -3))).toBeLessThan(1e-9);
   });
 });
 
-describe("in any window", () => {
-  test("the height is kept where it is wide, and what 4:5 shows from side to side where it is narrow", () => {
+describe("field of view", () => {
+  test("keeps the height in wide windows, and the width of 4:5 in narrow ones", () => {
     const camera = new PerspectiveCamera();
     for (const [aspect, wide] of [
       [21 / 9, true],
@@ -89,7 +89,7 @@ describe("in any window", () => {
       camera.fov = (fovForAspect(recorded, aspect) * 180) / Math.PI;
       camera.updateProjectionMatrix();
       camera.updateMatrixWorld();
-      // at a gaze point 3 m away
+      // At a target 3 m away.
       const side = new Vector3(3 * Math.tan(recorded / 2) * MIN_ASPECT, 0, -3).project(camera).x;
       if (wide) expect(camera.fov).toBeCloseTo((recorded * 180) / Math.PI, 9);
       else expect(side).toBeCloseTo(1, 9);
@@ -97,15 +97,15 @@ describe("in any window", () => {
     }
   });
 
-  test("however wide it was recorded, it stays a field of view", () => {
+  test("stays below 180 degrees in any window", () => {
     fc.assert(
       fc.property(
         fc.double({ min: 0.001, max: 3.14, noNaN: true }),
         fc.double({ min: 0.1, max: 5, noNaN: true }),
         (fov, aspect) => {
-          const seen = fovForAspect(fov, aspect);
-          expect(seen).toBeGreaterThan(fov - 1e-12);
-          expect(seen).toBeLessThan(Math.PI);
+          const adapted = fovForAspect(fov, aspect);
+          expect(adapted).toBeGreaterThan(fov - 1e-12);
+          expect(adapted).toBeLessThan(Math.PI);
         },
       ),
     );

@@ -13,8 +13,8 @@ import {
 } from "../../../src/stage/puppet/standard-figure";
 import { createOtherFigure, createStandardFigure } from "./figures";
 
-describe("the parts on a dancer", () => {
-  test("on the standard figure nothing moves", () => {
+describe("parts fitted to a figure", () => {
+  test("do not move on the standard figure", () => {
     const fit = fitToFigure(createStandardFigure());
     for (const bone of BONES) {
       const [place, normal] = [new Vector3(0.1, 1.2, 0.05), new Vector3(0.6, 0.8, 0)];
@@ -24,7 +24,7 @@ describe("the parts on a dancer", () => {
     }
   });
 
-  test("every limb ends at the dancer's own joints", () => {
+  test("end at the figure's own joints", () => {
     const figure = createOtherFigure();
     const fit = fitToFigure(figure);
     const rest = restPositions(figure);
@@ -42,17 +42,17 @@ describe("the parts on a dancer", () => {
     }
   });
 
-  test("twice the size is twice the scale", () => {
+  test("have twice the scale at twice the size", () => {
     expect(figureScale(createStandardFigure())).toBeCloseTo(1);
     expect(figureScale(createStandardFigure(2))).toBeCloseTo(2);
   });
 
-  test("a figure of no size, or of a giant, is brought within what can be seen", () => {
+  test("have a limited scale on tiny and huge figures", () => {
     expect(figureScale({ offsets: new Float64Array(54), tips: new Float64Array(54) })).toBe(0.2);
     expect(figureScale(createStandardFigure(1000))).toBe(5);
   });
 
-  test("crown and finger tips reach the dancer's own", () => {
+  test("reach the figure's crown and finger tips", () => {
     const figure = createStandardFigure(1.1);
     const fit = fitToFigure(figure);
     const place = LEFT_FINGER_TIP.clone();
@@ -66,7 +66,7 @@ describe("the parts on a dancer", () => {
     expect(top.distanceTo(CROWN.clone().multiplyScalar(1.1))).toBeLessThan(1e-9);
   });
 
-  test("the head sits under the crown, wherever the recording puts the skull's joint", () => {
+  test("place the head under the crown, wherever the skull's joint is", () => {
     const [high, low] = [createStandardFigure(), createStandardFigure()];
     const skull = JOINTS.indexOf("skullbase") * 3 + 1;
     low.offsets[skull] -= 0.08;
@@ -79,7 +79,7 @@ describe("the parts on a dancer", () => {
     expect(one.distanceTo(other)).toBeLessThan(1e-9);
   });
 
-  test("soles stay flat, as deep below the ball of the foot as the dancer is large", () => {
+  test("keep soles flat, at a depth proportional to the size", () => {
     const fit = fitToFigure(createStandardFigure(1.3));
     const sole = (name: string, z: number) => {
       const place = jointPosition("l_midtarsal").add(new Vector3(0.01, -SOLE_HEIGHT_M, z));
@@ -97,7 +97,7 @@ describe("the parts on a dancer", () => {
     }
   });
 
-  test("any lengths a file may say, even none, give places that can be drawn", () => {
+  test("are finite for any lengths in a file, even zero", () => {
     const lengths = fc.array(fc.oneof(fc.constant(0), fc.double({ min: -3, max: 3, noNaN: true })), {
       minLength: 54,
       maxLength: 54,

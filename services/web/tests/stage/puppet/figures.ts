@@ -1,11 +1,11 @@
-/** The figure that the puppet is drawn on, as a dancer of the contract. */
+/** Figures for tests of the puppet. */
 import { Texture, type Vector3 } from "three";
 import { type Figure, JOINTS, PARENTS, restPose } from "../../../src/motion/skeleton";
 import { Puppet } from "../../../src/stage/puppet/puppet";
 import { PuppetAssets } from "../../../src/stage/puppet/puppet-assets";
 import { CROWN, jointPosition, LEFT_FINGER_TIP } from "../../../src/stage/puppet/standard-figure";
 
-/** The standard figure, its joints `size` times as far apart. */
+/** Create the standard figure, scaled by `size`. */
 export function createStandardFigure(size = 1): Figure {
   const offsets = new Float64Array(54);
   const tips = new Float64Array(54);
@@ -27,7 +27,7 @@ export function createStandardFigure(size = 1): Figure {
   return { offsets, tips };
 }
 
-/** The puppet of the standard figure at rest where the figure stands, turned by `yaw`, radians about y. */
+/** Create a puppet of the standard figure at rest, turned by `yaw` radians about y. */
 export function createStandingPuppet(yaw = 0): Puppet {
   const puppet = new Puppet(
     createStandardFigure(),
@@ -40,7 +40,7 @@ export function createStandingPuppet(yaw = 0): Puppet {
   return puppet;
 }
 
-/** A dancer with longer legs and shorter arms than the standard, and broader hips. */
+/** Create a figure with longer legs, shorter arms and wider hips than the standard. */
 export function createOtherFigure(): Figure {
   const figure = createStandardFigure();
   const scale = (name: string, axis: number, by: number) => (figure.offsets[JOINTS.indexOf(name) * 3 + axis] *= by);

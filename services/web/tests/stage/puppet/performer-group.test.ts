@@ -5,8 +5,8 @@ import type { Performer } from "../../../src/stage/puppet/performer";
 import { PerformerGroup } from "../../../src/stage/puppet/performer-group";
 import { createStandardFigure } from "./figures";
 
-/** Dances for a figure, as far as a troupe sees. */
-class Dancer implements Performer {
+/** Performer without a mesh. */
+class FakePerformer implements Performer {
   readonly group = new Group();
   readonly scale = 1;
   readonly root = new Matrix4();
@@ -32,58 +32,58 @@ class Dancer implements Performer {
   }
 }
 
-let troupe: PerformerGroup;
+let group: PerformerGroup;
 const [FIRST, OTHER] = [createStandardFigure(), createStandardFigure(0.9)];
 
 beforeEach(() => {
-  troupe = new PerformerGroup({ value: 0 });
-  troupe.setPerformerFactory((figure) => new Dancer(figure));
+  group = new PerformerGroup({ value: 0 });
+  group.setPerformerFactory((figure) => new FakePerformer(figure));
 });
 
-test("one told of again dances on; another's lengths are another dancer", () => {
-  expect(troupe.setFigures([FIRST])).toBe(true);
-  const [first] = troupe.performers;
-  expect(troupe.setFigures([FIRST])).toBe(false);
-  expect(troupe.performers).toEqual([first]);
-  expect(troupe.setFigures([OTHER])).toBe(true);
-  expect(troupe.performers[0].figure).toBe(OTHER);
-  expect(troupe.group.children).toEqual([troupe.performers[0].group]);
+test("the same figure keeps its performer, another figure replaces it", () => {
+  expect(group.setFigures([FIRST])).toBe(true);
+  const [first] = group.performers;
+  expect(group.setFigures([FIRST])).toBe(false);
+  expect(group.performers).toEqual([first]);
+  expect(group.setFigures([OTHER])).toBe(true);
+  expect(group.performers[0].figure).toBe(OTHER);
+  expect(group.group.children).toEqual([group.performers[0].group]);
 });
 
-test("each one's place is taken for itself: the others dance on, and so it is in the next motion", () => {
+test("a factory replaces only its performer, and applies to the next motion", () => {
   const third = createStandardFigure(0.8);
-  for (const number of [1, 2, 3]) troupe.setPerformerFactory((figure) => new Dancer(figure), number);
-  troupe.setFigures([FIRST, OTHER, third]);
-  troupe.apply([restPose(), restPose(), restPose()], 0);
-  const [first, second, last] = troupe.performers;
-  const guests: Dancer[] = [];
-  troupe.setPerformerFactory((figure) => guests[guests.push(new Dancer(figure)) - 1], 1);
-  expect(troupe.performers).toEqual([first, guests[0], last]);
-  expect([guests[0].figure, second.group.parent, troupe.visiblePerformers]).toEqual([OTHER, null, [first, last]]);
-  expect(troupe.group.children).toHaveLength(3);
-  troupe.setFigures([third, FIRST]);
-  expect(troupe.performers[1]).toBe(guests[1]);
-  expect([guests.length, troupe.performers[1].figure]).toEqual([2, FIRST]);
-  // nobody is there whose place it is
-  troupe.setPerformerFactory(null, 3);
-  expect(troupe.performers).toHaveLength(2);
+  for (const number of [1, 2, 3]) group.setPerformerFactory((figure) => new FakePerformer(figure), number);
+  group.setFigures([FIRST, OTHER, third]);
+  group.apply([restPose(), restPose(), restPose()], 0);
+  const [first, second, last] = group.performers;
+  const replacements: FakePerformer[] = [];
+  group.setPerformerFactory((figure) => replacements[replacements.push(new FakePerformer(figure)) - 1], 1);
+  expect(group.performers).toEqual([first, replacements[0], last]);
+  expect([replacements[0].figure, second.group.parent, group.visiblePerformers]).toEqual([OTHER, null, [first, last]]);
+  expect(group.group.children).toHaveLength(3);
+  group.setFigures([third, FIRST]);
+  expect(group.performers[1]).toBe(replacements[1]);
+  expect([replacements.length, group.performers[1].figure]).toEqual([2, FIRST]);
+  // There is no such performer yet.
+  group.setPerformerFactory(null, 3);
+  expect(group.performers).toHaveLength(2);
 });
 
-test("is seen from its first pose on, and stands where none comes", () => {
-  troupe.setFigures([FIRST]);
-  troupe.apply([null], 0);
-  expect(troupe.visiblePerformers).toEqual([]);
-  troupe.apply([restPose()], 0);
-  troupe.apply([], 0);
-  expect(troupe.visiblePerformers).toEqual(troupe.performers);
-  expect((troupe.performers[0] as Dancer).poses).toBe(1);
+test("a performer is visible from its first pose and keeps its last", () => {
+  group.setFigures([FIRST]);
+  group.apply([null], 0);
+  expect(group.visiblePerformers).toEqual([]);
+  group.apply([restPose()], 0);
+  group.apply([], 0);
+  expect(group.visiblePerformers).toEqual(group.performers);
+  expect((group.performers[0] as FakePerformer).poses).toBe(1);
 });
 
-test("who comes on, or takes another's place, is dressed as the others are", () => {
-  troupe.setQuality(true, true);
-  troupe.setFigures([FIRST]);
-  expect(troupe.performers[0]).toMatchObject({ reflected: true, plain: true });
-  troupe.setPerformerFactory((figure) => new Dancer(figure));
-  expect(troupe.performers[0]).toMatchObject({ reflected: true, plain: true });
-  expect(troupe.group.children).toHaveLength(1);
+test("new and replaced performers get the current quality", () => {
+  group.setQuality(true, true);
+  group.setFigures([FIRST]);
+  expect(group.performers[0]).toMatchObject({ showsReflection: true, usesSimpleMaterials: true });
+  group.setPerformerFactory((figure) => new FakePerformer(figure));
+  expect(group.performers[0]).toMatchObject({ showsReflection: true, usesSimpleMaterials: true });
+  expect(group.group.children).toHaveLength(1);
 });

@@ -4,10 +4,10 @@ import { floorHeight, handlePosition, type JointSource } from "../../../src/stag
 import { SOLE_HEIGHT_M, jointPosition as standing } from "../../../src/stage/puppet/standard-figure";
 import { createStandingPuppet } from "./figures";
 
-/** Of the ankle over the ball of the foot of the standard figure. */
+/** Height of the ankle above the ball of the standard figure's foot. */
 const ANKLE = standing("l_ankle").y - standing("l_midtarsal").y;
 
-/** The standard figure, each joint moved and turned in its place by what `moved` says. */
+/** Return the standard figure with joints lifted or pitched as given. */
 function standingWith(moved: Record<string, { lift?: number; pitch?: number }>): JointSource {
   const joint = (name: string) => {
     const { lift = 0, pitch = 0 } = moved[name] ?? {};
@@ -20,14 +20,14 @@ function standingWith(moved: Record<string, { lift?: number; pitch?: number }>):
   return { joint, scale: 1 };
 }
 
-describe("the floor under a dancer", () => {
-  test("is under the soles of one who stands, and of the puppet", () => {
+describe("the floor under a performer", () => {
+  test("is under the soles of a standing figure and of the puppet", () => {
     const floor = standing("l_midtarsal").y - SOLE_HEIGHT_M;
     expect(floorHeight(standingWith({}), ANKLE)).toBeCloseTo(floor, 9);
     expect(createStandingPuppet().ground).toBeCloseTo(floor, 9);
   });
 
-  test("is under the other foot where one is lifted, and under a heel that is lower than its ball", () => {
+  test("is under the standing foot, and under a heel below its ball", () => {
     const lifted = { l_midtarsal: { lift: 0.4 }, l_ankle: { lift: 0.4 } };
     expect(floorHeight(standingWith(lifted), ANKLE)).toBeCloseTo(floorHeight(standingWith({}), ANKLE), 9);
     const onHeel = { ...lifted, r_midtarsal: { lift: 0.1 }, r_ankle: { pitch: -0.5 } };
@@ -36,8 +36,8 @@ describe("the floor under a dancer", () => {
   });
 });
 
-describe("where people hold a dancer", () => {
-  test("hands are held below the wrists, to either side, and turn with them", () => {
+describe("handles of a performer", () => {
+  test("are below the wrists, mirrored, and rotate with them", () => {
     const [left, right] = [0, 1].map((limb) => handlePosition(standingWith({}), limb, new Vector3()));
     expect(left.distanceTo(standing("l_wrist").add(new Vector3(0.004, -0.075, 0.004)))).toBeLessThan(1e-9);
     expect(right.x).toBeCloseTo(-left.x, 9);
@@ -45,7 +45,7 @@ describe("where people hold a dancer", () => {
     expect(turned.z - standing("l_wrist").z).toBeCloseTo(0.075, 9);
   });
 
-  test("larger dancers are held as much further out, and the puppet is told what is meant", () => {
+  test("scale with the figure, and equal the streamed ones on the puppet", () => {
     const large = handlePosition({ ...standingWith({}), scale: 2 }, 2, new Vector3());
     expect(large.z - standing("l_knee").z).toBeCloseTo(0.016, 9);
     const to = new Vector3(1, 2, 3);

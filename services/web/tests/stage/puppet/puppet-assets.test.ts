@@ -12,7 +12,7 @@ describe("the puppet's geometry", () => {
     expect((geometry.index?.count ?? 0) / 3).toBeGreaterThan(20_000);
   });
 
-  test("has finite places, unit normals, and weights that sum to one", () => {
+  test("has finite positions, unit normals and weights that sum to one", () => {
     expect([...values("position")].every(Number.isFinite)).toBe(true);
     const [normals, weights] = [values("normal"), values("skinWeight")];
     for (let i = 0; i < geometry.getAttribute("position").count; i++) {
@@ -21,7 +21,7 @@ describe("the puppet's geometry", () => {
     }
   });
 
-  test("hangs something on every limb's bone", () => {
+  test("has vertices on every limb's bone", () => {
     const used = new Set(values("skinIndex"));
     for (const bone of ["l_hip", "r_knee", "l_ankle", "r_midtarsal", "skullbase", "l_elbow", "r_wrist", "l_sleeve"]) {
       expect(used.has(BONES.indexOf(bone))).toBe(true);
@@ -29,15 +29,15 @@ describe("the puppet's geometry", () => {
   });
 });
 
-test("dancers of equal lengths have one mesh, and it is given back when none of them is left", () => {
-  const workshop = new PuppetAssets({ face: new Texture(), asanoha: new Texture() }, { value: 0 });
-  const shape = workshop.geometryFor(createStandardFigure());
-  expect(workshop.geometryFor(createStandardFigure())).toBe(shape);
-  const other = workshop.geometryFor(createOtherFigure());
+test("figures of equal lengths share a mesh, which is disposed of after use", () => {
+  const assets = new PuppetAssets({ face: new Texture(), asanoha: new Texture() }, { value: 0 });
+  const shape = assets.geometryFor(createStandardFigure());
+  expect(assets.geometryFor(createStandardFigure())).toBe(shape);
+  const other = assets.geometryFor(createOtherFigure());
   expect(other).not.toBe(shape);
-  const gone: unknown[] = [];
-  for (const one of [shape, other]) one.addEventListener("dispose", () => gone.push(one));
-  workshop.retainOnly([createStandardFigure()]);
-  expect(gone).toEqual([other]);
-  expect(workshop.geometryFor(createStandardFigure())).toBe(shape);
+  const disposed: unknown[] = [];
+  for (const one of [shape, other]) one.addEventListener("dispose", () => disposed.push(one));
+  assets.retainOnly([createStandardFigure()]);
+  expect(disposed).toEqual([other]);
+  expect(assets.geometryFor(createStandardFigure())).toBe(shape);
 });

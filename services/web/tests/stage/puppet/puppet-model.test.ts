@@ -6,7 +6,7 @@ import { createStandardFigure } from "./figures";
 const model = createPuppetModel(createStandardFigure());
 const vertices = model.positions.length / 3;
 
-test("every triangle of the puppet is in it once, with the colours, bones and weights of its vertices", () => {
+test("the model has every triangle once, with colours, bones and weights", () => {
   expect((model.face.length + model.body.length) / 3).toBeGreaterThan(20_000);
   for (const [values, width] of [
     [model.normals, 3],
@@ -23,7 +23,7 @@ test("every triangle of the puppet is in it once, with the colours, bones and we
   }
 });
 
-test("the face is painted in front of the head, upright", () => {
+test("the face is painted on the front of the head, upright", () => {
   expect(model.face.length).toBeGreaterThan(300);
   let [highest, lowest] = [model.face[0], model.face[0]];
   for (const vertex of model.face) {
@@ -34,7 +34,7 @@ test("the face is painted in front of the head, upright", () => {
   expect(model.faceUvs[highest * 2 + 1]).toBeLessThan(model.faceUvs[lowest * 2 + 1]);
 });
 
-test("a sleeve's turn is a rotation, and swings where the pose moves on", () => {
+test("a sleeve's rotation is a unit quaternion and swings with the pose", () => {
   const pose = restPose();
   const [still, moved] = [new Float64Array(8), new Float64Array(8)];
   model.poseSleeves(pose, 0, still);

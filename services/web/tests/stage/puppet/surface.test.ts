@@ -3,7 +3,7 @@ import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { ball, box, curve, lathe, type Surface, smoothStep } from "../../../src/stage/puppet/surface";
 
-/** Six times the signed volume: positive where triangles wind outwards. */
+/** Return the signed volume: positive if triangles wind outwards. */
 function volume({ positions, indices }: Surface): number {
   const at = (i: number) => new Vector3().fromArray(positions, i * 3);
   let sum = 0;
@@ -12,7 +12,7 @@ function volume({ positions, indices }: Surface): number {
 }
 
 describe("surfaces", () => {
-  test("a curve passes through its rows and stays at its ends beyond them", () => {
+  test("a curve passes through its rows and is constant beyond its ends", () => {
     const rows = [
       [0, 1, 5],
       [0.5, 3, 4],
@@ -24,7 +24,7 @@ describe("surfaces", () => {
     expect([...at(9)].map((value) => Number(value.toFixed(9)))).toEqual([2, 0]);
   });
 
-  test("smooth steps run from 0 to 1, upwards or downwards", () => {
+  test("a smooth step runs from 0 to 1 in both directions", () => {
     fc.assert(
       fc.property(fc.double({ min: -2, max: 2, noNaN: true }), (x) => {
         expect(smoothStep(0, 1, x)).toBeCloseTo(1 - smoothStep(1, 0, x), 9);
@@ -34,7 +34,7 @@ describe("surfaces", () => {
     );
   });
 
-  test("turned and round things hold the volume they should", () => {
+  test("solids have the expected volume", () => {
     expect(Math.abs(volume(ball(new Vector3(), 1, [1, 1, 1], 48)))).toBeCloseTo((4 / 3) * Math.PI, 1);
     const cylinder = lathe(
       new Vector3(),
@@ -51,7 +51,7 @@ describe("surfaces", () => {
     expect(volume(box(new Vector3(), [1, 2, 3], 0.4))).toBeCloseTo(6, 6);
   });
 
-  test("normals of a ball point straight out", () => {
+  test("normals of a ball are radial", () => {
     const { positions, normals } = ball(new Vector3(), 1);
     for (let i = 0; i < positions.length; i += 3) {
       const along = positions[i] * normals[i] + positions[i + 1] * normals[i + 1] + positions[i + 2] * normals[i + 2];

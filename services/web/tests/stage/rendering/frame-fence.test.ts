@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { FrameFence } from "../../../src/stage/rendering/frame-fence";
 
-/** The calls of a WebGL 2 context that the gate makes, over a queue this test drains by hand. */
+/** WebGL 2 context with a command queue that the test completes. */
 class Queue {
   readonly SYNC_STATUS = 1;
   readonly SIGNALED = 2;
@@ -26,27 +26,27 @@ class Queue {
   flush(): void {}
 }
 
-test("opens when the frame before is drawn, and keeps no fence behind", () => {
+test("is ready once the last frame is complete, and deletes its fence", () => {
   const queue = new Queue();
-  const gate = new FrameFence(queue as unknown as WebGL2RenderingContext);
-  expect(gate.isReady).toBe(true);
-  gate.insert();
-  expect([gate.isReady, gate.isReady]).toEqual([false, false]);
+  const fence = new FrameFence(queue as unknown as WebGL2RenderingContext);
+  expect(fence.isReady).toBe(true);
+  fence.insert();
+  expect([fence.isReady, fence.isReady]).toEqual([false, false]);
   queue.done = true;
-  expect(gate.isReady).toBe(true);
+  expect(fence.isReady).toBe(true);
   expect(queue.alive).toBe(0);
 });
 
-test("is shut while the context is lost, and not for good", () => {
+test("is not ready while the context is lost, and recovers after a reset", () => {
   const queue = new Queue();
-  const gate = new FrameFence(queue as unknown as WebGL2RenderingContext);
-  gate.insert();
+  const fence = new FrameFence(queue as unknown as WebGL2RenderingContext);
+  fence.insert();
   queue.lost = true;
   queue.done = true;
-  expect(gate.isReady).toBe(false);
-  // a fence of the context before never says anything again
+  expect(fence.isReady).toBe(false);
+  // A fence of the lost context never signals.
   [queue.lost, queue.done] = [false, false];
-  expect(gate.isReady).toBe(false);
-  gate.reset();
-  expect(gate.isReady).toBe(true);
+  expect(fence.isReady).toBe(false);
+  fence.reset();
+  expect(fence.isReady).toBe(true);
 });

@@ -6,21 +6,21 @@ function run(choice: AdaptiveQuality, seconds: number, frames: number): number {
   return QUALITY_LEVELS.indexOf(choice.quality);
 }
 
-test("quick frames keep the best, slow ones step down to the last and no further", () => {
+test("fast frames keep the best quality, slow frames reduce it to the last", () => {
   expect(run(new AdaptiveQuality("", false), 1 / 60, 1000)).toBe(0);
   expect(run(new AdaptiveQuality("", false), 1 / 15, 9)).toBe(1);
   expect(run(new AdaptiveQuality("", false), 1 / 15, 1000)).toBe(QUALITY_LEVELS.length - 1);
   expect(run(new AdaptiveQuality("", false), 1.5, 5)).toBe(2);
 });
 
-test("one stutter among quick frames, and a hidden tab, are no slow machine", () => {
+test("a single stutter and a page in the background do not count", () => {
   const choice = new AdaptiveQuality("", false);
   for (let i = 0; i < 200; i++) choice.addFrameTime(i % 10 === 0 ? 0.2 : 1 / 60);
   choice.addFrameTime(600);
   expect(QUALITY_LEVELS.indexOf(choice.quality)).toBe(0);
 });
 
-test("a software renderer starts lower, unless the best is asked for", () => {
+test("a software renderer starts lower unless quality is pinned", () => {
   expect(new AdaptiveQuality("ANGLE (Google, Vulkan 1.3 (SwiftShader Device))", false).quality.simpleMaterials).toBe(
     true,
   );
@@ -30,7 +30,7 @@ test("a software renderer starts lower, unless the best is asked for", () => {
   expect(new AdaptiveQuality("ANGLE (Apple M2)", false).quality.simpleMaterials).toBe(false);
 });
 
-test("frames after a new start are no measure, as shaders are compiled in them", () => {
+test("frames after a restart are not measured, since shaders are compiled", () => {
   const choice = new AdaptiveQuality("", false);
   run(choice, 1 / 60, 100);
   choice.restart();

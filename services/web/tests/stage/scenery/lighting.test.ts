@@ -13,13 +13,13 @@ beforeEach(() => {
   lights.applyLook(LOOKS.night);
   const is =
     <T extends Object3D>(kind: new () => T) =>
-    (one: Object3D): one is T =>
-      one instanceof kind;
+    (createLight: Object3D): createLight is T =>
+      createLight instanceof kind;
   [key, warm, cool] = lights.group.children.filter(is(SpotLight));
   [fill] = lights.group.children.filter(is(DirectionalLight));
 });
 
-const light = (
+const createLight = (
   share: number,
   place: [number, number, number] = [1, 4, 4],
   colour: [number, number, number] = [1, 0.2, 0.1],
@@ -28,37 +28,54 @@ const light = (
   numbers: [...place, ...colour, 200 * share],
 });
 
-/** What a spot throws on its target, and how wide its cone is there. */
-const thrown = (one: SpotLight) => {
-  const distance = one.position.distanceTo(one.target.position);
-  return [one.intensity / distance ** 2, Math.tan(one.angle) * distance];
+/** Return the illuminance at a spot's target and the width of its cone there. */
+const thrown = (createLight: SpotLight) => {
+  const distance = createLight.position.distanceTo(createLight.target.position);
+  return [createLight.intensity / distance ** 2, Math.tan(createLight.angle) * distance];
 };
 
-test("without a show's the look's own lights stand", () => {
-  const before = [key, warm, cool].map((one) => [one.intensity, ...one.position.toArray(), one.angle]);
+test("without a motion's lights the look's own are used", () => {
+  const before = [key, warm, cool].map((createLight) => [
+    createLight.intensity,
+    ...createLight.position.toArray(),
+    createLight.angle,
+  ]);
   lights.update([], 0.5);
-  expect([key, warm, cool].map((one) => [one.intensity, ...one.position.toArray(), one.angle])).toEqual(before);
+  expect(
+    [key, warm, cool].map((createLight) => [
+      createLight.intensity,
+      ...createLight.position.toArray(),
+      createLight.angle,
+    ]),
+  ).toEqual(before);
   expect(before[0]).toEqual([118, -1.9, 3.9, 4.1, expect.closeTo(0.36)]);
-  expect([key.shadow.camera.near, key.shadow.camera.far].map((one) => Math.round(one * 10) / 10)).toEqual([2, 9]);
+  expect(
+    [key.shadow.camera.near, key.shadow.camera.far].map((createLight) => Math.round(createLight * 10) / 10),
+  ).toEqual([2, 9]);
   expect([lights.ambientLevel, fill.intensity]).toEqual([1, 1.04]);
 });
 
-describe("a show's", () => {
-  test("first light is the key, the second and the third are the rims", () => {
+describe("a motion's lights", () => {
+  test("replace the key and the rims in this order", () => {
     lights.update(
-      [light(1, [1, 4, 4]), light(1, [2, 4, -2], [0, 1, 0]), light(1, [-2, 4, -2]), light(1, [9, 9, 9])],
+      [
+        createLight(1, [1, 4, 4]),
+        createLight(1, [2, 4, -2], [0, 1, 0]),
+        createLight(1, [-2, 4, -2]),
+        createLight(1, [9, 9, 9]),
+      ],
       5,
     );
-    expect([key, warm, cool].map((one) => one.position.toArray())).toEqual([
+    expect([key, warm, cool].map((createLight) => createLight.position.toArray())).toEqual([
       [1, 4, 4],
       [2, 4, -2],
       [-2, 4, -2],
     ]);
     expect(warm.color.toArray()).toEqual([0, 1, 0]);
-    expect([key, warm, cool].map((one) => one.castShadow)).toEqual([true, false, false]);
+    expect([key, warm, cool].map((createLight) => createLight.castShadow)).toEqual([true, false, false]);
   });
 
-  test("full, throws what the look's own does from wherever it stands, by night and by day", () => {
+  test("at full intensity light like the look's own from any position", () => {
     for (const look of [LOOKS.night, LOOKS.day]) {
       lights.applyLook(look);
       lights.update([], 5);
@@ -68,38 +85,38 @@ describe("a show's", () => {
         [0, 3, 2],
         [-6, 8, 6],
       ] as const) {
-        lights.update([light(1, [...place])], 5);
-        thrown(key).forEach((one, at) => expect(one).toBeCloseTo(own[at], 6));
+        lights.update([createLight(1, [...place])], 5);
+        thrown(key).forEach((createLight, at) => expect(createLight).toBeCloseTo(own[at], 6));
       }
-      lights.update([light(0.25)], 5);
+      lights.update([createLight(0.25)], 5);
       expect(thrown(key)[0]).toBeCloseTo(own[0] / 4, 6);
     }
   });
 
-  test("place is in the world's frame, though the stage travels with the dancer", () => {
+  test("are placed in the world frame although the stage moves", () => {
     lights.group.position.set(2, 0, -1);
     lights.group.rotation.y = 1;
     lights.group.updateMatrixWorld(true);
-    lights.update([light(1, [3, 4, 2])], 5);
+    lights.update([createLight(1, [3, 4, 2])], 5);
     lights.group.updateMatrixWorld(true);
     expect(key.getWorldPosition(new Vector3()).distanceTo(new Vector3(3, 4, 2))).toBeLessThan(1e-9);
   });
 
-  test("darkness leaves a little light to see by", () => {
-    lights.update([light(0), light(0), light(0)], 5);
-    expect([key, warm, cool].map((one) => one.intensity)).toEqual([0, 0, 0]);
+  test("that are dark leave a minimum of ambient light", () => {
+    lights.update([createLight(0), createLight(0), createLight(0)], 5);
+    expect([key, warm, cool].map((createLight) => createLight.intensity)).toEqual([0, 0, 0]);
     expect(lights.ambientLevel).toBeCloseTo(0.2);
     expect(fill.intensity).toBeCloseTo(0.2 * 1.04);
   });
 
-  test("lights come on and go evenly", () => {
+  test("blend in and out evenly", () => {
     const steps: number[] = [];
     let before = key.position.clone();
     const on = () => {
       steps.push(key.position.distanceTo(before));
       before = key.position.clone();
     };
-    for (let frame = 0; frame < 60; frame++, on()) lights.update([light(0.5)], 1 / 60);
+    for (let frame = 0; frame < 60; frame++, on()) lights.update([createLight(0.5)], 1 / 60);
     expect(key.position.toArray()).toEqual([1, 4, 4]);
     for (let frame = 0; frame < 60; frame++, on()) lights.update([], 1 / 60);
     expect(key.position.toArray()).toEqual([-1.9, 3.9, 4.1]);
@@ -108,8 +125,8 @@ describe("a show's", () => {
     expect(lights.ambientLevel).toBe(1);
   });
 
-  test("light on the dancer's very place stays off it", () => {
-    lights.update([light(1, [0, 0.9, 0])], 5);
+  test("at the performer's position are kept at a distance", () => {
+    lights.update([createLight(1, [0, 0.9, 0])], 5);
     expect(key.position.distanceTo(key.target.position)).toBeCloseTo(0.8);
     expect(Number.isFinite(key.intensity)).toBe(true);
   });

@@ -6,19 +6,19 @@ import { type StringState, Strings } from "../../../src/stage/strings/strings";
 const FREE: StringState = { puppeteer: null, isHighlighted: false, pullTarget: null };
 const RIGHT = new Vector3(1, 0, 0);
 
-/** Bars once they hang still, of limbs whose handles are at these places, held where a holder is given. */
-function hung(handles: readonly [number, number][], holders: readonly (number | null)[]): (Vector3 | null)[] {
+/** Return the bars at rest for limbs with handles at these positions, held where a puppeteer is given. */
+function barsFor(handles: readonly [number, number][], puppeteers: readonly (number | null)[]): (Vector3 | null)[] {
   const strings = new Strings();
   strings.reducedMotion = true;
   const puppet = { scale: 1, handle: (limb: number, out: Vector3) => out.set(...handles[limb], 0) };
-  const states = holders.map((holder) => ({ ...FREE, holder }));
+  const states = puppeteers.map((puppeteer) => ({ ...FREE, puppeteer }));
   strings.update([puppet], states, LOOKS.night, 0.016, { ground: 0, ceiling: 2.6, right: RIGHT, distanceScale: 1 });
   return [0, 1, 2, 3].map((limb) => strings.barPosition(limb)?.clone() ?? null);
 }
 
 describe("bars", () => {
-  test("hang over the limbs that are held, and over no others", () => {
-    const [left, right, ...legs] = hung(
+  test("hang over held limbs only", () => {
+    const [left, right, ...legs] = barsFor(
       [
         [0.6, 1.2],
         [-0.6, 1.2],
@@ -32,8 +32,8 @@ describe("bars", () => {
     expect([right, ...legs]).toEqual([null, null, null]);
   });
 
-  test("go aside for one another, each as far", () => {
-    const bars = hung(
+  test("move apart evenly", () => {
+    const bars = barsFor(
       [
         [0, 1.2],
         [0, 1.2],
@@ -47,8 +47,8 @@ describe("bars", () => {
     expect(places.reduce((sum, x) => sum + x, 0)).toBeCloseTo(0, 9);
   });
 
-  test("at heights of their own stay over their limbs", () => {
-    const bars = hung(
+  test("at different heights stay over their limbs", () => {
+    const bars = barsFor(
       [
         [0, 2.2],
         [0, 1.2],
@@ -71,7 +71,7 @@ describe("strings of several performers", () => {
     return Array.from({ length: attribute.itemSize }, (_, i) => attribute.getComponent(limb, i));
   };
 
-  test("are four each, numbered on, and none of one who is not there yet", () => {
+  test("are four each, and hidden for a missing performer", () => {
     const strings = new Strings();
     strings.reducedMotion = true;
     const states: StringState[] = [];
@@ -92,13 +92,13 @@ describe("strings of several performers", () => {
     expect(rings(strings).geometry.instanceCount).toBe(4);
   });
 
-  test("of those behind are calmer, until one points at them; from further away all are larger", () => {
+  test("are dimmed unless selected or highlighted, and larger at a distance", () => {
     const strings = new Strings();
     strings.reducedMotion = true;
-    const behind = { ...FREE, behind: true };
+    const dimmed = { ...FREE, isDimmed: true };
     strings.update(
       [place(0), place(1)],
-      [FREE, FREE, FREE, FREE, behind, { ...behind, isHighlighted: true }],
+      [FREE, FREE, FREE, FREE, dimmed, { ...dimmed, isHighlighted: true }],
       LOOKS.night,
       0.016,
       { ...view, distanceScale: 4 },

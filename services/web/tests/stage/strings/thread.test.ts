@@ -5,21 +5,26 @@ import { type Thread, Threads } from "../../../src/stage/strings/thread";
 const TAUT: Thread = { colour: "#ffffff", alpha: 1, tension: 1, sag: 0, fadesOut: false };
 const [FROM, TO] = [new Vector3(0.3, 1, 0.1), new Vector3(0.4, 2, 0)];
 
-/** What the graphics are told of a thread. */
-function told(threads: Threads, index: number): Record<string, number[]> {
+/** Return the attributes of a thread. */
+function attributesOf(threads: Threads, index: number): Record<string, number[]> {
   const { foot, top, tint, shape } = threads.mesh.geometry.attributes;
   const row = ({ array, itemSize }: typeof foot) =>
     [...array.slice(index * itemSize, (index + 1) * itemSize)].map((value) => Number(value.toFixed(6)));
   return { foot: row(foot), top: row(top), tint: row(tint), shape: row(shape) };
 }
 
-test("a thread goes from its handle to its other end, and touches no other", () => {
+test("a thread runs from its handle to its other end and changes no other", () => {
   const threads = new Threads();
   threads.count = 4;
   threads.set(1, FROM, TO, TAUT);
   threads.set(3, TO, FROM, { colour: "#ff0000", alpha: 0.4, tension: 0, sag: 0.05, fadesOut: true });
-  expect(told(threads, 1)).toEqual({ foot: [0.3, 1, 0.1], top: [0.4, 2, 0], tint: [1, 1, 1, 1], shape: [1, 0, 0] });
-  expect(told(threads, 3)).toEqual({
+  expect(attributesOf(threads, 1)).toEqual({
+    foot: [0.3, 1, 0.1],
+    top: [0.4, 2, 0],
+    tint: [1, 1, 1, 1],
+    shape: [1, 0, 0],
+  });
+  expect(attributesOf(threads, 3)).toEqual({
     foot: [0.4, 2, 0],
     top: [0.3, 1, 0.1],
     tint: [1, 0, 0, 0.4],
@@ -27,13 +32,13 @@ test("a thread goes from its handle to its other end, and touches no other", () 
   });
   for (const other of [0, 2])
     expect(
-      Object.values(told(threads, other))
+      Object.values(attributesOf(threads, other))
         .flat()
         .every((value) => value === 0),
     ).toBe(true);
 });
 
-test("all of them are one draw, of no more than there are", () => {
+test("all threads are one draw call with as many instances as there are", () => {
   const { mesh } = new Threads();
   const threads = new Threads();
   expect(mesh.geometry.instanceCount).toBe(0);

@@ -1,4 +1,4 @@
-/** Turned arms below the sleeve, and gofun hands with four fingers and a thumb, palm to the body. */
+/** Turned arms below the sleeves, and gofun hands with four fingers and a thumb, palms towards the body. */
 import { Vector3 } from "three";
 import { FINISH } from "../finish";
 import type { GeometryBuilder } from "../geometry-builder";
@@ -33,7 +33,7 @@ const FOREARM = [
   [0.925, 0.08],
   [0.93, 0.0005],
 ];
-/** Palm: (place, half thickness, half width). */
+/** Palm: (position, half thickness, half width). */
 const PALM_SECTIONS = [
   [0, 0.0005, 0.0005],
   [0.05, 0.016, 0.013],
@@ -43,7 +43,7 @@ const PALM_SECTIONS = [
   [0.97, 0.012, 0.034],
   [1, 0.0005, 0.0005],
 ];
-/** Fingers, little to index: (z of the knuckle, length, curl to the palm). */
+/** Fingers, little to index: (z of the knuckle, length, curl towards the palm). */
 const FINGERS = [
   [-0.0245, 0.07, 0.02],
   [-0.0075, 0.083, 0.017],

@@ -1,4 +1,4 @@
-/** The kimono's bodice, its crossed collars, the obi with cord and knot. */
+/** The kimono's bodice with its crossed collars, and the obi with cord and knot. */
 import { CatmullRomCurve3, Vector3 } from "three";
 import { FINISH, type Finish } from "../finish";
 import type { GeometryBuilder, VertexWeights } from "../geometry-builder";
@@ -29,7 +29,7 @@ const OBI = [
   [1.122, -0.04, 0.126, 0.099, 2.25],
 ];
 
-/** From the hips up into the chest. */
+/** Blend from the hips up to the chest. */
 export const waistWeights: VertexWeights = ({ y }) => {
   const chest = smoothStep(0.98, 1.09, y);
   return [
@@ -38,7 +38,7 @@ export const waistWeights: VertexWeights = ({ y }) => {
   ];
 };
 
-/** As the waist, and the yoke follows the arms a little. */
+/** Weights of the waist; the yoke also follows the arms a little. */
 const yokeWeights: VertexWeights = (at) => {
   const arm = smoothStep(0.13, 0.215, Math.abs(at.x)) * smoothStep(1.3, 1.42, at.y) * 0.45;
   const chest = smoothStep(0.98, 1.09, at.y);
@@ -51,11 +51,11 @@ const yokeWeights: VertexWeights = (at) => {
 
 const section = curve(BODICE);
 
-/** Front of the bodice at x, y. */
+/** Return the z of the bodice's front at x, y. */
 function frontDepth(x: number, y: number): number {
   const [centre, wide, deep, power] = section(Math.min(y, 1.512));
-  const aside = Math.min(0.985, Math.abs(x) / wide);
-  return centre + deep * (1 - aside ** power) ** (1 / power);
+  const lateral = Math.min(0.985, Math.abs(x) / wide);
+  return centre + deep * (1 - lateral ** power) ** (1 / power);
 }
 
 export function addBodice(builder: GeometryBuilder): void {
@@ -75,15 +75,17 @@ export function addBodice(builder: GeometryBuilder): void {
     "vl5",
     FINISH.throat,
   );
-  // White inner pair first; of the outer pair the left lies over the right, as the living wear it.
+  // White inner pair first. In the outer pair the left lies over the right, as the living wear it.
   for (const sign of [-1, 1]) addCollar(builder, sign, 0.036, sign < 0 ? 0.005 : 0.007, FINISH.innerCollar, 0.018, 0.7);
   for (const sign of [-1, 1]) addCollar(builder, sign, 0.05, sign < 0 ? 0.0085 : 0.0125, FINISH.collar, -0.007, 1);
   addObi(builder);
 }
 
-/** A band from the nape over one shoulder, crossing to the far side of the obi; `inset` draws it in towards the neck. */
+/**
+ * Add a band from the nape over one shoulder, crossing to the far side of the obi; `inset` moves it towards the neck.
+ */
 function addCollar(
-  assembly: GeometryBuilder,
+  builder: GeometryBuilder,
   sign: number,
   width: number,
   lift: number,
@@ -107,7 +109,7 @@ function addCollar(
   ];
   for (const [x, y] of crossing) path.push(new Vector3(sign * x, y, frontDepth(sign * x, y) + 0.002));
   const line = new CatmullRomCurve3(path, false, "centripetal");
-  assembly.add(
+  builder.add(
     grid(
       (u, v) => {
         const t = Math.min(1, Math.max(0, u)) * end;
@@ -137,9 +139,9 @@ function addCollar(
   );
 }
 
-function addObi(assembly: GeometryBuilder): void {
-  assembly.add(loft(OBI, 34, 6), waistWeights, FINISH.obi);
-  assembly.add(
+function addObi(builder: GeometryBuilder): void {
+  builder.add(loft(OBI, 34, 6), waistWeights, FINISH.obi);
+  builder.add(
     grid(
       (u, v) => {
         const [a, b] = [u * 2 * Math.PI, v * 2 * Math.PI];
@@ -157,17 +159,17 @@ function addObi(assembly: GeometryBuilder): void {
     waistWeights,
     FINISH.cord,
   );
-  assembly.add(ball(new Vector3(0, 1.068, 0.076), 0.0105, [1.3, 0.8, 1], 10), waistWeights, FINISH.cord);
-  assembly.add(
+  builder.add(ball(new Vector3(0, 1.068, 0.076), 0.0105, [1.3, 0.8, 1], 10), waistWeights, FINISH.cord);
+  builder.add(
     capsule(new Vector3(0.006, 1.066, 0.079), new Vector3(0.017, 1.012, 0.084), 0.0046, 0.0038),
     waistWeights,
     FINISH.cord,
   );
-  assembly.add(
+  builder.add(
     capsule(new Vector3(-0.006, 1.066, 0.079), new Vector3(-0.012, 1.02, 0.084), 0.0046, 0.0038),
     waistWeights,
     FINISH.cord,
   );
-  assembly.add(box(new Vector3(0, 1.085, -0.157), [0.15, 0.06, 0.024], 0.34), "sacroiliac", FINISH.obiPlain);
-  assembly.add(box(new Vector3(0, 1.07, -0.163), [0.055, 0.085, 0.028], -0.25), "sacroiliac", FINISH.obiPlain);
+  builder.add(box(new Vector3(0, 1.085, -0.157), [0.15, 0.06, 0.024], 0.34), "sacroiliac", FINISH.obiPlain);
+  builder.add(box(new Vector3(0, 1.07, -0.163), [0.055, 0.085, 0.028], -0.25), "sacroiliac", FINISH.obiPlain);
 }

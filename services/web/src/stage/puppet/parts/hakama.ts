@@ -1,4 +1,4 @@
-/** The hakama, hitched above the knee: one pleated tube a leg, lined vermilion, under a white cord with a bow. */
+/** The hakama, hitched above the knee: a pleated tube per leg, lined vermilion, under a white cord with a bow. */
 import { Vector3 } from "three";
 import { FINISH } from "../finish";
 import type { GeometryBuilder, VertexWeights } from "../geometry-builder";
@@ -29,7 +29,7 @@ const BAND = [
 
 const section = curve(LEG);
 
-/** Saw-tooth of a knife pleat. */
+/** Return the saw-tooth profile of a knife pleat, 0..1. */
 function pleatDepth(x: number): number {
   const t = ((x % 1) + 1) % 1;
   return smoothStep(0, 0.82, t) * smoothStep(1, 0.86, t);
@@ -107,7 +107,7 @@ export function addHakama(builder: GeometryBuilder): void {
   builder.add(box(new Vector3(0, 1.01, -0.148), [0.1, 0.085, 0.014], 0), "sacroiliac", FINISH.hakamaPlain);
 }
 
-/** Flat end of the cord, 22 mm wide and a little wider at the end. */
+/** Return a flat end of the cord, 22 mm wide and a little wider at the tip. */
 function createCordTail(from: Vector3, to: Vector3) {
   return grid(
     (u, v) => {

@@ -13,7 +13,7 @@ const NECK = [
   [0.95, 0.43],
   [1, 0.46],
 ];
-/** Hairline: fall from the crown (radians) by azimuth from the front (radians). */
+/** Hairline: angle from the crown by azimuth from the front, in radians. */
 const HAIRLINE = [
   [0, 0.8],
   [0.35, 0.84],
@@ -36,10 +36,10 @@ const TOPKNOT = [
   [1, 0.0005],
 ];
 const RADII = new Vector3(0.0745, 0.121, 0.094);
-/** The puppet's head is a little larger than life, grown about the chin. */
+/** The puppet's head is slightly larger than life, enlarged about the chin. */
 const HEAD_SCALE = 1.07;
 
-/** Reliefs of the mask: (x, y, half width, half height, depth); x is mirrored when not zero. */
+/** Reliefs of the mask: (x, y, half width, half height, depth); a non-zero x is mirrored. */
 const RELIEFS = [
   [0.0105, -0.0245, 0.006, 0.006, 0.0022],
   [0.0285, 0.006, 0.0165, 0.0125, -0.0062],
@@ -57,7 +57,7 @@ function gaussianBump(x: number, y: number, cx: number, cy: number, rx: number, 
   return Math.exp(-(((x - cx) / rx) ** 2 + ((y - cy) / ry) ** 2));
 }
 
-/** Point of the head in a direction of the unit sphere. */
+/** Return the point of the head in a direction of the unit sphere. */
 function headPoint(direction: Vector3): Vector3 {
   const jaw = Math.max(0, -direction.y);
   const front = direction.z > 0;
@@ -90,7 +90,7 @@ export function addHead(builder: GeometryBuilder): void {
   builder.add(
     grid(
       (u, v) => {
-        // Columns crowd to the front and rows to the features, where the mask needs them.
+        // Columns are denser at the front and rows at the features, where the mask needs them.
         const q = 2 * u - 1;
         const azimuth = ((q + 1.8 * q ** 3) / 2.8) * Math.PI;
         const fall = Math.min(1, Math.max(0, v - 0.055 * Math.sin(2 * Math.PI * (v - 0.02)))) * Math.PI;
@@ -112,9 +112,9 @@ export function addHead(builder: GeometryBuilder): void {
   addHair(builder);
 }
 
-function addHair(assembly: GeometryBuilder): void {
+function addHair(builder: GeometryBuilder): void {
   const line = curve(HAIRLINE);
-  assembly.add(
+  builder.add(
     grid(
       (u, v) => {
         const azimuth = ((((u % 1) + 1) % 1) - 0.5) * 2 * Math.PI;
@@ -140,7 +140,7 @@ function addHair(assembly: GeometryBuilder): void {
     [1.81, 0.002],
     [1.793, 0.026],
   ];
-  assembly.add(
+  builder.add(
     tube(
       fold.map(([y, z]) => new Vector3(0.002, y, z)),
       TOPKNOT,
@@ -149,7 +149,7 @@ function addHair(assembly: GeometryBuilder): void {
     "skullbase",
     FINISH.hair,
   );
-  assembly.add(
+  builder.add(
     ring(new Vector3(0.002, 1.777, -0.06), new Vector3(0, 1, 0.12), 0.0135, 0.0046),
     "skullbase",
     FINISH.hairTie,

@@ -1,4 +1,4 @@
-/** Turned legs: the part of the thigh below the hakama, knee and ankle balls, shin, tabi foot and split toes. */
+/** Turned legs: thigh below the hakama, knee and ankle balls, shin, tabi foot and split toes. */
 import { Vector3 } from "three";
 import { FINISH } from "../finish";
 import type { GeometryBuilder } from "../geometry-builder";
@@ -41,7 +41,7 @@ const CUFF = [
   [1, 0.6],
 ];
 
-/** Sections of a foot: (z, centre from the ankle towards the outside, half width, height of the instep). */
+/** Sections of a foot: (z, centre offset from the ankle to the outside, half width, height of the instep). */
 const FOOT = [
   [-0.13, 0, 0.001, 0.022],
   [-0.124, 0, 0.02, 0.036],
@@ -70,7 +70,7 @@ const OTHER_TOES = [
   [0.115, 0.021, 0.0008, 0.002],
 ];
 
-/** Flat-soled loft along z. */
+/** Return a flat-soled loft along z. */
 function createFootPart(
   sections: readonly (readonly number[])[],
   centre: number,
@@ -83,11 +83,11 @@ function createFootPart(
   return grid(
     (u, v) => {
       const z = back + (front - back) * v;
-      const [aside, half, top] = section(z);
+      const [lateral, half, top] = section(z);
       const [c, s] = [Math.cos(u * 2 * Math.PI), Math.sin(u * 2 * Math.PI)];
       const height = top + SOLE_HEIGHT_M;
       const y = -SOLE_HEIGHT_M + height * 0.36 + (s > 0 ? s ** 0.9 * height * 0.64 : -((-s) ** 0.45) * height * 0.36);
-      return new Vector3(centre + aside * sign + signedPower(c, 0.8) * half, y, z);
+      return new Vector3(centre + lateral * sign + signedPower(c, 0.8) * half, y, z);
     },
     columns,
     rows,

@@ -1,4 +1,4 @@
-/** Kimono sleeves: a lathe over the upper arm, and a bag that hangs from it on a bone of its own. */
+/** Kimono sleeves: a solid of revolution over the upper arm, and a bag that hangs from it on its own bone. */
 import { Vector3 } from "three";
 import { FINISH } from "../finish";
 import type { GeometryBuilder, VertexWeights } from "../geometry-builder";
@@ -21,10 +21,10 @@ const LINING = [
   [0.86, 0.237],
   [0.9, 0.243],
 ];
-/** The bag: along the arm from and to, how far it hangs, radius of its corners, half thickness at the arm. Metres. */
+/** The bag, in metres: extent along the arm, how far it hangs, corner radius, half thickness at the arm. */
 const BAG = { from: 0.075, to: 0.285, hang: 0.31, corner: 0.075, thick: 0.05 };
 
-/** Directions of the bag in the bind pose: down the arm, the way it hangs, across. */
+/** Return the directions of the bag in the bind pose: down the arm, the way it hangs, across. */
 export function sleeveBindAxes(side: "l" | "r"): { along: Vector3; hang: Vector3; across: Vector3 } {
   const along = jointPosition(`${side}_elbow`)
     .sub(jointPosition(`${side}_shoulder`))
@@ -44,7 +44,7 @@ export function addSleeves(builder: GeometryBuilder): void {
         [`${side}_shoulder`, 0.45 + 0.55 * arm],
       ];
     };
-    const shape = { wide: 0.92, deep: 1.06, columns: 22 };
+    const shape = { widthScale: 0.92, depthScale: 1.06, columns: 22 };
     builder.add(
       lathe(top, elbow, SLEEVE, { ...shape, rows: 13, uv: (u, v) => [u * 0.42, v * 0.31] }),
       weights,
@@ -60,7 +60,7 @@ export function addSleeves(builder: GeometryBuilder): void {
   }
 }
 
-function addBag(assembly: GeometryBuilder, side: "l" | "r"): void {
+function addBag(builder: GeometryBuilder, side: "l" | "r"): void {
   const shoulder = jointPosition(`${side}_shoulder`);
   const { along, hang, across } = sleeveBindAxes(side);
   const at = (angle: number, fall: number): Vector3 => {
@@ -77,7 +77,7 @@ function addBag(assembly: GeometryBuilder, side: "l" | "r"): void {
       .addScaledVector(across, thick);
   };
   const bone = `${side}_sleeve`;
-  assembly.add(
+  builder.add(
     grid(
       (u, v) => at(u * 2 * Math.PI, v * BAG.hang),
       26,
@@ -97,5 +97,5 @@ function addBag(assembly: GeometryBuilder, side: "l" | "r"): void {
     26,
     4,
   );
-  assembly.add(piping, bone, FINISH.piping);
+  builder.add(piping, bone, FINISH.piping);
 }

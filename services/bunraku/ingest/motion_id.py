@@ -1,0 +1,10 @@
+"""Ids of motions."""
+
+from __future__ import annotations
+
+import base64
+
+
+def derive_motion_id(digest: bytes) -> str:
+    """Return the id for a SHA-256 digest: 20 characters of a-z and 2-7; equal content gets an equal id."""
+    return base64.b32encode(digest).decode().lower()[:20]

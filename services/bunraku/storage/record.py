@@ -1,0 +1,64 @@
+"""Records of the catalogue and the errors of its methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+class InvalidCursor(ValueError):
+    """A page cursor that this catalogue did not issue."""
+
+
+class QuotaExceeded(Exception):
+    """A motion that does not fit into a quota; the message names the limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class CatalogueEntry:
+    """A motion in the catalogue."""
+
+    id: str
+    created: int
+    """Microseconds since 1970."""
+    description: dict[str, Any]
+    """Description of the motion in the API's JSON."""
+    subject: str = ""
+    """Subject of the token with which it was stored."""
+    bytes: int = 0
+    """Size of the stored object."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """Limits on stored motions, per subject and in total; 0 is unlimited."""
+
+    max_motions: int = 0
+    max_bytes: int = 0
+    max_total_motions: int = 0
+    max_total_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """A viewer link to a session or a motion, created by `subject`; times in seconds since 1970."""
+
+    id: str
+    created: int
+    expires: int
+    subject: str
+    session: str | None = None
+    motion: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """An uploaded file that is not yet a motion."""
+
+    id: str
+    created: int
+    """Microseconds since 1970."""
+    details: dict[str, Any]
+    """Parameters of the job as JSON."""
+    tries: int = 0
+    """Number of times that a replica resumed the job after another had abandoned it."""

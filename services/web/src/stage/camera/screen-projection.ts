@@ -1,0 +1,37 @@
+/** Projection between world positions and a picture of the scene in CSS pixels. */
+import { type PerspectiveCamera, Plane, Raycaster, Vector2, Vector3 } from "three";
+import { projectBox, type ScreenBox, type WorldExtent } from "./screen-box";
+
+export class ScreenProjection {
+  width = 1;
+  height = 1;
+  readonly #camera: PerspectiveCamera;
+  readonly #raycaster = new Raycaster();
+
+  constructor(camera: PerspectiveCamera) {
+    this.#camera = camera;
+  }
+
+  /** Return the position in the picture of a world position. */
+  toScreen(position: Vector3): { x: number; y: number } {
+    const clip = position.clone().project(this.#camera);
+    return { x: (clip.x * 0.5 + 0.5) * this.width, y: (0.5 - clip.y * 0.5) * this.height };
+  }
+
+  /**
+   * Return the world position of a pixel on the plane through `through` that faces the camera; null if it is behind the
+   * camera.
+   */
+  fromScreen(x: number, y: number, through: Vector3): Vector3 | null {
+    const clip = new Vector2((x / this.width) * 2 - 1, 1 - (y / this.height) * 2);
+    this.#raycaster.setFromCamera(clip, this.#camera);
+    const plane = new Plane().setFromNormalAndCoplanarPoint(this.#camera.getWorldDirection(new Vector3()), through);
+    return this.#raycaster.ray.intersectPlane(plane, new Vector3());
+  }
+
+  /** Return the box in the picture around a world position. */
+  boxAt(position: Vector3, { across, up, down }: WorldExtent, scale: number): ScreenBox {
+    const extent = { across: across * scale, up: up * scale, down: down * scale };
+    return projectBox(position, extent, this.#camera, this.width, this.height);
+  }
+}

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+from pathlib import Path
+
+import pytest
+
+from bunraku.ingest import job_process
+from bunraku.ingest.job_process import JobKind
+from bunraku.ingest.result import JobRejection, JobResult
+from tests.servers import make_bvh_clip
+
+
+async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(make_bvh_clip(0.5))
+    shares: list[float] = []
+    result = await job_process.run_job(JobKind.MOTION, ("m1", source), 60, shares.append)
+    assert isinstance(result, JobResult)
+    assert result.description["frames"] == 15
+    assert shares == sorted(set(shares))
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    assert 5 < len(shares) <= job_process.MAX_PROGRESS_REPORTS + 1
+
+
+async def test_crashed_job_is_a_rejection(tmp_path: Path) -> None:
+    result = await job_process.run_job(JobKind.MOTION, ("m1", tmp_path / "missing"), 60)
+    assert isinstance(result, JobRejection)
+    assert result.hint
+
+
+async def test_cancelled_job_is_killed(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(make_bvh_clip(60.0))
+    encoding = asyncio.Event()
+    job = asyncio.create_task(job_process.run_job(JobKind.MOTION, ("m1", source), 60, lambda _: encoding.set()))
+    await encoding.wait()
+    job.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await job
+    assert not multiprocessing.active_children()
+
+
+async def test_job_is_killed_at_its_time_limit(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(make_bvh_clip(20.0))
+    rejected = await job_process.run_job(JobKind.MOTION, ("m1", source), 0.001)
+    assert isinstance(rejected, JobRejection)
+    assert "long" in rejected.title
