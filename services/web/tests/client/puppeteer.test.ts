@@ -42,7 +42,7 @@ test("welcome sets id and colour", () => {
   expect(puppeteer.limits).toMatchObject({ reach: 1, handSpeed: 1, legSpeed: 2 });
 });
 
-test("replacement of the viewer's connection starts one here, and limbs are claimed again", () => {
+test("replacement of the viewer's connection starts one here and reclaims limbs", () => {
   puppeteer.claim(0);
   socket.receive({ name: "Grant", limb: 0, epoch: 3 });
   viewer.dispatchEvent(new Event("replaced"));
