@@ -92,7 +92,7 @@ prior: .setup/python
 
 # how far apart what is heard and what is shown are, in Chromium
 bench-audio: setup
-	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "is heard where"
+	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "clicks are heard in time"
 
 # the pictures of README and docs, of the running page
 pictures: setup

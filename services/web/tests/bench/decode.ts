@@ -1,4 +1,7 @@
-/** Milliseconds to decode blocks: JSON on standard input, for `make bench-codec`. The last line printed is one JSON object. */
+/**
+ * Milliseconds to decode blocks: JSON on standard input, for `make bench-codec`. The last line printed is one JSON
+ * object.
+ */
 import { readFileSync } from "node:fs";
 import { decodeMotionBlock } from "../../src/codec/motion-decoder";
 import { MotionTrack } from "../../src/codec/motion-track";

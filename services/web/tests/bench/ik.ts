@@ -1,6 +1,6 @@
 /**
- * One round of `make bench-ik` in Node: JSON on standard input. Ours, three.js's `CCDIKSolver` and `closed-chain-ik` take turns on the
- * same targets, all warm. The last line printed is one JSON object.
+ * One round of `make bench-ik` in Node: JSON on standard input. Ours, three.js's `CCDIKSolver` and `closed-chain-ik`
+ * take turns on the same targets, all warm. The last line printed is one JSON object.
  */
 
 import { readFileSync } from "node:fs";
@@ -14,7 +14,9 @@ import { type Proportions, parseProportions } from "../../src/marionette/proport
 interface Asked {
   /** Arms, and hand tips (x y z each) for which the other language solves too. */
   bodies: { proportions: string; table: string; checked: number[] }[];
-  /** Hand tips for the last body, by the order they come in; arm lengths from the shoulder, y up. A multiple of `BATCH`. */
+  /**
+   * Hand tips for the last body, by the order they come in; arm lengths from the shoulder, y up. A multiple of `BATCH`.
+   */
   orders: Record<string, number[]>;
 }
 
@@ -48,7 +50,9 @@ function oneByOne(solve: (x: number, y: number, z: number) => void, tip: () => A
   };
 }
 
-/** A skinned mesh of three links hanging from the shoulder, and a bone for the target; it goes on from the pose before. */
+/**
+ * A skinned mesh of three links hanging from the shoulder, and a bone for the target; it goes on from the pose before.
+ */
 function ccdik({ upper, forearm: fore, hand }: Proportions, limited: boolean): Contender {
   const [root, shoulder, elbow, wrist, tip, target] = Array.from({ length: 6 }, () => new Bone());
   root.add(shoulder, target);
@@ -80,8 +84,9 @@ function ccdik({ upper, forearm: fore, hand }: Proportions, limited: boolean): C
 const [X, Y, Z, EX, EY, EZ] = [0, 1, 2, 3, 4, 5];
 
 /**
- * A shoulder that turns freely, elbow and wrist that bend without limits, as it hardly ever gets past those. As it comes it stops
- * after five iterations, and wherever the way is not straight; here it may go on until it is within its thousandth.
+ * A shoulder that turns freely, elbow and wrist that bend without limits, as it hardly ever gets past those. As it
+ * comes it stops after five iterations, and wherever the way is not straight; here it may go on until it is within its
+ * thousandth.
  */
 function closedChain({ upper, forearm: fore, hand }: Proportions): Contender {
   const base = new Link(),

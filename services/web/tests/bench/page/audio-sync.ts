@@ -7,7 +7,7 @@ export function benchAudioSync({ note }: BenchContext): Promise<BenchFigures> {
   const web = resolve(import.meta.dirname, "../../..");
   const said = execFileSync(
     "npx",
-    ["vitest", "run", "tests/browser/audio.test.ts", "-t", "is heard where the stage is"],
+    ["vitest", "run", "tests/browser/audio.test.ts", "-t", "clicks are heard in time with the stage"],
     {
       cwd: web,
       env: { ...process.env, BUNRAKU_BENCH: "1" },

@@ -29,8 +29,8 @@ const MAX_IDLE_LOAD = 0.05;
 const IDLE_WINDOW_S = 0.5;
 
 /**
- * Calls `use` with a page of a browser started for it: nothing of ours was ever there, whether fetched or compiled. That it can
- * draw has been tried, as a browser that people have open has its graphics process.
+ * Calls `use` with a page of a browser started for it: nothing of ours was ever there, whether fetched or compiled.
+ * That it can draw has been tried, as a browser that people have open has its graphics process.
  */
 export async function withPage<T>(
   { chromium }: BenchContext,
@@ -51,8 +51,8 @@ export async function withPage<T>(
 }
 
 /**
- * Waits until the browser is done with its own start: for each window it loads pages of its own for its address bar, which take a
- * processor for half a second, and which a browser that people have open loaded long ago.
+ * Waits until the browser is done with its own start: for each window it loads pages of its own for its address bar,
+ * which take a processor for half a second, and which a browser that people have open loaded long ago.
  */
 async function waitForIdleBrowser(browser: Browser): Promise<void> {
   const protocol = await browser.newBrowserCDPSession();

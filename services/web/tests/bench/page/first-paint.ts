@@ -6,7 +6,9 @@ import { type BenchContext, type BenchFigures, percentile, roundTo, withPage } f
 
 declare global {
   interface Window {
-    /** When the graphics had drawn the puppet's first pose, milliseconds since the navigation began; noted by `watch`. */
+    /**
+     * When the graphics had drawn the puppet's first pose, milliseconds since the navigation began; noted by `watch`.
+     */
     firstPaint?: number;
   }
 }

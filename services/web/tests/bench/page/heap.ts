@@ -4,7 +4,10 @@ import type { CDPSession } from "playwright-core";
 export interface HeapUsage {
   /** What the page's script made and holds: objects, arrays, closures, strings and numbers. Bytes. */
   objects: number;
-  /** What V8 made of the script, and goes on making better for long: byte code, machine code and what it noted for them. Bytes. */
+  /**
+   * What V8 made of the script, and goes on making better for long: byte code, machine code and what it noted for them.
+   * Bytes.
+   */
   code: number;
 }
 
