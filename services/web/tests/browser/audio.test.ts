@@ -23,7 +23,7 @@ interface Clicks {
 interface Conditions {
   /** Maximum delay of each message, in milliseconds. The order is kept. */
   jitterMs?: number;
-  /** Whether the browser has an Opus decoder. */
+  /** False removes the browser's Opus decoder. */
   hasDecoder?: boolean;
   /** Bypass the page's security policy, so that the test can load an audio worklet. */
   bypassPolicy?: boolean;

@@ -424,7 +424,11 @@ describe("what cannot be played", () => {
 
   test.each([
     ["no motion", [{ type: "audio" }], "the stream has no motion in it"],
-    ["another codec", [{ ...goldenDescription(), codec: "bunraku.motion/9" }], "Unsupported motion codec bunraku.motion/9"],
+    [
+      "another codec",
+      [{ ...goldenDescription(), codec: "bunraku.motion/9" }],
+      "Unsupported motion codec bunraku.motion/9",
+    ],
     ["no frames", [{ ...goldenDescription(), frames: 0 }], "motion track: frames must"],
     [
       "a dancer cut short",
