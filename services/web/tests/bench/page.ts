@@ -1,20 +1,22 @@
 /**
  * Benchmark of the page in Chromium against a running server: `make bench-page`, or `make bench-page ARGUMENTS="--only
- * memory --minutes 3"`. It prints a table of figures with their bounds, and a JSON object as its last line.
+ * memory --minutes 3"`. It prints a table of figures with their bounds, and a JSON object as its last line. Cases:
  *
- * | case      | figures | |-----------|---------| | `arrival` | `first_paint_s`: from the start of the navigation until
- * a GPU fence after the first frame with the puppet is | |           | signalled. Median of five freshly started
- * browsers with empty caches. `js_gzip_kb`, `fonts_kb`: scripts and | |           | fonts loaded until a hand is held |
- * | `line`    | `first_paint_1mbit_s`: the same with 1 Mbit/s and 100 ms, emulated by Chromium, for WebSockets too | |
- * `frames`  | `frame_ms_p95`: main thread time of an animation frame callback that draws, at 4x CPU slowdown, full
- * quality | |           | and three controlled limbs. It is thread time of Chromium's trace: waits for a processor, the
- * GPU process and | |           | Chromium's own layout and painting are not included | | `drawing` | `draw_calls`,
- * `triangles` per frame, shadows and mirror included: full quality, dark theme, three held limbs | | `memory`  |
- * `heap_growth_mb`: growth of the script heap after a garbage collection, over `--minutes` (30) of playing, | |
- * | controlling, uploading and opening panels, after a warm-up. `heap_growth_objects_mb` are objects of the page, | |
- * | `heap_growth_code_mb` V8's compiled code. Growth of nodes and listeners | | `audio`   | `audio_ms_p95`: time
- * difference of sound and stage, worst of the tested conditions (`make bench-audio`) | | `axe`     | `axe_violations`:
- * axe-core's findings in both themes with each panel open, on a desktop and on a phone |
+ * - `arrival`: `first_paint_s` is the time from the start of the navigation until the GPU has completed the first frame
+ *   with the puppet; median of five newly started browsers with empty caches. `js_gzip_kb` and `fonts_kb` are all
+ *   scripts and fonts loaded until a hand is held.
+ * - `line`: `first_paint_1mbit_s` is the same at 1 Mbit/s and 100 ms RTT, emulated by Chromium, WebSockets included.
+ * - `frames`: `frame_ms_p95` is the main thread's time for an animation frame callback that draws, with 4x CPU slowdown,
+ *   full quality and three controlled limbs. It is thread time from Chromium's trace: it excludes waits for a processor,
+ *   the GPU process, and Chromium's own layout and painting.
+ * - `drawing`: `draw_calls` and `triangles` of a frame at full quality in the dark theme with three held limbs, shadow
+ *   and mirror passes included.
+ * - `memory`: `heap_growth_mb` is the growth of the script heap after a garbage collection, over `--minutes` (30) of
+ *   playing, controlling, uploading and opening panels, after a warm-up. `heap_growth_objects_mb` is its share of
+ *   objects, `heap_growth_code_mb` that of V8's compiled code. The growth of DOM nodes and listeners is reported too.
+ * - `audio`: `audio_ms_p95` is the time difference of sound and stage in the worst tested condition (`make bench-audio`).
+ * - `axe`: `axe_violations` is the number of axe-core's findings in both themes with each panel open, on a desktop and
+ *   on a phone.
  *
  * Without a graphics processor Chromium renders in software, which takes most of the first paint time.
  */
