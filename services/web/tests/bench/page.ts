@@ -6,15 +6,16 @@
  *   with the puppet; median of five newly started browsers with empty caches. `js_gzip_kb` and `fonts_kb` are all
  *   scripts and fonts loaded until a hand is held.
  * - `line`: `first_paint_1mbit_s` is the same at 1 Mbit/s and 100 ms RTT, emulated by Chromium, WebSockets included.
- * - `frames`: `frame_ms_p95` is the main thread's time for an animation frame callback that draws, with 4x CPU slowdown,
- *   full quality and three controlled limbs. It is thread time from Chromium's trace: it excludes waits for a processor,
- *   the GPU process, and Chromium's own layout and painting.
+ * - `frames`: `frame_ms_p95` is the main thread's time for an animation frame callback that draws, with 4x CPU
+ *   slowdown, full quality and three controlled limbs. It is thread time from Chromium's trace: it excludes waits for
+ *   a processor, the GPU process, and Chromium's own layout and painting.
  * - `drawing`: `draw_calls` and `triangles` of a frame at full quality in the dark theme with three held limbs, shadow
  *   and mirror passes included.
  * - `memory`: `heap_growth_mb` is the growth of the script heap after a garbage collection, over `--minutes` (30) of
  *   playing, controlling, uploading and opening panels, after a warm-up. `heap_growth_objects_mb` is its share of
  *   objects, `heap_growth_code_mb` that of V8's compiled code. The growth of DOM nodes and listeners is reported too.
- * - `audio`: `audio_ms_p95` is the time difference of sound and stage in the worst tested condition (`make bench-audio`).
+ * - `audio`: `audio_ms_p95` is the time difference of sound and stage in the worst tested condition
+ *   (`make bench-audio`).
  * - `axe`: `axe_violations` is the number of axe-core's findings in both themes with each panel open, on a desktop and
  *   on a phone.
  *

@@ -30,49 +30,49 @@ describeInBrowser("language of embedded stages", { demo: true, secret: SECRET, o
 
   test("each stage follows the nearest lang attribute, also when it changes", async () => {
     const page = await open(
-      `<div lang="ja-JP"><p>${stage('id="one"')}</p><p>${stage('id="two" lang="en-GB"')}</p></div>`,
+      `<div lang="ja-JP"><p>${stage('id="first"')}</p><p>${stage('id="second" lang="en-GB"')}</p></div>`,
     );
-    const [one, two] = ["#one", "#two"].map((id) => page.locator(id));
+    const [first, second] = ["#first", "#second"].map((id) => page.locator(id));
     await waitForStages(page, 2);
-    await one.getByRole("button", { name: "左手を持つ" }).waitFor();
-    await two.getByRole("button", { name: "Take the left hand" }).waitFor();
-    expect(await texts(page, "#one")).toEqual({ language: "ja", foreign: [] });
-    expect(await texts(page, "#two")).toEqual({ language: "en", foreign: [] });
+    await first.getByRole("button", { name: "左手を持つ" }).waitFor();
+    await second.getByRole("button", { name: "Take the left hand" }).waitFor();
+    expect(await texts(page, "#first")).toEqual({ language: "ja", foreign: [] });
+    expect(await texts(page, "#second")).toEqual({ language: "en", foreign: [] });
     expect(await countLoadedScripts(page, JAPANESE_SCRIPT)).toBe(1);
     // Each stage names the puppeteer in its own language.
-    await one.getByRole("button", { name: "左手を持つ" }).click();
-    await one.getByRole("button", { name: "左手を放す" }).waitFor();
-    await one.locator(".tag:visible", { hasText: "あなた" }).waitFor();
-    await two.getByRole("button", { name: "Left hand, held by" }).waitFor();
-    await two.locator(".tag:visible", { hasText: "left hand" }).waitFor();
+    await first.getByRole("button", { name: "左手を持つ" }).click();
+    await first.getByRole("button", { name: "左手を放す" }).waitFor();
+    await first.locator(".tag:visible", { hasText: "あなた" }).waitFor();
+    await second.getByRole("button", { name: "Left hand, held by" }).waitFor();
+    await second.locator(".tag:visible", { hasText: "left hand" }).waitFor();
 
-    await page.evaluate(() => document.querySelector("#two")!.setAttribute("lang", "ja"));
-    await two.getByRole("button", { name: "右手を持つ" }).waitFor();
+    await page.evaluate(() => document.querySelector("#second")!.setAttribute("lang", "ja"));
+    await second.getByRole("button", { name: "右手を持つ" }).waitFor();
     await waitForStages(page, 2);
     await page.evaluate(() => document.querySelector("div")!.removeAttribute("lang"));
-    await one.getByRole("button", { name: "Take the right hand" }).waitFor();
-    await two.getByRole("button", { name: "右手を持つ" }).waitFor();
+    await first.getByRole("button", { name: "Take the right hand" }).waitFor();
+    await second.getByRole("button", { name: "右手を持つ" }).waitFor();
     await waitForStages(page, 2);
     // Moved into an element of another language.
     await page.evaluate(() => {
       document.documentElement.lang = "ja";
       document.querySelector("div")!.lang = "en";
-      document.body.append(document.querySelector("#one")!);
+      document.body.append(document.querySelector("#first")!);
     });
-    await one.getByRole("button", { name: "右手を持つ" }).waitFor();
-    expect(await texts(page, "#one")).toEqual({ language: "ja", foreign: [] });
-    expect(await texts(page, "#two")).toEqual({ language: "ja", foreign: [] });
+    await first.getByRole("button", { name: "右手を持つ" }).waitFor();
+    expect(await texts(page, "#first")).toEqual({ language: "ja", foreign: [] });
+    expect(await texts(page, "#second")).toEqual({ language: "ja", foreign: [] });
   });
 
   test("errors are shown in the language of the stage", async () => {
     const missing = `/?session=nowhere#token=${token}`;
     const page = await open(
-      stage('id="one" lang="ja"', missing) +
-        stage('id="two"', missing) +
+      stage('id="first" lang="ja"', missing) +
+        stage('id="second"', missing) +
         '<bunraku-stage lang="ja" src="stage:here" style="width: 240px"></bunraku-stage>',
     );
-    await page.locator("#one .notice").getByText("舞台'nowhere'はありません").waitFor();
-    await page.locator("#two .notice").getByText("there is no session 'nowhere'").waitFor();
+    await page.locator("#first .notice").getByText("舞台'nowhere'はありません").waitFor();
+    await page.locator("#second .notice").getByText("there is no session 'nowhere'").waitFor();
     await page.getByText("ここに舞台はありません").waitFor();
     // Inside the shadow root of another element.
     await page.evaluate(() => {
@@ -101,7 +101,7 @@ async function texts(page: Page, selector: string): Promise<{ language: string; 
   const { language, names } = await page.locator(selector).evaluate((stage) => ({
     language: stage.shadowRoot!.querySelector<HTMLElement>(".frame")!.lang,
     names: [...stage.shadowRoot!.querySelectorAll("[aria-label], [title]")]
-      .flatMap((one) => [one.getAttribute("aria-label"), one.getAttribute("title")])
+      .flatMap((element) => [element.getAttribute("aria-label"), element.getAttribute("title")])
       .filter((name) => name !== null),
   }));
   expect(names.length).toBeGreaterThan(10);

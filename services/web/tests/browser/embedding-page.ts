@@ -33,12 +33,12 @@ export async function waitForStages(page: Page, count = 1): Promise<void> {
     );
   }, count);
   const frames = await page.evaluate(() =>
-    [...document.querySelectorAll("bunraku-stage")].map((one) => one.stage!.renderer.info.render.frame),
+    [...document.querySelectorAll("bunraku-stage")].map(({ stage }) => stage!.renderer.info.render.frame),
   );
   await page.waitForFunction(
     (frames) =>
       [...document.querySelectorAll("bunraku-stage")].every(
-        (one, nth) => one.stage!.renderer.info.render.frame > frames[nth] + 1,
+        ({ stage }, index) => stage!.renderer.info.render.frame > frames[index] + 1,
       ),
     frames,
   );

@@ -73,15 +73,15 @@ export async function benchMemory(bench: BenchContext): Promise<BenchFigures> {
 function findClip(folder: string): string {
   const shared = join(sharedClipFolder() ?? folder, "mocap/bvh/mass_walk.bvh");
   if (existsSync(shared)) return shared;
-  const own = join(folder, "own.bvh");
+  const demoClip = join(folder, "own.bvh");
   const script = [
     "import sys",
     "from bunraku.demo.choreography import animate_dance",
     "from bunraku.motion.bvh_writer import write_bvh",
     "sys.stdout.buffer.write(write_bvh(animate_dance()))",
   ].join("; ");
-  writeFileSync(own, execFileSync(join(REPOSITORY, ".venv/bin/python"), ["-c", script], { maxBuffer: 1 << 26 }));
-  return own;
+  writeFileSync(demoClip, execFileSync(join(REPOSITORY, ".venv/bin/python"), ["-c", script], { maxBuffer: 1 << 26 }));
+  return demoClip;
 }
 
 /** Return the size of the heap after a garbage collection, in bytes. */
