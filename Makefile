@@ -14,11 +14,12 @@ UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/vite.config.ts services/web/vite.embed.config.ts proto/prior.json proto/constants.json -type f 2>/dev/null)
 
-.PHONY: pictures test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
+.PHONY: package pictures test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
 
 help:
 	@echo "make demo    set everything up and open the dancing puppet   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
 	@echo "make test    every check and test"
+	@echo "make package build the wheel and the npm package in dist/"
 	@echo "make setup   only install;  make clean   remove what setup and runs made"
 
 .tools/bin/uv:
@@ -54,7 +55,7 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python $(wildcard services/bunraku/*/_kernels.py services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py services/bunraku/marionette/*.py) proto/prior.json proto/constants.json
+.setup/warm: .setup/python $(wildcard services/bunraku/*/_kernels.py services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py services/bunraku/marionette/*.py services/bunraku/marionette/solver/*.py) proto/prior.json proto/constants.json
 	@echo "setup: compiling reader, codec and what moves limbs"
 	@$(BIN)/bunraku warm
 	@touch $@
@@ -82,6 +83,15 @@ test-web: .setup/page
 	cd services/web && npm run --silent check && npm test --silent
 
 test: setup lint test-web test-python
+
+# build the wheel and the npm package in dist/, and try both in empty environments
+package: setup
+	@rm -rf dist && mkdir dist
+	@$(UV) build --quiet --wheel --out-dir dist .
+	@cd services/web && npm run --silent build:package && npm pack --silent --pack-destination ../../dist ./dist
+	@$(BIN)/pytest --quiet tests/e2e/test_package.py
+	@cd services/web && npx vitest run --project node tests/package.test.ts
+	@ls dist
 
 vectors: .setup/python
 	$(BIN)/python -m tests.vectors

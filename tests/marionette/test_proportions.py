@@ -86,5 +86,5 @@ def test_a_name_is_in_thousandths_where_they_say_the_same() -> None:
 def test_an_arm_without_a_hand_is_refused() -> None:
     with pytest.raises(ProportionsError, match="L2"):
         Proportions.from_links((0.3, 0.3, 0.0))
-    with pytest.raises(ProportionsError, match="above zero"):
+    with pytest.raises(ProportionsError, match="sum to zero"):
         Proportions.from_links((0.0, 0.0, 0.0))
