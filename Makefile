@@ -102,7 +102,7 @@ prior: .setup/python
 
 # measure the offset between sound and picture, in Chromium
 bench-audio: setup
-	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "is heard where"
+	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "clicks are heard in time"
 
 # take the pictures of README and docs from the running page
 pictures: setup
