@@ -86,7 +86,7 @@ async def test_edit_is_saved_before_it_is_acknowledged(
 async def test_join_of_a_full_stage_gives_503(context: ServiceContext, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 1)
     await join_stage(context, "a")
-    with pytest.raises(ProblemError, match="1 puppeteers are living") as refused:
+    with pytest.raises(ProblemError, match="1 puppeteers are here") as refused:
         await join_stage(context, "b")
     assert refused.value.status == 503
 
