@@ -1,4 +1,4 @@
-/** HTTP API for motions and sessions (`proto/SPEC.md`, HTTP). */
+/** HTTP API for motions and sessions (`proto/http.md`). */
 
 import { type Access, pageAccess } from "./access";
 import { ProblemError } from "./problem";

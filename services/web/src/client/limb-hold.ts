@@ -7,7 +7,7 @@ import { PredictedLimb } from "./predicted-limb";
 export const INPUT_INTERVAL_MS = 16;
 /** Interval of keep-alive messages for a limb that is held still. */
 const ALIVE_INTERVAL_MS = 100;
-/** Time after which a request for a limb expires (SPEC, Ownership). */
+/** Time after which a request for a limb expires (proto/server.md, 6.3). */
 const ASK_TIMEOUT_MS = 20_000;
 
 /** "claimed": not answered by the session yet. "granted": held under an epoch. */

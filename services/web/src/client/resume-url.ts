@@ -1,4 +1,4 @@
-/** URL with which a viewer resumes after a lost connection (`proto/SPEC.md`, Sockets: `have`, `at`, `clock`). */
+/** URL with which a viewer resumes after a lost connection (`proto/server.md`, 6.1: `have`, `at`, `clock`). */
 
 import type { MotionBlockStore } from "../playout/block-store";
 import { positionAt } from "../playout/timeline";

@@ -1,4 +1,4 @@
-/** Reason for the shown bitrate level or the missing picture, as a text for the user (`proto/SPEC.md`, Choice). */
+/** Reason for the shown bitrate level or the missing picture, as a text for the user (`proto/messages.md`, 3.8). */
 
 import { formatDecimal } from "../i18n/number-format";
 import { type PlainMessageKey, pageTranslator } from "../i18n/translator";

@@ -188,7 +188,7 @@ export class Viewer extends EventTarget {
   }
 
   /**
-   * Return the seven values of the camera or light `scenes[scene]` at local `nowMs` (`proto/SPEC.md`, Scene block).
+   * Return the seven values of the camera or light `scenes[scene]` at local `nowMs` (`proto/codec.md`, 2.14).
    * Null before the first block; while a block is missing the last values are kept. The next call reuses the storage.
    */
   sceneAt(nowMs: number, scene = 0): Float64Array | null {

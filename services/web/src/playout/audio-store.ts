@@ -1,4 +1,4 @@
-/** Audio blocks that a viewer holds (`proto/SPEC.md`, Audio block). */
+/** Audio blocks that a viewer holds (`proto/codec.md`, 2.15). */
 
 import { type AudioTrack, unpackAudioBlock } from "../codec/audio";
 import { DamagedBlock } from "../codec/errors";

@@ -2,7 +2,7 @@
 
 import type { SceneTrack } from "../codec/scene";
 
-/** Light at one instant: its seven values (`proto/SPEC.md`, Scene block), and the intensity that equals full scale. */
+/** Light at one instant: its seven values (`proto/codec.md`, 2.14), and the intensity that equals full scale. */
 export interface LightState {
   readonly full: number;
   readonly numbers: ArrayLike<number>;

@@ -1,4 +1,4 @@
-/** Overlays of controlled limbs, applied to the motion's pose at any clock time (`proto/SPEC.md`, Overlay). */
+/** Overlays of controlled limbs, applied to the motion's pose at any clock time (`proto/messages.md`, 3.5). */
 
 import { fromRotationVector, slerp } from "../motion/rotation";
 import { LIMB_FIRST_JOINTS, LIMBS, type Pose } from "../motion/skeleton";

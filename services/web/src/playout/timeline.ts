@@ -1,5 +1,5 @@
 /**
- * Timeline of a stage: mapping of clock time to motion time (`proto/SPEC.md`, Timeline). Times are microseconds:
+ * Timeline of a stage: mapping of clock time to motion time (`proto/playback.md`, 4.2). Times are microseconds:
  * `clock` of the reference clock, positions and durations of the motion.
  */
 
