@@ -55,13 +55,13 @@ class LineProcess:
         return line.strip()
 
     def write_line(self, line: object) -> None:
-        """Send a line."""
+        """Write one line of text."""
         assert self.process.stdin is not None
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 
     def request(self, line: object) -> Any:
-        """Send a line and return the parsed answer."""
+        """Write one line and return the parsed answer."""
         self.write_line(line)
         return json.loads(self.read_line())
 

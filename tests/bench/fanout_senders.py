@@ -4,8 +4,8 @@
 standard input, a number of seconds, sends for that time and prints one JSON object: `messages` sent and `cpu`, the user
 and system time of this process in seconds. KIND is `bunraku` (the stream service as `bunraku up` serves it, an overlay
 published on its bus), `playing` (the same with a playing motion), `fastapi` (`send_bytes` in a loop), `websockets`
-(`broadcast`) or `socketio` (`emit`). With the first two, the line `waiting` requests the maximum number of bytes queued
-for a viewer.
+(`broadcast`) or `socketio` (`emit`). With the first two, `waiting` instead of a number requests the maximum number of
+bytes queued for a viewer.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from math import pi
 from statistics import median
 from typing import Any
@@ -69,7 +70,8 @@ def measure_accuracy(random: np.random.Generator) -> dict[str, float]:
             paper = f"{100.0 * found.paper_tip_mean:18.4f}{100.0 * found.paper_tip_max:7.3f}"
             print(
                 f"{body.name + suffix.replace('_', ' '):<22}{found.tip_error_max:10.1e}"
-                f"{found.angle_error_mean_deg:13.4f}{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}{paper}",
+                f"{found.angle_error_mean_deg:13.4f}{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}"
+                f"{paper}",
                 flush=True,
             )
             for name, value in found._asdict().items():
@@ -123,13 +125,13 @@ def measure_speeds(random: np.random.Generator) -> dict[str, float]:
                 errors[order] = answer["orders"][order]["errors"] | {
                     "slsqp": slsqp.mean_tip_error(targets[:SLSQP_TARGET_COUNT])
                 }
-                found = {name: median(turns) for name, turns in answer["orders"][order]["rates"].items()}
+                found = {name: median(rounds) for name, rounds in answer["orders"][order]["rates"].items()}
                 found["numpy"], found["compiled"] = (
                     batches(arm_batch.solve_arms, targets),
                     batches(compiled_solve_arms, targets),
                 )
                 slsqp_targets = targets[nth * SLSQP_TARGET_COUNT : (nth + 1) * SLSQP_TARGET_COUNT]
-                found["slsqp"] = processor_rate(lambda slsqp_targets=slsqp_targets: slsqp.solve(slsqp_targets))  # type: ignore[misc]
+                found["slsqp"] = processor_rate(partial(slsqp.solve, slsqp_targets))
                 for name, rate in found.items():
                     rates[order].setdefault(name, []).append(rate)
     return report_speeds(rates, errors) | {"languages_differ_max": max_language_difference(bodies, answer["solved"])}

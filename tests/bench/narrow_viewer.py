@@ -41,7 +41,7 @@ class MeasuringViewer(Viewer):
         self.shown: list[tuple[int, int, int]] = []
         """Local time, reference time and bitrate of the shown block (-1 if none) at each picture."""
         self.audio_available: list[bool] = []
-        """Whether the sound was available at each picture."""
+        """Availability of the sound at each picture."""
 
     def _on_message(self, data: bytes) -> None:
         if data and data[0] == Overlay.TYPE:

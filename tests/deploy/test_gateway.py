@@ -80,7 +80,7 @@ APPS: dict[str, list[str]] = {
 
 
 async def app_paths(folder: Path, service: str) -> set[str]:
-    """Return the paths of a service's app, without those of its own documentation."""
+    """Return the paths of a service's app, without those of its documentation."""
     async with open_context(Settings(data=folder)) as context:
         factories: dict[str, Callable[[], FastAPI]] = {
             "stream": lambda: bunraku.stream.app.create_app(context),

@@ -12,6 +12,7 @@ import httpx2
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
 
 from bunraku.http.access_control import Role
 from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Problem, Welcome, unpack
@@ -126,7 +127,8 @@ def test_openapi_lists_every_route_with_its_role(guarded: GuardedServer) -> None
         for path, methods in described["paths"].items()
         for method, operation in methods.items()
     }
-    assert roles == {key: None if ROUTES[key] is None else ROUTES[key].label for key in listed}  # type: ignore[union-attr]
+    required_roles = {key: ROUTES[key] for key in listed}
+    assert roles == {key: None if role is None else role.label for key, role in required_roles.items()}
 
 
 @pytest.mark.parametrize("bad", [*INVALID_TOKENS, "revoked"])
@@ -177,7 +179,9 @@ async def read_until_closed(socket: ClientConnection) -> None:
 
 async def first_message(url: str, request_headers: dict[str, str]) -> tuple[object, int | None]:
     """Return the first message of a connection, and its close code if that message was a `Problem`."""
-    async with connect(url, subprotocols=[SUBPROTOCOL], compression=None, additional_headers=request_headers) as socket:  # type: ignore[list-item]
+    async with connect(
+        url, subprotocols=[Subprotocol(SUBPROTOCOL)], compression=None, additional_headers=request_headers
+    ) as socket:
         data = await socket.recv()
         assert isinstance(data, bytes)
         message = unpack(data)
@@ -313,7 +317,7 @@ async def test_revoking_a_link_closes_its_connections(guarded: GuardedServer) ->
         ticket = (await http.post("/v1/tickets", headers=bearer_headers(share["token"]))).json()["ticket"]
         unused = (await http.post("/v1/tickets", headers=bearer_headers(share["token"]))).json()["ticket"]
         address = guarded.url.replace("http", "ws") + f"/v1/sessions/{guarded.session}/stream"
-        async with connect(f"{address}?ticket={ticket}", subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
+        async with connect(f"{address}?ticket={ticket}", subprotocols=[Subprotocol(SUBPROTOCOL)]) as socket:
             await socket.recv()
             assert (await http.delete(f"/v1/shares/{share['id']}")).status_code == 204
             with pytest.raises(ConnectionClosed) as closed:
@@ -328,7 +332,7 @@ async def test_websocket_closes_when_its_token_expires(guarded: GuardedServer) -
     for path in ("stream", "control"):
         address = guarded.url.replace("http", "ws") + f"/v1/sessions/{guarded.session}/{path}"
         token = bearer_headers(make_token(Role.CONTROL, lifetime_s=2))
-        async with connect(address, subprotocols=[SUBPROTOCOL], additional_headers=token) as socket:  # type: ignore[list-item]
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=token) as socket:
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
             assert closed.value.rcvd is not None

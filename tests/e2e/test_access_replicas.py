@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import pytest
@@ -35,8 +36,8 @@ async def test_ticket_and_share_link_are_valid_at_every_replica(tmp_path: Path) 
     source.write_bytes(make_bvh_clip(2.0, 5))
     with ExitStack() as stack:
         nats = stack.enter_context(run_jetstream(tmp_path / "nats"))
-        options = {"bus": nats_url_of(nats), "secret": SECRET}
-        one, two = [stack.enter_context(run_server(tmp_path / "data", **options)) for _ in range(2)]  # type: ignore[arg-type]
+        options: dict[str, Any] = {"bus": nats_url_of(nats), "secret": SECRET}
+        one, two = [stack.enter_context(run_server(tmp_path / "data", **options)) for _ in range(2)]
         async with Client(one, make_token(Role.ADMIN)) as host, httpx2.AsyncClient(base_url=two) as other:
             motion = (await host.upload(source))["id"]
             session = (await host.open_session(motion))["id"]

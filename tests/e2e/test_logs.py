@@ -14,6 +14,7 @@ import httpx2
 import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
 
 from bunraku.wire.messages import SUBPROTOCOL, Welcome, unpack
 from tests.credentials import SECRET, bearer_headers, make_token
@@ -114,7 +115,7 @@ async def test_request_id_is_the_same_in_every_process_and_no_secret_is_logged(d
         address = deployment.url("session 2").replace("http", "ws") + f"/v1/sessions/{session}/control?ticket={ticket}"
         for request, accepted in (("pulling-01", True), ("pulling-02", False)):
             headers = {"X-Request-Id": request}
-            async with connect(address, subprotocols=[SUBPROTOCOL], additional_headers=headers) as socket:  # type: ignore[list-item]
+            async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=headers) as socket:
                 first = await socket.recv()
                 assert isinstance(first, bytes)
                 assert isinstance(unpack(first), Welcome) == accepted

@@ -18,7 +18,7 @@ import httpx2
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 from bunraku.http import header_timeout
 from bunraku.http.access_control import Role
@@ -206,9 +206,9 @@ async def test_websocket_from_a_foreign_origin_is_rejected(tmp_path: Path, origi
     with run_server(tmp_path) as url:
         address = url.replace("http", "ws") + "/v1/sessions/none/control"
         with pytest.raises(InvalidStatus) as refused:
-            await connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=origin)  # type: ignore[arg-type]
+            await connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=Origin(origin))
         assert refused.value.response.status_code == 403
-        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=url) as socket:  # type: ignore[arg-type]
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=Origin(url)) as socket:
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
         assert closed.value.rcvd is not None

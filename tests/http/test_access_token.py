@@ -79,11 +79,11 @@ def test_arbitrary_text_is_rejected(text: str) -> None:
         SIGNER.verify(text, NOW)
 
 
-@given(place=st.integers(0, 10_000), letter=st.sampled_from(string.ascii_letters + string.digits + "-_"))
-def test_changed_letter_never_grants_other_access(place: int, letter: str) -> None:
+@given(position=st.integers(0, 10_000), letter=st.sampled_from(string.ascii_letters + string.digits + "-_"))
+def test_changed_letter_never_grants_other_access(position: int, letter: str) -> None:
     token = SIGNER.mint(Access(Role.VIEW, "guest", session="s", expires=NOW + 60), NOW)
-    place %= len(token)
-    changed = token[:place] + letter + token[place + 1 :]
+    position %= len(token)
+    changed = token[:position] + letter + token[position + 1 :]
     try:
         access = SIGNER.verify(changed, NOW)
     except InvalidToken:

@@ -109,24 +109,24 @@ async def test_revocation_reaches_all_replicas_even_after_a_bus_outage(tmp_path:
     (tmp_path / "nats").mkdir()
     with run_jetstream(tmp_path / "nats") as server:
         async with AsyncExitStack() as stack:
-            here, there = [
+            first, second = [
                 (
                     await stack.enter_async_context(open_test_context(tmp_path / "data", nats_url_of(server)))
                 ).authenticator
                 for _ in range(2)
             ]
-            shares = [(await here.create_share(HOST, "s1", None, 600))[0] for _ in range(2)]
+            shares = [(await first.create_share(HOST, "s1", None, 600))[0] for _ in range(2)]
             reasons: list[asyncio.Future[CloseConnection]] = []
             for share in shares:
                 reasons.append(asyncio.get_running_loop().create_future())
-                there.register_connection(
+                second.register_connection(
                     Access(Role.VIEW, expires=share.expires, share=share.id), reasons[-1].set_result
                 )
             async with asyncio.timeout(20):
-                await here.revoke_share(shares[0].id)
+                await first.revoke_share(shares[0].id)
                 assert (await reasons[0]).title == "Link revoked"
                 # a message published during the outage is lost; links are checked after reconnecting
                 await asyncio.to_thread(server.kill)
-                await here.revoke_share(shares[1].id)
+                await first.revoke_share(shares[1].id)
                 await asyncio.to_thread(server.start)
                 assert (await reasons[1]).title == "Link revoked"

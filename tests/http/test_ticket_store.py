@@ -75,16 +75,16 @@ async def test_any_replica_redeems_a_ticket_exactly_once(tmp_path: Path) -> None
         try:
             for bus in buses:
                 await bus.open()
-            here, there, third = map(TicketStore, buses)
-            stores = [there, third, here, there, third] * 4
+            first, second, third = map(TicketStore, buses)
+            stores = [second, third, first, second, third] * 4
             for _ in range(5):
-                ticket = here.issue(ACCESS)
+                ticket = first.issue(ACCESS)
                 results = await asyncio.gather(*(one.redeem(ticket) for one in stores))
                 assert sorted(map(repr, results)) == sorted([repr(ACCESS), *["None"] * (len(stores) - 1)])
             # a ticket of a stopped replica is invalid
-            ticket = here.issue(ACCESS)
-            here.close()
-            assert await there.redeem(ticket) is None
+            ticket = first.issue(ACCESS)
+            first.close()
+            assert await second.redeem(ticket) is None
         finally:
             for bus in buses:
                 await bus.close()

@@ -13,11 +13,11 @@ from bunraku.http.token_bucket import KeyedTokenBuckets, TokenBucket, client_net
     waits=st.lists(st.floats(0, 5), max_size=200),
 )
 def test_taken_tokens_never_exceed_burst_plus_rate(rate: float, burst: float, waits: list[float]) -> None:
-    bucket, now, taken = TokenBucket(rate, burst), 0.0, 0
+    bucket, now, granted = TokenBucket(rate, burst), 0.0, 0
     for wait in waits:
         now += wait
-        taken += bucket.take(now)
-        assert taken <= burst + rate * now + 1e-6
+        granted += bucket.take(now)
+        assert granted <= burst + rate * now + 1e-6
 
 
 def test_burst_is_available_at_once_then_the_rate() -> None:

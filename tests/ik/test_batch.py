@@ -15,7 +15,7 @@ IDENTITY = "396-352-252-560-320-120"
 
 
 @pytest.mark.parametrize(
-    ("header", "kind"),
+    ("header", "media_type"),
     [
         (None, batch.JSON),
         ("application/json; charset=utf-8", batch.JSON),
@@ -23,12 +23,12 @@ IDENTITY = "396-352-252-560-320-120"
         ("application/vnd.msgpack", batch.MSGPACK),
     ],
 )
-def test_content_kind(header: str | None, kind: str) -> None:
-    assert batch.parse_content_type(header) == kind
+def test_content_type_is_parsed(header: str | None, media_type: str) -> None:
+    assert batch.parse_content_type(header) == media_type
 
 
 @pytest.mark.parametrize(
-    ("header", "kind"),
+    ("header", "media_type"),
     [
         (None, batch.MSGPACK),
         ("*/*", batch.MSGPACK),
@@ -36,11 +36,11 @@ def test_content_kind(header: str | None, kind: str) -> None:
         ("text/html, application/json;q=0.9", batch.JSON),
     ],
 )
-def test_accepted_kind_of_a_messagepack_request(header: str | None, kind: str) -> None:
-    assert batch.negotiate_media_type(header, batch.MSGPACK) == kind
+def test_accept_header_of_a_messagepack_request(header: str | None, media_type: str) -> None:
+    assert batch.negotiate_media_type(header, batch.MSGPACK) == media_type
 
 
-def test_kinds_not_spoken_are_refused() -> None:
+def test_unsupported_media_types_give_415_and_406() -> None:
     with pytest.raises(ProblemError) as refused:
         batch.parse_content_type("text/csv")
     assert refused.value.status == 415
@@ -49,10 +49,10 @@ def test_kinds_not_spoken_are_refused() -> None:
     assert refused.value.status == 406
 
 
-def test_decode_says_where_a_request_is_wrong() -> None:
-    asked = batch.decode_request(msgpack.packb({"proportions": IDENTITY, "legs": [1], "unknown": 3}), batch.MSGPACK)
-    assert asked.legs == [1.0]
-    assert asked.targets == []
+def test_decode_error_names_the_field() -> None:
+    request = batch.decode_request(msgpack.packb({"proportions": IDENTITY, "legs": [1], "unknown": 3}), batch.MSGPACK)
+    assert request.legs == [1.0]
+    assert request.targets == []
     with pytest.raises(ProblemError) as refused:
         batch.decode_request(b'{"proportions": "x", "targets": [[0, 0, 1e300]]}', batch.JSON)
     assert refused.value.status == 422
@@ -62,13 +62,13 @@ def test_decode_says_where_a_request_is_wrong() -> None:
     assert refused.value.status == 400
 
 
-def test_solve_answers_alike_in_both_forms() -> None:
-    asked = batch.SolveRequest(proportions=IDENTITY, targets=[(0.1, -0.4, 0.5)], legs=[0.5])
+def test_json_and_messagepack_solutions_are_equal() -> None:
+    request = batch.SolveRequest(proportions=IDENTITY, targets=[(0.1, -0.4, 0.5)], legs=[0.5])
     proportions = Proportions.parse(IDENTITY)
     data = bend_table.pack_bend_table(bend_table.build_bend_table(proportions))
-    said = json.loads(batch.solve_batch(asked, proportions, data, batch.JSON))
-    packed = msgpack.unpackb(batch.solve_batch(asked, proportions, data, batch.MSGPACK))
-    assert said == packed
-    batch.SolveAnswer.model_validate(said)
-    np.testing.assert_allclose(said["arms"]["tip"], [[0.1, -0.4, 0.5]], atol=1e-12)
-    assert said["legs"] == {"hip": [0.5], "knee": [0.5]}
+    solution = json.loads(batch.solve_batch(request, proportions, data, batch.JSON))
+    packed = msgpack.unpackb(batch.solve_batch(request, proportions, data, batch.MSGPACK))
+    assert solution == packed
+    batch.SolveAnswer.model_validate(solution)
+    np.testing.assert_allclose(solution["arms"]["tip"], [[0.1, -0.4, 0.5]], atol=1e-12)
+    assert solution["legs"] == {"hip": [0.5], "knee": [0.5]}

@@ -1,4 +1,4 @@
-"""Arms that several tests hang."""
+"""Arms, targets and motions that several tests use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ARM_PROPORTIONS = tuple(
 
 
 def random_tips(proportions: Proportions, count: int, seed: int) -> Array:
-    """Random hand tips (count, 3) the arm reaches, evenly in direction and distance."""
+    """Return random reachable hand tips (count, 3), uniform in direction and distance."""
     random = np.random.default_rng(seed)
     direction = random.normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -24,7 +24,7 @@ def random_tips(proportions: Proportions, count: int, seed: int) -> Array:
 
 
 def random_motion(frames: int, seed: int, fps: float = 60.0) -> Array:
-    """Rotations (frames, 18, 4) of a smooth invented dance: joints swing, the body turns, elbows bend forwards."""
+    """Return rotations (frames, 18, 4) of a smooth motion: joints swing, the body turns, elbows bend forwards."""
     random = np.random.default_rng(seed)
     t = (np.arange(frames) / fps)[:, None, None]
     hertz, phase = random.uniform(0.2, 1.5, (18, 3)), random.uniform(0.0, 6.3, (18, 3))

@@ -1,7 +1,7 @@
-"""The merge as it would be told to a child: for each frame, all that has come so far, in order, from the beginning.
+"""Reference implementation of the merge, for comparison with the real one.
 
-No state is carried on but the limbs themselves (`pulled`), which have tests of their own. It is slow and plain; what it
-is there for is to be compared with.
+It is slow and simple: each frame replays all inputs received so far, in order. The only state between frames is that of
+the limbs (`controlled_limb`), which have separate tests.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from bunraku.motion.skeleton import Figure
 
 @dataclass
 class ReceivedInput:
-    """One input as it came: at `came`, made at `sampled` by the sender's own clock."""
+    """Input of a puppeteer; `sampled_us` is a time of the sender's clock."""
 
     received_us: int
     sampled_us: int
@@ -33,7 +33,7 @@ class ReceivedInput:
 
 @dataclass
 class LimbHold:
-    """One limb in one hand since `since`: words are the times at which its holder said anything."""
+    """Control of a limb by a puppeteer; `heard_us` are the times of its messages."""
 
     puppeteer: str
     epoch: int
@@ -42,57 +42,60 @@ class LimbHold:
     inputs: list[ReceivedInput] = field(default_factory=list)
 
     def active_us(self, clock: int) -> int:
-        """Microseconds since the grant, without the silences."""
+        """Return the time since the grant, without silences."""
         times = [self.granted_us, *self.heard_us]
-        passed = sum(min(b - a, HOLD_TIMEOUT_US) for a, b in pairwise(times))
-        return passed + min(max(clock - times[-1], 0), HOLD_TIMEOUT_US)
+        elapsed_us = sum(min(b - a, HOLD_TIMEOUT_US) for a, b in pairwise(times))
+        return elapsed_us + min(max(clock - times[-1], 0), HOLD_TIMEOUT_US)
 
-    def active_us_at(self, one: ReceivedInput) -> int:
-        """`alive` when an input came."""
+    def active_us_at(self, received: ReceivedInput) -> int:
+        """Return `active_us` at the reception of an input."""
         return LimbHold(
-            self.puppeteer, self.epoch, self.granted_us, self.heard_us[: self.heard_us.index(one.received_us) + 1]
-        ).active_us(one.received_us)
+            self.puppeteer, self.epoch, self.granted_us, self.heard_us[: self.heard_us.index(received.received_us) + 1]
+        ).active_us(received.received_us)
 
     def ordered_inputs(self) -> list[tuple[ReceivedInput, int]]:
-        """The inputs that count, in order, each with when it was made in the time of `alive`."""
-        taken: list[tuple[ReceivedInput, int]] = []
-        for nth, one in enumerate(self.inputs):
-            lag = one.received_us - one.sampled_us
-            # the quickest so far is taken to have needed no time, whatever the sender's clock says
-            late = lag - min(other.received_us - other.sampled_us for other in self.inputs[: nth + 1])
-            taken.append((one, max(self.active_us_at(one) - min(late, HOLD_TIMEOUT_US), 0)))
-        return sorted(taken, key=lambda pair: pair[0].sequence)
+        """Return the inputs by sequence, each with its sample time on the scale of `active_us`."""
+        ordered: list[tuple[ReceivedInput, int]] = []
+        for index, received in enumerate(self.inputs):
+            lag_us = received.received_us - received.sampled_us
+            # the input with the least delay so far counts as not delayed: clock offsets cancel
+            delay_us = lag_us - min(other.received_us - other.sampled_us for other in self.inputs[: index + 1])
+            ordered.append((received, max(self.active_us_at(received) - min(delay_us, HOLD_TIMEOUT_US), 0)))
+        return sorted(ordered, key=lambda pair: pair[0].sequence)
 
     def target_at(self, limb: Limb, start: Vector, clock: int) -> Vector:
-        """Where the limb should be: all inputs played from the first."""
-        at, value = 0, start
-        goal: Vector | None = None
-        way, speed = 0, (0.0, 0.0, 0.0)
+        """Return the target of the limb: all inputs replayed from the first."""
+        time_us, value = 0, start
+        destination: Vector | None = None
+        duration_us, speed = 0, (0.0, 0.0, 0.0)
 
-        def along(until: int) -> Vector:
-            if goal is not None:
-                passed = until - at
-                if passed >= way:
-                    return goal
-                return vector.add(value, vector.scale(vector.subtract(goal, value), passed / way))
+        def value_at(until_us: int) -> Vector:
+            if destination is not None:
+                elapsed_us = until_us - time_us
+                if elapsed_us >= duration_us:
+                    return destination
+                return vector.add(value, vector.scale(vector.subtract(destination, value), elapsed_us / duration_us))
             if speed == (0.0, 0.0, 0.0):
                 return value
-            return clamp_to_reach(limb.is_hand, vector.add(value, vector.scale(speed, (until - at) * 1e-6)))
+            return clamp_to_reach(limb.is_hand, vector.add(value, vector.scale(speed, (until_us - time_us) * 1e-6)))
 
-        for one, made in self.ordered_inputs():
-            then = max(at, made)
-            value, before, at = along(then), at, then
-            if one.kind == 1:
-                goal, way = clamp_to_reach(limb.is_hand, one.values), min(then - before, MAX_TARGET_DURATION_US)
+        for received, sampled_us in self.ordered_inputs():
+            input_us = max(time_us, sampled_us)
+            value, previous_us, time_us = value_at(input_us), time_us, input_us
+            if received.kind == 1:
+                destination, duration_us = (
+                    clamp_to_reach(limb.is_hand, received.values),
+                    min(input_us - previous_us, MAX_TARGET_DURATION_US),
+                )
             else:
-                full = MAX_HAND_SPEED if limb.is_hand else MAX_LEG_SPEED
-                x, y, z = (min(max(part, -1.0), 1.0) * full for part in one.values)
-                goal, speed = None, (x, y, z) if limb.is_hand else (x, 0.0, 0.0)
-        return along(max(self.active_us(clock), at))
+                max_speed = MAX_HAND_SPEED if limb.is_hand else MAX_LEG_SPEED
+                x, y, z = (min(max(part, -1.0), 1.0) * max_speed for part in received.values)
+                destination, speed = None, (x, y, z) if limb.is_hand else (x, 0.0, 0.0)
+        return value_at(max(self.active_us(clock), time_us))
 
 
 class ReferenceMarionette:
-    """One puppet: who holds what, and the limbs' joints frame by frame."""
+    """Performer whose limbs are claimed and controlled."""
 
     def __init__(self, figure: Figure) -> None:
         self.limbs: dict[Limb, ControlledHand | ControlledLeg] = {
@@ -105,7 +108,7 @@ class ReferenceMarionette:
         self.epochs = dict.fromkeys(Limb, 0)
 
     def claim(self, limb: Limb, puppeteer: str, clock: int) -> int | None:
-        """The epoch granted, None where another holds the limb."""
+        """Return the granted epoch, or None if another puppeteer holds the limb."""
         hold = self.holds[limb]
         if hold is not None and hold.puppeteer != puppeteer:
             return None
@@ -118,57 +121,57 @@ class ReferenceMarionette:
         return self.epochs[limb]
 
     def release(self, limb: Limb, puppeteer: str, epoch: int) -> None:
-        """Lets a limb go."""
+        """Release a limb."""
         hold = self.holds[limb]
         if hold is not None and (hold.puppeteer, hold.epoch) == (puppeteer, epoch):
             self.holds[limb] = None
 
     def keep_alive(self, limb: Limb, puppeteer: str, clock: int) -> None:
-        """Its holder said that it still holds it."""
+        """Record a heartbeat of the holder."""
         hold = self.holds[limb]
         if hold is not None and hold.puppeteer == puppeteer:
             hold.heard_us.append(clock)
 
     def apply_input(self, limb: Limb, puppeteer: str, epoch: int, received: ReceivedInput) -> None:
-        """An input came."""
+        """Apply an input of the current epoch that is not a duplicate and not too old."""
         hold = self.holds[limb]
         if hold is None or (hold.puppeteer, hold.epoch) != (puppeteer, epoch):
             return
         known = {i.sequence for i in hold.inputs}
-        newer = sorted(known, reverse=True)
+        newest_first = sorted(known, reverse=True)
         if received.sequence in known or (
-            len(known) > MAX_REORDERED_INPUTS and received.sequence < newer[MAX_REORDERED_INPUTS]
+            len(known) > MAX_REORDERED_INPUTS and received.sequence < newest_first[MAX_REORDERED_INPUTS]
         ):
             return
         hold.inputs.append(received)
         hold.heard_us.append(received.received_us)
 
     def expire(self, clock: int) -> None:
-        """Limbs of silent holders are free."""
+        """Free the limbs of silent holders."""
         for limb, hold in self.holds.items():
             if hold is not None and clock - max([hold.granted_us, *hold.heard_us]) >= INPUT_TIMEOUT_US:
                 self.holds[limb] = None
 
     def solve_frame(self, pose: Pose, clock: int, seconds: float) -> dict[Limb, JointRotations]:
-        """The joints of the limbs that are not wholly the dance's."""
-        shown: dict[Limb, JointRotations] = {}
-        for limb, pulled in self.limbs.items():
+        """Return the joints of the limbs that are controlled or return to the motion."""
+        overlay: dict[Limb, JointRotations] = {}
+        for limb, controlled in self.limbs.items():
             hold = self.holds[limb]
             self.handovers[limb].advance(hold is not None, seconds)
-            pulled.observe_pose(pose, seconds)
+            controlled.observe_pose(pose, seconds)
             if not self.is_controlled[limb]:
                 continue
-            wanted = None
+            target = None
             if hold is not None:
                 if self.starts[limb] is None:
-                    self.starts[limb] = pulled.position
+                    self.starts[limb] = controlled.position
                 start = self.starts[limb]
                 assert start is not None
-                wanted = hold.target_at(limb, start, clock)
-            joints = pulled.solve_joints(pose, wanted, self.handovers[limb].weight, seconds)
+                target = hold.target_at(limb, start, clock)
+            joints = controlled.solve_joints(pose, target, self.handovers[limb].weight, seconds)
             if joints is None:
                 self.is_controlled[limb] = False
-                pulled.reset()
+                controlled.reset()
             else:
-                shown[limb] = joints
-        return shown
+                overlay[limb] = joints
+        return overlay

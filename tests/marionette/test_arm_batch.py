@@ -11,11 +11,11 @@ from bunraku.marionette.constants import MAX_ELBOW_BEND_RAD, MAX_TIP_DISTANCE, M
 from bunraku.marionette.proportions import Proportions
 from tests.marionette.fixtures import ARM_PROPORTIONS, random_tips
 
-places = st.tuples(*[st.floats(-1.5, 1.5)] * 3)
+positions = st.tuples(*[st.floats(-1.5, 1.5)] * 3)
 
 
 @pytest.mark.parametrize("proportions", ARM_PROPORTIONS, ids=lambda p: p.identity)
-def test_the_tip_is_exact_and_the_joints_are_within_their_limits(proportions: Proportions) -> None:
+def test_tip_is_exact_and_joints_are_within_their_limits(proportions: Proportions) -> None:
     targets = random_tips(proportions, 20_000, seed=1)
     solved = arm_batch.solve_arms(proportions, bend_table.load_bend_table(proportions.identity), targets)
     assert float(np.abs(solved.tip - targets).max()) < 1e-14
@@ -26,31 +26,30 @@ def test_the_tip_is_exact_and_the_joints_are_within_their_limits(proportions: Pr
     assert wrist.min() >= -1e-12
     assert wrist.max() <= MAX_WRIST_BEND_RAD + 1e-12
     links = np.diff(np.stack([np.zeros_like(solved.elbow), solved.elbow, solved.wrist, solved.tip]), axis=0)
-    sizes = np.linalg.norm(links, axis=2)
-    np.testing.assert_allclose(sizes, np.array(proportions.lengths)[:, None] * np.ones(len(targets)), atol=1e-12)
+    lengths = np.linalg.norm(links, axis=2)
+    np.testing.assert_allclose(lengths, np.array(proportions.lengths)[:, None] * np.ones(len(targets)), atol=1e-12)
 
 
 @pytest.mark.parametrize("proportions", ARM_PROPORTIONS, ids=lambda p: p.identity)
-def test_the_arm_hangs_as_low_as_any_other_bend_would(proportions: Proportions) -> None:
+def test_bend_has_the_least_potential_energy(proportions: Proportions) -> None:
     targets = random_tips(proportions, 500, seed=2)
     solved = arm_batch.solve_arms(proportions, bend_table.load_bend_table(proportions.identity), targets)
     r = np.linalg.norm(targets, axis=1)
     beta = np.arcsin(targets[:, 1] / r)
     low, high = wrist_bend_limits(proportions, r)
     shares = np.linspace(0.0, 1.0, 400)[:, None]
-    every = bend_table.potential(proportions, r, beta, low + shares * (high - low))
+    potentials = bend_table.potential(proportions, r, beta, low + shares * (high - low))
     _, t1, t2 = solved.angles()
-    here = bend_table.potential(proportions, r, beta, t2 - t1)
-    above = here - every.min(axis=0)
-    # a few hundredths of a degree from the minimum cost next to nothing; the corners near the shoulder are coarser
-    assert float(np.percentile(above, 98)) < 1e-4
-    assert float(above.max()) < 1e-3
+    excess = bend_table.potential(proportions, r, beta, t2 - t1) - potentials.min(axis=0)
+    # the potential is flat around its minimum; interpolation is coarser in the corners near the shoulder
+    assert float(np.percentile(excess, 98)) < 1e-4
+    assert float(excess.max()) < 1e-3
 
 
-@given(st.sampled_from(ARM_PROPORTIONS), places)
-def test_one_arm_at_a_time_gives_the_same(proportions: Proportions, place: tuple[float, float, float]) -> None:
+@given(st.sampled_from(ARM_PROPORTIONS), positions)
+def test_single_arm_equals_the_batch(proportions: Proportions, position: tuple[float, float, float]) -> None:
     stored = bend_table.load_bend_table(proportions.identity)
-    target = np.array([place])
+    target = np.array([position])
     solved = arm_batch.solve_arms(proportions, stored, target)
     one = Arm(proportions, stored)
     rho, y = float(np.hypot(target[0, 0], target[0, 2])), float(target[0, 1])
@@ -59,55 +58,57 @@ def test_one_arm_at_a_time_gives_the_same(proportions: Proportions, place: tuple
     np.testing.assert_allclose(angles, np.array(solved.angles())[:, 0], atol=1e-11)
 
 
-@given(st.sampled_from(ARM_PROPORTIONS), places)
-def test_out_of_reach_keeps_the_direction(proportions: Proportions, place: tuple[float, float, float]) -> None:
-    target = np.array([place])
-    size = float(np.linalg.norm(target))
-    tip = arm_batch.solve_arms(proportions, bend_table.load_bend_table(proportions.identity), target).tip[0]
-    reach = min(max(size, proportions.min_tip_distance), MAX_TIP_DISTANCE)
-    wanted = target[0] / size * reach if size >= 1e-12 else np.array([0.0, -reach, 0.0])
-    np.testing.assert_allclose(tip, wanted, atol=1e-9)
-
-
-@given(st.sampled_from(ARM_PROPORTIONS), places, st.tuples(*[st.floats(-1.0, 1.0)] * 3))
-def test_a_small_step_of_the_hand_is_a_small_step_of_the_arm(
-    proportions: Proportions, place: tuple[float, float, float], step: tuple[float, float, float]
+@given(st.sampled_from(ARM_PROPORTIONS), positions)
+def test_unreachable_target_is_clamped_along_its_direction(
+    proportions: Proportions, position: tuple[float, float, float]
 ) -> None:
-    """No jumps, away from the axis and from the straight arm: at most 12 radians of bend per arm length."""
-    here = np.array([place])
+    target = np.array([position])
+    distance = float(np.linalg.norm(target))
+    tip = arm_batch.solve_arms(proportions, bend_table.load_bend_table(proportions.identity), target).tip[0]
+    reach = min(max(distance, proportions.min_tip_distance), MAX_TIP_DISTANCE)
+    expected = target[0] / distance * reach if distance >= 1e-12 else np.array([0.0, -reach, 0.0])
+    np.testing.assert_allclose(tip, expected, atol=1e-9)
+
+
+@given(st.sampled_from(ARM_PROPORTIONS), positions, st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+def test_small_step_of_the_hand_causes_a_small_step_of_the_arm(
+    proportions: Proportions, position: tuple[float, float, float], step: tuple[float, float, float]
+) -> None:
+    """The bend changes by at most 12 radians per arm length, except near the axis and the straight arm."""
+    here = np.array([position])
     there = here + 1e-4 * np.array([step])
     rho = np.hypot(here[:, 0], here[:, 2])
-    size = float(np.linalg.norm(here))
-    if rho < 0.02 or size > 0.97:
+    distance = float(np.linalg.norm(here))
+    if rho < 0.02 or distance > 0.97:
         return
     stored = bend_table.load_bend_table(proportions.identity)
     a, b = arm_batch.solve_arms(proportions, stored, here), arm_batch.solve_arms(proportions, stored, there)
     bends = [np.diff(np.array(solved.angles()), axis=0) for solved in (a, b)]
     moved = float(np.abs(bends[0] - bends[1]).max())
-    assert moved <= 12.0 * 1e-4 * np.sqrt(3.0) / max(min(size, 1.0), 0.1)
+    assert moved <= 12.0 * 1e-4 * np.sqrt(3.0) / max(min(distance, 1.0), 0.1)
 
 
-def test_straight_below_faces_forwards() -> None:
+def test_target_straight_below_bends_the_arm_forwards() -> None:
     proportions = ARM_PROPORTIONS[0]
     solved = arm_batch.solve_arms(
         proportions, bend_table.load_bend_table(proportions.identity), np.array([[0.0, -0.7, 0.0], [0.0, 0.0, 0.0]])
     )
     assert solved.azimuth.tolist() == [0.0, 0.0]
-    assert solved.elbow[0, 2] < 0.0  # the elbow points back as a forearm is lifted forwards
+    assert solved.elbow[0, 2] < 0.0  # the elbow points backwards
     np.testing.assert_allclose(solved.tip[1], [0.0, -proportions.min_tip_distance, 0.0], atol=1e-12)
 
 
 def solve_by_specification(proportions: Proportions, stored: BendTable, x: float, y: float) -> list[complex]:
-    """Elbow, wrist and tip as `proto/SPEC.md` says it ("Arm table"), word by word."""
+    """Return elbow, wrist and tip by the formulas of `proto/SPEC.md` ("Arm table")."""
     a, b, c = proportions.lengths
     inner = min(
         abs(a + rest * np.exp(1j * min(np.radians(150.0), np.pi - np.angle(rest))))
         for rest in (b + c * np.exp(1j * np.radians(degrees)) for degrees in range(81))
     )
     inner = max(0.1, 1.25 * inner)
-    size = np.hypot(x, y)
-    r = min(max(size, inner), 1.0 - 1e-6)
-    p = (x + 1j * y) * r / size
+    distance = np.hypot(x, y)
+    r = min(max(distance, inner), 1.0 - 1e-6)
+    p = (x + 1j * y) * r / distance
     q = np.sqrt((1.0 - r) / (1.0 - inner))
     row, column = 63.0 * (1.0 - q) * (1.0 + 3.0 * q / 4.0), 63.0 * (1.0 + y / (x + abs(y))) / 2.0
     i, j = min(int(row), 62), min(int(column), 62)
@@ -128,21 +129,21 @@ def solve_by_specification(proportions: Proportions, stored: BendTable, x: float
 
 
 @given(st.sampled_from(ARM_PROPORTIONS), st.floats(0.001, 1.3), st.floats(-1.3, 1.3))
-def test_arms_are_as_the_contract_says(proportions: Proportions, x: float, y: float) -> None:
+def test_arms_equal_the_specification(proportions: Proportions, x: float, y: float) -> None:
     stored = bend_table.load_bend_table(proportions.identity)
     solved = arm_batch.solve_arms(proportions, stored, np.array([[0.0, y, x]]))
-    wanted = solve_by_specification(proportions, stored, x, y)
-    for joint, place in zip((solved.elbow, solved.wrist, solved.tip), wanted, strict=True):
-        assert abs(joint[0, 2] + 1j * joint[0, 1] - place) < 1e-9
+    expected = solve_by_specification(proportions, stored, x, y)
+    for joint, position in zip((solved.elbow, solved.wrist, solved.tip), expected, strict=True):
+        assert abs(joint[0, 2] + 1j * joint[0, 1] - position) < 1e-9
 
 
 @settings(max_examples=25)
 @given(st.integers(100, 780), st.data())
-def test_any_arm_there_is_a_table_for_is_exact(upper: int, data: st.DataObject) -> None:
+def test_tip_is_exact_for_any_valid_proportions(upper: int, data: st.DataObject) -> None:
     fore = data.draw(st.integers(100, 980 - upper))
-    heavy = data.draw(st.integers(1, 998))
-    middle = data.draw(st.integers(1, 999 - heavy))
-    identity = f"{upper}-{fore}-{1000 - upper - fore}-{heavy}-{middle}-{1000 - heavy - middle}"
+    upper_mass = data.draw(st.integers(1, 998))
+    forearm_mass = data.draw(st.integers(1, 999 - upper_mass))
+    identity = f"{upper}-{fore}-{1000 - upper - fore}-{upper_mass}-{forearm_mass}-{1000 - upper_mass - forearm_mass}"
     proportions = Proportions.parse(identity)
     targets = random_tips(proportions, 2_000, seed=upper)
     solved = arm_batch.solve_arms(proportions, bend_table.load_bend_table(identity), targets)

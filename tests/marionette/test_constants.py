@@ -38,7 +38,7 @@ def test_python_and_typescript_export_the_same_names() -> None:
     assert python - {"CONSTANTS"} == typescript - {"MAX_WRIST_BEND_DEG"}
 
 
-def test_no_other_module_defines_a_constant_again() -> None:
+def test_no_other_module_redefines_a_constant() -> None:
     names = set(re.findall(r"^([A-Z]\w+) = ", PYTHON_MODULE.read_text(encoding="utf-8"), re.M))
     pattern = re.compile(rf"^(?:export )?(?:const )?_?({'|'.join(sorted(names))})(?:: [^=\n]+)? = ", re.M)
     modules = [
@@ -48,8 +48,8 @@ def test_no_other_module_defines_a_constant_again() -> None:
         if path not in (PYTHON_MODULE, TYPESCRIPT_MODULE)
     ]
     assert len(modules) > 200
-    again = {str(path): pattern.findall(path.read_text(encoding="utf-8")) for path in modules}
-    assert {path: found for path, found in again.items() if found} == {}
+    redefinitions = {str(path): pattern.findall(path.read_text(encoding="utf-8")) for path in modules}
+    assert {path: found for path, found in redefinitions.items() if found} == {}
 
 
 def test_package_reads_the_contract_file() -> None:

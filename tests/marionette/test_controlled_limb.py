@@ -8,8 +8,7 @@ from bunraku.marionette.constants import HAND_ACCELERATION, MAX_REACH, MIN_REACH
 from bunraku.marionette.controlled_limb import ControlledHand, ControlledLeg
 from bunraku.marionette.handover import Handover
 from bunraku.marionette.limb_rig import Limb
-from bunraku.marionette.solver import shoulder as limit
-from bunraku.marionette.solver import vector
+from bunraku.marionette.solver import shoulder, vector
 from bunraku.marionette.solver.vector import Vector
 from bunraku.motion.skeleton import standard_figure
 from tests.bench import smoothness
@@ -22,72 +21,72 @@ POSES = random_motion(400, seed=5)
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(3, 200), st.tuples(*[st.floats(-0.15, 0.15)] * 3))
-def test_a_hand_taken_in_the_dance_is_soon_where_it_is_wanted_without_a_jerk(begin: int, aside: Vector) -> None:
-    poses = POSES[begin - 3 : begin + 60].tolist()
+def test_claimed_hand_reaches_its_target_with_bounded_acceleration(begin_frame: int, offset: Vector) -> None:
+    poses = POSES[begin_frame - 3 : begin_frame + 60].tolist()
     hand, handover = ControlledHand(FIGURE, Limb.LEFT_HAND), Handover()
     for pose in poses[:3]:
         hand.observe_pose(pose, FRAME_S)
-    wanted = vector.add(hand.motion_position, aside)
-    reach = vector.length(wanted)
-    places: list[Vector] = []
+    target = vector.add(hand.motion_position, offset)
+    reach = vector.length(target)
+    positions: list[Vector] = []
     for pose in poses[3:]:
         handover.advance(True, FRAME_S)
         hand.observe_pose(pose, FRAME_S)
-        joints = hand.solve_joints(pose, wanted, handover.weight, FRAME_S)
+        joints = hand.solve_joints(pose, target, handover.weight, FRAME_S)
         assert joints is not None
-        places.append(hand.position)
-        # the arm is where its hand is, the whole way, wherever the shoulder lets it
+        positions.append(hand.position)
+        # the joints put the tip exactly there, except near the limit of the shoulder and at full stretch
         if (
-            limit.depth_in_caps(hand.rig.shoulder, hand.rig.target_direction(hand.position)) < -0.3
+            shoulder.depth_in_caps(hand.rig.shoulder, hand.rig.target_direction(hand.position)) < -0.3
             and vector.length(hand.position) < 0.9
         ):
             np.testing.assert_allclose(hand.rig.tip_target(joints), hand.position, atol=1e-6)
     if MIN_REACH < reach < MAX_REACH:
-        assert vector.length(vector.subtract(places[-1], wanted)) < 1e-9
-    speeds = np.diff(np.array(places), axis=0) / FRAME_S
-    if min(vector.length(place) for place in places) > 0.2 and max(vector.length(p) for p in places) < 0.98:
+        assert vector.length(vector.subtract(positions[-1], target)) < 1e-9
+    speeds = np.diff(np.array(positions), axis=0) / FRAME_S
+    if min(vector.length(position) for position in positions) > 0.2 and max(vector.length(p) for p in positions) < 0.98:
         assert np.linalg.norm(np.diff(speeds, axis=0), axis=1).max() / FRAME_S <= HAND_ACCELERATION * 1.001
 
 
-def test_what_is_let_go_comes_back_to_the_dance_and_rests() -> None:
+def test_released_limb_returns_to_the_motion_within_400_ms() -> None:
     for limb in (Limb.RIGHT_HAND, Limb.RIGHT_LEG):
-        pulled = ControlledHand(FIGURE, limb) if limb.is_hand else ControlledLeg(FIGURE, limb)
+        controlled = ControlledHand(FIGURE, limb) if limb.is_hand else ControlledLeg(FIGURE, limb)
         handover = Handover()
-        back = None
+        returned_at = None
         for frame, pose in enumerate(POSES[:120].tolist()):
-            held = 5 <= frame < 60
-            handover.advance(held, FRAME_S)
-            pulled.observe_pose(pose, FRAME_S)
-            if frame < 5 or back is not None:
+            is_held = 5 <= frame < 60
+            handover.advance(is_held, FRAME_S)
+            controlled.observe_pose(pose, FRAME_S)
+            if frame < 5 or returned_at is not None:
                 continue
-            wanted: Vector | None = ((-0.4, 0.3, 0.4) if limb.is_hand else (1.2, 0.0, 0.0)) if held else None
-            joints = pulled.solve_joints(pose, wanted, handover.weight, FRAME_S)
-            assert joints is not None or not held
+            target: Vector | None = ((-0.4, 0.3, 0.4) if limb.is_hand else (1.2, 0.0, 0.0)) if is_held else None
+            joints = controlled.solve_joints(pose, target, handover.weight, FRAME_S)
+            assert joints is not None or not is_held
             if joints is None:
-                back = frame
-                pulled.reset()
-                assert pulled.position == pulled.motion_position
-        assert back is not None
-        assert 0.35 <= (back - 59) * FRAME_S <= 0.401
+                returned_at = frame
+                controlled.reset()
+                assert controlled.position == controlled.motion_position
+        assert returned_at is not None
+        assert 0.35 <= (returned_at - 59) * FRAME_S <= 0.401
 
 
-def test_hand_overs_of_the_demos_dance_are_within_their_bounds() -> None:
-    """As `make bench-ik` measures them, a few."""
-    found = smoothness.measure_handovers(10, 0.25)
-    assert max(one.taking for one in found) <= 80.0
-    assert sorted(one.taken_ms for one in found)[8] <= 120.0
-    assert max(one.back_ms for one in found) <= 400.0
+def test_hand_overs_of_the_demo_motion_are_within_bounds() -> None:
+    """A few of the hand-overs that `make bench-ik` measures."""
+    handovers = smoothness.measure_handovers(10, 0.25)
+    assert max(one.taking for one in handovers) <= 80.0
+    assert sorted(one.taken_ms for one in handovers)[8] <= 120.0
+    assert max(one.back_ms for one in handovers) <= 400.0
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples(*[st.floats(-0.5, 0.5)] * 3))
-def test_no_upper_arm_goes_where_no_shoulder_does_past_the_shoulder_too(one: Vector, other: Vector) -> None:
+def test_upper_arm_stays_within_the_shoulder_limit(first: Vector, second: Vector) -> None:
     hand = ControlledHand(FIGURE, Limb.RIGHT_HAND)
     pose = [[1.0, 0.0, 0.0, 0.0]] * 18
     hand.observe_pose(pose, FRAME_S)
     for frame in range(140):
         hand.observe_pose(pose, FRAME_S)
-        joints = hand.solve_joints(pose, one if frame < 90 else other, 1.0, FRAME_S)
+        joints = hand.solve_joints(pose, first if frame < 90 else second, 1.0, FRAME_S)
         assert joints is not None
         elbow = hand.rig.target_direction(hand.rig.joint_positions(joints)[0])
-        assert limit.depth_in_caps(hand.rig.shoulder, elbow) <= 1e-6
+        assert shoulder.depth_in_caps(hand.rig.shoulder, elbow) <= 1e-6

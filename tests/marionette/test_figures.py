@@ -17,27 +17,31 @@ H_ANIM = BODIES[2].proportions
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_the_pictures_in_the_docs_are_what_the_code_draws(name: Figure) -> None:
-    """Numbers to a fifth of a pixel: the last digit of a sine is the machine's own. To draw them anew:
-    `python -m tests.marionette.test_figures`."""
-    made, stored = draw_figure(H_ANIM, name), (DOCS / f"arm-{name}.svg").read_text(encoding="utf-8")
-    assert NUMBER.sub("#", made) == NUMBER.sub("#", stored)
-    here, there = ([float(number) for number in NUMBER.findall(text)] for text in (made, stored))
-    np.testing.assert_allclose(here, there, atol=0.2)
+def test_committed_figures_equal_generated_figures(name: Figure) -> None:
+    """Compare numbers to 0.2 pixels, since the last digit of a sine depends on the machine.
+
+    `python -m tests.marionette.test_figures` writes the figures again.
+    """
+    generated, stored = draw_figure(H_ANIM, name), (DOCS / f"arm-{name}.svg").read_text(encoding="utf-8")
+    assert NUMBER.sub("#", generated) == NUMBER.sub("#", stored)
+    generated_numbers, stored_numbers = (
+        [float(number) for number in NUMBER.findall(text)] for text in (generated, stored)
+    )
+    np.testing.assert_allclose(generated_numbers, stored_numbers, atol=0.2)
 
 
 @pytest.mark.parametrize("name", FIGURES)
 @pytest.mark.parametrize("identity", [*(body.proportions.identity for body in BODIES), "780-200-20-998-1-1"])
-def test_a_picture_stays_within_its_frame(name: Figure, identity: str) -> None:
+def test_figure_stays_within_its_frame(name: Figure, identity: str) -> None:
     image = ElementTree.fromstring(draw_figure(Proportions.parse(identity), name))
-    for way in image.iter("{http://www.w3.org/2000/svg}path"):
-        for x, y in (map(float, point.split(" ")) for point in way.attrib["d"][1:].split("L")):
+    for path in image.iter("{http://www.w3.org/2000/svg}path"):
+        for x, y in (map(float, point.split(" ")) for point in path.attrib["d"][1:].split("L")):
             assert 0.0 < x < WIDTH
             assert 60.0 < y < HEIGHT
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_the_tip_runs_where_the_figure_says(name: Figure) -> None:
+def test_tip_path_has_the_shape_of_the_figure(name: Figure) -> None:
     tips = tip_path(name, 200)
     assert tips.real.min() > 0.0
     assert np.abs(tips).max() < 1.0
@@ -46,8 +50,8 @@ def test_the_tip_runs_where_the_figure_says(name: Figure) -> None:
     else:
         assert np.ptp(tips.imag) == 0.0
     assert np.abs(exact_arm(H_ANIM, tips)[2] - tips).max() < 1e-14
-    theirs = np.abs(paper_arm(H_ANIM, tips)[2] - tips)
-    assert 1e-5 < theirs.max() < 0.003
+    paper_error = np.abs(paper_arm(H_ANIM, tips)[2] - tips)
+    assert 1e-5 < paper_error.max() < 0.003
 
 
 if __name__ == "__main__":

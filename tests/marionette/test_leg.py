@@ -23,24 +23,24 @@ angles = st.floats(-10.0, 10.0)
 
 
 @given(angles)
-def test_the_knee_bends_one_way_and_lets_the_shank_hang(theta: float) -> None:
+def test_knee_bends_one_way_and_the_shank_hangs(theta: float) -> None:
     hip, knee = leg.solve_legs(np.array([theta]))
     assert constants.MIN_THIGH_ANGLE_RAD <= hip[0] <= constants.MAX_THIGH_ANGLE_RAD
     assert hip[0] == leg.clamp_thigh(theta)
     assert knee[0] == leg.knee_bend(leg.clamp_thigh(theta)) >= 0.0
-    # the shank's own angle from straight down
+    # angle of the shank from straight down
     assert hip[0] - knee[0] == min(hip[0], 0.0)
 
 
 @given(angles, st.floats(0.0, 1.0))
-def test_the_leg_follows_its_input_without_jumps(theta: float, step: float) -> None:
+def test_leg_angles_are_continuous_in_the_input(theta: float, step: float) -> None:
     hip, knee = leg.solve_legs(np.array([theta, theta + step]))
     for angle in (hip, knee):
         assert 0.0 <= angle[1] - angle[0] <= step + 1e-12
 
 
 def plane_angles(rig: LegRig, index: int, joints: JointRotations) -> tuple[float, float, Vector, Vector]:
-    """Angles of thigh and shank from straight down, forwards, and both as unit vectors in the world."""
+    """Return the forward angles of thigh and shank from straight down, and both as world unit vectors."""
     hips, level = rig.hip_facing(POSES[index])
     hip, knee, _ = joints
     thigh = vector.unit(vector.rotate(vector.multiply(hips, hip), rig.thigh), (0.0, 0.0, 0.0))
@@ -55,7 +55,7 @@ def plane_angles(rig: LegRig, index: int, joints: JointRotations) -> tuple[float
 
 
 @given(legs, poses, angles)
-def test_a_figures_shank_hangs_plumb_and_its_knee_never_bends_backwards(limb: Limb, index: int, theta: float) -> None:
+def test_shank_hangs_vertically_and_knee_never_bends_backwards(limb: Limb, index: int, theta: float) -> None:
     rig = LEGS[limb]
     thigh_angle, shank_angle, thigh, shank = plane_angles(rig, index, rig.solve(theta, POSES[index]))
     lifted = leg.clamp_thigh(theta)
@@ -70,16 +70,16 @@ def test_a_figures_shank_hangs_plumb_and_its_knee_never_bends_backwards(limb: Li
 
 
 @given(legs, poses, poses, angles, angles)
-def test_the_ankle_keeps_its_angle(limb: Limb, index: int, other: int, theta: float, another: float) -> None:
+def test_ankle_rotation_is_constant(limb: Limb, index: int, other: int, theta: float, other_theta: float) -> None:
     rig = LEGS[limb]
-    assert rig.solve(theta, POSES[index])[2] == rig.solve(another, POSES[other])[2]
+    assert rig.solve(theta, POSES[index])[2] == rig.solve(other_theta, POSES[other])[2]
 
 
 @given(legs, poses, angles, st.floats(0.0, 0.1))
-def test_a_figures_joints_turn_no_more_than_the_input(limb: Limb, index: int, theta: float, step: float) -> None:
+def test_joints_rotate_at_most_as_far_as_the_input(limb: Limb, index: int, theta: float, step: float) -> None:
     rig = LEGS[limb]
     before, after = rig.solve(theta, POSES[index]), rig.solve(theta + step, POSES[index])
-    for one, other in zip(before, after, strict=True):
-        turn = vector.multiply(vector.conjugate(one), other)
+    for joint_before, joint_after in zip(before, after, strict=True):
+        turn = vector.multiply(vector.conjugate(joint_before), joint_after)
         angle = 2.0 * atan2(vector.length((turn[1], turn[2], turn[3])), abs(turn[0]))
         assert angle <= step + 1e-7

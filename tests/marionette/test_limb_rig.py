@@ -27,14 +27,14 @@ parts = st.floats(-1.0, 1.0)
 directions = st.tuples(parts, parts, parts).filter(lambda v: vector.length(v) > 0.05)
 
 
-def posed(pose: Array, limb: Limb, joints: tuple[tuple[float, ...], ...]) -> tuple[Array, Array]:
-    """World positions and orientations of the pose with one limb's joints replaced, root at the origin."""
+def transforms_with_limb(pose: Array, limb: Limb, joints: tuple[tuple[float, ...], ...]) -> tuple[Array, Array]:
+    """Return world positions and orientations of a pose with one limb's joints replaced, root at the origin."""
     merged = pose.copy()
     merged[list(limb.joint_indices)] = joints
     return skeleton.world_transforms(FIGURE, np.zeros(3), merged)
 
 
-def test_the_limbs_joints_are_the_contracts() -> None:
+def test_limb_joints_equal_the_specification() -> None:
     assert [[JOINTS[k] for k in limb.joint_indices] for limb in Limb] == [
         ["l_shoulder", "l_elbow", "l_wrist"],
         ["r_shoulder", "r_elbow", "r_wrist"],
@@ -44,42 +44,42 @@ def test_the_limbs_joints_are_the_contracts() -> None:
 
 
 @given(hands, poses, directions, st.floats(0.12, 0.999))
-def test_the_worlds_hand_tip_is_at_the_target_and_the_arm_hangs(
-    limb: Limb, pose: Array, towards: Vector, reach: float
+def test_world_hand_tip_is_at_the_target_and_the_arm_hangs(
+    limb: Limb, pose: Array, direction: Vector, reach: float
 ) -> None:
     rig = HANDS[limb]
-    target = vector.scale(vector.unit(towards, (0.0, -1.0, 0.0)), reach)
-    position, orientation = posed(pose, limb, rig.solve(target, rig.local_up(pose.tolist())))
+    target = vector.scale(vector.unit(direction, (0.0, -1.0, 0.0)), reach)
+    position, orientation = transforms_with_limb(pose, limb, rig.solve(target, rig.local_up(pose.tolist())))
     shoulder, elbow, wrist = limb.joint_indices
     tip = position[wrist] + rotation.rotate(orientation[wrist], FIGURE.tips[wrist])
-    place = rotation.rotate(orientation[JOINT_INDEX["vl5"]], np.array(target)) * rig.arm_length_m
-    np.testing.assert_allclose(tip - position[shoulder], place, atol=1e-9)
-    # one vertical plane: level distances are all along one line
+    offset = rotation.rotate(orientation[JOINT_INDEX["vl5"]], np.array(target)) * rig.arm_length_m
+    np.testing.assert_allclose(tip - position[shoulder], offset, atol=1e-9)
+    # all joints are in one vertical plane
     level = np.stack([position[elbow], position[wrist], tip])[:, [0, 2]] - position[shoulder][[0, 2]]
-    along = place[[0, 2]]
-    if np.hypot(*along) > 1e-3:
-        square = (level[:, 0] * along[1] - level[:, 1] * along[0]) / np.hypot(*along)
-        assert float(np.abs(square).max()) < 1e-9
-    # and the elbow below the line to the tip
-    chord = place / np.linalg.norm(place)
-    below = (position[elbow] - position[shoulder]) - chord * float(chord @ (position[elbow] - position[shoulder]))
-    assert below[1] < 1e-9
+    level_offset = offset[[0, 2]]
+    if np.hypot(*level_offset) > 1e-3:
+        distance = (level[:, 0] * level_offset[1] - level[:, 1] * level_offset[0]) / np.hypot(*level_offset)
+        assert float(np.abs(distance).max()) < 1e-9
+    # the elbow is below the chord
+    chord = offset / np.linalg.norm(offset)
+    sag = (position[elbow] - position[shoulder]) - chord * float(chord @ (position[elbow] - position[shoulder]))
+    assert sag[1] < 1e-9
 
 
 @given(hands, poses)
-def test_the_dances_own_hand_is_found(limb: Limb, pose: Array) -> None:
+def test_tip_target_of_a_pose_equals_its_hand_tip(limb: Limb, pose: Array) -> None:
     rig = HANDS[limb]
     position, orientation = skeleton.world_transforms(FIGURE, np.zeros(3), pose)
     shoulder, _, wrist = limb.joint_indices
     tip = position[wrist] + rotation.rotate(orientation[wrist], FIGURE.tips[wrist]) - position[shoulder]
     chest = rotation.conjugate(orientation[JOINT_INDEX["vl5"]])
-    found = rig.tip_target(rig.pose_joints(pose.tolist()))
-    np.testing.assert_allclose(found, rotation.rotate(chest, tip) / rig.arm_length_m, atol=1e-12)
+    target = rig.tip_target(rig.pose_joints(pose.tolist()))
+    np.testing.assert_allclose(target, rotation.rotate(chest, tip) / rig.arm_length_m, atol=1e-12)
 
 
 @given(directions, st.floats(0.12, 0.99))
-def test_the_two_arms_mirror_each_other(towards: Vector, reach: float) -> None:
-    x, y, z = vector.scale(vector.unit(towards, (0.0, -1.0, 0.0)), reach)
+def test_left_and_right_arm_mirror_each_other(direction: Vector, reach: float) -> None:
+    x, y, z = vector.scale(vector.unit(direction, (0.0, -1.0, 0.0)), reach)
     left = HANDS[Limb.LEFT_HAND].solve((x, y, z), (0.0, 1.0, 0.0))
     right = HANDS[Limb.RIGHT_HAND].solve((-x, y, z), (0.0, 1.0, 0.0))
     if np.hypot(x, z) < 1e-6:
@@ -89,20 +89,20 @@ def test_the_two_arms_mirror_each_other(towards: Vector, reach: float) -> None:
         assert abs(abs(sum(p * q for p, q in zip(a, mirrored, strict=True))) - 1.0) < 1e-9
 
 
-def test_a_hand_held_out_ahead_has_its_palm_down_and_its_elbow_bent_forwards() -> None:
+def test_hand_in_front_has_palm_down_and_elbow_bent_forwards() -> None:
     joints = HANDS[Limb.LEFT_HAND].solve((0.0, -0.5, 0.5), (0.0, 1.0, 0.0))
     bend = vector.rotate(joints[1], (0.0, -1.0, 0.0))
     assert bend[2] > 0.2
     assert abs(bend[0]) < 0.1
-    whole = vector.multiply(vector.multiply(joints[0], joints[1]), joints[2])
-    palm = vector.rotate(whole, (-1.0, 0.0, 0.0))
+    hand_rotation = vector.multiply(vector.multiply(joints[0], joints[1]), joints[2])
+    palm = vector.rotate(hand_rotation, (-1.0, 0.0, 0.0))
     assert palm[1] < 0.0
 
 
 @given(legs, poses, st.floats(constants.MIN_THIGH_ANGLE_RAD, constants.MAX_THIGH_ANGLE_RAD))
-def test_the_thigh_lifts_in_the_plane_the_hips_face_and_the_shank_hangs(limb: Limb, pose: Array, theta: float) -> None:
+def test_thigh_lifts_in_the_facing_plane_of_the_hips(limb: Limb, pose: Array, theta: float) -> None:
     rig = LEGS[limb]
-    position, orientation = posed(pose, limb, rig.solve(theta, pose.tolist()))
+    position, orientation = transforms_with_limb(pose, limb, rig.solve(theta, pose.tolist()))
     hip, knee, ankle = limb.joint_indices
     thigh, shank = position[knee] - position[hip], position[ankle] - position[knee]
     _, level = rig.hip_facing(pose.tolist())
@@ -121,7 +121,7 @@ def test_the_thigh_lifts_in_the_plane_the_hips_face_and_the_shank_hangs(limb: Li
     assert abs(rig.thigh_angle(merged.tolist()) - theta) < 1e-9
 
 
-def test_hips_on_their_side_still_face_somewhere() -> None:
+def test_sideways_hips_have_a_facing_direction() -> None:
     pose = np.tile(rotation.IDENTITY, (18, 1))
     pose[0] = rotation.from_coordinate_axis(2, np.array(np.pi / 2.0))
     _, level = LEGS[Limb.LEFT_LEG].hip_facing(pose.tolist())
@@ -130,20 +130,20 @@ def test_hips_on_their_side_still_face_somewhere() -> None:
     assert level[2] > 0.9
 
 
-def test_an_arm_too_short_to_hang_is_refused() -> None:
+def test_arm_without_a_hand_raises_proportions_error() -> None:
     tips = FIGURE.tips.copy()
     tips[JOINT_INDEX["l_wrist"]] = 0.0
     with pytest.raises(ProportionsError, match="L2"):
         ArmRig(Figure(FIGURE.offsets, tips), Limb.LEFT_HAND)
 
 
-def test_a_thigh_lifted_over_the_top_stays_at_its_limit_and_is_not_thrown_back() -> None:
+def test_thigh_lifted_over_the_top_stays_at_its_limit() -> None:
     rig = LegRig(FIGURE, Limb.LEFT_LEG)
     pose = np.tile(rotation.IDENTITY, (18, 1))
-    own, seen = 0.0, []
+    angle, angles = 0.0, []
     for lifted in np.linspace(0.0, 4.0, 100):
         pose[rig.joint_indices[0]] = rotation.from_coordinate_axis(0, np.array(-lifted))
-        own = rig.thigh_angle(pose.tolist(), own)
-        seen.append(own)
-    assert max(seen) == constants.MAX_THIGH_ANGLE_RAD == seen[-1]
-    assert np.abs(np.diff(seen)).max() < 0.05
+        angle = rig.thigh_angle(pose.tolist(), angle)
+        angles.append(angle)
+    assert max(angles) == constants.MAX_THIGH_ANGLE_RAD == angles[-1]
+    assert np.abs(np.diff(angles)).max() < 0.05

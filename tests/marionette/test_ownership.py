@@ -17,11 +17,14 @@ from bunraku.marionette.ownership import (
 
 PUPPETEERS = ("ada", "bo", "cy")
 limbs = st.sampled_from(list(Limb))
-people = st.sampled_from(PUPPETEERS)
+puppeteers = st.sampled_from(PUPPETEERS)
 
 
 class OwnershipMachine(RuleBasedStateMachine):
-    """Any order of claims, inputs and silences: one holder a limb, rising epochs, and only that epoch moves it."""
+    """Any order of claims, inputs and silences.
+
+    A limb has one holder, its epochs rise, and only inputs of the current epoch move it.
+    """
 
     @initialize()
     def start(self) -> None:
@@ -30,76 +33,78 @@ class OwnershipMachine(RuleBasedStateMachine):
         self.held: dict[Limb, tuple[str, int]] = {}
         self.epochs = dict.fromkeys(Limb, 0)
         self.sequences: dict[Limb, set[int]] = {limb: set() for limb in Limb}
-        self.heard = dict.fromkeys(Limb, 0)
+        self.last_heard = dict.fromkeys(Limb, 0)
 
     @rule(step=st.integers(0, 300_000))
     def time_passes(self, step: int) -> None:
         self.now += step
         lost = self.ownership.expire(self.now)
-        due = {limb for limb in self.held if self.now - self.heard[limb] >= INPUT_TIMEOUT_US}
+        due = {limb for limb in self.held if self.now - self.last_heard[limb] >= INPUT_TIMEOUT_US}
         assert {limb for limb, _ in lost} == due
-        for limb, who in lost:
-            assert self.held.pop(Limb(limb))[0] == who
+        for limb, puppeteer in lost:
+            assert self.held.pop(Limb(limb))[0] == puppeteer
 
-    @rule(limb=limbs, who=people)
-    def claim(self, limb: Limb, who: str) -> None:
-        answer = self.ownership.claim(limb, who, self.now)
-        if limb in self.held and self.held[limb][0] != who:
+    @rule(limb=limbs, puppeteer=puppeteers)
+    def claim(self, limb: Limb, puppeteer: str) -> None:
+        answer = self.ownership.claim(limb, puppeteer, self.now)
+        if limb in self.held and self.held[limb][0] != puppeteer:
             assert answer == LimbRefusal(limb, self.held[limb][0], "held")
             return
         assert isinstance(answer, LimbGrant)
         assert answer.epoch > self.epochs[limb]
         self.epochs[limb] = answer.epoch
-        self.held[limb] = (who, answer.epoch)
+        self.held[limb] = (puppeteer, answer.epoch)
         self.sequences[limb] = set()
-        self.heard[limb] = self.now
+        self.last_heard[limb] = self.now
 
-    @rule(limb=limbs, who=people, behind=st.integers(0, 2))
-    def release(self, limb: Limb, who: str, behind: int) -> None:
-        epoch = self.epochs[limb] - behind
-        freed = self.ownership.release(limb, who, epoch, self.now)
-        assert freed == (self.held.get(limb) == (who, epoch))
+    @rule(limb=limbs, puppeteer=puppeteers, epochs_behind=st.integers(0, 2))
+    def release(self, limb: Limb, puppeteer: str, epochs_behind: int) -> None:
+        epoch = self.epochs[limb] - epochs_behind
+        freed = self.ownership.release(limb, puppeteer, epoch, self.now)
+        assert freed == (self.held.get(limb) == (puppeteer, epoch))
         if freed:
             del self.held[limb]
 
-    @rule(who=people)
-    def leave(self, who: str) -> None:
-        mine = {limb for limb, (holder, _) in self.held.items() if holder == who}
-        assert set(self.ownership.leave(who, self.now)) == mine
-        for limb in mine:
+    @rule(puppeteer=puppeteers)
+    def leave(self, puppeteer: str) -> None:
+        held = {limb for limb, (holder, _) in self.held.items() if holder == puppeteer}
+        assert set(self.ownership.leave(puppeteer, self.now)) == held
+        for limb in held:
             del self.held[limb]
 
-    @rule(who=people, some=st.lists(limbs))
-    def alive(self, who: str, some: list[Limb]) -> None:
-        self.ownership.keep_alive(who, [*some, 17], self.now)
-        for limb in some:
-            if limb in self.held and self.held[limb][0] == who:
-                self.heard[limb] = self.now
+    @rule(puppeteer=puppeteers, limbs_sent=st.lists(limbs))
+    def keep_alive(self, puppeteer: str, limbs_sent: list[Limb]) -> None:
+        self.ownership.keep_alive(puppeteer, [*limbs_sent, 17], self.now)
+        for limb in limbs_sent:
+            if limb in self.held and self.held[limb][0] == puppeteer:
+                self.last_heard[limb] = self.now
 
     @rule(
         limb=limbs,
-        who=people,
-        behind=st.integers(0, 2),
+        puppeteer=puppeteers,
+        epochs_behind=st.integers(0, 2),
         sequence=st.integers(0, 6),
         values=st.tuples(*[st.floats(-0.5, 0.5)] * 3),
     )
-    def send_input(self, limb: Limb, who: str, behind: int, sequence: int, values: tuple[float, float, float]) -> None:
-        steering = self.ownership.target(limb)
+    def send_input(
+        self, limb: Limb, puppeteer: str, epochs_behind: int, sequence: int, values: tuple[float, float, float]
+    ) -> None:
+        target = self.ownership.target(limb)
         later = self.now + 10**9
-        before = steering.value_at(later) if steering else None
-        epoch = self.epochs[limb] - behind
-        outcome = self.ownership.apply_input(who, LimbInput(limb, 1, epoch, sequence, self.now, values), self.now)
-        if self.held.get(limb, ("", 0))[0] != who:
+        before = target.value_at(later) if target else None
+        epoch = self.epochs[limb] - epochs_behind
+        outcome = self.ownership.apply_input(puppeteer, LimbInput(limb, 1, epoch, sequence, self.now, values), self.now)
+        if self.held.get(limb, ("", 0))[0] != puppeteer:
             assert outcome is InputOutcome.NOT_OWNER
-        elif behind or sequence in self.sequences[limb]:
+        elif epochs_behind or sequence in self.sequences[limb]:
             assert outcome is InputOutcome.LATE
         else:
             assert outcome in (InputOutcome.ACCEPTED, InputOutcome.CLAMPED)
         after = self.ownership.target(limb)
-        assert after is steering
+        assert after is target
         if outcome in (InputOutcome.ACCEPTED, InputOutcome.CLAMPED):
             self.sequences[limb].add(sequence)
-            self.heard[limb] = self.now
+            self.last_heard[limb] = self.now
             assert after is not None
             if sequence == max(self.sequences[limb]):
                 assert after.value_at(later) == (values if limb.is_hand else (values[0], 0.0, 0.0))
@@ -108,14 +113,14 @@ class OwnershipMachine(RuleBasedStateMachine):
 
     @invariant()
     def one_holder_each(self) -> None:
-        wanted = tuple(self.held[limb][0] if limb in self.held else None for limb in Limb)
-        assert self.ownership.holders() == wanted
+        expected = tuple(self.held[limb][0] if limb in self.held else None for limb in Limb)
+        assert self.ownership.holders() == expected
 
 
 TestMachine = OwnershipMachine.TestCase
 
 
-def test_no_such_limb() -> None:
+def test_unknown_limb_is_refused() -> None:
     ownership = Ownership()
     assert ownership.claim(4, "ada", 0) == LimbRefusal(4, None, "unknown")
     assert not ownership.release(-1, "ada", 1, 0)
@@ -123,18 +128,18 @@ def test_no_such_limb() -> None:
     assert not ownership.ask(7, "ada", True, 0)
 
 
-def test_an_unknown_kind_is_refused() -> None:
+def test_unknown_input_kind_raises_value_error() -> None:
     ownership = Ownership()
-    granted = ownership.claim(0, "ada", 0)
-    assert isinstance(granted, LimbGrant)
+    grant = ownership.claim(0, "ada", 0)
+    assert isinstance(grant, LimbGrant)
     with pytest.raises(ValueError, match="2"):
-        ownership.apply_input("ada", LimbInput(0, 2, granted.epoch, 1, 0, (0.0, 0.0, 0.0)), 0)
+        ownership.apply_input("ada", LimbInput(0, 2, grant.epoch, 1, 0, (0.0, 0.0, 0.0)), 0)
 
 
-def test_first_who_asked_is_granted_a_free_limb() -> None:
+def test_free_limb_is_granted_to_the_first_requester() -> None:
     ownership = Ownership()
-    granted = ownership.claim(0, "ada", 0)
-    assert isinstance(granted, LimbGrant)
+    grant = ownership.claim(0, "ada", 0)
+    assert isinstance(grant, LimbGrant)
     assert ownership.ask(0, "bo", True, 1)
     assert ownership.ask(0, "cy", True, 2)
     assert not ownership.ask(0, "bo", True, 3)
@@ -143,19 +148,19 @@ def test_first_who_asked_is_granted_a_free_limb() -> None:
     assert ownership.asks()[0] == ("bo", "cy")
     assert ownership.grant_free_limbs(4) == ([], False)
     assert ownership.claim(0, "cy", 4) == LimbRefusal(0, "ada", "held")
-    ownership.release(0, "ada", granted.epoch, 5)
-    assert ownership.grant_free_limbs(6) == ([("bo", LimbGrant(Limb.LEFT_HAND, granted.epoch + 1))], True)
+    ownership.release(0, "ada", grant.epoch, 5)
+    assert ownership.grant_free_limbs(6) == ([("bo", LimbGrant(Limb.LEFT_HAND, grant.epoch + 1))], True)
     assert ownership.asks()[0] == ("cy",)
     ownership.leave("bo", 7)
-    assert ownership.grant_free_limbs(8) == ([("cy", LimbGrant(Limb.LEFT_HAND, granted.epoch + 2))], True)
+    assert ownership.grant_free_limbs(8) == ([("cy", LimbGrant(Limb.LEFT_HAND, grant.epoch + 2))], True)
     assert ownership.holders()[0] == "cy"
 
 
-def test_an_ask_ends_when_it_is_taken_back_forgotten_or_its_puppeteer_goes() -> None:
+def test_request_ends_when_withdrawn_expired_or_its_puppeteer_leaves() -> None:
     ownership = Ownership()
     ownership.claim(2, "ada", 0)
-    for who in ("bo", "cy", "di"):
-        ownership.ask(2, who, True, 0)
+    for puppeteer in ("bo", "cy", "di"):
+        ownership.ask(2, puppeteer, True, 0)
     assert ownership.ask(2, "bo", False, 1)
     assert not ownership.ask(2, "bo", False, 1)
     ownership.leave("cy", 2)
@@ -165,13 +170,13 @@ def test_an_ask_ends_when_it_is_taken_back_forgotten_or_its_puppeteer_goes() -> 
     assert ownership.asks()[2] == ()
 
 
-def test_a_limb_let_go_is_remembered_until_it_is_back() -> None:
+def test_released_limb_has_a_target_until_it_is_cleared() -> None:
     ownership = Ownership()
-    granted = ownership.claim(0, "ada", 0)
-    assert isinstance(granted, LimbGrant)
+    grant = ownership.claim(0, "ada", 0)
+    assert isinstance(grant, LimbGrant)
     ownership.clear_target(Limb.LEFT_HAND)
     assert ownership.target(Limb.LEFT_HAND) is not None
-    ownership.release(0, "ada", granted.epoch, 10)
+    ownership.release(0, "ada", grant.epoch, 10)
     assert ownership.target(Limb.LEFT_HAND) is not None
     ownership.clear_target(Limb.LEFT_HAND)
     assert ownership.target(Limb.LEFT_HAND) is None

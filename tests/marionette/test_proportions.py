@@ -12,27 +12,29 @@ masses = st.floats(0.002, 0.1)
 
 
 @given(st.tuples(links, links, links), st.tuples(masses, masses, masses), st.floats(0.01, 100.0))
-def test_identity_is_the_shape_whatever_the_size(
-    lengths: tuple[float, float, float], heavy: tuple[float, float, float], size: float
+def test_identity_is_independent_of_size(
+    lengths: tuple[float, float, float], link_masses: tuple[float, float, float], size: float
 ) -> None:
-    arm = Proportions.from_links(lengths, heavy)
+    arm = Proportions.from_links(lengths, link_masses)
     assert sum(arm.parts[:3]) == sum(arm.parts[3:]) == 10_000
     for exact, rounded in zip((*arm.lengths, *arm.masses), arm.parts, strict=True):
         assert abs(exact * 10_000.0 - rounded) <= 1.0
     assert Proportions.parse(arm.identity) == arm.rounded()
     a, b, c = (length * size for length in lengths)
     assert (
-        max(abs(x - y) for x, y in zip(Proportions.from_links((a, b, c), heavy).lengths, arm.lengths, strict=True))
+        max(
+            abs(x - y) for x, y in zip(Proportions.from_links((a, b, c), link_masses).lengths, arm.lengths, strict=True)
+        )
         < 1e-12
     )
 
 
 @given(st.integers(100, 780), st.data())
 def test_parse_and_identity_are_inverse(upper: int, data: st.DataObject) -> None:
-    fore = data.draw(st.integers(100, 980 - upper))
+    forearm = data.draw(st.integers(100, 980 - upper))
     first = data.draw(st.integers(1, 998))
     second = data.draw(st.integers(1, 999 - first))
-    identity = f"{upper}-{fore}-{1000 - upper - fore}-{first}-{second}-{1000 - first - second}"
+    identity = f"{upper}-{forearm}-{1000 - upper - forearm}-{first}-{second}-{1000 - first - second}"
     arm = Proportions.parse(identity)
     assert arm.identity == identity
     assert arm.rounded() == arm
@@ -55,7 +57,7 @@ def test_parse_and_identity_are_inverse(upper: int, data: st.DataObject) -> None
         ("3930-5880-190-5600-3200-1200", "L2"),
     ],
 )
-def test_refusals_name_the_field(identity: str, field: str) -> None:
+def test_invalid_identity_raises_an_error_that_names_the_field(identity: str, field: str) -> None:
     with pytest.raises(ProportionsError) as refused:
         Proportions.parse(identity)
     assert refused.value.field == field
@@ -63,27 +65,27 @@ def test_refusals_name_the_field(identity: str, field: str) -> None:
 
 
 @given(st.tuples(links, links, links))
-def test_a_link_weighs_by_its_own_length(lengths: tuple[float, float, float]) -> None:
+def test_default_mass_of_a_link_is_proportional_to_its_length(lengths: tuple[float, float, float]) -> None:
     arm = Proportions.from_links(lengths)
     reference = Proportions.from_links(ARM_LENGTH_RATIOS, ARM_MASS_RATIOS)
     assert Proportions.from_links(ARM_LENGTH_RATIOS) == reference
-    heaviness = [mass / length for mass, length in zip(arm.masses, arm.lengths, strict=True)]
-    usual = [mass / length for mass, length in zip(reference.masses, reference.lengths, strict=True)]
-    for one, other in zip(heaviness, usual, strict=True):
-        assert one / heaviness[0] == pytest.approx(other / usual[0], rel=1e-12)
+    densities = [mass / length for mass, length in zip(arm.masses, arm.lengths, strict=True)]
+    reference_densities = [mass / length for mass, length in zip(reference.masses, reference.lengths, strict=True)]
+    for density, reference_density in zip(densities, reference_densities, strict=True):
+        assert density / densities[0] == pytest.approx(reference_density / reference_densities[0], rel=1e-12)
 
 
-def test_masses_that_are_given_win() -> None:
+def test_given_masses_override_the_defaults() -> None:
     assert Proportions.from_links((1.0, 1.0, 1.0), (2.0, 1.0, 1.0)).identity == "3334-3333-3333-5000-2500-2500"
 
 
-def test_a_name_is_in_thousandths_where_they_say_the_same() -> None:
+def test_identity_is_in_thousandths_where_exact() -> None:
     assert Proportions.from_links((0.4, 0.35, 0.25), (0.5, 0.3, 0.2)).identity == "400-350-250-500-300-200"
     assert Proportions.parse("4000-3500-2500-5000-3000-2000").identity == "400-350-250-500-300-200"
     assert Proportions.parse("4001-3500-2499-5000-3000-2000").identity == "4001-3500-2499-5000-3000-2000"
 
 
-def test_an_arm_without_a_hand_is_refused() -> None:
+def test_arm_without_a_hand_raises_proportions_error() -> None:
     with pytest.raises(ProportionsError, match="L2"):
         Proportions.from_links((0.3, 0.3, 0.0))
     with pytest.raises(ProportionsError, match="sum to zero"):

@@ -33,70 +33,70 @@ def orientations(joints: JointRotations) -> JointRotations:
     return (joints[0], elbow, vector.multiply(elbow, joints[2]))
 
 
-def twisted(joints: JointRotations, by: tuple[float, float, float]) -> JointRotations:
-    """The same arm with its links turned about themselves."""
+def twisted(joints: JointRotations, twists: tuple[float, float, float]) -> JointRotations:
+    """Return the joints of the arm with each link twisted about its own axis."""
     first, second, third = (
         vector.multiply(link, vector.from_axis_angle(direction, turn))
-        for link, direction, turn in zip(orientations(joints), DIRECTIONS, by, strict=True)
+        for link, direction, turn in zip(orientations(joints), DIRECTIONS, twists, strict=True)
     )
     elbow = vector.multiply(vector.conjugate(first), second)
     return (first, elbow, vector.multiply(vector.conjugate(second), third))
 
 
 @given(st.lists(arms, min_size=1, max_size=8), st.floats(0.0, 1.0))
-def test_all_places_are_where_they_are_wanted_however_the_links_are_turned(
-    wanted: list[JointRotations], share: float
-) -> None:
-    spins = TwistLimiter(RIG.bones)
-    for joints in wanted:
-        shown = spins.limit(joints, share, FRAME_S)
-        for here, there in zip(RIG.joint_positions(shown), RIG.joint_positions(joints), strict=True):
-            assert vector.length(vector.subtract(here, there)) < 1e-7
-        for one, other, behind in zip(orientations(shown), orientations(joints), spins.lag_rad, strict=True):
-            assert abs(angle(one, other) - min(abs(behind), 2.0 * pi - abs(behind))) < 1e-6
-            assert abs(behind) <= 1.5 * pi * share
+def test_limiting_twist_keeps_joint_positions(requested: list[JointRotations], weight: float) -> None:
+    limiter = TwistLimiter(RIG.bones)
+    for joints in requested:
+        shown = limiter.limit(joints, weight, FRAME_S)
+        for shown_position, requested_position in zip(
+            RIG.joint_positions(shown), RIG.joint_positions(joints), strict=True
+        ):
+            assert vector.length(vector.subtract(shown_position, requested_position)) < 1e-7
+        for one, other, lag in zip(orientations(shown), orientations(joints), limiter.lag_rad, strict=True):
+            assert abs(angle(one, other) - min(abs(lag), 2.0 * pi - abs(lag))) < 1e-6
+            assert abs(lag) <= 1.5 * pi * weight
 
 
 @given(arms, st.tuples(turns, turns, turns))
-def test_links_that_jump_about_themselves_come_over_at_a_bounded_speed(
-    joints: JointRotations, by: tuple[float, float, float]
+def test_jump_of_twist_is_limited_to_the_maximum_speed(
+    joints: JointRotations, twists: tuple[float, float, float]
 ) -> None:
-    spins = TwistLimiter(RIG.bones)
-    shown = spins.limit(joints, 1.0, FRAME_S)
+    limiter = TwistLimiter(RIG.bones)
+    shown = limiter.limit(joints, 1.0, FRAME_S)
     assert shown is joints
-    wanted = twisted(joints, by)
-    for _ in range(int(max(map(abs, by)) / (MAX_TWIST_SPEED_RAD_S * FRAME_S)) + 1):
-        before, shown = shown, spins.limit(wanted, 1.0, FRAME_S)
-        for one, other, jump in zip(orientations(before), orientations(shown), by, strict=True):
+    requested = twisted(joints, twists)
+    for _ in range(int(max(map(abs, twists)) / (MAX_TWIST_SPEED_RAD_S * FRAME_S)) + 1):
+        before, shown = shown, limiter.limit(requested, 1.0, FRAME_S)
+        for one, other, jump in zip(orientations(before), orientations(shown), twists, strict=True):
             assert angle(one, other) <= min(abs(jump), MAX_TWIST_SPEED_RAD_S * FRAME_S) + 1e-6
-    assert max(map(abs, spins.lag_rad)) < 1e-9
-    assert all(angle(one, other) < 1e-6 for one, other in zip(shown, wanted, strict=True))
+    assert max(map(abs, limiter.lag_rad)) < 1e-9
+    assert all(angle(one, other) < 1e-6 for one, other in zip(shown, requested, strict=True))
 
 
-def test_a_link_that_swings_is_carried_without_being_turned() -> None:
-    """On the shortest way: an arm that goes round a circle is turned by nothing that was not asked for."""
-    spins = TwistLimiter(RIG.bones)
-    aside = vector.any_perpendicular(DIRECTIONS[0])
+def test_swing_without_twist_is_unchanged() -> None:
+    """An arm that moves in a circle gets no additional twist."""
+    limiter = TwistLimiter(RIG.bones)
+    axis = vector.any_perpendicular(DIRECTIONS[0])
     for frame in range(60):
-        wanted = (vector.from_axis_angle(aside, 0.2 * frame), IDENTITY, IDENTITY)
-        assert spins.limit(wanted, 1.0, FRAME_S) is wanted
+        requested = (vector.from_axis_angle(axis, 0.2 * frame), IDENTITY, IDENTITY)
+        assert limiter.limit(requested, 1.0, FRAME_S) is requested
 
 
-def test_what_goes_round_and_round_is_kept_up_with_on_the_way_it_goes() -> None:
-    """By the shortest way a link that is behind would turn back where half a circle is left."""
-    spins = TwistLimiter(RIG.bones)
-    behind = []
+def test_lag_behind_constant_rotation_keeps_its_direction() -> None:
+    """By the shortest rotation a link that lags by half a turn would turn back."""
+    limiter = TwistLimiter(RIG.bones)
+    lag = []
     for frame in range(60):
-        spins.limit(twisted(REST, (0.4 * frame, 0.0, 0.0)), 1.0, FRAME_S)
-        behind.append(spins.lag_rad[0])
-    least = behind.index(min(behind))
-    assert behind[least] < -pi
-    assert all(later <= sooner for sooner, later in pairwise(behind[: least + 1]))
+        limiter.limit(twisted(REST, (0.4 * frame, 0.0, 0.0)), 1.0, FRAME_S)
+        lag.append(limiter.lag_rad[0])
+    index_of_least = lag.index(min(lag))
+    assert lag[index_of_least] < -pi
+    assert all(later <= earlier for earlier, later in pairwise(lag[: index_of_least + 1]))
 
 
 @given(arms, arms)
-def test_with_no_share_left_the_joints_are_as_wanted(one: JointRotations, other: JointRotations) -> None:
-    spins = TwistLimiter(RIG.bones)
-    spins.limit(one, 1.0, FRAME_S)
-    assert spins.limit(other, 0.0, FRAME_S) is other
-    assert spins.lag_rad == NO_TWIST_LAG
+def test_weight_zero_returns_the_joints_unchanged(one: JointRotations, other: JointRotations) -> None:
+    limiter = TwistLimiter(RIG.bones)
+    limiter.limit(one, 1.0, FRAME_S)
+    assert limiter.limit(other, 0.0, FRAME_S) is other
+    assert limiter.lag_rad == NO_TWIST_LAG

@@ -9,17 +9,17 @@ from bunraku.client import Client
 from tests.servers import make_bvh_clip, run_server
 
 
-async def test_a_session_is_opened_edited_listed_and_ended(tmp_path: Path) -> None:
-    source, other = tmp_path / "one.bvh", tmp_path / "two.bvh"
-    source.write_bytes(make_bvh_clip(2.0, 1))
-    other.write_bytes(make_bvh_clip(1.0, 2))
+async def test_session_is_opened_edited_listed_and_ended(tmp_path: Path) -> None:
+    first_source, second_source = tmp_path / "one.bvh", tmp_path / "two.bvh"
+    first_source.write_bytes(make_bvh_clip(2.0, 1))
+    second_source.write_bytes(make_bvh_clip(1.0, 2))
     with run_server(tmp_path / "data") as url:
         async with Client(url) as client, httpx2.AsyncClient(base_url=url) as http:
-            one, two = (await client.upload(source))["id"], (await client.upload(other))["id"]
-            answer = await http.post("/v1/sessions", json={"motion": one, "playing": False})
-            assert answer.status_code == 201
-            session = answer.json()
-            assert answer.headers["location"] == f"/v1/sessions/{session['id']}"
+            one, two = (await client.upload(first_source))["id"], (await client.upload(second_source))["id"]
+            response = await http.post("/v1/sessions", json={"motion": one, "playing": False})
+            assert response.status_code == 201
+            session = response.json()
+            assert response.headers["location"] == f"/v1/sessions/{session['id']}"
             assert (session["motion"], session["playing"], session["loop"], session["position"]) == (
                 one,
                 False,
@@ -31,12 +31,12 @@ async def test_a_session_is_opened_edited_listed_and_ended(tmp_path: Path) -> No
             assert (edited["position"], edited["loop"], edited["epoch"]) == (700_000, False, 2)
             changed = await client.edit_session(session["id"], motion=two)
             assert (changed["motion"], changed["duration"], changed["epoch"]) == (two, 1_000_000, 3)
-            more = [(await client.open_session(one))["id"] for _ in range(2)]
-            page = (await http.get("/v1/sessions?limit=2")).json()
-            rest = (await http.get(f"/v1/sessions?limit=2&cursor={page['next']}")).json()
-            assert [s["id"] for s in page["items"] + rest["items"]] == [session["id"], *more]
-            assert (await http.delete(f"/v1/sessions/{more[0]}")).status_code == 204
-            assert (await http.get(f"/v1/sessions/{more[0]}")).status_code == 404
+            others = [(await client.open_session(one))["id"] for _ in range(2)]
+            first_page = (await http.get("/v1/sessions?limit=2")).json()
+            second_page = (await http.get(f"/v1/sessions?limit=2&cursor={first_page['next']}")).json()
+            assert [s["id"] for s in first_page["items"] + second_page["items"]] == [session["id"], *others]
+            assert (await http.delete(f"/v1/sessions/{others[0]}")).status_code == 204
+            assert (await http.get(f"/v1/sessions/{others[0]}")).status_code == 404
 
 
 @pytest.mark.parametrize(
@@ -51,15 +51,17 @@ async def test_a_session_is_opened_edited_listed_and_ended(tmp_path: Path) -> No
         ([], 422, None),
     ],
 )
-async def test_a_wrong_session_is_refused_in_words(server: str, body: object, status: int, field: str | None) -> None:
+async def test_invalid_session_request_gives_a_problem_document(
+    server: str, body: object, status: int, field: str | None
+) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
-        answer = await http.post("/v1/sessions", json=body)
-    assert answer.status_code == status
-    assert answer.headers["content-type"] == "application/problem+json"
-    assert answer.json().get("field") == field
+        response = await http.post("/v1/sessions", json=body)
+    assert response.status_code == status
+    assert response.headers["content-type"] == "application/problem+json"
+    assert response.json().get("field") == field
 
 
-async def test_a_wrong_edit_changes_nothing(server: str, clip_file: Path) -> None:
+async def test_invalid_edit_changes_nothing(server: str, clip_file: Path) -> None:
     async with Client(server) as client, httpx2.AsyncClient(base_url=server) as http:
         session = await client.open_session((await client.upload(clip_file))["id"], playing=False)
         path = f"/v1/sessions/{session['id']}"

@@ -17,7 +17,7 @@ async def session(server: str, clip_file: Path) -> str:
         return str((await client.open_session((await client.upload(clip_file))["id"]))["id"])
 
 
-async def test_a_limb_has_one_holder_and_the_first_one_gets_it(server: str, session: str) -> None:
+async def test_limb_is_granted_to_the_first_claim_until_released(server: str, session: str) -> None:
     async with Client(server) as client, Puppeteer(client, session, "Aiko") as aiko:
         async with Puppeteer(client, session, "Yuki") as yuki:
             await aiko.claim("left_hand")
@@ -29,14 +29,14 @@ async def test_a_limb_has_one_holder_and_the_first_one_gets_it(server: str, sess
             assert [(p["name"], p["colour"]) for p in state["puppeteers"]] == [("Aiko", 0), ("Yuki", 1)]
             await aiko.release("left_hand")
             await yuki.claim("left_hand")
-        # who leaves lets go
+        # a disconnect releases the limbs
         async with asyncio.timeout(5):
             while any((await client.session(session))["limbs"]):  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         await aiko.claim("left_hand")
 
 
-async def test_a_silent_holder_loses_the_limb(server: str, session: str) -> None:
+async def test_silent_holder_loses_the_limb(server: str, session: str) -> None:
     url = server.replace("http", "ws") + f"/v1/sessions/{session}/control"
     async with connect(url, subprotocols=[SUBPROTOCOL], compression=None) as silent:  # type: ignore[list-item]
         await silent.send(Claim(1).pack())
@@ -49,7 +49,7 @@ async def test_a_silent_holder_loses_the_limb(server: str, session: str) -> None
     assert (message.limb, message.reason) == (1, "lost")
 
 
-async def test_inputs_without_the_limb_are_ignored_and_pings_answered(server: str, session: str) -> None:
+async def test_input_without_the_limb_is_ignored_and_ping_is_answered(server: str, session: str) -> None:
     url = server.replace("http", "ws") + f"/v1/sessions/{session}/control?name=%00%20"
     async with connect(url, subprotocols=[SUBPROTOCOL], compression=None) as socket:  # type: ignore[list-item]
         await socket.send(Input(0, Input.TARGET, 99, 1, 0, (1, 1, 1)).pack())
@@ -62,13 +62,13 @@ async def test_inputs_without_the_limb_are_ignored_and_pings_answered(server: st
         assert (await client.session(session))["limbs"] == [None] * 4
 
 
-@pytest.mark.parametrize("sends", [bytes([67]), Input(0, 1, 1, 1, 1, (float("nan"), 0, 0)).pack(), bytes(2000)])
-async def test_broken_messages_end_only_the_one_who_sends_them(server: str, session: str, sends: bytes) -> None:
+@pytest.mark.parametrize("data", [bytes([67]), Input(0, 1, 1, 1, 1, (float("nan"), 0, 0)).pack(), bytes(2000)])
+async def test_malformed_message_closes_only_its_connection(server: str, session: str, data: bytes) -> None:
     url = server.replace("http", "ws") + f"/v1/sessions/{session}/control"
     async with Client(server) as client, Puppeteer(client, session, "Aiko") as aiko:
         with pytest.raises(ConnectionClosed) as closed:  # noqa: PT012
             async with connect(url, subprotocols=[SUBPROTOCOL], compression=None) as socket:  # type: ignore[list-item]
-                await socket.send(sends)
+                await socket.send(data)
                 while True:
                     message = unpack(await socket.recv(decode=False))
                     assert not isinstance(message, Problem) or message.detail
@@ -77,7 +77,7 @@ async def test_broken_messages_end_only_the_one_who_sends_them(server: str, sess
         await aiko.claim("left_hand")
 
 
-async def test_a_stage_that_is_not_there_is_said_so(server: str) -> None:
+async def test_control_of_an_unknown_session_is_refused(server: str) -> None:
     async with Client(server) as client:
         with pytest.raises(ControlRefused, match="No such session"):
             async with Puppeteer(client, "nothing"):

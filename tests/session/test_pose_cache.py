@@ -14,7 +14,7 @@ from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore
 from bunraku.playout.timeline import TimelineHistory
-from bunraku.session import pose_cache as poses_module
+from bunraku.session import pose_cache
 from bunraku.session.pose_cache import BATCH_FRAMES, PoseCache, shared_block_store
 from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import Data
@@ -25,16 +25,16 @@ STEP_US = 16_667
 
 
 async def stored_motion() -> StoredMotion:
-    library = MotionStore.open("memory:///")
-    await library.put(
+    store = MotionStore.open("memory:///")
+    await store.put(
         "one", pack_motion("one", encode_motion(random_motion(2.3, 30.0, 5), error_bounds_mm=(5.0,), grade="live"))
     )
-    motion = await library.get("one")
+    motion = await store.get("one")
     assert motion is not None
     return motion
 
 
-async def test_the_dance_ahead_is_the_dance_at_each_instant_also_over_the_ends_of_blocks_and_the_loop() -> None:
+async def test_poses_are_exact_across_block_boundaries_and_the_loop() -> None:
     motion = await stored_motion()
     track = motion.first_track
     timelines = TimelineHistory()
@@ -45,14 +45,14 @@ async def test_the_dance_ahead_is_the_dance_at_each_instant_also_over_the_ends_o
     for frame in range(200):
         due = 1_000_000 + frame * STEP_US
         await poses.decode_blocks(due)
-        wanted = blocks.pose_at(due - 1_000_000 - (due - 1_000_000) // track.duration_us * track.duration_us)
+        expected = blocks.pose_at(due - 1_000_000 - (due - 1_000_000) // track.duration_us * track.duration_us)
         found = poses.poses_at(due, STEP_US)
-        assert wanted is not None
+        assert expected is not None
         assert found is not None
-        np.testing.assert_allclose(found[0], wanted[1], atol=1e-12)
+        np.testing.assert_allclose(found[0], expected[1], atol=1e-12)
 
 
-async def test_an_edit_holds_at_once_and_another_motion_has_no_pose_here() -> None:
+async def test_edit_applies_at_once_and_other_motion_has_no_poses() -> None:
     motion = await stored_motion()
     timelines = TimelineHistory()
     first = timeline.start("one", motion.first_track.duration_us, 0)
@@ -60,23 +60,23 @@ async def test_an_edit_holds_at_once_and_another_motion_has_no_pose_here() -> No
     poses = PoseCache(motion, timelines)
     assert poses.poses_at(500_000, STEP_US) is None
     await poses.decode_blocks(500_000)
-    moving = poses.poses_at(500_000, STEP_US)
+    moving_poses = poses.poses_at(500_000, STEP_US)
     paused = timeline.edit(first, 500_000, position=200_000, playing=False)
     timelines.put(paused)
     await poses.decode_blocks(500_000)
-    still = poses.poses_at(500_000, STEP_US)
-    assert moving is not None
-    assert still is not None
-    assert np.abs(moving[0] - still[0]).max() > 1e-3
-    later = poses.poses_at(500_000 + 40 * STEP_US, STEP_US)
-    assert later is not None
-    np.testing.assert_array_equal(later, still)
+    still_poses = poses.poses_at(500_000, STEP_US)
+    assert moving_poses is not None
+    assert still_poses is not None
+    assert np.abs(moving_poses[0] - still_poses[0]).max() > 1e-3
+    later_poses = poses.poses_at(500_000 + 40 * STEP_US, STEP_US)
+    assert later_poses is not None
+    np.testing.assert_array_equal(later_poses, still_poses)
     timelines.put(timeline.change_motion(paused, 600_000, "two", 5_000_000))
     await poses.decode_blocks(700_000)
     assert poses.poses_at(700_000, STEP_US) is None
 
 
-async def test_stages_work_out_the_dance_at_instants_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_stages_compute_batches_of_poses_at_different_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     motion = await stored_motion()
     timelines = TimelineHistory()
     timelines.put(timeline.start("one", motion.first_track.duration_us, 0))
@@ -84,34 +84,34 @@ async def test_stages_work_out_the_dance_at_instants_of_their_own(monkeypatch: p
     for poses in stages:
         for due in (0, 1_000_000):
             await poses.decode_blocks(due)
-    worked_out: list[int] = []
+    computed_at: list[int] = []
     rotations_at = MotionBlockStore.rotations_at
 
-    def counted(store: MotionBlockStore, positions: list[int], loop: bool, duration: int) -> list[Array | None]:
-        worked_out.append(frame)
+    def counting(store: MotionBlockStore, positions: list[int], loop: bool, duration: int) -> list[Array | None]:
+        computed_at.append(frame)
         return rotations_at(store, positions, loop, duration)
 
-    monkeypatch.setattr(MotionBlockStore, "rotations_at", counted)
+    monkeypatch.setattr(MotionBlockStore, "rotations_at", counting)
     for frame in range(2 * BATCH_FRAMES):
         for poses in stages:
             assert poses.poses_at(frame * STEP_US, STEP_US) is not None
-    # the first frame is new to all of them
-    later = Counter(worked_out[len(stages) :])
-    assert sum(later.values()) >= len(stages)
-    assert max(later.values()) <= 10
+    # at the first frame every stage computes a batch
+    counts = Counter(computed_at[len(stages) :])
+    assert sum(counts.values()) >= len(stages)
+    assert max(counts.values()) <= 10
 
 
-async def test_a_dance_is_decoded_once_for_all_stages_and_forgotten_with_the_last(
+async def test_motion_is_decoded_once_and_freed_with_the_last_stage(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     motion, decoded = await stored_motion(), 0
 
-    def counted(track: MotionTrack, data: bytes) -> MotionBlock:
+    def counting(track: MotionTrack, data: bytes) -> MotionBlock:
         nonlocal decoded
         decoded += 1
         return decode_motion_block(track, data)
 
-    monkeypatch.setattr(poses_module, "decode_motion_block", counted)
+    monkeypatch.setattr(pose_cache, "decode_motion_block", counting)
     timelines = TimelineHistory()
     timelines.put(timeline.start("one", motion.first_track.duration_us, 0))
     stages = [PoseCache(motion, timelines) for _ in range(5)]
@@ -133,20 +133,23 @@ async def test_tracks_longer_or_shorter_than_the_motion_have_poses() -> None:
         motion = MOTIONS[name]
         timelines = TimelineHistory()
         timelines.put(timeline.start(motion.id, motion.first_track.duration_us, 0))
-        poses, blocks = PoseCache(motion, timelines), [MotionBlockStore(dance.track) for dance in motion.performers]
-        for dance, store in zip(motion.performers, blocks, strict=True):
-            for index, packet in enumerate(dance.packets[-1]):
-                store.put(index, 0, decode_motion_block(dance.track, Data.unpack(packet).block))
+        poses, blocks = (
+            PoseCache(motion, timelines),
+            [MotionBlockStore(performer.track) for performer in motion.performers],
+        )
+        for performer, block_store in zip(motion.performers, blocks, strict=True):
+            for index, packet in enumerate(performer.packets[-1]):
+                block_store.put(index, 0, decode_motion_block(performer.track, Data.unpack(packet).block))
         for frame in range(0, 400, 3):
             await poses.decode_blocks(frame * STEP_US)
             found = poses.poses_at(frame * STEP_US, STEP_US)
             assert found is not None
             position = frame * STEP_US % motion.first_track.duration_us
-            for rotations, store in zip(found, blocks, strict=True):
-                wanted = store.pose_at(position, True, motion.first_track.duration_us)
-                assert wanted is not None
-                np.testing.assert_allclose(rotations, wanted[1], atol=1e-12)
-            # of one that is over the last pose stands still
+            for rotations, block_store in zip(found, blocks, strict=True):
+                expected = block_store.pose_at(position, True, motion.first_track.duration_us)
+                assert expected is not None
+                np.testing.assert_allclose(rotations, expected[1], atol=1e-12)
+            # after the end of its track a performer keeps the last pose
             if name == "both" and position > MOTIONS[other].first_track.duration_us:
                 last = blocks[1].pose_at(MOTIONS[other].first_track.duration_us, False)
                 assert last is not None

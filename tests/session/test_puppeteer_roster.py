@@ -8,31 +8,31 @@ from bunraku.session import puppeteer_roster
 from bunraku.session.puppeteer_roster import PuppeteerRoster, SessionFull
 
 
-def test_colours_are_the_first_free_ones_and_a_stage_is_full_some_day(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_first_free_colour_is_assigned_until_the_session_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 3)
-    here = PuppeteerRoster()
-    told: list[tuple[str, bytes]] = []
+    roster = PuppeteerRoster()
+    sent: list[tuple[str, bytes]] = []
 
-    def hear(name: str, message: bytes) -> None:
-        told.append((name, message))
+    def record(name: str, message: bytes) -> None:
+        sent.append((name, message))
 
-    one, two, three = (here.join(name, name, partial(hear, name), 5) for name in "abc")
-    assert [p.colour for p in here] == [0, 1, 2]
+    first, second, third = (roster.join(name, name, partial(record, name), 5) for name in "abc")
+    assert [p.colour for p in roster] == [0, 1, 2]
     with pytest.raises(SessionFull, match="3"):
-        here.join("d", "d", print, 5)
-    here.leave(two)
-    assert here.get(two.id) is None
-    assert here.get(three.id) is three
-    assert here.join("e", "e", print, 5).colour == 1
-    assert len(here) == 3
-    one.send(b"x")
-    assert told == [("a", b"x")]
+        roster.join("d", "d", print, 5)
+    roster.leave(second)
+    assert roster.get(second.id) is None
+    assert roster.get(third.id) is third
+    assert roster.join("e", "e", print, 5).colour == 1
+    assert len(roster) == 3
+    first.send(b"x")
+    assert sent == [("a", b"x")]
 
 
-def test_those_here_may_leave_while_all_are_gone_through() -> None:
-    here = PuppeteerRoster()
+def test_puppeteers_may_leave_during_iteration() -> None:
+    roster = PuppeteerRoster()
     for name in "abc":
-        here.join(name, name, print, 0)
-    for one in here:
-        here.leave(one)
-    assert len(here) == 0
+        roster.join(name, name, print, 0)
+    for puppeteer in roster:
+        roster.leave(puppeteer)
+    assert len(roster) == 0

@@ -6,18 +6,18 @@ from pydantic import ValidationError
 from bunraku.session.schema import NewSession, SessionEdit
 
 
-def test_what_is_left_out_of_an_edit_stays() -> None:
+def test_omitted_fields_of_an_edit_are_excluded() -> None:
     assert SessionEdit().model_dump(exclude_none=True) == {}
     assert SessionEdit(position=0).model_dump(exclude_none=True) == {"position": 0}
 
 
 @pytest.mark.parametrize("values", [{"position": -1}, {"position": 1 << 53}, {"position": 1.5}, {"speed": 2}])
-def test_an_edit_has_whole_microseconds_and_nothing_unknown(values: dict[str, object]) -> None:
+def test_edit_with_fraction_or_unknown_field_is_invalid(values: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
         SessionEdit.model_validate(values)
 
 
-def test_a_session_plays_and_loops_unless_it_is_said_otherwise() -> None:
+def test_new_session_plays_and_loops_by_default() -> None:
     new = NewSession(motion="one")
     assert (new.playing, new.loop) == (True, True)
     with pytest.raises(ValidationError):

@@ -25,7 +25,7 @@ MOTIONS = ("one", "two")
 
 
 @pytest.fixture
-async def backing(tmp_path: Path) -> AsyncIterator[ServiceContext]:
+async def context(tmp_path: Path) -> AsyncIterator[ServiceContext]:
     async with open_context(Settings(data=tmp_path)) as opened:
         for seed, name in enumerate(MOTIONS):
             encoded = encode_motion(random_motion(2.0 + seed, 30.0, seed), error_bounds_mm=(30.0,), grade="live")
@@ -34,16 +34,16 @@ async def backing(tmp_path: Path) -> AsyncIterator[ServiceContext]:
 
 
 @pytest.fixture(autouse=True)
-def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+def _short_timeouts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session_manager, "HEARTBEAT_INTERVAL_S", 0.1)
     monkeypatch.setattr(session_manager, "REPLICA_TIMEOUT_S", 0.5)
 
 
 class Replica:
-    """One replica's sessions, until it is closed, or killed."""
+    """Session manager of a replica, which can be closed or killed."""
 
-    def __init__(self, backing: ServiceContext) -> None:
-        self.sessions = SessionManager(backing)
+    def __init__(self, context: ServiceContext) -> None:
+        self.sessions = SessionManager(context)
         self._running = asyncio.create_task(self.sessions.run())
 
     async def close(self) -> None:
@@ -52,7 +52,7 @@ class Replica:
         await self.sessions.close()
 
     async def kill(self) -> None:
-        """What a dead process leaves: nothing of it answers, and the register says what it said."""
+        """Stop responding as a dead process does: the records in the key-value store stay."""
         self._running.cancel()
         await asyncio.wait((self._running,))
         for session in tuple(self.sessions._endpoints):
@@ -60,21 +60,21 @@ class Replica:
 
 
 @pytest.fixture
-async def replicas(backing: ServiceContext) -> AsyncIterator[list[Replica]]:
-    both = [Replica(backing), Replica(backing)]
-    yield both
-    for replica in both:
+async def replicas(context: ServiceContext) -> AsyncIterator[list[Replica]]:
+    started = [Replica(context), Replica(context)]
+    yield started
+    for replica in started:
         await replica.close()
 
 
 class SessionMessages:
-    """What is published about one session."""
+    """Messages published about a session."""
 
-    def __init__(self, backing: ServiceContext, session: str) -> None:
+    def __init__(self, context: ServiceContext, session: str) -> None:
         self.messages: list[object] = []
         self._more = asyncio.Event()
-        for word in ("timeline", "presence", "overlay"):
-            backing.bus.subscribe(f"session.{session}.{word}", self._receive)
+        for subject in ("timeline", "presence", "overlay"):
+            context.bus.subscribe(f"session.{session}.{subject}", self._receive)
 
     def _receive(self, message: bytes) -> None:
         self.messages.append(unpack(message))
@@ -89,17 +89,17 @@ class SessionMessages:
 
 
 async def join_session(context: ServiceContext, stage: StageProxy, name: str) -> PuppeteerConnection:
-    visitor = PuppeteerConnection()
-    context.bus.subscribe(stage.outgoing_subject(visitor), visitor.send)
-    await stage.join(visitor, name)
-    return visitor
+    connection = PuppeteerConnection()
+    context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
+    await stage.join(connection, name)
+    return connection
 
 
 def received(connection: PuppeteerConnection, kind: type) -> list[object]:
     return [message for message in map(unpack, connection.queued) if isinstance(message, kind)]
 
 
-async def test_any_replica_reaches_a_session(backing: ServiceContext, replicas: list[Replica]) -> None:
+async def test_any_replica_reaches_a_session(context: ServiceContext, replicas: list[Replica]) -> None:
     owner, other = (replica.sessions for replica in replicas)
     opened = await owner.open_session("one", playing=False)
     stage = other.stage_proxy(opened["id"])
@@ -109,7 +109,7 @@ async def test_any_replica_reaches_a_session(backing: ServiceContext, replicas: 
     with pytest.raises(ProblemError) as refused:
         await stage.edit(SessionEdit(motion="three"))
     assert (refused.value.status, refused.value.extra["field"]) == (404, "motion")
-    ben = await join_session(backing, stage, "Ben")
+    ben = await join_session(context, stage, "Ben")
     assert received(ben, Welcome)
     stage.send(ben, Claim(2).pack())
     assert received(ben, Grant)
@@ -117,10 +117,10 @@ async def test_any_replica_reaches_a_session(backing: ServiceContext, replicas: 
     stage.send(ben, None)
     assert (await stage.describe())["puppeteers"] == []
     second = await other.open_session("one")
-    for asked in (owner, other):
-        items, following = await asked.list_sessions(1, None)
-        rest, end = await asked.list_sessions(1, following)
-        assert ([one["id"] for one in items + rest], end) == ([opened["id"], second["id"]], None)
+    for manager in (owner, other):
+        items, cursor = await manager.list_sessions(1, None)
+        rest, end_cursor = await manager.list_sessions(1, cursor)
+        assert ([one["id"] for one in items + rest], end_cursor) == ([opened["id"], second["id"]], None)
     await stage.end()
     with pytest.raises(ProblemError) as ended:
         await owner.stage_proxy(opened["id"]).describe()
@@ -128,123 +128,121 @@ async def test_any_replica_reaches_a_session(backing: ServiceContext, replicas: 
     assert [one["id"] for one in (await owner.list_sessions(5, None))[0]] == [second["id"]]
 
 
-async def test_another_replica_goes_on_with_the_sessions_of_one_that_died(
-    backing: ServiceContext, replicas: list[Replica]
-) -> None:
-    dead, living = replicas
+async def test_replica_takes_over_sessions_of_a_dead_replica(context: ServiceContext, replicas: list[Replica]) -> None:
+    dead, surviving = replicas
     opened = await dead.sessions.open_session("one")
-    stage = living.sessions.stage_proxy(opened["id"])
+    stage = surviving.sessions.stage_proxy(opened["id"])
     before = await stage.edit(SessionEdit(motion="two", position=100_000, playing=False))
-    ben = await join_session(backing, stage, "Ben")
+    ben = await join_session(context, stage, "Ben")
     stage.send(ben, Claim(0).pack())
     assert received(ben, Grant)
-    heard = SessionMessages(backing, opened["id"])
+    published = SessionMessages(context, opened["id"])
     await dead.kill()
     ben.is_unknown = False
-    state, presence = [await heard.wait_for(kind) for kind in (TimelineState, Presence)]
+    state, presence = [await published.wait_for(kind) for kind in (TimelineState, Presence)]
     assert isinstance(state, TimelineState)
     assert (state.motion, state.position, state.playing, state.epoch) == ("two", 100_000, False, before["epoch"])
     assert isinstance(presence, Presence)
     assert presence.limbs == [None] * 4
-    # the last of what the dead one said may have come after the kill began
-    last = [m for m in heard.messages if isinstance(m, Overlay)][-1]
+    # the last messages of the dead replica may have been received after the kill began
+    last = [m for m in published.messages if isinstance(m, Overlay)][-1]
     assert last.limbs == {}
     after = await stage.describe()
     assert {**after, "limbs": [], "puppeteers": []} == {**before, "limbs": [], "puppeteers": []}
-    # who came through a door that still stands is told to come again
+    # a puppeteer with an open connection is asked to reconnect
     stage.send(ben, Claim(0).pack())
     assert ben.is_unknown
     assert len(received(ben, Grant)) == 1
     assert dead.sessions.counters.sessions == {("opened",): 1, ("taken over",): 0, ("handed on",): 0}
-    assert living.sessions.counters.sessions == {("opened",): 0, ("taken over",): 1, ("handed on",): 0}
+    assert surviving.sessions.counters.sessions == {("opened",): 0, ("taken over",): 1, ("handed on",): 0}
 
 
-async def test_one_that_ends_in_order_leaves_its_sessions_at_once(
-    backing: ServiceContext, replicas: list[Replica], monkeypatch: pytest.MonkeyPatch
+async def test_closing_replica_hands_over_its_sessions_at_once(
+    context: ServiceContext, replicas: list[Replica], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_manager, "REPLICA_TIMEOUT_S", 1000.0)
     ending, staying = replicas
     opened = await ending.sessions.open_session("one")
-    heard = SessionMessages(backing, opened["id"])
-    ben = await join_session(backing, staying.sessions.stage_proxy(opened["id"]), "Ben")
+    published = SessionMessages(context, opened["id"])
+    ben = await join_session(context, staying.sessions.stage_proxy(opened["id"]), "Ben")
     await ending.close()
     assert ben.is_unknown
-    await heard.wait_for(TimelineState)
+    await published.wait_for(TimelineState)
     assert (await staying.sessions.stage_proxy(opened["id"]).describe())["motion"] == "one"
     assert ending.sessions.counters.sessions["handed on",] == staying.sessions.counters.sessions["taken over",] == 1
 
 
-async def test_one_that_stood_still_finds_its_sessions_elsewhere(
-    backing: ServiceContext, replicas: list[Replica]
+async def test_stalled_replica_gives_up_sessions_that_were_taken_over(
+    context: ServiceContext, replicas: list[Replica]
 ) -> None:
-    still, living = replicas
-    opened = await still.sessions.open_session("one")
-    heard = SessionMessages(backing, opened["id"])
-    still._running.cancel()
-    await asyncio.wait((still._running,))
-    await heard.wait_for(TimelineState)
+    stalled, surviving = replicas
+    opened = await stalled.sessions.open_session("one")
+    published = SessionMessages(context, opened["id"])
+    stalled._running.cancel()
+    await asyncio.wait((stalled._running,))
+    await published.wait_for(TimelineState)
     with pytest.raises(ProblemError) as refused:
-        await still.sessions.save_record(still.sessions._endpoints[opened["id"]].stage)
+        await stalled.sessions.save_record(stalled.sessions._endpoints[opened["id"]].stage)
     assert refused.value.status == 503
-    door = still.sessions._endpoints[opened["id"]]
-    still._running = asyncio.create_task(still.sessions.run())
-    await asyncio.wait((door.stage._tick_task,))
-    assert (await living.sessions.stage_proxy(opened["id"]).describe())["id"] == opened["id"]
-    assert opened["id"] not in still.sessions._endpoints
+    endpoint = stalled.sessions._endpoints[opened["id"]]
+    stalled._running = asyncio.create_task(stalled.sessions.run())
+    await asyncio.wait((endpoint.stage._tick_task,))
+    assert (await surviving.sessions.stage_proxy(opened["id"]).describe())["id"] == opened["id"]
+    assert opened["id"] not in stalled.sessions._endpoints
 
 
-async def test_a_session_between_two_replicas_is_to_be_asked_again(replicas: list[Replica]) -> None:
-    dead, living = replicas
+async def test_session_without_a_replica_gives_503(replicas: list[Replica]) -> None:
+    dead, surviving = replicas
     opened = await dead.sessions.open_session("one")
-    living._running.cancel()
+    surviving._running.cancel()
     await dead.kill()
-    with pytest.raises(ProblemError) as moving:
-        await living.sessions.stage_proxy(opened["id"]).describe()
-    assert moving.value.status == 503
-    assert (await living.sessions.list_sessions(5, None))[0] == []
+    with pytest.raises(ProblemError) as unavailable:
+        await surviving.sessions.stage_proxy(opened["id"]).describe()
+    assert unavailable.value.status == 503
+    assert (await surviving.sessions.list_sessions(5, None))[0] == []
 
 
-async def test_a_session_whose_motion_is_gone_ends_with_its_replica(
-    backing: ServiceContext, replicas: list[Replica]
+async def test_session_of_a_removed_motion_ends_with_its_replica(
+    context: ServiceContext, replicas: list[Replica]
 ) -> None:
-    dead, living = replicas
+    dead, surviving = replicas
     opened = await dead.sessions.open_session("one")
-    await backing.motion_store.remove("one")
+    await context.motion_store.remove("one")
     await dead.kill()
     async with asyncio.timeout(20):
-        while await backing.key_values.get(f"sessions.{opened['id']}") is not None:  # noqa: ASYNC110
+        while await context.key_values.get(f"sessions.{opened['id']}") is not None:  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     with pytest.raises(ProblemError) as ended:
-        await living.sessions.stage_proxy(opened["id"]).describe()
+        await surviving.sessions.stage_proxy(opened["id"]).describe()
     assert ended.value.status == 404
 
 
-async def test_a_register_that_is_gone_for_a_while_takes_nothing_away(
-    backing: ServiceContext, replicas: list[Replica], monkeypatch: pytest.MonkeyPatch
+async def test_outage_of_the_key_value_store_moves_no_session(
+    context: ServiceContext, replicas: list[Replica], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner, other = replicas
     opened = await owner.sessions.open_session("one")
-    heard = SessionMessages(backing, opened["id"])
-    put, refused = backing.key_values.put, asyncio.Event()
+    published = SessionMessages(context, opened["id"])
+    put, refused = context.key_values.put, asyncio.Event()
     failures = 0
 
-    async def failing(*_: object) -> int:
+    async def fail(*_: object) -> int:
         nonlocal failures
         failures += 1
         if failures > 12:
             refused.set()
-        raise ConnectionError("away")
+        raise ConnectionError("unavailable")
 
-    monkeypatch.setattr(backing.key_values, "put", failing)
+    monkeypatch.setattr(context.key_values, "put", fail)
     async with asyncio.timeout(20):
         await refused.wait()
-    monkeypatch.setattr(backing.key_values, "put", put)
-    counts: set[int] = set()
+    monkeypatch.setattr(context.key_values, "put", put)
+    revisions: set[int] = set()
     async with asyncio.timeout(20):
-        while len(counts) < 10:
-            counts |= {one.revision for one in (await backing.key_values.list_prefix("replicas")).values()}
+        while len(revisions) < 10:
+            revisions |= {one.revision for one in (await context.key_values.list_prefix("replicas")).values()}
             await asyncio.sleep(0)
-    assert not [m for m in heard.messages if isinstance(m, TimelineState)]
+    assert not [m for m in published.messages if isinstance(m, TimelineState)]
     assert list(owner.sessions._endpoints) == [opened["id"]]
     assert not other.sessions._endpoints
     with contextlib.suppress(ProblemError):

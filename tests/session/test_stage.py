@@ -46,7 +46,7 @@ from tests.vectors.blocks import random_motion
 
 
 class StageMessages:
-    """What a stage says on the bus."""
+    """Messages of a stage on the bus."""
 
     def __init__(self, bus: MemoryBus) -> None:
         self.messages: list[object] = []
@@ -66,19 +66,19 @@ class StageMessages:
         return found
 
     async def wait_until_at_rest(self) -> None:
-        """Until the dance is alone."""
+        """Wait for an overlay without limbs."""
         count = 1
         while (found := await self.wait_for(count, Overlay)) and found[-1].limbs:  # type: ignore[attr-defined]
             count = len(found) + 1
 
 
 async def stored_motion(name: str, seed: int) -> StoredMotion:
-    library = MotionStore.open("memory:///")
-    await library.put(
+    store = MotionStore.open("memory:///")
+    await store.put(
         name,
         pack_motion(name, encode_motion(random_motion(2.3, 30.0, seed), error_bounds_mm=(30.0, 5.0), grade="live")),
     )
-    motion = await library.get(name)
+    motion = await store.get(name)
     assert motion is not None
     return motion
 
@@ -100,7 +100,7 @@ async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
 
 @dataclass
 class JoinedPuppeteer:
-    """One who came to a stage, and what they were told."""
+    """Puppeteer who has joined a stage, and the messages it has received."""
 
     puppeteer: Puppeteer
     received: list[bytes]
@@ -111,31 +111,31 @@ class JoinedPuppeteer:
 
 
 def join_stage(stage: Stage, name: str) -> JoinedPuppeteer:
-    told: list[bytes] = []
-    return JoinedPuppeteer(stage.join(name.lower(), name, told.append), told)
+    received: list[bytes] = []
+    return JoinedPuppeteer(stage.join(name.lower(), name, received.append), received)
 
 
-def last_grant(person: JoinedPuppeteer) -> Grant:
-    return next(m for m in map(unpack, reversed(person.received)) if isinstance(m, Grant))
+def last_grant(joined: JoinedPuppeteer) -> Grant:
+    return next(m for m in map(unpack, reversed(joined.received)) if isinstance(m, Grant))
 
 
 @asynccontextmanager
-async def keep_holding(stage: Stage, person: JoinedPuppeteer, limb: int) -> AsyncIterator[None]:
-    """Meanwhile they say that they hold it, however long that takes."""
+async def keep_holding(stage: Stage, joined: JoinedPuppeteer, limb: int) -> AsyncIterator[None]:
+    """Send heartbeats for a limb until the context ends."""
 
-    async def alive() -> None:
+    async def send_heartbeats() -> None:
         while True:
-            stage.receive(person.puppeteer, Alive([limb]))
+            stage.receive(joined.puppeteer, Alive([limb]))
             await asyncio.sleep(0.05)
 
-    speaking = asyncio.create_task(alive())
+    heartbeats = asyncio.create_task(send_heartbeats())
     try:
         yield
     finally:
-        speaking.cancel()
+        heartbeats.cancel()
 
 
-async def test_overlays_carry_only_pulled_limbs_and_end_with_an_empty_one(stage: Stage, bus: MemoryBus) -> None:
+async def test_overlays_have_only_controlled_limbs_and_end_with_an_empty_one(stage: Stage, bus: MemoryBus) -> None:
     audience = StageMessages(bus)
     aiko = join_stage(stage, "Aiko")
     stage.receive(aiko.puppeteer, Claim(0))
@@ -156,7 +156,7 @@ async def test_overlays_carry_only_pulled_limbs_and_end_with_an_empty_one(stage:
     assert overlays[-1].limbs == {}
 
 
-async def test_edits_hold_for_everyone_a_lead_from_now(stage: Stage, bus: MemoryBus) -> None:
+async def test_edit_applies_after_the_lead_time(stage: Stage, bus: MemoryBus) -> None:
     audience = StageMessages(bus)
     before = stage.timeline
     stage.edit_timeline(playing=False, position=None, loop=None)
@@ -180,10 +180,10 @@ async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: Memory
         await audience.wait_for(count + 3, Overlay)
 
 
-async def test_colours_are_given_in_order_and_again_when_free(stage: Stage) -> None:
-    people = [join_stage(stage, f"p{n}") for n in range(6)]
-    assert [p.puppeteer.colour for p in people] == [0, 1, 2, 3, 4, 0]
-    stage.leave(people[2].puppeteer)
+async def test_colours_are_assigned_in_order_and_reused(stage: Stage) -> None:
+    puppeteers = [join_stage(stage, f"p{n}") for n in range(6)]
+    assert [p.puppeteer.colour for p in puppeteers] == [0, 1, 2, 3, 4, 0]
+    stage.leave(puppeteers[2].puppeteer)
     assert join_stage(stage, "new").puppeteer.colour == 2
 
 
@@ -200,7 +200,7 @@ async def test_presence_counts_viewers_of_all_replicas(bus: MemoryBus) -> None:
     audience = StageMessages(bus)
     for replica, count in (("a", 3), ("b", 4), ("a", 2), ("b", 0)):
         bus.publish("session.s.viewers", msgpack.packb([replica, count]))
-    # the first at once; then those of half a second together, however many replicas there are
+    # the first count is published at once, later ones together after half a second
     counts = [p.viewers for p in await audience.wait_for(2, Presence) if isinstance(p, Presence)]
     assert counts == [3, 2]
     bus.publish("session.s.viewers", msgpack.packb(["b", 1]))
@@ -226,22 +226,22 @@ async def test_released_limb_is_granted_to_the_first_who_asked(stage: Stage, bus
     assert stage.presence.limbs[1] is None
 
 
-@pytest.mark.parametrize("said", [Alive([0]), Input(0, Input.TARGET, 1, 5, 0, (0.1, 0.0, 0.0))])
-async def test_refusal_is_repeated_to_a_puppeteer_of_a_lost_limb(stage: Stage, said: Alive | Input) -> None:
+@pytest.mark.parametrize("message", [Alive([0]), Input(0, Input.TARGET, 1, 5, 0, (0.1, 0.0, 0.0))])
+async def test_refusal_is_repeated_to_a_puppeteer_of_a_lost_limb(stage: Stage, message: Alive | Input) -> None:
     aiko = join_stage(stage, "Aiko")
     ben = join_stage(stage, "Ben")
     stage.receive(aiko.puppeteer, Claim(0))
-    # it is taken from her while nothing can be said
+    # she loses the limb without a message
     stage._ownership.release(0, aiko.id, last_grant(aiko).epoch, clock())
     for _ in range(5):
-        stage.receive(aiko.puppeteer, said)
-        stage.receive(ben.puppeteer, said)
+        stage.receive(aiko.puppeteer, message)
+        stage.receive(ben.puppeteer, message)
     assert not [m for m in map(unpack, ben.received) if isinstance(m, Refusal)]
     assert [m for m in map(unpack, aiko.received) if isinstance(m, Refusal)] == [Refusal(0, "lost")]
     stage.receive(aiko.puppeteer, Claim(0))
-    told = len(aiko.received)
+    count = len(aiko.received)
     stage.receive(aiko.puppeteer, Alive([0]))
-    assert not [m for m in map(unpack, aiko.received[told:]) if isinstance(m, Refusal)]
+    assert not [m for m in map(unpack, aiko.received[count:]) if isinstance(m, Refusal)]
 
 
 async def test_notices_are_sent_once_a_second(stage: Stage) -> None:
@@ -251,14 +251,14 @@ async def test_notices_are_sent_once_a_second(stage: Stage) -> None:
     for number in range(5):
         stage.receive(aiko.puppeteer, Input(0, Input.TARGET, epoch, number, 0, (900.0, 0.0, 0.0)))
         stage.receive(ben.puppeteer, Input(0, Input.TARGET, epoch, number, 0, (0.1, 0.0, 0.0)))
-    told = [m for m in map(unpack, aiko.received) if isinstance(m, Notice)]
-    assert [(m.limb, m.reason) for m in told] == [(0, "reach")]
-    told = [m for m in map(unpack, ben.received) if isinstance(m, Notice)]
-    assert [(m.limb, m.reason) for m in told] == [(0, "owner")]
-    assert "left hand" in told[0].detail
+    notices = [m for m in map(unpack, aiko.received) if isinstance(m, Notice)]
+    assert [(m.limb, m.reason) for m in notices] == [(0, "reach")]
+    notices = [m for m in map(unpack, ben.received) if isinstance(m, Notice)]
+    assert [(m.limb, m.reason) for m in notices] == [(0, "owner")]
+    assert "left hand" in notices[0].detail
 
 
-async def test_the_limbs_of_all_performers_are_pulled_and_one_message_tells_of_them(bus: MemoryBus) -> None:
+async def test_one_overlay_has_the_limbs_of_all_performers(bus: MemoryBus) -> None:
     motion, audience = MOTIONS["both"], StageMessages(bus)
     state = timeline.start("both", motion.first_track.duration_us, clock())
     stage = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
@@ -274,14 +274,14 @@ async def test_the_limbs_of_all_performers_are_pulled_and_one_message_tells_of_t
         stage.receive(aiko.puppeteer, Input(1, Input.TARGET, 1, number, 16_000 * number, (-0.6, 0.3, 0.3)))
         stage.receive(ben.puppeteer, Input(6, Input.VELOCITY, 1, number, 16_000 * number, (0.5, 0.0, 0.0)))
         await audience.wait_for(len([m for m in audience.messages if isinstance(m, Overlay)]) + 1, Overlay)
-    told = [m for m in audience.messages if isinstance(m, Overlay)]
-    assert {tuple(overlay.limbs) for overlay in told} == {(1, 6)}
-    # an input for a limb that is nobody's here is not taken, and said so by the limb's name
+    overlays = [m for m in audience.messages if isinstance(m, Overlay)]
+    assert {tuple(overlay.limbs) for overlay in overlays} == {(1, 6)}
+    # the notice about an input for an unknown limb contains the name of the limb
     stage.receive(ben.puppeteer, Input(12, Input.VELOCITY, 1, 1, 0, (0.5, 0.0, 0.0)))
     assert [m.detail for m in map(unpack, ben.received) if isinstance(m, Notice)] == [
         "the left hand of dancer 4 is not yours: an input for it was refused"
     ]
-    # the second performer goes, and Ben's leg with them; Aiko's hand stays in hers
+    # Ben loses the leg of the removed second performer; Aiko keeps her hand
     async with keep_holding(stage, aiko, 1):
         await stage.change_motion(await stored_motion("two", 6))
     assert stage.presence.limbs == [None, aiko.id, None, None]
@@ -292,11 +292,11 @@ async def test_the_limbs_of_all_performers_are_pulled_and_one_message_tells_of_t
     await stage.close()
 
 
-async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -> None:
-    """Two people pull, let go, and pull again; every frame that was published comes again from the log's bytes."""
+async def test_input_log_replays_the_published_overlays(stage: Stage, bus: MemoryBus) -> None:
+    """Two puppeteers claim, control and release limbs twice; the packed log gives every published frame."""
     audience = StageMessages(bus)
     aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
-    for passage in range(2):
+    for segment in range(2):
         stage.receive(aiko.puppeteer, Claim(0))
         stage.receive(ben.puppeteer, Claim(3))
         hand, leg = last_grant(aiko).epoch, last_grant(ben).epoch
@@ -310,13 +310,13 @@ async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -
         stage.receive(aiko.puppeteer, Release(0, hand))
         stage.receive(ben.puppeteer, Release(3, leg))
         await audience.wait_until_at_rest()
-        assert passage == 0 or stage.log.begin_us is not None
+        assert segment == 0 or stage.log.begin_us is not None
     shown: dict[int, dict[int, tuple[int, ...]]] = {}
     for overlay in audience.messages:
         if isinstance(overlay, Overlay):
             frames = (*overlay.earlier, overlay.limbs)
             shown |= {
-                overlay.due - FRAME_INTERVAL_US * (len(frames) - 1 - nth): limbs for nth, limbs in enumerate(frames)
+                overlay.due - FRAME_INTERVAL_US * (len(frames) - 1 - index): limbs for index, limbs in enumerate(frames)
             }
     motion = await stored_motion("one", 5)
     blocks = MotionBlockStore(motion.first_track)
@@ -329,12 +329,12 @@ async def test_the_log_replays_to_what_was_shown(stage: Stage, bus: MemoryBus) -
         assert pose is not None
         return [pose[1]]
 
-    again = {
-        due: {limb: pack_joints(joints) for limb, joints in laid.items()}
-        for due, laid in InputLog.unpack(stage.log.pack()).replay(lambda _: [motion.first_track.figure], poses_at)
+    replayed = {
+        due: {limb: pack_joints(joints) for limb, joints in overlay.items()}
+        for due, overlay in InputLog.unpack(stage.log.pack()).replay(lambda _: [motion.first_track.figure], poses_at)
     }
-    # once the dance is alone nothing is noted
-    assert {due: again.get(due) or {} for due in shown} == shown
+    # frames without controlled limbs are not in the log
+    assert {due: replayed.get(due) or {} for due in shown} == shown
 
 
 async def test_limb_stays_held_during_a_server_stall(stage: Stage, bus: MemoryBus) -> None:
@@ -343,17 +343,15 @@ async def test_limb_stays_held_during_a_server_stall(stage: Stage, bus: MemoryBu
     stage.receive(aiko.puppeteer, Claim(0))
     async with keep_holding(stage, aiko, 0):
         shown = len(await audience.wait_for(2, Overlay))
-    # the machine has something else to do for longer than a lease: what Aiko says meanwhile waits at the socket
-    time.sleep(1.5e-6 * INPUT_TIMEOUT_US)  # noqa: ASYNC251 - it is the loop that stands still
+    # the event loop is blocked for longer than the input timeout; Aiko's messages wait at the socket
+    time.sleep(1.5e-6 * INPUT_TIMEOUT_US)  # noqa: ASYNC251 - blocks the event loop on purpose
     await audience.wait_for(shown + 1, Overlay)
     async with keep_holding(stage, aiko, 0):
         await audience.wait_for(shown + 8, Overlay)
     assert stage.presence.limbs[0] == aiko.id
 
 
-async def test_one_that_goes_on_here_tells_where_it_is_and_that_nobody_holds_a_limb(
-    stage: Stage, bus: MemoryBus
-) -> None:
+async def test_takeover_publishes_timeline_presence_and_an_empty_overlay(stage: Stage, bus: MemoryBus) -> None:
     audience = StageMessages(bus)
     stage.announce_takeover()
     state, presence, overlay = audience.messages

@@ -24,7 +24,7 @@ from tests.vectors.blocks import random_motion
 
 
 class FakeStageOwner:
-    """Notes what is asked of the keeper of stages."""
+    """Owner that records its calls."""
 
     def __init__(self) -> None:
         self.saved: list[bytes] = []
@@ -41,7 +41,7 @@ class FakeStageOwner:
 
 
 @pytest.fixture
-async def backing(tmp_path: Path) -> AsyncIterator[ServiceContext]:
+async def context(tmp_path: Path) -> AsyncIterator[ServiceContext]:
     async with open_context(Settings(data=tmp_path)) as opened:
         encoded = encode_motion(random_motion(2.0, 30.0, 1), error_bounds_mm=(30.0,), grade="live")
         await opened.motion_store.put("one", pack_motion("one", encoded))
@@ -54,60 +54,60 @@ def owner() -> FakeStageOwner:
 
 
 @pytest.fixture
-async def door(backing: ServiceContext, owner: FakeStageOwner) -> AsyncIterator[StageEndpoint]:
-    stored = await backing.motion_store.get("one")
+async def endpoint(context: ServiceContext, owner: FakeStageOwner) -> AsyncIterator[StageEndpoint]:
+    stored = await context.motion_store.get("one")
     assert stored is not None
-    state = timeline.start("one", stored.first_track.duration_us, backing.clock())
-    stage = Stage(SessionStart("s", stored, state, state.clock), backing.bus, backing.clock)
-    opened = StageEndpoint(stage, backing, owner, 1)
+    state = timeline.start("one", stored.first_track.duration_us, context.clock())
+    stage = Stage(SessionStart("s", stored, state, state.clock), context.bus, context.clock)
+    opened = StageEndpoint(stage, context, owner, 1)
     yield opened
     await opened.close()
 
 
 async def join_stage(context: ServiceContext, name: str) -> tuple[StageProxy, PuppeteerConnection]:
-    stage, visitor = StageProxy("s", context.bus, context.key_values), PuppeteerConnection()
-    context.bus.subscribe(stage.outgoing_subject(visitor), visitor.send)
-    await stage.join(visitor, name)
-    return stage, visitor
+    stage, connection = StageProxy("s", context.bus, context.key_values), PuppeteerConnection()
+    context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
+    await stage.join(connection, name)
+    return stage, connection
 
 
-async def test_an_edit_is_noted_before_it_is_acknowledged(
-    backing: ServiceContext, door: StageEndpoint, owner: FakeStageOwner
+async def test_edit_is_saved_before_it_is_acknowledged(
+    context: ServiceContext, endpoint: StageEndpoint, owner: FakeStageOwner
 ) -> None:
-    stage = StageProxy("s", backing.bus, backing.key_values)
+    stage = StageProxy("s", context.bus, context.key_values)
     await stage.edit(SessionEdit(playing=False))
-    assert owner.saved == [door.stage.timeline.pack()]
-    assert not door.stage.timeline.playing
+    assert owner.saved == [endpoint.stage.timeline.pack()]
+    assert not endpoint.stage.timeline.playing
     await stage.end()
     assert owner.ended == ["s"]
 
 
-@pytest.mark.usefixtures("door")
-async def test_join_of_a_full_stage_gives_503(backing: ServiceContext, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("endpoint")
+async def test_join_of_a_full_stage_gives_503(context: ServiceContext, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 1)
-    await join_stage(backing, "a")
+    await join_stage(context, "a")
     with pytest.raises(ProblemError, match="1 puppeteers are here") as refused:
-        await join_stage(backing, "b")
+        await join_stage(context, "b")
     assert refused.value.status == 503
 
 
-@pytest.mark.usefixtures("door")
-async def test_unknown_puppeteer_is_notified(backing: ServiceContext) -> None:
-    stage, visitor = StageProxy("s", backing.bus, backing.key_values), PuppeteerConnection()
-    backing.bus.subscribe(stage.outgoing_subject(visitor), visitor.send)
-    stage.send(visitor, None)
-    assert not visitor.is_unknown
-    stage.send(visitor, b"")
-    assert visitor.is_unknown
+@pytest.mark.usefixtures("endpoint")
+async def test_unknown_puppeteer_is_notified(context: ServiceContext) -> None:
+    stage, connection = StageProxy("s", context.bus, context.key_values), PuppeteerConnection()
+    context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
+    stage.send(connection, None)
+    assert not connection.is_unknown
+    stage.send(connection, b"")
+    assert connection.is_unknown
 
 
-async def test_puppeteer_of_a_dead_replica_is_removed(backing: ServiceContext, door: StageEndpoint) -> None:
-    stage, dead = await join_stage(backing, "dead")
-    _, here = await join_stage(backing, "here")
+async def test_puppeteer_of_a_dead_replica_is_removed(context: ServiceContext, endpoint: StageEndpoint) -> None:
+    stage, dead = await join_stage(context, "dead")
+    _, living = await join_stage(context, "living")
     stage.send(dead, Claim(0).pack())
-    stage.send(here, Claim(1).pack())
-    assert door.stage.presence.limbs == [dead.id, here.id, None, None]
-    for puppeteer in door.stage.puppeteers:
+    stage.send(living, Claim(1).pack())
+    assert endpoint.stage.presence.limbs == [dead.id, living.id, None, None]
+    for puppeteer in endpoint.stage.puppeteers:
         if puppeteer.id == dead.id:
             puppeteer.last_heard_us -= stage_endpoint.PUPPETEER_TIMEOUT_US
     async with asyncio.timeout(20):
@@ -115,11 +115,11 @@ async def test_puppeteer_of_a_dead_replica_is_removed(backing: ServiceContext, d
             dead.has_messages.clear()
             await dead.has_messages.wait()
     assert dead.is_unknown
-    assert not here.is_unknown
-    assert [one["name"] for one in door.stage.presence.puppeteers] == ["here"]
+    assert not living.is_unknown
+    assert [one["name"] for one in endpoint.stage.presence.puppeteers] == ["living"]
 
 
-@pytest.mark.usefixtures("door")
-async def test_answers_are_of_plain_values(backing: ServiceContext) -> None:
-    answer = msgpack.unpackb(await backing.bus.request("session.s.describe", msgpack.packb(None)))
+@pytest.mark.usefixtures("endpoint")
+async def test_answers_are_plain_values(context: ServiceContext) -> None:
+    answer = msgpack.unpackb(await context.bus.request("session.s.describe", msgpack.packb(None)))
     assert answer["answer"]["id"] == "s"

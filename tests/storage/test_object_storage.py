@@ -62,17 +62,17 @@ async def test_object_exists_until_it_is_deleted(url: str, size: int) -> None:
 async def test_motion_store_stores_motions_and_logs(url: str) -> None:
     encoded = encode_motion(random_motion(1.5, 30.0, 8), error_bounds_mm=(30.0,), grade="live")
     await MotionStore.open(url).put("m1", pack_motion("m1", encoded))
-    library = MotionStore.open(url)
-    stored = await library.get("m1")
+    store = MotionStore.open(url)
+    stored = await store.get("m1")
     assert stored is not None
     assert len(stored.first_packets[0]) == 2
-    assert await library.get("m2") is None
-    await library.put_log("a-log_1", b"what was done")
-    assert await library.get_log("a-log_1") == b"what was done"
-    await library.remove_log("a-log_1")
-    await library.remove_log("a-log_1")
-    assert await library.get_log("a-log_1") is None
-    await library.remove("m1")
+    assert await store.get("m2") is None
+    await store.put_log("a-log_1", b"log bytes")
+    assert await store.get_log("a-log_1") == b"log bytes"
+    await store.remove_log("a-log_1")
+    await store.remove_log("a-log_1")
+    assert await store.get_log("a-log_1") is None
+    await store.remove("m1")
     assert await MotionStore.open(url).get("m1") is None
 
 
@@ -102,13 +102,13 @@ async def test_killed_server_is_unavailable_but_cached_motions_are_served(tmp_pa
         endpoint = f"http://127.0.0.1:{other_server.port}"
         patch.setenv("AWS_ENDPOINT_URL", endpoint)
         httpx2.put(f"{endpoint}/bucket").raise_for_status()
-        objects, library = ObjectStorage("s3://bucket"), MotionStore.open("s3://bucket")
+        objects, store = ObjectStorage("s3://bucket"), MotionStore.open("s3://bucket")
         encoded = encode_motion(random_motion(1.5, 30.0, 8), error_bounds_mm=(30.0,), grade="live")
-        await library.put("m1", pack_motion("m1", encoded))
-        assert await library.get("m1") is not None
+        await store.put("m1", pack_motion("m1", encoded))
+        assert await store.get("m1") is not None
         other_server.kill()
         await assert_unavailable(objects)
-        assert await library.get("m1") is not None
+        assert await store.get("m1") is not None
         other_server.start()
         httpx2.put(f"{endpoint}/bucket").raise_for_status()
         await objects.put("object", b"data")

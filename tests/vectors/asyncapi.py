@@ -111,13 +111,13 @@ def _without_titles(schema: Any) -> Any:
         return [_without_titles(part) for part in schema]
     if not isinstance(schema, dict):
         return schema
-    kept = {key: _without_titles(value) for key, value in schema.items() if key != "properties"}
+    result = {key: _without_titles(value) for key, value in schema.items() if key != "properties"}
     if "properties" in schema:
-        kept["properties"] = {
+        result["properties"] = {
             name: {key: value for key, value in _without_titles(field).items() if key != "title"}
             for name, field in schema["properties"].items()
         }
-    return kept
+    return result
 
 
 def _payload(kind: Any) -> dict[str, Any]:

@@ -42,8 +42,8 @@ def random_motion(seconds: float, fps: float, seed: int) -> Motion:
 def random_coefficients(random: np.random.Generator, count: int, max_magnitude: int) -> IntArray:
     """Return sparse coefficients (19, 3, `count`) of all magnitudes up to `max_magnitude`."""
     size = np.floor(2.0 ** random.uniform(0, np.log2(max_magnitude + 1), (CHANNEL_COUNT, 3, count))).astype(np.int64)
-    here = random.random(size.shape) < random.choice([0.05, 0.5, 0.95], (CHANNEL_COUNT, 1, 1))
-    quantised: IntArray = size * here * random.choice([-1, 1], size.shape)
+    is_nonzero = random.random(size.shape) < random.choice([0.05, 0.5, 0.95], (CHANNEL_COUNT, 1, 1))
+    quantised: IntArray = size * is_nonzero * random.choice([-1, 1], size.shape)
     return quantised
 
 
@@ -96,9 +96,9 @@ def make_vectors() -> dict[str, Any]:
     motion, fast_motion = random_motion(2.6, 30.0, 7), random_motion(1.1, 59.94, 8)
     even = replace(plan_motion_track(motion), block_frames=30, first_frames=30)
     quick = plan_motion_track(fast_motion, 0.5, 0.1, mean_error_mm=2.0)
-    stood = np.repeat(motion.rotations[3:4], 20, axis=0)
-    statue = Motion(standard_figure(), 24.0, motion.root[:20] * 0, stood)
-    still = plan_motion_track(statue)
+    still_rotations = np.repeat(motion.rotations[3:4], 20, axis=0)
+    still_motion = Motion(standard_figure(), 24.0, motion.root[:20] * 0, still_rotations)
+    still = plan_motion_track(still_motion)
     tracks = [even, quick, still]
     valid = []
     goals: tuple[tuple[int, Motion, int, int, Literal["first", "mean"]], ...] = (
@@ -109,7 +109,7 @@ def make_vectors() -> dict[str, Any]:
         (1, fast_motion, 0, 60, "first"),
         (1, fast_motion, 1, 150, "mean"),
         (1, fast_motion, 2, 110, "mean"),
-        (2, statue, 0, 120, "mean"),
+        (2, still_motion, 0, 120, "mean"),
     )
     for number, source, index, step, goal in goals:
         coded = BlockEncoder(tracks[number], source, load_shipped_prior()).encode_block(

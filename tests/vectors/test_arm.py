@@ -33,9 +33,11 @@ def test_committed_arm_vectors_are_what_the_code_makes() -> None:
     made = arm.make_vectors()
     compare(made, stored, "arm.json")
     for one, other in zip(made["arms"], stored["arms"], strict=True):
-        here, there = (bend_table.parse_bend_table(base64.b64decode(vectors["table"])) for vectors in (one, other))
+        generated, committed = (
+            bend_table.parse_bend_table(base64.b64decode(vectors["table"])) for vectors in (one, other)
+        )
         # one float16 step near 1: the bisection may end on the other side of a rounding border
-        assert float(np.abs(here.astype(np.float64) - there.astype(np.float64)).max()) <= 2.0**-11
+        assert float(np.abs(generated.astype(np.float64) - committed.astype(np.float64)).max()) <= 2.0**-11
 
 
 def test_committed_tables_have_the_recorded_digests() -> None:

@@ -118,8 +118,8 @@ async def test_broken_connection_ends_and_the_others_receive(sender: MulticastSe
     clients[3].close()
     MulticastGroup(connections, sender).write(b"to all")
     async with asyncio.timeout(20):
-        for place, client in enumerate(clients):
-            if place != 3:
+        for index, client in enumerate(clients):
+            if index != 3:
                 assert await read_bytes(client, 6) == b"to all"
         await ended.wait()
     await close_all(connections, clients)

@@ -1,1 +1,1 @@
-"""Pure: limbs on strings, and who holds them."""
+"""Control of limbs: kinematics of arms and legs, ownership, hand-over and overlay (pure: no input or output)."""

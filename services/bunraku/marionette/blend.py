@@ -100,7 +100,7 @@ class ArmBlend:
             if weight > SWIVEL_RESET_WEIGHT and abs(continued) <= MAX_TWIST_LAG_RAD:
                 swivel = continued
             else:
-                # the other way round from here on: the offset keeps the shown elbow in place and decays
+                # the other way round from now on: the offset keeps the shown elbow in place and decays
                 offset = self._swivel_offset_rad + weight * (continued - swivel)
                 self._swivel_offset_rad = offset - 2.0 * pi * round(offset / (2.0 * pi))
         self._swivel_rad = swivel
@@ -119,10 +119,15 @@ class ArmBlend:
         """Return shoulder and elbow rotated least so that the tip is at `reach` arm lengths along the chord."""
         upper, fore, hand = self._rig.bones
         rest = vector.add(fore, vector.rotate(wrist, hand))
-        near, far = vector.length(upper), vector.length(rest)
+        upper_length, rest_length = vector.length(upper), vector.length(rest)
         chord = max(reach * self._rig.arm_length_m, 1e-9)
-        along = min(max((near * near + chord * chord - far * far) / (2.0 * chord), -near), near)
-        off = sqrt(max(near * near - along * along, 0.0))
+        along = min(
+            max(
+                (upper_length * upper_length + chord * chord - rest_length * rest_length) / (2.0 * chord), -upper_length
+            ),
+            upper_length,
+        )
+        off = sqrt(max(upper_length * upper_length - along * along, 0.0))
         mixed = vector.rotate(shoulder, upper)
         # an elbow that must move away from the chord moves towards -y: a straight arm leaves the side open, and the
         # elbow of the bent arm is there
@@ -130,7 +135,9 @@ class ArmBlend:
         _, y, z = vector.unit((0.0, mixed[1] - farther, mixed[2]), (0.0, -1.0, 0.0))
         position = (along, off * y, off * z)
         before = vector.multiply(shoulder, elbow)
-        raised = vector.rotation_between(vector.scale(mixed, 1.0 / near), vector.scale(position, 1.0 / near))
+        raised = vector.rotation_between(
+            vector.scale(mixed, 1.0 / upper_length), vector.scale(position, 1.0 / upper_length)
+        )
         shoulder = vector.multiply(raised, shoulder)
         lower = vector.unit(vector.rotate(before, rest), (1.0, 0.0, 0.0))
         goal = vector.unit(vector.subtract((chord, 0.0, 0.0), position), (1.0, 0.0, 0.0))

@@ -129,7 +129,7 @@ class ControlledHand(_ControlledLimb):
             hand = follower.step(goal, seconds, HAND_ACCELERATION, rig.arm.min_tip_distance, MAX_TIP_DISTANCE)
         else:
             acceleration = self._choose_return_acceleration(MAX_HAND_RETURN_ACCELERATION)
-            # the motion may have its hand nearer to the shoulder than a controlled one goes
+            # the hand of the motion may be nearer to the shoulder than a controlled hand can be
             inner = min(rig.arm.min_tip_distance, vector.length(own))
             hand = follower.step(own, seconds, acceleration, inner, 1.0, self._velocity)
             if weight <= 0.0 and vector.length(vector.subtract(hand, own)) < ARRIVAL_TOLERANCE:
@@ -142,7 +142,7 @@ class ControlledHand(_ControlledLimb):
             rig.target_direction(hand), vector.length(hand), rig.local_up(pose), seconds
         )
         solved = rig.bend_joints(vector.length(tip), bend)
-        # the motion may hold an arm where the shoulder's limit forbids it: the limit comes in with the weight
+        # the motion may hold an arm where the shoulder's limit forbids it: the limit is blended in with the weight
         target = vector.add(hand, vector.scale(vector.subtract(tip, hand), weight))
         alignment = self._alignment.update(own, target, weight)
         return self._blend.blend(

@@ -64,7 +64,7 @@ def exact_arm(proportions: Proportions, tips: PlanarPoints) -> PlanarPoints:
 
 def draw_figure(proportions: Proportions, name: Figure) -> str:
     """Return the figure as SVG."""
-    way, poses = tip_path(name, 241), tip_path(name, _POSE_COUNT + 1)[: _POSE_COUNT if name == "circle" else None]
+    path, poses = tip_path(name, 241), tip_path(name, _POSE_COUNT + 1)[: _POSE_COUNT if name == "circle" else None]
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="{_SANS}" font-size="13" '
         f'fill="{_MUTED}" role="img" aria-label="{_TITLES[name]}">',
@@ -74,10 +74,10 @@ def draw_figure(proportions: Proportions, name: Figure) -> str:
         f'<text x="48" y="54" font-size="21" fill="{_INK}" font-family="{_SERIF}" font-weight="500">'
         f"{_TITLES[name]}</text>",
     ]
-    for x, arm, words in zip(
+    for x, arm, label in zip(
         _SHOULDER_XS, (paper_arm, exact_arm), ("As in the paper", "Exact, and within the joints' limits"), strict=True
     ):
-        parts += _panel(x, arm(proportions, poses), arm(proportions, way), words)
+        parts += _panel(x, arm(proportions, poses), arm(proportions, path), label)
     parts += _legend(proportions)
     return "\n".join([*parts, "</svg>", ""])
 
@@ -90,21 +90,21 @@ def _panel(left: float, poses: PlanarPoints, joint_paths: PlanarPoints, caption:
         y = _SHOULDER_Y - _PIXELS_PER_ARM_LENGTH * position.imag
         return f"{x:.1f} {y:.1f}"
 
-    def line(joints: list[complex], look: str) -> str:
+    def polyline(joints: list[complex], look: str) -> str:
         return f'<path d="M{"L".join(to_pixels(joint) for joint in joints)}" fill="none" {look}/>'
 
     disc = [0.55 * np.exp(1j * angle) for angle in np.linspace(-0.5, 0.5, 2) * pi]
     parts = [
         f'<text x="{left + 10:.1f}" y="92" font-size="15" fill="{_INK}">{caption}</text>',
-        line(disc, f'stroke="{_HAIRLINE}" stroke-opacity="0.34" stroke-dasharray="1 5" stroke-linecap="round"'),
+        polyline(disc, f'stroke="{_HAIRLINE}" stroke-opacity="0.34" stroke-dasharray="1 5" stroke-linecap="round"'),
     ]
     for nth in range(poses.shape[1]):
         joints = [0j, *poses[:, nth].tolist()]
         bold = nth % 6 == 0
         look = f'stroke="{_INK}" stroke-opacity="{0.8 if bold else 0.2}" stroke-width="{2.6 if bold else 1.4}"'
-        parts.append(line(joints, look + ' stroke-linejoin="round" stroke-linecap="round"'))
+        parts.append(polyline(joints, look + ' stroke-linejoin="round" stroke-linecap="round"'))
     for joint, colour in zip(joint_paths, (_ELBOW, _WRIST, _TIP), strict=True):
-        parts.append(line(joint.tolist(), f'stroke="{colour}" stroke-width="2.2" stroke-linejoin="round"'))
+        parts.append(polyline(joint.tolist(), f'stroke="{colour}" stroke-width="2.2" stroke-linejoin="round"'))
     for nth in range(0, poses.shape[1], 6):
         for joint, colour in zip(poses[:, nth].tolist(), (_ELBOW, _WRIST, _TIP), strict=True):
             x, y = to_pixels(joint).split(" ")
@@ -115,12 +115,12 @@ def _panel(left: float, poses: PlanarPoints, joint_paths: PlanarPoints, caption:
 
 def _legend(proportions: Proportions) -> list[str]:
     parts, x = [], 48.0
-    for colour, words in ((_ELBOW, "elbow"), (_WRIST, "wrist"), (_TIP, "hand tip")):
+    for colour, label in ((_ELBOW, "elbow"), (_WRIST, "wrist"), (_TIP, "hand tip")):
         parts.append(f'<line x1="{x}" y1="512" x2="{x + 24}" y2="512" stroke="{colour}" stroke-width="2.6"/>')
-        parts.append(f'<text x="{x + 32}" y="516.5" fill="{_INK}">{words}</text>')
+        parts.append(f'<text x="{x + 32}" y="516.5" fill="{_INK}">{label}</text>')
         x += 96.0
     lengths, masses = (
         " : ".join(f"{100.0 * part:.1f}" for part in of) for of in (proportions.lengths, proportions.masses)
     )
-    words = f"links {lengths} %, masses {masses} %"
-    return [*parts, f'<text x="{WIDTH - 48}" y="516.5" text-anchor="end" font-size="12.5">{words}</text>']
+    label = f"links {lengths} %, masses {masses} %"
+    return [*parts, f'<text x="{WIDTH - 48}" y="516.5" text-anchor="end" font-size="12.5">{label}</text>']

@@ -72,17 +72,22 @@ class DirectionAlignment:
         the shortest rotation once the hand is back. At `weight` 1 the state is reset.
         """
         down = (0.0, -1.0, 0.0)
-        here, there = vector.unit(motion_target, down), vector.unit(controlled_target, down)
-        shortest = vector.rotation_between(here, there)
+        motion_direction, controlled_direction = vector.unit(motion_target, down), vector.unit(controlled_target, down)
+        shortest = vector.rotation_between(motion_direction, controlled_direction)
         turn = shortest
         if self._rotation is not None:
-            turn = vector.multiply(vector.rotation_between(vector.rotate(self._rotation, here), there), self._rotation)
+            turn = vector.multiply(
+                vector.rotation_between(vector.rotate(self._rotation, motion_direction), controlled_direction),
+                self._rotation,
+            )
             w, x, y, z = vector.multiply(turn, vector.conjugate(shortest))
-            twist = 2.0 * atan2(vector.dot((x, y, z), there), w)
+            twist = 2.0 * atan2(vector.dot((x, y, z), controlled_direction), w)
             twist -= 2.0 * pi * round(twist / (2.0 * pi))
             max_twist = pi * weight
             if abs(twist) > max_twist:
-                turn = vector.multiply(vector.from_axis_angle(there, min(max(twist, -max_twist), max_twist)), shortest)
+                turn = vector.multiply(
+                    vector.from_axis_angle(controlled_direction, min(max(twist, -max_twist), max_twist)), shortest
+                )
         self._rotation = None if weight >= 1.0 else vector.normalise(turn)
         return turn
 

@@ -170,4 +170,4 @@ def clamp_to_reach(is_hand: bool, value: Vector) -> Vector:
 
 
 class LateInput(Exception):
-    """Duplicate input, or one that comes too late."""
+    """Duplicate input, or one received too late."""

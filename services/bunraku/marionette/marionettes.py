@@ -90,18 +90,18 @@ class Marionettes:
     def _replace_figures(self, figures: Sequence[Figure]) -> list[tuple[int, str]]:
         if not 1 <= len(figures) <= MAX_PERFORMERS:
             raise ValueError(f"a stage has 1 to {MAX_PERFORMERS} performers, not {len(figures)}")
-        here = len(self._marionettes)
+        count = len(self._marionettes)
         # creating all of them first raises before anything changes
         created = [
             Marionette(figure, self.ownership, performer, self._solver) for performer, figure in enumerate(figures)
         ]
         for marionette, figure in zip(self._marionettes, figures, strict=False):
             marionette.set_figure(figure)
-        self._marionettes = [*self._marionettes[: len(figures)], *created[here:]]
+        self._marionettes = [*self._marionettes[: len(figures)], *created[count:]]
         return self.ownership.set_limb_count(LIMBS_PER_PERFORMER * len(figures))
 
     def _reset_after_rest(self) -> None:
-        """Forget what happened before the last rest, so that a log replays from any rest to the same overlays."""
+        """Reset the state at rest, so that a log replays from any rest to the same overlays."""
         if self._wake_count != self.ownership.wake_count:
             self._wake_count = self.ownership.wake_count
             for marionette in self._marionettes:

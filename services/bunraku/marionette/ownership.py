@@ -90,7 +90,7 @@ class _LimbState:
 
 
 class Ownership:
-    """Limbs of a stage and their holders: the one interface for what puppeteers do.
+    """Limbs of a stage and their holders: the only interface for actions of puppeteers.
 
     Limb l of performer k has the number 4 k + l. A recorder receives every command that can have a consequence.
     """
@@ -103,7 +103,7 @@ class Ownership:
     ) -> None:
         """`epochs` are those of the last grants, by limb."""
         self._recorder = recorder
-        # of all limbs that a stage can have, so that a limb that disappears and comes back never repeats an epoch
+        # of all limbs that a stage can have, so that a limb that is removed and added again never repeats an epoch
         self._epochs = [*epochs, *INITIAL_EPOCHS[len(epochs) :]]
         self._limbs: list[_LimbState] = []
         self.wake_count = 0
@@ -119,8 +119,8 @@ class Ownership:
         removed = [
             (limb, state.holder) for limb, state in enumerate(self._limbs) if limb >= count and state.holder is not None
         ]
-        here = len(self._limbs)
-        self._limbs = [*self._limbs[:count], *(_LimbState(epoch=epoch) for epoch in self._epochs[here:count])]
+        current = len(self._limbs)
+        self._limbs = [*self._limbs[:count], *(_LimbState(epoch=epoch) for epoch in self._epochs[current:count])]
         return removed
 
     def holders(self) -> tuple[str | None, ...]:

@@ -23,7 +23,7 @@ class CommandKind(IntEnum):
     INPUT = 4
     """puppeteer, limb, kind, epoch, sequence, sample time, three values"""
     ASK = 5
-    """puppeteer, limb, whether the limb is wanted"""
+    """puppeteer, limb, True to ask or False to withdraw"""
     GRANT_FREE_LIMBS = 6
     EXPIRE = 7
     OBSERVE = 8

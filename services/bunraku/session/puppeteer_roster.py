@@ -43,7 +43,7 @@ class Puppeteer:
             self.send(notice)
 
     def send_limb_lost(self, limb: int, now: int) -> None:
-        """Send that a limb is lost, at most once a second: an earlier message may have been lost."""
+        """Report the loss of a limb, at most once per second: an earlier report may not have arrived."""
         if (
             limb in self.granted_limbs
             and now - self._lost_notice_us.get(limb, -LOST_NOTICE_INTERVAL_US) >= LOST_NOTICE_INTERVAL_US

@@ -1,4 +1,4 @@
-"""Sessions of one replica: opened here, or taken over from a replica that is gone.
+"""Sessions of one replica: opened here, or taken over from a replica that has stopped.
 
 A session is owned by one replica. The key-value store names the owner, beside the state that another replica needs to
 continue the session, and holds a heartbeat counter of every replica. A replica whose counter stands still for
@@ -113,7 +113,7 @@ class SessionManager:
         return [endpoint.stage for endpoint in tuple(self._endpoints.values())]
 
     def use_solver(self, solver: LimbSolver) -> None:
-        """Solve the limbs of all stages, and of those to come, with another solver."""
+        """Solve the limbs of all present and future stages with another solver."""
         self._solver = solver
         for stage in self.stages:
             stage.use_solver(solver)
@@ -144,7 +144,7 @@ class SessionManager:
         return found, ids[first + limit] if first + limit < len(ids) else None
 
     async def load_motion(self, motion: str) -> StoredMotion:
-        """Return a motion; raises `ProblemError` if there is none of this id."""
+        """Return a motion; raises `ProblemError` if it does not exist."""
         stored = await self._context.motion_store.get(motion)
         if stored is None:
             raise ProblemError(404, "No such motion", f"there is no motion {motion[:40]!r}", field="motion")

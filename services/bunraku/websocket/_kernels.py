@@ -31,7 +31,7 @@ def multicast_send(
     sockets that did not accept all bytes.
     """
     short = 0
-    for place in range(file_descriptors.size):
-        sent[place] = _libc_send(file_descriptors[place], data.ctypes.data, data.size, flags)
-        short += sent[place] != data.size
+    for index in range(file_descriptors.size):
+        sent[index] = _libc_send(file_descriptors[index], data.ctypes.data, data.size, flags)
+        short += sent[index] != data.size
     return short

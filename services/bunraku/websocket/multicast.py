@@ -65,11 +65,11 @@ class CompiledSender:
             size = len(data)
             total = len(connections) * size
             if multicast_send(file_descriptors, np.frombuffer(data, np.uint8), flags, sent):
-                for place in np.flatnonzero(sent != size).tolist():
+                for index in np.flatnonzero(sent != size).tolist():
                     # the transport buffers the rest; that of a broken connection notices the error by itself
-                    rest = data[max(int(sent[place]), 0) :]
+                    rest = data[max(int(sent[index]), 0) :]
                     total -= len(rest)
-                    connections[place].write(rest)
+                    connections[index].write(rest)
             return total
 
         return write_to_all

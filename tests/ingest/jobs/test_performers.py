@@ -81,18 +81,18 @@ def test_equal_motions_get_the_minimum_spacing() -> None:
 
 
 def test_extra_spacing_is_limited() -> None:
-    far, still = make_walk("far", 30.0, 0.0), make_walk("still", 0.0, 0.0)
-    left, right = place_side_by_side([far.performers[0], still.performers[0]])
-    middles = [place.x + 3.0 + half for place, half in ((left, 15.0), (right, 0.0))]
+    wide, still = make_walk("far", 30.0, 0.0), make_walk("still", 0.0, 0.0)
+    left, right = place_side_by_side([wide.performers[0], still.performers[0]])
+    middles = [placement.x + 3.0 + half for placement, half in ((left, 15.0), (right, 0.0))]
     assert middles[1] - middles[0] == pytest.approx(PERFORMER_SPACING_M + MAX_EXTRA_SPACING_M, abs=0.6)
 
 
 def test_given_placements_must_match_the_performers() -> None:
-    places = [Placement(0.0, 1.0, 0.0), Placement(0.5, -1.0, 3.0)]
-    result = combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], places)
+    placements = [Placement(0.0, 1.0, 0.0), Placement(0.5, -1.0, 3.0)]
+    result = combine_performers("m", MOTIONS["one"], [MOTIONS["two"]], placements)
     assert isinstance(result, JobResult)
-    assert [performer.placement for performer in container.unpack_motion("m", result.packed).performers] == places
-    rejected = combine_performers("m", MOTIONS["one"], [MOTIONS["both"]], places)
+    assert [performer.placement for performer in container.unpack_motion("m", result.packed).performers] == placements
+    rejected = combine_performers("m", MOTIONS["one"], [MOTIONS["both"]], placements)
     assert isinstance(rejected, JobRejection)
     assert rejected.field == "places"
 

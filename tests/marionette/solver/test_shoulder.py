@@ -28,7 +28,7 @@ def upper_arm(chord: Vector, normal: Vector, lift: float, angle: float) -> Vecto
 
 
 @pytest.mark.parametrize(
-    ("direction", "goes"),
+    ("direction", "is_allowed"),
     [
         ((0.0, -1.0, 0.0), True),  # hanging
         ((0.0, 1.0, 0.0), True),  # overhead
@@ -43,49 +43,51 @@ def upper_arm(chord: Vector, normal: Vector, lift: float, angle: float) -> Vecto
         ((-0.8, 0.0, -0.6), False),  # across the back
     ],
 )
-def test_an_arm_goes_where_arms_go(direction: Vector, goes: bool) -> None:
-    assert (depth_in_caps(SHOULDER, vector.unit(direction, direction)) <= 0.0) == goes
+def test_allowed_and_forbidden_directions_of_the_upper_arm(direction: Vector, is_allowed: bool) -> None:
+    assert (depth_in_caps(SHOULDER, vector.unit(direction, direction)) <= 0.0) == is_allowed
     x, y, z = direction
     mirrored = (-x, y, z)
-    assert (depth_in_caps(make_shoulder_limit(right=True), vector.unit(mirrored, mirrored)) <= 0.0) == goes
+    assert (depth_in_caps(make_shoulder_limit(right=True), vector.unit(mirrored, mirrored)) <= 0.0) == is_allowed
 
 
 @given(directions, directions, st.floats(0.01, 2.0))
-def test_the_least_turn_is_allowed_and_none_less_is(chord: Vector, other: Vector, lift: float) -> None:
+def test_min_allowed_turn_is_allowed_and_minimal(chord: Vector, other: Vector, lift: float) -> None:
     normal = vector.unit(vector.reject_from(other, chord), vector.any_perpendicular(chord))
-    least = min_allowed_turn(SHOULDER, chord, normal, lift)
+    min_turn = min_allowed_turn(SHOULDER, chord, normal, lift)
     grid = [step * pi / 180.0 for step in range(-180, 181)]
     allowed = [t for t in grid if depth_in_caps(SHOULDER, upper_arm(chord, normal, lift, t)) <= 0.0]
-    if isnan(least):
+    if isnan(min_turn):
         assert not allowed
         return
-    assert depth_in_caps(SHOULDER, upper_arm(chord, normal, lift, least)) <= 1e-9
-    assert all(abs(least) <= abs(t) + 1e-9 for t in allowed)
+    assert depth_in_caps(SHOULDER, upper_arm(chord, normal, lift, min_turn)) <= 1e-9
+    assert all(abs(min_turn) <= abs(t) + 1e-9 for t in allowed)
 
 
 @given(directions)
-def test_the_nearest_direction_is_that_far_away(direction: Vector) -> None:
-    far = angle_to_allowed(SHOULDER, direction)
-    assert (far == 0.0) == (depth_in_caps(SHOULDER, direction) <= 0.0)
-    if far > 0.0:
-        # a circle a little wider has a place where an arm goes, one a little narrower has none
+def test_angle_to_allowed_is_the_distance_to_the_nearest_direction(direction: Vector) -> None:
+    distance = angle_to_allowed(SHOULDER, direction)
+    assert (distance == 0.0) == (depth_in_caps(SHOULDER, direction) <= 0.0)
+    if distance > 0.0:
+        # a slightly wider circle has an allowed direction, a slightly narrower one has none
         normal = vector.any_perpendicular(direction)
-        assert not isnan(min_allowed_turn(SHOULDER, direction, normal, far + 1e-6))
-        grid = [upper_arm(direction, normal, max(far - 1e-3, 0.5 * far), step * pi / 90.0) for step in range(180)]
-        assert all(depth_in_caps(SHOULDER, place) > 0.0 for place in grid)
+        assert not isnan(min_allowed_turn(SHOULDER, direction, normal, distance + 1e-6))
+        grid = [
+            upper_arm(direction, normal, max(distance - 1e-3, 0.5 * distance), step * pi / 90.0) for step in range(180)
+        ]
+        assert all(depth_in_caps(SHOULDER, arm_direction) > 0.0 for arm_direction in grid)
 
 
 @given(directions, directions, st.floats(0.001, 0.3))
-def test_the_way_to_another_direction_goes_round_the_caps(begin: Vector, end: Vector, most: float) -> None:
+def test_step_toward_avoids_the_caps(begin: Vector, end: Vector, max_angle: float) -> None:
     if depth_in_caps(SHOULDER, begin) > 0.0 or depth_in_caps(SHOULDER, end) > 0.0:
         return
-    step = step_toward(SHOULDER, begin, end, most)
+    step = step_toward(SHOULDER, begin, end, max_angle)
     assert abs(vector.length(step) - 1.0) < 1e-9
     assert depth_in_caps(SHOULDER, step) <= 1e-12
-    assert vector.length(vector.subtract(step, begin)) <= 2.0 * most + 1e-9
+    assert vector.length(vector.subtract(step, begin)) <= 2.0 * max_angle + 1e-9
 
 
-def test_caps_are_of_unit_axes() -> None:
+def test_axes_of_caps_are_unit_vectors() -> None:
     for axis, radius in LEFT_CAPS:
         assert abs(vector.length(axis) - 1.0) < 1e-12
         assert depth_in_caps((((axis, radius),), ()), axis) == pytest.approx(radius)

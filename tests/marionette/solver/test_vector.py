@@ -1,4 +1,4 @@
-"""The plain-float rotations say what the rotations over arrays say."""
+"""Plain-float rotations equal the array rotations of `bunraku.motion.rotation`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ units = vectors.filter(lambda v: vector.length(v) > 1e-2).map(lambda v: vector.u
 
 
 @given(quaternions, quaternions, vectors)
-def test_multiply_and_rotate_agree_with_the_arrays(a: Quaternion, b: Quaternion, v: Vector) -> None:
+def test_multiply_and_rotate_equal_the_array_functions(a: Quaternion, b: Quaternion, v: Vector) -> None:
     np.testing.assert_allclose(vector.multiply(a, b), rotation.multiply(np.array(a), np.array(b)), atol=1e-14)
     np.testing.assert_allclose(vector.rotate(a, v), rotation.rotate(np.array(a), np.array(v)), atol=1e-13)
 
@@ -37,29 +37,29 @@ def test_between_brings_one_to_the_other(a: Vector, b: Vector) -> None:
 
 
 @given(units)
-def test_between_opposites_is_half_a_turn(a: Vector) -> None:
+def test_rotation_between_opposites_is_half_a_turn(a: Vector) -> None:
     opposite = vector.scale(a, -1.0)
     np.testing.assert_allclose(vector.rotate(vector.rotation_between(a, opposite), a), opposite, atol=1e-12)
 
 
 @given(quaternions, quaternions, st.floats(0.0, 1.0))
-def test_slerp_agrees_with_the_arrays(a: Quaternion, b: Quaternion, t: float) -> None:
+def test_slerp_equals_the_array_function(a: Quaternion, b: Quaternion, t: float) -> None:
     if abs(sum(x * y for x, y in zip(a, b, strict=True))) < 1e-6:
-        return  # both ways are as short
-    here = np.array(vector.slerp(a, b, t))
-    there = rotation.slerp(np.array(a), np.array(b), t)
-    assert abs(abs(float(here @ there)) - 1.0) < 1e-9
+        return  # both directions are equally short
+    plain = np.array(vector.slerp(a, b, t))
+    from_arrays = rotation.slerp(np.array(a), np.array(b), t)
+    assert abs(abs(float(plain @ from_arrays)) - 1.0) < 1e-9
 
 
 @given(units)
-def test_across_is_square_and_unit(a: Vector) -> None:
-    square = vector.any_perpendicular(a)
-    assert abs(vector.dot(square, a)) < 1e-12
-    assert abs(vector.length(square) - 1.0) < 1e-12
+def test_any_perpendicular_is_perpendicular_and_unit(a: Vector) -> None:
+    perpendicular = vector.any_perpendicular(a)
+    assert abs(vector.dot(perpendicular, a)) < 1e-12
+    assert abs(vector.length(perpendicular) - 1.0) < 1e-12
 
 
 @given(quaternions, st.floats(0.0, 1.0))
-def test_a_part_of_a_turn_goes_its_own_way_round(q: Quaternion, share: float) -> None:
-    rest = vector.multiply(vector.scale_rotation(q, 1.0 - share), vector.scale_rotation(q, share))
-    np.testing.assert_allclose(rest, q, atol=1e-9)
+def test_scaled_rotations_compose_to_the_rotation(q: Quaternion, share: float) -> None:
+    composed = vector.multiply(vector.scale_rotation(q, 1.0 - share), vector.scale_rotation(q, share))
+    np.testing.assert_allclose(composed, q, atol=1e-9)
     assert vector.scale_rotation(q, 0.0) == pytest.approx(vector.IDENTITY)

@@ -39,7 +39,7 @@ def advance(
         position, vector.subtract(target, vector.scale(target_velocity, seconds)), min_distance
     )
     max_change = acceleration * seconds
-    # the speed from which whole steps at full deceleration stop after `distance`
+    # the speed from which steps at full deceleration stop after `distance`
     speed = max_change * (sqrt(0.25 + 2.0 * distance / (max_change * seconds)) - 0.5)
     speed = min(speed, distance / seconds, MAX_LIMB_SPEED)
     goal_velocity = vector.subtract(vector.add(target_velocity, vector.scale(direction, speed)), frame_velocity)

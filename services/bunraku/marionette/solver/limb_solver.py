@@ -1,4 +1,4 @@
-"""Functions that take most of the time of a controlled limb, in plain Python or compiled.
+"""The most expensive functions of a controlled limb, in plain Python or compiled.
 
 Both solvers return the same numbers to the last bit. A stage starts with `PYTHON_SOLVER`; importing numba takes
 seconds, and the first compilation takes longer. `bunraku.kernels.load_kernels("marionette").compile_solver` returns the

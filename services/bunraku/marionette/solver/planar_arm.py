@@ -80,14 +80,14 @@ def bend_for_lift(geometry: ArmGeometry, r: float, lift: float, min_bend: float,
 
 def max_distance_for_lift(geometry: ArmGeometry, r: float, lift: float) -> float:
     """Return the largest distance up to `r` at which the upper arm can be `lift` off the chord."""
-    near, far = geometry[3], r
+    nearest, farthest = geometry[3], r
     for _ in range(40):
-        middle = 0.5 * (near + far)
+        middle = 0.5 * (nearest + farthest)
         if lift_for_bend(geometry, middle, bend_limits(geometry, middle)[0]) >= lift:
-            near = middle
+            nearest = middle
         else:
-            far = middle
-    return near
+            farthest = middle
+    return nearest
 
 
 def clamped_acos(x: float) -> float:

@@ -35,13 +35,13 @@ def make_shoulder_limit(*, right: bool) -> ShoulderLimit:
     """Return the limit of the left shoulder, or its mirror image."""
     side = -1.0 if right else 1.0
     caps = tuple(((side * axis[0], axis[1], axis[2]), radius) for axis, radius in LEFT_CAPS)
-    alone: ShoulderLimit = (caps, ())
+    caps_only: ShoulderLimit = (caps, ())
     pairs = ((one, other) for i, one in enumerate(caps) for other in caps[i + 1 :])
     corners = tuple(
         corner
         for one, other in pairs
         for corner in _cap_corners(one, other)
-        if depth_in_caps(alone, corner) <= CAP_EDGE_MARGIN_RAD
+        if depth_in_caps(caps_only, corner) <= CAP_EDGE_MARGIN_RAD
     )
     return caps, corners
 
@@ -117,8 +117,8 @@ def min_allowed_turn(limit: ShoulderLimit, chord: Vector, normal: Vector, lift: 
                 continue
             free = True
             for other in caps:
-                middle_there, half_there = _blocked_turns(other, chord, normal, down, lift)
-                free = free and abs(_wrap_angle(to - middle_there)) >= half_there
+                other_middle, other_half = _blocked_turns(other, chord, normal, down, lift)
+                free = free and abs(_wrap_angle(to - other_middle)) >= other_half
             if free:
                 least = to
     return least

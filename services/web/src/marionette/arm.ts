@@ -162,7 +162,7 @@ export class Arm {
       table,
     } = this;
     const upperSquare = upper * upper,
-      whole = (fore + hand) * (fore + hand),
+      stretchedSquare = (fore + hand) * (fore + hand),
       part = 4 * fore * hand;
     for (let from = targetsAt, to = outAt; from < targetsAt + 3 * count; from += 3, to += NUMBERS_PER_ARM) {
       const x = targets[from],
@@ -222,7 +222,7 @@ export class Arm {
       // the rest of the arm in the frame of the forearm, and its triangle with the upper arm
       const restX = fore + hand * cosBend,
         restY = hand * sinBend,
-        rest = whole - part * halfSquare;
+        rest = stretchedSquare - part * halfSquare;
       const along = 0.5 + (upperSquare - rest) * 0.5 * inverse;
       const belowSquare = upperSquare * inverse - along * along;
       const below = belowSquare > 0 ? Math.sqrt(belowSquare) : 0;

@@ -30,13 +30,13 @@ export class ArmBlend {
   /** Decaying offset about the chord that hides a change of the way round. */
   private swivelOffsetRad = 0;
   private readonly twistLimiter: TwistLimiter;
-  private readonly own = new Float64Array(3);
+  private readonly motionTip = new Float64Array(3);
   private readonly direction = new Float64Array(3);
   private readonly ownNormal = new Float64Array(3);
   private readonly carried = new Float64Array(3);
   private readonly side = new Float64Array(3);
   private readonly rest = new Float64Array(3);
-  private readonly place = new Float64Array(3);
+  private readonly elbowPoint = new Float64Array(3);
   private readonly goal = new Float64Array(3);
   private readonly frame = new Float64Array(4);
   private readonly turn = new Float64Array(4);
@@ -74,13 +74,13 @@ export class ArmBlend {
     weight: number,
     seconds: number,
   ): void {
-    const { rig, own, direction, frame, carried } = this;
+    const { rig, motionTip, direction, frame, carried } = this;
     rig.targetDirection(direction, 0, target, 0);
-    rig.tipTarget(own, 0, motionJoints, motionJointsAt);
+    rig.tipTarget(motionTip, 0, motionJoints, motionJointsAt);
     // offset and lag vanish with the weight, so that the release of the limb is no jump
-    const share = Math.min(Math.max(Math.cbrt(weight), DISTANCE_WEIGHT * distanceBetween(target, 0, own, 0)), 1);
-    const most = Math.min(Math.abs(this.swivelOffsetRad), FULL_TURN_RAD * share);
-    this.swivelOffsetRad = Math.sign(this.swivelOffsetRad) * Math.max(most - MAX_TWIST_SPEED_RAD_S * seconds, 0);
+    const share = Math.min(Math.max(Math.cbrt(weight), DISTANCE_WEIGHT * distanceBetween(target, 0, motionTip, 0)), 1);
+    const maxOffset = Math.min(Math.abs(this.swivelOffsetRad), FULL_TURN_RAD * share);
+    this.swivelOffsetRad = Math.sign(this.swivelOffsetRad) * Math.max(maxOffset - MAX_TWIST_SPEED_RAD_S * seconds, 0);
     if (weight >= 1) {
       this.swivelRad = null;
       fromAxisAngle(frame, 0, direction, 0, this.swivelOffsetRad);
@@ -90,13 +90,13 @@ export class ArmBlend {
       normalise(out, outAt);
       for (let i = 4; i < 12; i++) out[outAt + i] = solvedJoints[i];
     } else {
-      rig.targetDirection(own, 0, own, 0);
+      rig.targetDirection(motionTip, 0, motionTip, 0);
       this.blendJoints(out, outAt, motionJoints, motionJointsAt, solvedJoints, target, alignment, normal, weight);
     }
     this.twistLimiter.limit(out, outAt, share, seconds);
   }
 
-  /** Write the joints (12) below weight 1; `direction` and `own` hold the directions of target and motion. */
+  /** Write the joints (12) below weight 1; `direction` and `motionTip` hold the directions of target and motion. */
   private blendJoints(
     out: Numbers,
     outAt: number,
@@ -108,10 +108,10 @@ export class ArmBlend {
     normal: Numbers,
     weight: number,
   ): void {
-    const { rig, direction, own, ownNormal, carried, side, frame } = this;
+    const { rig, direction, motionTip, ownNormal, carried, side, frame } = this;
     rig.planeNormal(ownNormal, 0, motionJoints, motionJointsAt);
-    rejectFrom(ownNormal, 0, ownNormal, 0, own, 0);
-    if (!unit(ownNormal, 0, ownNormal, 0)) anyPerpendicular(ownNormal, 0, own, 0);
+    rejectFrom(ownNormal, 0, ownNormal, 0, motionTip, 0);
+    if (!unit(ownNormal, 0, ownNormal, 0)) anyPerpendicular(ownNormal, 0, motionTip, 0);
     rotate(carried, 0, alignment, 0, ownNormal, 0);
     cross(side, 0, carried, 0, normal, 0);
     let swivel = Math.atan2(dot(side, 0, direction, 0), dot(carried, 0, normal, 0));
@@ -119,7 +119,7 @@ export class ArmBlend {
       const onwards = swivel + FULL_TURN_RAD * Math.round((this.swivelRad - swivel) / FULL_TURN_RAD);
       if (weight > SWIVEL_RESET_WEIGHT && Math.abs(onwards) <= MAX_TWIST_LAG_RAD) swivel = onwards;
       else {
-        // the other way round from here on: the offset keeps the shown elbow in place and decays
+        // the other way round from now on: the offset keeps the shown elbow in place and decays
         this.swivelOffsetRad += weight * (onwards - swivel);
         this.swivelOffsetRad -= FULL_TURN_RAD * Math.round(this.swivelOffsetRad / FULL_TURN_RAD);
       }
@@ -129,7 +129,7 @@ export class ArmBlend {
       for (let i = 0; i < 12; i++) out[outAt + i] = motionJoints[motionJointsAt + i];
       return;
     }
-    rig.chordFrame(frame, 0, own, ownNormal);
+    rig.chordFrame(frame, 0, motionTip, ownNormal);
     conjugate(frame, 0, frame, 0);
     multiply(out, outAt, frame, 0, motionJoints, motionJointsAt);
     for (let i = 4; i < 12; i++) out[outAt + i] = motionJoints[motionJointsAt + i];
@@ -147,7 +147,7 @@ export class ArmBlend {
 
   /** Rotate shoulder and elbow least so that the tip is at `reach` arm lengths along the chord. */
   private closeOnTip(joints: Numbers, at: number, reach: number): void {
-    const { rig, rest, place, goal, turn, before, side: mixed } = this;
+    const { rig, rest, elbowPoint, goal, turn, before, side: blendedElbow } = this;
     const { bones: links } = rig;
     rotate(rest, 0, joints, at + 8, links, 6);
     addScaled(rest, 0, links, 3, rest, 0, 1);
@@ -156,20 +156,26 @@ export class ArmBlend {
     const chord = Math.max(reach * rig.armLengthM, 1e-9);
     const along = Math.min(Math.max((near * near + chord * chord - far * far) / (2 * chord), -near), near);
     const off = Math.sqrt(Math.max(near * near - along * along, 0));
-    rotate(mixed, 0, joints, at, links, 0);
+    rotate(blendedElbow, 0, joints, at, links, 0);
     // an elbow that must move away from the chord moves towards -y, where the elbow of the bent arm is
-    setVector(place, 0, 0, mixed[1] - Math.max(off - Math.hypot(mixed[1], mixed[2]), 0), mixed[2]);
-    if (!unit(place, 0, place, 0)) setVector(place, 0, 0, -1, 0);
-    setVector(place, 0, along, off * place[1], off * place[2]);
+    setVector(
+      elbowPoint,
+      0,
+      0,
+      blendedElbow[1] - Math.max(off - Math.hypot(blendedElbow[1], blendedElbow[2]), 0),
+      blendedElbow[2],
+    );
+    if (!unit(elbowPoint, 0, elbowPoint, 0)) setVector(elbowPoint, 0, 0, -1, 0);
+    setVector(elbowPoint, 0, along, off * elbowPoint[1], off * elbowPoint[2]);
     multiply(before, 0, joints, at, joints, at + 4);
-    setVector(goal, 0, place[0] / near, place[1] / near, place[2] / near);
-    for (let i = 0; i < 3; i++) mixed[i] /= near;
-    rotationBetween(turn, 0, mixed, 0, goal, 0);
+    setVector(goal, 0, elbowPoint[0] / near, elbowPoint[1] / near, elbowPoint[2] / near);
+    for (let i = 0; i < 3; i++) blendedElbow[i] /= near;
+    rotationBetween(turn, 0, blendedElbow, 0, goal, 0);
     multiply(joints, at, turn, 0, joints, at);
     // the part below the elbow: its direction now, and the required one
     rotate(rest, 0, before, 0, rest, 0);
     if (!unit(rest, 0, rest, 0)) setVector(rest, 0, 1, 0, 0);
-    setVector(goal, 0, chord - place[0], -place[1], -place[2]);
+    setVector(goal, 0, chord - elbowPoint[0], -elbowPoint[1], -elbowPoint[2]);
     if (!unit(goal, 0, goal, 0)) setVector(goal, 0, 1, 0, 0);
     rotationBetween(turn, 0, rest, 0, goal, 0);
     multiply(before, 0, turn, 0, before, 0);

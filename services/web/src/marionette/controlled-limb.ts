@@ -53,7 +53,7 @@ export abstract class ControlledLimb {
     this.hasPose = true;
   }
 
-  /** Return to the motion at once and forget the state. */
+  /** Return to the motion at once and reset the state. */
   reset(): void {
     this.follower = null;
     this.returnAcceleration = null;
@@ -90,10 +90,10 @@ export abstract class ControlledLimb {
   /** Return the acceleration of the return, chosen once when the limb is released. */
   protected chooseReturnAcceleration(maxAcceleration: number): number {
     if (this.returnAcceleration !== null) return this.returnAcceleration;
-    const { position: place, velocity } = this.ensureFollower();
-    const away = distanceBetween(place, 0, this.previousPosition, 0);
+    const { position, velocity } = this.ensureFollower();
+    const distance = distanceBetween(position, 0, this.previousPosition, 0);
     return (this.returnAcceleration = returnAcceleration(
-      away,
+      distance,
       distanceBetween(velocity, 0, this.velocity, 0),
       maxAcceleration,
     ));
@@ -112,7 +112,7 @@ export class ControlledHand extends ControlledLimb {
   private readonly up = new Float64Array(3);
   private readonly target = new Float64Array(3);
   private readonly around = new Float64Array(4);
-  private readonly places = new Float64Array(9);
+  private readonly jointPoints = new Float64Array(9);
   private readonly bent = new Float64Array(12);
 
   /** `limb` is 0 (left hand) or 1 (right hand), `table` the parsed bend table of the arm's proportions. */
@@ -150,7 +150,7 @@ export class ControlledHand extends ControlledLimb {
       for (let i = 0; i < 3; i++) this.clampedGoal[i] *= reach;
       follower.step(this.clampedGoal, seconds, HAND_ACCELERATION, inner, MAX_TIP_DISTANCE);
     } else {
-      // the motion may have its hand nearer to the shoulder than a controlled one goes
+      // the hand of the motion may be nearer to the shoulder than a controlled hand can be
       follower.step(
         own,
         seconds,
@@ -162,10 +162,10 @@ export class ControlledHand extends ControlledLimb {
       if (weight <= 0 && distanceBetween(hand, 0, own, 0) < ARRIVAL_TOLERANCE) return false;
     }
     if (!elbow.hasBegun) {
-      rig.jointPositions(this.places, 0, rotations, at);
+      rig.jointPositions(this.jointPoints, 0, rotations, at);
       rig.targetDirection(direction, 0, own, 0);
       rig.planeNormal(this.axis, 0, rotations, at);
-      elbow.begin(direction, this.axis, liftAngle(this.places, direction));
+      elbow.begin(direction, this.axis, liftAngle(this.jointPoints, direction));
     }
     rig.targetDirection(direction, 0, hand, 0);
     rig.localUp(up, 0, rotations);
@@ -198,7 +198,7 @@ export class ControlledHand extends ControlledLimb {
 /** One leg of a figure. */
 export class ControlledLeg extends ControlledLimb {
   readonly rig: LegRig;
-  private readonly hung = new Float64Array(12);
+  private readonly solved = new Float64Array(12);
   private readonly blend = new JointBlend();
 
   /** `limb` is 2 (left leg) or 3 (right leg). */
@@ -220,7 +220,7 @@ export class ControlledLeg extends ControlledLimb {
     weight: number,
     seconds: number,
   ): boolean {
-    const { rig, motionPosition: own, hung } = this;
+    const { rig, motionPosition: own, solved } = this;
     const follower = this.ensureFollower(),
       thigh = follower.position;
     if (goal) {
@@ -230,8 +230,8 @@ export class ControlledLeg extends ControlledLimb {
       follower.step(own, seconds, this.chooseReturnAcceleration(THIGH_ACCELERATION), 0, Infinity, this.velocity);
       if (weight <= 0 && Math.abs(thigh[0] - own[0]) < ARRIVAL_TOLERANCE) return false;
     }
-    rig.solve(hung, 0, thigh[0], rotations);
-    this.blend.blend(out, outAt, rotations, 4 * rig.firstJointIndex, hung, 0, Math.max(weight, MIN_SOLVE_WEIGHT));
+    rig.solve(solved, 0, thigh[0], rotations);
+    this.blend.blend(out, outAt, rotations, 4 * rig.firstJointIndex, solved, 0, Math.max(weight, MIN_SOLVE_WEIGHT));
     return true;
   }
 

@@ -98,7 +98,7 @@ export class Elbow {
   private readonly configuration: ArmConfiguration = { tip: new Float64Array(3), normal: new Float64Array(3), bend: 0 };
   private readonly before = new Float64Array(3);
   private readonly upperArm = new Float64Array(3);
-  private readonly wanted = new Float64Array(3);
+  private readonly targetVector = new Float64Array(3);
   private readonly side = new Float64Array(3);
   private readonly along = new Float64Array(3);
   private readonly carry = new Float64Array(4);
@@ -135,7 +135,7 @@ export class Elbow {
    * `up` is the world's up in the same frame. The next call overwrites the result.
    */
   step(direction: Numbers, reach: number, up: Numbers, seconds: number): ArmConfiguration {
-    const { arm, shoulder, normal, before, upperArm, configuration: hanging, wanted } = this;
+    const { arm, shoulder, normal, before, upperArm, configuration, targetVector } = this;
     const { upper } = arm.proportions;
     this.computeUpperArm(before, this.direction, normal, this.lift);
     rotationBetween(this.carry, 0, this.direction, 0, direction, 0);
@@ -159,29 +159,29 @@ export class Elbow {
     let turn = shoulder.minAllowedTurn(direction, normal, lift);
     if (turn === null) {
       // no turn helps: bend the elbow more, and if that does not help, bring the hand nearer
-      const away = shoulder.angleToAllowed(direction) + CAP_CLEARANCE_RAD;
-      if (away > this.maxLift(r)) r = this.maxDistanceForLift(r, away);
-      lift = Math.min(Math.max(lift, away), this.maxLift(r));
+      const minLift = shoulder.angleToAllowed(direction) + CAP_CLEARANCE_RAD;
+      if (minLift > this.maxLift(r)) r = this.maxDistanceForLift(r, minLift);
+      lift = Math.min(Math.max(lift, minLift), this.maxLift(r));
       turn = shoulder.minAllowedTurn(direction, normal, lift);
       this.rotateNormal(direction, turn ?? 0);
     } else if (turn !== 0) {
       this.rotateNormal(direction, turn);
     }
     this.computeUpperArm(upperArm, direction, normal, lift);
-    const most = (moved + left) / upper;
-    hanging.normal.set(normal);
-    if (this.hasLastUpperArm && (turn === null || angleBetween(upperArm, this.lastUpperArm) > most)) {
+    const maxAngle = (moved + left) / upper;
+    configuration.normal.set(normal);
+    if (this.hasLastUpperArm && (turn === null || angleBetween(upperArm, this.lastUpperArm) > maxAngle)) {
       // the shoulder's limit leaves only a long way: the hand waits for the elbow; near the shoulder both wait
-      if (turn !== null) shoulder.stepToward(this.lastUpperArm, this.lastUpperArm, upperArm, most);
-      for (let i = 0; i < 3; i++) wanted[i] = direction[i] * reach;
-      this.reachFromUpperArm(this.lastUpperArm, wanted);
+      if (turn !== null) shoulder.stepToward(this.lastUpperArm, this.lastUpperArm, upperArm, maxAngle);
+      for (let i = 0; i < 3; i++) targetVector[i] = direction[i] * reach;
+      this.reachFromUpperArm(this.lastUpperArm, targetVector);
     } else {
       this.lastUpperArm.set(upperArm);
-      for (let i = 0; i < 3; i++) hanging.tip[i] = direction[i] * r;
-      hanging.bend = this.bendForLift(r, lift);
+      for (let i = 0; i < 3; i++) configuration.tip[i] = direction[i] * r;
+      configuration.bend = this.bendForLift(r, lift);
     }
     this.hasLastUpperArm = true;
-    return hanging;
+    return configuration;
   }
 
   private setNormal(normal: Numbers, direction: Numbers): void {
@@ -204,18 +204,21 @@ export class Elbow {
     seconds: number,
     maxTravel: number,
   ): void {
-    const { normal, wanted, side } = this;
-    if (!verticalNormal(wanted, direction, up)) return;
+    const { normal, targetVector, side } = this;
+    if (!verticalNormal(targetVector, direction, up)) return;
     rejectFrom(side, 0, direction, 0, up, 0);
     const off = length(side, 0) * r;
     const pull = (off * off) / (off * off + HALF_SWING_DISTANCE * HALF_SWING_DISTANCE);
-    cross(side, 0, normal, 0, wanted, 0);
-    const swing = Math.atan2(dot(side, 0, direction, 0), dot(normal, 0, wanted, 0));
-    const most = Math.min(
+    cross(side, 0, normal, 0, targetVector, 0);
+    const swing = Math.atan2(dot(side, 0, direction, 0), dot(normal, 0, targetVector, 0));
+    const maxAngle = Math.min(
       MAX_SWING_SPEED_RAD_S * seconds,
       maxTravel / Math.max(this.arm.proportions.upper * Math.sin(lift), 1e-3),
     );
-    this.rotateNormal(direction, clamp(-most, swing * (1 - 2 ** ((-seconds * pull) / SWING_HALF_LIFE_S)), most));
+    this.rotateNormal(
+      direction,
+      clamp(-maxAngle, swing * (1 - 2 ** ((-seconds * pull) / SWING_HALF_LIFE_S)), maxAngle),
+    );
   }
 
   private rotateNormal(direction: Numbers, turn: number): void {
@@ -228,17 +231,17 @@ export class Elbow {
   /** Solve forearm and hand as near to `target` as this upper arm allows. */
   private reachFromUpperArm(upperArm: Numbers, target: Numbers): void {
     const { upper, forearm: fore, hand } = this.arm.proportions;
-    const { configuration: hanging, side, along, before: way, wanted: direction } = this;
-    const { tip, normal } = hanging;
-    addScaled(way, 0, target, 0, upperArm, 0, -upper);
+    const { configuration, side, along, before: toTarget, targetVector: direction } = this;
+    const { tip, normal } = configuration;
+    addScaled(toTarget, 0, target, 0, upperArm, 0, -upper);
     const shortest = Math.sqrt(fore * fore + hand * hand + 2 * fore * hand * Math.cos(MAX_WRIST_BEND_RAD));
-    const reach = clamp(shortest, length(way, 0), fore + hand);
+    const reach = clamp(shortest, length(toTarget, 0), fore + hand);
     // where forearm and hand are straight, the cosine has no digits left for the bend
     const bend = reach < fore + hand ? clampedAcos((reach * reach - fore * fore - hand * hand) / (2 * fore * hand)) : 0;
     const lean = Math.atan2(hand * Math.sin(bend), fore + hand * Math.cos(bend));
-    rejectFrom(side, 0, way, 0, upperArm, 0);
+    rejectFrom(side, 0, toTarget, 0, upperArm, 0);
     if (!unit(side, 0, side, 0)) cross(side, 0, normal, 0, upperArm, 0);
-    let angle = Math.atan2(dot(way, 0, side, 0), dot(way, 0, upperArm, 0));
+    let angle = Math.atan2(dot(toTarget, 0, side, 0), dot(toTarget, 0, upperArm, 0));
     angle = clamp(lean, angle, Math.min(MAX_ELBOW_BEND_RAD + lean, Math.PI));
     combine(along, 0, upperArm, 0, Math.cos(angle), side, 0, Math.sin(angle));
     combine(tip, 0, upperArm, 0, upper, along, 0, reach);
@@ -249,7 +252,7 @@ export class Elbow {
     cross(normal, 0, side, 0, direction, 0);
     for (let i = 0; i < 3; i++) tip[i] = direction[i] * r;
     this.arm.bendLimits(this.limits, 0, r);
-    hanging.bend = clamp(this.limits[0], bend, this.limits[1]);
+    configuration.bend = clamp(this.limits[0], bend, this.limits[1]);
   }
 
   /** Return the largest distance up to `r` at which the upper arm can be `minLift` radians off the chord. */

@@ -36,9 +36,9 @@ export class Follower {
   private readonly before = new Float64Array(3);
   private readonly aside = new Float64Array(3);
 
-  /** Start at `place` (3) with `velocity` (3), which are copied. */
-  constructor(place: Numbers, velocity: Numbers) {
-    this.position = place.slice();
+  /** Start at `position` (3) with `velocity` (3), which are copied. */
+  constructor(position: Numbers, velocity: Numbers) {
+    this.position = position.slice();
     this.velocity = velocity.slice();
   }
 
@@ -59,7 +59,7 @@ export class Follower {
     frameVelocity: Numbers | null = null,
   ): void {
     if (seconds <= 0) return;
-    const { position: place, velocity, ahead, goal, direction, change, before } = this;
+    const { position, velocity, ahead, goal, direction, change, before } = this;
     for (let i = 0; i < 3; i++) {
       ahead[i] = frameVelocity
         ? frameVelocity[i]
@@ -76,9 +76,9 @@ export class Follower {
     // the remaining path without the part that the target itself will move
     addScaled(goal, 0, target, 0, ahead, 0, -seconds);
     const distance = this.findPath(goal, minDistance);
-    const most = acceleration * seconds;
-    // the speed from which whole steps of the bounded acceleration come to rest after `distance`
-    let speed = most * (Math.sqrt(0.25 + (2 * distance) / (most * seconds)) - 0.5);
+    const maxChange = acceleration * seconds;
+    // the speed from which steps of the bounded acceleration stop after `distance`
+    let speed = maxChange * (Math.sqrt(0.25 + (2 * distance) / (maxChange * seconds)) - 0.5);
     speed = Math.min(speed, distance / seconds, MAX_LIMB_SPEED);
     // in a moving frame all velocities are relative to it
     for (let i = 0; i < 3; i++) {
@@ -88,11 +88,11 @@ export class Follower {
       velocity[i] = frameVelocity ? had + ahead[i] : had;
     }
     const size = length(change, 0);
-    addScaled(velocity, 0, velocity, 0, change, 0, size > most ? most / size : 1);
-    before.set(place);
-    addScaled(place, 0, place, 0, velocity, 0, seconds);
-    clampDistance(place, minDistance, maxDistance);
-    for (let i = 0; i < 3; i++) velocity[i] = (place[i] - before[i]) / seconds;
+    addScaled(velocity, 0, velocity, 0, change, 0, size > maxChange ? maxChange / size : 1);
+    before.set(position);
+    addScaled(position, 0, position, 0, velocity, 0, seconds);
+    clampDistance(position, minDistance, maxDistance);
+    for (let i = 0; i < 3; i++) velocity[i] = (position[i] - before[i]) / seconds;
   }
 
   /**
@@ -100,8 +100,8 @@ export class Follower {
    * direction.
    */
   private findPath(target: Numbers, minDistance: number): number {
-    const { position: place, direction, aside } = this;
-    addScaled(direction, 0, target, 0, place, 0, -1);
+    const { position, direction, aside } = this;
+    addScaled(direction, 0, target, 0, position, 0, -1);
     const distance = length(direction, 0);
     if (distance < 1e-12) {
       direction.fill(0);
@@ -109,11 +109,11 @@ export class Follower {
     }
     for (let i = 0; i < 3; i++) direction[i] /= distance;
     if (minDistance <= 0) return distance;
-    const along = -dot(place, 0, direction, 0);
-    const near = Math.min(SHOULDER_CLEARANCE, length(place, 0), length(target, 0));
+    const along = -dot(position, 0, direction, 0);
+    const near = Math.min(SHOULDER_CLEARANCE, length(position, 0), length(target, 0));
     if (!(along > 0 && along < distance)) return distance;
     // the point of the straight path nearest to the origin
-    addScaled(aside, 0, place, 0, direction, 0, along);
+    addScaled(aside, 0, position, 0, direction, 0, along);
     const off = length(aside, 0);
     if (off >= near) return distance;
     if (off > 1e-3) unit(aside, 0, aside, 0);
@@ -124,9 +124,9 @@ export class Follower {
       else anyPerpendicular(aside, 0, direction, 0);
     }
     for (let i = 0; i < 3; i++) aside[i] *= near;
-    const leg = distanceBetween(aside, 0, place, 0);
+    const leg = distanceBetween(aside, 0, position, 0);
     if (leg < 1e-9) return distance;
-    for (let i = 0; i < 3; i++) direction[i] = (aside[i] - place[i]) / leg;
+    for (let i = 0; i < 3; i++) direction[i] = (aside[i] - position[i]) / leg;
     return leg + distanceBetween(target, 0, aside, 0);
   }
 }

@@ -24,8 +24,8 @@ export function returnAcceleration(distance: number, speed: number, maxAccelerat
     high = maxAcceleration;
   for (let i = 0; i < 20; i++) {
     const middle = 0.5 * (low + high);
-    const turned = distance + (speed * speed) / (2 * middle);
-    if (speed / middle + 2 * Math.sqrt(turned / middle) > RETURN_DURATION_S) low = middle;
+    const farthest = distance + (speed * speed) / (2 * middle);
+    if (speed / middle + 2 * Math.sqrt(farthest / middle) > RETURN_DURATION_S) low = middle;
     else high = middle;
   }
   return high;
@@ -59,8 +59,8 @@ export class Handover {
 export class DirectionAlignment {
   private readonly rotation = new Float64Array(4);
   private hasRotation = false;
-  private readonly here = new Float64Array(3);
-  private readonly there = new Float64Array(3);
+  private readonly motionDirection = new Float64Array(3);
+  private readonly controlledDirection = new Float64Array(3);
   private readonly onwards = new Float64Array(4);
   private readonly shortest = new Float64Array(4);
 
@@ -75,24 +75,24 @@ export class DirectionAlignment {
    * state is reset.
    */
   update(out: Numbers, outAt: number, motionTarget: Numbers, controlledTarget: Numbers, weight: number): void {
-    const { rotation: turn, here, there, onwards, shortest } = this;
-    if (!unit(here, 0, motionTarget, 0)) setVector(here, 0, 0, -1, 0);
-    if (!unit(there, 0, controlledTarget, 0)) setVector(there, 0, 0, -1, 0);
-    rotationBetween(shortest, 0, here, 0, there, 0);
+    const { rotation: turn, motionDirection, controlledDirection, onwards, shortest } = this;
+    if (!unit(motionDirection, 0, motionTarget, 0)) setVector(motionDirection, 0, 0, -1, 0);
+    if (!unit(controlledDirection, 0, controlledTarget, 0)) setVector(controlledDirection, 0, 0, -1, 0);
+    rotationBetween(shortest, 0, motionDirection, 0, controlledDirection, 0);
     if (this.hasRotation) {
-      rotate(here, 0, turn, 0, here, 0);
-      rotationBetween(onwards, 0, here, 0, there, 0);
+      rotate(motionDirection, 0, turn, 0, motionDirection, 0);
+      rotationBetween(onwards, 0, motionDirection, 0, controlledDirection, 0);
       multiply(turn, 0, onwards, 0, turn, 0);
       conjugate(onwards, 0, shortest, 0);
       multiply(onwards, 0, turn, 0, onwards, 0);
-      const whole = 2 * Math.PI,
-        most = Math.PI * weight;
-      let twist = 2 * Math.atan2(dot(onwards, 1, there, 0), onwards[0]);
-      twist -= whole * Math.round(twist / whole);
-      if (Math.abs(twist) > most) {
-        const sine = Math.sin(0.5 * Math.min(Math.max(twist, -most), most));
+      const fullTurn = 2 * Math.PI,
+        maxTwist = Math.PI * weight;
+      let twist = 2 * Math.atan2(dot(onwards, 1, controlledDirection, 0), onwards[0]);
+      twist -= fullTurn * Math.round(twist / fullTurn);
+      if (Math.abs(twist) > maxTwist) {
+        const sine = Math.sin(0.5 * Math.min(Math.max(twist, -maxTwist), maxTwist));
         onwards[0] = Math.sqrt(1 - sine * sine);
-        for (let i = 0; i < 3; i++) onwards[i + 1] = there[i] * sine;
+        for (let i = 0; i < 3; i++) onwards[i + 1] = controlledDirection[i] * sine;
         multiply(turn, 0, onwards, 0, shortest, 0);
       }
       normalise(turn, 0);

@@ -76,7 +76,7 @@ export class ArmRig {
   private readonly columns = new Float64Array(9);
   private readonly turn = new Float64Array(4);
   private readonly palm = new Float64Array(4);
-  private readonly place = new Float64Array(3);
+  private readonly scratch = new Float64Array(3);
   private readonly found = new Float64Array(9);
 
   /** `limb` is 0 (left hand) or 1 (right hand), `table` the bend table of `armProportions(figure, limb)`. */
@@ -99,13 +99,13 @@ export class ArmRig {
 
   /** Write elbow, wrist and tip (9) relative to the shoulder, in metres on the axes of vl5. */
   jointPositions(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
-    const { turn, place, bones: links } = this;
+    const { turn, scratch, bones: links } = this;
     for (let link = 0; link < 3; link++) {
       const at = outAt + 3 * link;
       if (link === 0) for (let i = 0; i < 4; i++) turn[i] = joints[jointsAt + i];
       else multiply(turn, 0, turn, 0, joints, jointsAt + 4 * link);
-      rotate(place, 0, turn, 0, links, 3 * link);
-      for (let i = 0; i < 3; i++) out[at + i] = link === 0 ? place[i] : out[at - 3 + i] + place[i];
+      rotate(scratch, 0, turn, 0, links, 3 * link);
+      for (let i = 0; i < 3; i++) out[at + i] = link === 0 ? scratch[i] : out[at - 3 + i] + scratch[i];
     }
   }
 
@@ -121,11 +121,11 @@ export class ArmRig {
    * straight arm.
    */
   planeNormal(out: Numbers, outAt: number, joints: Numbers, jointsAt: number): void {
-    const { found, place, armLengthM: scale } = this;
+    const { found, scratch, armLengthM: scale } = this;
     this.jointPositions(found, 0, joints, jointsAt);
     cross(found, 0, found, 0, found, 6);
-    rotate(place, 0, joints, jointsAt, BEND_AXIS, 0);
-    combine(out, outAt, found, 0, 1 / (scale * scale), place, 0, 0.1);
+    rotate(scratch, 0, joints, jointsAt, BEND_AXIS, 0);
+    combine(out, outAt, found, 0, 1 / (scale * scale), scratch, 0, 0.1);
   }
 
   /** Write the unit vector (3) to a target; straight down for the shoulder itself. */
@@ -213,7 +213,7 @@ export class LegRig {
   private readonly hips = new Float64Array(4);
   private readonly columns = new Float64Array(9);
   private readonly turn = new Float64Array(4);
-  private readonly place = new Float64Array(3);
+  private readonly scratch = new Float64Array(3);
 
   /** `limb` is 2 (left leg) or 3 (right leg). */
   constructor(figure: Figure, limb: 2 | 3) {
@@ -233,12 +233,12 @@ export class LegRig {
    * their product.
    */
   private computeHipFacing(rotations: Numbers): void {
-    const { hips, columns, place } = this;
+    const { hips, columns, scratch } = this;
     multiply(hips, 0, rotations, 0, rotations, 4 * SACROILIAC_INDEX);
-    rotate(place, 0, hips, 0, X, 0);
-    cross(columns, 0, place, 0, UP, 0);
-    rotate(place, 0, hips, 0, FORWARDS, 0);
-    setVector(columns, 0, columns[0] + 0.05 * place[0], 0, columns[2] + 0.05 * place[2]);
+    rotate(scratch, 0, hips, 0, X, 0);
+    cross(columns, 0, scratch, 0, UP, 0);
+    rotate(scratch, 0, hips, 0, FORWARDS, 0);
+    setVector(columns, 0, columns[0] + 0.05 * scratch[0], 0, columns[2] + 0.05 * scratch[2]);
     if (!unit(columns, 0, columns, 0)) columns.set(FORWARDS, 0);
     columns.set(UP, 3);
     cross(columns, 6, columns, 0, UP, 0);
@@ -251,8 +251,8 @@ export class LegRig {
   thighAngle(rotations: Numbers, referenceAngle = 0): number {
     this.computeHipFacing(rotations);
     multiply(this.turn, 0, this.hips, 0, rotations, 4 * this.firstJointIndex);
-    rotate(this.place, 0, this.turn, 0, this.thigh, 0);
-    const theta = Math.atan2(dot(this.place, 0, this.columns, 0), -this.place[1]);
+    rotate(this.scratch, 0, this.turn, 0, this.thigh, 0);
+    const theta = Math.atan2(dot(this.scratch, 0, this.columns, 0), -this.scratch[1]);
     return clampThigh(theta + 2 * Math.PI * Math.round((referenceAngle - theta) / (2 * Math.PI)));
   }
 

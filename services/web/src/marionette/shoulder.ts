@@ -67,7 +67,7 @@ export class ShoulderLimit {
   private readonly edge = new Float64Array(3);
   private readonly side = new Float64Array(3);
   private readonly step = new Float64Array(3);
-  private readonly spin = new Float64Array(4);
+  private readonly stepRotation = new Float64Array(4);
 
   /** The caps of the right shoulder mirror those of the left one. */
   constructor(right: boolean) {
@@ -110,11 +110,11 @@ export class ShoulderLimit {
       out.set(end);
       return;
     }
-    const { step, side, spin } = this;
+    const { step, side, stepRotation } = this;
     cross(side, 0, begin, 0, end, 0);
     if (!unit(side, 0, side, 0)) anyPerpendicular(side, 0, begin, 0);
-    fromAxisAngle(spin, 0, side, 0, maxAngle);
-    rotate(step, 0, spin, 0, begin, 0);
+    fromAxisAngle(stepRotation, 0, side, 0, maxAngle);
+    rotate(step, 0, stepRotation, 0, begin, 0);
     for (const one of this.caps) {
       if (!(depthInCap(one, step) > 0 && depthInCap(one, begin) <= 0)) continue;
       // along the edge, on the side that leads on

@@ -19,7 +19,7 @@ export class TwistLimiter {
   private hasOrientations = false;
   private readonly directions = new Float64Array(9);
   private readonly orientations = new Float64Array(12);
-  private readonly wanted = new Float64Array(4);
+  private readonly requested = new Float64Array(4);
   private readonly carried = new Float64Array(4);
   private readonly turn = new Float64Array(4);
   private readonly along = new Float64Array(3);
@@ -43,16 +43,16 @@ export class TwistLimiter {
    * whenever no bone lags.
    */
   limit(joints: Numbers, at: number, share: number, seconds: number): void {
-    const { wanted, orientations: shown, lagRad: behind, turn } = this;
-    wanted[0] = 1;
-    setVector(wanted, 1, 0, 0, 0);
+    const { requested, orientations: shown, lagRad: lag, turn } = this;
+    requested[0] = 1;
+    setVector(requested, 1, 0, 0, 0);
     for (let link = 0; link < 3; link++) {
-      multiply(wanted, 0, wanted, 0, joints, at + 4 * link);
+      multiply(requested, 0, requested, 0, joints, at + 4 * link);
       if (this.hasOrientations) this.limitBoneTwist(link, MAX_TWIST_LAG_RAD * share, MAX_TWIST_SPEED_RAD_S * seconds);
-      else for (let i = 0; i < 4; i++) shown[4 * link + i] = wanted[i];
+      else for (let i = 0; i < 4; i++) shown[4 * link + i] = requested[i];
     }
     this.hasOrientations = true;
-    if (behind[0] === 0 && behind[1] === 0 && behind[2] === 0) return;
+    if (lag[0] === 0 && lag[1] === 0 && lag[2] === 0) return;
     for (let i = 0; i < 4; i++) joints[at + i] = shown[i];
     for (let i = 4; i < 12; i += 4) {
       conjugate(turn, 0, shown, i - 4);
@@ -63,21 +63,21 @@ export class TwistLimiter {
 
   /** Limit the lag of one bone to `maxLag` radians, and reduce it by up to `maxStep` radians. */
   private limitBoneTwist(link: number, maxLag: number, maxStep: number): void {
-    const { directions, wanted, orientations: shown, lagRad: behind, carried, turn, along, before } = this;
-    rotate(along, 0, wanted, 0, directions, 3 * link);
+    const { directions, requested, orientations: shown, lagRad: lag, carried, turn, along, before } = this;
+    rotate(along, 0, requested, 0, directions, 3 * link);
     rotate(before, 0, shown, 4 * link, directions, 3 * link);
     rotationBetween(carried, 0, before, 0, along, 0);
     multiply(carried, 0, carried, 0, shown, 4 * link);
-    conjugate(turn, 0, wanted, 0);
+    conjugate(turn, 0, requested, 0);
     multiply(turn, 0, carried, 0, turn, 0);
     let angle = 2 * Math.atan2(dot(turn, 1, along, 0), turn[0]);
     // keep the way round unless it is much longer by now
-    angle += FULL_TURN_RAD * Math.round((behind[link] - angle) / FULL_TURN_RAD);
+    angle += FULL_TURN_RAD * Math.round((lag[link] - angle) / FULL_TURN_RAD);
     if (Math.abs(angle) > MAX_TWIST_LAG_RAD) angle -= FULL_TURN_RAD * Math.round(angle / FULL_TURN_RAD);
     const left = Math.min(Math.max(Math.abs(angle) - maxStep, 0), maxLag);
-    behind[link] = left > 0 ? Math.sign(angle) * left : 0;
-    fromAxisAngle(turn, 0, along, 0, behind[link]);
-    multiply(shown, 4 * link, turn, 0, wanted, 0);
+    lag[link] = left > 0 ? Math.sign(angle) * left : 0;
+    fromAxisAngle(turn, 0, along, 0, lag[link]);
+    multiply(shown, 4 * link, turn, 0, requested, 0);
     normalise(shown, 4 * link);
   }
 }

@@ -21,7 +21,7 @@ function makeLimb(limb: 0 | 1 | 2 | 3): ControlledLimb {
   return limb === 0 || limb === 1 ? new ControlledHand(figure, limb, table) : new ControlledLeg(figure, limb);
 }
 
-/** The dance that a case tells by numbers, at a frame. */
+/** Return the pose of the motion of a case at a frame. */
 function pose({ swing, hertz, phase }: Case, frame: number): Float64Array {
   const rotations = new Float64Array(72),
     t = frame * vector.seconds;
@@ -34,37 +34,37 @@ function pose({ swing, hertz, phase }: Case, frame: number): Float64Array {
   return rotations;
 }
 
-describe("a limb taken, pulled and let go", () => {
-  test.each(vector.cases)("limb $limb moves as the golden vectors say", (one) => {
-    const pulled = makeLimb(one.limb),
+describe("a limb that is claimed, controlled and released", () => {
+  test.each(vector.cases)("limb $limb equals the golden vectors", (vectorCase) => {
+    const controlled = makeLimb(vectorCase.limb),
       handover = new Handover(),
       joints = new Float64Array(12);
     const { seconds, frames } = vector;
-    let wanted: Float64Array | null = null,
-      taken = false,
+    let target: Float64Array | null = null,
+      isControlled = false,
       compared = 0;
     for (let frame = 0; frame < frames; frame++) {
-      for (const [begin, where] of one.asked) {
+      for (const [begin, requested] of vectorCase.asked) {
         if (begin !== frame) continue;
-        wanted = where && Float64Array.from(where);
-        taken ||= where !== null;
+        target = requested && Float64Array.from(requested);
+        isControlled ||= requested !== null;
       }
-      const rotations = pose(one, frame);
-      handover.advance(wanted !== null, seconds);
-      pulled.observePose(rotations, seconds);
-      const out = taken && pulled.solveJoints(joints, 0, rotations, wanted, handover.weight, seconds);
-      if (taken && !out) {
-        pulled.reset();
-        taken = false;
+      const rotations = pose(vectorCase, frame);
+      handover.advance(target !== null, seconds);
+      controlled.observePose(rotations, seconds);
+      const out = isControlled && controlled.solveJoints(joints, 0, rotations, target, handover.weight, seconds);
+      if (isControlled && !out) {
+        controlled.reset();
+        isControlled = false;
       }
-      if (frame % one.every !== 0) continue;
-      const golden = one.joints[frame / one.every];
+      if (frame % vectorCase.every !== 0) continue;
+      const golden = vectorCase.joints[frame / vectorCase.every];
       expect(out, `frame ${frame}`).toBe(golden !== null);
       golden?.forEach((q, joint) => {
-        const along = q.reduce((sum, value, i) => sum + value * joints[4 * joint + i], 0);
+        const dot = q.reduce((sum, value, i) => sum + value * joints[4 * joint + i], 0);
         q.forEach((value, i) => {
           expect(
-            Math.abs(joints[4 * joint + i] * Math.sign(along) - value),
+            Math.abs(joints[4 * joint + i] * Math.sign(dot) - value),
             `frame ${frame}, joint ${joint}`,
           ).toBeLessThan(1e-9);
         });

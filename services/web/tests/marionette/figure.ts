@@ -1,4 +1,4 @@
-/** The figure of the golden vectors, and its arms' table. */
+/** Figure of the golden vectors and the bend table of its arms. */
 
 import { parseBendTable } from "../../src/marionette/arm";
 import { armProportions } from "../../src/marionette/limb-rig";
@@ -13,7 +13,7 @@ export const { identity } = armProportions(figure, 0);
 export const packed = decodeBase64(golden.arms.find((arm) => arm.proportions === identity)!.table);
 export const table = parseBendTable(packed);
 
-/** The angle between two rotations (4 each), radians. */
+/** Return the angle between two rotations (4 each), radians. */
 export function rotationAngle(a: Float64Array, aAt: number, b: Float64Array, bAt: number): number {
   let dot = 0,
     square = 0;

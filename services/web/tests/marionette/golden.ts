@@ -1,4 +1,4 @@
-/** The shape of `proto/vectors/arm.json`. */
+/** Types and content of `proto/vectors/arm.json`. */
 
 import { loadVectors } from "../golden-vectors";
 

@@ -16,36 +16,36 @@ const poses = golden.limbs.cases.map(({ rotations }) => Float64Array.from(rotati
 const pose = fc.constantFrom(...poses);
 const limb = fc.constantFrom<2 | 3>(2, 3);
 
-test("the knee bends one way and lets the shank hang", () => {
+test("knee bends one way and the shank hangs", () => {
   fc.assert(
     fc.property(angle, (theta) => {
       const thigh = clampThigh(theta);
       expect(thigh).toBeGreaterThanOrEqual(MIN_THIGH_ANGLE_RAD);
       expect(thigh).toBeLessThanOrEqual(MAX_THIGH_ANGLE_RAD);
       expect(kneeBend(thigh)).toBeGreaterThanOrEqual(0);
-      // the shank's own angle from straight down
+      // angle of the shank from straight down
       expect(thigh - kneeBend(thigh)).toBe(Math.min(thigh, 0));
     }),
   );
 });
 
-test("the leg follows its input without jumps", () => {
+test("leg angles are continuous in the input", () => {
   fc.assert(
-    fc.property(angle, step, (theta, more) => {
-      for (const of of [clampThigh, (value: number) => kneeBend(clampThigh(value))]) {
-        const moved = of(theta + more) - of(theta);
+    fc.property(angle, step, (theta, increase) => {
+      for (const angleOf of [clampThigh, (value: number) => kneeBend(clampThigh(value))]) {
+        const moved = angleOf(theta + increase) - angleOf(theta);
         expect(moved).toBeGreaterThanOrEqual(0);
-        expect(moved).toBeLessThanOrEqual(more + 1e-12);
+        expect(moved).toBeLessThanOrEqual(increase + 1e-12);
       }
     }),
   );
 });
 
-test("a figure's shank hangs plumb, its knee never bends backwards, its ankle keeps its angle", () => {
-  const plain = new Float64Array(12);
+test("shank hangs, knee never bends backwards, ankle is constant", () => {
+  const straight = new Float64Array(12);
   fc.assert(
-    fc.property(limb, pose, angle, (which, rotations, theta) => {
-      const rig = new LegRig(figure, which),
+    fc.property(limb, pose, angle, (legLimb, rotations, theta) => {
+      const rig = new LegRig(figure, legLimb),
         joints = new Float64Array(12),
         q = new Float64Array(4),
         link = new Float64Array(3);
@@ -57,30 +57,30 @@ test("a figure's shank hangs plumb, its knee never bends backwards, its ankle ke
       multiply(q, 0, q, 0, joints, 4);
       rotate(link, 0, q, 0, figure.offsets, 3 * rig.firstJointIndex + 6);
       const shank = Array.from(link, (part) => part / Math.hypot(...link)),
-        lifted = clampThigh(theta);
-      expect(Math.abs(Math.cos(lifted) + thigh[1])).toBeLessThan(1e-9);
-      const plumb = lifted >= 0 ? [0, -1, 0] : thigh;
-      plumb.forEach((part, axis) => expect(Math.abs(part - shank[axis])).toBeLessThan(1e-9));
-      rig.solve(plain, 0, 0, poses[0]);
-      expect(joints.subarray(8)).toEqual(plain.subarray(8));
+        thighAngle = clampThigh(theta);
+      expect(Math.abs(Math.cos(thighAngle) + thigh[1])).toBeLessThan(1e-9);
+      const expectedShank = thighAngle >= 0 ? [0, -1, 0] : thigh;
+      expectedShank.forEach((part, axis) => expect(Math.abs(part - shank[axis])).toBeLessThan(1e-9));
+      rig.solve(straight, 0, 0, poses[0]);
+      expect(joints.subarray(8)).toEqual(straight.subarray(8));
     }),
   );
 });
 
-test("a figure's joints turn no more than the input", () => {
+test("joints rotate at most as far as the input", () => {
   fc.assert(
-    fc.property(limb, pose, angle, step, (which, rotations, theta, more) => {
-      const rig = new LegRig(figure, which),
+    fc.property(limb, pose, angle, step, (legLimb, rotations, theta, increase) => {
+      const rig = new LegRig(figure, legLimb),
         before = new Float64Array(12),
         after = new Float64Array(12),
         turn = new Float64Array(4);
       rig.solve(before, 0, theta, rotations);
-      rig.solve(after, 0, theta + more, rotations);
+      rig.solve(after, 0, theta + increase, rotations);
       for (let joint = 0; joint < 12; joint += 4) {
         conjugate(turn, 0, before.slice(joint, joint + 4), 0);
         multiply(turn, 0, turn, 0, after, joint);
         expect(2 * Math.atan2(Math.hypot(turn[1], turn[2], turn[3]), Math.abs(turn[0]))).toBeLessThanOrEqual(
-          more + 1e-7,
+          increase + 1e-7,
         );
       }
     }),

@@ -13,8 +13,8 @@ const lift = fc.double({ min: 0.01, max: 1.5, noNaN: true });
 const left = new ShoulderLimit(false),
   right = new ShoulderLimit(true);
 
-/** The upper arm of a chord, below it in the plane that is turned by `turn` from some plane through it. */
-function upperArm(chord: Float64Array, turn: number, lifted: number): Float64Array {
+/** Return the direction of the upper arm: `liftAngle` below the chord, in a plane turned about the chord by `turn`. */
+function upperArm(chord: Float64Array, turn: number, liftAngle: number): Float64Array {
   const normal = new Float64Array(3),
     side = new Float64Array(3),
     out = new Float64Array(3);
@@ -22,11 +22,11 @@ function upperArm(chord: Float64Array, turn: number, lifted: number): Float64Arr
   cross(side, 0, chord, 0, normal, 0);
   combine(normal, 0, normal, 0, Math.cos(turn), side, 0, Math.sin(turn));
   cross(side, 0, chord, 0, normal, 0);
-  combine(out, 0, chord, 0, Math.cos(lifted), side, 0, Math.sin(lifted));
+  combine(out, 0, chord, 0, Math.cos(liftAngle), side, 0, Math.sin(liftAngle));
   return out;
 }
 
-test("the right shoulder mirrors the left one", () => {
+test("right shoulder mirrors the left one", () => {
   fc.assert(
     fc.property(direction, (v) => {
       const mirrored = Float64Array.of(-v[0], v[1], v[2]);
@@ -36,59 +36,64 @@ test("the right shoulder mirrors the left one", () => {
   );
 });
 
-test("arms go forwards, down and to their side, not back and not across", () => {
-  const goes = (x: number, y: number, z: number) => left.depthInCaps(Float64Array.of(x, y, z)) <= 0;
-  expect([goes(0, 0, 1), goes(0, -1, 0), goes(1, 0, 0), goes(0, 1, 0)]).toEqual([true, true, true, true]);
-  expect([goes(0, 0, -1), goes(-1, 0, 0)]).toEqual([false, false]);
+test("forwards, down and sideways are allowed, back and across are not", () => {
+  const isAllowed = (x: number, y: number, z: number) => left.depthInCaps(Float64Array.of(x, y, z)) <= 0;
+  expect([isAllowed(0, 0, 1), isAllowed(0, -1, 0), isAllowed(1, 0, 0), isAllowed(0, 1, 0)]).toEqual([
+    true,
+    true,
+    true,
+    true,
+  ]);
+  expect([isAllowed(0, 0, -1), isAllowed(-1, 0, 0)]).toEqual([false, false]);
 });
 
-test("the least turn about the chord brings the upper arm where a shoulder goes, if any does", () => {
+test("minAllowedTurn is allowed and minimal, or null", () => {
   const normal = new Float64Array(3);
-  let some = 0,
-    none = 0;
+  let allowedCount = 0,
+    forbiddenCount = 0;
   fc.assert(
-    fc.property(direction, lift, (chord, lifted) => {
+    fc.property(direction, lift, (chord, liftAngle) => {
       anyPerpendicular(normal, 0, chord, 0);
-      const turn = left.minAllowedTurn(chord, normal, lifted);
+      const turn = left.minAllowedTurn(chord, normal, liftAngle);
       const allowed = Array.from({ length: 360 }, (_, degrees) => ((degrees - 180) * Math.PI) / 180).filter(
-        (angle) => left.depthInCaps(upperArm(chord, angle, lifted)) <= 0,
+        (angle) => left.depthInCaps(upperArm(chord, angle, liftAngle)) <= 0,
       );
       if (turn === null) {
-        none++;
+        forbiddenCount++;
         expect(allowed).toEqual([]);
         return;
       }
-      some++;
-      expect(left.depthInCaps(upperArm(chord, turn, lifted))).toBeLessThan(1e-8);
+      allowedCount++;
+      expect(left.depthInCaps(upperArm(chord, turn, liftAngle))).toBeLessThan(1e-8);
       for (const angle of allowed) expect(Math.abs(turn)).toBeLessThanOrEqual(Math.abs(angle) + 1e-6);
     }),
     { numRuns: 300 },
   );
-  expect(Math.min(some, none)).toBeGreaterThan(5);
+  expect(Math.min(allowedCount, forbiddenCount)).toBeGreaterThan(5);
 });
 
-test("it says how far away the nearest direction is that a shoulder has", () => {
+test("angleToAllowed is the angle to the nearest allowed direction", () => {
   fc.assert(
     fc.property(direction, direction, (from, to) => {
-      const away = left.angleToAllowed(from);
-      if (left.depthInCaps(from) <= 0) expect(away).toBe(0);
-      else if (left.depthInCaps(to) <= 0) expect(away).toBeLessThanOrEqual(angleBetween(from, to) + 1e-6);
+      const distance = left.angleToAllowed(from);
+      if (left.depthInCaps(from) <= 0) expect(distance).toBe(0);
+      else if (left.depthInCaps(to) <= 0) expect(distance).toBeLessThanOrEqual(angleBetween(from, to) + 1e-6);
     }),
     { numRuns: 500 },
   );
 });
 
-test("a way from where a shoulder goes never leads where none does, in steps no longer than said", () => {
+test("stepToward stays within the limit and the maximum step", () => {
   fc.assert(
-    fc.property(direction, direction, fc.double({ min: 0.001, max: 0.1, noNaN: true }), (begin, end, most) => {
+    fc.property(direction, direction, fc.double({ min: 0.001, max: 0.1, noNaN: true }), (begin, end, maxAngle) => {
       fc.pre(left.depthInCaps(begin) <= 0 && left.depthInCaps(end) <= 0);
-      const here = begin.slice(),
+      const current = begin.slice(),
         before = begin.slice();
       for (let step = 0; step < 60; step++) {
-        left.stepToward(here, here, end, most);
-        expect(left.depthInCaps(here)).toBeLessThanOrEqual(1e-9);
-        expect(angleBetween(here, before)).toBeLessThanOrEqual(1.01 * most);
-        before.set(here);
+        left.stepToward(current, current, end, maxAngle);
+        expect(left.depthInCaps(current)).toBeLessThanOrEqual(1e-9);
+        expect(angleBetween(current, before)).toBeLessThanOrEqual(1.01 * maxAngle);
+        before.set(current);
       }
     }),
   );
