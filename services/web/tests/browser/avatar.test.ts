@@ -93,7 +93,7 @@ describeInBrowser("avatars", { demo: true }, ({ open }) => {
     const page = await open("", SMALL);
     await waitForFirstPose(page);
     await drop(page, "armless.glb", { without: ["leftLowerArm", "leftHand", "leftMiddleProximal"] });
-    await page.getByRole("alert").getByText("these bones were not found: left lower arm, left hand").waitFor();
+    await page.getByRole("alert").getByText("missing bones: left lower arm, left hand").waitFor();
     await dropBytes(page, "cube.glb", [1, 2, 3]);
     await page.getByRole("alert").getByText("cube.glb: Not a GLB file").waitFor();
     expect(await page.evaluate(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined)).toBe(
