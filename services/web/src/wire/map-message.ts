@@ -59,7 +59,8 @@ const asksPerLimb = (value: unknown, { limbs }: Readonly<Record<string, unknown>
   const each = limbs as unknown[];
   if (value === undefined || value === null) return each.map(() => []);
   const asks = list(list(text))(value) as unknown[];
-  return (requireValid(asks.length === each.length, "a list for each limb"), asks);
+  requireValid(asks.length === each.length, "a list for each limb");
+  return asks;
 };
 
 type FieldReader = (value: unknown, before: Readonly<Record<string, unknown>>) => unknown;
