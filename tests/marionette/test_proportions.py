@@ -88,5 +88,5 @@ def test_identity_is_in_thousandths_where_exact() -> None:
 def test_arm_without_a_hand_raises_proportions_error() -> None:
     with pytest.raises(ProportionsError, match="L2"):
         Proportions.from_links((0.3, 0.3, 0.0))
-    with pytest.raises(ProportionsError, match="above zero"):
+    with pytest.raises(ProportionsError, match="sum to zero"):
         Proportions.from_links((0.0, 0.0, 0.0))
