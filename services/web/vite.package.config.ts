@@ -14,7 +14,7 @@ const manifest = {
   name: "bunraku",
   version,
   description: "A streamed puppet whose hands and legs the audience controls: element, viewer, puppeteer and stage.",
-  license: "UNLICENSED",
+  license: "Apache-2.0",
   type: "module",
   engines,
   exports: {
@@ -44,6 +44,7 @@ const pack: Plugin = {
     }
     emit("package.json", `${JSON.stringify(manifest, null, 2)}\n`);
     emit("README.md", readFileSync("PACKAGE.md", "utf8"));
+    for (const name of ["LICENSE", "NOTICE"]) emit(name, readFileSync(join("../..", name), "utf8"));
   },
 };
 

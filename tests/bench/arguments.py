@@ -1,4 +1,4 @@
-"""Which parts of a bench are asked for on its command line."""
+"""Command line of benchmarks that consist of parts."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from collections.abc import Collection
 
 
 def parse_parts(about: str | None, parts: Collection[str]) -> list[str]:
-    """The names given, all `parts` where none is; ends the program, with a word, for one that is not there. The first
-    line of `about` says what the bench is."""
+    """Return the parts named on the command line, all `parts` if there are none; exit with an error for an unknown one.
+
+    The first line of `about` is the description of the benchmark."""
     parser = argparse.ArgumentParser(description=(about or "").partition("\n")[0])
-    parser.add_argument("parts", nargs="*", help=f"of {', '.join(parts)}; default: all")
-    given: list[str] = parser.parse_args().parts
-    unknown = [part for part in given if part not in parts]
+    parser.add_argument("parts", nargs="*", help=f"any of {', '.join(parts)}; default: all")
+    requested: list[str] = parser.parse_args().parts
+    unknown = [part for part in requested if part not in parts]
     if unknown:
-        parser.error(f"parts are {', '.join(parts)}, not {unknown[0]}")
-    return given or list(parts)
+        parser.error(f"unknown part {unknown[0]}: choose from {', '.join(parts)}")
+    return requested or list(parts)

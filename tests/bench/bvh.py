@@ -1,4 +1,4 @@
-"""How fast BVH is read: `make bench-bvh`. The last line printed is one JSON object."""
+"""Throughput of the BVH parser: `make bench-bvh`. The last line printed is one JSON object."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ REPEATS = 5
 
 
 def generate_bvh() -> bytes:
-    """A BVH of at least `SIZE` bytes: one random second, again and again."""
+    """Generate a BVH file of at least `FILE_BYTES` bytes: one random second, repeated."""
     random = np.random.default_rng(1)
-    turned = from_rotation_vector(random.uniform(-1.0, 1.0, (120, JOINT_COUNT, 3)))
-    text = write_bvh(Motion(standard_figure(), 120.0, random.normal(0.0, 1.0, (120, 3)), turned))
+    rotations = from_rotation_vector(random.uniform(-1.0, 1.0, (120, JOINT_COUNT, 3)))
+    text = write_bvh(Motion(standard_figure(), 120.0, random.normal(0.0, 1.0, (120, 3)), rotations))
     body = text[text.index(b"\n", text.index(b"Frame Time")) + 1 :]
     seconds = FILE_BYTES // len(body) + 1
     return text[: -len(body)].replace(b"Frames: 120", b"Frames: %d" % (120 * seconds)) + body * seconds
 
 
 def best_parse_seconds(data: bytes) -> tuple[float, tuple[int, ...]]:
-    """Seconds of the fastest of `REPEATS` readings, and the shape of the frames."""
+    """Return the seconds of the fastest of `REPEATS` runs, and the shape of the frames."""
     seconds = []
     for _ in range(REPEATS):
         begin = time.perf_counter()

@@ -1,6 +1,6 @@
-"""Rate over error as a picture for the README: an SVG of the art direction's paper, ink and gold.
+"""Chart of bitrate over error for the documentation: an SVG in the colours of the page.
 
-It has a ground of its own, so that it reads on dark pages and on light ones. Both axes are logarithmic.
+The chart has a background, so that it is legible on dark and light pages. Both axes are logarithmic.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Points = list[tuple[float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One codec: `points` are (error in mm, kbit/s), rising in error; each is marked where it was `measured`."""
+    """Curve of one codec: `points` are (error in mm, kbit/s) by rising error, marked with dots if `measured`."""
 
     name: str
     colour: str
@@ -33,7 +33,7 @@ class Curve:
     measured: bool = False
 
     def kbps_at(self, error: float) -> float:
-        """kbit/s at an error within the points, log-log between them."""
+        """Return the bitrate at an error within the points, interpolated log-log, kbit/s."""
         for (a, low), (b, high) in zip(self.points, self.points[1:], strict=False):
             if a <= error <= b:
                 return math.exp(math.log(low) + math.log(high / low) * math.log(error / a) / math.log(b / a))
@@ -42,7 +42,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One kind of error. The first of `curves` is compared with the others at the errors `compared`."""
+    """Panel of one kind of error; the first of `curves` is compared with the others at `compared_errors`."""
 
     title: str
     curves: list[Curve]
@@ -50,7 +50,7 @@ class Panel:
 
 
 class _Axes:
-    """Places of one panel's values."""
+    """Coordinates of the values of one panel."""
 
     def __init__(self, left: float, errors: tuple[float, float], rates: tuple[float, float]) -> None:
         self.left, self.errors, self.rates = left, errors, rates
@@ -65,7 +65,7 @@ class _Axes:
 
 
 def draw_chart(panels: tuple[Panel, Panel], note: str) -> str:
-    """The picture as SVG; `note` stands below."""
+    """Draw the chart as SVG; `note` is the text below it."""
     rates = [rate for panel in panels for curve in panel.curves for _, rate in curve.points]
     bounds = min(rates) / 1.25, max(rates) * 1.25
     parts = [
@@ -179,7 +179,7 @@ def _ratio_elements(axes: _Axes, panel: Panel) -> list[str]:
             rate = curve.kbps_at(error)
             x, y = axes.x(error), axes.y(rate)
             parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{curve.colour}"/>')
-            # above the highest curve there is room on the right, between two curves on the left
+            # labels stand above the highest curve on its right, and between two curves on the left
             dx, dy, anchor = (9, -6, "start") if curve is others[-1] else (-8, 15, "end")
             parts.append(_text_element(x + dx, y + dy, f"× {rate / ours.kbps_at(error):.1f}", anchor, 13, curve.colour))
     return parts

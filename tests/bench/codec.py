@@ -1,9 +1,10 @@
-"""How small motion is: `make bench-codec CORPUS=../shared/mocap`. The last line printed is one JSON object.
+"""Compression of motion, compared with other codecs: `make bench-codec CORPUS=../shared/mocap`.
 
-Every clip is encoded with a prior that saw none of its family, when asked for a mean or a largest error. Its kbit/s
-count all that a viewer receives of the motion over the clip: blocks, Data heads, WebSocket frames, and the dancer (limb
-lengths and references) from the Description. `--quick` takes every third clip. With PICTURE=FILE more errors are asked
-for, and rate over error is drawn (SVG).
+The last line printed is one JSON object. Every clip is encoded for a mean or maximum error with a prior that was not
+trained on its family. The bitrate counts all bytes that a viewer receives for the motion: blocks, headers of Data
+messages, WebSocket frames, and the skeleton description (limb lengths and references) of the Description. `--quick`
+takes every third clip. With PICTURE=FILE further error bounds are measured, and a chart of bitrate over error is
+written (SVG).
 """
 
 from __future__ import annotations
@@ -29,26 +30,26 @@ from training import corpus as clips
 
 ERROR_GOALS = (("mean", 1.0), ("mean", 5.0), ("max", 10.0), ("max", 2.0))
 PEERS = {"acl": "acl", "meshopt": "meshopt_brotli"}
-ERROR_COLUMNS = {"mean": peer_results.MEAN, "max": peer_results.MOST}
+ERROR_COLUMNS = {"mean": peer_results.MEAN, "max": peer_results.MAX}
 CHART_ERRORS_MM = {"mean": (0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0), "max": (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)}
 PRIORS_FOLDER = Path(__file__).with_name("priors")
 
 
 def load_held_out_prior(name: str) -> Prior:
-    """The prior that has not seen the clip's family."""
+    """Load the prior that was not trained on the clip's family."""
     path = PRIORS_FOLDER / f"{clips.clip_family(name)}.json"
     return parse_prior(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else load_shipped_prior()
 
 
 def received_bytes(track: MotionTrack, blocks: list[bytes]) -> int:
-    """Bytes of a motion on its way to a viewer."""
+    """Return the bytes that a viewer receives for a motion."""
     packets = [len(Data(0, 0, index, block).pack()) for index, block in enumerate(blocks)]
     framed = sum(size + (2 if size < 126 else 4) for size in packets)
     return framed + len(track.skeleton.pack())
 
 
 def encode_to_goal(motion: Motion, goal: tuple[str, float], prior: Prior, block_seconds: float) -> float:
-    """Our kbit/s for a goal."""
+    """Encode a motion for a goal and return its bitrate, kbit/s."""
     kind, error = goal
     if kind == "mean":
         track, rate = encode_motion_to_mean_error(motion, error, block_seconds, prior)
@@ -68,7 +69,7 @@ def draw_chart(
     rates: dict[tuple[str, float], list[float]],
     block_seconds: float,
 ) -> str:
-    """The picture of rate over error; our `rates` (kbit/s of each clip) are added where they lack an error."""
+    """Draw the chart of bitrate over error; missing errors are measured and added to `rates` (kbit/s of each clip)."""
     panels = []
     for kind, title in (("mean", "Mean error"), ("max", "Largest error, held in every block")):
         for error in CHART_ERRORS_MM[kind]:
@@ -83,8 +84,8 @@ def draw_chart(
         curves = [chart.Curve("Bunraku", "#b3301f", points, measured=True)]
         for name, peer, colour in (("meshoptimizer + brotli", "meshopt", "#27418f"), ("ACL", "acl", "#7d5a14")):
             rows = [measured[clip][PEERS[peer]] for clip in motions]
-            theirs = peer_results.mean_curve(rows, ERROR_COLUMNS[kind], points[0][0], points[-1][0])
-            curves.append(chart.Curve(name, colour, theirs))
+            peer_points = peer_results.mean_curve(rows, ERROR_COLUMNS[kind], points[0][0], points[-1][0])
+            curves.append(chart.Curve(name, colour, peer_points))
         panels.append(chart.Panel(title, curves, tuple(error for of, error in ERROR_GOALS if of == kind)))
     note = (
         f"Geometric means over {len(motions)} clips. Ours: all that a viewer receives, in independent blocks of "
@@ -94,11 +95,12 @@ def draw_chart(
 
 
 def measure_speeds(motions: dict[str, Motion]) -> dict[str, float]:
-    """Times real time over clips of 30 to 60 frames a second, of one live rate and of the whole ladder at its best, and
-    milliseconds to decode a block."""
-    usual = [motion for motion in motions.values() if 30 <= motion.fps <= 60]
+    """Measure the encoder's speed relative to real time, and the decoding time of a block in milliseconds.
+
+    Clips have 30 to 60 frames per second; encoded are one live bitrate level and the whole ladder, live and best."""
+    clips_30_to_60_fps = [motion for motion in motions.values() if 30 <= motion.fps <= 60]
     figures = {}
-    seconds = sum(motion.duration for motion in usual)
+    seconds = sum(motion.duration for motion in clips_30_to_60_fps)
     warm_up()
     for key, grade, ladder in (
         ("encode_times_real_time", "live", ERROR_BOUNDS_MM[2:3]),
@@ -106,14 +108,14 @@ def measure_speeds(motions: dict[str, Motion]) -> dict[str, float]:
         ("encode_best_times_real_time", "best", ERROR_BOUNDS_MM),
     ):
         began = time.perf_counter()
-        for motion in usual:
+        for motion in clips_30_to_60_fps:
             encode_motion(motion, grade=grade, error_bounds_mm=ladder)  # type: ignore[arg-type]
         figures[key] = seconds / (time.perf_counter() - began)
     spent = []
     for motion in motions.values():
         track, rate = encode_motion_to_mean_error(motion, 1.0)
         for block in rate.blocks:
-            # the best of three: others share the machine
+            # best of three, as other processes share the machine
             tries = []
             for _ in range(3):
                 began = time.perf_counter()
@@ -125,9 +127,9 @@ def measure_speeds(motions: dict[str, Motion]) -> dict[str, float]:
 
 
 def measure_typescript_decode_ms(motions: dict[str, Motion]) -> float | None:
-    """Median milliseconds in Node of a block at 1 mm, None where there is no Node."""
+    """Return the median decoding time of a block at 1 mm in Node, milliseconds; None if there is no Node."""
     web = Path(__file__).resolve().parents[2] / "services/web"
-    coded = []
+    encoded_clips = []
     for motion in motions.values():
         track, rate = encode_motion_to_mean_error(motion, 1.0)
         described = {
@@ -137,28 +139,33 @@ def measure_typescript_decode_ms(motions: dict[str, Motion]) -> float | None:
             "firstFrames": track.first_frames,
             "dancer": track.skeleton.pack().hex(),
         }
-        coded.append({"track": described, "blocks": [block.hex() for block in rate.blocks]})
+        encoded_clips.append({"track": described, "blocks": [block.hex() for block in rate.blocks]})
     with tempfile.TemporaryDirectory() as folder:
         script = str(Path(folder) / "decode.mjs")
         bundle = ["npx", "rolldown", "tests/bench/decode.ts", "--file", script, "--platform", "node", "--format", "esm"]
         try:
             subprocess.run(bundle, cwd=web, capture_output=True, timeout=120, check=True)
-            done = subprocess.run(
-                ["node", script], input=json.dumps(coded), capture_output=True, text=True, timeout=300, check=True
+            result = subprocess.run(
+                ["node", script],
+                input=json.dumps(encoded_clips),
+                capture_output=True,
+                text=True,
+                timeout=300,
+                check=True,
             )
         except (FileNotFoundError, subprocess.SubprocessError):
             return None
-    return float(json.loads(done.stdout.splitlines()[-1])["median_ms"])
+    return float(json.loads(result.stdout.splitlines()[-1])["median_ms"])
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="bench-codec", description=__doc__)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--block-seconds", type=float, default=1.0)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     folder = Path(os.environ.get("CORPUS") or os.environ.get("BUNRAKU_SHARED", "../shared") + "/mocap")
     measured = peer_results.load_peer_results(folder)
-    names = [name for name in clips.list_clips(folder) if name in measured][:: 3 if asked.quick else 1]
+    names = [name for name in clips.list_clips(folder) if name in measured][:: 3 if options.quick else 1]
     motions = {name: clips.load_clip(folder, name) for name in names}
     ratios: dict[str, list[float]] = {}
     rates: dict[tuple[str, float], list[float]] = {}
@@ -170,25 +177,25 @@ def main() -> None:
         row = f"{name:<16}"
         for kind, error in ERROR_GOALS:
             key = f"{kind}_{error:g}mm"
-            kbps = encode_to_goal(motion, (kind, error), load_held_out_prior(name), asked.block_seconds)
+            kbps = encode_to_goal(motion, (kind, error), load_held_out_prior(name), options.block_seconds)
             rates.setdefault((kind, error), []).append(kbps)
             row += f"{kbps:12.2f}"
             for peer, column in PEERS.items():
-                theirs = peer_results.interpolate_kbps(measured[name][column], ERROR_COLUMNS[kind], error)
-                ratios.setdefault(f"{peer}_{key}", []).append(theirs / kbps)
-                row += f"{theirs / kbps:8.2f}" if peer == "acl" else f"{theirs / kbps:9.2f}"
+                peer_points = peer_results.interpolate_kbps(measured[name][column], ERROR_COLUMNS[kind], error)
+                ratios.setdefault(f"{peer}_{key}", []).append(peer_points / kbps)
+                row += f"{peer_points / kbps:8.2f}" if peer == "acl" else f"{peer_points / kbps:9.2f}"
         print(row, flush=True)
-    told = ratios | {f"kbps_{kind}_{error:g}mm": values for (kind, error), values in rates.items()}
-    figures = {key: round(geometric_mean(values), 3) for key, values in told.items()}
+    values_by_key = ratios | {f"kbps_{kind}_{error:g}mm": values for (kind, error), values in rates.items()}
+    figures = {key: round(geometric_mean(values), 3) for key, values in values_by_key.items()}
     if os.environ.get("PICTURE"):
-        drawn = draw_chart(motions, measured, rates, asked.block_seconds)
+        drawn = draw_chart(motions, measured, rates, options.block_seconds)
         Path(os.environ["PICTURE"]).write_text(drawn, encoding="utf-8", newline="\n")
     figures |= {key: round(value, 3) for key, value in measure_speeds(motions).items()}
     typescript = measure_typescript_decode_ms(motions)
     figures["decode_ms_typescript"] = round(typescript, 3) if typescript is not None else -1.0
     print(
         json.dumps(
-            figures | {"clips": len(names), "ladder_mm": list(ERROR_BOUNDS_MM), "block_seconds": asked.block_seconds}
+            figures | {"clips": len(names), "ladder_mm": list(ERROR_BOUNDS_MM), "block_seconds": options.block_seconds}
         )
     )
 

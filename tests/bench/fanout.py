@@ -1,18 +1,18 @@
-"""A thousand viewers: `make bench-fanout`. The last line printed is one JSON object.
+"""Fan-out to a thousand viewers: `make bench-fanout`. The last line printed is one JSON object.
 
-Everything is on loopback, each server and each crowd in a process of its own. Parts, all of them unless some are named:
+Everything is on loopback, each server and each load generator in a separate process. Parts, all unless some are named:
 
-- `rates`: processor time per message of who sends, 600 viewers x 60 Hz x 120 bytes, of ours (the stream service as
-  `bunraku up` serves it, overlays published on its bus), FastAPI's `send_bytes`, `websockets.broadcast`, Socket.IO,
-  nats-server's WebSocket and a bare loop of `send` in C, in turns of a second. Ratios are of one round, and the median
-  of the rounds is told.
-- `latency`: 1,000 viewers at 20 Hz x 3 frames: from the publishing to the viewer's socket.
-- `blocks`: 4,000 viewers of a playing motion's blocks, about one a second each.
-- `stalled`: of 300 viewers one stops reading, another never answers: what waits for the one, when the other is gone,
-  and what the rest see of it, in turns with and without one who stops reading.
-- `memory`: what the server's process grows by with 2,000 viewers.
-- `crowd`: a real session with a real puppeteer; 1,000 join within 5 s and leave at once, and the overlays of 50 who
-  were there before and stay are looked at.
+- `rates`: CPU time of the sender per message, 600 viewers x 60 Hz x 120 bytes, for ours (the stream service as
+  `bunraku up` serves it, overlays published on its bus), `send_bytes` of FastAPI, `websockets.broadcast`, Socket.IO,
+  the WebSocket of nats-server, and a plain loop of `send` in C, alternating every second. Ratios are computed within
+  a round; the median of the rounds is reported.
+- `latency`: 1,000 viewers at 20 Hz x 3 frames: from publication to the viewer's socket.
+- `blocks`: 4,000 viewers of the blocks of a playing motion, about one per second each.
+- `stalled`: of 300 viewers one stops reading, another never answers: the data queued for the first, the time until the
+  second is disconnected, and the latency of the others, alternating with and without a viewer that stops reading.
+- `memory`: memory growth of the server's process with 2,000 viewers.
+- `crowd`: a real session with a real puppeteer; 1,000 viewers join within 5 s and leave at once; measured are the
+  overlays of 50 other viewers that stay throughout.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from tests.bench.fanout_processes import LineProcess, start_c_sender
 from tests.raw_client import upgrade_request
 
 OVERLAY_LEAD_MS = 60.0
-"""How far ahead of their publishing overlays are due."""
+"""Lead time of overlays: from their publication until they are due, milliseconds."""
 STREAM_PATH = "/v1/sessions/bench/stream"
 Figures = dict[str, float | None]
 
@@ -49,48 +49,48 @@ Figures = dict[str, float | None]
 def measure_send_cost(
     viewers: int = 600, size: int = 120, hertz: int = 60, rounds: int = 7, seconds: float = 1.0
 ) -> Figures:
-    """Processor time of who sends, side by side."""
+    """Measure the CPU time of each sender per message, in alternation."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bunraku-bench-")))
         senders: dict[str, LineProcess] = {}
-        bare = stack.enter_context(start_c_sender(folder, viewers, size, hertz))
-        if bare is not None:
-            senders["c"] = bare
+        c_sender = stack.enter_context(start_c_sender(folder, viewers, size, hertz))
+        if c_sender is not None:
+            senders["c"] = c_sender
         else:
-            print("no C compiler (cc): without the ceiling")
+            print("no C compiler (cc): the ceiling is not measured")
         kinds = ["bunraku", "fastapi", "websockets"]
         if find_spec("socketio") is not None:
             kinds.append("socketio")
         else:
-            print("python-socketio is not installed: without Socket.IO")
+            print("python-socketio is not installed: Socket.IO is not measured")
         for kind in kinds:
             senders[kind] = stack.enter_context(LineProcess.start_module("fanout_senders", kind, size, hertz))
         if which("nats-server") is not None:
             senders["nats"] = stack.enter_context(LineProcess.start_module("fanout_nats", size, hertz))
         else:
-            print("nats-server is not installed: without its WebSocket")
-        speech = {"c": ("raw",), "bunraku": ("bunraku", STREAM_PATH), "nats": ("nats", "/")}
-        speech["socketio"] = ("socketio", "/socket.io/?EIO=4&transport=websocket")
+            print("nats-server is not installed: its WebSocket is not measured")
+        protocols = {"c": ("raw",), "bunraku": ("bunraku", STREAM_PATH), "nats": ("nats", "/")}
+        protocols["socketio"] = ("socketio", "/socket.io/?EIO=4&transport=websocket")
         drains = {}
         for kind, sender in senders.items():
-            said = speech.get(kind, ("websocket", "/"))
+            protocol = protocols.get(kind, ("websocket", "/"))
             drains[kind] = stack.enter_context(
-                LineProcess.start_module("fanout_drain", sender.read_line(), viewers, *said)
+                LineProcess.start_module("fanout_drain", sender.read_line(), viewers, *protocol)
             )
             assert drains[kind].read_line() == "ready"
         found: dict[str, list[float]] = {kind: [] for kind in senders}
-        for turn in range(rounds + 1):
+        for round_number in range(rounds + 1):
             for kind, sender in senders.items():
-                # what Socket.IO takes needs no seven rounds
-                if kind == "socketio" and turn > 2:
+                # Socket.IO is so slow that two rounds suffice
+                if kind == "socketio" and round_number > 2:
                     continue
                 drains[kind].request("")
                 sent = sender.request(seconds)
                 time.sleep(0.1)
-                came = drains[kind].request("")
-                assert came["open"] == viewers, f"{kind}: {came['open']} of {viewers} are still there"
-                assert came["frames"] >= 0.95 * sent["messages"] > 0, f"{kind}: {came} of {sent}"
-                if turn:
+                received = drains[kind].request("")
+                assert received["open"] == viewers, f"{kind}: {received['open']} of {viewers} connections are open"
+                assert received["frames"] >= 0.95 * sent["messages"] > 0, f"{kind}: received {received} of {sent}"
+                if round_number:
                     found[kind].append(sent["cpu"] / sent["messages"] * 1e6)
     figures: Figures = {f"us_{kind}": _round(statistics.median(values)) for kind, values in found.items()}
 
@@ -109,7 +109,7 @@ def measure_send_cost(
 
 
 def measure_latency(viewers: int = 1000, hertz: int = 20, seconds: float = 8.0) -> Figures:
-    """From the publishing of an overlay to the viewers' sockets."""
+    """Measure the time from the publication of an overlay to its arrival at viewers."""
     with (
         LineProcess.start_module("fanout_senders", "bunraku", 66, hertz) as sender,
         _start_viewers(sender.read_line()) as crowd,
@@ -118,100 +118,100 @@ def measure_latency(viewers: int = 1000, hertz: int = 20, seconds: float = 8.0) 
         sender.request(1)
         crowd.request("count")
         sent = sender.request(seconds)
-        came = crowd.request("figures")
-    assert came["joined"] == viewers
-    assert came["overlays"] >= 0.99 * sent["messages"]
+        received = crowd.request("figures")
+    assert received["joined"] == viewers
+    assert received["overlays"] >= 0.99 * sent["messages"]
     return {
-        "latency_ms_p50": _round(came["overlay_late_ms_p50"] + OVERLAY_LEAD_MS),
-        "latency_ms_p99": _round(came["overlay_p99"] + OVERLAY_LEAD_MS),
+        "latency_ms_p50": _round(received["overlay_late_ms_p50"] + OVERLAY_LEAD_MS),
+        "latency_ms_p99": _round(received["overlay_p99"] + OVERLAY_LEAD_MS),
         "latency_cores": _round(sent["cpu"] / seconds),
     }
 
 
 def measure_block_delivery(viewers: int = 4000, sample: int = 200, seconds: float = 12.0) -> Figures:
-    """Blocks of a motion that plays: `sample` of the viewers are looked at, of the others what comes is counted."""
+    """Measure the delivery of blocks of a playing motion: `sample` viewers measure latency, the others count bytes."""
     with LineProcess.start_module("fanout_senders", "playing", 66, 20) as sender:
         port = sender.read_line()
         drain = LineProcess.start_module("fanout_drain", port, viewers - sample, "bunraku", STREAM_PATH)
         with drain, _start_viewers(port) as crowd:
             assert drain.read_line() == "ready"
             crowd.request(f"join {sample} 100")
-            # what is sent ahead at first is not counted
+            # the initial prefetch is not counted
             time.sleep(2)
             drain.request("")
             crowd.request("count")
             before, begun = sender.processor_seconds(), time.monotonic()
             time.sleep(seconds)
             passed, cores = time.monotonic() - begun, sender.processor_seconds() - before
-            came, seen = drain.request(""), crowd.request("figures")
-    # pings of the silent are frames too, one in twelve seconds
-    sent = came["frames"] + seen["blocks"]
+            received, sampled = drain.request(""), crowd.request("figures")
+    # pings to the counting viewers are frames too, one in twelve seconds
+    sent = received["frames"] + sampled["blocks"]
     return {
-        "blocks_viewers": came["open"] + seen["joined"],
+        "blocks_viewers": received["open"] + sampled["joined"],
         "blocks_per_second": _round(sent / passed),
         "blocks_cores": _round(cores / passed, 3),
         "blocks_us_each": _round(cores * 1e6 / max(sent, 1)),
-        "blocks_spread_ms": _round(seen["block_spread"]),
-        "blocks_late": seen["stalls"],
+        "blocks_spread_ms": _round(sampled["block_spread"]),
+        "blocks_late": sampled["stalls"],
     }
 
 
 def measure_stalled_viewer(viewers: int = 300, hertz: int = 60, seconds: float = 10.0, rounds: int = 7) -> Figures:
-    """One who stops reading, and one who never answers."""
+    """Measure a viewer that stops reading, one that never answers, and their effect on the others."""
     with LineProcess.start_module("fanout_senders", "bunraku", 228, hertz) as sender:
         port = sender.read_line()
         with _start_viewers(port) as crowd:
             crowd.request(f"join {viewers} 300")
             sender.request(1)
 
-            def late() -> float:
+            def latency_p99_ms() -> float:
                 crowd.request("count")
                 sender.request(3)
                 return float(crowd.request("figures")["overlay_p99"]) + OVERLAY_LEAD_MS
 
-            without, beside = [], []
+            without, with_stalled = [], []
             for _ in range(rounds):
-                without.append(late())
+                without.append(latency_p99_ms())
                 one = _open_viewer(int(port), 4096)
-                # until it is full
+                # until its buffers are full
                 sender.request(2)
-                beside.append(late())
+                with_stalled.append(latency_p99_ms())
                 one.close()
-            silent, stopped = _open_viewer(int(port)), _open_viewer(int(port), 4096)
+            silent, stalled = _open_viewer(int(port)), _open_viewer(int(port), 4096)
             begun = time.monotonic()
-            most = 0
+            max_queued = 0
             while time.monotonic() - begun < seconds:
                 sender.request(1)
-                most = max(most, sender.request("waiting")["most"])
+                max_queued = max(max_queued, sender.request("waiting")["most"])
                 assert not _read_available(silent, 0.0)[1]
             number = sender.request("waiting")["number"]
-            data, ended = _read_available(stopped, 1.0)
-            gone = None
-            while gone is None and time.monotonic() - begun < 30:
+            data, ended = _read_available(stalled, 1.0)
+            disconnected_s = None
+            while disconnected_s is None and time.monotonic() - begun < 30:
                 if _read_available(silent, 0.2)[1]:
-                    gone = time.monotonic() - begun
-    # overlays of 228 bytes: their heads, then the number
+                    disconnected_s = time.monotonic() - begun
+    # overlays of 228 bytes: the frame header and type, then the sequence number
     found = re.finditer(rb"\x82\x7e\x00\xe4\x05.(..)", data, re.DOTALL)
     numbers = [int.from_bytes(one[1], "little") for one in found]
     assert not ended
-    assert numbers[-1] == number, "the newest is what comes last"
+    assert numbers[-1] == number, "the last overlay received is not the newest"
     return {
-        "stalled_waiting_bytes": most,
+        "stalled_waiting_bytes": max_queued,
         "stalled_skipped": max(b - a for a, b in pairwise(numbers)) - 1,
         "others_p99_ms_without": _round(statistics.median(without)),
-        "others_p99_ms": _round(statistics.median(beside)),
-        "others_p99_ratio": _round(statistics.median(b / a for a, b in zip(without, beside, strict=True))),
-        "half_open_gone_s": _round(gone),
+        "others_p99_ms": _round(statistics.median(with_stalled)),
+        "others_p99_ratio": _round(statistics.median(b / a for a, b in zip(without, with_stalled, strict=True))),
+        "half_open_gone_s": _round(disconnected_s),
     }
 
 
 def measure_memory(viewers: int = 2000) -> Figures:
-    """What the server's process grows by."""
+    """Measure the memory growth of the server's process."""
     with (
         LineProcess.start_module("fanout_senders", "playing", 66, 20) as sender,
         _start_viewers(sender.read_line()) as crowd,
     ):
-        # what is made with the first viewers is not the others'
+        # allocations for the first viewers are not counted
         crowd.request("join 20 100")
         time.sleep(1)
         before = sender.resident_kilobytes()
@@ -222,7 +222,7 @@ def measure_memory(viewers: int = 2000) -> Figures:
 
 
 def measure_join_burst(viewers: int = 1000, initial_viewers: int = 50) -> Figures:
-    """A flash crowd and its going, with a limb pulled all the while."""
+    """Measure the overlays of other viewers while many join and leave, with a limb controlled throughout."""
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         bunraku = str(Path(sys.executable).parent / "bunraku")
         with LineProcess([bunraku, "up", "--demo", "--port", "0", "--data", folder]) as server:
@@ -240,55 +240,55 @@ async def _run_join_burst(server: LineProcess, url: str, viewers: int, initial_v
         stream = client.socket_url(f"/v1/sessions/{session}/stream")
         ended = asyncio.Event()
 
-        async def pull() -> None:
+        async def control_limb() -> None:
             async with Puppeteer(client, session, "bench") as puppeteer:
                 number = 0
                 while not ended.is_set():
                     try:
                         await puppeteer.target("left_hand", 0.45, -0.2 + 0.2 * (number // 30 % 2), 0.5)
                     except ControlRefused:
-                        # not yet, or lost while this process was kept from running
+                        # the limb is not claimed yet, or was lost while this process was not scheduled
                         await puppeteer.claim("left_hand")
                     number += 1
                     await asyncio.sleep(1 / 60)
 
         with (
-            LineProcess.start_module("fanout_crowd", stream, "talk") as stay,
-            LineProcess.start_module("fanout_crowd", stream) as come,
+            LineProcess.start_module("fanout_crowd", stream, "talk") as staying,
+            LineProcess.start_module("fanout_crowd", stream) as joining,
         ):
 
-            async def during(what: Callable[[], Any], rest: float) -> tuple[dict[str, Any], float]:
-                await asyncio.to_thread(stay.request, "count")
+            async def measure_during(action: Callable[[], Any], wait_s: float) -> tuple[dict[str, Any], float]:
+                await asyncio.to_thread(staying.request, "count")
                 before, begun = server.processor_seconds(), time.monotonic()
-                await asyncio.to_thread(what)
-                await asyncio.sleep(rest)
+                await asyncio.to_thread(action)
+                await asyncio.sleep(wait_s)
                 cores = (server.processor_seconds() - before) / (time.monotonic() - begun)
-                return await asyncio.to_thread(stay.request, "figures"), cores
+                return await asyncio.to_thread(staying.request, "figures"), cores
 
-            pulling = asyncio.create_task(pull())
-            await asyncio.to_thread(stay.request, f"join {initial_viewers} 50")
-            # what is loaded after the start is loaded
+            controlling = asyncio.create_task(control_limb())
+            await asyncio.to_thread(staying.request, f"join {initial_viewers} 50")
+            # wait until everything that loads after the start is loaded
             await asyncio.sleep(8)
-            calm, _ = await during(lambda: None, 6)
-            flash, cores = await during(lambda: come.request(f"join {viewers} {viewers / 5}"), 1)
-            joined = await asyncio.to_thread(come.request, "figures")
-            many, many_cores = await during(lambda: None, 5)
-            storm, _ = await during(lambda: come.request(f"leave {viewers}"), 3)
+            calm, _ = await measure_during(lambda: None, 6)
+            burst, cores = await measure_during(lambda: joining.request(f"join {viewers} {viewers / 5}"), 1)
+            joined = await asyncio.to_thread(joining.request, "figures")
+            all_present, present_cores = await measure_during(lambda: None, 5)
+            leaving, _ = await measure_during(lambda: joining.request(f"leave {viewers}"), 3)
             ended.set()
-            await pulling
+            await controlling
     return {
         "crowd_joined": joined["joined"],
         "crowd_join_ms_p99": joined["join_ms_p99"],
         "crowd_join_cores": _round(cores),
-        "crowd_there_cores": _round(many_cores),
+        "crowd_there_cores": _round(present_cores),
         "overlay_gap_ms_p99_calm": calm["overlay_gap_ms_p99"],
-        "overlay_gap_ms_p99_joining": flash["overlay_gap_ms_p99"],
-        "overlay_gap_ms_p99_there": many["overlay_gap_ms_p99"],
-        "overlay_gap_ms_p99_leaving": storm["overlay_gap_ms_p99"],
+        "overlay_gap_ms_p99_joining": burst["overlay_gap_ms_p99"],
+        "overlay_gap_ms_p99_there": all_present["overlay_gap_ms_p99"],
+        "overlay_gap_ms_p99_leaving": leaving["overlay_gap_ms_p99"],
         "overlay_late_ms_p99_calm": _round(calm["overlay_p99"]),
-        "overlay_late_ms_p99_joining": _round(flash["overlay_p99"]),
-        "overlay_late_ms_p99_there": _round(many["overlay_p99"]),
-        "overlay_late_ms_p99_leaving": _round(storm["overlay_p99"]),
+        "overlay_late_ms_p99_joining": _round(burst["overlay_p99"]),
+        "overlay_late_ms_p99_there": _round(all_present["overlay_p99"]),
+        "overlay_late_ms_p99_leaving": _round(leaving["overlay_p99"]),
     }
 
 
@@ -297,7 +297,7 @@ def _start_viewers(port: str) -> LineProcess:
 
 
 def _open_viewer(port: int, buffer: int | None = None) -> socket.socket:
-    """A viewer of no more than a socket; `buffer` is what its system keeps for it."""
+    """Open a viewer as a plain socket; `buffer` is its SO_RCVBUF."""
     viewer = socket.socket()
     if buffer is not None:
         viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
@@ -308,12 +308,12 @@ def _open_viewer(port: int, buffer: int | None = None) -> socket.socket:
 
 
 def _read_available(viewer: socket.socket, wait: float) -> tuple[bytes, bool]:
-    """What there is to be read, until nothing comes for `wait` seconds; and whether the server has ended it."""
+    """Read until nothing arrives for `wait` seconds; return the data, and whether the server closed the connection."""
     viewer.settimeout(wait)
     data = b""
     try:
-        while part := viewer.recv(1 << 16):
-            data += part
+        while data_part := viewer.recv(1 << 16):
+            data += data_part
     except (BlockingIOError, TimeoutError):
         return data, False
     except ConnectionError:

@@ -1,8 +1,8 @@
-/* The least that one core can do: send(2) of the same bytes to every socket, sixty times a second.
+/* Upper bound for one core: send(2) of the same bytes to every socket at a fixed rate.
  *
- * fanout_ceiling VIEWERS BYTES HERTZ: prints the port that it listens at, takes VIEWERS connections, then for each line
- * of standard input, a number of seconds, sends for that long and prints a JSON object: `messages` sent and `cpu`,
- * seconds of this process in user and kernel mode. What a socket has no room for is left out and not counted.
+ * fanout_ceiling VIEWERS BYTES HERTZ: prints the port at which it listens, accepts VIEWERS connections, then for each
+ * line of standard input, a number of seconds, sends for that time and prints a JSON object: `messages` sent and `cpu`,
+ * the user and system time of this process in seconds. Messages that do not fit into a socket's buffer are not counted.
  */
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -29,7 +29,7 @@ int main(int count, char **arguments) {
     socklen_t length = sizeof address;
     int *sockets = malloc(sizeof *sockets * viewers);
     char *bytes = calloc(1, size + 2), line[64];
-    /* a WebSocket's frame of a binary message (RFC 6455, section 5.2) */
+    /* WebSocket frame of a binary message (RFC 6455, section 5.2) */
     bytes[0] = (char)0x82, bytes[1] = size, size += 2;
     if (bind(listening, (struct sockaddr *)&address, sizeof address) || listen(listening, 1024)) return 1;
     getsockname(listening, (struct sockaddr *)&address, &length);

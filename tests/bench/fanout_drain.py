@@ -1,8 +1,9 @@
-"""Many clients in one cheap process: they read what comes and count it, so that a bench measures who sends.
+"""Many minimal clients in one process, which read and count frames, so that a benchmark measures the sender.
 
-`python -m tests.bench.fanout_drain PORT VIEWERS SPEECH [PATH]`: connects, says `ready`, and for each line of standard
-input prints one JSON object: the `bytes` and `frames` that came since the line before, and how many sockets are `open`.
-SPEECH is `raw` (frames without a handshake), `bunraku`, `websocket`, `socketio` or `nats`. Pings are answered.
+`python -m tests.bench.fanout_drain PORT VIEWERS PROTOCOL [PATH]`: connects, prints `ready`, and for each line of
+standard input prints one JSON object: the `bytes` and `frames` received since the last line, and the number of `open`
+sockets. PROTOCOL is `raw` (frames without a handshake), `bunraku`, `websocket`, `socketio` or `nats`. Pings are
+answered.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ from bunraku.wire.messages import SUBPROTOCOL
 
 
 def encode_masked_frame(opcode: int, payload: bytes) -> bytes:
-    """A client's frame of less than 126 bytes (RFC 6455, section 5.2); its mask is zero."""
+    """Encode a client's frame of less than 126 bytes with a mask of zero (RFC 6455, section 5.2)."""
     return bytes((0x80 | opcode, 0x80 | len(payload), 0, 0, 0, 0)) + payload
 
 
 @dataclass(slots=True)
 class DrainClient:
-    """One client: its socket, what came of a frame that is not whole yet, and bytes of the body still to come."""
+    """One client: its socket, an incomplete frame header, and the outstanding bytes of a frame body."""
 
     socket: socket.socket
     partial_frame: bytes = b""
@@ -34,7 +35,7 @@ class DrainClient:
 
 @dataclass
 class DrainPool:
-    """All clients of the process."""
+    """The clients of the process."""
 
     protocol: str
     clients: dict[int, DrainClient] = field(default_factory=dict)
@@ -42,7 +43,7 @@ class DrainPool:
     frames: int = 0
 
     def open(self, port: int, path: str) -> int:
-        """One more client, its handshake done; its socket's number."""
+        """Connect one more client and do its handshake; return the file descriptor of its socket."""
         connection = socket.create_connection(("127.0.0.1", port), timeout=30)
         client = DrainClient(connection)
         if self.protocol != "raw":
@@ -52,13 +53,13 @@ class DrainPool:
             if self.protocol == "bunraku":
                 lines.append(f"Sec-WebSocket-Protocol: {SUBPROTOCOL}")
             connection.sendall("\r\n".join([*lines, "", ""]).encode())
-            answer = b""
-            while b"\r\n\r\n" not in answer:
-                part = connection.recv(4096)
-                if not part:
+            response = b""
+            while b"\r\n\r\n" not in response:
+                data = connection.recv(4096)
+                if not data:
                     break
-                answer += part
-            head, _, rest = answer.partition(b"\r\n\r\n")
+                response += data
+            head, _, rest = response.partition(b"\r\n\r\n")
             if b" 101 " not in head.split(b"\r\n", 1)[0]:
                 raise ConnectionError(head.decode(errors="replace"))
             if self.protocol == "socketio":
@@ -73,35 +74,35 @@ class DrainPool:
         return connection.fileno()
 
     def process_frames(self, client: DrainClient, data: bytes) -> None:
-        """Count the frames in what came, and answer the pings."""
-        at, end = client.remaining_body_bytes, len(data)
-        if at >= end:
+        """Count the frames in received bytes and answer pings."""
+        offset, end = client.remaining_body_bytes, len(data)
+        if offset >= end:
             client.remaining_body_bytes -= end
             return
         if client.partial_frame:
-            data, client.partial_frame = client.partial_frame + data[at:], b""
-            at, end = 0, len(data)
-        while at < end:
-            if end - at < 10 and (end - at < 2 or end - at < {126: 4, 127: 10}.get(data[at + 1], 2)):
-                client.partial_frame, client.remaining_body_bytes = data[at:], 0
+            data, client.partial_frame = client.partial_frame + data[offset:], b""
+            offset, end = 0, len(data)
+        while offset < end:
+            if end - offset < 10 and (end - offset < 2 or end - offset < {126: 4, 127: 10}.get(data[offset + 1], 2)):
+                client.partial_frame, client.remaining_body_bytes = data[offset:], 0
                 return
-            size, body = data[at + 1], at + 2
+            size, body = data[offset + 1], offset + 2
             if size == 126:
-                size, body = int.from_bytes(data[at + 2 : at + 4], "big"), at + 4
+                size, body = int.from_bytes(data[offset + 2 : offset + 4], "big"), offset + 4
             elif size == 127:
-                size, body = int.from_bytes(data[at + 2 : at + 10], "big"), at + 10
-            if data[at] == 0x89:
+                size, body = int.from_bytes(data[offset + 2 : offset + 10], "big"), offset + 10
+            if data[offset] == 0x89:
                 if body + size > end:
-                    client.partial_frame, client.remaining_body_bytes = data[at:], 0
+                    client.partial_frame, client.remaining_body_bytes = data[offset:], 0
                     return
                 client.socket.send(encode_masked_frame(10, data[body : body + size]))
             self.frames += 1
-            at = body + size
-        client.remaining_body_bytes = at - end
+            offset = body + size
+        client.remaining_body_bytes = offset - end
 
-    def read_client(self, number: int, buffer: bytearray) -> None:
-        """Read what a socket holds."""
-        client = self.clients[number]
+    def read_client(self, descriptor: int, buffer: bytearray) -> None:
+        """Read and process the data available at a client's socket."""
+        client = self.clients[descriptor]
         try:
             size = client.socket.recv_into(buffer)
         except BlockingIOError:
@@ -110,35 +111,35 @@ class DrainPool:
             size = 0
         if size == 0:
             client.socket.close()
-            del self.clients[number]
+            del self.clients[descriptor]
             return
         self.received_bytes += size
         self.process_frames(client, bytes(memoryview(buffer)[:size]))
 
 
 def main() -> None:
-    port, viewers, speech = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
+    port, viewers, protocol = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
     path = sys.argv[4] if len(sys.argv) > 4 else "/"
-    drains = DrainPool(speech)
-    waiting = select.epoll()
+    pool = DrainPool(protocol)
+    poller = select.epoll()
     buffer = bytearray(1 << 16)
     for _ in range(viewers):
-        waiting.register(drains.open(port, path), select.EPOLLIN)
-        # those who have joined are viewers already
-        for number, _ in waiting.poll(0):
-            drains.read_client(number, buffer)
+        poller.register(pool.open(port, path), select.EPOLLIN)
+        # the clients connected so far are viewers already
+        for descriptor, _ in poller.poll(0):
+            pool.read_client(descriptor, buffer)
     print("ready", flush=True)
-    waiting.register(0, select.EPOLLIN)
+    poller.register(0, select.EPOLLIN)
     while True:
-        for number, _ in waiting.poll():
-            if number:
-                drains.read_client(number, buffer)
+        for descriptor, _ in poller.poll():
+            if descriptor:
+                pool.read_client(descriptor, buffer)
             elif not os.read(0, 64):
                 return
             else:
-                said = {"bytes": drains.received_bytes, "frames": drains.frames, "open": len(drains.clients)}
-                drains.received_bytes = drains.frames = 0
-                print(json.dumps(said), flush=True)
+                counts = {"bytes": pool.received_bytes, "frames": pool.frames, "open": len(pool.clients)}
+                pool.received_bytes = pool.frames = 0
+                print(json.dumps(counts), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""nats-server with its WebSocket, as a sender of `make bench-fanout`: `python -m tests.bench.fanout_nats BYTES HERTZ`.
+"""nats-server's WebSocket as a sender of `make bench-fanout`: `python -m tests.bench.fanout_nats BYTES HERTZ`.
 
-Speaks as `fanout_senders` does. What is published goes through one TCP connection of this process, as from a service;
-`cpu` is the server's alone.
+The commands are those of `fanout_senders`. Messages are published through one TCP connection of this process, as by a
+service; `cpu` is that of the server alone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SUBJECT = "overlay"
 
 
 def server_config(client: int, websocket: int, monitor: int) -> str:
-    """A server that asks nothing of its clients while a bench runs."""
+    """Return a configuration with which the server sends no pings during a benchmark."""
     return f"""
 host: "127.0.0.1"
 port: {client}
@@ -37,26 +37,26 @@ websocket {{
 
 
 def connect_publisher(port: int) -> socket.socket:
-    """A client of the server that may publish."""
+    """Connect a client that may publish."""
     client = socket.create_connection(("127.0.0.1", port), timeout=10)
     client.sendall(b'CONNECT {"verbose":false,"pedantic":false}\r\nPING\r\n')
-    said = b""
-    while b"PONG\r\n" not in said:
-        said += client.recv(4096)
+    received = b""
+    while b"PONG\r\n" not in received:
+        received += client.recv(4096)
     return client
 
 
-def sent_bytes(monitor: int) -> int:
-    """How many messages it has sent to clients, as the server counts them."""
-    with socket.create_connection(("127.0.0.1", monitor), timeout=10) as asked:
-        asked.sendall(b"GET /varz HTTP/1.0\r\n\r\n")
-        said = b"".join(iter(lambda: asked.recv(1 << 16), b""))
-    found: Any = json.loads(said.partition(b"\r\n\r\n")[2])
-    return int(found["out_msgs"])
+def sent_messages(monitor: int) -> int:
+    """Return the number of messages that the server has sent to clients, by its own counter."""
+    with socket.create_connection(("127.0.0.1", monitor), timeout=10) as connection:
+        connection.sendall(b"GET /varz HTTP/1.0\r\n\r\n")
+        received = b"".join(iter(lambda: connection.recv(1 << 16), b""))
+    counters: Any = json.loads(received.partition(b"\r\n\r\n")[2])
+    return int(counters["out_msgs"])
 
 
 def processor_seconds_of(pid: int) -> float:
-    """Seconds of processor that the server has had, to the nanosecond, threads that have ended aside."""
+    """Return the CPU time of the server, seconds, at nanosecond resolution, without threads that have ended."""
     return sum(int(one.read_text().split()[0]) for one in Path(f"/proc/{pid}/task").glob("*/schedstat")) / 1e9
 
 
@@ -73,13 +73,13 @@ def main() -> None:
             print(websocket, flush=True)
             message = f"PUB {SUBJECT} {size}\r\n".encode() + os.urandom(size) + b"\r\n"
             while line := sys.stdin.readline():
-                messages, before, begun = sent_bytes(monitor), processor_seconds_of(server.pid), time.monotonic()
+                messages, before, begun = sent_messages(monitor), processor_seconds_of(server.pid), time.monotonic()
                 for tick in range(round(float(line) * hertz)):
                     time.sleep(max(begun + tick / hertz - time.monotonic(), 0.0))
                     publisher.sendall(message)
                 time.sleep(1 / hertz)
                 cpu = processor_seconds_of(server.pid) - before
-                print(json.dumps({"messages": sent_bytes(monitor) - messages, "cpu": round(cpu, 6)}), flush=True)
+                print(json.dumps({"messages": sent_messages(monitor) - messages, "cpu": round(cpu, 6)}), flush=True)
         finally:
             server.stop()
 

@@ -1,4 +1,4 @@
-"""The processes of `make bench-fanout`: each is told lines and answers lines, and ends with the bench."""
+"""Child processes of the benchmarks, controlled by lines on standard input; they end with the benchmark."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BENCH_FOLDER = Path(__file__).parent
 
 
 class LineProcess:
-    """A process that answers each line with one line."""
+    """Process that answers each line with one line."""
 
     def __init__(self, command: list[str]) -> None:
         environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200"}
@@ -28,7 +28,7 @@ class LineProcess:
 
     @classmethod
     def start_module(cls, name: str, *arguments: object) -> Self:
-        """A module of the benches."""
+        """Start a module of this package with arguments."""
         return cls([sys.executable, "-m", f"tests.bench.{name}", *map(str, arguments)])
 
     def __enter__(self) -> Self:
@@ -37,7 +37,7 @@ class LineProcess:
     def __exit__(self, *_: object) -> None:
         assert self.process.stdin is not None
         assert self.process.stdout is not None
-        # nothing more will be said: one that has a server of its own ends it
+        # end of input: a module that runs a server stops it
         self.process.stdin.close()
         try:
             self.process.wait(3)
@@ -47,42 +47,42 @@ class LineProcess:
         self.process.stdout.close()
 
     def read_line(self) -> str:
-        """Its next line; raises RuntimeError where it has ended."""
+        """Return the next line of output; raise RuntimeError if the process has ended."""
         assert self.process.stdout is not None
-        found = self.process.stdout.readline()
-        if not found:
+        line = self.process.stdout.readline()
+        if not line:
             raise RuntimeError(f"{self.process.args!r} ended")
-        return found.strip()
+        return line.strip()
 
     def write_line(self, line: object) -> None:
-        """Tell it something."""
+        """Write one line of text."""
         assert self.process.stdin is not None
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 
     def request(self, line: object) -> Any:
-        """Its answer."""
+        """Write one line and return the parsed answer."""
         self.write_line(line)
         return json.loads(self.read_line())
 
     def processor_seconds(self) -> float:
-        """As `processes.processor_seconds`."""
+        """Return the CPU time of the process, seconds."""
         return cpu_seconds(self.process.pid)
 
     def resident_kilobytes(self) -> int:
-        """Its memory."""
+        """Return the resident memory of the process, kB."""
         status = Path(f"/proc/{self.process.pid}/status").read_text()
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
 
 
 @contextmanager
 def start_c_sender(folder: Path, viewers: int, size: int, hertz: int) -> Iterator[LineProcess | None]:
-    """The bare loop in C, None where there is no compiler."""
+    """Compile and start the sender in C; None if there is no compiler."""
     compiler = shutil.which("cc")
     if compiler is None:
         yield None
         return
     program = folder / "ceiling"
     subprocess.run([compiler, "-O2", "-o", program, BENCH_FOLDER / "fanout_ceiling.c"], check=True)
-    with LineProcess([str(program), str(viewers), str(size), str(hertz)]) as told:
-        yield told
+    with LineProcess([str(program), str(viewers), str(size), str(hertz)]) as sender:
+        yield sender

@@ -1,10 +1,11 @@
-"""The servers that `make bench-fanout` sets side by side: the same bytes to every client, so many times a second.
+"""Servers that `make bench-fanout` compares: each sends the same bytes to every client at a fixed rate.
 
-`python -m tests.bench.fanout_senders KIND BYTES HERTZ`: prints the port that it listens at, then for each line of
-standard input, a number of seconds, sends for that long and prints one JSON object: `messages` sent and `cpu`, seconds
-of this process in user and kernel mode. KIND is `bunraku` (the stream service as `bunraku up` serves it, an overlay
-published on its bus), `playing` (the same with a motion that plays), `fastapi` (`send_bytes` in a loop), `websockets`
-(`broadcast`) or `socketio` (`emit`). Of the first two, `waiting` asks for the most bytes that wait for a viewer.
+`python -m tests.bench.fanout_senders KIND BYTES HERTZ`: prints the port at which it listens, then for each line of
+standard input, a number of seconds, sends for that time and prints one JSON object: `messages` sent and `cpu`, the user
+and system time of this process in seconds. KIND is `bunraku` (the stream service as `bunraku up` serves it, an overlay
+published on its bus), `playing` (the same with a playing motion), `fastapi` (`send_bytes` in a loop), `websockets`
+(`broadcast`) or `socketio` (`emit`). With the first two, `waiting` instead of a number requests the maximum number of
+bytes queued for a viewer.
 """
 
 from __future__ import annotations
@@ -40,11 +41,11 @@ from bunraku.wire.overlay import Overlay
 SESSION = "bench"
 MOTION_DURATION_US = 90_000_000
 SendMessage = Callable[[bytes], Awaitable[int]]
-"""Sends to every client, and says how many those were."""
+"""Sends to every client and returns the number of clients."""
 
 
 def processor_seconds() -> float:
-    """Seconds of processor that this process has had."""
+    """Return the user and system time of this process, seconds."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_utime + usage.ru_stime
 
@@ -52,7 +53,7 @@ def processor_seconds() -> float:
 async def run_sender(
     listening: socket.socket, send: SendMessage, size: int, hertz: int, queued_bytes: Callable[[], int] = lambda: 0
 ) -> None:
-    """Do what standard input says until its end."""
+    """Execute the commands of standard input until it ends."""
     print(listening.getsockname()[1], flush=True)
     number = 0
     while line := await asyncio.to_thread(sys.stdin.readline):
@@ -68,14 +69,16 @@ async def run_sender(
 
 
 def make_overlay(number: int, size: int) -> bytes:
-    """An overlay of `size` bytes: 12 and a multiple of 18; of others a likeness."""
+    """Make an overlay of `size` bytes, 12 plus a multiple of 18; zeros for other sizes."""
     limbs, frames = next(((n, f) for n in (1, 2, 3, 4) for f in (1, 2, 3) if 12 + 18 * n * f == size), (0, 0))
-    one: dict[int, tuple[int, ...]] = dict.fromkeys(range(limbs), (number & 0xFF,) * 9)
-    return Overlay(number, clock() + 60_000, one, (one,) * (frames - 1)).pack() if limbs else bytes(size)
+    limb_values: dict[int, tuple[int, ...]] = dict.fromkeys(range(limbs), (number & 0xFF,) * 9)
+    return (
+        Overlay(number, clock() + 60_000, limb_values, (limb_values,) * (frames - 1)).pack() if limbs else bytes(size)
+    )
 
 
 async def start_server(app: Any, listening: socket.socket, **options: Any) -> uvicorn.Server:
-    """A uvicorn server with its defaults, which listens when this returns."""
+    """Start a uvicorn server with its defaults; return when it listens."""
     server = uvicorn.Server(uvicorn.Config(app, log_level="warning", access_log=False, **options))
     _tasks.append(asyncio.create_task(server.serve(sockets=[listening])))
     while not server.started:  # noqa: ASYNC110 - uvicorn has no event for it
@@ -87,14 +90,14 @@ _tasks: list[asyncio.Task[None]] = []
 
 
 def max_queued_bytes(server: uvicorn.Server) -> int:
-    """Bytes that wait for the viewer for whom most do: in the process, and in the kernel (SIOCOUTQ)."""
-    most = 0
-    for outlet in server.server_state.connections:
-        if isinstance(outlet, WebSocketConnection):
-            bare = outlet._transport.get_extra_info("socket")
-            held = struct.unpack("=i", fcntl.ioctl(bare.fileno(), termios.TIOCOUTQ, bytes(4)))[0]
-            most = max(most, outlet.buffered_bytes + held)
-    return most
+    """Return the maximum number of bytes queued for a viewer: in the process, and in the kernel (SIOCOUTQ)."""
+    max_bytes = 0
+    for connection in server.server_state.connections:
+        if isinstance(connection, WebSocketConnection):
+            plain_socket = connection._transport.get_extra_info("socket")
+            kernel_bytes = struct.unpack("=i", fcntl.ioctl(plain_socket.fileno(), termios.TIOCOUTQ, bytes(4)))[0]
+            max_bytes = max(max_bytes, connection.buffered_bytes + kernel_bytes)
+    return max_bytes
 
 
 async def run_bunraku(listening: socket.socket, size: int, hertz: int, *, playing: bool = False) -> None:
@@ -104,28 +107,28 @@ async def run_bunraku(listening: socket.socket, size: int, hertz: int, *, playin
     from tests.vectors.blocks import random_motion
 
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
-        async with open_context(Settings(data=Path(folder))) as backing:
+        async with open_context(Settings(data=Path(folder))) as context:
             encoded = encode_motion(
                 random_motion(MOTION_DURATION_US / 1e6, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live"
             )
-            await backing.motion_store.put(SESSION, pack_motion(SESSION, encoded))
+            await context.motion_store.put(SESSION, pack_motion(SESSION, encoded))
             state = timeline.start(SESSION, MOTION_DURATION_US, clock())
-            # on a stage that stands what is measured is the overlay
+            # on a paused timeline only overlays are sent
             state = timeline.edit(state, clock(), playing=playing)
             viewers: dict[str, int] = {}
 
-            async def answer(_: bytes) -> bytes:
+            async def report_state(_: bytes) -> bytes:
                 packed: bytes = msgpack.packb([state.pack(), Presence(0, [], [None] * 4).pack(), None])
                 return packed
 
-            backing.bus.serve(f"session.{SESSION}.state", answer)
-            backing.bus.subscribe(f"session.{SESSION}.viewers", lambda data: viewers.update([msgpack.unpackb(data)]))
+            context.bus.serve(f"session.{SESSION}.state", report_state)
+            context.bus.subscribe(f"session.{SESSION}.viewers", lambda data: viewers.update([msgpack.unpackb(data)]))
 
             async def send(data: bytes) -> int:
-                backing.bus.publish(f"session.{SESSION}.overlay", data)
+                context.bus.publish(f"session.{SESSION}.overlay", data)
                 return sum(viewers.values())
 
-            app = bunraku.stream.app.create_app(backing)
+            app = bunraku.stream.app.create_app(context)
             await asyncio.to_thread(app.state.multicast_sender.load)
             server = await start_server(app, listening, lifespan="off", **uvicorn_protocol_options())
             await run_sender(listening, send, size, hertz, lambda: max_queued_bytes(server))
@@ -150,8 +153,8 @@ async def run_fastapi(listening: socket.socket, size: int, hertz: int) -> None:
             sockets.discard(websocket)
 
     async def send(data: bytes) -> int:
-        for one in tuple(sockets):
-            await one.send_bytes(data)
+        for connection in tuple(sockets):
+            await connection.send_bytes(data)
         return len(sockets)
 
     await start_server(app, listening)
@@ -177,13 +180,13 @@ async def run_socketio(listening: socket.socket, size: int, hertz: int) -> None:
     import socketio
 
     server = socketio.AsyncServer(async_mode="asgi", ping_interval=3600)
-    there: set[str] = set()
-    server.on("connect", lambda sid, _: there.add(sid))
-    server.on("disconnect", lambda sid, _: there.discard(sid))
+    clients: set[str] = set()
+    server.on("connect", lambda sid, _: clients.add(sid))
+    server.on("disconnect", lambda sid, _: clients.discard(sid))
 
     async def send(data: bytes) -> int:
         await server.emit("overlay", data)
-        return len(there)
+        return len(clients)
 
     await start_server(socketio.ASGIApp(server), listening)
     await run_sender(listening, send, size, hertz)

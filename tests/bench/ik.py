@@ -1,17 +1,17 @@
-"""How exact and how fast an arm is solved, beside what is used otherwise: `make bench-ik`. The last line printed is one
-JSON object.
+"""Accuracy and speed of the arm solver, compared with other solvers: `make bench-ik`.
 
-Rates are arms a second of the processor, on one core. Ours and its peers take turns, and how many times faster we are
-is told of the same language and the same round: TypeScript beside three.js's CCDIKSolver and closed-chain-ik, Python
-beside scipy's SLSQP. Targets come in two orders: `jumps`, even over all that the arm reaches, each far from the one
-before; and `path`, a hand that wanders at half an arm's length a second at 60 Hz, which spares solvers that go on from
-the pose before most of their work. Figures whose names do not say `path` are of the jumps.
+The last line printed is one JSON object. Rates are arms per second of CPU time on one core. Solvers alternate, and
+ratios are computed between solvers of one language in one round: TypeScript against CCDIKSolver of three.js and
+closed-chain-ik, Python against SLSQP of scipy. Targets come in two orders: `jumps`, uniform over the reach of the arm,
+each far from the one before; and `path`, a hand that moves at half an arm length per second at 60 Hz, which saves
+most of the work of solvers that start from the previous pose. Figures without `path` in their names are for `jumps`.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from math import pi
 from statistics import median
 from typing import Any
@@ -42,11 +42,11 @@ EDGE_CASE_TARGETS = (
     (0.01, 0.0, -0.01),
     (-0.3, -1.4, -0.2),
 )
-"""Straight below and above, at the shoulder, out of reach, too near, beyond."""
+"""Straight below and above, at the shoulder, out of reach, too near, beyond the reach."""
 
 
 def wandering_targets(proportions: Proportions, count: int) -> Array:
-    """Places (count, 3) of a wandering hand at 60 Hz, on average half an arm's length a second."""
+    """Return positions (count, 3) of a moving hand at 60 Hz, on average half an arm length per second."""
     t = np.arange(count) / 60.0
     inner = proportions.min_tip_distance
     r = 0.5 * (inner + MAX_TIP_DISTANCE) + 0.48 * (MAX_TIP_DISTANCE - inner) * np.sin(0.83 * t) * np.cos(0.11 * t)
@@ -56,40 +56,48 @@ def wandering_targets(proportions: Proportions, count: int) -> Array:
 
 
 def measure_accuracy(random: np.random.Generator) -> dict[str, float]:
-    """The worst of the bodies, each told on a line of its own: as their tables have them, in ten-thousandths, and
-    once more as they are, their bends from that nearest table."""
+    """Measure the accuracy for all bodies and return the worst figures; prints a row for each body.
+
+    Each body is measured with its proportions rounded to ten-thousandths, as its table has them, and exactly, with the
+    bends of the nearest table."""
     print(f"{'body':<22}{'tip max':>10}{'angles mean':>13}{'p99':>8}{'max':>7} deg{'paper: mean':>14}{'max':>7} %")
     figures: dict[str, float] = {}
-    for after, shape in (("", Proportions.rounded), ("_nearest_table", lambda proportions: proportions)):
+    for suffix, adjust in (("", Proportions.rounded), ("_nearest_table", lambda proportions: proportions)):
         for body in BODIES:
-            proportions = shape(body.proportions)
+            proportions = adjust(body.proportions)
             stored = bend_table.load_bend_table(proportions.identity)
             found = ik_accuracy.measure_accuracy(proportions, stored, ACCURACY_TARGET_COUNT, random)
             paper = f"{100.0 * found.paper_tip_mean:18.4f}{100.0 * found.paper_tip_max:7.3f}"
             print(
-                f"{body.name + after.replace('_', ' '):<22}{found.tip_error_max:10.1e}"
-                f"{found.angle_error_mean_deg:13.4f}{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}{paper}",
+                f"{body.name + suffix.replace('_', ' '):<22}{found.tip_error_max:10.1e}"
+                f"{found.angle_error_mean_deg:13.4f}{found.angle_error_p99_deg:8.3f}{found.angle_error_max_deg:7.2f}"
+                f"{paper}",
                 flush=True,
             )
             for name, value in found._asdict().items():
-                # the tips and the paper's own are the same either way
-                if not after or name.startswith("angle"):
-                    figures[name + after] = max(figures.get(name + after, 0.0), value)
+                # the tips and the paper's figures are the same in both cases
+                if not suffix or name.startswith("angle"):
+                    figures[name + suffix] = max(figures.get(name + suffix, 0.0), value)
     return figures
 
 
 def max_language_difference(bodies: list[tuple[Proportions, Array]], solved: list[Any]) -> float:
-    """How far places and angles of the two languages are apart at most."""
-    most = 0.0
+    """Return the maximum difference of positions and angles between the two languages."""
+    max_difference = 0.0
     for (proportions, targets), rows in zip(bodies, solved, strict=True):
-        ours = arm_batch.solve_arms(proportions, bend_table.load_bend_table(proportions.identity), targets)
-        most = max(most, float(np.abs(np.concatenate([ours.rows, np.array(ours.angles())]).T - np.array(rows)).max()))
-    return most
+        python_result = arm_batch.solve_arms(proportions, bend_table.load_bend_table(proportions.identity), targets)
+        max_difference = max(
+            max_difference,
+            float(
+                np.abs(np.concatenate([python_result.rows, np.array(python_result.angles())]).T - np.array(rows)).max()
+            ),
+        )
+    return max_difference
 
 
 def measure_speeds(random: np.random.Generator) -> dict[str, float]:
-    """Rates of all solvers in both orders, and how the languages differ."""
-    # as their identities have them: TypeScript knows no others
+    """Measure the rates of all solvers in both orders, and the difference between the languages."""
+    # rounded as in their identities: TypeScript has no others
     shapes = [body.proportions.rounded() for body in BODIES]
     proportions = shapes[-1]
     stored = bend_table.load_bend_table(proportions.identity)
@@ -98,8 +106,8 @@ def measure_speeds(random: np.random.Generator) -> dict[str, float]:
         "path": wandering_targets(proportions, TARGET_COUNT),
     }
     bodies = [
-        (shape, np.concatenate([EDGE_CASE_TARGETS, ik_accuracy.random_reachable_targets(shape, 1000, random)]))
-        for shape in shapes
+        (adjust, np.concatenate([EDGE_CASE_TARGETS, ik_accuracy.random_reachable_targets(adjust, 1000, random)]))
+        for adjust in shapes
     ]
     slsqp = SlsqpSolver(proportions)
 
@@ -115,26 +123,26 @@ def measure_speeds(random: np.random.Generator) -> dict[str, float]:
             answer = node.run_round(bodies, orders)
             for order, targets in orders.items():
                 errors[order] = answer["orders"][order]["errors"] | {
-                    "slsqp": slsqp.max_tip_error(targets[:SLSQP_TARGET_COUNT])
+                    "slsqp": slsqp.mean_tip_error(targets[:SLSQP_TARGET_COUNT])
                 }
-                found = {name: median(turns) for name, turns in answer["orders"][order]["rates"].items()}
+                found = {name: median(rounds) for name, rounds in answer["orders"][order]["rates"].items()}
                 found["numpy"], found["compiled"] = (
                     batches(arm_batch.solve_arms, targets),
                     batches(compiled_solve_arms, targets),
                 )
-                few = targets[nth * SLSQP_TARGET_COUNT : (nth + 1) * SLSQP_TARGET_COUNT]
-                found["slsqp"] = processor_rate(lambda few=few: slsqp.solve(few))  # type: ignore[misc]
+                slsqp_targets = targets[nth * SLSQP_TARGET_COUNT : (nth + 1) * SLSQP_TARGET_COUNT]
+                found["slsqp"] = processor_rate(partial(slsqp.solve, slsqp_targets))
                 for name, rate in found.items():
                     rates[order].setdefault(name, []).append(rate)
     return report_speeds(rates, errors) | {"languages_differ_max": max_language_difference(bodies, answer["solved"])}
 
 
 def report_speeds(rates: dict[str, dict[str, list[float]]], errors: dict[str, dict[str, float]]) -> dict[str, float]:
-    """Prints the table of solvers, and gives its figures."""
+    """Print the table of solvers and return its figures."""
     figures = {}
     for order, found in rates.items():
-        print(f"\n{order:<26}{'solves/s':>12}{'ours is':>10}{'tip off by':>12}")
-        after = "" if order == "jumps" else f"_{order}"
+        print(f"\n{order:<26}{'solves/s':>12}{'python_result is':>10}{'tip off by':>12}")
+        suffix = "" if order == "jumps" else f"_{order}"
         for name, base, key in (
             ("ours", "ours", "typescript"),
             ("ccdik_10", "ours", "ccdik_10"),
@@ -144,12 +152,14 @@ def report_speeds(rates: dict[str, dict[str, list[float]]], errors: dict[str, di
             ("numpy", "compiled", "numpy"),
             ("slsqp", "compiled", "slsqp"),
         ):
-            times = median(ours / theirs for ours, theirs in zip(found[base], found[name], strict=True))
-            figures[f"solves_per_s_{key}{after}"] = median(found[name])
+            ratio = median(
+                python_result / theirs for python_result, theirs in zip(found[base], found[name], strict=True)
+            )
+            figures[f"solves_per_s_{key}{suffix}"] = median(found[name])
             if name != base and name != "numpy":
-                figures[f"times_{key}{after}"] = times
+                figures[f"times_{key}{suffix}"] = ratio
             off = f"{errors[order][name]:12.0e}" if name in errors[order] else ""
-            print(f"{key:<26}{median(found[name]):12,.0f}{times:10,.0f}{off}", flush=True)
+            print(f"{key:<26}{median(found[name]):12,.0f}{ratio:10,.0f}{off}", flush=True)
     return figures
 
 

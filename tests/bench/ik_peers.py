@@ -1,4 +1,4 @@
-"""What an arm is solved with otherwise: scipy here, three.js and closed-chain-ik in Node, warm, on the same targets."""
+"""Other solvers for comparison: scipy here, three.js and closed-chain-ik in Node, warmed up, on the same targets."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ WEB = Path(__file__).resolve().parents[2] / "services/web"
 
 
 def processor_rate(solve: Callable[[], int]) -> float:
-    """How many arms `solve` has solved a second of the processor, as others share the machine."""
+    """Return how many arms `solve` solves per second of CPU time, which other processes do not affect."""
     began = time.process_time()
     count = solve()
     return count / (time.process_time() - began)
 
 
 class SlsqpSolver:
-    """scipy's SLSQP: the paper's E as small as it gets with the tip on its target, from the arm before.
+    """SLSQP of scipy: minimises the paper's E with the tip on its target, starting from the previous arm.
 
-    Gradients are given, and the joints have no limits, which spares it a third of its time.
+    Gradients are provided and joints have no limits, which saves a third of its time.
     """
 
     def __init__(self, proportions: Proportions) -> None:
@@ -43,20 +43,20 @@ class SlsqpSolver:
         self.angles = np.array([-1.2, -0.6, 0.0])
 
     def solve(self, targets: Array) -> int:
-        """Solves for `targets` (n, 3) one after the other; `n`."""
+        """Solve for `targets` (n, 3) one after the other and return `n`."""
         for x, y, z in targets.tolist():
             self.reach(hypot(x, z), y)
         return len(targets)
 
-    def max_tip_error(self, targets: Array) -> float:
-        """How far tips are from `targets` (n, 3) on average."""
+    def mean_tip_error(self, targets: Array) -> float:
+        """Return the mean distance of tips from `targets` (n, 3)."""
         return float(np.mean([self.reach(hypot(x, z), y) for x, y, z in targets.tolist()]))
 
     def reach(self, level: float, up: float) -> float:
-        """Solves for one target in the plane; how far the tip is from it."""
+        """Solve for one target in the plane and return the distance of the tip from it."""
         links, weights = self._links, self._weights
 
-        def off(angles: Array) -> Array:
+        def tip_offset(angles: Array) -> Array:
             return np.array([links @ np.cos(angles) - level, links @ np.sin(angles) - up])
 
         found = minimize(
@@ -64,14 +64,18 @@ class SlsqpSolver:
             self.angles,
             jac=lambda angles: weights * np.cos(angles),
             method="SLSQP",
-            constraints={"type": "eq", "fun": off, "jac": lambda t: np.array([-links * np.sin(t), links * np.cos(t)])},
+            constraints={
+                "type": "eq",
+                "fun": tip_offset,
+                "jac": lambda t: np.array([-links * np.sin(t), links * np.cos(t)]),
+            },
         )
         if found.success:
             self.angles = found.x
         else:
             # from a pose it cannot leave it would fail for ever
             self.angles = atan2(up, level) + np.array([-1.0, 0.3, 0.8])
-        return float(np.linalg.norm(off(self.angles)))
+        return float(np.linalg.norm(tip_offset(self.angles)))
 
 
 class NodeProcess:

@@ -1,4 +1,4 @@
-"""What Bunraku's line room is measured against: every message written as it comes, whatever the line carries."""
+"""Baseline for congestion control: a relay that writes every message as it arrives, regardless of the link."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from bunraku.wire.messages import MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
 
 @asynccontextmanager
 async def naive_relay(url: str, port: int) -> AsyncIterator[None]:
-    """A relay at `port`: writes each viewer all that a stream at `url` says, at once, and hands back what it says."""
+    """Run a relay at `port` between viewers and the stream at `url`, without any limit on queued data."""
 
     async def relay(viewer: ServerConnection) -> None:
         async with connect(
             url, subprotocols=[Subprotocol(SUBPROTOCOL)], compression=None, max_size=MAX_SERVER_MESSAGE_BYTES
-        ) as stage:
+        ) as server:
 
-            async def there() -> None:
-                # what is not read here is kept by the kernel: as much as a server that only writes would let it keep
-                async for message in stage:
+            async def forward() -> None:
+                # unread messages stay in the kernel, as much as a server that only writes would have there
+                async for message in server:
                     viewer.transport.set_write_buffer_limits(high=1 << 24)
                     await viewer.send(message)
 
-            async def back() -> None:
+            async def send_back() -> None:
                 async for message in viewer:
-                    await stage.send(message)
+                    await server.send(message)
 
-            ways = [asyncio.create_task(there()), asyncio.create_task(back())]
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-            for way in ways:
-                way.cancel()
-            for end in await asyncio.gather(*ways, return_exceptions=True):
-                if isinstance(end, Exception) and not isinstance(end, ConnectionClosed):
-                    raise end
+            tasks = [asyncio.create_task(forward()), asyncio.create_task(send_back())]
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in tasks:
+                task.cancel()
+            for outcome in await asyncio.gather(*tasks, return_exceptions=True):
+                if isinstance(outcome, Exception) and not isinstance(outcome, ConnectionClosed):
+                    raise outcome
 
     async with serve(
         relay, "0.0.0.0", port, subprotocols=[Subprotocol(SUBPROTOCOL)], compression=None, ping_interval=None

@@ -1,4 +1,4 @@
-"""The viewers at the far ends of `narrow.py`'s lines, and the session they watch."""
+"""Viewers at the far ends of the links of `narrow.py`, and the session they watch."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from tests.bench.network import EmulatedLink, EmulatedNetwork, FarEnd
 
 SERVER_PORT = 18352
 OVERLAY_LEAD_US = 60_000
-"""How far ahead of its making an overlay is due, microseconds; a session's Welcome says it."""
+"""Lead time of overlays: from their computation until they are due, microseconds; stated in a session's Welcome."""
 LINKS = {"9k6": EmulatedLink(9_600, 150), "28k8": EmulatedLink(28_800, 75), "56k": EmulatedLink(56_000, 75)}
-"""The lines of old telephones, by their kbit/s."""
+"""Links of telephone modems by bitrate."""
 Figures = dict[str, Any]
 
 
 class MeasuringViewer(Viewer):
-    """A viewer that remembers when what came."""
+    """Viewer that records the arrival of messages and the state at each picture."""
 
     def __init__(self, url: str, far: FarEnd | None = None, truth: float = 0.0, **options: Any) -> None:
-        """`truth` is the server's clock minus this machine's monotonic one, microseconds."""
+        """`truth` is the server's clock minus the monotonic clock of this machine, microseconds."""
         super().__init__(url, open_socket=far.open_socket if far else None, **options)
         self.true_clock_offset_us = truth
         self.overlay_arrivals: list[tuple[int, float, int]] = []
-        """When each overlay came, how late after its newest frame was made (ms), and how many frames it had."""
+        """Arrival time of each overlay, its age since its newest frame was computed (ms), and its number of frames."""
         self.started_us = 0
         self.clock_errors: list[float] = []
         self.shown: list[tuple[int, int, int]] = []
-        """Of each picture: local time, reference time, rate of the block shown or -1."""
+        """Local time, reference time and bitrate of the shown block (-1 if none) at each picture."""
         self.audio_available: list[bool] = []
-        """Of each picture: whether the sound that goes with it was there."""
+        """Availability of the sound at each picture."""
 
-    def _take(self, data: bytes) -> None:
+    def _on_message(self, data: bytes) -> None:
         if data and data[0] == Overlay.TYPE:
             overlay, now = Overlay.unpack(data), time.monotonic_ns() // 1000
             self.overlay_arrivals.append(
@@ -56,9 +56,9 @@ class MeasuringViewer(Viewer):
         super()._on_message(data)
 
     async def watch_and_measure(self, seconds: float, **options: Any) -> None:
-        """Watch, and note how far the clock is off at each picture once it was told the time well."""
+        """Watch for `seconds` and record the clock error and the shown block at each picture."""
 
-        def picture(reference: int, _: Any) -> None:
+        def record_picture(reference: int, _: Any) -> None:
             now = time.monotonic_ns() // 1000
             shown = self.clock.at(self._local_clock()) - (now + self.true_clock_offset_us)
             self.clock_errors.append(shown / 1e3)
@@ -68,50 +68,51 @@ class MeasuringViewer(Viewer):
         self.started_us = time.monotonic_ns() // 1000
         while (left := seconds - (time.monotonic_ns() // 1000 - self.started_us) / 1e6) > 0.5:
             try:
-                await self.watch(left, picture, **options)
+                await self.watch(left, record_picture, **options)
             except StreamEnded as ended:
                 print(f"a stream ended: {ended}")
                 self.statistics.gaps += 1
             except (OSError, TimeoutError):
-                # the line does not carry a connection yet
+                # the link is down: no connection is possible yet
                 continue
 
 
 class NonReconnectingViewer(MeasuringViewer):
-    """One that waits for what comes late, however late."""
+    """Viewer that never gives up a silent connection and waits for late messages."""
 
     def __init__(self, url: str, far: FarEnd | None = None, truth: float = 0.0) -> None:
         super().__init__(url, far, truth, silent=float("inf"))
 
 
 class BenchContext:
-    """The server at the near end, a motion in it, and what every case needs."""
+    """Server at the near end, a motion on it, and the settings that every case needs."""
 
-    def __init__(self, net: EmulatedNetwork, url: str, motion: str, truth: float) -> None:
-        self.network, self.url, self.motion, self.true_clock_offset_us = net, url, motion, truth
+    def __init__(self, network: EmulatedNetwork, url: str, motion: str, truth: float) -> None:
+        self.network, self.url, self.motion, self.true_clock_offset_us = network, url, motion, truth
 
     def create_viewer(self, far: FarEnd, path: str, **options: Any) -> MeasuringViewer:
-        """A viewer at a far end."""
+        """Create a viewer at a far end."""
         return MeasuringViewer(f"ws://{far.host}:{SERVER_PORT}{path}", far, self.true_clock_offset_us, **options)
 
     def create_motion_viewer(self, far: FarEnd, query: str = "", **options: Any) -> MeasuringViewer:
-        """A viewer of the motion."""
+        """Create a viewer of the motion."""
         return self.create_viewer(far, f"/v1/motions/{self.motion}/stream{query}", **options)
 
     async def run_controlled(self, work: Callable[[str], Awaitable[None]], angular_speed: float = 2.0) -> None:
-        """`work`, told the id of a session whose dancer is pulled about by all four limbs meanwhile, at `pace` radians
-        of their swing a second."""
+        """Run `work` with the id of a session while all four limbs of its performer are controlled.
+
+        The limbs swing at `angular_speed` radians per second."""
         async with Client(self.url) as client:
             session = (await client.open_session(self.motion))["id"]
             async with Puppeteer(client, session, "bench") as puppeteer:
                 for limb in LIMBS:
                     await puppeteer.claim(limb)
-                pulling = asyncio.create_task(_move_limbs(puppeteer, angular_speed))
+                moving = asyncio.create_task(_move_limbs(puppeteer, angular_speed))
                 try:
                     await work(session)
                 finally:
-                    pulling.cancel()
-                    await asyncio.gather(pulling, return_exceptions=True)
+                    moving.cancel()
+                    await asyncio.gather(moving, return_exceptions=True)
 
 
 async def _move_limbs(puppeteer: Puppeteer, angular_speed: float) -> None:
@@ -127,17 +128,17 @@ async def _move_limbs(puppeteer: Puppeteer, angular_speed: float) -> None:
 
 
 def round_finite(value: float) -> int | None:
-    """To the nearest one; None for what did not come."""
+    """Round to the nearest integer; None for a value that was not measured."""
     return round(value) if np.isfinite(value) else None
 
 
 def percentile(values: Any, share: float) -> float:
-    """NaN of nothing."""
+    """Return a percentile of the values, NaN if there are none."""
     return float(np.percentile(values, share)) if len(values) else float("nan")
 
 
 async def measure_clock_offset() -> float:
-    """The server's clock minus this machine's monotonic one, microseconds, over the loopback."""
+    """Measure the server's clock minus the monotonic clock of this machine over loopback, microseconds."""
     url = f"ws://127.0.0.1:{SERVER_PORT}"
     async with Client(url.replace("ws", "http")) as client:
         motion = (await client.motions())[0]["id"]

@@ -1,6 +1,9 @@
-"""Emulated narrow lines for benches and tests: network namespaces joined by TUN devices, with real kernel TCP at both
-ends. Needs root, Linux and iproute2, and `links/narrowlink.py` from the folder of shared material: its queue, rate and
-delay are what a line is made of here. Many lines run side by side, each to a far end of its own.
+"""Emulated constrained links for benchmarks and tests.
+
+Network namespaces are joined by TUN devices, with kernel TCP at both ends.
+
+Needs root, Linux and iproute2, and `links/narrowlink.py` from the folder of shared material, which implements queue,
+bitrate and delay of a link. Several links run side by side, each to a separate far end.
 """
 
 from __future__ import annotations
@@ -29,12 +32,12 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 def narrowlink_path() -> Path:
-    """Where `narrowlink.py` is, or would be."""
+    """Return the expected path of `narrowlink.py`."""
     return Path(os.environ.get("BUNRAKU_SHARED") or REPOSITORY.parent / "shared") / "links" / "narrowlink.py"
 
 
 def missing_requirement() -> str | None:
-    """Why lines cannot be emulated here, None where they can."""
+    """Return why links cannot be emulated here, None if they can."""
     if not narrowlink_path().is_file():
         return f"there is no {narrowlink_path()}; set BUNRAKU_SHARED to the folder of shared material"
     if sys.platform != "linux" or os.geteuid() != 0:
@@ -48,9 +51,11 @@ def missing_requirement() -> str | None:
 
 @dataclass(frozen=True)
 class EmulatedLink:
-    """One line: bit/s both ways, one-way delay, and the router's buffer. `step` is 'seconds:bit/s,...', `trace` a file
-    of milliseconds and kbit/s whose rates are multiplied with `scale`; both begin with `Network.start`. It is cut
-    (nothing passes) between the two times of `cut`, seconds after the start."""
+    """Emulated link: bit/s in each direction, one-way delay, and the buffer of the router.
+
+    `bitrate_steps` is 'seconds:bit/s,...'; `trace` is a file of milliseconds and kbit/s, whose bitrates are multiplied
+    by `trace_scale`. Both start when the link opens. No packet passes between the two times of `outage_s`, seconds
+    after the start."""
 
     bitrate: float = 28_800.0
     delay_ms: float = 75.0
@@ -63,7 +68,7 @@ class EmulatedLink:
 
 @dataclass
 class FarEnd:
-    """The far end of a line: sockets opened there reach the near end at `host`."""
+    """Far end of a link: sockets opened there reach the near end at `host`."""
 
     namespace: str
     host: str
@@ -72,21 +77,21 @@ class FarEnd:
     byte_counters: Any = field(default=None, repr=False)
 
     def open_socket(self) -> socket.socket:
-        """An unconnected TCP socket at the far end; the thread stays where it is."""
+        """Open an unconnected TCP socket at the far end; the calling thread stays in its namespace."""
         with _in_namespace(self.namespace):
-            made = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        made.setblocking(False)
-        made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return made
+            opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        opened.setblocking(False)
+        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return opened
 
     @property
     def received_bytes(self) -> int:
-        """Bytes of IP packets that the line has carried to the far end."""
+        """Bytes of IP packets that the link has delivered to the far end."""
         return int(self.byte_counters[0])
 
 
 class EmulatedNetwork:
-    """The near namespace, in which the server runs and this thread too, and the lines made so far."""
+    """The near namespace, in which the server and this thread run, and the links opened so far."""
 
     def __init__(self, near: str) -> None:
         self.near_namespace = near
@@ -94,17 +99,17 @@ class EmulatedNetwork:
         self._namespaces: list[str] = []
 
     def run(self, command: Sequence[str], **options: Any) -> subprocess.Popen[str]:
-        """A process at the near end; options as of `subprocess.Popen`."""
+        """Start a process at the near end; `options` are those of `subprocess.Popen`."""
         return subprocess.Popen(["ip", "netns", "exec", self.near_namespace, *command], text=True, **options)
 
     @contextmanager
     def open_links(self, links: Sequence[EmulatedLink]) -> Iterator[list[FarEnd]]:
-        """The far ends of these lines, which begin now and last until the block ends."""
+        """Open links and yield their far ends; the links start now and close at the end of the block."""
         module = _load_narrowlink()
-        counted = multiprocessing.Array("q", 2 * len(links))
+        counters = multiprocessing.Array("q", 2 * len(links))
         fars: list[FarEnd] = []
         devices: list[tuple[int, int]] = []
-        begun = self._link_count
+        first_number = self._link_count
         try:
             for nth, link in enumerate(links):
                 number, self._link_count = self._link_count, self._link_count + 1
@@ -125,9 +130,9 @@ class EmulatedNetwork:
                     _run_ip(f"-n {namespace} addr add {host} peer {peer} dev {name}")
                     _run_ip(f"-n {namespace} link set {name} up mtu 1500 txqueuelen 1000")
                 fars.append(FarEnd(far, near_host, link, names[1]))
-                fars[-1].byte_counters = _Counter(counted, 2 * nth)
+                fars[-1].byte_counters = _Counter(counters, 2 * nth)
             pump = multiprocessing.get_context("fork").Process(
-                target=_run_links, args=(module, list(links), devices, counted), daemon=True
+                target=_run_links, args=(module, list(links), devices, counters), daemon=True
             )
             pump.start()
             try:
@@ -139,7 +144,7 @@ class EmulatedNetwork:
             for pair in devices:
                 for fd in pair:
                     os.close(fd)
-            for number in range(begun, self._link_count):
+            for number in range(first_number, self._link_count):
                 self._remove(f"{self.near_namespace}f{number}")
 
     def _remove(self, namespace: str) -> None:
@@ -149,10 +154,10 @@ class EmulatedNetwork:
 
 
 class _Counter:
-    """One far end's part of the numbers that the pump counts in."""
+    """The counters of one far end."""
 
-    def __init__(self, counted: Any, at: int) -> None:
-        self._counted, self._at = counted, at
+    def __init__(self, counters: Any, at: int) -> None:
+        self._counted, self._at = counters, at
 
     def __getitem__(self, nth: int) -> int:
         return int(self._counted[self._at + nth])
@@ -160,7 +165,7 @@ class _Counter:
 
 @contextmanager
 def open_network() -> Iterator[EmulatedNetwork]:
-    """A near end, which this thread is in until the block ends; threads and processes it starts meanwhile are too."""
+    """Create a near end; this thread, and all it starts, runs in it until the end of the block."""
     name = f"bunraku{os.getpid()}"
     _run_ip(f"netns add {name}")
     try:
@@ -181,15 +186,15 @@ def _run_ip(arguments: str) -> None:
 
 @contextmanager
 def _in_namespace(namespace: str) -> Iterator[None]:
-    here = os.open(f"/proc/self/task/{threading.get_native_id()}/ns/net", os.O_RDONLY)
-    there = os.open(f"/run/netns/{namespace}", os.O_RDONLY)
+    own_namespace = os.open(f"/proc/self/task/{threading.get_native_id()}/ns/net", os.O_RDONLY)
+    target_namespace = os.open(f"/run/netns/{namespace}", os.O_RDONLY)
     try:
-        _enter_namespace(there)
+        _enter_namespace(target_namespace)
         yield
     finally:
-        _enter_namespace(here)
-        os.close(here)
-        os.close(there)
+        _enter_namespace(own_namespace)
+        os.close(own_namespace)
+        os.close(target_namespace)
 
 
 def _enter_namespace(fd: int) -> None:
@@ -206,33 +211,34 @@ def _load_narrowlink() -> Any:
     return module
 
 
-def _run_links(module: Any, links: list[EmulatedLink], devices: list[tuple[int, int]], counted: Any) -> None:
-    """Carries the packets of all lines until it is ended; `counted` is told the bytes that went to each far end and to
-    the near one."""
+def _run_links(module: Any, links: list[EmulatedLink], devices: list[tuple[int, int]], counters: Any) -> None:
+    """Forward the packets of all links until the process is terminated.
+
+    `counters` receives the bytes delivered to each far end and to the near end."""
     os.nice(-15)
-    begun = time.monotonic()
-    ways: dict[int, Any] = {}
-    cuts: dict[int, tuple[float, float]] = {}
+    started = time.monotonic()
+    directions: dict[int, Any] = {}
+    outages: dict[int, tuple[float, float]] = {}
     for link, (near, far) in zip(links, devices, strict=True):
-        given = Namespace(rate=link.bitrate, step=link.bitrate_steps, trace=link.trace, scale=link.trace_scale)
-        rate_at = module.rates(given, begun)
+        link_arguments = Namespace(rate=link.bitrate, step=link.bitrate_steps, trace=link.trace, scale=link.trace_scale)
+        rate_at = module.rates(link_arguments, started)
         for source, sink in ((near, far), (far, near)):
-            ways[source] = module.Direction(sink, rate_at, link.delay_ms / 1e3, link.queue_bytes, 0.0)
-            cuts[source] = link.outage_s
+            directions[source] = module.Direction(sink, rate_at, link.delay_ms / 1e3, link.queue_bytes, 0.0)
+            outages[source] = link.outage_s
     order = [fd for pair in devices for fd in pair]
     while True:
         now = time.monotonic()
-        due = min(way.step(now) for way in ways.values())
+        due = min(direction.step(now) for direction in directions.values())
         for nth, fd in enumerate(order):
-            counted[nth] = ways[fd].sent
+            counters[nth] = directions[fd].sent
         ready, _, _ = select.select(order, [], [], max(0.0, min(due - time.monotonic(), 0.2)))
         now = time.monotonic()
         for fd in ready:
-            begin, end = cuts[fd]
+            begin, end = outages[fd]
             for _ in range(64):
                 try:
                     packet = os.read(fd, 65536)
                 except BlockingIOError:
                     break
-                if not begin <= now - begun < end:
-                    ways[fd].put(packet, now)
+                if not begin <= now - started < end:
+                    directions[fd].put(packet, now)

@@ -1,5 +1,4 @@
-"""The peers' measured points, read as the bench reads them (`peers.json`: clip, peer, rows of kbit/s, mean, max,
-...)."""
+"""Measured points of other codecs (`peers.json`: clip, codec, rows of kbit/s, mean error, max error, ...)."""
 
 from __future__ import annotations
 
@@ -10,19 +9,19 @@ from pathlib import Path
 import numpy as np
 
 Rows = list[list[float]]
-MEAN, MOST = 1, 2
+MEAN, MAX = 1, 2
 CURVE_SAMPLES = 48
-"""Points of a curve."""
+"""Number of points of a curve."""
 
 
 def load_peer_results(corpus: Path) -> dict[str, dict[str, Rows]]:
-    """Clip -> peer -> rows; raises FileNotFoundError."""
+    """Return the rows by clip and codec; raise FileNotFoundError."""
     peers: dict[str, dict[str, Rows]] = json.loads((corpus / "peers.json").read_text(encoding="utf-8"))
     return peers
 
 
 def lower_hull(rows: Rows, column: int) -> list[tuple[float, float]]:
-    """The lower hull of (error mm, kbit/s): what mixing a peer's own settings over time could reach at best."""
+    """Return the lower hull of (error mm, kbit/s): the best that mixing settings of a codec over time could reach."""
     points: list[tuple[float, float]] = []
     for error, rate in sorted((row[column], row[0]) for row in rows):
         if points and rate >= points[-1][1]:
@@ -34,7 +33,7 @@ def lower_hull(rows: Rows, column: int) -> list[tuple[float, float]]:
 
 
 def interpolate_kbps(rows: Rows, column: int, error: float) -> float:
-    """A peer's kbit/s at an error in mm: on its hull, interpolated log-log; raises ValueError outside its points."""
+    """Interpolate the bitrate of a codec at an error in mm log-log on its hull; raise ValueError outside its points."""
     points = lower_hull(rows, column)
     if not points[0][0] <= error <= points[-1][0]:
         raise ValueError(f"the peer was measured from {points[0][0]} to {points[-1][0]} mm, not at {error}")
@@ -43,13 +42,13 @@ def interpolate_kbps(rows: Rows, column: int, error: float) -> float:
 
 
 def mean_curve(clips: list[Rows], column: int, min_error: float, max_error: float) -> list[tuple[float, float]]:
-    """(error mm, geometric mean of kbit/s over the clips) from `least` to `most`, as far as every clip was measured."""
+    """Return (error mm, geometric mean of kbit/s over the clips) within the range in which every clip was measured."""
     hulls = [lower_hull(rows, column) for rows in clips]
     low, high = (
         max(min_error, *(points[0][0] for points in hulls)),
         min(max_error, *(points[-1][0] for points in hulls)),
     )
-    # ends that rounding cannot put outside
+    # rounding must not move the ends outside the range
     errors = np.clip(np.geomspace(low, high, CURVE_SAMPLES), low, high)
     return [
         (float(e), math.exp(np.mean([math.log(interpolate_kbps(rows, column, e)) for rows in clips]))) for e in errors

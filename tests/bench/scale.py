@@ -1,9 +1,9 @@
-"""What deploy/SCALE.md counts with, beside what other benches tell: `make bench-scale`. `gateway` needs Caddy.
+"""Costs for the capacity planning of deploy/SCALE.md that no other benchmark measures: `make bench-scale`.
 
-The last line printed is one JSON object. `dance`: the demo's dance with all its tracks to many viewers of one process.
-`gateway`: overlays of one limb through Caddy with our Caddyfile; what it needs of a processor and of memory for each
-viewer. `origin`: blocks over HTTP, as a CDN fetches them, by connections that stay open. `register` and `links`: what
-is asked of NATS for each session, and of PostgreSQL for who comes by a link.
+The last line printed is one JSON object. `dance`: the demo motion with all tracks to many viewers of one process.
+`gateway` (needs Caddy): overlays of one limb through Caddy with our Caddyfile, its CPU time per message and memory per
+viewer. `origin`: blocks over HTTP on persistent connections, as a CDN fetches them. `register` and `links`: requests to
+NATS for each session, and to PostgreSQL for each client with a share link.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ Figures = dict[str, float]
 
 @contextmanager
 def start_demo() -> Iterator[tuple[LineProcess, str]]:
-    """A whole server in a process of its own, with the demo's dance on the stage; and where it is."""
+    """Run a complete server in a separate process with the demo; yield the process and its URL."""
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         bunraku = str(Path(sys.executable).parent / "bunraku")
         with LineProcess([bunraku, "up", "--demo", "--port", "0", "--data", folder]) as server:
             found = None
             while found is None:
                 found = re.search(r"is at (http://\S+)/", server.read_line())
-            # what it loads after its start is not the viewers'
+            # CPU time for loading after the start must not count for viewers
             used = -1.0
             while server.processor_seconds() - used > 0.1:
                 used = server.processor_seconds()
@@ -51,7 +51,7 @@ def start_demo() -> Iterator[tuple[LineProcess, str]]:
 
 
 async def _find_demo_session(url: str) -> tuple[str, str]:
-    """The demo's session and motion."""
+    """Return the session and motion of the demo."""
     async with Client(url) as client:
         session = await client.first_session()
         assert session is not None
@@ -59,26 +59,26 @@ async def _find_demo_session(url: str) -> tuple[str, str]:
 
 
 def measure_demo_delivery(viewers: int = 1000, seconds: float = 20.0) -> Figures:
-    """Cores and bytes of a dance with sound, camera and lights, for each viewer."""
+    """Measure CPU time and bytes per viewer of a motion with sound, camera and lights."""
     with start_demo() as (server, url):
         session, _ = asyncio.run(_find_demo_session(url))
         path, port = f"/v1/sessions/{session}/stream", url.rpartition(":")[2]
-        alone, joining = server.processor_seconds(), time.monotonic()
+        cpu_before_join, joining = server.processor_seconds(), time.monotonic()
         with LineProcess.start_module("fanout_drain", port, viewers, "bunraku", path) as drain:
             assert drain.read_line() == "ready"
-            # what is sent ahead at first is the join's
+            # the initial prefetch counts for the join
             time.sleep(10)
             drain.request("")
             before, begun = server.processor_seconds(), time.monotonic()
             time.sleep(seconds)
             passed, cores = time.monotonic() - begun, server.processor_seconds() - before
-            came = drain.request("")
-    joined = before - alone - cores / passed * (begun - joining)
-    assert came["open"] == viewers
+            received = drain.request("")
+    joined = before - cpu_before_join - cores / passed * (begun - joining)
+    assert received["open"] == viewers
     return {
         "dance_viewers": viewers,
-        "dance_messages_viewer_second": round(came["frames"] / passed / viewers, 2),
-        "dance_kbps_viewer": round(came["bytes"] * 8e-3 / passed / viewers, 1),
+        "dance_messages_viewer_second": round(received["frames"] / passed / viewers, 2),
+        "dance_kbps_viewer": round(received["bytes"] * 8e-3 / passed / viewers, 1),
         "dance_join_ms": round(joined * 1e3 / viewers, 2),
         "dance_cores": round(cores / passed, 3),
         "dance_viewers_core": round(viewers * passed / cores),
@@ -87,7 +87,7 @@ def measure_demo_delivery(viewers: int = 1000, seconds: float = 20.0) -> Figures
 
 @contextmanager
 def start_gateway(port: str) -> Iterator[tuple[LineProcess, int]]:
-    """Caddy with our file, all services at one port of this machine; and its own port."""
+    """Run Caddy with our Caddyfile, all services at one local port; yield the process and its port."""
     program, own = shutil.which("caddy"), free_port()
     if program is None:
         raise RuntimeError("Caddy is not installed")
@@ -96,8 +96,10 @@ def start_gateway(port: str) -> Iterator[tuple[LineProcess, int]]:
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         file = Path(folder) / "Caddyfile"
         file.write_text(text)
-        set_to = [f"BUNRAKU_SITE=:{own}", f"XDG_DATA_HOME={folder}", f"XDG_CONFIG_HOME={folder}"]
-        with LineProcess(["env", *set_to, program, "run", "--config", str(file), "--adapter", "caddyfile"]) as caddy:
+        environment = [f"BUNRAKU_SITE=:{own}", f"XDG_DATA_HOME={folder}", f"XDG_CONFIG_HOME={folder}"]
+        with LineProcess(
+            ["env", *environment, program, "run", "--config", str(file), "--adapter", "caddyfile"]
+        ) as caddy:
             while True:
                 try:
                     socket.create_connection(("127.0.0.1", own), 1).close()
@@ -108,7 +110,7 @@ def start_gateway(port: str) -> Iterator[tuple[LineProcess, int]]:
 
 
 def measure_gateway(viewers: int = 600, hertz: int = 20, seconds: float = 10.0) -> Figures:
-    """Overlays of one limb, 66 bytes, by way of the gateway."""
+    """Measure overlays of one limb, 66 bytes, through the gateway."""
     path = f"/v1/sessions/{SESSION}/stream"
     with (
         LineProcess.start_module("fanout_senders", "bunraku", 66, hertz) as sender,
@@ -124,9 +126,9 @@ def measure_gateway(viewers: int = 600, hertz: int = 20, seconds: float = 10.0) 
             cores = caddy.processor_seconds() - used
             memory = caddy.resident_kilobytes() - before
             time.sleep(0.5)
-            came = drain.request("")
-    assert came["open"] == viewers
-    assert came["frames"] >= 0.95 * sent["messages"] > 0
+            received = drain.request("")
+    assert received["open"] == viewers
+    assert received["frames"] >= 0.95 * sent["messages"] > 0
     return {
         "gateway_us_message": round(cores * 1e6 / sent["messages"], 1),
         "gateway_kb_viewer": round(memory / viewers, 1),
@@ -135,17 +137,17 @@ def measure_gateway(viewers: int = 600, hertz: int = 20, seconds: float = 10.0) 
 
 
 def measure_origin(connections: int = 8, seconds: float = 8.0) -> Figures:
-    """Blocks a second that one process gives over HTTP, and what they need of a processor."""
+    """Measure the blocks per second that one process serves over HTTP, and their CPU time."""
     with start_demo() as (server, url):
         _, motion = asyncio.run(_find_demo_session(url))
         host, port = url.removeprefix("http://").split(":")
-        asked = f"GET /v1/motions/{motion}/blocks/4/1 HTTP/1.1\r\nHost: {host}\r\n\r\n".encode()
+        request = f"GET /v1/motions/{motion}/blocks/4/1 HTTP/1.1\r\nHost: {host}\r\n\r\n".encode()
 
         async def fetch(until: float) -> int:
             reader, writer = await asyncio.open_connection(host, int(port))
             number = 0
             while time.monotonic() < until:
-                writer.write(asked)
+                writer.write(request)
                 head = await reader.readuntil(b"\r\n\r\n")
                 assert b" 200 " in head[:20]
                 assert b"immutable" in head
@@ -156,41 +158,44 @@ def measure_origin(connections: int = 8, seconds: float = 8.0) -> Figures:
             writer.close()
             return number
 
-        async def every() -> int:
+        async def fetch_all() -> int:
             until = time.monotonic() + seconds
             return sum(await asyncio.gather(*(fetch(until) for _ in range(connections))))
 
         before = server.processor_seconds()
-        fetched = asyncio.run(every())
+        fetched = asyncio.run(fetch_all())
         used = server.processor_seconds() - before
     return {"origin_blocks_second": round(fetched / seconds), "origin_us_block": round(used * 1e6 / fetched)}
 
 
 def measure_key_value_store(sessions: int = 500, rounds: int = 10) -> Figures:
-    """What each session costs each session replica, and NATS, at each beat."""
+    """Measure the CPU time of a session replica and of NATS per session and heartbeat."""
 
-    async def beats(server: ServerProcess) -> Figures:
+    async def run_heartbeats(server: ServerProcess) -> Figures:
         bus = NatsBus(nats_url_of(server))
         await bus.open()
-        kept = NatsKeyValueStore(bus)
+        key_values = NatsKeyValueStore(bus)
         for number in range(sessions):
-            await kept.put(f"sessions.{number}", bytes(80))
+            await key_values.put(f"sessions.{number}", bytes(80))
         own, nats = time.process_time(), cpu_seconds(server.pid)
         for _ in range(rounds):
-            assert len(await kept.list_prefix("sessions")) == sessions
+            assert len(await key_values.list_prefix("sessions")) == sessions
         own, nats = time.process_time() - own, cpu_seconds(server.pid) - nats
         await bus.close()
-        each = sessions * rounds * 1e-6
-        return {"register_us_session": round(own / each), "register_nats_us_session": round(nats / each)}
+        session_rounds = sessions * rounds * 1e-6
+        return {
+            "register_us_session": round(own / session_rounds),
+            "register_nats_us_session": round(nats / session_rounds),
+        }
 
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder, run_jetstream(Path(folder)) as server:
-        return asyncio.run(beats(server))
+        return asyncio.run(run_heartbeats(server))
 
 
 def measure_share_links(concurrency: int = 5, lookups: int = 2000) -> Figures:
-    """What it costs a service to look a link up in PostgreSQL."""
+    """Measure the CPU time of a service for the lookup of a share link in PostgreSQL."""
 
-    async def look(url: str) -> Figures:
+    async def look_up(url: str) -> Figures:
         catalogue = Catalogue(url)
         await catalogue.open()
         used = time.process_time()
@@ -201,7 +206,7 @@ def measure_share_links(concurrency: int = 5, lookups: int = 2000) -> Figures:
         return {"link_us": round(used * 1e6 / lookups)}
 
     with run_postgres() as server:
-        return asyncio.run(look(f"postgresql://postgres@127.0.0.1:{server.port}/postgres"))
+        return asyncio.run(look_up(f"postgresql://postgres@127.0.0.1:{server.port}/postgres"))
 
 
 BENCHMARKS: dict[str, Callable[[], Figures]] = {

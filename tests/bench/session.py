@@ -1,12 +1,12 @@
-"""How soon a pull is on the others' screens: `make bench-session`. The last line printed is one JSON object.
+"""Latency from a puppeteer's input to other viewers' screens: `make bench-session`.
 
-A real server in a process of its own, on loopback: some sessions, each of one puppeteer and some viewers, for some
-seconds. Each puppeteer asks its hand from one place to another, a fifth of an arm away, twice a second, through the
-session's control socket. Each viewer takes in what comes, and is taken to have a screen of 60 frames a second, in a
-phase of its own: a frame shows the overlays between which its time lies, of those that had come by then. A pull is on
-the screen with the first frame that shows the hand a hundredth of an arm from where it stood.
+The last line printed is one JSON object. A real server in a separate process, on loopback, with several sessions of one
+puppeteer and some viewers each. Each puppeteer moves its hand between two targets, a fifth of an arm length apart,
+twice a second, through the control connection of the session. Each viewer receives all messages and is assumed to have
+a 60 Hz screen with a random phase: a frame interpolates between the overlays around its time that had arrived by then.
+The latency of a move ends with the first frame that shows the hand a hundredth of an arm length from its old position.
 
-What the viewers receive is kept, and looked at when all is over, so that looking costs the server nothing.
+Messages are stored during the run and evaluated afterwards, so that the evaluation takes no CPU time from the server.
 """
 
 from __future__ import annotations
@@ -47,21 +47,21 @@ from tests.processes import cpu_seconds
 
 FRAME_US = 1e6 / 60.0
 WARM_UP_S = 4.0
-"""Seconds that limbs are held before the first pull that counts."""
+"""Time for which limbs are controlled before the first counted move, seconds."""
 SETTLE_TIMEOUT_S = 60.0
-"""Seconds that a server is waited for at most, until it has loaded all it needs."""
+"""Maximum time until a server has loaded everything, seconds."""
 MOVE_INTERVAL_S = 0.5
-"""Seconds between two pulls of a puppeteer."""
+"""Time between two moves of a puppeteer, seconds."""
 HAND_TARGETS = ((0.45, -0.2, 0.5), (0.45, 0.0, 0.5))
-"""Where a left hand is asked to be, arm lengths on the axes of vl5."""
+"""Targets of the left hand, arm lengths on the axes of vl5."""
 MIN_VISIBLE_MOVE = 0.01
-"""Arm lengths from where it stood: the hand is seen to move."""
+"""Distance from which a movement of the hand counts as visible, arm lengths."""
 MOVE_TIMEOUT_US = 1_000_000
-"""Microseconds: a pull that nobody saw by then is lost."""
+"""Time after which a move that no screen shows counts as lost, microseconds."""
 
 
 class RecordingSocket(MessageSocket):
-    """One viewer's socket: messages are kept with the clock time at which they came."""
+    """Connection of one viewer that stores messages with their arrival times."""
 
     def __init__(self, url: str) -> None:
         super().__init__(url)
@@ -78,31 +78,31 @@ class RecordingSocket(MessageSocket):
 
 @dataclass
 class SessionRun:
-    """One session of the run: when its puppeteer pulled (clock times, µs), and what its viewers received."""
+    """One session of the run: when its puppeteer moved (clock times, µs), and what its viewers received."""
 
     viewers: list[RecordingSocket]
     moves_us: list[int] = field(default_factory=list)
     lost_claims: int = 0
-    """Times that the limb was lost, its puppeteer or the server having stood still for half a second."""
+    """Number of times that the limb was lost because its puppeteer or the server stood still for half a second."""
 
 
 async def open_watched_session(client: Client, motion: str, viewers: int) -> tuple[str, SessionRun]:
-    """One session with its viewers."""
+    """Open one session and its viewers."""
     session = (await client.open_session(motion))["id"]
     url = client.socket_url(f"/v1/sessions/{session}/stream?rate=0")
-    screens = [RecordingSocket(url) for _ in range(viewers)]
-    for screen in screens:
-        await asyncio.wait_for(screen.open(), 30)
-    return session, SessionRun(screens)
+    viewer_sockets = [RecordingSocket(url) for _ in range(viewers)]
+    for viewer in viewer_sockets:
+        await asyncio.wait_for(viewer.open(), 30)
+    return session, SessionRun(viewer_sockets)
 
 
 async def move_hand(client: Client, session: str, run: SessionRun, seconds: float, nth: int, share: float) -> None:
-    """The puppeteer of a session, from its coming to its going; `share` of a beat after the others."""
+    """Run the puppeteer of a session; `share` is its phase in the move interval."""
     loop = asyncio.get_running_loop()
     async with Puppeteer(client, session, f"puppeteer {nth}") as puppeteer:
         await puppeteer.claim("left_hand")
         await puppeteer.target("left_hand", *HAND_TARGETS[1])
-        # each in its own beat
+        # each puppeteer has its own phase
         await asyncio.sleep(WARM_UP_S + share * MOVE_INTERVAL_S)
         begin = loop.time()
         for number in range(int(seconds / MOVE_INTERVAL_S)):
@@ -111,16 +111,16 @@ async def move_hand(client: Client, session: str, run: SessionRun, seconds: floa
             try:
                 await puppeteer.target("left_hand", *HAND_TARGETS[number % 2])
             except ControlRefused:
-                # half a second went by in which this machine had no time for it: that pull nobody sees
+                # the machine did not run this process for half a second: nobody sees this move
                 run.lost_claims += 1
                 await puppeteer.claim("left_hand")
         await asyncio.sleep(MOVE_TIMEOUT_US * 1e-6)
 
 
 def extract_hand_positions(rig: ArmRig, messages: list[tuple[int, bytes]]) -> list[tuple[int, int, Vector]]:
-    """Each overlay frame that came: when it came, when it was due, and where it has the left hand, arm lengths."""
+    """Return arrival time, due time and left hand position (arm lengths) of each overlay frame."""
     found: list[tuple[int, int, Vector]] = []
-    for came, data in messages:
+    for arrived, data in messages:
         if data[0] != Overlay.TYPE:
             continue
         overlay = Overlay.unpack(data)
@@ -129,7 +129,7 @@ def extract_hand_positions(rig: ArmRig, messages: list[tuple[int, bytes]]) -> li
             if 0 in limbs:
                 due = overlay.due - (len(frames) - 1 - nth) * Overlay.FRAME_INTERVAL_US
                 joints = [_unpack_quaternion(limbs[0][3 * joint : 3 * joint + 3]) for joint in range(3)]
-                found.append((came, due, rig.tip_target((joints[0], joints[1], joints[2]))))
+                found.append((arrived, due, rig.tip_target((joints[0], joints[1], joints[2]))))
     return found
 
 
@@ -139,40 +139,40 @@ def _unpack_quaternion(numbers: tuple[int, ...]) -> Quaternion:
 
 
 def move_latency_ms(frames: list[tuple[int, int, Vector]], move_us: int, phase: float) -> float:
-    """Milliseconds from a pull to the first frame of a screen that shows the hand moving; NaN where none does."""
+    """Return the time from a move to the first frame of a screen that shows it, milliseconds; NaN if none does."""
     dues = [due for _, due, _ in frames]
     at = bisect_right(dues, move_us)
     if at == 0:
         return float("nan")
-    stood = frames[at - 1][2]
+    old_position = frames[at - 1][2]
     shown = move_us + phase * FRAME_US
     while shown - move_us < MOVE_TIMEOUT_US:
-        place = _position_at(frames, dues, shown)
-        if vector.length(vector.subtract(place, stood)) > MIN_VISIBLE_MOVE:
+        position = _position_at(frames, dues, shown)
+        if vector.length(vector.subtract(position, old_position)) > MIN_VISIBLE_MOVE:
             return (shown - move_us) / 1e3
         shown += FRAME_US
     return float("nan")
 
 
 def _position_at(frames: list[tuple[int, int, Vector]], dues: list[int], shown: float) -> Vector:
-    """Where a screen has the hand at a time: between the two frames that lie about it, or at the last that came."""
+    """Return the hand position on a screen: interpolated between two frames, or that of the last frame that arrived."""
     after = bisect_right(dues, shown)
-    # what has not come yet is not shown
+    # frames that have not arrived yet are not shown
     while after > 0 and after < len(frames) and frames[after][0] > shown:
         after -= 1
         if frames[after][0] <= shown:
             return frames[after][2]
     if after == 0 or after == len(frames):
         return frames[max(after - 1, 0)][2]
-    (_, begin, one), (_, end, other) = frames[after - 1], frames[after]
+    (_, begin, earlier), (_, end, later) = frames[after - 1], frames[after]
     share = (shown - begin) / (end - begin)
-    return vector.add(one, vector.scale(vector.subtract(other, one), share))
+    return vector.add(earlier, vector.scale(vector.subtract(later, earlier), share))
 
 
 def wait_until_idle(pid: int) -> None:
-    """Waits until a server that has just begun has loaded what it needs, and has nothing more to do."""
+    """Wait until a server that has just started has loaded everything and is idle."""
     end = time.monotonic() + SETTLE_TIMEOUT_S
-    # it begins to load a little after it answers
+    # loading starts shortly after the server answers
     time.sleep(WARM_UP_DELAY_S + 1.0)
     before = cpu_seconds(pid)
     while time.monotonic() < end:
@@ -185,59 +185,59 @@ def wait_until_idle(pid: int) -> None:
 
 
 async def run_sessions(url: str, pid: int, sessions: int, viewers: int, seconds: float) -> dict[str, float]:
-    """The run, and its figures."""
+    """Run the benchmark against a server and return the figures."""
     async with Client(url) as client:
         motion = (await client.motions())[0]["id"]
-        async with httpx2.AsyncClient(base_url=url) as plain:
-            description = unpack((await plain.get(f"/v1/motions/{motion}/description")).content)
+        async with httpx2.AsyncClient(base_url=url) as http:
+            description = unpack((await http.get(f"/v1/motions/{motion}/description")).content)
         assert isinstance(description, Description)
         figure: Figure = parse_motion_track(description.tracks[0]).figure
-        stages = [await open_watched_session(client, motion, viewers) for _ in range(sessions)]
-        before, begun, own = cpu_seconds(pid), time.perf_counter(), time.process_time()
-        async with asyncio.TaskGroup() as pulling:
-            for nth, (session, one) in enumerate(stages):
-                pulling.create_task(move_hand(client, session, one, seconds, nth, nth / sessions))
-        played = [one for _, one in stages]
+        watched_sessions = [await open_watched_session(client, motion, viewers) for _ in range(sessions)]
+        before, begun, own_cores = cpu_seconds(pid), time.perf_counter(), time.process_time()
+        async with asyncio.TaskGroup() as tasks:
+            for nth, (session, run) in enumerate(watched_sessions):
+                tasks.create_task(move_hand(client, session, run, seconds, nth, nth / sessions))
+        runs = [run for _, run in watched_sessions]
         passed = time.perf_counter() - begun
-        busy, own = (cpu_seconds(pid) - before) / passed, (time.process_time() - own) / passed
+        server_cores, own_cores = (cpu_seconds(pid) - before) / passed, (time.process_time() - own_cores) / passed
     rig = ArmRig(figure, Limb.LEFT_HAND)
     random = np.random.default_rng(1)
-    delays: list[float] = []
-    late: list[float] = []
+    latencies_ms: list[float] = []
+    lateness_ms: list[float] = []
     gaps: list[float] = []
     messages = 0
-    for one in played:
-        for screen in one.viewers:
-            assert not screen.closed, "a viewer was dropped"
-            frames = extract_hand_positions(rig, screen.messages)
-            messages += sum(data[0] == Overlay.TYPE for _, data in screen.messages)
-            late += [(came - due) / 1e3 for came, due, _ in frames]
+    for run in runs:
+        for viewer in run.viewers:
+            assert not viewer.closed, "a viewer was dropped"
+            frames = extract_hand_positions(rig, viewer.messages)
+            messages += sum(data[0] == Overlay.TYPE for _, data in viewer.messages)
+            lateness_ms += [(arrived - due) / 1e3 for arrived, due, _ in frames]
             gaps += [(b[1] - a[1]) / 1e3 for a, b in pairwise(frames)]
-            delays += [move_latency_ms(frames, pull, float(random.random())) for pull in one.moves_us]
-    known = np.array([delay for delay in delays if delay == delay])
+            latencies_ms += [move_latency_ms(frames, move_us, float(random.random())) for move_us in run.moves_us]
+    measured = np.array([latency for latency in latencies_ms if latency == latency])
     return {
         "sessions": sessions,
         "viewers": sessions * viewers,
-        "pulls": len(delays),
-        "lost": len(delays) - len(known),
-        "limbs_lost": sum(one.lost_claims for one in played),
-        "input_to_screen_ms_p50": round(float(np.percentile(known, 50)), 1),
-        "input_to_screen_ms_p95": round(float(np.percentile(known, 95)), 1),
-        "input_to_screen_ms_p99": round(float(np.percentile(known, 99)), 1),
-        "overlays_late_share": round(float(np.mean(np.array(late) > 0.0)), 4),
+        "pulls": len(latencies_ms),
+        "lost": len(latencies_ms) - len(measured),
+        "limbs_lost": sum(run.lost_claims for run in runs),
+        "input_to_screen_ms_p50": round(float(np.percentile(measured, 50)), 1),
+        "input_to_screen_ms_p95": round(float(np.percentile(measured, 95)), 1),
+        "input_to_screen_ms_p99": round(float(np.percentile(measured, 99)), 1),
+        "overlays_late_share": round(float(np.mean(np.array(lateness_ms) > 0.0)), 4),
         "overlay_frame_ms_p99": round(float(np.percentile(gaps, 99)), 1),
         "messages_per_s": round(messages / seconds),
-        "server_cores": round(busy, 2),
-        "screens_cores": round(own, 2),
+        "server_cores": round(server_cores, 2),
+        "screens_cores": round(own_cores, 2),
     }
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--sessions", type=int, default=50)
-    parser.add_argument("--viewers", type=int, default=10, help="of each session")
+    parser.add_argument("--viewers", type=int, default=10, help="viewers per session")
     parser.add_argument("--seconds", type=float, default=20.0)
-    given = parser.parse_args()
+    options = parser.parse_args()
     bunraku = Path(sys.executable).parent / "bunraku"
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         server = subprocess.Popen(
@@ -249,11 +249,11 @@ def main() -> None:
         assert server.stdout is not None
         try:
             url = next(found[1] for line in server.stdout if (found := re.search(r"is at (http://\S+)/", line)))
-            print(f"{given.sessions} sessions of one puppeteer and {given.viewers} viewers, {given.seconds:g} s")
+            print(f"{options.sessions} sessions of one puppeteer and {options.viewers} viewers, {options.seconds:g} s")
             wait_until_idle(server.pid)
-            # what is kept for later is not walked through meanwhile: that would stop the screens' clocks
+            # garbage collection would walk the stored messages and stall the viewers
             gc.disable()
-            figures = uvloop.run(run_sessions(url, server.pid, given.sessions, given.viewers, given.seconds))
+            figures = uvloop.run(run_sessions(url, server.pid, options.sessions, options.viewers, options.seconds))
         finally:
             server.terminate()
             server.wait(20)

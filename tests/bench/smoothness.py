@@ -1,6 +1,6 @@
-"""How smoothly limbs are taken, pulled and let go: the part of `make bench-ik` that needs the whole marionette.
+"""Smoothness of claims, control and releases of limbs: the part of `make bench-ik` that needs the whole marionette.
 
-All lengths are arm lengths and all places are in the shoulder's frame, at 60 frames a second.
+Lengths are in arm lengths, positions in the shoulder's frame, at 60 frames per second.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from bunraku.motion.skeleton import Figure, standard_figure
 
 FRAME_US = 16_667
 HAND_SPEED = 0.5
-"""Of a hand, arm lengths per second."""
+"""Speed of a hand, arm lengths per second."""
 UP = (0.0, 1.0, 0.0)
 HandPath = list[Vector]
 
 
 def straight_path(begin: Vector, end: Vector, speed: float = HAND_SPEED) -> HandPath:
-    """A hand's way straight from one place to another and back, a place for each frame."""
+    """Return a hand's path from one position straight to another and back, one position per frame."""
     way = vector.subtract(end, begin)
     steps = max(int(vector.length(way) * 60.0 / speed), 1)
-    there = [vector.add(begin, vector.scale(way, k / steps)) for k in range(steps + 1)]
-    return there + there[-2::-1]
+    outward = [vector.add(begin, vector.scale(way, k / steps)) for k in range(steps + 1)]
+    return outward + outward[-2::-1]
 
 
 def circular_path(radius: float, normal: Vector, speed: float, turns: float = 2.0, away: float = 0.0) -> HandPath:
-    """A hand's way round the shoulder, in the plane of the unit `normal`, `away` from the shoulder along it."""
+    """Return a hand's path around the shoulder, in the plane of the unit vector `normal`, offset by `away` along it."""
     one = vector.any_perpendicular(normal)
     other = vector.cross(normal, one)
     middle = vector.scale(normal, away)
@@ -58,7 +58,7 @@ def circular_path(radius: float, normal: Vector, speed: float, turns: float = 2.
 
 
 def slow_paths(inner: float) -> Iterator[HandPath]:
-    """Ways at `SPEED` through all of the reachable shell: over and under the shoulder, in and out, across, around."""
+    """Yield paths at `HAND_SPEED` through the reachable shell: over and under the shoulder, in and out, around."""
     random = np.random.default_rng(4)
     for height in (-0.95, -0.6, -0.3, 0.3, 0.6, 0.9):
         for off in (0.0, 1e-9, 1e-6, 1e-3, 0.01, 0.03, 0.1):
@@ -81,24 +81,24 @@ def slow_paths(inner: float) -> Iterator[HandPath]:
 
 
 def measure_elbow_steps(rig: ArmRig, path: HandPath) -> tuple[float, float, float]:
-    """The farthest that the elbow goes in a frame, and that the tip is from where it was asked to be."""
+    """Return the maxima of elbow movement per frame, of tip error, and of depth in the shoulder's limit."""
     inner = max(rig.arm.min_tip_distance, MIN_REACH)
     elbow = Elbow(rig.arm, rig.shoulder)
-    farthest = error = 0.0
+    max_elbow_step = max_tip_error = 0.0
     depth = -pi
     last: Vector | None = None
-    for place in path:
-        reach = vector.length(place)
+    for position in path:
+        reach = vector.length(position)
         if reach < inner or reach > MAX_REACH:
-            place = vector.scale(rig.target_direction(place), min(max(reach, inner), MAX_REACH))
+            position = vector.scale(rig.target_direction(position), min(max(reach, inner), MAX_REACH))
             if reach < inner:
-                # not a place that a hand can be: the way goes on beyond it
+                # outside the reach of the hand: the path continues behind it
                 last = None
                 elbow.reset()
                 continue
-        direction = rig.target_direction(place)
+        direction = rig.target_direction(position)
         if not elbow.has_begun:
-            reach = vector.length(place)
+            reach = vector.length(position)
             normal = (
                 vector.cross(direction, UP) if vector.length(vector.cross(direction, UP)) > 1e-9 else (1.0, 0.0, 0.0)
             )
@@ -106,24 +106,29 @@ def measure_elbow_steps(rig: ArmRig, path: HandPath) -> tuple[float, float, floa
             elbow.begin(direction, normal, -bent[0])
             for _ in range(120):
                 elbow.step(direction, reach, UP, FRAME_US * 1e-6)
-        tip, normal, bend = elbow.step(direction, vector.length(place), UP, FRAME_US * 1e-6)
+        tip, normal, bend = elbow.step(direction, vector.length(position), UP, FRAME_US * 1e-6)
         shoulder, *others = rig.bend_joints(vector.length(tip), bend)
-        places = rig.joint_positions(
+        positions = rig.joint_positions(
             (vector.multiply(rig.chord_frame(rig.target_direction(tip), normal), shoulder), others[0], others[1])
         )
-        here, there = (vector.scale(one, 1.0 / rig.arm_length_m) for one in (places[0], places[2]))
-        depth = max(depth, limit.depth_in_caps(rig.shoulder, rig.target_direction(here)))
-        error = max(error, vector.length(vector.subtract(there, place)))
+        elbow_position, tip_position = (
+            vector.scale(one, 1.0 / rig.arm_length_m) for one in (positions[0], positions[2])
+        )
+        depth = max(depth, limit.depth_in_caps(rig.shoulder, rig.target_direction(elbow_position)))
+        max_tip_error = max(max_tip_error, vector.length(vector.subtract(tip_position, position)))
         if last is not None:
-            farthest = max(farthest, vector.length(vector.subtract(here, last)))
-        last = here
-    return farthest, error, depth
+            max_elbow_step = max(max_elbow_step, vector.length(vector.subtract(elbow_position, last)))
+        last = elbow_position
+    return max_elbow_step, max_tip_error, depth
 
 
 class HandoverSmoothness(NamedTuple):
-    """One hand taken and let go: its greatest acceleration while it is held and on its way back, and that of the
-    dance's own hand meanwhile; and milliseconds from the grant until it is within a hundredth of where its puppeteer
-    wants it, and from the release until it is the dance's."""
+    """One claim and release of a hand.
+
+    Accelerations are maxima: of the hand while it is controlled (`taking`) and while it returns, and of the motion's
+    own hand meanwhile (`dancing`). Times are from the grant until the hand is within a hundredth of its target, and
+    from the release until it follows the motion, milliseconds.
+    """
 
     taking: float
     returning: float
@@ -135,21 +140,22 @@ class HandoverSmoothness(NamedTuple):
 def measure_handover(
     limb: Limb, figure: Figure, poses: Array, begin: int, away: Vector, phase: int
 ) -> HandoverSmoothness:
-    """Takes the hand in frame `begin` of a dance (n, 18, 4), `phase` µs after it, asks for the place `away` from where
-    the dance has it, holds for half a second, and lets go."""
+    """Claim a hand `phase` µs after frame `begin` of poses (n, 18, 4), hold it for half a second, and release it.
+
+    Its target is `away` from its position in the motion."""
     rig, puppet = ArmRig(figure, limb), Marionette(figure)
-    own = [rig.tip_target(rig.pose_joints(pose)) for pose in poses[begin - 3 : begin + 80].tolist()]
-    times = [(begin - 3 + k) * FRAME_US for k in range(len(own))]
-    hands = own[:4]
+    own_hands = [rig.tip_target(rig.pose_joints(pose)) for pose in poses[begin - 3 : begin + 80].tolist()]
+    times = [(begin - 3 + k) * FRAME_US for k in range(len(own_hands))]
+    hands = own_hands[:4]
     granted = times[3] + phase
     puppet.observe_pose(poses[begin - 1], times[2])
     puppet.observe_pose(poses[begin], times[3])
     grant = puppet.ownership.claim(limb, "one", granted)
     assert isinstance(grant, LimbGrant)
-    target = vector.add(own[3], away)
+    target = vector.add(own_hands[3], away)
     taken = back = released = 0
     home = 36
-    for k in range(4, len(own)):
+    for k in range(4, len(own_hands)):
         now = times[k]
         if k == 34:
             puppet.ownership.release(limb, "one", grant.epoch, now - FRAME_US + phase)
@@ -162,14 +168,14 @@ def measure_handover(
         hands.append(rig.tip_target(rig.pose_joints(merged.tolist())))
         if not taken and vector.length(vector.subtract(hands[-1], target)) < 0.01:
             taken = now - granted - round(FRAME_US * (1.0 - _path_share(hands[-2], hands[-1], target)))
-        off = vector.length(vector.subtract(hands[-1], own[k]))
+        off = vector.length(vector.subtract(hands[-1], own_hands[k]))
         if released and off > 1e-4:
             back, home = now + FRAME_US - released, k + 2
-    speeding = np.linalg.norm(_accelerations(hands[:home]), axis=1)
-    dancing = np.linalg.norm(_accelerations(own[:home]), axis=1)
+    accelerations = np.linalg.norm(_accelerations(hands[:home]), axis=1)
+    dancing = np.linalg.norm(_accelerations(own_hands[:home]), axis=1)
     return HandoverSmoothness(
-        float(speeding[2:32].max()),
-        float(speeding[32:].max()),
+        float(accelerations[2:32].max()),
+        float(accelerations[32:].max()),
         float(dancing[32:].max()),
         taken / 1e3 or math.inf,
         back / 1e3,
@@ -177,21 +183,21 @@ def measure_handover(
 
 
 def _path_share(begin: Vector, end: Vector, target: Vector) -> float:
-    """When between two frames, of which viewers see all that is between, a hand came within a hundredth of a target."""
+    """Return the share of a frame interval after which a hand came within a hundredth of a target."""
     for step in range(21):
-        place = vector.add(begin, vector.scale(vector.subtract(end, begin), step / 20.0))
-        if vector.length(vector.subtract(place, target)) < 0.01:
+        position = vector.add(begin, vector.scale(vector.subtract(end, begin), step / 20.0))
+        if vector.length(vector.subtract(position, target)) < 0.01:
             return step / 20.0
     return 1.0
 
 
-def _accelerations(places: list[Vector]) -> Array:
-    second: Array = np.diff(np.array(places), 2, axis=0) / (FRAME_US * 1e-6) ** 2
+def _accelerations(positions: list[Vector]) -> Array:
+    second: Array = np.diff(np.array(positions), 2, axis=0) / (FRAME_US * 1e-6) ** 2
     return second
 
 
 def measure_handovers(count: int, distance: float) -> list[HandoverSmoothness]:
-    """Hands taken in the demo's dance at random instants, the wanted place `distance` away in a random direction."""
+    """Measure claims in the demo motion at random times, with targets `distance` away in random directions."""
     motion = choreography.animate_dance()
     random = np.random.default_rng(7)
     found: list[HandoverSmoothness] = []
@@ -227,7 +233,7 @@ def _random_direction(random: np.random.Generator) -> Vector:
 
 
 def create_figure(proportions: Proportions) -> Figure:
-    """The standard figure with arms of these proportions, as long as before."""
+    """Return the standard figure with arms of these proportions and unchanged arm length."""
     figure = standard_figure()
     offsets, tips = figure.offsets.copy(), figure.tips.copy()
     for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
@@ -240,7 +246,7 @@ def create_figure(proportions: Proportions) -> Figure:
 
 
 def measure_smoothness(paths: int = 300, hands: int = 200) -> dict[str, float]:
-    """All figures of this module, with a table; some tens of seconds."""
+    """Measure all figures of this module and print a table; takes some tens of seconds."""
     print(f"\n{'elbow, arm lengths a frame':<34}{'slow hand':>10}{'circles':>10}{'tip off':>10}{'in a cap':>10}")
     slow: list[float] = []
     fast: list[float] = []
@@ -248,21 +254,21 @@ def measure_smoothness(paths: int = 300, hands: int = 200) -> dict[str, float]:
         rig = ArmRig(create_figure(body.proportions), Limb.LEFT_HAND)
         steps = [measure_elbow_steps(rig, path) for path in islice(slow_paths(MIN_REACH), paths)]
         circles = [measure_elbow_steps(rig, path) for path in fast_circular_paths()]
-        # where the shoulder lets an arm be, the tip is exact; what it does not is told apart
-        exact = [error for _, error, _ in steps if error < 1e-6]
+        # inside the shoulder's limits the tip is exact; other paths are reported separately
+        exact = [max_tip_error for _, max_tip_error, _ in steps if max_tip_error < 1e-6]
         print(
             f"{body.name:<34}{max(s for s, _, _ in steps):10.4f}{max(s for s, _, _ in circles):10.4f}"
             f"{max(exact):10.0e}{max(d for _, _, d in steps + circles):10.0e}"
-            f"   tip exact on {len(exact)} of {len(steps)} ways, the others lead behind the back",
+            f"   tip exact on {len(exact)} of {len(steps)} paths, the others lead behind the back",
             flush=True,
         )
         slow += [step for step, _, _ in steps]
         fast += [step for step, _, _ in circles]
-    print(f"\n{'hand-over':<34}{'median':>10}{'95 %':>10}{'most':>10}")
+    print(f"\n{'hand-over':<34}{'median':>10}{'95 %':>10}{'p95':>10}")
     found = np.array(measure_handovers(hands, 0.25))
     for name, column in zip(HandoverSmoothness._fields, found.T, strict=True):
-        median, most, all_of = np.percentile(column, (50, 95, 100))
-        print(f"{name:<34}{median:10.1f}{most:10.1f}{all_of:10.1f}")
+        median, p95, maximum = np.percentile(column, (50, 95, 100))
+        print(f"{name:<34}{median:10.1f}{p95:10.1f}{maximum:10.1f}")
     return {
         "elbow_step_max": max(slow),
         "elbow_step_circle_max": max(fast),
@@ -275,7 +281,7 @@ def measure_smoothness(paths: int = 300, hands: int = 200) -> dict[str, float]:
 
 
 def fast_circular_paths() -> Iterator[HandPath]:
-    """Round the shoulder at two arm lengths a second, level, upright and aslant."""
+    """Yield circles around the shoulder at two arm lengths per second, level, upright and tilted."""
     for radius in (0.5, 0.6, 0.7, 0.8, 0.9):
         for normal in (
             (0.0, 1.0, 0.0),

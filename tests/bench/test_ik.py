@@ -15,7 +15,7 @@ each_body = pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
 
 
 @each_body
-def test_an_arm_is_as_exact_as_the_bench_says(body: Body) -> None:
+def test_arm_accuracy_is_within_documented_bounds(body: Body) -> None:
     proportions = body.proportions.rounded()
     found = ik_accuracy.measure_accuracy(
         proportions, bend_table.load_bend_table(proportions.identity), 4_000, np.random.default_rng(2)
@@ -29,7 +29,7 @@ def test_an_arm_is_as_exact_as_the_bench_says(body: Body) -> None:
 
 
 @each_body
-def test_the_true_angles_are_no_higher_than_any_other_bend(body: Body) -> None:
+def test_minimum_energy_is_below_every_other_bend(body: Body) -> None:
     random = np.random.default_rng(3)
     r, beta = random.uniform(body.proportions.min_tip_distance, MAX_TIP_DISTANCE, 300), random.uniform(-1.57, 1.57, 300)
     t0, t1, t2 = ik_accuracy.minimum_energy_angles(body.proportions, r, beta)
@@ -40,7 +40,7 @@ def test_the_true_angles_are_no_higher_than_any_other_bend(body: Body) -> None:
         assert (ik_accuracy.potential_energy(body.proportions, other) >= lowest - 1e-12).all()
 
 
-def test_slsqp_finds_the_same_arm_where_no_limit_is_in_its_way() -> None:
+def test_slsqp_finds_the_same_arm_away_from_limits() -> None:
     proportions = BODIES[0].proportions.rounded()
     targets = ik_accuracy.random_reachable_targets(proportions, 60, np.random.default_rng(7))
     solved = arm_batch.solve_arms(proportions, bend_table.load_bend_table(proportions.identity), targets)
@@ -49,7 +49,7 @@ def test_slsqp_finds_the_same_arm_where_no_limit_is_in_its_way() -> None:
     low, high = wrist_bend_limits(proportions, r)
     for nth, (x, y, z) in enumerate(targets.tolist()):
         bend = angles[2, nth] - angles[1, nth]
-        # started beside the answer: on its own it may end in another valley
+        # started beside the solution, as it may otherwise end in another local minimum
         peer.angles = angles[:, nth] + 0.05
         if low[nth] + 0.05 < bend < high[nth] - 0.05:
             assert peer.reach(float(np.hypot(x, z)), y) < 1e-6
@@ -58,17 +58,17 @@ def test_slsqp_finds_the_same_arm_where_no_limit_is_in_its_way() -> None:
     assert compared > 10
 
 
-def test_the_path_is_a_hands_at_half_an_arms_length_a_second() -> None:
-    way = wandering_targets(BODIES[2].proportions, 20_000)
-    speed = np.linalg.norm(np.diff(way, axis=0), axis=1) * 60.0
+def test_path_moves_at_half_an_arm_length_per_second() -> None:
+    path = wandering_targets(BODIES[2].proportions, 20_000)
+    speed = np.linalg.norm(np.diff(path, axis=0), axis=1) * 60.0
     assert 0.4 < speed.mean() < 0.6
     assert speed.max() < 2.0
-    reach = np.linalg.norm(way, axis=1)
+    reach = np.linalg.norm(path, axis=1)
     assert BODIES[2].proportions.min_tip_distance < reach.min() < 0.2
     assert 0.95 < reach.max() < MAX_TIP_DISTANCE
 
 
-def test_how_many_times_faster_is_told_of_the_same_round(capsys: pytest.CaptureFixture[str]) -> None:
+def test_speed_ratio_is_computed_within_one_round(capsys: pytest.CaptureFixture[str]) -> None:
     names = ("ours", "ccdik_10", "ccdik_10_with_limits", "closed_chain_ik", "compiled", "numpy", "slsqp")
     rates = {order: {name: [600.0, 100.0, 200.0] for name in names} for order in ("jumps", "path")}
     rates["jumps"]["ccdik_10"], rates["path"]["slsqp"] = [2.0, 1.0, 1.0], [100.0, 50.0, 10.0]

@@ -14,18 +14,18 @@ ROWS = [
 ]
 
 
-def test_only_the_lower_hull_counts() -> None:
+def test_lower_hull_drops_dominated_points() -> None:
     assert peer_results.lower_hull(ROWS, peer_results.MEAN) == [(0.5, 30.0), (1.0, 10.0), (8.0, 2.0)]
 
 
-def test_a_peer_is_read_log_log_between_its_points() -> None:
+def test_peer_bitrate_is_interpolated_log_log() -> None:
     assert peer_results.interpolate_kbps(ROWS, peer_results.MEAN, 1.0) == pytest.approx(10.0)
     assert peer_results.interpolate_kbps(ROWS, peer_results.MEAN, 8**0.5) == pytest.approx(20**0.5)
     with pytest.raises(ValueError, match="measured from"):
         peer_results.interpolate_kbps(ROWS, peer_results.MEAN, 0.4)
 
 
-def test_a_curve_is_the_geometric_mean_where_every_clip_was_measured() -> None:
+def test_mean_curve_covers_errors_measured_for_every_clip() -> None:
     slower = [[row[0] * 4, *row[1:]] for row in ROWS if row[1] < 4]
     points = peer_results.mean_curve([ROWS, slower], peer_results.MEAN, 0.1, 100.0)
     assert (points[0][0], points[-1][0]) == (0.5, 3.0)

@@ -1,4 +1,4 @@
-"""The stack's own files of nats-server, for servers of this machine."""
+"""Configuration files of nats-server from the stack, adapted to servers on this machine."""
 
 from __future__ import annotations
 
@@ -12,22 +12,25 @@ from tests.processes import find_program, free_port
 
 
 def localize_config(file: Path, folder: Path, replacements: Mapping[str, str]) -> Path:
-    """A copy in `folder` with other places, each of which must be named in it: its ports are taken, its folders root's.
-    What a nats-server before 2.10 does not know is left out for it; a file that is included comes along."""
+    """Copy a configuration file and its includes to `folder` with paths and addresses replaced; return the copy.
+
+    Raises AssertionError if a text to replace does not occur. For nats-server before 2.10, which does not know it,
+    `sync_interval` is removed.
+    """
     for included in re.findall(r"^include (\S+)$", file.read_text(), re.MULTILINE):
         shutil.copy(file.parent / included, folder)
     copy = folder / file.name
     shutil.copy(file, copy)
-    said = subprocess.check_output([find_program("nats-server"), "--version"], text=True)
-    version = re.search(r"v(\d+)\.(\d+)", said)
-    assert version is not None, said
+    version_text = subprocess.check_output([find_program("nats-server"), "--version"], text=True)
+    version = re.search(r"v(\d+)\.(\d+)", version_text)
+    assert version is not None, version_text
     old = (int(version[1]), int(version[2])) < (2, 10)
     found = set()
     for path in folder.glob("*.conf"):
         text = path.read_text()
-        for here, there in {"127.0.0.1:8222": f"127.0.0.1:{free_port()}", **replacements}.items():
-            found |= {here} if here in text else set()
-            text = text.replace(here, there)
+        for original, replacement in {"127.0.0.1:8222": f"127.0.0.1:{free_port()}", **replacements}.items():
+            found |= {original} if original in text else set()
+            text = text.replace(original, replacement)
         path.write_text(re.sub(r"^\s*sync_interval: .*\n", "", text, flags=re.MULTILINE) if old else text)
     assert set(replacements) <= found, set(replacements) - found
     return copy

@@ -1,4 +1,4 @@
-"""What docker-compose.yml promises of every service, without an engine."""
+"""Settings of docker-compose.yml, checked without a container engine."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from tests.conftest import REPOSITORY
 COMPOSE: dict[str, Any] = yaml.safe_load((REPOSITORY / "docker-compose.yml").read_text())
 DOCKERFILE = (REPOSITORY / "deploy" / "Dockerfile").read_text()
 SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
-STOCK = {
+STOCK_IMAGES = {
     "python:3.13-slim", "node:20-slim", "nats:2.10-alpine", "postgres:17", "caddy:2",
     "prom/prometheus:v3.13.1", "grafana/grafana:12.4.2",
 }  # fmt: skip
-OURS = {"bunraku", "bunraku-gateway", "bunraku-bus", "bunraku-prometheus", "bunraku-grafana"}
-OBSERVE = {"prometheus", "grafana"}
+OWN_IMAGES = {"bunraku", "bunraku-gateway", "bunraku-bus", "bunraku-prometheus", "bunraku-grafana"}
+OBSERVE_SERVICES = {"prometheus", "grafana"}
 
 
-def test_the_whole_house_is_there() -> None:
-    always = {name for name, service in SERVICES.items() if "profiles" not in service}
-    assert always == {"gateway", "ingest", "stream", "ik", "session", "page", "nats", "postgres"}
-    assert {name for name, service in SERVICES.items() if service.get("profiles") == ["observe"]} == OBSERVE
-    assert set(SERVICES) == always | OBSERVE
+def test_compose_lists_every_service() -> None:
+    default_services = {name for name, service in SERVICES.items() if "profiles" not in service}
+    assert default_services == {"gateway", "ingest", "stream", "ik", "session", "page", "nats", "postgres"}
+    assert {name for name, service in SERVICES.items() if service.get("profiles") == ["observe"]} == OBSERVE_SERVICES
+    assert set(SERVICES) == default_services | OBSERVE_SERVICES
     assert {name: one["scale"] for name, one in SERVICES.items() if "scale" in one} == {"stream": 2, "session": 2}
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_every_service_may_do_no_more_than_it_must(name: str) -> None:
+def test_service_has_least_privileges(name: str) -> None:
     service = SERVICES[name]
     assert service["read_only"] is True
     assert service["cap_drop"] == ["ALL"]
@@ -43,7 +43,7 @@ def test_every_service_may_do_no_more_than_it_must(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_every_service_is_looked_after_and_ends_in_order(name: str) -> None:
+def test_service_has_health_check_restart_and_grace_period(name: str) -> None:
     service = SERVICES[name]
     assert service["healthcheck"]["test"][0] == "CMD"
     assert service["restart"] == "always"
@@ -51,7 +51,7 @@ def test_every_service_is_looked_after_and_ends_in_order(name: str) -> None:
     assert re.fullmatch(r"\d+s", service["stop_grace_period"])
 
 
-def test_nothing_but_the_gateway_is_reached_from_outside_and_that_from_this_machine_alone() -> None:
+def test_only_the_gateway_publishes_a_port_on_loopback() -> None:
     assert [name for name, service in SERVICES.items() if "ports" in service] == ["gateway", "grafana"]
     assert SERVICES["gateway"]["ports"] == ["${BUNRAKU_ADDRESS:-127.0.0.1}:${BUNRAKU_PORT:-8080}:8080"]
     assert COMPOSE["networks"]["backing"] == {"internal": True}
@@ -60,50 +60,50 @@ def test_nothing_but_the_gateway_is_reached_from_outside_and_that_from_this_mach
     assert SERVICES["gateway"]["networks"] == ["gateway"]
 
 
-def test_who_observes_reaches_no_more_than_it_must() -> None:
+def test_monitoring_has_least_network_access() -> None:
     address, port = "${BUNRAKU_GRAFANA_ADDRESS:-127.0.0.1}", "${BUNRAKU_GRAFANA_PORT:-3000}"
     assert SERVICES["grafana"]["ports"] == [f"{address}:{port}:3000"]
     assert SERVICES["grafana"]["environment"]["BUNRAKU_GRAFANA_ADDRESS"] == address
-    # the services are Prometheus's to ask, and Prometheus is Grafana's
+    # Prometheus reaches the services, Grafana reaches Prometheus
     assert SERVICES["prometheus"]["networks"] == ["backing", "observing"]
     assert SERVICES["grafana"]["networks"] == ["observing", "looking"]
     assert COMPOSE["networks"]["observing"] == {"internal": True}
     for name in ("ingest", "stream", "ik", "session", "page"):
-        given = SERVICES[name]["environment"]
-        assert (given["BUNRAKU_METRICS"], given["BUNRAKU_LOGS"]) == ("0.0.0.0:9100", "json")
+        environment = SERVICES[name]["environment"]
+        assert (environment["BUNRAKU_METRICS"], environment["BUNRAKU_LOGS"]) == ("0.0.0.0:9100", "json")
     assert "9100" not in (REPOSITORY / "deploy" / "Caddyfile").read_text()
     for service in SERVICES.values():
-        # a volume of its own, and nothing of this machine
+        # named volumes only, no folder of the host
         assert all(re.fullmatch(r"[a-z]+:/\S+|/\S+", one) for one in service.get("volumes", []))
 
 
-def test_every_password_can_be_given() -> None:
+def test_every_password_can_be_set() -> None:
     text = (REPOSITORY / "docker-compose.yml").read_text()
     for line in text.splitlines():
         if "PASSWORD" in line:
             assert re.search(r"\$\{BUNRAKU_((BUS|CATALOGUE)_PASSWORD:-bunraku|GRAFANA_PASSWORD:-)\}", line), line
 
 
-def test_what_can_be_given_is_documented_and_nothing_else() -> None:
-    given = set(re.findall(r"\$\{(\w+)", (REPOSITORY / "docker-compose.yml").read_text()))
+def test_readme_lists_exactly_the_settings_of_compose() -> None:
+    environment = set(re.findall(r"\$\{(\w+)", (REPOSITORY / "docker-compose.yml").read_text()))
     readme = (REPOSITORY / "deploy" / "README.md").read_text()
     settings = readme.partition("\n## Settings\n")[2].partition("\n**")[0]
-    assert set(re.findall(r"`((?:BUNRAKU|AWS)_\w+)`", settings)) == given
+    assert set(re.findall(r"`((?:BUNRAKU|AWS)_\w+)`", settings)) == environment
 
 
-def test_images_are_ours_or_stock_and_none_names_a_registry() -> None:
-    begun = re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE)
-    targets = {target for _, target in begun}
-    assert len(begun) == len(re.findall(r"^FROM ", DOCKERFILE, re.MULTILINE))
-    assert {image for image, _ in begun} <= STOCK
+def test_images_are_own_or_stock_without_a_registry() -> None:
+    stages = re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE)
+    targets = {target for _, target in stages}
+    assert len(stages) == len(re.findall(r"^FROM ", DOCKERFILE, re.MULTILINE))
+    assert {image for image, _ in stages} <= STOCK_IMAGES
     for service in SERVICES.values():
-        assert service["image"] in OURS | STOCK
-        assert ("build" in service) == (service["image"] in OURS)
+        assert service["image"] in OWN_IMAGES | STOCK_IMAGES
+        assert ("build" in service) == (service["image"] in OWN_IMAGES)
         if "build" in service:
             assert service["build"]["target"] in targets
 
 
-def test_an_image_runs_as_nobody_in_particular_and_says_what_it_is() -> None:
+def test_image_runs_unprivileged_and_has_labels() -> None:
     for target in ("bunraku", "bus", "gateway"):
         stage = DOCKERFILE.partition(f" AS {target}\n")[2].partition("\nFROM ")[0]
         assert "\nUSER 10001:10001\n" in stage
@@ -112,11 +112,11 @@ def test_an_image_runs_as_nobody_in_particular_and_says_what_it_is() -> None:
     assert "--require-hashes" in DOCKERFILE
 
 
-def test_where_others_reach_the_gateway_the_services_need_a_secret() -> None:
+def test_services_know_whether_the_gateway_is_published() -> None:
     for name in ("ingest", "stream", "ik", "session", "page"):
-        given = SERVICES[name]["environment"]
-        assert given["BUNRAKU_PUBLISHED"] == "${BUNRAKU_ADDRESS:-127.0.0.1}"
-        assert given["BUNRAKU_SECRET"] == "${BUNRAKU_SECRET:-}"
-        # the gateway alone gets to them, and says who connects
-        assert given["FORWARDED_ALLOW_IPS"] == "*"
+        environment = SERVICES[name]["environment"]
+        assert environment["BUNRAKU_PUBLISHED"] == "${BUNRAKU_ADDRESS:-127.0.0.1}"
+        assert environment["BUNRAKU_SECRET"] == "${BUNRAKU_SECRET:-}"
+        # only the gateway reaches them, so its forwarded client address is trusted
+        assert environment["FORWARDED_ALLOW_IPS"] == "*"
         assert "ports" not in SERVICES[name]

@@ -1,4 +1,4 @@
-"""The gateway's paths are those of the services: each route of the interface goes to the one that has it."""
+"""Routing of the gateway: each route of the HTTP API goes to the service that has it."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ CADDYFILE = (REPOSITORY / "deploy" / "Caddyfile").read_text()
 
 
 def read_matchers() -> dict[str, re.Pattern[str]]:
-    """The named matchers, as expressions."""
+    """Return the named matchers of the Caddyfile as regular expressions."""
     found = {}
-    for name, kind, given in re.findall(r"^\t@(\w+) (path|path_regexp) (.+)$", CADDYFILE, re.MULTILINE):
+    for name, kind, patterns in re.findall(r"^\t@(\w+) (path|path_regexp) (.+)$", CADDYFILE, re.MULTILINE):
         if kind == "path_regexp":
-            found[f"@{name}"] = re.compile(given)
+            found[f"@{name}"] = re.compile(patterns)
         else:
-            words = (re.escape(word).replace(r"\*", ".*") for word in given.split())
+            words = (re.escape(word).replace(r"\*", ".*") for word in patterns.split())
             found[f"@{name}"] = re.compile(f"^({'|'.join(words)})$")
     return found
 
 
 def read_handles() -> list[tuple[str, str]]:
-    """What is handled, in order, and by which service."""
+    """Return the `handle` blocks in order: matcher and service."""
     return re.findall(
         r"^\thandle ?(\S*) \{\n\t\treverse_proxy \{\n\t\t\tdynamic a (\w+) 8000 \{", CADDYFILE, re.MULTILINE
     )
 
 
 def service_for(path: str) -> str:
-    """Who answers a path."""
-    known = read_matchers()
+    """Return the service to which the gateway routes a path."""
+    matchers = read_matchers()
     for matcher, service in read_handles():
-        if not matcher or matcher == path or (matcher in known and known[matcher].search(path)):
+        if not matcher or matcher == path or (matcher in matchers and matchers[matcher].search(path)):
             return service
-    raise AssertionError(f"nobody answers {path}")
+    raise AssertionError(f"no handle block matches {path}")
 
 
-def routes(service: str) -> Iterator[str]:
-    """The paths of a service's app, an id put in for each parameter."""
+def sample_paths(service: str) -> Iterator[str]:
+    """Yield the paths of a service with an id for each parameter."""
     for route in APPS[service]:
         yield re.sub(r"\{[^}]+\}", "1234abcd", route)
 
@@ -79,23 +79,23 @@ APPS: dict[str, list[str]] = {
 }
 
 
-async def paths(folder: Path, service: str) -> set[str]:
-    """The paths of a service's app, but those with which it describes itself."""
-    async with open_context(Settings(data=folder)) as backing:
-        made: dict[str, Callable[[], FastAPI]] = {
-            "stream": lambda: bunraku.stream.app.create_app(backing),
-            "ingest": lambda: bunraku.ingest.app.create_app(backing),
+async def app_paths(folder: Path, service: str) -> set[str]:
+    """Return the paths of a service's app, without those of its documentation."""
+    async with open_context(Settings(data=folder)) as context:
+        factories: dict[str, Callable[[], FastAPI]] = {
+            "stream": lambda: bunraku.stream.app.create_app(context),
+            "ingest": lambda: bunraku.ingest.app.create_app(context),
             "ik": bunraku.ik.app.create_app,
-            "session": lambda: bunraku.session.app.create_app(backing),
+            "session": lambda: bunraku.session.app.create_app(context),
         }
-        found = {str(getattr(route, "path", "")) for route in made[service]().routes}
+        found = {str(getattr(route, "path", "")) for route in factories[service]().routes}
     return {path for path in found if path.startswith("/v1/")}
 
 
 @pytest.mark.parametrize("service", sorted(APPS))
-async def test_what_a_service_answers_comes_to_it(service: str, tmp_path: Path) -> None:
-    assert await paths(tmp_path, service) == set(APPS[service])
-    for path in routes(service):
+async def test_gateway_routes_every_path_of_a_service_to_it(service: str, tmp_path: Path) -> None:
+    assert await app_paths(tmp_path, service) == set(APPS[service])
+    for path in sample_paths(service):
         assert service_for(path) == service, path
 
 
@@ -112,10 +112,10 @@ async def test_what_a_service_answers_comes_to_it(service: str, tmp_path: Path) 
         "/v1/shares",
     ],
 )
-def test_all_else_is_the_pages(path: str) -> None:
+def test_other_path_goes_to_the_page(path: str) -> None:
     assert service_for(path) == "page"
 
 
-def test_each_way_comes_upon_replicas_as_they_come_and_go() -> None:
+def test_every_service_is_resolved_dynamically() -> None:
     assert len(read_handles()) == CADDYFILE.count("reverse_proxy {") == CADDYFILE.count("\t\t\timport replicas\n") == 6
     assert {service for _, service in read_handles()} == {*APPS, "page"}

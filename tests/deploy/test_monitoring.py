@@ -1,4 +1,4 @@
-"""What watches the stack: our own Prometheus settings, rules and dashboard, on a real Prometheus and real services."""
+"""Monitoring of the stack: Prometheus settings, alert rules and dashboard, on a real Prometheus and real services."""
 
 from __future__ import annotations
 
@@ -30,52 +30,52 @@ CONFIG: dict[str, Any] = yaml.safe_load((OBSERVE / "prometheus.yml").read_text()
 TIMEOUT_S = 60
 
 
-def expressions() -> list[tuple[str, str]]:
-    """Of the dashboard: the panel, and what it shows."""
+def dashboard_queries() -> list[tuple[str, str]]:
+    """Return the panel title and expression of every query of the dashboard."""
     return [(panel["title"], target["expr"]) for panel in DASHBOARD["panels"] for target in panel["targets"]]
 
 
 class Prometheus:
-    """A server with our settings, asked over its API."""
+    """Client of the API of a Prometheus server."""
 
     def __init__(self, process: ServerProcess) -> None:
         self._url = f"http://127.0.0.1:{process.port}/api/v1"
 
     def get(self, path: str, **query: str) -> Any:
-        """Its answer; what it cannot do is an error."""
-        with urlopen(f"{self._url}/{path}?{urlencode(query)}", timeout=10) as answer:
-            told = json.load(answer)
-        assert told["status"] == "success", told
-        return told["data"]
+        """Return the `data` of a response; fail unless its status is success."""
+        with urlopen(f"{self._url}/{path}?{urlencode(query)}", timeout=10) as http_response:
+            response = json.load(http_response)
+        assert response["status"] == "success", response
+        return response["data"]
 
-    def found(self, expression: str) -> list[Any]:
-        """What an expression gives now."""
+    def query(self, expression: str) -> list[Any]:
+        """Return the current result of an expression."""
         return list(self.get("query", query=expression)["result"])
 
 
 @pytest.fixture
 def services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, tuple[ServerProcess, int]]]:
-    """Two processes, and where each has its metrics, by the name under which they are found."""
+    """Start two processes; return each with its metrics port, by service name."""
     monkeypatch.setenv("NO_COLOR", "1")
     (tmp_path / "nats").mkdir()
     with ExitStack() as stack, run_jetstream(tmp_path / "nats") as nats:
         monkeypatch.setenv("BUNRAKU_BUS", nats_url_of(nats))
-        built: dict[str, tuple[ServerProcess, int]] = {}
-        for name, also in (("session", ["--service", "ingest"]), ("stream", [])):
+        started: dict[str, tuple[ServerProcess, int]] = {}
+        for name, more_options in (("session", ["--service", "ingest"]), ("stream", [])):
             port, metrics = free_port(), free_port()
             monkeypatch.setenv("BUNRAKU_METRICS", f"127.0.0.1:{metrics}")
             (tmp_path / name).mkdir()
-            command = [sys.executable, "-m", "bunraku.cli", "up", "--port", str(port), "--service", name, *also]
+            command = [sys.executable, "-m", "bunraku.cli", "up", "--port", str(port), "--service", name, *more_options]
             process = ServerProcess([*command, "--data", str(tmp_path / "data")], port, tmp_path / name)
             stack.callback(process.stop)
             process.start()
-            built[name] = process, metrics
-        yield built
+            started[name] = process, metrics
+        yield started
 
 
 @pytest.fixture
 def prometheus(tmp_path: Path, services: dict[str, tuple[ServerProcess, int]]) -> Iterator[Prometheus]:
-    """With our own settings, but for how the services are found."""
+    """Start Prometheus with the settings of the stack, but with static targets instead of DNS discovery."""
     program = find_program("prometheus")
     folder = tmp_path / "prometheus"
     folder.mkdir()
@@ -83,8 +83,8 @@ def prometheus(tmp_path: Path, services: dict[str, tuple[ServerProcess, int]]) -
     targets = [
         {"targets": [f"127.0.0.1:{port}"], "labels": {"__meta_dns_name": name}} for name, (_, port) in services.items()
     ]
-    other = {**{key: value for key, value in job.items() if key != "dns_sd_configs"}, "static_configs": targets}
-    (folder / "prometheus.yml").write_text(yaml.safe_dump({**CONFIG, "scrape_configs": [other]}))
+    scrape_config = {**{key: value for key, value in job.items() if key != "dns_sd_configs"}, "static_configs": targets}
+    (folder / "prometheus.yml").write_text(yaml.safe_dump({**CONFIG, "scrape_configs": [scrape_config]}))
     (folder / "rules.yml").write_text((OBSERVE / "rules.yml").read_text())
     port = free_port()
     options = [f"--web.listen-address=127.0.0.1:{port}", f"--storage.tsdb.path={folder / 'data'}"]
@@ -96,36 +96,36 @@ def prometheus(tmp_path: Path, services: dict[str, tuple[ServerProcess, int]]) -
         process.stop()
 
 
-async def use(services: dict[str, tuple[ServerProcess, int]], source: Path) -> None:
-    """Something of all that is counted."""
-    at = {name: f"http://127.0.0.1:{process.port}" for name, (process, _) in services.items()}
-    async with Client(at["session"]) as client:
+async def use_services(services: dict[str, tuple[ServerProcess, int]], source: Path) -> None:
+    """Use every service, so that every metric has a value."""
+    urls = {name: f"http://127.0.0.1:{process.port}" for name, (process, _) in services.items()}
+    async with Client(urls["session"]) as client:
         motion = (await client.upload(source))["id"]
         session = (await client.open_session(motion))["id"]
         async with Puppeteer(client, session, "Aiko") as puppeteer:
             await puppeteer.claim("left_hand")
             for step in range(10):
                 await puppeteer.target("left_hand", 0.3 + 0.01 * step, 0.1, 0.4)
-            await Viewer(Client(at["stream"]).socket_url(f"/v1/sessions/{session}/stream")).watch(1)
-    async with httpx2.AsyncClient(base_url=at["stream"]) as http:
+            await Viewer(Client(urls["stream"]).socket_url(f"/v1/sessions/{session}/stream")).watch(1)
+    async with httpx2.AsyncClient(base_url=urls["stream"]) as http:
         assert (await http.get("/v1/nothing")).status_code == 404
 
 
-async def test_what_is_shown_is_there(
+async def test_every_panel_and_rule_has_data(
     tmp_path: Path, prometheus: Prometheus, services: dict[str, tuple[ServerProcess, int]]
 ) -> None:
     source = tmp_path / "one.bvh"
     source.write_bytes(make_bvh_clip(4.0, 1))
     end = time.monotonic() + TIMEOUT_S
-    # what is counted for the first time has no rate yet: it is done again until every panel has something
-    missing = expressions()
+    # a counter has no rate after its first increment: repeat until every panel has data
+    missing = dashboard_queries()
     while missing:
-        await use(services, source)
-        missing = [(title, one) for title, one in missing if not prometheus.found(one)]
+        await use_services(services, source)
+        missing = [(title, one) for title, one in missing if not prometheus.query(one)]
         assert time.monotonic() < end, missing
-    asked = {target["labels"]["service"]: target for target in prometheus.get("targets")["activeTargets"]}
-    assert asked.keys() == services.keys()
-    assert all(target["health"] == "up" and not target["lastError"] for target in asked.values())
+    targets = {target["labels"]["service"]: target for target in prometheus.get("targets")["activeTargets"]}
+    assert targets.keys() == services.keys()
+    assert all(target["health"] == "up" and not target["lastError"] for target in targets.values())
 
     (group,) = prometheus.get("rules")["groups"]
     rules = {rule["name"]: rule for rule in group["rules"]}
@@ -134,36 +134,40 @@ async def test_what_is_shown_is_there(
         assert time.monotonic() < end, rules
         rules = {rule["name"]: rule for rule in prometheus.get("rules")["groups"][0]["rules"]}
     assert [rule["lastError"] for rule in rules.values() if rule.get("lastError")] == []
-    # of five services two are here, and all else is well but for what a slow machine is late with
+    # two of five services run; SolvingLate may fire on a slow machine
     assert {name for name, rule in rules.items() if rule["state"] != "inactive"} - {"SolvingLate"} == {"ServiceMissing"}
 
 
-def test_the_settings_are_such_as_prometheus_takes() -> None:
+def test_prometheus_accepts_the_settings() -> None:
     program = find_program("promtool")
     for command in (["config", "--syntax-only", "prometheus.yml"], ["rules", "rules.yml"]):
         checked = subprocess.run([program, "check", *command], cwd=OBSERVE, capture_output=True, text=True, check=False)
         assert checked.returncode == 0, checked.stdout + checked.stderr
     (job,) = CONFIG["scrape_configs"]
-    (found,) = job["dns_sd_configs"]
+    (query,) = job["dns_sd_configs"]
     compose = yaml.safe_load((REPOSITORY / "docker-compose.yml").read_text())["services"]
-    ours = {name for name, service in compose.items() if "BUNRAKU_METRICS" in service.get("environment", {})}
-    assert set(found["names"]) == ours
-    assert {compose[name]["environment"]["BUNRAKU_METRICS"] for name in ours} == {f"0.0.0.0:{found['port']}"}
+    services_with_metrics = {
+        name for name, service in compose.items() if "BUNRAKU_METRICS" in service.get("environment", {})
+    }
+    assert set(query["names"]) == services_with_metrics
+    assert {compose[name]["environment"]["BUNRAKU_METRICS"] for name in services_with_metrics} == {
+        f"0.0.0.0:{query['port']}"
+    }
 
 
-def test_every_panel_says_what_it_shows_and_in_what() -> None:
+def test_every_panel_has_description_unit_and_legend() -> None:
     assert len(DASHBOARD["panels"]) <= 16
     for panel in DASHBOARD["panels"]:
         assert panel["description"].endswith((".", "hidden"))
         assert panel["fieldConfig"]["defaults"]["unit"]
         assert all(target["legendFormat"] for target in panel["targets"])
-    places = [(p["gridPos"]["x"], p["gridPos"]["y"]) for p in DASHBOARD["panels"]]
-    assert len(set(places)) == len(places)
+    positions = [(p["gridPos"]["x"], p["gridPos"]["y"]) for p in DASHBOARD["panels"]]
+    assert len(set(positions)) == len(positions)
     source = yaml.safe_load((OBSERVE / "datasource.yml").read_text())["datasources"][0]["uid"]
     assert {panel["datasource"]["uid"] for panel in DASHBOARD["panels"]} == {source}
 
 
-def test_what_is_in_the_images_is_in_the_folder() -> None:
+def test_images_contain_every_monitoring_file() -> None:
     dockerfile = (REPOSITORY / "deploy" / "Dockerfile").read_text()
     copied = set(re.findall(r"deploy/observe/(\S+)", dockerfile))
     assert copied == {path.name for path in OBSERVE.iterdir()}
@@ -179,21 +183,21 @@ def test_what_is_in_the_images_is_in_the_folder() -> None:
         ("192.0.2.1", "a password", "false", True),
     ],
 )
-def test_who_is_here_looks_without_a_login_and_others_with_one(
+def test_grafana_needs_a_login_unless_it_listens_on_loopback(
     address: str, password: str, anonymous: str, login: bool
 ) -> None:
-    given = {"BUNRAKU_GRAFANA_ADDRESS": address, "BUNRAKU_GRAFANA_PASSWORD": password, "GRAFANA": "/usr/bin/env"}
-    given["PATH"] = os.environ["PATH"]
-    begun = subprocess.run([OBSERVE / "grafana"], env=given, capture_output=True, text=True, check=True)
-    settings = dict(line.split("=", 1) for line in begun.stdout.splitlines() if line.startswith("GF_"))
+    environment = {"BUNRAKU_GRAFANA_ADDRESS": address, "BUNRAKU_GRAFANA_PASSWORD": password, "GRAFANA": "/usr/bin/env"}
+    environment["PATH"] = os.environ["PATH"]
+    result = subprocess.run([OBSERVE / "grafana"], env=environment, capture_output=True, text=True, check=True)
+    settings = dict(line.split("=", 1) for line in result.stdout.splitlines() if line.startswith("GF_"))
     assert settings["GF_AUTH_ANONYMOUS_ENABLED"] == anonymous
     assert (settings.get("GF_SECURITY_ADMIN_PASSWORD") == password) == login
     assert len(settings["GF_SECURITY_ADMIN_PASSWORD"]) == (len(password) if login else 44)
     assert (settings.get("GF_AUTH_DISABLE_LOGIN_FORM") == "true") == (not login)
 
 
-def test_where_others_come_it_does_not_begin_without_a_password() -> None:
-    given = {"BUNRAKU_GRAFANA_ADDRESS": "0.0.0.0", "BUNRAKU_GRAFANA_PASSWORD": "", "GRAFANA": "/usr/bin/env"}
-    begun = subprocess.run([OBSERVE / "grafana"], env=given, capture_output=True, text=True, check=False)
-    assert begun.returncode == 1
-    assert "set BUNRAKU_GRAFANA_PASSWORD" in begun.stderr
+def test_published_grafana_refuses_to_start_without_a_password() -> None:
+    environment = {"BUNRAKU_GRAFANA_ADDRESS": "0.0.0.0", "BUNRAKU_GRAFANA_PASSWORD": "", "GRAFANA": "/usr/bin/env"}
+    result = subprocess.run([OBSERVE / "grafana"], env=environment, capture_output=True, text=True, check=False)
+    assert result.returncode == 1
+    assert "set BUNRAKU_GRAFANA_PASSWORD" in result.stderr

@@ -1,4 +1,4 @@
-"""The three NATS servers of deploy/kubernetes/overlays/cluster, with its own file: one may die."""
+"""Three NATS servers with the configuration of deploy/kubernetes/overlays/cluster: one may fail."""
 
 from __future__ import annotations
 
@@ -26,64 +26,64 @@ def servers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Se
     monkeypatch.setenv("BUNRAKU_BUS_PASSWORD", "0123abcd")
     program = find_program("nats-server")
     routes = [free_port() for _ in range(SERVERS)]
-    every = ",".join(f"nats://bunraku:0123abcd@127.0.0.1:{port}" for port in routes)
+    routes_url = ",".join(f"nats://bunraku:0123abcd@127.0.0.1:{port}" for port in routes)
     with ExitStack() as stack:
-        made = []
+        started = []
         for number in range(SERVERS):
             folder = tmp_path / f"nats-{number}"
             folder.mkdir()
-            there = {"0.0.0.0:6222": f"127.0.0.1:{routes[number]}", "/var/lib/nats": str(folder / "store")}
-            file, port = localize_config(CONFIG, folder, there), free_port()
-            # of a name each, as the cluster's pods have
-            command = ["env", f"BUNRAKU_BUS_NAME=nats-{number}", program, f"--config={file}", f"--routes={every}"]
+            replacements = {"0.0.0.0:6222": f"127.0.0.1:{routes[number]}", "/var/lib/nats": str(folder / "store")}
+            file, port = localize_config(CONFIG, folder, replacements), free_port()
+            # each has a name, as the pods of the cluster have
+            command = ["env", f"BUNRAKU_BUS_NAME=nats-{number}", program, f"--config={file}", f"--routes={routes_url}"]
             server = ServerProcess([*command, "-a", "127.0.0.1", "-p", str(port)], port, folder)
             stack.callback(server.stop)
             server.start()
-            made.append(server)
-        yield made
+            started.append(server)
+        yield started
 
 
-async def put_when_available(register: NatsKeyValueStore, key: str, value: bytes) -> None:
-    """Put, once the servers agree on who leads them."""
+async def put_when_available(key_values: NatsKeyValueStore, key: str, value: bytes) -> None:
+    """Put a value; retry until the servers have elected a leader."""
     async with asyncio.timeout(60):
         while True:
             try:
-                await register.put(key, value)
+                await key_values.put(key, value)
             except BackendUnavailable:
                 await asyncio.sleep(0.1)
             else:
                 return
 
 
-async def test_the_register_outlives_any_one_of_three_servers(servers: list[ServerProcess]) -> None:
+async def test_key_value_store_survives_the_loss_of_any_one_server(servers: list[ServerProcess]) -> None:
     bus = NatsBus("nats://" + ",".join(f"bunraku:0123abcd@127.0.0.1:{server.port}" for server in servers))
     await bus.open(20)
     try:
-        register = NatsKeyValueStore(bus, SERVERS)
-        await put_when_available(register, "sessions.a", b"1")
+        key_values = NatsKeyValueStore(bus, SERVERS)
+        await put_when_available(key_values, "sessions.a", b"1")
         for number, server in enumerate(servers):
             await asyncio.to_thread(server.kill)
-            # whichever it was, the leader or the one that the bus was connected to
-            await put_when_available(register, f"sessions.{number}", b"2")
-            found = await register.list_prefix("sessions")
+            # the killed server may be the leader or the one to which the bus was connected
+            await put_when_available(key_values, f"sessions.{number}", b"2")
+            found = await key_values.list_prefix("sessions")
             assert found["sessions.a"].value == b"1"
             assert len(found) == number + 2
             await asyncio.to_thread(server.start)
-            # all three have it again before the next one goes
+            # all three are up to date before the next one is killed
             await wait_for_replication(bus)
     finally:
         await bus.close()
 
 
 async def wait_for_replication(bus: NatsBus) -> None:
-    """Until the register's bucket is up to date at every server."""
+    """Wait until the bucket is up to date at every server."""
 
     async with asyncio.timeout(60):
         while True:
             try:
-                told = json.loads(await bus.request("$JS.API.STREAM.INFO.KV_bunraku"))
-                others = told["cluster"]["replicas"]
-                if len(others) == SERVERS - 1 and all(one["current"] for one in others):
+                info = json.loads(await bus.request("$JS.API.STREAM.INFO.KV_bunraku"))
+                replicas = info["cluster"]["replicas"]
+                if len(replicas) == SERVERS - 1 and all(one["current"] for one in replicas):
                     return
             except (KeyError, BackendUnavailable):
                 pass

@@ -1,4 +1,4 @@
-"""Every route and socket of a real server with a secret, tried with all that should not let in, and with what does."""
+"""Access control of every route and WebSocket of a real server with a secret: all invalid tokens, and valid ones."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import httpx2
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
 
 from bunraku.http.access_control import Role
 from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Problem, Welcome, unpack
@@ -20,7 +21,7 @@ from tests.servers import make_bvh_clip, run_server
 
 TIMEOUT_S = 20
 UNKNOWN_ID = "x" * 20
-"""An id of nothing."""
+"""An id that does not exist."""
 
 ROUTES: dict[tuple[str, str], Role | None] = {
     ("GET", "/livez"): None,
@@ -76,9 +77,9 @@ INVALID_TOKENS: dict[str, Callable[[], str | None]] = {
 }
 
 
-def body_without_request_id(answer: httpx2.Response) -> str:
-    """What is answered, but for what the request is called."""
-    return answer.text.replace(answer.headers["x-request-id"], "")
+def body_without_request_id(response: httpx2.Response) -> str:
+    """Return the body of a response without its request id."""
+    return response.text.replace(response.headers["x-request-id"], "")
 
 
 @dataclass
@@ -91,8 +92,8 @@ class GuardedServer:
     revoked: str
 
     def fill_path(self, path: str) -> str:
-        """A path with what is there in its places."""
-        places = {
+        """Return `path` with its parameters replaced by existing ids."""
+        parameters = {
             "motion": self.motion,
             "session": self.session,
             "rate": "0",
@@ -102,11 +103,11 @@ class GuardedServer:
             "upload": "unknown-upload",
             "share": "0" * 18,
         }
-        return path.format(**places)
+        return path.format(**parameters)
 
 
 @pytest.fixture(scope="module")
-def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GuardedServer]:
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GuardedServer]:
     with run_server(tmp_path_factory.mktemp("guarded"), secret=SECRET, connects=0) as url:
         with httpx2.Client(base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=60) as http:
             motion = http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(2.0, 5)).json()["id"]
@@ -117,67 +118,70 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GuardedServer]:
         yield GuardedServer(url, motion, session, share["token"])
 
 
-def test_the_table_has_every_route_and_socket_of_the_server(house: GuardedServer) -> None:
-    described = httpx2.get(f"{house.url}/v1/openapi.json").json()
-    told = {(method.upper(), path) for path, methods in described["paths"].items() for method in methods}
-    assert told == {key for key in ROUTES if key[1] not in ("/v1/openapi.json", "/v1/docs")}
+def test_openapi_lists_every_route_with_its_role(guarded: GuardedServer) -> None:
+    described = httpx2.get(f"{guarded.url}/v1/openapi.json").json()
+    listed = {(method.upper(), path) for path, methods in described["paths"].items() for method in methods}
+    assert listed == {key for key in ROUTES if key[1] not in ("/v1/openapi.json", "/v1/docs")}
     roles = {
-        (method.upper(), path): said.get("x-role")
+        (method.upper(), path): operation.get("x-role")
         for path, methods in described["paths"].items()
-        for method, said in methods.items()
+        for method, operation in methods.items()
     }
-    assert roles == {key: None if ROUTES[key] is None else ROUTES[key].label for key in told}  # type: ignore[union-attr]
+    required_roles = {key: ROUTES[key] for key in listed}
+    assert roles == {key: None if role is None else role.label for key, role in required_roles.items()}
 
 
 @pytest.mark.parametrize("bad", [*INVALID_TOKENS, "revoked"])
-def test_what_is_no_good_token_opens_nothing(house: GuardedServer, bad: str) -> None:
-    held = house.revoked if bad == "revoked" else INVALID_TOKENS[bad]()
-    with httpx2.Client(base_url=house.url, headers=bearer_headers(held)) as http:
+def test_invalid_token_is_rejected_on_every_route(guarded: GuardedServer, bad: str) -> None:
+    token = guarded.revoked if bad == "revoked" else INVALID_TOKENS[bad]()
+    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(token)) as http:
         for (method, path), role in ROUTES.items():
-            answer = http.request(method, house.fill_path(path))
+            response = http.request(method, guarded.fill_path(path))
             if role is None:
-                assert answer.status_code == 200, path
+                assert response.status_code == 200, path
                 continue
-            assert answer.status_code == 401, (method, path)
-            assert answer.headers["www-authenticate"].startswith("Bearer realm=")
-            assert answer.headers["content-type"] == "application/problem+json"
-            # the same about what is there and what is not
+            assert response.status_code == 401, (method, path)
+            assert response.headers["www-authenticate"].startswith("Bearer realm=")
+            assert response.headers["content-type"] == "application/problem+json"
+            # the response does not reveal whether the resource exists
             other = http.request(
-                method, house.fill_path(path).replace(house.motion, UNKNOWN_ID).replace(house.session, UNKNOWN_ID)
+                method, guarded.fill_path(path).replace(guarded.motion, UNKNOWN_ID).replace(guarded.session, UNKNOWN_ID)
             )
-            assert (other.status_code, body_without_request_id(other)) == (401, body_without_request_id(answer))
+            assert (other.status_code, body_without_request_id(other)) == (401, body_without_request_id(response))
             title = {"none": "A link is needed", "expired": "Link expired", "revoked": "Link revoked"}
-            assert answer.json()["title"] == title.get(bad, "Link not valid")
+            assert response.json()["title"] == title.get(bad, "Link not valid")
 
 
 @pytest.mark.parametrize("role", Role)
-def test_each_role_may_do_what_the_table_says(house: GuardedServer, role: Role) -> None:
-    with httpx2.Client(base_url=house.url, headers=bearer_headers(make_token(role)), timeout=60) as http:
-        for (method, path), needs in ROUTES.items():
-            if method == "DELETE" and role >= (needs or Role.VIEW):
-                continue  # below, of things that may go
-            answer = http.request(method, house.fill_path(path))
-            if needs is None or role >= needs:
-                assert answer.status_code not in (401, 403), (method, path, answer.text)
-                assert answer.status_code < 500
+def test_role_grants_exactly_the_listed_routes(guarded: GuardedServer, role: Role) -> None:
+    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(make_token(role)), timeout=60) as http:
+        for (method, path), required_role in ROUTES.items():
+            if method == "DELETE" and role >= (required_role or Role.VIEW):
+                continue  # deletions have their own tests below
+            response = http.request(method, guarded.fill_path(path))
+            if required_role is None or role >= required_role:
+                assert response.status_code not in (401, 403), (method, path, response.text)
+                assert response.status_code < 500
             else:
-                assert answer.status_code == 403, (method, path)
-                assert answer.json()["needed"] == needs.label
-                assert f'scope="{needs.label}"' in answer.headers["www-authenticate"]
-                other = http.request(method, house.fill_path(path).replace(house.motion, UNKNOWN_ID))
-                assert (other.status_code, body_without_request_id(other)) == (403, body_without_request_id(answer))
+                assert response.status_code == 403, (method, path)
+                assert response.json()["needed"] == required_role.label
+                assert f'scope="{required_role.label}"' in response.headers["www-authenticate"]
+                other = http.request(method, guarded.fill_path(path).replace(guarded.motion, UNKNOWN_ID))
+                assert (other.status_code, body_without_request_id(other)) == (403, body_without_request_id(response))
 
 
 async def read_until_closed(socket: ClientConnection) -> None:
-    """Read until there is nothing more."""
+    """Read until the server closes the connection."""
     async with asyncio.timeout(TIMEOUT_S):
         while True:
             await socket.recv()
 
 
 async def first_message(url: str, request_headers: dict[str, str]) -> tuple[object, int | None]:
-    """The first message of a socket, and the code with which it was closed if it was."""
-    async with connect(url, subprotocols=[SUBPROTOCOL], compression=None, additional_headers=request_headers) as socket:  # type: ignore[list-item]
+    """Return the first message of a connection, and its close code if that message was a `Problem`."""
+    async with connect(
+        url, subprotocols=[Subprotocol(SUBPROTOCOL)], compression=None, additional_headers=request_headers
+    ) as socket:
         data = await socket.recv()
         assert isinstance(data, bytes)
         message = unpack(data)
@@ -187,35 +191,33 @@ async def first_message(url: str, request_headers: dict[str, str]) -> tuple[obje
             await socket.recv()
         except ConnectionClosed as closed:
             return message, closed.rcvd.code if closed.rcvd else None
-        raise AssertionError("a problem is the last word")
+        raise AssertionError("the connection stayed open after a Problem")
 
 
 @pytest.mark.parametrize("bad", [*INVALID_TOKENS, "revoked"])
-async def test_no_socket_opens_with_what_is_no_good_token(house: GuardedServer, bad: str) -> None:
-    held = house.revoked if bad == "revoked" else INVALID_TOKENS[bad]()
+async def test_invalid_token_closes_every_websocket_with_4401(guarded: GuardedServer, bad: str) -> None:
+    token = guarded.revoked if bad == "revoked" else INVALID_TOKENS[bad]()
     for path in WEBSOCKETS:
-        address = house.url.replace("http", "ws") + house.fill_path(path)
-        there = await first_message(address, bearer_headers(held))
-        assert isinstance(there[0], Problem)
-        assert there[1] == 4401
-        away = await first_message(
-            address.replace(house.motion, UNKNOWN_ID).replace(house.session, UNKNOWN_ID), bearer_headers(held)
+        address = guarded.url.replace("http", "ws") + guarded.fill_path(path)
+        existing = await first_message(address, bearer_headers(token))
+        assert isinstance(existing[0], Problem)
+        assert existing[1] == 4401
+        missing = await first_message(
+            address.replace(guarded.motion, UNKNOWN_ID).replace(guarded.session, UNKNOWN_ID), bearer_headers(token)
         )
-        assert away == there
+        assert missing == existing
 
 
 @pytest.mark.parametrize("role", Role)
-async def test_sockets_open_by_role_with_a_token_or_a_ticket_and_a_ticket_is_good_once(
-    house: GuardedServer, role: Role
-) -> None:
-    async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(make_token(role))) as http:
-        for path, needs in WEBSOCKETS.items():
-            address = house.url.replace("http", "ws") + house.fill_path(path)
+async def test_websocket_accepts_token_or_single_use_ticket_by_role(guarded: GuardedServer, role: Role) -> None:
+    async with httpx2.AsyncClient(base_url=guarded.url, headers=bearer_headers(make_token(role))) as http:
+        for path, required_role in WEBSOCKETS.items():
+            address = guarded.url.replace("http", "ws") + guarded.fill_path(path)
             ticket = (await http.post("/v1/tickets")).json()["ticket"]
             assert len(ticket) < 64
             by_token = await first_message(address, bearer_headers(make_token(role)))
             by_ticket = await first_message(f"{address}?ticket={ticket}", {})
-            if role >= needs:
+            if role >= required_role:
                 for message, _ in (by_token, by_ticket):
                     assert isinstance(message, ChannelHeader | Welcome)
                 again = await first_message(f"{address}?ticket={ticket}", {})
@@ -224,62 +226,64 @@ async def test_sockets_open_by_role_with_a_token_or_a_ticket_and_a_ticket_is_goo
                 assert by_token[1] == by_ticket[1] == 4403
 
 
-async def test_one_who_speaks_another_protocol_is_told_that_first(house: GuardedServer) -> None:
+async def test_missing_subprotocol_closes_with_4406(guarded: GuardedServer) -> None:
     for path in WEBSOCKETS:
-        async with connect(house.url.replace("http", "ws") + house.fill_path(path)) as socket:
+        async with connect(guarded.url.replace("http", "ws") + guarded.fill_path(path)) as socket:
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 4406
 
 
-async def test_one_who_is_bound_sees_that_alone_and_of_the_rest_not_whether_it_is_there(house: GuardedServer) -> None:
-    async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(make_token()), timeout=60) as host:
+async def test_bound_token_sees_nothing_but_its_resource(guarded: GuardedServer) -> None:
+    async with httpx2.AsyncClient(base_url=guarded.url, headers=bearer_headers(make_token()), timeout=60) as host:
         other = (await host.post("/v1/motions?filename=b.bvh", content=make_bvh_clip(1.0, 6))).json()["id"]
-        elsewhere = (await host.post("/v1/sessions", json={"motion": other})).json()["id"]
-        for bound, shown in (("session", house.session), ("motion", house.motion)):
+        other_session = (await host.post("/v1/sessions", json={"motion": other})).json()["id"]
+        for bound, bound_id in (("session", guarded.session), ("motion", guarded.motion)):
             guest = make_token(
-                Role.CONTROL, session=shown if bound == "session" else None, motion=shown if bound == "motion" else None
+                Role.CONTROL,
+                session=bound_id if bound == "session" else None,
+                motion=bound_id if bound == "motion" else None,
             )
-            async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(guest)) as http:
+            async with httpx2.AsyncClient(base_url=guarded.url, headers=bearer_headers(guest)) as http:
                 motions = (await http.get("/v1/motions")).json()["items"]
-                assert [one["id"] for one in motions] == [house.motion]
+                assert [one["id"] for one in motions] == [guarded.motion]
                 sessions = (await http.get("/v1/sessions")).json()["items"]
-                assert [one["id"] for one in sessions] == ([house.session] if bound == "session" else [])
-                assert (await http.get(f"/v1/motions/{house.motion}")).status_code == 200
-                there = (await http.get(f"/v1/sessions/{house.session}")).status_code
-                assert there == (200 if bound == "session" else 404)
+                assert [one["id"] for one in sessions] == ([guarded.session] if bound == "session" else [])
+                assert (await http.get(f"/v1/motions/{guarded.motion}")).status_code == 200
+                existing = (await http.get(f"/v1/sessions/{guarded.session}")).status_code
+                assert existing == (200 if bound == "session" else 404)
                 for path, hidden in (
                     ("/v1/motions/{}", other),
                     ("/v1/motions/{}/description", other),
                     ("/v1/motions/{}/blocks/0/0", other),
-                    ("/v1/sessions/{}", elsewhere),
+                    ("/v1/sessions/{}", other_session),
                 ):
                     seen, missing = await http.get(path.format(hidden)), await http.get(path.format(UNKNOWN_ID))
                     assert seen.status_code == missing.status_code == 404
                     assert body_without_request_id(seen).replace(hidden, UNKNOWN_ID) == body_without_request_id(missing)
-                for asked in ({"session": elsewhere}, {"motion": other}):
-                    ((name, hidden),) = asked.items()
+                for body in ({"session": other_session}, {"motion": other}):
+                    ((name, hidden),) = body.items()
                     seen, missing = [await http.post("/v1/shares", json={name: one}) for one in (hidden, UNKNOWN_ID)]
                     assert seen.status_code == missing.status_code == 404
                     assert body_without_request_id(seen).replace(hidden, UNKNOWN_ID) == body_without_request_id(missing)
-                # a guest neither opens, ends, nor changes a session
-                assert (await http.post("/v1/sessions", json={"motion": house.motion})).status_code == 403
+                # a guest may not open or change a session
+                assert (await http.post("/v1/sessions", json={"motion": guarded.motion})).status_code == 403
                 edited = [
-                    await http.patch(f"/v1/sessions/{house.session}", json={"motion": m}) for m in (other, UNKNOWN_ID)
+                    await http.patch(f"/v1/sessions/{guarded.session}", json={"motion": m}) for m in (other, UNKNOWN_ID)
                 ]
                 assert body_without_request_id(edited[0]) == body_without_request_id(edited[1])
                 assert edited[0].status_code == (403 if bound == "session" else 404)
-            for path, hidden in (("motions", other), ("sessions", elsewhere)):
-                address = house.url.replace("http", "ws") + f"/v1/{path}/{{}}/stream"
+            for path, hidden in (("motions", other), ("sessions", other_session)):
+                address = guarded.url.replace("http", "ws") + f"/v1/{path}/{{}}/stream"
                 seen_there = await first_message(address.format(hidden), bearer_headers(guest))
                 seen_not = await first_message(address.format(UNKNOWN_ID), bearer_headers(guest))
                 assert seen_there[1] == seen_not[1] == 4404
                 assert str(seen_there[0]).replace(hidden, UNKNOWN_ID) == str(seen_not[0])
 
 
-def test_who_stores_removes_their_own_and_an_admin_all(house: GuardedServer) -> None:
-    with httpx2.Client(base_url=house.url, timeout=60) as http:
+def test_motion_is_deleted_by_its_owner_or_an_admin(guarded: GuardedServer) -> None:
+    with httpx2.Client(base_url=guarded.url, timeout=60) as http:
         mine, theirs = (bearer_headers(make_token(Role.INGEST, name)) for name in ("aiko", "ben"))
         made = http.post("/v1/motions?filename=c.bvh", content=make_bvh_clip(1.0, 7), headers=mine).json()["id"]
         assert http.delete(f"/v1/motions/{made}", headers=theirs).status_code == 403
@@ -288,10 +292,10 @@ def test_who_stores_removes_their_own_and_an_admin_all(house: GuardedServer) -> 
         assert http.delete(f"/v1/motions/{again}", headers=bearer_headers(make_token())).status_code == 204
 
 
-def test_links_are_their_makers_and_the_admin_s(house: GuardedServer) -> None:
-    with httpx2.Client(base_url=house.url) as http:
+def test_share_link_is_managed_by_its_creator_or_an_admin(guarded: GuardedServer) -> None:
+    with httpx2.Client(base_url=guarded.url) as http:
         mine, theirs = (bearer_headers(make_token(Role.CONTROL, name)) for name in ("aiko", "ben"))
-        share = http.post("/v1/shares", json={"session": house.session, "seconds": 60}, headers=mine).json()
+        share = http.post("/v1/shares", json={"session": guarded.session, "seconds": 60}, headers=mine).json()
         assert "token" not in http.get("/v1/shares", headers=mine).text
         assert [one["id"] for one in http.get("/v1/shares", headers=mine).json()["items"]] == [share["id"]]
         assert http.get("/v1/shares", headers=theirs).json()["items"] == []
@@ -301,47 +305,47 @@ def test_links_are_their_makers_and_the_admin_s(house: GuardedServer) -> None:
         assert hidden.status_code == missing.status_code == 404
         assert body_without_request_id(hidden).replace(share["id"], "0" * 18) == body_without_request_id(missing)
         viewer = bearer_headers(share["token"])
-        assert http.get(f"/v1/sessions/{house.session}", headers=viewer).status_code == 200
-        assert http.patch(f"/v1/sessions/{house.session}", json={"playing": False}, headers=viewer).status_code == 403
+        assert http.get(f"/v1/sessions/{guarded.session}", headers=viewer).status_code == 200
+        assert http.patch(f"/v1/sessions/{guarded.session}", json={"playing": False}, headers=viewer).status_code == 403
         assert http.delete(f"/v1/shares/{share['id']}", headers=mine).status_code == 204
-        assert http.get(f"/v1/sessions/{house.session}", headers=viewer).json()["title"] == "Link revoked"
+        assert http.get(f"/v1/sessions/{guarded.session}", headers=viewer).json()["title"] == "Link revoked"
 
 
-async def test_what_is_open_with_a_link_that_is_revoked_is_ended(house: GuardedServer) -> None:
-    async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(make_token())) as http:
-        share = (await http.post("/v1/shares", json={"session": house.session})).json()
+async def test_revoking_a_link_closes_its_connections(guarded: GuardedServer) -> None:
+    async with httpx2.AsyncClient(base_url=guarded.url, headers=bearer_headers(make_token())) as http:
+        share = (await http.post("/v1/shares", json={"session": guarded.session})).json()
         ticket = (await http.post("/v1/tickets", headers=bearer_headers(share["token"]))).json()["ticket"]
         unused = (await http.post("/v1/tickets", headers=bearer_headers(share["token"]))).json()["ticket"]
-        address = house.url.replace("http", "ws") + f"/v1/sessions/{house.session}/stream"
-        async with connect(f"{address}?ticket={ticket}", subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
+        address = guarded.url.replace("http", "ws") + f"/v1/sessions/{guarded.session}/stream"
+        async with connect(f"{address}?ticket={ticket}", subprotocols=[Subprotocol(SUBPROTOCOL)]) as socket:
             await socket.recv()
             assert (await http.delete(f"/v1/shares/{share['id']}")).status_code == 204
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
             assert closed.value.rcvd is not None
             assert (closed.value.rcvd.code, closed.value.rcvd.reason[:12]) == (4401, "Link revoked")
-        # a ticket that was given before is good no more
+        # a ticket issued before the revocation is invalid
         assert (await first_message(f"{address}?ticket={unused}", {}))[1] == 4401
 
 
-async def test_an_open_socket_ends_with_its_token(house: GuardedServer) -> None:
+async def test_websocket_closes_when_its_token_expires(guarded: GuardedServer) -> None:
     for path in ("stream", "control"):
-        address = house.url.replace("http", "ws") + f"/v1/sessions/{house.session}/{path}"
-        held = bearer_headers(make_token(Role.CONTROL, lifetime_s=2))
-        async with connect(address, subprotocols=[SUBPROTOCOL], additional_headers=held) as socket:  # type: ignore[list-item]
+        address = guarded.url.replace("http", "ws") + f"/v1/sessions/{guarded.session}/{path}"
+        token = bearer_headers(make_token(Role.CONTROL, lifetime_s=2))
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=token) as socket:
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 4401
 
 
-async def test_what_needs_a_token_is_kept_by_no_cache_on_the_way(house: GuardedServer) -> None:
-    async with httpx2.AsyncClient(base_url=house.url, headers=bearer_headers(make_token())) as http:
-        for path in (f"/v1/motions/{house.motion}/blocks/0/0", "/v1/arms/393-351-256-560-320-120/table"):
+async def test_protected_resource_is_not_cached_by_proxies(guarded: GuardedServer) -> None:
+    async with httpx2.AsyncClient(base_url=guarded.url, headers=bearer_headers(make_token())) as http:
+        for path in (f"/v1/motions/{guarded.motion}/blocks/0/0", "/v1/arms/393-351-256-560-320-120/table"):
             assert "private" in (await http.get(path)).headers["cache-control"]
 
 
-def test_a_server_that_is_open_lets_everybody_do_everything(tmp_path: Path) -> None:
+def test_server_without_secret_allows_every_request(tmp_path: Path) -> None:
     with run_server(tmp_path) as url, httpx2.Client(base_url=url, headers=bearer_headers("whatever")) as http:
         assert http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 8)).status_code == 201
         assert http.post("/v1/tickets").status_code == 201

@@ -1,10 +1,11 @@
-"""Two replicas that share a secret, a catalogue and a real nats-server: what one gives is good once at either."""
+"""Tickets and share links across two replicas that share a secret, a catalogue and a real nats-server."""
 
 from __future__ import annotations
 
 import asyncio
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import pytest
@@ -22,53 +23,53 @@ TIMEOUT_S = 20
 
 
 async def first_message(url: str) -> object:
-    """The first message of a socket."""
+    """Return the first message of a connection."""
     async with connect(url, subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
         data = await socket.recv()
         assert isinstance(data, bytes)
         return unpack(data)
 
 
-async def test_tickets_and_links_hold_across_replicas(tmp_path: Path) -> None:
+async def test_ticket_and_share_link_are_valid_at_every_replica(tmp_path: Path) -> None:
     (tmp_path / "nats").mkdir()
     source = tmp_path / "a.bvh"
     source.write_bytes(make_bvh_clip(2.0, 5))
     with ExitStack() as stack:
         nats = stack.enter_context(run_jetstream(tmp_path / "nats"))
-        given = {"bus": nats_url_of(nats), "secret": SECRET}
-        one, two = [stack.enter_context(run_server(tmp_path / "data", **given)) for _ in range(2)]  # type: ignore[arg-type]
+        options: dict[str, Any] = {"bus": nats_url_of(nats), "secret": SECRET}
+        one, two = [stack.enter_context(run_server(tmp_path / "data", **options)) for _ in range(2)]
         async with Client(one, make_token(Role.ADMIN)) as host, httpx2.AsyncClient(base_url=two) as other:
             motion = (await host.upload(source))["id"]
             session = (await host.open_session(motion))["id"]
             share = await host.share(session=session)
             stream = f"/v1/sessions/{session}/stream"
-            for giver, taker in ((one, two), (two, one)):
-                async with httpx2.AsyncClient(base_url=giver, headers=bearer_headers(share["token"])) as viewer:
+            for issuer, redeemer in ((one, two), (two, one)):
+                async with httpx2.AsyncClient(base_url=issuer, headers=bearer_headers(share["token"])) as viewer:
                     ticket = (await viewer.post("/v1/tickets")).json()["ticket"]
-                address = taker.replace("http", "ws") + f"{stream}?ticket={ticket}"
+                address = redeemer.replace("http", "ws") + f"{stream}?ticket={ticket}"
                 assert isinstance(await first_message(address), ChannelHeader)
-                for again in (address, address.replace(taker.replace("http", "ws"), giver.replace("http", "ws"))):
-                    refused = await first_message(again)
-                    assert isinstance(refused, Problem)
-                    assert refused.title == "Ticket not valid"
-            # a link that is revoked at one replica is good no more at the other, and what is open there ends
-            watching = two.replace("http", "ws") + stream
+                for again in (address, address.replace(redeemer.replace("http", "ws"), issuer.replace("http", "ws"))):
+                    problem = await first_message(again)
+                    assert isinstance(problem, Problem)
+                    assert problem.title == "Ticket not valid"
+            # a link that is revoked at one replica is invalid at the other, whose connections close
+            stream_url = two.replace("http", "ws") + stream
             async with connect(
-                watching,
+                stream_url,
                 subprotocols=[SUBPROTOCOL],  # type: ignore[list-item]
                 additional_headers=bearer_headers(share["token"]),
             ) as socket:
                 await socket.recv()
                 await host.revoke_share(share["id"])
 
-                async def to_its_end() -> None:
+                async def read_until_closed() -> None:
                     async with asyncio.timeout(TIMEOUT_S):
                         while True:
                             await socket.recv()
 
                 with pytest.raises(ConnectionClosed) as closed:
-                    await to_its_end()
+                    await read_until_closed()
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 4401
-            answer = await other.get(f"/v1/sessions/{session}", headers=bearer_headers(share["token"]))
-            assert answer.json()["title"] == "Link revoked"
+            response = await other.get(f"/v1/sessions/{session}", headers=bearer_headers(share["token"]))
+            assert response.json()["title"] == "Link revoked"

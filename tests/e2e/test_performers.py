@@ -1,4 +1,4 @@
-"""Several performers on one stage, pulled at by two people, watched, and kept, over real sockets."""
+"""Several performers on one stage: controlled by two puppeteers, watched and recorded over real connections."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ LEFT_TIP, RIGHT_TIP = 19, 20
 
 
 async def load_performer(http: httpx2.AsyncClient, motion: str, performer: int) -> tuple[MotionBlockStore, Placement]:
-    """What a performer dances, at the best rate, and where."""
+    """Return the blocks of a performer at its highest bitrate level, and its placement."""
     description = unpack((await http.get(f"/v1/motions/{motion}/description")).content)
     assert isinstance(description, Description)
-    said = description.tracks[performer]
-    store, rate = MotionBlockStore(parse_motion_track(said)), len(said["rates"]) - 1
+    track_description = description.tracks[performer]
+    store, rate = MotionBlockStore(parse_motion_track(track_description)), len(track_description["rates"]) - 1
     for index in range(store.track.block_count):
-        answer = await http.get(f"/v1/motions/{motion}/blocks/{rate}/{index}?track={performer}")
-        store.put(index, rate, decode_motion_block(store.track, Data.unpack(answer.content).block))
-    return store, Placement.parse(said["place"])
+        response = await http.get(f"/v1/motions/{motion}/blocks/{rate}/{index}?track={performer}")
+        store.put(index, rate, decode_motion_block(store.track, Data.unpack(response.content).block))
+    return store, Placement.parse(track_description["place"])
 
 
 def tip_positions(store: MotionBlockStore, pose: Pose) -> np.ndarray:
-    """World places of both hands' tips."""
+    """Return the world positions of the tips of both hands."""
     return joint_and_tip_positions(store.track.figure, *pose)[[LEFT_TIP, RIGHT_TIP]]
 
 
-async def test_three_dance_side_by_side_and_each_has_strings_of_its_own(tmp_path: Path) -> None:
+async def test_three_performers_are_controlled_independently(tmp_path: Path) -> None:
     for name, seed in (("Swan", 91), ("Fox", 92)):
         (tmp_path / f"{name}.bvh").write_bytes(make_bvh_clip(3.0, seed))
     with run_server(tmp_path / "data") as url:
@@ -47,15 +47,15 @@ async def test_three_dance_side_by_side_and_each_has_strings_of_its_own(tmp_path
             swan, fox = [await client.upload(tmp_path / f"{name}.bvh") for name in ("Swan", "Fox")]
             trio = await client.add_performers(swan["id"], [fox["id"], swan["id"]])
             session = (await client.open_session(trio["id"]))["id"]
-            dances = [await load_performer(http, trio["id"], nth) for nth in range(3)]
+            performers = [await load_performer(http, trio["id"], nth) for nth in range(3)]
             viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream?rate=4"))
             seen: list[tuple[int, list[Pose | None]]] = []
 
-            def note(reference: int, _: Pose) -> None:
+            def record_poses(reference: int, _: Pose) -> None:
                 seen.append((reference, [viewer.pose_at(reference, nth) for nth in range(3)]))
 
             async with Puppeteer(client, session) as aiko, Puppeteer(client, session) as ben:
-                watching = asyncio.create_task(viewer.watch(3.0, note, frame_interval=1 / 30))
+                watching = asyncio.create_task(viewer.watch(3.0, record_poses, frame_interval=1 / 30))
                 await aiko.claim("left_hand")
                 await ben.claim(9)
                 loop = asyncio.get_running_loop()
@@ -67,30 +67,30 @@ async def test_three_dance_side_by_side_and_each_has_strings_of_its_own(tmp_path
                 assert viewer.presence is not None
                 assert [limb for limb, holder in enumerate(viewer.presence.limbs) if holder is not None] == [0, 9]
                 assert len(viewer.presence.limbs) == 12
-                kept = await client.record(session, None, 2.0)
+                recorded = await client.record(session, None, 2.0)
                 await watching
     assert viewer.statistics.gaps == 0
-    pulled: list[list[np.ndarray]] = [[], [], []]
+    offsets: list[list[np.ndarray]] = [[], [], []]
     roots: list[list[np.ndarray]] = [[], [], []]
     state = viewer.timeline_history.newest
     assert state is not None
     for reference, poses in seen:
-        for nth, ((store, place), pose) in enumerate(zip(dances, poses, strict=True)):
-            dance = store.pose_at(position_at(state, reference), True, state.duration)
-            assert dance is not None
+        for nth, ((store, placement), pose) in enumerate(zip(performers, poses, strict=True)):
+            own_pose = store.pose_at(position_at(state, reference), True, state.duration)
+            assert own_pose is not None
             if pose is not None:
-                off = tip_positions(store, pose) - tip_positions(store, place.apply(*dance))
-                pulled[nth].append(np.linalg.norm(off, axis=-1))
+                offset = tip_positions(store, pose) - tip_positions(store, placement.apply(*own_pose))
+                offsets[nth].append(np.linalg.norm(offset, axis=-1))
                 roots[nth].append(pose[0])
-    assert all(len(frames) > 30 for frames in pulled)
-    moved = [np.max(frames, axis=0) for frames in pulled]
-    # the first's left hand, and the third's right hand: all others are the dance's, of which a first
-    # block may be of the lowest rate, within 60 mm
-    assert moved[0][0] > 0.2
-    assert moved[2][1] > 0.2
-    for quiet in (moved[0][1], *moved[1], moved[2][0]):
-        assert quiet < 0.06
-    across = [np.mean([root[0] for root in frames]) for frames in roots]
-    assert across[0] < across[1] < across[2]
-    assert (kept["performers"], kept["tracks"]) == (3, ["motion"] * 3)
-    assert kept["name"] == "Swan × 2 + Fox, kept"
+    assert all(len(frames) > 30 for frames in offsets)
+    max_offsets = [np.max(frames, axis=0) for frames in offsets]
+    # the left hand of the first and the right hand of the third are controlled; all others follow the motion,
+    # of which a first block may have the lowest bitrate level, within 60 mm
+    assert max_offsets[0][0] > 0.2
+    assert max_offsets[2][1] > 0.2
+    for uncontrolled in (max_offsets[0][1], *max_offsets[1], max_offsets[2][0]):
+        assert uncontrolled < 0.06
+    mean_x = [np.mean([root[0] for root in frames]) for frames in roots]
+    assert mean_x[0] < mean_x[1] < mean_x[2]
+    assert (recorded["performers"], recorded["tracks"]) == (3, ["motion"] * 3)
+    assert recorded["name"] == "Swan × 2 + Fox, kept"

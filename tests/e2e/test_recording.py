@@ -1,4 +1,4 @@
-"""A session is pulled at, kept, and danced again, over real sockets."""
+"""Recording of a controlled session, and playback of the recording, over real connections."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LIMB = "left_hand"
 
 
 async def watch_controlled_session(client: Client, session: str, seconds: float) -> tuple[Viewer, dict[int, Pose]]:
-    """What a viewer sees of a session while a hand of it is pulled: poses by clock time."""
+    """Watch a session while its left hand is controlled; return the viewer and its poses by clock time."""
     seen: dict[int, Pose] = {}
     viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
     async with Puppeteer(client, session) as puppeteer:
@@ -39,13 +39,13 @@ async def watch_controlled_session(client: Client, session: str, seconds: float)
 
 
 def hand_tip(viewer: Viewer, pose: Pose) -> np.ndarray:
-    """World place of the left hand's tip."""
+    """Return the world position of the tip of the left hand."""
     assert viewer.track is not None
-    place: np.ndarray = joint_and_tip_positions(viewer.track.figure, *pose)[19]
-    return place
+    position: np.ndarray = joint_and_tip_positions(viewer.track.figure, *pose)[19]
+    return position
 
 
-async def test_what_was_pulled_is_kept_and_danced_again(tmp_path: Path) -> None:
+async def test_recording_replays_what_viewers_saw(tmp_path: Path) -> None:
     source = tmp_path / "Swan.bvh"
     source.write_bytes(make_bvh_clip(3.0, 91))
     with run_server(tmp_path / "data") as url:
@@ -58,45 +58,45 @@ async def test_what_was_pulled_is_kept_and_danced_again(tmp_path: Path) -> None:
                 {"time": clock(), "position": [2, 1.2, 3], "gaze": [0, 1, 0], "fov": 0.7},
             ]
             before = clock()
-            kept = await client.record(session, "A swan's arm", 2.5, camera)
-            assert kept["name"] == "A swan's arm"
-            assert kept["kept_from"] == dance["id"]
-            assert kept["duration"] == pytest.approx(2.5, abs=0.02)
-            assert (await client.motions())[0] == kept
-            assert kept["tracks"] == ["motion", "camera"]
-            again = Viewer(client.socket_url(f"/v1/motions/{kept['id']}/stream"))
-            danced: dict[int, Pose] = {}
-            figures = await again.watch(3.2, danced.__setitem__)
-            # it is a motion like any other: it is played in a session and pulled at
-            second = (await client.open_session(kept["id"]))["id"]
-            over, _ = await watch_controlled_session(client, second, 0.5)
+            recorded = await client.record(session, "A swan's arm", 2.5, camera)
+            assert recorded["name"] == "A swan's arm"
+            assert recorded["kept_from"] == dance["id"]
+            assert recorded["duration"] == pytest.approx(2.5, abs=0.02)
+            assert (await client.motions())[0] == recorded
+            assert recorded["tracks"] == ["motion", "camera"]
+            again = Viewer(client.socket_url(f"/v1/motions/{recorded['id']}/stream"))
+            replayed: dict[int, Pose] = {}
+            statistics = await again.watch(3.2, replayed.__setitem__)
+            # a recording is a motion: a session can play it, and its limbs can be controlled
+            second = (await client.open_session(recorded["id"]))["id"]
+            controlled, _ = await watch_controlled_session(client, second, 0.5)
             await client.delete_motion(dance["id"])
-            assert (await client.motion(kept["id"]))["id"] == kept["id"]
-    assert figures.gaps == 0
-    assert figures.camera_blocks == kept["blocks"]
-    assert figures.camera is not None
-    assert over.statistics.overlays > 20
+            assert (await client.motion(recorded["id"]))["id"] == recorded["id"]
+    assert statistics.gaps == 0
+    assert statistics.camera_blocks == recorded["blocks"]
+    assert statistics.camera is not None
+    assert controlled.statistics.overlays > 20
     state = again.timeline_history.newest
     assert state is not None
     assert again.track is not None
-    # frame k of what was kept was seen at the instant when it was asked for, less its length, and a little for the way
+    # frame k of the recording was seen at the time of the request, less its length, plus a small delay
     frames = [again._blocks.pose_at(round(k * 1e6 / 60)) for k in range(150)]  # type: ignore[union-attr]
-    kept_hands = np.array([hand_tip(again, pose) for pose in frames if pose is not None])
-    assert len(kept_hands) == 150
+    recorded_hands = np.array([hand_tip(again, pose) for pose in frames if pose is not None])
+    assert len(recorded_hands) == 150
     seen_at = np.array(sorted(seen))
     seen_hands = np.array([hand_tip(viewer, seen[t]) for t in sorted(seen)])
 
-    def off(late: int) -> float:
-        at = before + late - 2_500_000 + np.arange(150) * 1e6 / 60
+    def median_offset(delay: int) -> float:
+        at = before + delay - 2_500_000 + np.arange(150) * 1e6 / 60
         inside = (at > seen_at[0]) & (at < seen_at[-1])
-        wanted = np.stack([np.interp(at[inside], seen_at, seen_hands[:, axis]) for axis in range(3)], axis=1)
+        expected = np.stack([np.interp(at[inside], seen_at, seen_hands[:, axis]) for axis in range(3)], axis=1)
         assert inside.sum() > 100
-        return float(np.median(np.linalg.norm(kept_hands[inside] - wanted, axis=1)))
+        return float(np.median(np.linalg.norm(recorded_hands[inside] - expected, axis=1)))
 
-    assert min(off(late) for late in range(0, 200_000, 2_000)) < 0.01
+    assert min(median_offset(delay) for delay in range(0, 200_000, 2_000)) < 0.01
 
 
-async def test_what_cannot_be_kept_is_said(server: str, clip_file: Path) -> None:
+async def test_invalid_recording_request_is_rejected(server: str, clip_file: Path) -> None:
     async with Client(server) as client:
         with pytest.raises(ServerProblem, match="No such session"):
             await client.record("none")
@@ -108,7 +108,7 @@ async def test_what_cannot_be_kept_is_said(server: str, clip_file: Path) -> None
             await client.record(session, camera=[{"time": 5, "position": [0, 1], "gaze": [0, 1, 0], "fov": 0.5}])
 
 
-def test_the_command_line_keeps_a_session_by_id_and_by_its_page(server: str, clip_file: Path) -> None:
+def test_keep_command_accepts_session_id_and_page_url(server: str, clip_file: Path) -> None:
     async def open_session() -> str:
         async with Client(server) as client:
             session: str = (await client.open_session((await client.upload(clip_file))["id"]))["id"]

@@ -1,4 +1,4 @@
-"""Each service in processes of its own, two of those that may be many, upon a real nats-server."""
+"""Services in separate processes on a real nats-server, with two replicas of stream and session."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TIMEOUT_S = 20
 
 
 class Deployment:
-    """The processes, and their addresses by name."""
+    """Service processes and their addresses by name."""
 
     def __init__(self, folder: Path, nats: ServerProcess) -> None:
         self.folder, self.nats = folder, nats
@@ -30,9 +30,9 @@ class Deployment:
 
     def add_process(self, name: str, *services: str) -> ServerProcess:
         port = free_port()
-        chosen = [word for service in services for word in ("--service", service)]
+        service_options = [word for service in services for word in ("--service", service)]
         data = str(self.folder / "data")
-        command = [sys.executable, "-m", "bunraku.cli", "up", "--port", str(port), "--data", data, *chosen]
+        command = [sys.executable, "-m", "bunraku.cli", "up", "--port", str(port), "--data", data, *service_options]
         (self.folder / name).mkdir()
         self.processes[name] = ServerProcess(command, port, self.folder / name)
         return self.processes[name]
@@ -42,12 +42,12 @@ class Deployment:
 
 
 @pytest.fixture
-def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Deployment]:
+def deployment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Deployment]:
     monkeypatch.setenv("NO_COLOR", "1")
     (tmp_path / "nats").mkdir()
     with ExitStack() as stack, run_jetstream(tmp_path / "nats") as nats:
         monkeypatch.setenv("BUNRAKU_BUS", nats_url_of(nats))
-        built = Deployment(tmp_path, nats)
+        deployed = Deployment(tmp_path, nats)
         for name, services in (
             ("ingest", ("ingest", "ik")),
             ("stream 1", ("stream",)),
@@ -55,30 +55,30 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Deploymen
             ("session 1", ("session",)),
             ("session 2", ("session",)),
         ):
-            process = built.add_process(name, *services)
+            process = deployed.add_process(name, *services)
             stack.callback(process.stop)
             process.start()
-        yield built
+        yield deployed
 
 
 class RecordingViewer:
-    """A viewer at one stream replica: what came, and a way to wait for more."""
+    """Viewer at one stream replica: the received messages, and a way to wait for more."""
 
     def __init__(self) -> None:
         self.messages: list[object] = []
-        self._more = asyncio.Event()
+        self._changed = asyncio.Event()
 
     def add_message(self, message: object) -> None:
         self.messages.append(message)
-        self._more.set()
+        self._changed.set()
 
-    async def wait_for(self, wanted: Callable[[object], bool]) -> None:
-        """The first message that is wanted, from now on."""
+    async def wait_for(self, matches: Callable[[object], bool]) -> None:
+        """Wait for the next message for which `matches` returns true."""
         begin = len(self.messages)
         async with asyncio.timeout(TIMEOUT_S):
-            while not any(map(wanted, self.messages[begin:])):
-                self._more.clear()
-                await self._more.wait()
+            while not any(map(matches, self.messages[begin:])):
+                self._changed.clear()
+                await self._changed.wait()
 
 
 def is_left_hand_overlay(message: object) -> bool:
@@ -114,7 +114,7 @@ async def watch_session(url: str, session: str) -> AsyncIterator[RecordingViewer
 
 
 async def open_puppeteer(stack: AsyncExitStack, client: Client, session: str) -> Puppeteer:
-    """A puppeteer who holds the left hand, as soon as there is a stage for it."""
+    """Connect a puppeteer and claim the left hand; retry while the session has no owner."""
     async with asyncio.timeout(TIMEOUT_S):
         while True:
             try:
@@ -122,36 +122,37 @@ async def open_puppeteer(stack: AsyncExitStack, client: Client, session: str) ->
                 await puppeteer.claim("left_hand")
                 await puppeteer.target("left_hand", 0.4, 0.1, 0.4)
             except ControlRefused:
-                # between two owners the door says: come again
+                # while no replica owns the session, clients are asked to retry
                 await asyncio.sleep(0.1)
             else:
                 return puppeteer
 
 
-async def retry_until_available(ask: Callable[[], Awaitable[dict[str, Any]]]) -> dict[str, Any]:
-    """The answer, once there is one: until then the server says that it cannot now, and to try again."""
+async def retry_until_available(request: Callable[[], Awaitable[dict[str, Any]]]) -> dict[str, Any]:
+    """Return the response of `request`; retry while it is rejected with 503."""
     async with asyncio.timeout(TIMEOUT_S):
         while True:
             try:
-                return await ask()
+                return await request()
             except ServerProblem as problem:
                 if problem.status != 503:
                     raise
                 await asyncio.sleep(0.1)
 
 
-async def test_a_session_is_pulled_through_any_replica_and_survives_its_own(house: Deployment) -> None:
-    source = house.folder / "one.bvh"
+async def test_session_is_controlled_through_any_replica_and_outlives_its_owner(deployment: Deployment) -> None:
+    source = deployment.folder / "one.bvh"
     source.write_bytes(make_bvh_clip(4.0, 1))
     async with AsyncExitStack() as stack:
         ingest, one, two = [
-            await stack.enter_async_context(Client(house.url(name))) for name in ("ingest", "session 1", "session 2")
+            await stack.enter_async_context(Client(deployment.url(name)))
+            for name in ("ingest", "session 1", "session 2")
         ]
         motion = (await ingest.upload(source))["id"]
         session = (await one.open_session(motion))["id"]
         assert await two.first_session() == session
         near, far = [
-            await stack.enter_async_context(watch_session(house.url(name), session))
+            await stack.enter_async_context(watch_session(deployment.url(name), session))
             for name in ("stream 1", "stream 2")
         ]
         waiting = [asyncio.create_task(viewer.wait_for(is_timeline_since(2))) for viewer in (near, far)]
@@ -161,9 +162,9 @@ async def test_a_session_is_pulled_through_any_replica_and_survives_its_own(hous
         await open_puppeteer(stack, two, session)
         for viewer in (near, far):
             await viewer.wait_for(is_left_hand_overlay)
-        # its owner dies, and is not there any more to say so
+        # the owner is killed and cannot announce it
         waiting = [asyncio.create_task(viewer.wait_for(is_empty_presence)) for viewer in (near, far)]
-        await asyncio.to_thread(house.processes["session 1"].kill)
+        await asyncio.to_thread(deployment.processes["session 1"].kill)
         await asyncio.gather(*waiting)
         puppeteer = await open_puppeteer(stack, two, session)
         for viewer in (near, far):
@@ -174,20 +175,20 @@ async def test_a_session_is_pulled_through_any_replica_and_survives_its_own(hous
         async with asyncio.timeout(TIMEOUT_S):
             while (await two.session(session))["viewers"] != 2:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
-        # one that ends in order hands its sessions on
-        third = house.add_process("session 3", "session")
+        # a replica that shuts down in order hands its sessions over
+        third = deployment.add_process("session 3", "session")
         stack.callback(third.stop)
         await asyncio.to_thread(third.start)
         waiting = [asyncio.create_task(viewer.wait_for(is_empty_presence)) for viewer in (near, far)]
-        await asyncio.to_thread(house.processes["session 2"].stop)
+        await asyncio.to_thread(deployment.processes["session 2"].stop)
         await asyncio.gather(*waiting)
-        three = await stack.enter_async_context(Client(house.url("session 3")))
+        three = await stack.enter_async_context(Client(deployment.url("session 3")))
         assert (await retry_until_available(lambda: three.session(session)))["epoch"] == 2
-        # the broker goes away and comes back: an edit is refused meanwhile, and once it is taken everyone has it
-        await asyncio.to_thread(house.nats.kill)
+        # while the broker is unavailable an edit is rejected; the edit accepted afterwards reaches every viewer
+        await asyncio.to_thread(deployment.nats.kill)
         with pytest.raises(ServerProblem, match="the bus is unavailable"):
             await three.edit_session(session, playing=False)
         waiting = [asyncio.create_task(viewer.wait_for(is_timeline_since(3))) for viewer in (near, far)]
-        await asyncio.to_thread(house.nats.start)
+        await asyncio.to_thread(deployment.nats.start)
         await retry_until_available(lambda: three.edit_session(session, playing=False))
         await asyncio.gather(*waiting)

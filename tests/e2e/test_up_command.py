@@ -1,4 +1,4 @@
-"""The command as people run it: a process, its page and API, and its end."""
+"""`bunraku up` as users run it: its process, page, API and shutdown."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BUNRAKU = Path(sys.executable).parent / "bunraku"
 
 
 def process_group_members(group: int) -> set[int]:
-    """The processes of a session of processes."""
+    """Return the running processes of a process session."""
     found = set()
     for status in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -33,7 +33,7 @@ def process_group_members(group: int) -> set[int]:
 
 @pytest.fixture
 def up(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """`bunraku up` with the options of the test, and its address."""
+    """Run `bunraku up` with the options of the test; return the process and its address."""
     process = subprocess.Popen(
         [BUNRAKU, "up", *request.param, "--port", "0", "--data", tmp_path / "data"],
         stdout=subprocess.PIPE,
@@ -48,7 +48,7 @@ def up(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[subproc
             if found := re.search(r"is at (http://\S+)/", line):
                 url = found[1]
                 break
-        assert url is not None, f"it ended with {process.wait(10)}"
+        assert url is not None, f"the command ended with {process.wait(10)}"
         yield process, url
     finally:
         if process.poll() is None:
@@ -58,7 +58,7 @@ def up(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[subproc
 
 
 @pytest.mark.parametrize("up", [["--demo"]], indirect=True)
-def test_the_demo_dances_and_ctrl_c_leaves_nothing(up: tuple[subprocess.Popen[str], str]) -> None:
+def test_demo_plays_and_ctrl_c_ends_every_process(up: tuple[subprocess.Popen[str], str]) -> None:
     process, url = up
     with httpx2.Client(base_url=url) as http:
         assert http.get("/v1/health").json()["status"] == "ok"
@@ -80,20 +80,20 @@ def test_the_demo_dances_and_ctrl_c_leaves_nothing(up: tuple[subprocess.Popen[st
         check=True,
         timeout=60,
     )
-    figures = json.loads(watched.stdout)
-    assert figures["frames"] > 10
-    assert figures["gaps"] == 0
+    statistics = json.loads(watched.stdout)
+    assert statistics["frames"] > 10
+    assert statistics["gaps"] == 0
     os.killpg(process.pid, signal.SIGINT)
     assert process.wait(20) == 0
-    # the process that jobs are forked from ends when it sees that this one has
+    # the process that forks jobs ends when it detects the end of this one
     deadline = time.monotonic() + 5
-    while left := process_group_members(process.pid):
-        assert time.monotonic() < deadline, f"still running: {left}"
+    while remaining := process_group_members(process.pid):
+        assert time.monotonic() < deadline, f"still running: {remaining}"
         time.sleep(0.01)
 
 
 @pytest.mark.parametrize("up", [[]], indirect=True)
-def test_a_port_in_use_is_said_in_words(up: tuple[subprocess.Popen[str], str]) -> None:
+def test_port_in_use_is_reported_without_traceback(up: tuple[subprocess.Popen[str], str]) -> None:
     _, url = up
     second = subprocess.run(
         [BUNRAKU, "up", "--port", url.rpartition(":")[2]], capture_output=True, text=True, timeout=60, check=False

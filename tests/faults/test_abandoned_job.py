@@ -1,4 +1,4 @@
-"""A server that is killed while it encodes: another makes the motion, and nobody sends it again."""
+"""A server killed while it encodes: another server finishes the job without a second upload."""
 
 from __future__ import annotations
 
@@ -19,20 +19,18 @@ from tests.servers import make_bvh_clip
 def make_ingest_process(folder: Path, name: str) -> ServerProcess:
     port = free_port()
     (folder / name).mkdir()
-    words = ["up", "--service", "ingest", "--port", str(port), "--data", str(folder / "data")]
-    return ServerProcess([sys.executable, "-m", "bunraku.cli", *words], port, folder / name)
+    arguments = ["up", "--service", "ingest", "--port", str(port), "--data", str(folder / "data")]
+    return ServerProcess([sys.executable, "-m", "bunraku.cli", *arguments], port, folder / name)
 
 
 def pending_sources(folder: Path) -> list[Path]:
     return list(folder.glob("*"))
 
 
-async def test_a_server_that_is_killed_while_it_encodes_leaves_a_job_to_another(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_job_of_a_killed_server_is_finished_by_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
-    sent = make_bvh_clip(40.0, 11)
-    motion = derive_motion_id(hashlib.sha256(sent).digest())
+    upload = make_bvh_clip(40.0, 11)
+    motion = derive_motion_id(hashlib.sha256(upload).digest())
     first, second = make_ingest_process(tmp_path, "first"), make_ingest_process(tmp_path, "second")
     with ExitStack() as stack:
         for process in (first, second):
@@ -41,17 +39,17 @@ async def test_a_server_that_is_killed_while_it_encodes_leaves_a_job_to_another(
         async with httpx2.AsyncClient(timeout=60.0) as http:
             one, two = (f"http://127.0.0.1:{process.port}/v1" for process in (first, second))
             query = {"filename": "long.bvh", "upload": "a-long-one"}
-            sending = asyncio.create_task(http.post(f"{one}/motions", params=query, content=sent))
+            sending = asyncio.create_task(http.post(f"{one}/motions", params=query, content=upload))
             async with asyncio.timeout(60):
                 while True:
-                    assert not sending.done(), "it was encoded before it could be seen at work"
-                    said = await http.get(f"{one}/uploads/a-long-one")
-                    if said.status_code == 200 and said.json()["stage"] == "encoding":
+                    assert not sending.done(), "the upload was encoded before the server could be killed"
+                    status = await http.get(f"{one}/uploads/a-long-one")
+                    if status.status_code == 200 and status.json()["stage"] == "encoding":
                         break
             await asyncio.to_thread(first.kill)
             with pytest.raises(httpx2.TransportError):
                 await sending
-            assert (await http.get(f"{two}/motions")).json()["items"] == [], "nothing half made is listed"
+            assert (await http.get(f"{two}/motions")).json()["items"] == [], "an unfinished motion is listed"
             async with asyncio.timeout(90):
                 while (await http.get(f"{two}/motions/{motion}")).status_code != 200:  # noqa: ASYNC110
                     await asyncio.sleep(0.2)

@@ -1,4 +1,4 @@
-"""The whole house upon PostgreSQL, S3 and NATS, and what still goes on while they are away."""
+"""All services on PostgreSQL, S3 and NATS, and what still works while these backends are unavailable."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tests.servers import make_bvh_clip, run_server
 
 
 class Deployment:
-    """A running server and what it stands on."""
+    """Running server and its backends."""
 
     def __init__(self, url: str, database: ServerProcess, bus: ServerProcess) -> None:
         self.url, self.database, self.bus = url, database, bus
 
 
 @pytest.fixture(scope="module")
-def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Deployment]:
+def deployment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Deployment]:
     with ExitStack() as stack:
         patch = stack.enter_context(pytest.MonkeyPatch.context())
         folders = [tmp_path_factory.mktemp(name) for name in ("nats", "s3", "data")]
@@ -55,17 +55,19 @@ def write_clip(folder: Path, seconds: float = 2.0) -> Path:
     return source
 
 
-async def response_status(asked: Awaitable[object]) -> int:
-    """What the server says of a request."""
+async def response_status(request: Awaitable[object]) -> int:
+    """Return the status of the response to a request."""
     try:
-        await asked
+        await request
     except ServerProblem as problem:
         return problem.status
     return 200
 
 
-async def test_a_dance_is_taken_in_pulled_at_and_kept(house: Deployment, tmp_path: Path) -> None:
-    async with Client(house.url) as client:
+async def test_motion_is_uploaded_controlled_and_recorded_on_real_backends(
+    deployment: Deployment, tmp_path: Path
+) -> None:
+    async with Client(deployment.url) as client:
         motion = await client.upload(write_clip(tmp_path))
         session = (await client.open_session(motion["id"]))["id"]
         viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
@@ -75,18 +77,20 @@ async def test_a_dance_is_taken_in_pulled_at_and_kept(house: Deployment, tmp_pat
             for number in range(60):
                 await puppeteer.target("left_hand", 0.7, 0.2 + 0.01 * number, 0.4)
                 await asyncio.sleep(1 / 60)
-        figures = await watching
-        assert figures.overlays > 10
-        assert figures.gaps == 0
-        kept = await client.record(session, "kept", 1.0)
-        assert (await client.motion(kept["id"]))["kept_from"] == motion["id"]
-    connection = await asyncpg.connect(f"postgresql://postgres@127.0.0.1:{house.database.port}/postgres")
+        statistics = await watching
+        assert statistics.overlays > 10
+        assert statistics.gaps == 0
+        recording = await client.record(session, "kept", 1.0)
+        assert (await client.motion(recording["id"]))["kept_from"] == motion["id"]
+    connection = await asyncpg.connect(f"postgresql://postgres@127.0.0.1:{deployment.database.port}/postgres")
     assert await connection.fetchval("SELECT count(*) FROM motions") >= 2
     await connection.close()
 
 
-async def test_the_dance_plays_on_while_catalogue_and_bus_are_away(house: Deployment, tmp_path: Path) -> None:
-    async with Client(house.url) as client:
+async def test_playback_continues_while_catalogue_and_bus_are_unavailable(
+    deployment: Deployment, tmp_path: Path
+) -> None:
+    async with Client(deployment.url) as client:
         motion = await client.upload(write_clip(tmp_path, 5.0))
         session = (await client.open_session(motion["id"]))["id"]
         viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
@@ -94,15 +98,15 @@ async def test_the_dance_plays_on_while_catalogue_and_bus_are_away(house: Deploy
         watching = asyncio.create_task(viewer.watch(6.0, lambda _, __: shown.set()))
         async with asyncio.timeout(60):
             await shown.wait()
-        house.database.kill()
-        house.bus.kill()
-        for asked in (client.motions(), client.motion(motion["id"]), client.upload(write_clip(tmp_path))):
-            assert await response_status(asked) == 503
-        house.database.start()
-        house.bus.start()
+        deployment.database.kill()
+        deployment.bus.kill()
+        for request in (client.motions(), client.motion(motion["id"]), client.upload(write_clip(tmp_path))):
+            assert await response_status(request) == 503
+        deployment.database.start()
+        deployment.bus.start()
         async with asyncio.timeout(60):
-            while (said := await response_status(client.upload(write_clip(tmp_path)))) != 200:
-                assert said == 503
-        figures = await watching
-        assert figures.gaps == 0
-        assert figures.frames > 100
+            while (status := await response_status(client.upload(write_clip(tmp_path)))) != 200:
+                assert status == 503
+        statistics = await watching
+        assert statistics.gaps == 0
+        assert statistics.frames > 100

@@ -1,4 +1,4 @@
-"""What no controller should send, to a real server: the sender is told, the others see nothing of it."""
+"""Invalid puppeteer input to a real server: the sender is notified, and other clients are unaffected."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from bunraku.client.puppeteer import Puppeteer
 from bunraku.wire.messages import SUBPROTOCOL, Claim, Grant, Input, Message, Notice, Presence, Problem, Refusal, unpack
 from bunraku.wire.overlay import Overlay
 
-FLOOD = 5_000
+FLOOD_INPUTS = 5_000
 
 
 class RawPuppeteer:
-    """A puppeteer's socket, without the care that the SDK takes."""
+    """Puppeteer connection without the checks of the SDK."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
@@ -57,7 +57,7 @@ async def open_session(client: Client, clip_file: Path) -> str:
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), float("-inf")])
-async def test_a_number_that_is_none_ends_the_line_with_the_reason_and_frees_the_limb(
+async def test_non_finite_input_closes_the_connection_and_frees_the_limb(
     server: str, clip_file: Path, bad: float
 ) -> None:
     async with Client(server) as client:
@@ -77,7 +77,7 @@ async def test_a_number_that_is_none_ends_the_line_with_the_reason_and_frees_the
             await ben.claim("left_hand")
 
 
-async def test_a_place_a_kilometre_away_and_another_s_limb_are_told_of_once(server: str, clip_file: Path) -> None:
+async def test_unreachable_target_and_unowned_limb_are_notified_once(server: str, clip_file: Path) -> None:
     async with Client(server) as client:
         session = await open_session(client, clip_file)
         async with connect_control(client, session) as socket, Puppeteer(client, session, "Ben") as ben:
@@ -86,25 +86,25 @@ async def test_a_place_a_kilometre_away_and_another_s_limb_are_told_of_once(serv
             epoch = await controller.claim_limb(0)
             for _ in range(20):
                 await socket.send(controller.make_input(0, epoch, (1_000.0, 0.0, 0.0)))
-            told = await controller.wait_for(Notice)
-            assert isinstance(told, Notice)
-            assert (told.limb, told.reason) == (0, "reach")
+            notice = await controller.wait_for(Notice)
+            assert isinstance(notice, Notice)
+            assert (notice.limb, notice.reason) == (0, "reach")
             for _ in range(20):
                 await socket.send(controller.make_input(1, epoch, (0.3, 0.0, 0.0)))
-            told = await controller.wait_for(Notice)
-            assert isinstance(told, Notice)
-            assert (told.limb, told.reason) == (1, "owner")
+            notice = await controller.wait_for(Notice)
+            assert isinstance(notice, Notice)
+            assert (notice.limb, notice.reason) == (1, "owner")
             await socket.send(Claim(1).pack())
             refusal = await controller.wait_for(Refusal)
             assert refusal == Refusal(1, "held", ben.id)
 
 
-async def test_a_flood_of_inputs_is_dropped_and_the_others_see_nothing_of_it(server: str, clip_file: Path) -> None:
+async def test_input_flood_is_rate_limited_without_effect_on_others(server: str, clip_file: Path) -> None:
     async with Client(server) as client:
         session = await open_session(client, clip_file)
         watched = client.socket_url(f"/v1/sessions/{session}/stream")
         async with (
-            connect(watched, subprotocols=[SUBPROTOCOL], compression=None) as screen,  # type: ignore[list-item]
+            connect(watched, subprotocols=[SUBPROTOCOL], compression=None) as viewer,  # type: ignore[list-item]
             Puppeteer(client, session, "Ben") as ben,
             connect_control(client, session) as socket,
         ):
@@ -113,24 +113,24 @@ async def test_a_flood_of_inputs_is_dropped_and_the_others_see_nothing_of_it(ser
             await ben.target("right_hand", -0.3, 0.2, 0.4)
             epoch = await controller.claim_limb(0)
 
-            async def flood() -> None:
-                for _ in range(FLOOD):
+            async def send_flood() -> None:
+                for _ in range(FLOOD_INPUTS):
                     await socket.send(controller.make_input(0, epoch, (0.3, 0.2, 0.4)))
 
-            async def listen() -> Notice:
+            async def wait_for_rate_notice() -> Notice:
                 while True:
                     notice = await controller.wait_for(Notice)
                     assert isinstance(notice, Notice)
                     if notice.reason == "rate":
                         return notice
 
-            flooding = asyncio.create_task(flood())
+            flooding = asyncio.create_task(send_flood())
             overlays: list[Overlay] = []
             presences: list[Presence] = []
             async with asyncio.timeout(60):
-                assert (await listen()).limb == 0
+                assert (await wait_for_rate_notice()).limb == 0
                 while len(overlays) < 60:
-                    data = await screen.recv()
+                    data = await viewer.recv()
                     assert isinstance(data, bytes)
                     message = unpack(data)
                     if isinstance(message, Overlay):
@@ -139,7 +139,7 @@ async def test_a_flood_of_inputs_is_dropped_and_the_others_see_nothing_of_it(ser
                         presences.append(message)
             flooding.cancel()
             await asyncio.gather(flooding, return_exceptions=True)
-            # Ben's hand is in his hands all the while, and the stage goes on
+            # Ben still controls his limb, and overlays are still sent
             assert all(1 in overlay.limbs for overlay in overlays[-30:])
             assert presences[-1].limbs[1] == ben.id
             assert all(b.due > a.due for a, b in pairwise(overlays))

@@ -1,4 +1,4 @@
-"""What is too much, too large, too slow or too often, at a real server: a 4xx with a reason, and nothing stored."""
+"""Requests that exceed a limit of size, rate or time, to a real server: a 4xx with a reason, and nothing is stored."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import httpx2
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 from bunraku.http import header_timeout
 from bunraku.http.access_control import Role
@@ -31,15 +31,15 @@ TIMEOUT_S = 30
 
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    given: dict[str, Any] = {"secret": SECRET, "connects": 20.0, "body_seconds": 1.0, "quota_motions": 2}
+    options: dict[str, Any] = {"secret": SECRET, "connects": 20.0, "body_seconds": 1.0, "quota_motions": 2}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(header_timeout, "HEADER_TIMEOUT_S", 1.0)
-        with run_server(tmp_path_factory.mktemp("limits"), upload_bytes=1 << 20, **given) as url:
+        with run_server(tmp_path_factory.mktemp("limits"), upload_bytes=1 << 20, **options) as url:
             yield url
 
 
 def temporary_files() -> set[Path]:
-    """What servers have put into the temporary folder."""
+    """Return the entries of the temporary folder."""
     return set(Path(tempfile.gettempdir()).iterdir())
 
 
@@ -48,7 +48,7 @@ def motion_count(url: str) -> int:
 
 
 async def send_raw(url: str, *pieces: bytes, interval_s: float = 0.0) -> bytes:
-    """What a server answers to bytes, sent piece by piece, before it ends the connection."""
+    """Send `pieces` one by one and return the bytes received until the server closes the connection."""
     parts = urlsplit(url)
     reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
 
@@ -62,11 +62,11 @@ async def send_raw(url: str, *pieces: bytes, interval_s: float = 0.0) -> bytes:
     sending = asyncio.create_task(send())
     try:
         async with asyncio.timeout(TIMEOUT_S):
-            said = b""
+            response = b""
             with contextlib.suppress(OSError):
                 while more := await reader.read(65_536):
-                    said += more
-            return said
+                    response += more
+            return response
     finally:
         sending.cancel()
         await asyncio.gather(sending, return_exceptions=True)
@@ -74,62 +74,62 @@ async def send_raw(url: str, *pieces: bytes, interval_s: float = 0.0) -> bytes:
 
 
 async def read_until_closed(socket: ClientConnection) -> None:
-    """Read until there is nothing more."""
+    """Read until the server closes the connection."""
     while True:
         await socket.recv()
 
 
 def request_head(method: str, path: str, *lines: str, bearer_token: str | None = None) -> bytes:
-    given = [f"{name}: {value}" for name, value in bearer_headers(bearer_token or make_token()).items()]
-    return "\r\n".join([f"{method} {path} HTTP/1.1", "Host: stage", *given, *lines, "", ""]).encode()
+    options = [f"{name}: {value}" for name, value in bearer_headers(bearer_token or make_token()).items()]
+    return "\r\n".join([f"{method} {path} HTTP/1.1", "Host: stage", *options, *lines, "", ""]).encode()
 
 
-def response_status(said: bytes) -> int:
-    return int(said.split(b" ", 2)[1])
+def response_status(response: bytes) -> int:
+    return int(response.split(b" ", 2)[1])
 
 
-async def test_an_upload_that_drips_is_refused_and_nothing_is_left(guarded: str) -> None:
-    before, away = motion_count(guarded), temporary_files()
-    begin = request_head("POST", "/v1/motions?filename=a.bvh", "Content-Length: 100000")
-    said = await send_raw(guarded, begin, *[b"x"] * 1_000, interval_s=0.05)
-    assert response_status(said) == 408
-    assert b"too slowly" in said
+async def test_slow_upload_is_rejected_with_408_and_leaves_nothing(guarded: str) -> None:
+    before, files_before = motion_count(guarded), temporary_files()
+    head = request_head("POST", "/v1/motions?filename=a.bvh", "Content-Length: 100000")
+    response = await send_raw(guarded, head, *[b"x"] * 1_000, interval_s=0.05)
+    assert response_status(response) == 408
+    assert b"too slowly" in response
     chunked = request_head("POST", "/v1/motions?filename=a.bvh", "Transfer-Encoding: chunked")
     assert response_status(await send_raw(guarded, chunked, *[b"1\r\nx\r\n"] * 1_000, interval_s=0.05)) == 408
-    # one that stops altogether
-    assert response_status(await send_raw(guarded, begin, b"x" * 500)) == 408
+    # an upload that stops
+    assert response_status(await send_raw(guarded, head, b"x" * 500)) == 408
     assert motion_count(guarded) == before
-    assert temporary_files() <= away
+    assert temporary_files() <= files_before
 
 
 @pytest.mark.parametrize("path", ["/v1/sessions", "/v1/solve", "/v1/shares"])
-async def test_any_body_that_drips_is_refused(guarded: str, path: str) -> None:
-    begin = request_head("POST", path, "Content-Length: 1000", "Content-Type: application/json")
-    assert response_status(await send_raw(guarded, begin, *[b" "] * 900, interval_s=0.05)) == 408
+async def test_slow_body_is_rejected_with_408(guarded: str, path: str) -> None:
+    head = request_head("POST", path, "Content-Length: 1000", "Content-Type: application/json")
+    assert response_status(await send_raw(guarded, head, *[b" "] * 900, interval_s=0.05)) == 408
 
 
-async def test_a_head_that_drips_is_cut_off_and_does_not_hold_up_others(guarded: str) -> None:
+async def test_slow_request_head_is_closed_without_delaying_others(guarded: str) -> None:
     begun = time.monotonic()
-    dripping = [
+    slow_requests = [
         asyncio.create_task(send_raw(guarded, b"GET /v1/health HTTP/1.1\r\n", *[b"a"] * 1_000, interval_s=0.05))
     ]
-    dripping.append(asyncio.create_task(send_raw(guarded)))
+    slow_requests.append(asyncio.create_task(send_raw(guarded)))
     async with httpx2.AsyncClient(base_url=guarded) as http:
         assert (await http.get("/v1/health")).status_code == 200
-    assert await asyncio.gather(*dripping) == [b"", b""]
+    assert await asyncio.gather(*slow_requests) == [b"", b""]
     assert time.monotonic() - begun < TIMEOUT_S
 
 
-async def test_a_head_without_end_is_refused(guarded: str) -> None:
-    said = await send_raw(
+async def test_oversized_request_head_is_rejected(guarded: str) -> None:
+    response = await send_raw(
         guarded, b"GET /v1/health HTTP/1.1\r\nHost: stage\r\n", *[b"a: " + b"b" * 1_000 + b"\r\n"] * 100
     )
-    assert response_status(said) in (400, 431)
+    assert response_status(response) in (400, 431)
     assert response_status(await send_raw(guarded, b"GET /" + b"a" * 100_000)) in (400, 414, 431)
 
 
 @pytest.mark.parametrize(
-    ("path", "most"),
+    ("path", "max_bytes"),
     [
         ("/v1/motions?filename=a.bvh", 1 << 20),
         ("/v1/sessions", 64 << 10),
@@ -140,32 +140,32 @@ async def test_a_head_without_end_is_refused(guarded: str) -> None:
         ("/v1/sessions/none/recordings", 16 << 20),
     ],
 )
-async def test_a_body_of_a_byte_too_many_is_refused_before_it_is_read(guarded: str, path: str, most: int) -> None:
+async def test_oversized_body_is_rejected_before_it_is_read(guarded: str, path: str, max_bytes: int) -> None:
     before = motion_count(guarded)
-    said = await send_raw(
-        guarded, request_head("POST", path, f"Content-Length: {most + 1}", "Content-Type: application/json")
+    response = await send_raw(
+        guarded, request_head("POST", path, f"Content-Length: {max_bytes + 1}", "Content-Type: application/json")
     )
-    assert response_status(said) == 413
-    assert b"application/problem+json" in said
+    assert response_status(response) == 413
+    assert b"application/problem+json" in response
     assert motion_count(guarded) == before
 
 
-async def test_who_has_no_token_sends_no_body(guarded: str) -> None:
+async def test_invalid_token_is_rejected_before_the_body_is_read(guarded: str) -> None:
     for path in ("/v1/motions?filename=a.bvh", "/v1/solve"):
-        begin = request_head("POST", path, "Content-Length: 1000000", "Expect: 100-continue", bearer_token="guess")
-        said = await send_raw(guarded, begin, b"x" * 1_000)
-        assert response_status(said) == 401
+        head = request_head("POST", path, "Content-Length: 1000000", "Expect: 100-continue", bearer_token="guess")
+        response = await send_raw(guarded, head, b"x" * 1_000)
+        assert response_status(response) == 401
 
 
-@pytest.mark.parametrize("packed", [gzip.compress(b" " * 50_000_000), zlib.compress(b" " * 50_000_000)])
+@pytest.mark.parametrize("compressed", [gzip.compress(b" " * 50_000_000), zlib.compress(b" " * 50_000_000)])
 @pytest.mark.parametrize("path", ["/v1/sessions", "/v1/solve", "/v1/motions?filename=a.bvh"])
-async def test_nothing_that_comes_packed_is_unpacked(guarded: str, path: str, packed: bytes) -> None:
+async def test_compressed_body_is_rejected(guarded: str, path: str, compressed: bytes) -> None:
     before = motion_count(guarded)
-    given = {"Content-Encoding": "gzip", "Content-Type": "application/json", **bearer_headers(make_token())}
+    options = {"Content-Encoding": "gzip", "Content-Type": "application/json", **bearer_headers(make_token())}
     async with httpx2.AsyncClient(base_url=guarded, timeout=TIMEOUT_S) as http:
-        answer = await http.post(path, content=packed, headers=given)
-    assert 400 <= answer.status_code < 500
-    assert answer.headers["content-type"] == "application/problem+json"
+        response = await http.post(path, content=compressed, headers=options)
+    assert 400 <= response.status_code < 500
+    assert response.headers["content-type"] == "application/problem+json"
     assert motion_count(guarded) == before
 
 
@@ -174,18 +174,18 @@ async def test_nothing_that_comes_packed_is_unpacked(guarded: str, path: str, pa
     [b"[" * 60_000, b'{"motion":' * 6_000, b"1" * 60_000, b'{"seconds":' + b"9" * 5_000 + b"}", b'"\\ud800"', b"\xff"],
 )
 @pytest.mark.parametrize("path", ["/v1/sessions", "/v1/shares", "/v1/solve"])
-async def test_json_that_means_harm_is_a_4xx(guarded: str, path: str, body: bytes) -> None:
-    given = {"Content-Type": "application/json", **bearer_headers(make_token())}
+async def test_hostile_json_is_rejected_with_4xx(guarded: str, path: str, body: bytes) -> None:
+    options = {"Content-Type": "application/json", **bearer_headers(make_token())}
     async with httpx2.AsyncClient(base_url=guarded, timeout=TIMEOUT_S) as http:
-        answer = await http.post(path, content=body, headers=given)
-    assert 400 <= answer.status_code < 500
-    json.loads(answer.text)
+        response = await http.post(path, content=body, headers=options)
+    assert 400 <= response.status_code < 500
+    json.loads(response.text)
 
 
-async def test_who_connects_too_often_is_told_to_wait(guarded: str) -> None:
+async def test_too_many_handshakes_are_rejected_with_429(guarded: str) -> None:
     address = guarded.replace("http", "ws") + "/v1/motions/none/stream"
 
-    async def come_again_and_again() -> None:
+    async def connect_repeatedly() -> None:
         for _ in range(400):
             async with connect(
                 address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=bearer_headers(make_token())
@@ -194,21 +194,21 @@ async def test_who_connects_too_often_is_told_to_wait(guarded: str) -> None:
                     await socket.recv()
 
     with pytest.raises(InvalidStatus) as refused:
-        await come_again_and_again()
+        await connect_repeatedly()
     assert refused.value.response.status_code == 429
     assert refused.value.response.headers["Retry-After"] == "1"
-    # requests with a token go on
+    # requests with a token are still accepted
     assert (await asyncio.to_thread(motion_count, guarded)) >= 0
 
 
 @pytest.mark.parametrize("origin", ["https://evil.example", "null", "http://[::1"])
-async def test_a_page_of_another_site_opens_no_socket(tmp_path: Path, origin: str) -> None:
+async def test_websocket_from_a_foreign_origin_is_rejected(tmp_path: Path, origin: str) -> None:
     with run_server(tmp_path) as url:
         address = url.replace("http", "ws") + "/v1/sessions/none/control"
         with pytest.raises(InvalidStatus) as refused:
-            await connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=origin)  # type: ignore[arg-type]
+            await connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=Origin(origin))
         assert refused.value.response.status_code == 403
-        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=url) as socket:  # type: ignore[arg-type]
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], origin=Origin(url)) as socket:
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
         assert closed.value.rcvd is not None
@@ -216,7 +216,7 @@ async def test_a_page_of_another_site_opens_no_socket(tmp_path: Path, origin: st
 
 
 @pytest.mark.parametrize("path", ["stream", "control"])
-async def test_a_frame_that_is_too_long_ends_the_socket(server: str, path: str) -> None:
+async def test_oversized_frame_closes_with_1009(server: str, path: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=TIMEOUT_S) as http:
         motion = (await http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 8))).json()["id"]
         session = (await http.post("/v1/sessions", json={"motion": motion})).json()["id"]
@@ -230,11 +230,11 @@ async def test_a_frame_that_is_too_long_ends_the_socket(server: str, path: str) 
             assert closed.value.rcvd is None or closed.value.rcvd.code == 1009
 
 
-def test_a_quota_is_counted_for_each_and_what_is_beyond_leaves_nothing(guarded: str) -> None:
+def test_motion_quota_is_counted_per_user(guarded: str) -> None:
     with httpx2.Client(base_url=guarded, timeout=60) as http:
         aiko, ben = (bearer_headers(make_token(Role.INGEST, name)) for name in ("aiko", "ben"))
         before = motion_count(guarded)
-        made = [
+        created = [
             http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5, 40 + seed), headers=aiko).json()["id"]
             for seed in range(2)
         ]
@@ -242,22 +242,24 @@ def test_a_quota_is_counted_for_each_and_what_is_beyond_leaves_nothing(guarded: 
         assert (third.status_code, third.json()["title"]) == (403, "Quota used up")
         assert "2 motions" in third.json()["detail"]
         light = {"time": 0, "position": [0, 1, 0], "colour": [1, 1, 1], "intensity": 1}
-        lit = http.post(f"/v1/motions/{made[0]}/scene", json={"lights": [[light]]}, headers=aiko)
-        assert lit.json()["title"] == "Quota used up"
+        scene = http.post(f"/v1/motions/{created[0]}/scene", json={"lights": [[light]]}, headers=aiko)
+        assert scene.json()["title"] == "Quota used up"
         assert motion_count(guarded) == before + 2
-        # what is there already costs nothing, and another has a quota of their own
+        # uploading an existing motion is free for another user, whose quota is separate
         again = http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5, 42), headers=ben)
         assert again.status_code == 201
-        http.delete(f"/v1/motions/{made[0]}", headers=aiko)
+        http.delete(f"/v1/motions/{created[0]}", headers=aiko)
         assert http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5, 43), headers=aiko).status_code == 201
 
 
-def test_a_quota_of_bytes_holds_for_all_also_without_a_secret(tmp_path: Path) -> None:
+def test_total_byte_quota_applies_without_a_secret(tmp_path: Path) -> None:
     with run_server(tmp_path, total_bytes=9_000) as url, httpx2.Client(base_url=url, timeout=60) as http:
-        told = [http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 60 + seed)) for seed in range(8)]
-        assert told[0].status_code == 201
-        assert told[-1].status_code == 403
-        assert "9000 bytes" in told[-1].json()["detail"]
-        kept = len(http.get("/v1/motions").json()["items"])
-        assert kept == sum(answer.status_code == 201 for answer in told)
-        assert len(list((tmp_path / "library").rglob("*.*"))) <= kept
+        responses = [
+            http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 60 + seed)) for seed in range(8)
+        ]
+        assert responses[0].status_code == 201
+        assert responses[-1].status_code == 403
+        assert "9000 bytes" in responses[-1].json()["detail"]
+        motions = len(http.get("/v1/motions").json()["items"])
+        assert motions == sum(response.status_code == 201 for response in responses)
+        assert len(list((tmp_path / "library").rglob("*.*"))) <= motions

@@ -1,4 +1,4 @@
-"""Uploads that mean harm: each is refused with a reason, soon, and leaves nothing behind."""
+"""Hostile uploads: each is rejected with a reason within a short time and leaves nothing behind."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def leftover_sources() -> list[Path]:
     return list(Path(tempfile.gettempdir()).glob("bunraku-upload-*/source"))
 
 
-@pytest.mark.parametrize("harm", MALFORMED_FILES)
-async def test_harm_is_refused_in_words_and_leaves_nothing(server: str, harm: str) -> None:
+@pytest.mark.parametrize("name", MALFORMED_FILES)
+async def test_malformed_upload_is_rejected_with_hint_and_leaves_nothing(server: str, name: str) -> None:
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
         before = (await http.get("/v1/motions?limit=200")).json()
-        answer = await http.post("/v1/motions", params={"filename": f"{harm}.bvh"}, content=MALFORMED_FILES[harm]())
-        assert answer.status_code in (413, 422), answer.text
-        problem = answer.json()
+        response = await http.post("/v1/motions", params={"filename": f"{name}.bvh"}, content=MALFORMED_FILES[name]())
+        assert response.status_code in (413, 422), response.text
+        problem = response.json()
         assert problem["title"]
         assert problem["detail"]
         assert problem["hint"]
@@ -57,34 +57,36 @@ async def test_harm_is_refused_in_words_and_leaves_nothing(server: str, harm: st
     assert not leftover_sources()
 
 
-async def test_a_line_of_a_gigabyte_is_cut_off(server: str) -> None:
-    sent = 0
+async def test_line_of_a_gigabyte_is_rejected_early(server: str) -> None:
+    sent_bytes = 0
 
-    async def line() -> AsyncIterator[bytes]:
-        nonlocal sent
+    async def endless_line() -> AsyncIterator[bytes]:
+        nonlocal sent_bytes
         yield HEAD + b"MOTION\nFrames: 1\nFrame Time: 0.03\n"
         for _ in range(1_000):
-            sent += 1 << 20
+            sent_bytes += 1 << 20
             yield b"0" * (1 << 20)
 
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
         try:
-            assert (await http.post("/v1/motions", params={"filename": "x.bvh"}, content=line())).status_code == 413
+            assert (
+                await http.post("/v1/motions", params={"filename": "x.bvh"}, content=endless_line())
+            ).status_code == 413
         except httpx2.TransportError:
-            assert sent < 500 << 20
+            assert sent_bytes < 500 << 20
         assert (await http.get("/v1/health")).status_code == 200
 
 
-async def test_one_who_goes_away_while_sending_leaves_nothing(server: str) -> None:
-    class Gone(Exception):
+async def test_interrupted_upload_leaves_nothing(server: str) -> None:
+    class ClientGone(Exception):
         pass
 
-    async def half() -> AsyncIterator[bytes]:
+    async def partial_upload() -> AsyncIterator[bytes]:
         yield VALID_BVH[:1000]
-        raise Gone
+        raise ClientGone
 
     async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
         before = (await http.get("/v1/motions?limit=200")).json()
-        with pytest.raises(Gone):
-            await http.post("/v1/motions", params={"filename": "x.bvh"}, content=half())
+        with pytest.raises(ClientGone):
+            await http.post("/v1/motions", params={"filename": "x.bvh"}, content=partial_upload())
         assert (await http.get("/v1/motions?limit=200")).json() == before

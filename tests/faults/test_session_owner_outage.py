@@ -1,4 +1,4 @@
-"""A session whose server is gone, or not back on the bus yet: it is not said to have ended."""
+"""A session whose owner is unavailable: viewers are asked to retry, not told that the session ended."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.servers import run_server
 
 
 @pytest.mark.parametrize(("session", "code", "title"), [("left", 1013, "not here yet"), ("never", 4404, "No such")])
-async def test_who_watches_is_told_to_come_again_unless_there_is_none(
+async def test_viewer_retries_unless_the_session_does_not_exist(
     tmp_path: Path, session: str, code: int, title: str
 ) -> None:
     with run_jetstream(tmp_path) as nats:
@@ -31,9 +31,9 @@ async def test_who_watches_is_told_to_come_again_unless_there_is_none(
         with run_server(tmp_path / "data", services=("stream",), bus=nats_url_of(nats)) as server:
             address = f"ws://{urlsplit(server).netloc}/v1/sessions/{session}/stream"
             async with connect(address, subprotocols=[SUBPROTOCOL]) as socket:  # type: ignore[list-item]
-                said = unpack(bytes(await socket.recv(decode=False)))
-                assert isinstance(said, Problem)
-                assert title in said.title
+                problem = unpack(bytes(await socket.recv(decode=False)))
+                assert isinstance(problem, Problem)
+                assert title in problem.title
                 with pytest.raises(ConnectionClosed):
                     await socket.recv()
                 assert socket.close_code == code

@@ -1,8 +1,8 @@
-"""The coverage-guided run: `python -m tests.fuzz CORPUS COUNTS [options of libFuzzer]`, in a process of its own.
+"""Coverage-guided fuzzing in a separate process: `python -m tests.fuzz CORPUS COUNTS [options of libFuzzer]`.
 
-The first byte of an input picks the target. The Python of the rooms is instrumented; compiled code cannot be, but has
-its bounds checked where NUMBA_BOUNDSCHECK=1. The file COUNTS is an int64 for each target and outcome (refused, read). A
-fault ends the process with its traceback on stdout and the input's bytes on stderr.
+The first byte of an input selects the target. The Python code of the packages is instrumented. Compiled code cannot be,
+but its bounds are checked if NUMBA_BOUNDSCHECK=1. The file COUNTS holds an int64 for each target and outcome (rejected,
+accepted). A failure ends the process with its traceback on stdout and the bytes of the input on stderr.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ with atheris.instrument_imports(include=INSTRUMENTED, enable_loader_override=Fal
 
 def main() -> None:
     corpus, file, *options = sys.argv[1:]
-    # libFuzzer ends the process without a word to Python: what is counted must be in the file at once
+    # libFuzzer ends the process without returning to Python, so counts are written to the file immediately
     counts = np.memmap(file, np.int64, "w+", shape=(len(TARGETS), 2))
     for number, (target, data) in enumerate(load_seeds()):
         (Path(corpus) / f"{number:03}").write_bytes(bytes([target]) + data)
 
-    def feed(data: bytes) -> None:
+    def run_target(data: bytes) -> None:
         if data:
             number = data[0] % len(TARGETS)
             counts[number, int(TARGETS[number](data[1:]))] += 1
 
-    atheris.Setup([sys.argv[0], corpus, *options], feed)
+    atheris.Setup([sys.argv[0], corpus, *options], run_target)
     atheris.Fuzz()
 
 

@@ -1,7 +1,7 @@
-"""Where strangers' bytes come in, and what must hold of anything that is made of them.
+"""Fuzzing targets: the decoders of untrusted bytes, and invariants of every decoded value.
 
-A target takes bytes and says whether they were read (True) or refused (False) with the one error type of its room.
-Anything else that comes out of it is a fault. What is read is bounded: a block is less than a megabyte when decoded.
+A target returns True if it accepts the bytes and False if it rejects them with the one error type of its package. Any
+other exception is a failure. Decoded values are bounded: a decoded block takes less than a megabyte.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from tests.vectors.blocks import random_coefficients
 from tests.vectors.golden import VECTORS_FOLDER
 
 MAX_DECODED_BYTES = 1_000_000
-"""Bytes that a block may come to."""
+"""Maximum size of a decoded block, bytes."""
 
 
 def load_golden(name: str) -> dict[str, Any]:
-    """A file of golden vectors."""
+    """Load a file of golden vectors."""
     vectors: dict[str, Any] = json.loads((VECTORS_FOLDER / name).read_text(encoding="utf-8"))
     return vectors
 
 
 def golden_description(track: dict[str, Any]) -> dict[str, Any]:
-    """A golden track as a Description has it."""
+    """Return the entry of a Description for a golden track."""
     numbers = {key: track[key] for key in ("fps", "frames", "block_frames", "first_frames")}
     return numbers | {"type": "motion", "codec": MOTION_CODEC, "rates": [], "dancer": base64.b64decode(track["dancer"])}
 
@@ -67,8 +67,10 @@ def _decode(track: MotionTrack, data: bytes) -> bool:
 
 
 def _expose_size_to_coverage(block: MotionBlock) -> None:
-    """Nothing but loops as long as a block is great in one way or another. The coder is compiled, and coverage does not
-    see into it; it sees how often these go round."""
+    """Run loops whose lengths are the sizes of a block.
+
+    The coder is compiled, so coverage does not see into it; coverage sees how often these loops run.
+    """
     for _ in range(block.frames):
         pass
     for _ in range(block.q.shape[2]):
@@ -82,28 +84,28 @@ def _expose_size_to_coverage(block: MotionBlock) -> None:
 
 
 def block(data: bytes) -> bool:
-    """A byte that picks a golden track, and a block of it."""
+    """Decode a block; the first byte selects the golden track."""
     return bool(data) and _decode(TRACKS[data[0] % len(TRACKS)], data[1:])
 
 
 def skeleton_description(data: bytes) -> bool:
-    """A dancer, and the weights of its limbs."""
+    """Parse a skeleton description and compute the weights of its channels."""
     try:
-        read = SkeletonDescription.unpack(data)
+        parsed = SkeletonDescription.unpack(data)
     except DamagedBlock:
         return False
     assert len(data) <= MAX_SKELETON_BYTES
-    track = MotionTrack(30.0, 30, 30, 30, read)
+    track = MotionTrack(30.0, 30, 30, 30, parsed)
     assert np.isfinite(track.weights).all()
     assert np.isfinite(track.inverse_weights).all()
     return _decode(track, BLOCK)
 
 
 def message(data: bytes) -> bool:
-    """Any message; the tracks of a Description are read too, and used."""
+    """Parse a message; parse and use the tracks of a Description."""
     try:
-        read = unpack(data)
-        for track in read.tracks if isinstance(read, Description) else []:
+        parsed = unpack(data)
+        for track in parsed.tracks if isinstance(parsed, Description) else []:
             check_track(track)
     except (MalformedMessage, DamagedBlock):
         return False
@@ -111,7 +113,7 @@ def message(data: bytes) -> bool:
 
 
 def audio(data: bytes) -> bool:
-    """A block of Opus packets."""
+    """Parse a block of Opus packets."""
     try:
         packets = unpack_audio_block(data)
     except DamagedBlock:
@@ -125,7 +127,7 @@ def audio(data: bytes) -> bool:
 
 
 def check_track(described: dict[str, Any]) -> MotionTrack:
-    """The track of a Description's map, once each of its questions has an answer; raises `DamagedBlock`."""
+    """Parse a track of a Description and check its timing; raise `DamagedBlock`."""
     track = parse_motion_track(described)
     assert track.block_count >= 1
     assert 0 <= track.duration_us < 1 << 48
@@ -140,7 +142,7 @@ TARGETS: tuple[Callable[[bytes], bool], ...] = (block, skeleton_description, mes
 
 
 def _largest_block() -> bytes:
-    """A block with as many coefficients as there can be, for the first track."""
+    """Return a block of the first track with the maximum number of coefficients."""
     track, q = TRACKS[0], random_coefficients(np.random.default_rng(1), MAX_BLOCK_FRAMES, 1)
     return coefficients.encode_coefficients(
         load_shipped_prior(), coefficients.BlockHeader(MAX_BLOCK_FRAMES, 99, 1), q, track.block_frames, track.fps
@@ -148,14 +150,14 @@ def _largest_block() -> bytes:
 
 
 def load_seeds() -> list[tuple[int, bytes]]:
-    """Golden bytes, valid and broken, each with the number of its target."""
-    found = [(0, bytes(1) + _largest_block())]
-    found += [(0, bytes([v["track"]]) + base64.b64decode(v["block"])) for v in _BLOCKS["valid"]]
-    found += [(0, bytes(1) + base64.b64decode(v["block"])) for v in _BLOCKS["invalid"]]
-    found += [(1, track["dancer"]) for track in TRACK_DESCRIPTIONS]
-    found += [(2, Description("a", [track]).pack()) for track in TRACK_DESCRIPTIONS]
+    """Return golden bytes, valid and invalid, each with the index of its target."""
+    seeds = [(0, bytes(1) + _largest_block())]
+    seeds += [(0, bytes([v["track"]]) + base64.b64decode(v["block"])) for v in _BLOCKS["valid"]]
+    seeds += [(0, bytes(1) + base64.b64decode(v["block"])) for v in _BLOCKS["invalid"]]
+    seeds += [(1, track["dancer"]) for track in TRACK_DESCRIPTIONS]
+    seeds += [(2, Description("a", [track]).pack()) for track in TRACK_DESCRIPTIONS]
     messages = load_golden("messages.json")
-    found += [(2, base64.b64decode(v["bytes"])) for v in messages["valid"] + messages["invalid"]]
+    seeds += [(2, base64.b64decode(v["bytes"])) for v in messages["valid"] + messages["invalid"]]
     sounds = load_golden("audio.json")
-    found += [(3, base64.b64decode(v["block"])) for v in sounds["valid"] + sounds["invalid"]]
-    return found
+    seeds += [(3, base64.b64decode(v["block"])) for v in sounds["valid"] + sounds["invalid"]]
+    return seeds

@@ -1,4 +1,4 @@
-"""Damaged, truncated and hostile bytes: one error type a room, nothing unbounded, nothing else."""
+"""Fuzzing with damaged, truncated and hostile bytes: one error type per package, bounded results, no other error."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLES = 1_000
 RUNS = 3_000
 MAX_SHOWN_BYTES = 4_096
-"""Bytes of a seed for Hypothesis, which prints what fails."""
+"""Maximum size of a seed for Hypothesis, which prints failing inputs, bytes."""
 
 SEEDS = load_seeds()
 EDITS = st.lists(st.tuples(st.integers(0, 1 << 16), st.integers(0, 255)), max_size=8)
 
 
 def corrupt(data: bytes, edits: list[tuple[int, int]], kept_share: float, tail: bytes) -> bytes:
-    """`data` with some bytes changed, cut to a part of its length, and something behind it."""
+    """Return `data` with bytes replaced, cut to a share of its length, and followed by `tail`."""
     octets = bytearray(data)
-    for place, value in edits:
+    for position, value in edits:
         if octets:
-            octets[place % len(octets)] = value
+            octets[position % len(octets)] = value
     return bytes(octets[: round(kept_share * len(octets))]) + tail
 
 
 def hostile_inputs(number: int) -> st.SearchStrategy[bytes]:
-    """Bytes for a target: any at all, and damaged golden ones."""
-    whole = st.sampled_from([data for target, data in SEEDS if target == number and len(data) <= MAX_SHOWN_BYTES])
+    """Return a strategy of inputs for a target: random bytes and corrupted golden bytes."""
+    golden = st.sampled_from([data for target, data in SEEDS if target == number and len(data) <= MAX_SHOWN_BYTES])
     kept = st.just(1.0) | st.floats(0, 1)
-    return st.binary(max_size=600) | st.builds(corrupt, whole, EDITS, kept, st.binary(max_size=40))
+    return st.binary(max_size=600) | st.builds(corrupt, golden, EDITS, kept, st.binary(max_size=40))
 
 
 VALUES = st.one_of(
@@ -72,7 +72,7 @@ HOSTILE_DESCRIPTIONS = st.builds(
     ],
     ids=["blocks", "dancers", "messages", "descriptions", "audio"],
 )
-def test_hypothesis(
+def test_random_input_is_accepted_or_rejected_as_declared(
     number: int, inputs: st.SearchStrategy[bytes], tally: Callable[[str], None], request: pytest.FixtureRequest
 ) -> None:
     counts = [0, 0]
@@ -84,19 +84,21 @@ def test_hypothesis(
 
     check()
     assert min(counts) > 0
-    tally(f"Hypothesis, {request.node.callspec.id}: {sum(counts)} inputs, {counts[1]} read, {counts[0]} refused")
+    tally(f"Hypothesis, {request.node.callspec.id}: {sum(counts)} inputs, {counts[1]} accepted, {counts[0]} rejected")
 
 
 @pytest.mark.timeout(600)
-def test_atheris(tmp_path: Path, tally: Callable[[str], None]) -> None:
+def test_coverage_guided_input_is_accepted_or_rejected_as_declared(
+    tmp_path: Path, tally: Callable[[str], None]
+) -> None:
     if find_spec("atheris") is None:
-        why = "atheris is not installed: it has wheels for CPython 3.11 to 3.14 on Linux, x86-64"
-        pytest.fail(why) if os.environ.get("CI") else pytest.skip(why)
+        reason = "atheris is not installed: it has wheels for CPython 3.11 to 3.14 on Linux, x86-64"
+        pytest.fail(reason) if os.environ.get("CI") else pytest.skip(reason)
     corpus, file = tmp_path / "corpus", tmp_path / "counts"
     corpus.mkdir()
-    # a hang is what one input's guard of 60 s is for; what a block may cost is bounded by its numbers, in the targets
+    # the timeout of 60 s per input detects a hang; the cost of a block is bounded by its sizes, in the targets
     options = [f"-runs={RUNS}", "-timeout=60", "-rss_limit_mb=2048", f"-artifact_prefix={tmp_path}/"]
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-m", "tests.fuzz", corpus, file, *options],
         cwd=REPOSITORY,
         env=os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path / "numba")},
@@ -105,8 +107,8 @@ def test_atheris(tmp_path: Path, tally: Callable[[str], None]) -> None:
         timeout=580,
         check=False,
     )
-    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+    assert result.returncode == 0, result.stdout[-4000:] + result.stderr[-2000:]
     counts = np.fromfile(file, np.int64).reshape(len(TARGETS), 2)
     assert counts.min() > 0
-    for target, (refused, read) in zip(TARGETS, counts, strict=True):
-        tally(f"atheris, {target.__name__}s: {refused + read} inputs, {read} read, {refused} refused")
+    for target, (rejected, accepted) in zip(TARGETS, counts, strict=True):
+        tally(f"atheris, {target.__name__}s: {rejected + accepted} inputs, {accepted} accepted, {rejected} rejected")

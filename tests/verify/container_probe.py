@@ -1,7 +1,7 @@
-"""What is asked from within the stack, by a Python of the image: read from standard input, with one argument.
+"""Measurements inside the stack, run by the Python of the image: the source is read from standard input.
 
-`hop`: how long messages take from one publisher through the bus to one who listens. A session's id: whether an input
-was applied to its puppet more than once, by its own log.
+With the argument `hop`: latency of messages from one publisher through the bus to a subscriber. With the id of a
+session: whether an input was applied to its marionette more than once, by its input log.
 """
 
 import asyncio
@@ -21,16 +21,16 @@ MESSAGE_RATE_HZ = 60.0
 
 
 async def measure_bus_latency() -> dict[str, float]:
-    """Milliseconds, of messages as overlays are."""
+    """Measure the latency of messages of the size and rate of overlays, milliseconds."""
     one, other = NatsBus(Settings().bus), NatsBus(Settings().bus)
-    late: list[float] = []
+    latencies: list[float] = []
 
-    def hear(data: bytes) -> None:
-        late.append((time.monotonic_ns() - int.from_bytes(data[:8], "little")) * 1e-6)
+    def record(data: bytes) -> None:
+        latencies.append((time.monotonic_ns() - int.from_bytes(data[:8], "little")) * 1e-6)
 
     for bus in (one, other):
         await bus.open()
-    other.subscribe("verify.hop", hear)
+    other.subscribe("verify.hop", record)
     await asyncio.sleep(0.5)
     for _ in range(MESSAGE_COUNT):
         one.publish("verify.hop", time.monotonic_ns().to_bytes(8, "little") + bytes(MESSAGE_BYTES - 8))
@@ -38,31 +38,36 @@ async def measure_bus_latency() -> dict[str, float]:
     await asyncio.sleep(0.5)
     for bus in (one, other):
         await bus.close()
-    late.sort()
-    return {"sent": MESSAGE_COUNT, "heard": len(late), "p50": late[len(late) // 2], "p99": late[len(late) * 99 // 100]}
+    latencies.sort()
+    return {
+        "sent": MESSAGE_COUNT,
+        "heard": len(latencies),
+        "p50": latencies[len(latencies) // 2],
+        "p99": latencies[len(latencies) * 99 // 100],
+    }
 
 
 async def count_inputs(session: str) -> dict[str, int]:
-    """How many inputs were applied, and how many of them a second time."""
+    """Count the inputs that were applied, and those applied twice."""
     from bunraku.marionette import input_log
     from bunraku.marionette.recorder import CommandKind
 
-    async with open_context(Settings()) as backing:
-        said = msgpack.unpackb(await backing.bus.request(f"session.{session}.log", msgpack.packb(60.0), 10.0))
-        name = said["answer"]["log"]
-        data = await backing.motion_store.get_log(name)
-        await backing.motion_store.remove_log(name)
+    async with open_context(Settings()) as context:
+        reply = msgpack.unpackb(await context.bus.request(f"session.{session}.log", msgpack.packb(60.0), 10.0))
+        name = reply["answer"]["log"]
+        data = await context.motion_store.get_log(name)
+        await context.motion_store.remove_log(name)
     assert data is not None
     seen: list[tuple[int, ...]] = []
-    for passage in input_log.InputLog.unpack(data)._segments:
-        at = 0
-        while at < len(passage.records):
-            kind = CommandKind(passage.records[at])
+    for segment in input_log.InputLog.unpack(data)._segments:
+        offset = 0
+        while offset < len(segment.records):
+            kind = CommandKind(segment.records[offset])
             layout = input_log._RECORDS[kind]
             if kind is CommandKind.INPUT:
-                _, who, limb, _, epoch, sequence, *_ = layout.unpack_from(passage.records, at + 1)
-                seen.append((who, limb, epoch, sequence))
-            at += 1 + layout.size
+                _, puppeteer, limb, _, epoch, sequence, *_ = layout.unpack_from(segment.records, offset + 1)
+                seen.append((puppeteer, limb, epoch, sequence))
+            offset += 1 + layout.size
     return {"applied": len(seen), "twice": len(seen) - len(set(seen))}
 
 

@@ -1,4 +1,4 @@
-"""Those who are there while things break: viewers without a screen, and a puppeteer who comes again by itself."""
+"""Participants of the fault tests: viewers without a screen, and a puppeteer that reconnects by itself."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from bunraku.runtime.clock import clock
 from bunraku.wire.overlay import Overlay
 
 FRAME_S = 1 / 20
-"""Seconds between two pictures: enough to see whether one is missing."""
+"""Interval between two pictures, seconds: short enough to detect a missing one."""
 
 
 class _CloseRecorder(ReconnectingConnection):
-    """A line of which it is noted when and how its connections were closed."""
+    """Connection that records when and with which code it was closed."""
 
     closes: list[tuple[float, int | None]]
 
-    async def _listen(self, connection: ClientConnection) -> None:
+    async def _receive(self, connection: ClientConnection) -> None:
         try:
             await super()._receive(connection)
         finally:
@@ -36,7 +36,7 @@ class _CloseRecorder(ReconnectingConnection):
 
 
 class MonitoredViewer(Viewer):
-    """A viewer who notes when something was heard, and how connections ended. Times are of `time.monotonic`."""
+    """Viewer that records when messages arrived and how connections ended. Times are those of `time.monotonic`."""
 
     def __init__(self, url: str) -> None:
         super().__init__(url)
@@ -44,12 +44,12 @@ class MonitoredViewer(Viewer):
         self.overlay_times: list[float] = []
         self.dues: list[int] = []
         self.closes: list[tuple[float, int | None]] = []
-        self._line = noted = _CloseRecorder(self._make_url, self._on_open, self._on_bytes)
-        noted.closes = self.closes
+        self._connection = recorder = _CloseRecorder(self._make_url, self._on_open, self._on_bytes)
+        recorder.closes = self.closes
         self._task: asyncio.Task[object] | None = None
 
     async def start(self) -> None:
-        """Watch until `stop`; returns once something is shown."""
+        """Start watching; return when the first pose is shown."""
         shown = asyncio.Event()
         self._task = asyncio.create_task(self.watch(86_400.0, lambda _, __: shown.set(), frame_interval=FRAME_S))
         waiting = asyncio.create_task(shown.wait())
@@ -60,35 +60,35 @@ class MonitoredViewer(Viewer):
             self._task.result()
 
     async def stop(self) -> None:
-        """Go."""
+        """Stop and disconnect."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
 
     @property
     def failure(self) -> str | None:
-        """Why the stream was given up, None while it goes on."""
+        """Return the error that ended the stream, None while it is running."""
         if self._task is None or not self._task.done() or self._task.cancelled():
             return None
         return repr(self._task.exception())
 
     def clock_error_s(self) -> float:
-        """Seconds by which the dance here is off where the stage's clock has it."""
+        """Return the difference between this viewer's motion time and that of the server's clock, seconds."""
         state = self.timeline_history.newest
         assert state is not None
-        here = position_at(state, self.clock.at(time.monotonic_ns() // 1000))
-        apart = abs(here - position_at(state, clock()))
-        return min(apart, state.duration - apart) * 1e-6
+        position = position_at(state, self.clock.at(time.monotonic_ns() // 1000))
+        difference = abs(position - position_at(state, clock()))
+        return min(difference, state.duration - difference) * 1e-6
 
     def longest_silence_s(self, since: float) -> float:
-        """The longest time from `since` to now in which nothing was heard, seconds."""
+        """Return the longest time since `since` without a message, seconds."""
         return _longest_gap(self.message_times, since)
 
     def longest_overlay_gap_s(self, since: float) -> float:
-        """The longest time from `since` to now without a pulled limb."""
+        """Return the longest time since `since` without an overlay of a controlled limb, seconds."""
         return _longest_gap(self.overlay_times, since)
 
-    def _take(self, data: bytes) -> None:
+    def _on_message(self, data: bytes) -> None:
         now = time.monotonic()
         self.message_times.append(now)
         if data[0] == Overlay.TYPE and data[1]:
@@ -97,17 +97,17 @@ class MonitoredViewer(Viewer):
 
 
 class MonitoredPuppeteer:
-    """A puppeteer who leads the left hand round, thirty times a second, and comes again whenever the line is lost."""
+    """Puppeteer that moves the left hand in circles at 30 Hz and reconnects whenever the connection is lost."""
 
     def __init__(self, client: Client, session: str) -> None:
         self._client, self._session = client, session
         self.connections = 0
         self.errors: list[tuple[float, str]] = []
-        """Why the line was lost, and when."""
+        """When connections were lost, and why."""
         self._task = asyncio.create_task(self._run(), name="puppeteer")
 
     async def stop(self) -> None:
-        """Go."""
+        """Stop and disconnect."""
         self._task.cancel()
         await asyncio.gather(self._task, return_exceptions=True)
 
@@ -118,8 +118,8 @@ class MonitoredPuppeteer:
                     await aiko.claim("left_hand")
                     self.connections += 1
                     for tick in range(1 << 30):
-                        turn = tick / 30.0
-                        await aiko.target("left_hand", 0.5, 0.2 * math.sin(turn), 0.4 + 0.1 * math.cos(turn))
+                        phase = tick / 30.0
+                        await aiko.target("left_hand", 0.5, 0.2 * math.sin(phase), 0.4 + 0.1 * math.cos(phase))
                         await asyncio.sleep(1 / 30)
             except (ControlRefused, OSError, TimeoutError, WebSocketException) as error:
                 self.errors.append((time.monotonic(), str(error)))

@@ -1,4 +1,4 @@
-"""The faults of processes: killed, gone for a while, stopped in order."""
+"""Faults of processes: killed, unavailable for a while, stopped in order."""
 
 from __future__ import annotations
 
@@ -25,154 +25,158 @@ KILL_TARGETS = (
     "postgres",
 )
 MAX_REFUSAL_S = 2.0
-"""Seconds within which a write is refused."""
+"""Maximum time until a write is rejected during an outage, seconds."""
 
 
-async def kill_service(scene: Scenario, target: str, folder: Path, rounds: int) -> FaultResult:
-    """`kill -9` of one of `KILLED`, mid-stream."""
-    row, service = FaultResult(f"kill -9 {target}"), target.partition(":")[0]
+async def kill_service(scenario: Scenario, target: str, folder: Path, rounds: int) -> FaultResult:
+    """Kill one of `KILL_TARGETS` with `kill -9` during playback."""
+    result, service = FaultResult(f"kill -9 {target}"), target.partition(":")[0]
     for _ in range(rounds):
-        await scene.upload_motion(folder)
-        await scene.record_motion()
+        await scenario.upload_motion(folder)
+        await scenario.record_motion()
         if service == "session":
-            await connect_through_other_replica(scene)
-            owner = await scene.find_owner_replica()
+            await connect_through_other_replica(scenario)
+            owner = await scenario.find_owner_replica()
             replica = owner if "stage" in target else 3 - owner
         else:
-            replica = await _busiest_replica(scene.stack, service)
-        restarts, began = await scene.stack.restarts(service, replica), time.monotonic()
-        await scene.stack.kill(service, replica)
-        # who has not noticed yet has nothing to come back from
+            replica = await _busiest_replica(scenario.stack, service)
+        restarts, began = await scenario.stack.restarts(service, replica), time.monotonic()
+        await scenario.stack.kill(service, replica)
+        # give clients time to detect the loss
         await asyncio.sleep(1.0)
-        flows = await scene.wait_for_overlays(time.monotonic())
-        figures, broken = scene.evaluate(began)
-        figures["healthy_s"] = await scene.stack.wait_until_healthy()
-        broken += [] if flows else ["the pulled limb is not seen again"]
-        broken += (
-            [] if await scene.stack.restarts(service, replica) == restarts + 1 else ["it was not started anew once"]
+        resumed = await scenario.wait_for_overlays(time.monotonic())
+        figures, violations = scenario.evaluate(began)
+        figures["healthy_s"] = await scenario.stack.wait_until_healthy()
+        violations += [] if resumed else ["viewers receive no overlays of the controlled limb"]
+        violations += (
+            []
+            if await scenario.stack.restarts(service, replica) == restarts + 1
+            else ["the container was not restarted exactly once"]
         )
-        broken += await _check_integrity(scene, figures)
-        row.add_round(figures, *broken)
-    return row
+        violations += await _check_integrity(scenario, figures)
+        result.add_round(figures, *violations)
+    return result
 
 
-async def run_outage(scene: Scenario, service: str, folder: Path, rounds: int, seconds: float) -> FaultResult:
-    """NATS or PostgreSQL is not there for a while."""
-    row = FaultResult(f"{service} gone for {seconds:g} s")
+async def run_outage(scenario: Scenario, service: str, folder: Path, rounds: int, seconds: float) -> FaultResult:
+    """Stop NATS or PostgreSQL for a while; playback must continue and writes must be rejected quickly."""
+    result = FaultResult(f"{service} gone for {seconds:g} s")
     write: Callable[[], Awaitable[tuple[int, float]]] = (
-        (lambda: _timed_request(scene, "PATCH", f"/v1/sessions/{scene.session}", json={"loop": True}))
+        (lambda: _timed_request(scenario, "PATCH", f"/v1/sessions/{scenario.session}", json={"loop": True}))
         if service == "nats"
-        else (lambda: _timed_request(scene, "DELETE", "/v1/motions/none"))
+        else (lambda: _timed_request(scenario, "DELETE", "/v1/motions/none"))
     )
     for _ in range(rounds):
-        await scene.upload_motion(folder)
-        frames = [one.statistics.frames for one in scene.viewers]
-        dark = [one.statistics.dark_ms for one in scene.viewers]
-        began, broken, slowest = time.monotonic(), [], 0.0
-        await scene.stack.kill_all_replicas(service)
-        left = time.monotonic()
-        while time.monotonic() < left + seconds:
+        await scenario.upload_motion(folder)
+        frames = [one.statistics.frames for one in scenario.viewers]
+        dark_before = [one.statistics.dark_ms for one in scenario.viewers]
+        began, violations, slowest = time.monotonic(), [], 0.0
+        await scenario.stack.kill_all_replicas(service)
+        outage_began = time.monotonic()
+        while time.monotonic() < outage_began + seconds:
             status, took = await write()
             slowest = max(slowest, took)
             if status != 503:
-                broken.append(f"a write was answered {status}")
+                violations.append(f"a write returned {status}, expected 503")
             await asyncio.sleep(1.0)
         shown = time.monotonic() - began
-        played = min(one.statistics.frames - had for one, had in zip(scene.viewers, frames, strict=True)) / (
+        played = min(one.statistics.frames - had for one, had in zip(scenario.viewers, frames, strict=True)) / (
             20.0 * shown
         )
-        black = max(one.statistics.dark_ms - had for one, had in zip(scene.viewers, dark, strict=True))
-        back = time.monotonic()
-        await scene.stack.compose("start", service)
-        while (await write())[0] == 503 and time.monotonic() < back + 30:  # noqa: ASYNC110
+        dark_ms = max(one.statistics.dark_ms - had for one, had in zip(scenario.viewers, dark_before, strict=True))
+        restarted = time.monotonic()
+        await scenario.stack.compose("start", service)
+        while (await write())[0] == 503 and time.monotonic() < restarted + 30:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
-        await scene.wait_for_overlays(back)
-        healed = time.monotonic() - back
-        await scene.stack.wait_until_healthy()
-        figures, odd = scene.evaluate(time.monotonic() - 0.5)
-        figures = {"refused_s": slowest, "heal_s": healed, "dark_ms": black, "off_ms": figures["off_ms"]}
-        broken += odd
+        await scenario.wait_for_overlays(restarted)
+        recovery_s = time.monotonic() - restarted
+        await scenario.stack.wait_until_healthy()
+        figures, found = scenario.evaluate(time.monotonic() - 0.5)
+        figures = {"refused_s": slowest, "heal_s": recovery_s, "dark_ms": dark_ms, "off_ms": figures["off_ms"]}
+        violations += found
         if slowest > MAX_REFUSAL_S:
-            broken.append(f"a write was refused after {slowest:.1f} s")
-        if healed > MAX_SILENCE_S:
-            told = [f"{when - back:.1f} s: {why}" for when, why in scene.puppeteer.errors if when > back]
-            broken.append(f"it took {healed:.1f} s to heal; the puppeteer was told: {'; '.join(told)}")
-        if black > 0 or played < 0.8:
-            broken.append(f"the dance stood: {black:.0f} ms dark, {played:.2f} of the pictures")
-        broken += await _check_integrity(scene, figures)
-        row.add_round(figures, *broken)
-    return row
+            violations.append(f"a write was rejected after {slowest:.1f} s")
+        if recovery_s > MAX_SILENCE_S:
+            errors = [
+                f"{when - restarted:.1f} s: {reason}" for when, reason in scenario.puppeteer.errors if when > restarted
+            ]
+            violations.append(f"recovery took {recovery_s:.1f} s; errors of the puppeteer: {'; '.join(errors)}")
+        if dark_ms > 0 or played < 0.8:
+            violations.append(f"playback stalled: {dark_ms:.0f} ms dark, {played:.2f} of the pictures shown")
+        violations += await _check_integrity(scenario, figures)
+        result.add_round(figures, *violations)
+    return result
 
 
-async def stop_stream_service(scene: Scenario, rounds: int) -> FaultResult:
-    """`docker compose stop stream`: each is told to come again."""
-    row = FaultResult("docker compose stop stream")
+async def stop_stream_service(scenario: Scenario, rounds: int) -> FaultResult:
+    """Stop the stream service in order; each connection must be closed with code 1012."""
+    result = FaultResult("docker compose stop stream")
     for _ in range(rounds):
-        dark = [one.statistics.dark_ms for one in scene.viewers]
-        counts = [len(one.closes) for one in scene.viewers]
+        dark_before = [one.statistics.dark_ms for one in scenario.viewers]
+        counts = [len(one.closes) for one in scenario.viewers]
         began = time.monotonic()
-        await scene.stack.compose("stop", "stream")
+        await scenario.stack.compose("stop", "stream")
         took = time.monotonic() - began
-        closes = [one.closes[had:] for one, had in zip(scene.viewers, counts, strict=True)]
-        broken = [
-            f"a viewer was not told to come again: {found}" for found in closes if not found or found[0][1] != 1012
+        closes = [one.closes[had:] for one, had in zip(scenario.viewers, counts, strict=True)]
+        violations = [
+            f"a viewer was not asked to reconnect: {found}" for found in closes if not found or found[0][1] != 1012
         ]
-        told = max((found[0][0] - began for found in closes if found), default=took)
-        await scene.stack.compose("start", "stream")
-        back = time.monotonic()
-        if not await scene.wait_for_overlays(back):
-            broken.append("viewers did not come back")
-        black = max(one.statistics.dark_ms - had for one, had in zip(scene.viewers, dark, strict=True))
-        figures = {"told_s": told, "stopped_s": took, "back_s": time.monotonic() - back, "dark_ms": black}
-        await scene.stack.wait_until_healthy()
-        row.add_round(figures, *broken, *scene.evaluate(time.monotonic() - 0.5)[1])
-    return row
+        closed_s = max((found[0][0] - began for found in closes if found), default=took)
+        await scenario.stack.compose("start", "stream")
+        restarted = time.monotonic()
+        if not await scenario.wait_for_overlays(restarted):
+            violations.append("viewers did not reconnect")
+        dark_ms = max(one.statistics.dark_ms - had for one, had in zip(scenario.viewers, dark_before, strict=True))
+        figures = {"told_s": closed_s, "stopped_s": took, "back_s": time.monotonic() - restarted, "dark_ms": dark_ms}
+        await scenario.stack.wait_until_healthy()
+        result.add_round(figures, *violations, *scenario.evaluate(time.monotonic() - 0.5)[1])
+    return result
 
 
-async def stop_one_stream_replica(scene: Scenario, rounds: int) -> FaultResult:
-    """One replica of the stream service stops: its viewers go on at the other."""
-    row = FaultResult("one stream replica stops")
+async def stop_one_stream_replica(scenario: Scenario, rounds: int) -> FaultResult:
+    """Stop one replica of the stream service; its viewers must continue at the other."""
+    result = FaultResult("one stream replica stops")
     for _ in range(rounds):
-        dark = [one.statistics.dark_ms for one in scene.viewers]
-        replica = await _busiest_replica(scene.stack, "stream")
+        dark_before = [one.statistics.dark_ms for one in scenario.viewers]
+        replica = await _busiest_replica(scenario.stack, "stream")
         began = time.monotonic()
-        await scene.stack.stop_replica("stream", replica)
-        flows = await scene.wait_for_overlays(time.monotonic())
-        figures, broken = scene.evaluate(began)
-        black = max(one.statistics.dark_ms - had for one, had in zip(scene.viewers, dark, strict=True))
-        broken += [] if flows else ["viewers did not come back"]
-        broken += [f"{black:.0f} ms were dark"] if black else []
-        figures["dark_ms"] = black
-        await scene.stack.compose("start", "stream")
-        await scene.stack.wait_until_healthy()
-        row.add_round(figures, *broken)
-    return row
+        await scenario.stack.stop_replica("stream", replica)
+        resumed = await scenario.wait_for_overlays(time.monotonic())
+        figures, violations = scenario.evaluate(began)
+        dark_ms = max(one.statistics.dark_ms - had for one, had in zip(scenario.viewers, dark_before, strict=True))
+        violations += [] if resumed else ["viewers did not reconnect"]
+        violations += [f"{dark_ms:.0f} ms were dark"] if dark_ms else []
+        figures["dark_ms"] = dark_ms
+        await scenario.stack.compose("start", "stream")
+        await scenario.stack.wait_until_healthy()
+        result.add_round(figures, *violations)
+    return result
 
 
 async def _busiest_replica(stack: Stack, service: str) -> int:
-    """The number of the replica that has most to do."""
+    """Return the number of the replica with the most connections."""
     if service != "stream":
         return 1
     connections = await stack.count_connections(service)
     return connections.index(max(connections)) + 1
 
 
-async def _check_integrity(scene: Scenario, figures: dict[str, float]) -> list[str]:
-    """What of the acknowledged is lost, and whether an input was applied twice."""
-    lost, inputs = await scene.find_lost_motions(), await scene.count_inputs()
+async def _check_integrity(scenario: Scenario, figures: dict[str, float]) -> list[str]:
+    """Check that no acknowledged motion is lost and no input was applied twice."""
+    lost, inputs = await scenario.find_lost_motions(), await scenario.count_inputs()
     figures |= {"lost": float(len(lost)), "twice": float(inputs["twice"])}
-    broken = [f"lost: {one}" for one in lost]
+    violations = [f"lost: {one}" for one in lost]
     if inputs["twice"]:
-        broken.append(f"{inputs['twice']} inputs were applied twice")
+        violations.append(f"{inputs['twice']} inputs were applied twice")
     if not inputs["applied"]:
-        broken.append("no input was applied")
-    return broken
+        violations.append("no input was applied")
+    return violations
 
 
-async def _timed_request(scene: Scenario, method: str, path: str, **options: object) -> tuple[int, float]:
-    """The status of an answer, and how long it took."""
+async def _timed_request(scenario: Scenario, method: str, path: str, **options: object) -> tuple[int, float]:
+    """Send a request; return the status of the response (0 if there was none) and the time it took."""
     began = time.monotonic()
-    async with httpx2.AsyncClient(base_url=scene.stack.url, timeout=10.0) as http:
+    async with httpx2.AsyncClient(base_url=scenario.stack.url, timeout=10.0) as http:
         try:
             status = (await http.request(method, path, **options)).status_code  # type: ignore[arg-type]
         except httpx2.TransportError:

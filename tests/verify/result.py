@@ -1,4 +1,4 @@
-"""The table: of each fault how often it was tried, how often all held, and the worst of each figure."""
+"""Results by fault: attempts, passed attempts, and the worst value of each figure."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class FaultResult:
-    """One fault."""
+    """Result of one fault."""
 
     fault: str
     attempts: int = 0
@@ -15,16 +15,16 @@ class FaultResult:
     worst: dict[str, float] = field(default_factory=dict)
     violations: list[str] = field(default_factory=list)
 
-    def add_round(self, figures: dict[str, float], *broken: str) -> None:
-        """One time: its figures, of which the greatest is kept, and what did not hold."""
+    def add_round(self, figures: dict[str, float], *violations: str) -> None:
+        """Add one attempt: its figures, of which the maximum is kept, and its violations."""
         self.attempts += 1
-        self.passed += not broken
-        self.violations += broken
+        self.passed += not violations
+        self.violations += violations
         for name, value in figures.items():
             self.worst[name] = max(value, self.worst.get(name, value))
 
     def format_row(self) -> str:
-        """As a line of the table."""
+        """Format the result as a row of the table."""
         figures = ", ".join(f"{name} {value:.3g}" for name, value in self.worst.items())
-        said = f"{self.fault:<34} {self.passed}/{self.attempts}  {figures}"
-        return "\n".join([said, *(f"{'':<34} did not hold: {why}" for why in dict.fromkeys(self.violations))])
+        row = f"{self.fault:<34} {self.passed}/{self.attempts}  {figures}"
+        return "\n".join([row, *(f"{'':<34} failed: {violation}" for violation in dict.fromkeys(self.violations))])

@@ -1,5 +1,5 @@
-"""What goes on while things break: two viewers on different replicas, a puppeteer who comes through a session replica
-that is not the stage's, and what the stack has acknowledged so far."""
+"""Scenario of the fault tests: two viewers at different replicas, a puppeteer connected through a session replica that
+does not own the session, and the motions that the stack has acknowledged so far."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from tests.verify.stack import Stack
 
 PROBE_SOURCE = (Path(__file__).parent / "container_probe.py").read_bytes()
 MAX_SILENCE_S = 5.0
-"""Seconds within which viewers go on."""
+"""Maximum time without a message at a viewer, seconds."""
 MAX_CLOCK_ERROR_S = 0.1
-"""Seconds by which the dance may be off."""
+"""Maximum error of a viewer's motion time, seconds."""
 _OPEN_SESSION_SCRIPT = """
 import json, sys, urllib.request
 kind = {"Content-Type": "application/json"}
-asked = urllib.request.Request("http://127.0.0.1:8000/v1/sessions", sys.argv[1].encode(), kind)
-print(urllib.request.urlopen(asked, timeout=20).read().decode())
+request = urllib.request.Request("http://127.0.0.1:8000/v1/sessions", sys.argv[1].encode(), kind)
+print(urllib.request.urlopen(request, timeout=20).read().decode())
 """
 
 
 class Scenario:
-    """One session, its people, and what must not be lost."""
+    """One session, its participants, and the motions that must not be lost."""
 
     def __init__(self, stack: Stack, client: Client, motion: str, session: str) -> None:
         self.stack, self.client, self.motion, self.session = stack, client, motion, session
@@ -42,45 +42,45 @@ class Scenario:
         self.puppeteer: MonitoredPuppeteer
 
     async def upload_motion(self, folder: Path, seconds: float = 1.0) -> str:
-        """A new motion, acknowledged."""
+        """Upload a generated motion and return its id."""
         source = folder / f"{secrets.token_hex(4)}.bvh"
         source.write_bytes(make_bvh_clip(seconds, secrets.randbelow(1 << 30)))
-        made = (await self.client.upload(source))["id"]
-        self.acknowledged.append(made)
-        return str(made)
+        uploaded = (await self.client.upload(source))["id"]
+        self.acknowledged.append(uploaded)
+        return str(uploaded)
 
     async def record_motion(self) -> None:
-        """What was shown last becomes a motion, acknowledged."""
+        """Record the last second of the session as a motion."""
         self.acknowledged.append((await self.client.record(self.session, "kept", 1.0))["id"])
 
     async def find_lost_motions(self) -> list[str]:
-        """What was acknowledged and is not there, or not whole."""
+        """Return the acknowledged motions that are missing or incomplete."""
         missing = []
         async with httpx2.AsyncClient(base_url=self.stack.url, timeout=10.0) as http:
             for motion in self.acknowledged:
                 described = await http.get(f"/v1/motions/{motion}")
                 blocks = described.json().get("blocks", 1) if described.status_code == 200 else 1
-                asked = [http.get(f"/v1/motions/{motion}/blocks/0/{index}") for index in (0, blocks - 1)]
-                answers = [described, *await asyncio.gather(*asked)]
-                if any(answer.status_code != 200 for answer in answers):
-                    missing.append(f"{motion} {[answer.status_code for answer in answers]}")
+                requests = [http.get(f"/v1/motions/{motion}/blocks/0/{index}") for index in (0, blocks - 1)]
+                responses = [described, *await asyncio.gather(*requests)]
+                if any(response.status_code != 200 for response in responses):
+                    missing.append(f"{motion} {[response.status_code for response in responses]}")
         return missing
 
     async def find_owner_replica(self) -> int:
-        """The number of the session replica that has the stage: the first, until another says that it took it over."""
-        taken = f"session {self.session} was left"
-        said = [await self.stack.last_logged("session", number, taken) for number in (1, 2)]
-        return said.index(max(said)) + 1
+        """Return the number of the session replica that owns the session: the first until another took over."""
+        takeover = f"session {self.session} taken over"
+        times = [await self.stack.last_logged("session", number, takeover) for number in (1, 2)]
+        return times.index(max(times)) + 1
 
     async def count_inputs(self) -> dict[str, int]:
-        """Inputs applied to the puppet, and those a second time, by the session's own log."""
-        said: dict[str, int] = json.loads(
+        """Count the inputs that were applied and those applied twice, by the log of the session."""
+        counts: dict[str, int] = json.loads(
             await self.stack.exec_in_replica("session", 1, "python", "-", self.session, stdin=PROBE_SOURCE)
         )
-        return said
+        return counts
 
     async def wait_for_overlays(self, since: float, seconds: float = 30.0) -> bool:
-        """Wait until both viewers see a pulled limb again, with what they heard after `since`; whether they do."""
+        """Wait until both viewers receive overlays of a controlled limb after `since`; return whether they do."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             now = time.monotonic()
@@ -90,40 +90,42 @@ class Scenario:
         return False
 
     def evaluate(self, since: float) -> tuple[dict[str, float], list[str]]:
-        """How viewers fared from `since` to now, and what did not hold."""
+        """Return figures of the viewers since `since`, and the violated limits."""
         silence = max(one.longest_silence_s(since) for one in self.viewers)
-        off = max(one.clock_error_s() for one in self.viewers)
+        clock_error = max(one.clock_error_s() for one in self.viewers)
         figures = {
             "resume_s": silence,
             "pull_s": max(one.longest_overlay_gap_s(since) for one in self.viewers),
-            "off_ms": off * 1e3,
+            "off_ms": clock_error * 1e3,
         }
-        broken = [f"a viewer gave up: {one.failure}" for one in self.viewers if one.failure is not None]
+        violations = [f"a viewer gave up: {one.failure}" for one in self.viewers if one.failure is not None]
         if silence > MAX_SILENCE_S:
-            broken.append(f"viewers heard nothing for {silence:.1f} s")
-        if off > MAX_CLOCK_ERROR_S:
-            broken.append(f"the dance was {off:.3f} s off")
-        return figures, broken
+            violations.append(f"viewers received nothing for {silence:.1f} s")
+        if clock_error > MAX_CLOCK_ERROR_S:
+            violations.append(f"playback was {clock_error:.3f} s off")
+        return figures, violations
 
 
 @asynccontextmanager
 async def open_scenario(stack: Stack, motion: str) -> AsyncIterator[Scenario]:
-    """A scene over a motion: the session is the first replica's, its puppeteer comes through another."""
+    """Open a session at the first session replica, its puppeteer connected through the other."""
     body = json.dumps({"motion": motion, "loop": True})
-    said = await stack.exec_in_replica("session", 1, "python", "-c", _OPEN_SESSION_SCRIPT, body)
-    session = json.loads(said)["id"]
+    response = await stack.exec_in_replica("session", 1, "python", "-c", _OPEN_SESSION_SCRIPT, body)
+    session = json.loads(response)["id"]
     async with Client(stack.url) as client:
-        scene = Scenario(stack, client, motion, session)
+        scenario = Scenario(stack, client, motion, session)
         try:
             address = client.socket_url(f"/v1/sessions/{session}/stream")
-            await _spread_viewers(scene, address)
-            await connect_through_other_replica(scene)
-            assert await scene.wait_for_overlays(time.monotonic()), "the pulled limb is not seen"
-            yield scene
+            await _spread_viewers(scenario, address)
+            await connect_through_other_replica(scenario)
+            assert await scenario.wait_for_overlays(time.monotonic()), (
+                "viewers receive no overlays of the controlled limb"
+            )
+            yield scenario
         finally:
-            if hasattr(scene, "puller"):
-                await scene.puppeteer.stop()
-            await asyncio.gather(*(one.stop() for one in scene.viewers))
+            if hasattr(scenario, "puppeteer"):
+                await scenario.puppeteer.stop()
+            await asyncio.gather(*(one.stop() for one in scenario.viewers))
             with contextlib.suppress(ServerProblem, httpx2.TransportError):
                 await asyncio.wait_for(_delete_session(client, session), 10.0)
 
@@ -133,37 +135,37 @@ async def _delete_session(client: Client, session: str) -> None:
     response.raise_for_status()
 
 
-async def _spread_viewers(scene: Scenario, address: str) -> None:
-    """Two viewers on different replicas of the stream service."""
-    taken: int | None = None
+async def _spread_viewers(scenario: Scenario, address: str) -> None:
+    """Connect two viewers to different replicas of the stream service."""
+    used: int | None = None
     for _ in range(20):
-        before = await scene.stack.count_connections("stream")
-        watcher = MonitoredViewer(address)
-        await watcher.start()
-        after = await scene.stack.count_connections("stream")
+        before = await scenario.stack.count_connections("stream")
+        viewer = MonitoredViewer(address)
+        await viewer.start()
+        after = await scenario.stack.count_connections("stream")
         grown = [number for number in range(2) if after[number] > before[number]]
-        if len(grown) == 1 and grown[0] != taken:
-            taken = grown[0]
-            scene.viewers.append(watcher)
-            if len(scene.viewers) == 2:
+        if len(grown) == 1 and grown[0] != used:
+            used = grown[0]
+            scenario.viewers.append(viewer)
+            if len(scenario.viewers) == 2:
                 return
         else:
-            await watcher.stop()
-    raise AssertionError("two viewers do not come to different replicas")
+            await viewer.stop()
+    raise AssertionError("two viewers did not connect to different replicas")
 
 
-async def connect_through_other_replica(scene: Scenario) -> None:
-    """The puppeteer comes through a session replica that has not the stage."""
-    owner = await scene.find_owner_replica()
+async def connect_through_other_replica(scenario: Scenario) -> None:
+    """Connect the puppeteer through a session replica that does not own the session."""
+    owner = await scenario.find_owner_replica()
     for _ in range(20):
-        if hasattr(scene, "puller"):
-            await scene.puppeteer.stop()
-        before = await scene.stack.count_connections("session")
-        scene.puppeteer = MonitoredPuppeteer(scene.client, scene.session)
+        if hasattr(scenario, "puppeteer"):
+            await scenario.puppeteer.stop()
+        before = await scenario.stack.count_connections("session")
+        scenario.puppeteer = MonitoredPuppeteer(scenario.client, scenario.session)
         async with asyncio.timeout(30):
-            while not scene.puppeteer.connections:  # noqa: ASYNC110
+            while not scenario.puppeteer.connections:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
-        after = await scene.stack.count_connections("session")
+        after = await scenario.stack.count_connections("session")
         if after[2 - owner] > before[2 - owner] and after[owner - 1] <= before[owner - 1]:
             return
-    raise AssertionError("no puppeteer comes through the other replica")
+    raise AssertionError("the puppeteer did not connect through the other replica")

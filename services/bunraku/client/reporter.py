@@ -1,4 +1,4 @@
-"""Periodic messages of a viewer: clock pings and reports (specification: Ping, Report)."""
+"""Periodic messages of a viewer: clock pings and reports (proto/messages.md, 3.6 and 3.8)."""
 
 from __future__ import annotations
 

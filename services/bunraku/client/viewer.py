@@ -178,7 +178,7 @@ class Viewer:
 
     def scene_at(self, reference: int, scene: int = 0) -> Array | None:
         """Return the seven values (7,) of the camera or light `scenes[scene]` at `reference`, or None
-        (specification: Scene block)."""
+        (proto/codec.md, 2.14)."""
         state = self.timeline_history.at(reference)
         if state is None or self._tracks is None or state.motion != self.motion or not 0 <= scene < len(self.scenes):
             return None

@@ -1,4 +1,4 @@
-"""Audio track: Opus packets in the blocks of a motion (SPEC.md, Track `audio` and Audio block).
+"""Audio track: Opus packets in the blocks of a motion (proto/codec.md, 2.15).
 
 A packet contains `PACKET_SAMPLES` samples; packet p starts at sample `PACKET_SAMPLES` * p - pre-skip, and sample 0 is
 the motion's first frame. A packet is in the block in which it starts. This module neither encodes nor decodes Opus.

@@ -1,4 +1,4 @@
-"""Weights of the channels: how far a small rotation of each joint moves the body (SPEC.md, Weights and Axes).
+"""Weights of the channels: how far a small rotation of each joint moves the body (proto/codec.md, 2.5 and 2.6).
 
 A channel's values are multiplied with its weight before they are quantised. Weights depend on the skeleton description
 alone, and their axes have the same meaning on every skeleton.

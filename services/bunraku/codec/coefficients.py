@@ -1,4 +1,4 @@
-"""Block bytes: header and quantised coefficients to bytes and back (SPEC.md, Motion block)."""
+"""Block bytes: header and quantised coefficients to bytes and back (proto/codec.md, 2.8 and 2.9)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Adaptive coder of a few integers (SPEC.md, Skeleton), in plain Python.
+"""Adaptive coder of a few integers (proto/codec.md, 2.4), in plain Python.
 
 A service parses a skeleton description for each motion that it opens, and must not wait seconds until the compiled
 entropy coder is loaded.

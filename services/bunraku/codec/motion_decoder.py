@@ -1,4 +1,4 @@
-"""Decoder of motion blocks: bytes to poses at any instant (SPEC.md, Motion block)."""
+"""Decoder of motion blocks: bytes to poses at any instant (proto/codec.md, 2.8 and 2.9)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class MotionBlock:
 
 
 def reconstruct(q: IntArray) -> Array:
-    """Return the values of quantised coefficients in steps (SPEC.md, Quantiser).
+    """Return the values of quantised coefficients in steps (proto/codec.md, 2.7).
 
     They lie a little below the middle of the quantiser's intervals, because smaller values are more frequent.
     """

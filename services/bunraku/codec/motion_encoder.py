@@ -1,4 +1,4 @@
-"""Encoder of motions: blocks at several bitrate levels, each within its error bound (SPEC.md, Motion block)."""
+"""Encoder of motions: blocks at several bitrate levels, each within its error bound (proto/codec.md, 2.8 and 2.9)."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class EncodedMotion:
     placement: Placement = STAGE_CENTRE
 
     def describe(self) -> dict[str, Any]:
-        """Return the entry of a Description's `tracks` (SPEC.md, Track `motion`)."""
+        """Return the entry of a Description's `tracks` (proto/messages.md, 3.2)."""
         description = describe_motion_track(self.track, [level.describe() for level in self.ladder])
         description["front"] = round(self.front, 3)
         if self.placement != STAGE_CENTRE:

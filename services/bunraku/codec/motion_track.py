@@ -1,4 +1,4 @@
-"""Motion track: what the blocks of a motion share, sent once in the Description (SPEC.md, Track `motion`)."""
+"""Motion track: what the blocks of a motion share, sent once in the Description (proto/messages.md, 3.2)."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def plan_motion_track(
 
 
 def describe_motion_track(track: MotionTrack, rates: list[dict[str, float]]) -> dict[str, Any]:
-    """Return the entry of a Description's `tracks` for a motion (SPEC.md, Track `motion`)."""
+    """Return the entry of a Description's `tracks` for a motion (proto/messages.md, 3.2)."""
     return {
         "type": "motion",
         "codec": MOTION_CODEC,

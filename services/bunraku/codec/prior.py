@@ -1,7 +1,7 @@
 """Prior of the context model: fixed integers, trained on human motion (`training/`) and never adapted.
 
-SPEC.md, Prior, is the definition. The module also contains the lookup tables of the context model. All numbers are
-integers, so that every decoder reaches the same bits.
+proto/codec.md, 2.11, is the definition. The module also contains the lookup tables of the context model. All numbers
+are integers, so that every decoder reaches the same bits.
 """
 
 from __future__ import annotations

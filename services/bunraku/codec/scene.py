@@ -1,4 +1,4 @@
-"""Scene tracks: camera and light beside a motion (SPEC.md, Tracks `camera` and `light`).
+"""Scene tracks: camera and light beside a motion (proto/codec.md, 2.14).
 
 A scene has seven values per frame, world frame, metres: position 0-2; then of a camera its target 3-5 and its vertical
 field of view 6 in radians; of a light its colour 3-5 in linear RGB and its intensity 6.

@@ -1,4 +1,4 @@
-"""Decoder of scene blocks: bytes to the values of a camera or light at any instant (SPEC.md, Scene block)."""
+"""Decoder of scene blocks: bytes to the values of a camera or light at any instant (proto/codec.md, 2.14)."""
 
 from __future__ import annotations
 

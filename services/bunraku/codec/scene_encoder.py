@@ -1,4 +1,4 @@
-"""Encoder of scenes: a camera or light at several bitrate levels (SPEC.md, Tracks `camera` and `light`)."""
+"""Encoder of scenes: a camera or light at several bitrate levels (proto/codec.md, 2.14)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Skeleton description: bone lengths and reference pose in few bytes (SPEC.md, Skeleton; wire key `dancer`).
+"""Skeleton description: bone lengths and reference pose in few bytes (proto/codec.md, 2.4; wire key `dancer`).
 
 A sequence of integers, each an Exp-Golomb code with adaptive models. An integer of the right side is coded as the
 difference of its magnitude from that of the left side, mostly zero, and whether its sign differs.

@@ -1,4 +1,4 @@
-"""Division of a track into blocks over time, the same for motion, scene and audio (SPEC.md, Description)."""
+"""Division of a track into blocks over time, the same for motion, scene and audio (proto/messages.md, 3.2)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Cosine transform of channel values over time.
 
 The orthonormal DCT-II over the n frames of a block: x(t) = sum_k s_k X_k cos(pi (t + 1/2) k / n), s_0 = sqrt(1/n),
-s_k = sqrt(2/n). It is a function of continuous time, so that a viewer draws at its own frame rate (SPEC.md, Transform).
+s_k = sqrt(2/n). It is a function of continuous time, so that a viewer draws at its own frame rate
+(proto/codec.md, 2.7).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Blocks that a reconnecting viewer still holds, as sent in the `have` parameter (SPEC.md, Sockets)."""
+"""Blocks that a reconnecting viewer still holds, as sent in the `have` parameter (proto/server.md, 6.1)."""
 
 from __future__ import annotations
 

@@ -24,8 +24,8 @@ class Bvh:
     """Contents of a BVH file in its own units, axes and names.
 
     For J joints, parents before children: `names`, `parents` (-1 for the root), `offsets` (J, 3) from the parent,
-    `channels` (each a tuple of "Xposition" ... "Zrotation" in the file's order) and `joint_lines`, line numbers of their
-    declarations. `ends` are the End Sites. `frames` (n, C) holds the channel values in the order of the joints, angles
+    `channels` (each a tuple of "Xposition" ... "Zrotation" in the file's order) and `joint_lines`, their line
+    numbers. `ends` are the End Sites. `frames` (n, C) holds the channel values in the order of the joints, angles
     in degrees; `frame_time` is in seconds. `notes` are sentences about irregularities.
     """
 

@@ -25,7 +25,7 @@ def solve_kabsch(points: Array, targets: Array, weights: Array) -> Array:
 
 
 def mean_local_positions(orientation: Array, targets: Array) -> Array:
-    """Return the mean positions (m, 3) of `targets` (n, m, 3), relative to a joint, in its frame; `orientation` (n, 4)."""
+    """Return the mean positions (m, 3) of `targets` (n, m, 3) in the frame of a joint; `orientation` (n, 4)."""
     places: Array = rotation.rotate(rotation.conjugate(orientation)[:, None], targets).mean(axis=0)
     return places
 

@@ -1,4 +1,4 @@
-"""Audio blocks that a viewer holds, and the packets to decode from any position (SPEC.md, Audio block)."""
+"""Audio blocks that a viewer holds, and the packets to decode from any position (proto/codec.md, 2.15)."""
 
 from __future__ import annotations
 

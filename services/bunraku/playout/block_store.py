@@ -1,4 +1,4 @@
-"""Blocks that a viewer holds, and their values at any position (SPEC.md, Motion block and Scene block)."""
+"""Blocks that a viewer holds, and their values at any position (proto/codec.md, 2.8 and 2.14)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Overlays of controlled limbs, applied to the motion's pose at any clock time (SPEC.md, Overlay)."""
+"""Overlays of controlled limbs, applied to the motion's pose at any clock time (proto/messages.md, 3.5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Timeline of a stage: mapping of clock time to motion time, and its edits (SPEC.md, Timeline).
+"""Timeline of a stage: mapping of clock time to motion time, and its edits (proto/playback.md, 4.2).
 
 All times are integer microseconds: `clock` of the reference clock, `position` and `duration` of the motion.
 """

@@ -16,9 +16,9 @@ def compile_cache_folder(package: str) -> str | None:
     set.
     """
     sources = sha256()
-    files = (file for file in (PACKAGE_FOLDER / package).iterdir() if file.suffix in (".py", ".json"))
-    for file in sorted(files):
-        sources.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
+    root = PACKAGE_FOLDER / package
+    for file in sorted(file for file in root.rglob("*") if file.suffix in (".py", ".json")):
+        sources.update(str(file.relative_to(root)).encode() + b"\0" + file.read_bytes() + b"\0")
     configured = os.environ.get("NUMBA_CACHE_DIR")
     parent = Path(configured) / package if configured else PACKAGE_FOLDER / package / "__pycache__"
     folder = parent / sources.hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""WebSocket endpoint of a puppeteer (SPEC.md, Sockets).
+"""WebSocket endpoint of a puppeteer (proto/server.md, 6.1).
 
 The stage may be on another replica: messages travel to and from it over the bus.
 """

@@ -1,4 +1,7 @@
-"""Notices about inputs that were changed or ignored, at most one a second per reason and limb (SPEC.md, Notice)."""
+"""Notices about inputs that were changed or ignored, at most one a second per reason and limb.
+
+The notices are defined in proto/messages.md, 3.7.
+"""
 
 from __future__ import annotations
 

@@ -7,12 +7,11 @@ Path of a block from storage to the socket
 A viewer that receives blocks on its own:
 
 1. `app` (a stored motion) or `watched_session` (a live session) gets the `StoredMotion` from the motion store and
-passes
-   it to `ViewerConnection.set_timeline`.
+   passes it to `ViewerConnection.set_timeline`.
 2. `viewer_connection` hands it to `motion_delivery`, where `MotionFeed` keeps it for the viewer.
 3. In a scheduler tick `viewer_connection` asks `MotionFeed.next_packet` for the next message. `motion_delivery` gets
-track,
-   index and level from `delivery.block_scheduler`, and returns the stored bytes (first return to `viewer_connection`).
+   track, index and level from `delivery.block_scheduler`, and returns the stored bytes (first return to
+   `viewer_connection`).
 4. `viewer_connection` frames the bytes with `websocket.frame` (second return) and writes them to the
    `websocket.connection`, through `counters`, which counts the bytes.
 

@@ -1,4 +1,4 @@
-"""Connection of one viewer: what it is sent, in which order, and how its messages are handled (SPEC.md, Sockets).
+"""Connection of one viewer: what it is sent, in which order, and how its messages are handled (proto/server.md, 6.1).
 
 A viewer has no separate task. It acts when something is published for it, when it sends a message, when its
 connection becomes writable, and in its scheduler ticks (`bunraku.stream.tick_scheduler`). While the connection is not

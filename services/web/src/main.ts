@@ -2,7 +2,7 @@
 import "./style/page.css";
 import { App } from "./app/app";
 import { StartupSequence } from "./app/startup";
-import { bound, consumeUrlToken, currentRole } from "./client/access";
+import { consumeUrlToken, pageAccess } from "./client/access";
 import { loadPageLanguage } from "./i18n/language";
 
 // Remove the token from the address before anything else can read or share that address.
@@ -10,8 +10,8 @@ consumeUrlToken();
 addEventListener("hashchange", () => consumeUrlToken() && location.reload());
 
 const root = document.documentElement;
-root.dataset.role = currentRole();
-if (bound()) root.dataset.bound = "";
+root.dataset.role = pageAccess.role;
+if (pageAccess.isRestricted) root.dataset.bound = "";
 const startup = new StartupSequence(root);
 const query = new URLSearchParams(location.search);
 // The language must be known before any text is shown.

@@ -3,7 +3,10 @@ import { execFileSync } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
+import { build, preview } from "vite";
 import { afterAll, beforeAll, expect, test } from "vitest";
+
+import { chromiumPath, launchChromium } from "./browser/chromium";
 
 const WEB = resolve(import.meta.dirname, "..");
 const COMPILER = join(WEB, "node_modules/typescript/bin/tsc");
@@ -130,6 +133,35 @@ test("package can be loaded without a page, and decodes messages", () => {
   ]);
 });
 
+const PAGE = `<!doctype html>
+<bunraku-stage src="http://127.0.0.1:9/" theme="day"></bunraku-stage>
+<script type="module" src="/page.js"></script>
+`;
+const PAGE_SCRIPT = `
+import { JOINTS } from "bunraku";
+import "bunraku/element";
+document.title = [JOINTS.length, document.querySelector("bunraku-stage").theme].join(" ");
+`;
+
+test.skipIf(!chromiumPath())("package works in a page that Vite builds", { timeout: 90_000 }, async () => {
+  writeFileSync(join(folder, "index.html"), PAGE);
+  writeFileSync(join(folder, "page.js"), PAGE_SCRIPT);
+  const config = { configFile: false, root: folder, logLevel: "error", build: { target: "es2023" } } as const;
+  await build(config);
+  const [server, browser] = await Promise.all([
+    preview({ ...config, preview: { port: 0, host: "127.0.0.1" } }),
+    launchChromium(chromiumPath() ?? ""),
+  ]);
+  try {
+    const page = await browser.newPage();
+    await page.goto(server.resolvedUrls?.local[0] ?? "");
+    await page.waitForFunction("document.title === '18 day'");
+  } finally {
+    await browser.close();
+    await server.close();
+  }
+});
+
 test("package has metadata and contains only built files", () => {
   const installed = join(folder, "node_modules/bunraku");
   const manifest = JSON.parse(readFileSync(join(installed, "package.json"), "utf8")) as Record<string, unknown>;
@@ -144,7 +176,9 @@ test("package has metadata and contains only built files", () => {
       .map(({ path }) => path)
       .filter(
         (path) =>
-          !/^(package\.json|(README|LICENSES)\.md|bunraku(-stage)?\.js|parts\/.+\.js|types\/.+\.d\.ts)$/.test(path),
+          !/^(package\.json|LICENSE|NOTICE|(README|LICENSES)\.md|bunraku(-stage)?\.js|parts\/.+\.js|types\/.+\.d\.ts)$/.test(
+            path,
+          ),
       ),
   ).toEqual([]);
   // a quarter of this is the Opus decoder, which only browsers without one load

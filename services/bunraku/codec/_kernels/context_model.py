@@ -1,4 +1,4 @@
-"""Context model: predicts the scale of the next coefficient from those already coded (SPEC.md, Features and Prior).
+"""Context model: predicts the scale of the next coefficient from those already coded (proto/codec.md, 2.10 and 2.11).
 
 Coefficients are int64 (19, 3, K): channel, axis, frequency. They are coded channel by channel, frequency by frequency,
 axis by axis. All arithmetic is in integers, so that Python and TypeScript decode the same bits.

@@ -1,6 +1,6 @@
 """Binary range coder with carry, in integers (Martin 1979; the carry as in LZMA).
 
-SPEC.md, Range coder, is the definition; the TypeScript client runs the same arithmetic and must reach the same bits.
+proto/codec.md, 2.1, is the definition; the TypeScript client runs the same arithmetic and must reach the same bits.
 The state of a coder is one int64 array: LOW, RANGE, CACHE, PENDING, POSITION. A decoder keeps its code in LOW.
 """
 

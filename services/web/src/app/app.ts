@@ -1,6 +1,6 @@
 /** Composition of the page: session, stage, inputs, sound and user interface. */
 import { browserSoundPreference } from "../audio/preference";
-import { may } from "../client/access";
+import { pageAccess } from "../client/access";
 import { translate } from "../i18n/translator";
 import type { Mapping } from "../input/mapping";
 import { loadMapping, saveMapping } from "../input/mapping-store";
@@ -44,7 +44,7 @@ export class App implements AppParts {
     const getPlayback = () => this.playback.current;
     this.exporter = new Exporter(page, () => ({ playback: getPlayback(), stage: this.stageHost.stage }));
     this.limbController = new ClaimController(page, () => this.#mapping);
-    this.limbController.viewOnly = !may("control");
+    this.limbController.viewOnly = !pageAccess.allows("control");
     this.avatarSlots = new AvatarSlots(
       { page, files: new FileStore("bunraku"), preferences: browserStorage },
       this.limbController.selectedPerformer,

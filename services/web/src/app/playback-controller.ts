@@ -1,5 +1,5 @@
 /** Playback of the page: enter a session or a motion, show its state, and replace it by another. */
-import { may, whenDenied } from "../client/access";
+import { pageAccess } from "../client/access";
 import { createSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import { translate } from "../i18n/translator";
@@ -37,7 +37,7 @@ export class PlaybackController {
   #accessDenied = false;
 
   constructor(private readonly options: PlaybackControllerOptions) {
-    whenDenied(({ title, detail, hint }) => {
+    pageAccess.onUnauthorized(({ title, detail, hint }) => {
       this.#accessDenied = true;
       const text = hint ? translate("{detail}; {hint}.", { detail, hint }) : detail;
       options.page.notice("access", title, text);
@@ -90,7 +90,7 @@ export class PlaybackController {
   /** Put a motion on the stage: in the session, for all its viewers, or in a new session if there is none. */
   async playMotion(id: string): Promise<void> {
     const { library, page, reducedMotion } = this.options;
-    if (!may("control")) return;
+    if (!pageAccess.allows("control")) return;
     try {
       if (this.#current) {
         this.#current.edit({ motion: id, position: 0 });
@@ -203,7 +203,7 @@ export class PlaybackController {
     const { page, startup } = this.options;
     startup.finish();
     const title = translate("The stage is empty");
-    if (!may("ingest")) {
+    if (!pageAccess.allows("ingest")) {
       page.notice("dance", title, translate("No performance is running now. Come back later."));
       return;
     }

@@ -1,5 +1,5 @@
 /** Copying of a link to the session on the stage. */
-import { guarded } from "../client/access";
+import { pageAccess } from "../client/access";
 import { shareSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import { translate } from "../i18n/translator";
@@ -12,7 +12,7 @@ export async function copyShareLink(session: string | null, notify: (message: st
   const url = new URL(location.href);
   url.search = session === null ? "" : `?session=${encodeURIComponent(session)}`;
   let message = translate("Link copied");
-  if (guarded() && session !== null) {
+  if (pageAccess.hasToken && session !== null) {
     try {
       url.href = new URL(await shareSession(session), location.href).href;
       message = translate("Link copied. Anyone who has it can watch for one week");

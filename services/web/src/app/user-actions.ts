@@ -1,5 +1,5 @@
 /** Actions of the page's controls and of its keys, as functions of the application's parts. */
-import { may } from "../client/access";
+import { pageAccess } from "../client/access";
 import { type CameraKeyframe, recordSession } from "../client/api";
 import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
@@ -79,8 +79,8 @@ export function createUserActions(app: AppParts): UserActions {
     dancer: (performer) => app.limbController.selectedPerformer.select(performer),
     nextDancer: () => app.limbController.selectNextPerformer(),
     reframe: () => app.stageHost.resize(),
-    ...(may("ingest") ? { keep: createPageRecordAction(app) } : {}),
-    ...(may("ingest") && may("control")
+    ...(pageAccess.allows("ingest") ? { keep: createPageRecordAction(app) } : {}),
+    ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {
           add: (motion) => {
             const { current } = app.playback;
@@ -117,7 +117,7 @@ export function createKeyActions(app: AppParts): PageActions {
 function openFiles({ page, avatarSlots, playback }: AppParts, files: readonly File[]): void {
   const avatar = files.findLast(isAvatarFile);
   if (avatar) void avatarSlots.selected.load(avatar);
-  const motions = may("ingest") ? files.filter((file) => !isAvatarFile(file)) : [];
+  const motions = pageAccess.allows("ingest") ? files.filter((file) => !isAvatarFile(file)) : [];
   if (avatar || motions.length > 0) page.panels.open("library");
   void uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
 }

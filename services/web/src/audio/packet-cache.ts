@@ -1,4 +1,4 @@
-/** Cache of decoded packets around the play position, decoded on demand (`proto/SPEC.md`, Audio block, Decoding). */
+/** Cache of decoded packets around the play position, decoded on demand (`proto/codec.md`, 2.15, Decoding). */
 
 import { PACKET_SAMPLES } from "../codec/audio";
 import type { DecoderFactory, PacketDecoder } from "./packet-decoder";

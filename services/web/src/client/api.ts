@@ -1,29 +1,30 @@
-/** Motions and sessions over HTTP (`proto/SPEC.md`, HTTP). */
+/** HTTP API for motions and sessions (`proto/http.md`). */
 
-import { type Access, authorization, pageAccess, refusedWith } from "./access";
+import { type Access, pageAccess } from "./access";
 import { ProblemError } from "./problem";
 
-/** A motion as the server describes it; what more it says is kept. */
+/** Motion as described by the server; further members are kept. */
 export interface Motion {
   id: string;
   name: string;
   filename: string;
   created: string;
-  /** Seconds. */
+  /** Duration in seconds. */
   duration: number;
   fps: number;
-  /** The types of its tracks. */
+  /** Types of its tracks. */
   tracks?: string[];
-  /** How many dance in it; left out: one. Of several also what each of them dances, by name. */
+  /** Number of performers, by default one. */
   performers?: number;
+  /** Names of the performers' motions, if there are several. */
   pieces?: string[];
-  /** Of a motion that was kept from a session: words of where it is from, and its dance's id. */
+  /** For a recording of a session: description of its origin, and id of the motion that was performed. */
   source?: string;
   kept_from?: string;
   [key: string]: unknown;
 }
 
-/** A session; `position` and `duration` in microseconds, `limbs` the holder's id or null for each of every performer's. */
+/** Session; `position` and `duration` in microseconds, `limbs` the id or null of the holder of each limb. */
 export interface Session {
   id: string;
   motion: string;
@@ -37,7 +38,7 @@ export interface Session {
   limbs: (string | null)[];
 }
 
-/** Edits of a session's timeline; `position` in microseconds. */
+/** Edit of a session's timeline; `position` in microseconds. */
 export interface SessionEdit {
   playing?: boolean;
   position?: number;
@@ -46,8 +47,8 @@ export interface SessionEdit {
 }
 
 /**
- * Where a camera stood: `time` on the reference clock in microseconds, `position` and the point gazed at in metres in the
- * dance's frame, the vertical field of view in radians.
+ * Camera position at one time: `time` of the reference clock in microseconds, `position` and point of `gaze` in metres
+ * in the motion's frame, and the vertical field of view in radians.
  */
 export interface CameraKeyframe {
   time: number;
@@ -56,30 +57,30 @@ export interface CameraKeyframe {
   fov: number;
 }
 
-/** What to keep of a session: the last `seconds` of what it showed, or all that can be kept, with camera moves if any. */
+/** Request to record a session: the last `seconds`, or as much as possible, with camera keyframes if any. */
 export interface Recording {
   name?: string;
   seconds?: number;
   camera?: readonly CameraKeyframe[];
 }
 
-/** One page of a list, and the cursor of the next. */
+/** One page of a list, and the cursor of the next page. */
 export interface Page<T> {
   items: T[];
   next: string | null;
 }
 
-/** Motions, newest first. */
+/** List motions, newest first. */
 export function listMotions(cursor?: string): Promise<Page<Motion>> {
   return requestJson("GET", `/v1/motions${cursorQuery(cursor)}`) as Promise<Page<Motion>>;
 }
 
-/** Removes a motion. */
+/** Delete a motion. */
 export async function deleteMotion(id: string): Promise<void> {
   await requestJson("DELETE", `/v1/motions/${encodeURIComponent(id)}`);
 }
 
-/** A new motion: `motion` with those who dance in `motions` beside its own, in a row. There may be four in all. */
+/** Create a motion from `motion` and the performers of `motions`, placed in a row; at most four performers. */
 export function addPerformers(motion: string, motions: readonly string[], access = pageAccess): Promise<Motion> {
   return requestJson(
     "POST",
@@ -89,50 +90,50 @@ export function addPerformers(motion: string, motions: readonly string[], access
   ) as Promise<Motion>;
 }
 
-/** A new session over a motion. */
+/** Create a session for a motion. */
 export function createSession(motion: string): Promise<Session> {
   return requestJson("POST", "/v1/sessions", { motion }) as Promise<Session>;
 }
 
-/** Sessions. */
+/** List sessions. */
 export function listSessions(cursor?: string, access = pageAccess): Promise<Page<Session>> {
   return requestJson("GET", `/v1/sessions${cursorQuery(cursor)}`, undefined, access) as Promise<Page<Session>>;
 }
 
-/** One session. */
+/** Get a session. */
 export function getSession(id: string): Promise<Session> {
   return requestJson("GET", `/v1/sessions/${encodeURIComponent(id)}`) as Promise<Session>;
 }
 
-/** Plays, pauses, seeks, loops, or changes the motion, for everyone. */
+/** Play, pause, seek, loop, or change the motion, for all viewers. */
 export function editSession(id: string, edit: SessionEdit, access = pageAccess): Promise<Session> {
   return requestJson("PATCH", `/v1/sessions/${encodeURIComponent(id)}`, edit, access) as Promise<Session>;
 }
 
-/** Keeps what a session has shown as a new motion; resolves when it can be watched, with seconds of work done. */
+/** Record a session as a new motion; resolves after some seconds of work, when the motion can be played. */
 export function recordSession(session: string, recording: Recording = {}): Promise<Motion> {
   return requestJson("POST", `/v1/sessions/${encodeURIComponent(session)}/recordings`, recording) as Promise<Motion>;
 }
 
-/** A link by which others may watch a session, as what follows the page's address. */
+/** Share a session; return the link for viewers, relative to the page's URL. */
 export async function shareSession(session: string): Promise<string> {
   return ((await requestJson("POST", "/v1/shares", { session })) as { link: string }).link;
 }
 
-/** Where an upload is: on its way, or in the server's hands; and the share of that which is done, 0..1. */
+/** Current stage of an upload, on the way or on the server, and the share of the stage that is done, 0..1. */
 export interface UploadProgress {
   stage: "sending" | "waiting" | "reading" | "encoding";
   share: number;
 }
 
-/** Milliseconds between two questions how far the server is with an upload. */
+/** Interval between requests for the progress of an upload on the server. */
 export const PROGRESS_INTERVAL_MS = 400;
 
 /**
- * Uploads a motion capture file. `onProgress` is told how far it is: fetch cannot say what is sent, so this is an
- * XMLHttpRequest; what the server does then is asked for. Cancelled by `signal`, it rejects with the signal's reason.
+ * Upload a motion capture file. An XMLHttpRequest is used, since fetch does not report the progress of sending; the
+ * progress on the server is polled.
  *
- * @throws ProblemError
+ * @throws ProblemError if the upload fails, or the reason of `signal` if it is aborted
  */
 export function uploadMotion(
   file: File,
@@ -141,53 +142,54 @@ export function uploadMotion(
 ): Promise<Motion> {
   return new Promise((resolve, reject) => {
     signal?.throwIfAborted();
-    const upload = randomName();
-    const sending = new XMLHttpRequest();
+    const uploadId = createUploadId();
+    const request = new XMLHttpRequest();
     const ended = new AbortController();
-    const cancel = () => sending.abort();
+    const cancel = () => request.abort();
     signal?.addEventListener("abort", cancel, { once: true });
-    sending.upload.addEventListener("progress", ({ loaded, total }) => {
+    request.upload.addEventListener("progress", ({ loaded, total }) => {
       onProgress?.({ stage: "sending", share: total > 0 ? loaded / total : 0 });
     });
-    sending.upload.addEventListener("load", () => {
-      if (onProgress) void pollProgress(upload, onProgress, ended.signal);
+    request.upload.addEventListener("load", () => {
+      if (onProgress) void pollProgress(uploadId, onProgress, ended.signal);
     });
-    sending.addEventListener("loadend", () => {
+    request.addEventListener("loadend", () => {
       ended.abort();
       signal?.removeEventListener("abort", cancel);
     });
-    sending.addEventListener("abort", () => reject(signal?.reason as Error));
-    sending.addEventListener("error", () => reject(ProblemError.unreachable()));
-    sending.addEventListener("load", () => {
-      if (sending.status >= 300) reject(refusedWith(ProblemError.from(sending.status, sending.responseText)));
-      else resolve(JSON.parse(sending.responseText) as Motion);
+    request.addEventListener("abort", () => reject(signal?.reason as Error));
+    request.addEventListener("error", () => reject(ProblemError.unreachable()));
+    request.addEventListener("load", () => {
+      if (request.status >= 300)
+        reject(pageAccess.reportProblem(ProblemError.from(request.status, request.responseText)));
+      else resolve(JSON.parse(request.responseText) as Motion);
     });
-    sending.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${upload}`);
-    sending.setRequestHeader("Content-Type", "application/octet-stream");
-    for (const [name, value] of Object.entries(authorization())) sending.setRequestHeader(name, value);
-    sending.send(file);
+    request.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${uploadId}`);
+    request.setRequestHeader("Content-Type", "application/octet-stream");
+    for (const [name, value] of Object.entries(pageAccess.authorization())) request.setRequestHeader(name, value);
+    request.send(file);
   });
 }
 
-/** Tells what the server does with an upload, until `ended`. What fails in this is no matter: the upload's own answer tells. */
+/** Report the progress of an upload on the server until `ended`. Errors are ignored: the upload reports its own. */
 async function pollProgress(
-  upload: string,
+  uploadId: string,
   onProgress: (progress: UploadProgress) => void,
   ended: AbortSignal,
 ): Promise<void> {
   while (!ended.aborted) {
-    const said = (await requestJson("GET", `/v1/uploads/${upload}`).catch(() => null)) as
+    const progress = (await requestJson("GET", `/v1/uploads/${uploadId}`).catch(() => null)) as
       | UploadProgress
       | { stage: "receiving" }
       | null;
     if (ended.aborted) return;
-    if (said && said.stage !== "receiving") onProgress(said);
+    if (progress && progress.stage !== "receiving") onProgress(progress);
     await new Promise((resolve) => setTimeout(resolve, PROGRESS_INTERVAL_MS));
   }
 }
 
-/** 32 hexadecimal digits. `crypto.randomUUID` is not there on a page without TLS. */
-function randomName(): string {
+/** Return 32 random hexadecimal digits. `crypto.randomUUID` does not exist on pages without TLS. */
+function createUploadId(): string {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
@@ -201,8 +203,8 @@ async function requestJson(
   body?: unknown,
   access: Access = pageAccess,
 ): Promise<unknown> {
-  const sent =
+  const content =
     body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
-  const said = await (await access.request(access.server + path, { method, ...sent })).text();
-  return said === "" ? null : JSON.parse(said);
+  const text = await (await access.request(access.server + path, { method, ...content })).text();
+  return text === "" ? null : JSON.parse(text);
 }

@@ -1,13 +1,20 @@
-/** The marionette of one figure, its arm tables fetched from the IK service. */
+/** Solver of a figure's four limbs, with the bend tables of its arms from the IK service. */
 
 import { parseBendTable } from "../marionette/arm";
-import { ControlledHand, ControlledLeg } from "../marionette/controlled-limb";
+import { ControlledHand, ControlledLeg, type ControlledLimb } from "../marionette/controlled-limb";
 import { armProportions } from "../marionette/limb-rig";
 import type { Figure } from "../motion/skeleton";
 import { type Access, pageAccess } from "./access";
-import type { LimbSolver } from "./solver";
 
-/** The limbs of `figure`; `tables` are what `readTable` gave for the left and the right arm. */
+/** Four limbs of a figure, in the order of the contract, each with its state. */
+export interface LimbSolver {
+  readonly limbs: readonly ControlledLimb[];
+}
+
+/** Function that creates the solver of a figure; `origin` is the HTTP origin of the stream, for data to be fetched. */
+export type SolverFactory = (figure: Figure, origin: string) => LimbSolver | Promise<LimbSolver>;
+
+/** Create the solver of `figure`; `tables` are the parsed bend tables of the left and the right arm. */
 export function createMarionetteSolver(figure: Figure, tables: readonly [Float64Array, Float64Array]): LimbSolver {
   return {
     limbs: [
@@ -19,14 +26,18 @@ export function createMarionetteSolver(figure: Figure, tables: readonly [Float64
   };
 }
 
-/** The solver of `figure`, its tables from the service at `origin`; rejects with `ProblemError` where there are none. */
+/**
+ * Fetch the bend tables of `figure` from the IK service at `origin`, and create its solver.
+ *
+ * @throws ProblemError if the service is unreachable or has no tables for the figure
+ */
 export async function fetchMarionetteSolver(figure: Figure, origin: string, access = pageAccess): Promise<LimbSolver> {
-  const tables = await Promise.all(([0, 1] as const).map((limb) => fetchTable(figure, limb, origin, access)));
-  return createMarionetteSolver(figure, [tables[0], tables[1]]);
+  const [left, right] = await Promise.all(([0, 1] as const).map((limb) => fetchTable(figure, limb, origin, access)));
+  return createMarionetteSolver(figure, [left, right]);
 }
 
 async function fetchTable(figure: Figure, limb: 0 | 1, origin: string, access: Access): Promise<Float64Array> {
   const { identity } = armProportions(figure, limb);
-  const answer = await access.request(`${origin}/v1/arms/${identity}/table`);
-  return parseBendTable(new Uint8Array(await answer.arrayBuffer()));
+  const response = await access.request(`${origin}/v1/arms/${identity}/table`);
+  return parseBendTable(new Uint8Array(await response.arrayBuffer()));
 }

@@ -1,4 +1,4 @@
-/** The whole dance of one performer of a motion at its best rate, over HTTP, with what a viewer has of it already. */
+/** Download of one performer's motion at the highest bitrate level over HTTP, except for blocks that a viewer holds. */
 
 import { DamagedBlock } from "../codec/errors";
 import { MotionTrack } from "../codec/motion-track";
@@ -7,71 +7,76 @@ import { MotionBlockStore } from "../playout/block-store";
 import { unpack } from "../wire/codec";
 import { MalformedMessage } from "../wire/errors";
 import type { Message } from "../wire/messages";
-import { request } from "./access";
+import { pageAccess } from "./access";
 import { ProblemError } from "./problem";
 
-/** Blocks asked for at a time. */
 const MAX_CONCURRENT_REQUESTS = 4;
 
 export interface MotionDownloadOptions {
-  /** Whose dance, by number. */
+  /** Number of the performer. */
   performer?: number;
-  /** What is here of it, null for nothing. */
+  /** Blocks that are already there, if any. */
   existing?: MotionBlockStore | null;
-  /** Told of the share that is here, 0..1. */
+  /** Listener for the share of the blocks that is there, 0..1. */
   onProgress?: (share: number) => void;
   signal?: AbortSignal;
 }
 
 /**
- * Every block of a dance in `motion` at its best rate, and how many of its frames are danced there: the motion is as long as the
- * first performer's dance, at which a longer one is cut. Rejects with ProblemError; given up by `signal`, with the signal's reason.
+ * Download a performer's blocks at the highest level. Return the store and the number of frames to use: a motion is as
+ * long as the track of its first performer, so a longer track is cut.
+ *
+ * @throws ProblemError if the download fails, or the reason of `signal` if it is aborted
  */
 export async function downloadMotion(
   motion: string,
-  { performer = 0, existing: held = null, onProgress: told, signal }: MotionDownloadOptions = {},
+  { performer = 0, existing = null, onProgress, signal }: MotionDownloadOptions = {},
 ): Promise<{ store: MotionBlockStore; frames: number }> {
   const base = `/v1/motions/${encodeURIComponent(motion)}`;
   try {
     const { tracks } = await fetchMessage(`${base}/description`, "Description", signal);
-    const dances = [...tracks.keys()].filter((index) => tracks[index].type === "motion");
-    const number = dances.at(performer);
-    if (number === undefined) throw new DamagedBlock("there is no motion in it");
-    const track = MotionTrack.fromDescription(tracks[number]);
+    const motionTracks = [...tracks.keys()].filter((index) => tracks[index].type === "motion");
+    const trackIndex = motionTracks.at(performer);
+    if (trackIndex === undefined)
+      throw new DamagedBlock(`The motion has no performer ${performer}, only ${motionTracks.length}.`);
+    const track = MotionTrack.fromDescription(tracks[trackIndex]);
     const store = new MotionBlockStore(track);
-    if (held) store.mergeFrom(held);
-    const lasting = parseTiming(tracks[dances[0]], "motion").durationUs;
-    const frames = Math.min(track.frames, Math.max(1, Math.round((lasting * track.fps) / 1e6)));
-    const best = track.ladder.length - 1;
-    const danced = [...store.levels.keys()].filter((index) => track.firstFrame(index) < frames);
-    const missing = danced.filter((index) => store.levels[index] < best);
-    let here = danced.length - missing.length;
-    const fetchOn = async () => {
+    if (existing) store.mergeFrom(existing);
+    const { durationUs } = parseTiming(tracks[motionTracks[0]], "motion");
+    const frames = Math.min(track.frames, Math.max(1, Math.round((durationUs * track.fps) / 1e6)));
+    const highest = track.ladder.length - 1;
+    const required = [...store.levels.keys()].filter((index) => track.firstFrame(index) < frames);
+    const missing = required.filter((index) => store.levels[index] < highest);
+    let doneCount = required.length - missing.length;
+    const fetchMissing = async () => {
       for (let index = missing.shift(); index !== undefined; index = missing.shift()) {
-        const { block } = await fetchMessage(`${base}/blocks/${best}/${index}?track=${number}`, "Data", signal);
-        store.put(index, best, block);
+        const { block } = await fetchMessage(`${base}/blocks/${highest}/${index}?track=${trackIndex}`, "Data", signal);
+        store.put(index, highest, block);
         signal?.throwIfAborted();
-        told?.(++here / danced.length);
+        onProgress?.(++doneCount / required.length);
       }
     };
-    await Promise.all(Array.from({ length: MAX_CONCURRENT_REQUESTS }, fetchOn));
+    await Promise.all(Array.from({ length: MAX_CONCURRENT_REQUESTS }, fetchMissing));
     return { store, frames };
   } catch (error) {
     signal?.throwIfAborted();
     if (error instanceof DamagedBlock || error instanceof MalformedMessage)
-      throw new ProblemError(0, "This dance cannot be read", error.message);
+      throw new ProblemError(0, "This motion cannot be read", error.message);
     throw error;
   }
 }
 
-/** The message of this name at an address. */
+/** Fetch the message at `url`; raise `MalformedMessage` if it has another name. */
 async function fetchMessage<Name extends Message["name"]>(
-  address: string,
+  url: string,
   name: Name,
   signal?: AbortSignal,
 ): Promise<Extract<Message, { name: Name }>> {
-  const answer = await request(address, signal ? { signal } : {});
-  const said = unpack(new Uint8Array(await answer.arrayBuffer()));
-  if (said?.name !== name) throw new MalformedMessage(`${address} is no ${name}`);
-  return said as Extract<Message, { name: Name }>;
+  const response = await pageAccess.request(url, signal ? { signal } : {});
+  const message = unpack(new Uint8Array(await response.arrayBuffer()));
+  if (message?.name !== name)
+    throw new MalformedMessage(
+      `Response of ${url} is a message ${message?.name ?? "of unknown type"}, expected ${name}.`,
+    );
+  return message as Extract<Message, { name: Name }>;
 }

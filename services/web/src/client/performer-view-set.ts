@@ -1,38 +1,41 @@
-/** The performers of the motion that is watched, and how the first's dance comes on: by that a line is judged. */
+/** Performers of the current motion, and the playback statistics of the first one. */
 
 import type { Figure, Pose } from "../motion/skeleton";
 import { OverlayBuffer } from "../playout/overlay-buffer";
 import { positionAt } from "../playout/timeline";
 import type { TrackSet } from "../playout/track-set";
 import type { TimelineState } from "../wire/messages";
-import { PerformerView } from "./performer-view";
-import type { Puppeteer } from "./puppeteer";
+import { type LimbPredictor, PerformerView } from "./performer-view";
 import type { SolverLoader } from "./solver-loader";
 
+/** "starting": no pose yet. "stalled": a block is missing, and the last pose is shown. */
+export type PlaybackState = "starting" | "stalled" | "playing";
+
+/** Performers of the current motion. The first one's blocks determine the statistics. */
 export class PerformerViewSet {
-  /** By number; null one whose track cannot be read. */
+  /** Performers by number; null for one that cannot be played. */
   all: (PerformerView | null)[] = [];
   readonly overlays = new OverlayBuffer();
-  /** Of the first: when it was first to be seen (local milliseconds), the rate of the block on show (-1 before there is one), how often one was missing. */
+  /** Puppeteer whose limbs are predicted, if any. */
+  predictor: LimbPredictor | null = null;
+  /** Local time of the first pose, milliseconds. */
   firstPoseMs: number | null = null;
+  /** Level of the shown block, -1 before the first. */
   level = -1;
+  /** Number of missing blocks while playing. */
   gaps = 0;
   private missingBlock = -1;
 
-  /** @param createLoader makes what one's own limbs of a figure are solved with */
+  /** @param createLoader function that creates the solver loader of a figure */
   constructor(private readonly createLoader: (figure: Figure) => SolverLoader) {}
 
-  /** Whether anything of the first could be shown yet. */
-  get hasPose(): boolean {
-    return this.all[0]?.hasPose ?? false;
+  /** Playback state of the first performer. */
+  get state(): PlaybackState {
+    if (!this.all[0]?.hasPose) return "starting";
+    return this.missingBlock >= 0 ? "stalled" : "playing";
   }
 
-  /** Whether the first holds still, as the block needed is missing. */
-  get isStalled(): boolean {
-    return this.missingBlock >= 0;
-  }
-
-  /** Another motion comes on. */
+  /** Replace the performers by those of another motion. */
   reset(tracks: TrackSet): void {
     this.overlays.clear();
     this.missingBlock = this.level = -1;
@@ -40,7 +43,7 @@ export class PerformerViewSet {
     this.add(tracks);
   }
 
-  /** Those who were not known before come on. */
+  /** Add the performers that were described since the last call. */
   add({ performers }: TrackSet): void {
     for (let number = this.all.length; number < performers.length; number++) {
       const store = performers[number];
@@ -48,43 +51,34 @@ export class PerformerViewSet {
     }
   }
 
-  /** Makes what is missing of what one's own limbs of those who were seen are solved with. */
+  /** Load the missing solvers of the performers shown so far. */
   loadSolvers(): void {
-    for (const one of this.all) if (one?.hasPose) one.loadSolver();
+    for (const view of this.all) if (view?.hasPose) view.loadSolver();
   }
 
-  /** The pose of a performer to draw at `clock` of its motion's `timeline`, local `nowMs`: see `Viewer.poseAt`. */
-  poseAt(
-    performer: number,
-    clock: number,
-    timeline: TimelineState,
-    puppeteer: Puppeteer | null,
-    nowMs: number,
-  ): Pose | null {
-    const one = this.all[performer];
-    if (!one) return null;
+  /** Return the pose of a performer at presented clock time `clock`, local time `nowMs`: see `Viewer.poseAt`. */
+  poseAt(performer: number, timeline: TimelineState, clock: number, nowMs: number): Pose | null {
+    const view = this.all[performer];
+    if (!view) return null;
     const position = positionAt(timeline, clock);
-    const here = one.seek(position, timeline.loop, timeline.duration);
-    if (performer === 0) this.updateStatistics(one, here, position, timeline.playing, nowMs);
-    return one.pose(clock, this.overlays, puppeteer, nowMs);
+    const hasBlock = view.seek(position, timeline.loop, timeline.duration);
+    if (performer === 0) {
+      const index = view.store.track.blockAt(position);
+      if (hasBlock) this.onBlockShown(view.store.levels[index], nowMs);
+      else if (timeline.playing && view.hasPose) this.onBlockMissing(index);
+    }
+    return view.pose({ clock, nowMs, overlays: this.overlays, predictor: this.predictor });
   }
 
-  /** The first was to go to `position`: it did, or it holds still. */
-  private updateStatistics(
-    { store, hasPose: shown }: PerformerView,
-    hasBlock: boolean,
-    position: number,
-    playing: boolean,
-    nowMs: number,
-  ): void {
-    const index = store.track.blockAt(position);
-    if (hasBlock) {
-      this.firstPoseMs ??= nowMs;
-      this.missingBlock = -1;
-      this.level = store.levels[index];
-    } else if (playing && shown && this.missingBlock !== index) {
-      this.missingBlock = index;
-      this.gaps++;
-    }
+  private onBlockShown(level: number, nowMs: number): void {
+    this.firstPoseMs ??= nowMs;
+    this.missingBlock = -1;
+    this.level = level;
+  }
+
+  private onBlockMissing(index: number): void {
+    if (this.missingBlock === index) return;
+    this.missingBlock = index;
+    this.gaps++;
   }
 }

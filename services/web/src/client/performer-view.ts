@@ -1,22 +1,39 @@
-/** One performer of a motion as a viewer shows it: its dance, what is pulled laid over it, and where it stands on the stage. */
+/** One performer as a viewer shows it: motion, overlays, and placement on the stage. */
 
 import { applyPlacement, type Placement, type StagedPerformer } from "../motion/placement";
 import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
 import type { OverlayBuffer } from "../playout/overlay-buffer";
-import type { Puppeteer } from "./puppeteer";
+import type { PredictionFrame } from "./predicted-limb";
 import type { SolverLoader } from "./solver-loader";
 
+/** Source of predictions for the limbs that this page controls: a puppeteer. */
+export interface LimbPredictor {
+  /** Apply the predictions to the frame's pose. */
+  applyOwnLimbs(frame: PredictionFrame): void;
+}
+
+/** Instant and live inputs of a drawn frame. */
+export interface FrameContext {
+  /** Presented reference time, microseconds. */
+  readonly clock: number;
+  /** Local time, milliseconds. */
+  readonly nowMs: number;
+  readonly overlays: OverlayBuffer;
+  readonly predictor: LimbPredictor | null;
+}
+
+/** One performer of a motion. */
 export class PerformerView implements StagedPerformer {
-  /** Whether anything of it could be shown yet. */
+  /** True once there was a pose to show. */
   hasPose = false;
   private readonly motionPose = restPose();
   private readonly mergedPose = restPose();
 
   /**
-   * @param number of the performer
-   * @param store keeps the blocks of its dance
-   * @param solverLoader what one's own limbs of it are solved with
+   * @param number number of the performer
+   * @param store blocks of its motion
+   * @param solverLoader loader of the solver that predicts this page's limbs
    */
   constructor(
     private readonly number: number,
@@ -36,13 +53,13 @@ export class PerformerView implements StagedPerformer {
     return this.store.track.placement;
   }
 
-  /** Makes what one's own limbs are solved with, unless it is there. */
+  /** Load the solver, unless it is loaded. */
   loadSolver(): void {
     this.solverLoader.load();
   }
 
   /**
-   * The dance goes to `position` of a motion of `duration`, microseconds; false, and it holds still, where the block needed is
+   * Move to `position` of a motion of `duration` (microseconds). Return false, and keep the last pose, if the block is
    * missing.
    */
   seek(position: number, loop: boolean, duration: number): boolean {
@@ -52,15 +69,16 @@ export class PerformerView implements StagedPerformer {
   }
 
   /**
-   * The pose to draw at `clock`, local `nowMs`: the dance where it is, with what is pulled laid over it, and one's own limbs as
-   * one pulls them, all of it in its place. Null before there is any. The storage is used again by the next call.
+   * Return the pose at the current position with overlays and predicted limbs, placed on the stage; null before the
+   * first pose. The next call reuses the storage.
    */
-  pose(clock: number, overlays: OverlayBuffer, puppeteer: Puppeteer | null, nowMs: number): Pose | null {
+  pose({ clock, nowMs, overlays, predictor }: FrameContext): Pose | null {
     if (!this.hasPose) return null;
-    const { motionPose: danced, mergedPose: merged, number, solverLoader: own } = this;
-    copyPose(danced, merged);
-    const laid = overlays.apply(clock, merged, number);
-    if (own.solver) puppeteer?.applyOwnLimbs(merged, danced, laid, nowMs, own.solver, number);
-    return applyPlacement(merged, this.placement);
+    const { motionPose: motion, mergedPose: pose, number: performer } = this;
+    const { solver } = this.solverLoader;
+    copyPose(motion, pose);
+    const overlaidMask = overlays.apply(clock, pose, performer);
+    if (solver) predictor?.applyOwnLimbs({ performer, pose, motion, overlaidMask, nowMs, solver });
+    return applyPlacement(pose, this.placement);
   }
 }

@@ -1,7 +1,8 @@
 /**
- * One limb in this puppeteer's own hands, as this puppeteer sees it: moved at once, as the session will move it for everyone.
- * Once it is back in the dance it is what everyone sees again, and so it is while the session has it in another's hands. Between
- * the two nothing jumps (`marionette/correction`). Times are local milliseconds.
+ * Prediction of one limb that this page controls: it moves at once, as the session will move it for all viewers.
+ *
+ * After its return to the motion, and while another puppeteer holds it, the limb is shown as the session sends it.
+ * Transitions between the two are smooth (`marionette/correction`). Times are local milliseconds.
  */
 
 import type { ControlledLimb } from "../marionette/controlled-limb";
@@ -10,93 +11,105 @@ import { Handover } from "../marionette/handover";
 import { LIMB_FIRST_JOINTS, type Pose } from "../motion/skeleton";
 import { limbWithinPerformer } from "../wire/limbs";
 import { LimbTarget } from "./limb-target";
-import type { LimbSolver } from "./solver";
+import type { LimbSolver } from "./marionette-solver";
 
-/** After a longer pause between two frames the limb moves as if only this had passed, seconds. */
+/** Maximum time step of the prediction, seconds: a longer pause between two frames counts as this. */
 const MAX_STEP_S = 0.1;
 /**
- * A limb let go comes home here before it does for everyone. For so many seconds the dance is shown of it until the others' has
- * come too, and not once more its way home.
+ * A released limb returns here before the session's overlays show its return. For this time the motion is shown, so
+ * that the return is not seen twice; seconds.
  */
 const MAX_RETURN_S = 1;
 
+/** One frame of one performer, to which predictions are applied. */
+export interface PredictionFrame {
+  /** Number of the performer. */
+  readonly performer: number;
+  /** Pose with the session's overlays; it is modified. */
+  readonly pose: Pose;
+  /** Pose of the motion alone. */
+  readonly motion: Pose;
+  /** Mask of the performer's limbs that overlays replace; bit 0 is its first limb. */
+  readonly overlaidMask: number;
+  readonly nowMs: number;
+  readonly solver: LimbSolver;
+}
+
+/** Prediction of one limb. */
 export class PredictedLimb {
   readonly target: LimbTarget;
   private readonly handover = new Handover();
   private readonly correction = new Correction();
+  /** Predicted rotations of the limb's three joints. */
   private readonly joints = new Float64Array(12);
+  /** Number of the limb within its performer, and index of its first number in a pose. */
+  private readonly localNumber: number;
   private readonly offset: number;
   private drawnAt: number | null = null;
   private controlled: ControlledLimb | null = null;
-  /** Whether it has left the dance, and whether it is shown as it is here (else as everyone sees it). */
+  /** True from the claim until the limb is back in the motion. */
   private hasLeftMotion = false;
+  /** True if the prediction is shown, false if the session's pose is. */
   private isPredicted = false;
-  /** Seconds since it came back. */
-  private sinceReturn = 0;
+  /** Seconds since the return. */
+  private sinceReturnS = 0;
 
+  /** @param limb number of the limb among those of all performers */
   constructor(readonly limb: number) {
     this.target = new LimbTarget(limb);
-    this.offset = 4 * LIMB_FIRST_JOINTS[limbWithinPerformer(limb)];
+    this.localNumber = limbWithinPerformer(limb);
+    this.offset = 4 * LIMB_FIRST_JOINTS[this.localNumber];
   }
 
-  /**
-   * Lays the limb over `pose` of its performer, which shows what everyone sees, where it is this puppeteer's. `dance` is the dance alone, `laid`
-   * says whether `pose` has the limb pulled, `theirs` whether the session has it in another's hands.
-   */
-  apply(
-    pose: Pose,
-    motion: Pose,
-    isOverlaid: boolean,
-    isHeldByOther: boolean,
-    nowMs: number,
-    solver: LimbSolver,
-  ): void {
-    const { target: pull, handover, correction, joints, offset: at } = this;
+  /** Apply the prediction to the frame's pose, unless another puppeteer holds the limb (`isHeldByOther`). */
+  apply({ pose, motion, overlaidMask, nowMs, solver }: PredictionFrame, isHeldByOther: boolean): void {
+    const { target, handover, correction, joints, offset } = this;
     const seconds = this.drawnAt === null ? 0 : Math.min(Math.max(nowMs - this.drawnAt, 0) / 1000, MAX_STEP_S);
     this.drawnAt = nowMs;
-    const puppet = solver.limbs[limbWithinPerformer(this.limb)];
-    if (puppet !== this.controlled) {
-      // another dancer: a limb that is held goes on in it, from where the dance has it
-      this.controlled = puppet;
+    const isOverlaid = ((overlaidMask >> this.localNumber) & 1) !== 0;
+    const isHeldHere = target.isHeld && !isHeldByOther;
+    const controlled = solver.limbs[this.localNumber];
+    if (controlled !== this.controlled) {
+      // the figure changed: a held limb continues from its position in the motion
+      this.controlled = controlled;
       this.isPredicted = false;
     }
-    handover.advance(pull.isHeld && !isHeldByOther, seconds);
-    puppet.observePose(motion.rotations, seconds);
-    if (pull.isHeld && !isHeldByOther && !this.hasLeftMotion) {
+    handover.advance(isHeldHere, seconds);
+    controlled.observePose(motion.rotations, seconds);
+    if (isHeldHere && !this.hasLeftMotion) {
       this.hasLeftMotion = true;
-      // on its way home from other hands, or from these: it starts where everyone sees it
-      if (isOverlaid && !this.isPredicted) puppet.startFrom(pose.rotations);
+      // while an earlier control is still shown, start from the shown position
+      if (isOverlaid && !this.isPredicted) controlled.startFrom(pose.rotations);
     }
-    this.step(motion, nowMs, seconds);
-    const own =
-      !isHeldByOther && (this.hasLeftMotion || (this.isPredicted && isOverlaid && this.sinceReturn < MAX_RETURN_S));
+    this.step(controlled, motion, nowMs, seconds);
+    const isPredicted =
+      !isHeldByOther && (this.hasLeftMotion || (this.isPredicted && isOverlaid && this.sinceReturnS < MAX_RETURN_S));
     correction.advance(seconds);
-    if (own && !this.isPredicted) correction.begin(pose.rotations, at, joints, 0);
-    if (!own && this.isPredicted) correction.begin(joints, 0, pose.rotations, at);
-    this.isPredicted = own;
-    if (own) pose.rotations.set(joints, at);
-    correction.apply(pose.rotations, at);
+    if (isPredicted && !this.isPredicted) correction.begin(pose.rotations, offset, joints, 0);
+    if (!isPredicted && this.isPredicted) correction.begin(joints, 0, pose.rotations, offset);
+    this.isPredicted = isPredicted;
+    if (isPredicted) pose.rotations.set(joints, offset);
+    correction.apply(pose.rotations, offset);
     if (isHeldByOther && this.hasLeftMotion) {
       this.hasLeftMotion = false;
-      puppet.reset();
+      controlled.reset();
     }
   }
 
-  /** Moves the limb on by `seconds`: `joints` are where it is here. */
-  private step(dance: Pose, nowMs: number, seconds: number): void {
-    const { target: pull, joints, offset: at } = this;
-    const puppet = this.controlled!;
+  /** Advance the prediction by `seconds` and write its `joints`. */
+  private step(controlled: ControlledLimb, motion: Pose, nowMs: number, seconds: number): void {
+    const { target, joints, offset } = this;
     if (this.hasLeftMotion) {
-      if (pull.isHeld) pull.setStart(puppet.position, nowMs);
-      const wanted = pull.isHeld ? pull.valueAt(nowMs) : null;
-      if (puppet.solveJoints(joints, 0, dance.rotations, wanted, this.handover.weight, seconds)) return;
-      puppet.reset();
+      if (target.isHeld) target.setStart(controlled.position, nowMs);
+      const goal = target.isHeld ? target.valueAt(nowMs) : null;
+      if (controlled.solveJoints(joints, 0, motion.rotations, goal, this.handover.weight, seconds)) return;
+      controlled.reset();
       this.hasLeftMotion = false;
-      this.sinceReturn = 0;
-      // the hand is back, but the arm may still be turned about the line to it
-      this.correction.begin(joints, 0, dance.rotations, at);
+      this.sinceReturnS = 0;
+      // the tip is back, but the limb may still be twisted about the axis to it
+      this.correction.begin(joints, 0, motion.rotations, offset);
     }
-    this.sinceReturn += seconds;
-    joints.set(dance.rotations.subarray(at, at + 12));
+    this.sinceReturnS += seconds;
+    joints.set(motion.rotations.subarray(offset, offset + 12));
   }
 }

@@ -1,6 +1,8 @@
+/** Problem of an HTTP request (RFC 9457). */
+
 import { pageTranslator } from "../i18n/translator";
 
-/** What went wrong over HTTP, in words for the person who gets it (RFC 9457). `status` is 0 where no server answered. */
+/** Failed HTTP request, with texts for the user. `status` is 0 if no server answered. */
 export class ProblemError extends Error {
   override readonly name = "ProblemError";
 
@@ -16,30 +18,31 @@ export class ProblemError extends Error {
     super(translate("{title}: {detail}", { title, detail }));
   }
 
-  /** The problem in the body of an answer of `status`, of whatever form, in words of `speech`. */
-  static from(status: number, body: string, speech = pageTranslator): ProblemError {
-    const { translate, translateServerText } = speech;
-    let said: Record<string, unknown> = {};
+  /** Parse the body of a response with `status`; a body in any other format gets generic texts. */
+  static from(status: number, body: string, translator = pageTranslator): ProblemError {
+    const { translate, translateServerText } = translator;
+    let document: Record<string, unknown> = {};
     try {
       const parsed: unknown = JSON.parse(body);
-      if (typeof parsed === "object" && parsed !== null) said = parsed as Record<string, unknown>;
+      if (typeof parsed === "object" && parsed !== null) document = parsed as Record<string, unknown>;
     } catch {
-      // a proxy's page, or nothing: the status has to do
+      // the response of a proxy, or an empty body: only the status is known
     }
     const text = (value: unknown) => (typeof value === "string" ? translateServerText(value) : null);
     return new ProblemError(
       status,
-      text(said.title) ?? translate("The server refused"),
-      text(said.detail) ?? translate("it answered {status}", { status }),
-      text(said.hint),
-      typeof said.line === "number" ? said.line : null,
-      typeof said.field === "string" ? said.field : null,
-      speech,
+      text(document.title) ?? translate("The server refused"),
+      text(document.detail) ?? translate("it answered {status}", { status }),
+      text(document.hint),
+      typeof document.line === "number" ? document.line : null,
+      typeof document.field === "string" ? document.field : null,
+      translator,
     );
   }
 
-  static unreachable(speech = pageTranslator): ProblemError {
-    const { translate } = speech;
+  /** Create the problem of a request without an answer. */
+  static unreachable(translator = pageTranslator): ProblemError {
+    const { translate } = translator;
     return new ProblemError(
       0,
       translate("No answer"),
@@ -47,7 +50,7 @@ export class ProblemError extends Error {
       translate("check your connection, then try again"),
       null,
       null,
-      speech,
+      translator,
     );
   }
 }

@@ -1,6 +1,8 @@
 /**
- * A WebSocket of `bunraku.v1` that comes back by itself when it is lost. One that falls silent may be lost too, and the system finds that out after minutes
- * only: so another is tried beside it, and whichever is heard first is the line from then on.
+ * WebSocket connection of `bunraku.v1` that reconnects when it is lost.
+ *
+ * A silent connection may be lost, which the operating system detects only after minutes. A second connection is
+ * therefore attempted beside it, and whichever receives a message first becomes current.
  */
 
 import { type PlainMessageKey, pageTranslator, type Translator } from "../i18n/translator";
@@ -11,15 +13,15 @@ import { ProblemError } from "./problem";
 
 const INITIAL_RETRY_DELAY_MS = 250;
 const MAX_RETRY_DELAY_MS = 4_000;
-/** Nothing was heard for so long after something was said, milliseconds: another line is tried. */
+/** Silence after a sent message, after which another connection is attempted. */
 const SILENCE_TIMEOUT_MS = 4_000;
 
-/** Closes after which to come again would help nobody: done, contract broken, too large, not there, not spoken here. */
+/** Closes after which a retry cannot succeed: normal, protocol error, too big, forbidden, not found, other version. */
 const FINAL_CLOSE_CODES = new Set([1000, 1008, 1009, 4403, 4404, 4406]);
-/** What the address comes with is not good: who asked for it can ask for another. */
+/** Credentials rejected: a retry can succeed with a new ticket. */
 const UNAUTHORIZED_CLOSE_CODE = 4401;
 
-/** Plain words for closes that bring none of their own. */
+/** Texts for close codes without a reason of the server. */
 const CLOSE_REASONS: Readonly<Record<number, PlainMessageKey>> = {
   1000: "ended by the server",
   1006: "the connection was lost",
@@ -32,35 +34,39 @@ const CLOSE_REASONS: Readonly<Record<number, PlainMessageKey>> = {
   4406: "the server speaks another version",
 };
 
+/** Options of a connection. */
 export interface ConnectionOptions {
-  /** Where to; asked before every attempt. One that comes later may be good for this attempt alone. */
+  /** Function called before each attempt; a promise resolves to a URL with a ticket for this attempt alone. */
   url: () => string | Promise<string>;
-  /** Whether the other end answers what is said soon: then its silence counts. */
+  /** True if the server answers each message soon, so that silence means a lost connection. */
   expectsAnswers?: boolean;
-  /** In whose words it is told why the line is gone: the page's, if nothing else is said. */
+  /** Language of the close reasons; that of the page by default. */
   translator?: Translator;
-  /** There is a line; `replaced` where it takes the place of one that fell silent. */
+  /** Listener for an open connection; `replaced` if it takes the place of a silent one. */
   onOpen: (replaced: boolean) => void;
   onMessage: (message: Message, bytes: number) => void;
-  /** A message that could not be read; the connection goes on. */
+  /** Listener for messages that cannot be decoded; the connection continues. */
   onMalformed: (error: MalformedMessage) => void;
-  /** The line is gone; `final` where it will not be tried again. */
+  /** Listener for a lost connection; `final` if there is no retry. */
   onClosed: (reason: string, final: boolean) => void;
 }
 
+/** Connection that reconnects with exponential backoff. */
 export class ReconnectingConnection {
+  /** Current connection, open or connecting. */
   private socket: WebSocket | null = null;
-  /** Tried while the socket is silent. */
+  /** Connection that is attempted while the current one is silent. */
   private candidate: WebSocket | null = null;
   private retryDelay = INITIAL_RETRY_DELAY_MS;
   private retryTimer: ReturnType<typeof setTimeout> | undefined;
+  /** Problem that the server announced before its close. */
   private problem: string | null = null;
-  private ended = false;
-  /** Whether the address was asked for anew. */
+  private isEnded = false;
+  /** True if the current URL was issued for this attempt. */
   private usedFreshTicket = false;
-  /** Counts what other lines were asked for: an address that comes too late is not used. */
+  /** Number of the last replacement attempt: a URL that arrives later than its attempt is not used. */
   private attempt = 0;
-  /** Since when an answer is waited for, local milliseconds. */
+  /** Time since which an answer is awaited, milliseconds of `performance.now`. */
   private awaitingSince: number | null = null;
   private silenceTimer: ReturnType<typeof setTimeout> | undefined;
 
@@ -71,17 +77,17 @@ export class ReconnectingConnection {
     this.connect();
   }
 
-  /** Whether messages can be sent. */
+  /** True if messages can be sent. */
   get isOpen(): boolean {
     return this.socket?.readyState === 1;
   }
 
-  /** Bytes handed over and not sent yet: on a narrow line, how long what is sent now would wait. */
+  /** Bytes queued for sending: on a constrained link they delay further messages. */
   get bufferedBytes(): number {
     return this.socket?.bufferedAmount ?? 0;
   }
 
-  /** Sends a message; false where there is no line. */
+  /** Send a message. Return false if not connected. */
   send(message: ClientMessage): boolean {
     if (!this.socket || !this.isOpen) return false;
     this.socket.send(pack(message));
@@ -89,9 +95,9 @@ export class ReconnectingConnection {
     return true;
   }
 
-  /** Tries another line, as this one may be lost. */
+  /** Attempt another connection, since the current one may be lost. */
   tryReplacement(): void {
-    if (this.ended || !this.socket) return;
+    if (this.isEnded || !this.socket) return;
     this.candidate?.close(1000);
     this.candidate = null;
     const url = this.options.url();
@@ -100,23 +106,23 @@ export class ReconnectingConnection {
       return;
     }
     const attempt = ++this.attempt;
-    const dial = (found: string) => {
-      if (attempt === this.attempt && this.socket) this.candidate = this.createSocket(found);
+    const openCandidate = (resolved: string) => {
+      if (attempt === this.attempt && this.socket) this.candidate = this.createSocket(resolved);
     };
-    // without one there is no other line yet: the silent one is still there
-    url.then(dial, () => undefined);
+    // without a URL there is no attempt, and the silent connection stays current
+    url.then(openCandidate, () => undefined);
   }
 
-  /** Ends it for good. */
+  /** Close for good. */
   close(reason = this.translator.translate("closed here")): void {
-    if (this.ended) return;
-    this.ended = true;
+    if (this.isEnded) return;
+    this.isEnded = true;
     clearTimeout(this.retryTimer);
     clearTimeout(this.silenceTimer);
-    const { socket, candidate: beside } = this;
+    const { socket, candidate } = this;
     this.socket = this.candidate = null;
     socket?.close(1000);
-    beside?.close(1000);
+    candidate?.close(1000);
     this.options.onClosed(reason, true);
   }
 
@@ -127,8 +133,8 @@ export class ReconnectingConnection {
     if (typeof url === "string") this.openSocket(url);
     else
       url.then(
-        (found) => this.ended || this.openSocket(found),
-        (error: unknown) => this.ended || this.onUrlFailed(error),
+        (resolved) => this.isEnded || this.openSocket(resolved),
+        (error: unknown) => this.isEnded || this.onUrlFailed(error),
       );
   }
 
@@ -137,7 +143,6 @@ export class ReconnectingConnection {
     this.startSilenceTimer();
   }
 
-  /** There is no address. */
   private onUrlFailed(error: unknown): void {
     if (error instanceof ProblemError && (error.status === 401 || error.status === 403)) this.close(error.message);
     else this.onSocketClosed(1006, error instanceof ProblemError ? error.detail : "");
@@ -160,10 +165,10 @@ export class ReconnectingConnection {
     return socket;
   }
 
-  /** The other line was heard first: the silent one is let go. */
-  private promote(socket: WebSocket): void {
+  /** Make the candidate current, since it received a message first. */
+  private promote(candidate: WebSocket): void {
     this.socket?.close(1000);
-    this.socket = socket;
+    this.socket = candidate;
     this.candidate = null;
     this.problem = null;
     this.options.onOpen(true);
@@ -178,18 +183,16 @@ export class ReconnectingConnection {
   private checkSilence(): void {
     this.silenceTimer = undefined;
     if (this.awaitingSince === null || !this.socket) return;
-    const left = this.awaitingSince + SILENCE_TIMEOUT_MS - performance.now();
-    if (left <= 0) this.tryReplacement();
-    this.silenceTimer = setTimeout(() => this.checkSilence(), left > 0 ? left : SILENCE_TIMEOUT_MS);
+    const remaining = this.awaitingSince + SILENCE_TIMEOUT_MS - performance.now();
+    if (remaining <= 0) this.tryReplacement();
+    this.silenceTimer = setTimeout(() => this.checkSilence(), remaining > 0 ? remaining : SILENCE_TIMEOUT_MS);
   }
 
   private receive(data: ArrayBuffer | string): void {
     this.awaitingSince = null;
-    this.attempt++;
-    this.candidate?.close(1000);
-    this.candidate = null;
+    this.cancelReplacement();
     if (typeof data === "string") {
-      this.options.onMalformed(new MalformedMessage("a message was text; all are binary"));
+      this.options.onMalformed(new MalformedMessage("Message is text, expected binary."));
       return;
     }
     let message: Message | null;
@@ -211,20 +214,27 @@ export class ReconnectingConnection {
     this.options.onMessage(message, data.byteLength);
   }
 
-  private onSocketClosed(code: number, serverReason: string): void {
+  private cancelReplacement(): void {
     this.attempt++;
     this.candidate?.close(1000);
-    this.socket = this.candidate = this.awaitingSince = null;
-    const { translate, translateServerText } = this.translator;
-    const reason =
-      this.problem ??
-      (translateServerText(serverReason) ||
-        (code in CLOSE_REASONS ? translate(CLOSE_REASONS[code]) : translate("closed with code {code}", { code })));
-    this.ended = FINAL_CLOSE_CODES.has(code) || (code === UNAUTHORIZED_CLOSE_CODE && !this.usedFreshTicket);
-    if (!this.ended) {
+    this.candidate = null;
+  }
+
+  private onSocketClosed(code: number, serverReason: string): void {
+    this.cancelReplacement();
+    this.socket = this.awaitingSince = null;
+    const reason = this.problem ?? this.describeClose(code, serverReason);
+    this.isEnded = FINAL_CLOSE_CODES.has(code) || (code === UNAUTHORIZED_CLOSE_CODE && !this.usedFreshTicket);
+    if (!this.isEnded) {
       this.retryTimer = setTimeout(() => this.connect(), this.retryDelay);
       this.retryDelay = Math.min(this.retryDelay * 2, MAX_RETRY_DELAY_MS);
     }
-    this.options.onClosed(reason, this.ended);
+    this.options.onClosed(reason, this.isEnded);
+  }
+
+  private describeClose(code: number, serverReason: string): string {
+    const { translate, translateServerText } = this.translator;
+    if (serverReason) return translateServerText(serverReason);
+    return code in CLOSE_REASONS ? translate(CLOSE_REASONS[code]) : translate("closed with code {code}", { code });
   }
 }

@@ -1,52 +1,59 @@
-/** What a viewer says by itself: it asks for the time, quickly at first, and tells how it fares (`proto/SPEC.md`, Ping and Report). */
+/** Periodic messages of a viewer: clock pings and reports (`proto/messages.md`, 3.6 and 3.8). */
+
 import type { ClientMessage, Report } from "../wire/messages";
 
+/** Pings of a new connection that are sent at the shorter interval. */
 const INITIAL_PINGS = 8;
 const INITIAL_PING_INTERVAL_MS = 60;
 const PING_INTERVAL_MS = 2_000;
 const REPORT_INTERVAL_MS = 1_000;
-/** So many questions may be on their way: on a line that all but stands their answers would be all that it carries. */
+/** Pings in flight: on a stalled link their answers would use all of its bandwidth. */
 const MAX_UNANSWERED_PINGS = 2;
 
+/** Sender of pings and reports over the current connection. */
 export class ViewerReporter {
   private pingTimer: ReturnType<typeof setTimeout> | undefined;
   private pingCount = 0;
   private answeredCount = 0;
   private readonly reportTimer: ReturnType<typeof setInterval>;
 
-  /** `send` says whether there is a line, `now` is local milliseconds. */
+  /**
+   * @param send function that sends a message; false if not connected
+   * @param now local clock, milliseconds
+   * @param makeReport function that returns the current report
+   */
   constructor(
     private readonly send: (message: ClientMessage) => boolean,
     private readonly now: () => number,
-    fares: () => Omit<Report, "name">,
+    makeReport: () => Omit<Report, "name">,
   ) {
     this.reportTimer = setInterval(
-      () => this.isLimitReached || send({ name: "Report", ...fares() }),
+      () => this.isLimitReached || send({ name: "Report", ...makeReport() }),
       REPORT_INTERVAL_MS,
     );
   }
 
-  /** There is a new line. */
+  /** Start anew on a new connection. */
   restart(): void {
     this.pause();
     this.sendPing();
   }
 
-  /** The question of this number was answered, and so were those before it. */
+  /** Record the answer to a ping and to all before it. */
   onPong(sequence: number): void {
-    const { isLimitReached: full } = this;
+    const { isLimitReached: wasLimitReached } = this;
     this.answeredCount = Math.max(this.answeredCount, sequence + 1);
-    if (full && this.pingTimer === undefined) this.sendPing();
+    if (wasLimitReached && this.pingTimer === undefined) this.sendPing();
   }
 
-  /** There is no line. */
+  /** Stop until the next connection. */
   pause(): void {
     clearTimeout(this.pingTimer);
     this.pingTimer = undefined;
     this.pingCount = this.answeredCount = 0;
   }
 
-  /** There will be none. */
+  /** Stop for good. */
   close(): void {
     this.pause();
     clearInterval(this.reportTimer);

@@ -1,19 +1,24 @@
-/** Why a page has no word from a server: browsers say of every such failure only that it failed. */
-import { pageTranslator } from "../i18n/translator";
+/** Diagnosis of an unreachable server: browsers give pages no reason for a failed request. */
 
-/** In words for a person; `final` where to try again would not help. */
+import { type PlainMessageKey, pageTranslator } from "../i18n/translator";
+
+/** Texts for the user; `isFinal` if a retry cannot succeed. */
 export interface ConnectionDiagnosis {
   title: string;
   text: string;
   isFinal: boolean;
 }
 
-/** Names of this machine, which browsers trust without TLS. */
+/** Text for a page without an origin. */
+const FILE_PAGE_TEXT: PlainMessageKey =
+  "This page was opened from a file. The stage's server allows such pages only if BUNRAKU_ORIGINS contains null.";
+
+/** Host names of this machine, to which https pages may connect without TLS. */
 const LOCAL_HOST = /^(localhost|127\.\d+\.\d+\.\d+|\[::1\]|.*\.localhost)$/;
 
 /**
- * Why `server` (an origin) does not speak with a page of `origin`; null where it does. A page of the kind that may not read answers still learns whether
- * there are any.
+ * Determine why a page of `origin` cannot use `server` (an origin); null if it can. A page that CORS does not allow to
+ * read responses still learns by a `no-cors` request that the server answers.
  */
 export async function diagnoseUnreachable(
   server: string,
@@ -32,9 +37,7 @@ export async function diagnoseUnreachable(
   if (await isReachable(health, "no-cors")) {
     const text =
       origin === "null"
-        ? translate(
-            "This page was opened from a file. The stage's server allows such pages only if BUNRAKU_ORIGINS contains null.",
-          )
+        ? translate(FILE_PAGE_TEXT)
         : translate(
             "The stage's server does not allow this site. Its operator can allow it: BUNRAKU_ORIGINS={origin}",
             {
@@ -50,7 +53,6 @@ export async function diagnoseUnreachable(
   };
 }
 
-/** Whether an answer comes at all. */
 async function isReachable(url: string, mode: RequestMode): Promise<boolean> {
   try {
     await fetch(url, { mode, cache: "no-store", credentials: "omit" });

@@ -1,23 +1,23 @@
-/** What a puppeteer's own limbs of one figure are solved with: made once for each figure that comes on. */
+/** Loader of a figure's limb solver, which is not part of the page's first chunk. */
 
 import type { Figure } from "../motion/skeleton";
 import { type Access, pageAccess } from "./access";
-import type { LimbSolver, SolverFactory } from "./solver";
+import type { LimbSolver, SolverFactory } from "./marionette-solver";
 
-/** The marionette, fetched by this access. It comes after the first pose: nobody pulls before. */
+/** Return a factory that imports the marionette and fetches its tables with `access`. */
 export function marionetteSolverFactory(access: Access): SolverFactory {
   return async (figure, origin) => (await import("./marionette-solver")).fetchMarionetteSolver(figure, origin, access);
 }
 
+/** Loader of one figure's solver. */
 export class SolverLoader {
-  /** Null until it is there. */
-  solver: LimbSolver | null = null;
+  private loaded: LimbSolver | null = null;
   private isLoading = false;
 
   /**
-   * @param figure whose limbs they are
-   * @param origin of the server, `http(s)://...`
-   * @param factory makes a figure's; null where there is to be none
+   * @param figure figure of the limbs
+   * @param origin origin of the server, `http(s)://...`
+   * @param factory factory of the solver; null for none
    */
   constructor(
     private readonly figure: Figure,
@@ -25,16 +25,22 @@ export class SolverLoader {
     private readonly factory: SolverFactory | null = marionetteSolverFactory(pageAccess),
   ) {}
 
-  /** Makes it, unless it is there or being made. A failure is told, and tried again with the next call. */
+  /** Solver, or null until it is loaded. */
+  get solver(): LimbSolver | null {
+    return this.loaded;
+  }
+
+  /** Start loading, unless it is loaded or in progress. A failure is logged, and the next call tries again. */
   load(): void {
-    const { figure, origin, factory: solverOf } = this;
-    if (this.solver || this.isLoading || !solverOf) return;
+    const { figure, origin, factory } = this;
+    if (this.loaded || this.isLoading || !factory) return;
     this.isLoading = true;
     void Promise.resolve()
-      .then(() => solverOf(figure, origin))
+      .then(() => factory(figure, origin))
       .then(
-        (solver) => void (this.solver = solver),
-        (error: unknown) => console.warn("your own limbs follow with the session's delay: no arm tables.", error),
+        (solver) => void (this.loaded = solver),
+        (error: unknown) =>
+          console.warn("Limb solver not loaded: your limbs are shown with the delay of the session.", error),
       )
       .then(() => void (this.isLoading = false));
   }

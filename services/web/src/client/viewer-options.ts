@@ -1,17 +1,17 @@
 import type { Access } from "./access";
-import type { SolverFactory } from "./solver";
+import type { SolverFactory } from "./marionette-solver";
 
-/** What a viewer watches, and with what. */
+/** Options of a viewer. */
 export interface ViewerOptions {
   /** `ws(s)://.../stream` of a motion or a session. */
   url: string;
-  /** Local milliseconds, never running backwards. */
+  /** Monotonic local clock, milliseconds; `performance.now` by default. */
   now?: () => number;
   /**
-   * Makes what a puppeteer's own limbs are solved with: the marionette, if nothing else is said. With null, and until it is
-   * there, they are seen as everyone sees them.
+   * Factory of the solvers that predict the puppeteer's own limbs, by default the marionette. With null, and until the
+   * solver is loaded, these limbs are shown as the session sends them.
    */
   solver?: SolverFactory | null;
-  /** How it comes in at the server: this page's own, if nothing else is said. */
+  /** Server and credentials; those of the page by default. */
   access?: Access;
 }

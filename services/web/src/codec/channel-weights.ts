@@ -1,5 +1,5 @@
 /**
- * Weights of the channels: how far a small rotation of each joint moves the body (`proto/SPEC.md`, Weights). A
+ * Weights of the channels: how far a small rotation of each joint moves the body (`proto/codec.md`, 2.5). A
  * channel's values are multiplied with its weight before they are quantised. Weights depend on the skeleton description
  * alone.
  */

@@ -1,4 +1,4 @@
-/** Axes in which rotations are coded, which have the same meaning on every skeleton (`proto/SPEC.md`, Axes). */
+/** Axes in which rotations are coded, which have the same meaning on every skeleton (`proto/codec.md`, 2.6). */
 
 import { multiply, rotate, toMatrix } from "../motion/rotation";
 import { type Figure, JOINT_COUNT, JOINTS, PARENTS, TIP_JOINTS } from "../motion/skeleton";

@@ -1,5 +1,5 @@
 /**
- * Decoder of block bytes: header and quantised coefficients (`proto/SPEC.md`, Motion block). It decodes the same bits
+ * Decoder of block bytes: header and quantised coefficients (`proto/codec.md`, 2.8 and 2.9). It decodes the same bits
  * as `codec/_kernels/entropy_coder.py`.
  */
 

@@ -1,5 +1,5 @@
 /**
- * Context model: predicts the scale of the next coefficient from those already decoded (`proto/SPEC.md`, Levels,
+ * Context model: predicts the scale of the next coefficient from those already decoded (`proto/codec.md`, 2.10,
  * Features, Prior). All arithmetic is in integers that fit in 32 bits, with the same results as
  * `codec/_kernels/context_model.py`.
  */

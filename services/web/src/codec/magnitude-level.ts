@@ -1,4 +1,4 @@
-/** Levels of magnitudes: a logarithmic scale in integers, so that all decoders agree (`proto/SPEC.md`, Levels). */
+/** Levels of magnitudes: a logarithmic scale in integers, so that all decoders agree (`proto/codec.md`, 2.10). */
 
 const LEVEL_COUNT = 4096;
 const table = new Uint8Array(LEVEL_COUNT);

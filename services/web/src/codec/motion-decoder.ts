@@ -1,4 +1,4 @@
-/** Decoder of motion blocks: bytes to poses at any instant (`proto/SPEC.md`, Motion block). */
+/** Decoder of motion blocks: bytes to poses at any instant (`proto/codec.md`, 2.8 and 2.9). */
 
 import { fromRotationVector, multiply } from "../motion/rotation";
 import { CHANNEL_COUNT, JOINT_COUNT, type Pose } from "../motion/skeleton";

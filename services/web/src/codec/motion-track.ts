@@ -1,4 +1,4 @@
-/** Motion track: what the blocks of a motion share, sent once in the Description (`proto/SPEC.md`, Track `motion`). */
+/** Motion track: what the blocks of a motion share, sent once in the Description (`proto/messages.md`, 3.2). */
 
 import { type Placement, STAGE_CENTRE } from "../motion/placement";
 import { multiply } from "../motion/rotation";

@@ -1,5 +1,5 @@
 /**
- * Prior of the context model: fixed integers, trained on human motion (`proto/SPEC.md`, Prior). They come from the same
+ * Prior of the context model: fixed integers, trained on human motion (`proto/codec.md`, 2.11). They come from the same
  * file as in Python, and are stored in the order in which the decoder reads them.
  */
 

@@ -1,5 +1,5 @@
 /**
- * Binary range decoder in 32-bit integers (Martin 1979; the carry as in LZMA; `proto/SPEC.md`, Range coder). It decodes
+ * Binary range decoder in 32-bit integers (Martin 1979; the carry as in LZMA; `proto/codec.md`, 2.1). It decodes
  * the same bits as `codec/_kernels/range_coder.py`.
  */
 

@@ -1,5 +1,5 @@
 /**
- * Scene tracks: camera and light beside a motion, and the decoder of their blocks (`proto/SPEC.md`, Scene block).
+ * Scene tracks: camera and light beside a motion, and the decoder of their blocks (`proto/codec.md`, 2.14).
  *
  * A scene has seven values at an instant, world frame, metres: position 0-2; then of a camera its target 3-5 and its
  * vertical field of view 6 in radians; of a light its colour 3-5 in linear RGB and its intensity 6.

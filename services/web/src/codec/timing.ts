@@ -1,4 +1,4 @@
-/** Division of a track into blocks over time, the same for motion, scene and audio (`proto/SPEC.md`, Description). */
+/** Division of a track into blocks over time, the same for motion, scene and audio (`proto/messages.md`, 3.2). */
 
 import { MAX_BLOCK_FRAMES } from "./coefficients";
 import { DamagedBlock } from "./errors";
@@ -11,7 +11,7 @@ const MAX_BLOCKS = 86_400;
 const MAX_LEVELS = 16;
 
 /**
- * One encoding of a track: bitrate over its duration, mean error and error bound in mm (`proto/SPEC.md`, Description).
+ * One encoding of a track: bitrate over its duration, mean error and error bound in mm (`proto/messages.md`, 3.2).
  */
 export interface BitrateLevel {
   kbps: number;

@@ -19,5 +19,7 @@ export function fileName(name: string, extension: string, suffix = ""): string {
     .slice(0, MAX_NAME_CHARACTERS)
     .join("")
     .replace(/^[\s.]+|[\s.]+$/g, "");
-  return `${truncated === "" || WINDOWS_DEVICE.test(truncated) ? `dance${truncated && ` ${truncated}`}` : truncated}${suffix}.${extension}`;
+  const isUnusable = truncated === "" || WINDOWS_DEVICE.test(truncated);
+  const base = isUnusable ? `dance ${truncated}`.trimEnd() : truncated;
+  return `${base}${suffix}.${extension}`;
 }

@@ -349,7 +349,7 @@ export const JAPANESE_SERVER_MESSAGES = {
   "a BVH file begins with the word HIERARCHY; export the motion as BVH":
     "BVHファイルはHIERARCHYで始まります。BVH形式で書き出してください",
   "Empty file": "空のファイルです",
-  "there is nothing in it": "中身がありません",
+  "the file has no content": "中身がありません",
   "export the motion again and send that file": "モーションを書き出し直して、そのファイルを送ってください",
   "Not a humanoid": "人の形の骨格ではありません",
   "neither the joints' names nor the skeleton's shape show two arms and two legs":
@@ -366,14 +366,13 @@ export const JAPANESE_SERVER_MESSAGES = {
   "there is no motion {motion}": "演目{motion}はありません",
   "Not available now": "ただいま利用できません",
   "Not now": "ただいま利用できません",
-  "{what} does not answer now; nothing is lost by sending the request again":
+  "{what} is unavailable; it is safe to send the request again":
     "{what}が応答しません。もう一度送っても失われるものはありません",
-  "{what} does not answer; come again": "{what}が応答しません。後でもう一度お越しください",
-  "try again in a while": "しばらくしてからもう一度お試しください",
+  "{what} is unavailable; try again later": "{what}が応答しません。後でもう一度お越しください",
   "Link expired": "リンクの期限が切れました",
-  "this link, or token, was good for a while that is over": "このリンクの有効期間は終わりました",
+  "this link or token has expired": "このリンクの有効期間は終わりました",
   "Link revoked": "リンクは取り消されました",
-  "who made this link has ended it": "リンクを作った人が取り消しました",
+  "this link was revoked": "このリンクは取り消されました",
   "ask for a new link": "新しいリンクをもらってください",
   "the {limb} was asked to a place out of reach and goes as near as it can":
     "{limb}が届かない位置です。届くところまで動かします",

@@ -1,5 +1,5 @@
 /**
- * The 14 inputs of a puppeteer (paper, section 5; SPEC, Ownership) by name. Pure.
+ * The 14 inputs of a puppeteer (paper, section 5; proto/server.md, 6.3) by name. Pure.
  *
  * A hand has six inputs, plus and minus along x, y and z; a leg has one, its angle: 2 x 6 + 2 x 1 = 14. A hand's inputs
  * are buttons. A leg's input goes both ways and takes two buttons, so that 16 digital inputs stand for the 14. Each

@@ -1,4 +1,4 @@
-/** Conversion of world positions and directions to the values of inputs (SPEC, Input). Pure. */
+/** Conversion of world positions and directions to the values of inputs (proto/control.md, 5.1). Pure. */
 import { type Matrix4, Quaternion, Vector3 } from "three";
 
 /** Return a hand's tip in the shoulder's frame: axes of the chest (vl5), origin at the shoulder, in arm lengths. */

@@ -1,6 +1,6 @@
 /**
  * Placement of performers: each motion has its own coordinates, and a placement moves them to the shared stage
- * (`proto/SPEC.md`, Track `motion`).
+ * (`proto/messages.md`, 3.2).
  */
 
 import { multiply, rotate } from "./rotation";

@@ -1,5 +1,5 @@
 /**
- * The H-Anim LOA-1 figure: a root and 17 joints (`proto/SPEC.md`, Conventions). Right-handed, metres, y up, facing z,
+ * The H-Anim LOA-1 figure: a root and 17 joints (`proto/SPEC.md`, 1.4). Right-handed, metres, y up, facing z,
  * its left at +x; at rest every local rotation is the identity and the arms hang down.
  */
 

@@ -1,19 +1,19 @@
-/** The sound a viewer holds: packets of each block, of the best rate that came (`proto/SPEC.md`, Audio block). */
+/** Audio blocks that a viewer holds (`proto/codec.md`, 2.15). */
 
 import { type AudioTrack, unpackAudioBlock } from "../codec/audio";
 import { DamagedBlock } from "../codec/errors";
 import { TrackBlockStore } from "./block-store";
 
-/** What a block adds beside its packets, which are kept by their number. */
+/** Block without its packets, which are stored by their number. */
 interface AudioBlock {
   readonly frames: number;
 }
 
-/** Packets of one audio track. Nothing is decoded here. */
+/** Encoded packets of one audio track, each at the highest level received. */
 export class AudioBlockStore extends TrackBlockStore<AudioTrack, AudioBlock> {
   private readonly packets = new Map<number, Uint8Array>();
 
-  /** The bytes of packet `number`, null where they are not here. */
+  /** Return the bytes of packet `number`, or null if they were not received. */
   packet(number: number): Uint8Array | null {
     return this.packets.get(number) ?? null;
   }
@@ -23,9 +23,11 @@ export class AudioBlockStore extends TrackBlockStore<AudioTrack, AudioBlock> {
     const packets = unpackAudioBlock(data);
     const last = packets.at(-1);
     if (last && last.number >= track.packetCount) {
-      throw new DamagedBlock(`this audio has ${track.packetCount} packets, and none of number ${last.number}`);
+      throw new DamagedBlock(
+        `Block ${index} of the audio track holds packet ${last.number}, expected less than ${track.packetCount}.`,
+      );
     }
-    // the message they came in is not kept
+    // copied, so that the message that carried the packets can be freed
     for (const packet of packets) this.packets.set(packet.number, packet.data.slice());
     return { frames: track.framesIn(index) };
   }

@@ -1,4 +1,4 @@
-/** The blocks a viewer holds, and what they show at any instant (`proto/SPEC.md`, Motion block and Scene block). */
+/** Blocks that a viewer holds, and their values at any position (`proto/codec.md`, 2.8 and 2.14). */
 
 import { DamagedBlock } from "../codec/errors";
 import { decodeMotionBlock, type MotionBlock } from "../codec/motion-decoder";
@@ -8,11 +8,20 @@ import type { Timing } from "../codec/timing";
 import { slerp } from "../motion/rotation";
 import { JOINT_COUNT, type Pose, restPose } from "../motion/skeleton";
 
-/** Decoded blocks of one track, of each the best rate that came. */
+/** Place of a motion time in the stored blocks. */
+interface BlockLocation<Block> {
+  readonly block: Block;
+  /** Instant in the block, in frames. */
+  readonly instant: number;
+  /** Following block if the instant is past the last frame and the block is stored, else null. */
+  readonly following: Block | null;
+}
+
+/** Decoded blocks of one track, each at the highest level received. */
 export abstract class TrackBlockStore<Track extends Timing, Block extends { readonly frames: number }> {
-  /** Per block: -1 missing, else the best rate held. */
+  /** Level of each block, -1 if it is missing. */
   readonly levels: Int8Array;
-  protected readonly blocks: (Block | null)[];
+  private readonly blocks: (Block | null)[];
 
   constructor(readonly track: Track) {
     this.levels = new Int8Array(track.blockCount).fill(-1);
@@ -22,82 +31,91 @@ export abstract class TrackBlockStore<Track extends Timing, Block extends { read
   protected abstract decode(data: Uint8Array, index: number): Block;
 
   /**
-   * Decodes block `index` and keeps it, unless as good a one is here already; whether it was kept.
+   * Decode and store block `index`, unless it is stored at this level or a higher one. Return true if it was stored.
    *
-   * @throws DamagedBlock where it cannot be decoded or is not of this motion
+   * @throws DamagedBlock if the block cannot be decoded or does not belong to this track
    */
   put(index: number, level: number, encoded: Uint8Array): boolean {
     const { track } = this;
     if (index >= track.blockCount)
-      throw new DamagedBlock(`this motion has ${track.blockCount} blocks, and none of index ${index}`);
+      throw new DamagedBlock(`Block ${index} does not belong to this track, which has ${track.blockCount} blocks.`);
     if (this.levels[index] >= level) return false;
     const block = this.decode(encoded, index);
     if (block.frames !== track.framesIn(index)) {
-      throw new DamagedBlock(`block ${index} has ${track.framesIn(index)} frames, not ${block.frames}`);
+      throw new DamagedBlock(`Block ${index} has ${block.frames} frames, expected ${track.framesIn(index)}.`);
     }
     this.blocks[index] = block;
     this.levels[index] = level;
     return true;
   }
 
-  /** Takes over what `other`, of the same track, holds at a better rate. */
+  /** Copy each block that `other`, a store of the same track, holds at a higher level. */
   mergeFrom(other: this): void {
-    other.levels.forEach((rate, index) => {
-      if (rate <= this.levels[index]) return;
-      this.levels[index] = rate;
+    other.levels.forEach((level, index) => {
+      if (level <= this.levels[index]) return;
+      this.levels[index] = level;
       this.blocks[index] = other.blocks[index];
     });
   }
 
-  /** Microseconds of motion that are here from `position` on without a gap, once around at most. */
+  /** Return the duration stored from `position` on without a gap, at most one loop; microseconds. */
   bufferedUs(position: number, loop: boolean): number {
     const { track } = this;
     const first = track.blockAt(position);
-    const most = loop ? track.blockCount : track.blockCount - first;
+    const maxCount = loop ? track.blockCount : track.blockCount - first;
     let count = 0;
-    while (count < most && this.levels[(first + count) % track.blockCount] >= 0) count++;
+    while (count < maxCount && this.levels[(first + count) % track.blockCount] >= 0) count++;
     if (count === 0) return 0;
-    if (count === most) return loop ? track.durationUs : Math.max(track.durationUs - position, 0);
+    if (count === maxCount) return loop ? track.durationUs : Math.max(track.durationUs - position, 0);
     const end = first + count;
     return track.startUs(end % track.blockCount) + (end >= track.blockCount ? track.durationUs : 0) - position;
   }
 
-  /** Whether the track is, to a frame, as long as a motion of `duration` microseconds, or longer. */
-  protected coversDuration(duration: number): boolean {
+  /**
+   * Find the block at motion time `position`, or null if it is missing. At the end of a loop the first block follows,
+   * if the track is, to a frame, as long as the motion (`duration` microseconds) or longer.
+   */
+  protected findBlock(position: number, loop: boolean, duration: number): BlockLocation<Block> | null {
     const { track } = this;
-    return track.durationUs + 1e6 / track.fps > duration;
-  }
-
-  /** The block after block `index`, in a loop the first after the last; null where there is none, or it is not here. */
-  protected nextBlock(index: number, loop: boolean): Block | null {
-    return index + 1 < this.track.blockCount ? this.blocks[index + 1] : loop ? this.blocks[0] : null;
+    const index = track.blockAt(position);
+    const block = this.blocks[index];
+    if (!block) return null;
+    const instant = (position * track.fps) / 1e6 - track.firstFrame(index);
+    const wraps = loop && track.durationUs + 1e6 / track.fps > duration;
+    const following =
+      instant <= block.frames - 1
+        ? null
+        : index + 1 < track.blockCount
+          ? this.blocks[index + 1]
+          : wraps
+            ? this.blocks[0]
+            : null;
+    return { block, instant, following };
   }
 }
 
-/** Decoded blocks of one motion, of each the best rate that came. */
+/** Decoded blocks of one performer's motion, each at the highest level received. */
 export class MotionBlockStore extends TrackBlockStore<MotionTrack, MotionBlock> {
   private readonly nextPose = restPose();
 
   /**
-   * The pose at motion time `position` in microseconds, written into `out`; false, and `out` untouched, where its block is
-   * missing. Between the last frame of a block and the first of the next it is the mix of the two where the next is here, at
-   * the end of a loop too where the track is as long as the motion, of `duration` microseconds. Past the end of a shorter one
-   * it stands still.
+   * Write the pose at motion time `position` (microseconds) to `out`. Return false, and leave `out` unchanged, if its
+   * block is missing.
+   *
+   * Between the last frame of a block and the first of the next, the two are interpolated if the next is stored. This
+   * holds at the end of a loop, too, if the track is as long as the motion (`duration` microseconds, by default that of
+   * the track). Past the end of a shorter track the pose stays constant.
    */
   poseAt(position: number, loop: boolean, out: Pose, duration = this.track.durationUs): boolean {
-    const { track } = this;
-    const index = track.blockAt(position);
-    const block = this.blocks[index];
-    if (!block) return false;
-    const instant = (position * track.fps) / 1e6 - track.firstFrame(index);
-    const past = instant - (block.frames - 1);
-    const following = this.nextBlock(index, loop && this.coversDuration(duration));
-    if (past <= 0 || !following) {
+    const location = this.findBlock(position, loop, duration);
+    if (!location) return false;
+    const { block, instant, following } = location;
+    if (!following) {
       block.poseAt(Math.min(Math.max(instant, -0.5), block.frames - 0.5), out);
       return true;
     }
     const { nextPose: next } = this;
-    const mix = Math.min(past, 1);
+    const mix = Math.min(instant - (block.frames - 1), 1);
     block.poseAt(block.frames - 1, out);
     following.poseAt(0, next);
     for (let axis = 0; axis < 3; axis++) out.root[axis] += mix * (next.root[axis] - out.root[axis]);
@@ -111,35 +129,33 @@ export class MotionBlockStore extends TrackBlockStore<MotionTrack, MotionBlock> 
   }
 }
 
-/** Decoded blocks of one camera or light, of each the best rate that came. */
+/** Decoded blocks of one camera or light, each at the highest level received. */
 export class SceneBlockStore extends TrackBlockStore<SceneTrack, SceneBlock> {
   private readonly values = new Float64Array(SCENE_VALUE_COUNT);
   private readonly nextValues = new Float64Array(SCENE_VALUE_COUNT);
   private hasValues = false;
 
   /**
-   * The seven numbers at `position` of a motion of `duration` microseconds, in storage that the next call uses again. Between
-   * blocks they are the linear mix, at the end of a loop too where the track is as long as the motion. Past the end of a
-   * shorter one, and where a block is missing, they stand still; null before there are any.
+   * Return the seven values at `position` of a motion of `duration` microseconds, in storage that the next call reuses.
+   *
+   * They are interpolated linearly between blocks, and at the end of a loop if the track is as long as the motion. Past
+   * the end of a shorter track, and while a block is missing, they stay constant; null before the first stored block.
    */
   sceneAt(position: number, loop: boolean, duration: number): Float64Array | null {
-    const { track, values: shown, nextValues: next } = this;
-    const index = track.blockAt(position);
-    const block = this.blocks[index];
-    if (!block) return this.hasValues ? shown : null;
+    const { values, nextValues } = this;
+    const location = this.findBlock(position, loop, duration);
+    if (!location) return this.hasValues ? values : null;
     this.hasValues = true;
-    const instant = (position * track.fps) / 1e6 - track.firstFrame(index);
-    const past = instant - (block.frames - 1);
-    const following = this.nextBlock(index, loop && this.coversDuration(duration));
-    if (past <= 0 || !following) {
-      block.valuesAt(Math.min(Math.max(instant, -0.5), block.frames - 0.5), shown);
-      return shown;
+    const { block, instant, following } = location;
+    if (!following) {
+      block.valuesAt(Math.min(Math.max(instant, -0.5), block.frames - 0.5), values);
+      return values;
     }
-    const mix = Math.min(past, 1);
-    block.valuesAt(block.frames - 1, shown);
-    following.valuesAt(0, next);
-    for (let number = 0; number < SCENE_VALUE_COUNT; number++) shown[number] += mix * (next[number] - shown[number]);
-    return shown;
+    const mix = Math.min(instant - (block.frames - 1), 1);
+    block.valuesAt(block.frames - 1, values);
+    following.valuesAt(0, nextValues);
+    for (let n = 0; n < SCENE_VALUE_COUNT; n++) values[n] += mix * (nextValues[n] - values[n]);
+    return values;
   }
 
   protected override decode(data: Uint8Array): SceneBlock {

@@ -1,20 +1,20 @@
-/** The lights among a motion's scenes, as they are at an instant. */
+/** States of a motion's lights at one instant. */
 
 import type { SceneTrack } from "../codec/scene";
 
-/** A light at an instant: its seven numbers (`proto/SPEC.md`, Scene block), and the intensity that counts as one. */
+/** Light at one instant: its seven values (`proto/codec.md`, 2.14), and the intensity that equals full scale. */
 export interface LightState {
   readonly full: number;
   readonly numbers: ArrayLike<number>;
 }
 
-/** The lights of `scenes` in their order; `numbersOf` gives a scene's numbers, null where nothing is known of it yet. */
+/** Return the lights among `scenes`, in order. `valuesOf` returns a scene's values, null before its first block. */
 export function lightStates(
   scenes: readonly SceneTrack[],
-  numbersOf: (scene: number) => ArrayLike<number> | null,
+  valuesOf: (scene: number) => ArrayLike<number> | null,
 ): LightState[] {
   return scenes.flatMap(({ kind, full }, scene) => {
-    const numbers = kind === "light" ? numbersOf(scene) : null;
+    const numbers = kind === "light" ? valuesOf(scene) : null;
     return numbers ? [{ full, numbers }] : [];
   });
 }

@@ -1,45 +1,48 @@
 /**
- * A difference between two clocks that closes on another and never steps: exponentially, and the clock it is added to never runs
- * slower than a tenth of its speed, so what is shown by it neither jumps nor runs backwards. All numbers are microseconds.
+ * Offset between two clocks that approaches a target without a step.
+ *
+ * The approach is exponential, and limited so that the clock with this offset never runs slower than a tenth of real
+ * time: the presentation neither jumps nor runs backwards. All numbers are microseconds.
  */
 
-/** Time constant, unless another is asked for: a difference of 100 ms is made good to a frame within half a second. */
+/** Default time constant: a difference of 100 ms shrinks to less than a frame within half a second. */
 const SLEW_TIME_CONSTANT_US = 250e3;
 
-/** How much slower than real the clock may run. */
+/** Upper bound of the decrease of the offset, microseconds per microsecond. */
 const MAX_SLEW_RATE = 0.9;
 
+/** Offset that approaches a target. */
 export class Slew {
-  // the difference was `from` at local time `since`, and goes to `goal`
+  // the offset was `initial` at local time `startedAt`, and approaches `target`
   private initial = 0;
   private startedAt = 0;
   private target = 0;
 
   constructor(private readonly timeConstant = SLEW_TIME_CONSTANT_US) {}
 
-  /** At local time `local` the difference is `from`, at once, and goes to `goal`. */
+  /** Set the offset to `initial` at local time `local`, and its target. */
   start(initial: number, target: number, local: number): void {
     this.initial = initial;
     this.startedAt = local;
     this.target = target;
   }
 
-  /** From local time `local` on it goes to `goal`. */
+  /** Change the target from local time `local` on. */
   slewTo(target: number, local: number): void {
     this.start(this.at(local), target, local);
   }
 
-  /** The difference at `local`. */
+  /** Return the offset at local time `local`. */
   at(local: number): number {
-    const { timeConstant: constant } = this;
-    let away = this.initial - this.target;
+    const { timeConstant } = this;
+    let difference = this.initial - this.target;
     let elapsed = Math.max(local - this.startedAt, 0);
-    if (away > MAX_SLEW_RATE * constant) {
-      // far ahead: the exponential would run backwards, so go at the slowest speed until it no longer does
-      const until = Math.min((away - MAX_SLEW_RATE * constant) / MAX_SLEW_RATE, elapsed);
-      away -= MAX_SLEW_RATE * until;
-      elapsed -= until;
+    if (difference > MAX_SLEW_RATE * timeConstant) {
+      // the exponential would exceed the rate here, so decrease at the constant maximum rate first
+      const limited = Math.min((difference - MAX_SLEW_RATE * timeConstant) / MAX_SLEW_RATE, elapsed);
+      difference -= MAX_SLEW_RATE * limited;
+      elapsed -= limited;
     }
-    return this.target + away * Math.exp(-elapsed / constant);
+    return this.target + difference * Math.exp(-elapsed / timeConstant);
   }
 }

@@ -1,8 +1,8 @@
-/** What a stretch of clock time is in the motion: a span for each piece in which it goes on without a jump. */
+/** Mapping of an interval of clock time to spans of motion time, in each of which the motion does not jump. */
 
 import { positionAt, type TimelineHistory } from "./timeline";
 
-/** From clock time `from` up to `to` the motion goes on from `position`, or stands still there. Microseconds. */
+/** Interval of clock time in which the motion plays from `position`, or stands still there; microseconds. */
 export interface TimelineSpan {
   readonly start: number;
   readonly end: number;
@@ -11,8 +11,8 @@ export interface TimelineSpan {
 }
 
 /**
- * The spans of clock times `from`..`to`, in order and without gaps: cut where a timeline that is known already takes effect,
- * where a loop begins anew, and where the motion ends. None before there is a timeline.
+ * Return the spans of the clock times `from`..`to`, in order and without gaps. A span ends where a known timeline takes
+ * effect, where a loop restarts, and where the motion ends. The result is empty before the first timeline.
  */
 export function spansBetween(timelines: TimelineHistory, from: number, to: number): TimelineSpan[] {
   const spans: TimelineSpan[] = [];
@@ -21,13 +21,13 @@ export function spansBetween(timelines: TimelineHistory, from: number, to: numbe
     const state = timelines.at(at);
     if (!state || !newest) break;
     const position = positionAt(state, at);
-    const left = state.duration - position;
-    const moving = state.playing && at >= state.clock && left > 0;
+    const remaining = state.duration - position;
+    const isMoving = state.playing && at >= state.clock && remaining > 0;
     let end = to;
-    for (const begin of [state.clock, newest.clock]) if (at < begin) end = Math.min(end, begin);
-    // a step of a microsecond at least: finer ones are lost in numbers as large as clock times
-    if (moving) end = Math.min(end, Math.max(at + left, at + 1));
-    spans.push({ start: at, end: end, position, isMoving: moving });
+    for (const start of [state.clock, newest.clock]) if (at < start) end = Math.min(end, start);
+    // a span is at least one microsecond long: smaller steps are lost in the precision of clock times
+    if (isMoving) end = Math.min(end, Math.max(at + remaining, at + 1));
+    spans.push({ start: at, end, position, isMoving });
     at = end;
   }
   return spans;

@@ -1,28 +1,28 @@
 /**
- * Where in the motion the stage stands at a clock time (`proto/SPEC.md`, Timeline). Times are microseconds: `clock` on the
- * reference clock, positions in the motion.
+ * Timeline of a stage: mapping of clock time to motion time (`proto/playback.md`, 4.2). Times are microseconds:
+ * `clock` of the reference clock, positions and durations of the motion.
  */
 
 import type { TimelineState } from "../wire/messages";
 
-/** The motion time at `clock`, 0..duration; before the timeline begins, where it begins. */
+/** Return the motion time at `clock`, 0..duration; before the timeline begins, its first position. */
 export function positionAt(state: TimelineState, clock: number): number {
   const position = state.position + (state.playing ? Math.max(clock - state.clock, 0) : 0);
   if (state.loop && state.duration > 0) return position % state.duration;
   return Math.min(position, state.duration);
 }
 
-/** The timeline that holds at a clock time: the newest, or while that lies ahead the one before it. */
+/** Newest timeline, and the one before it, which applies until the newest begins. */
 export class TimelineHistory {
   private previous: TimelineState | null = null;
   private latest: TimelineState | null = null;
 
-  /** The timeline of the highest epoch. */
+  /** Timeline of the highest epoch. */
   get newest(): TimelineState | null {
     return this.latest;
   }
 
-  /** Takes in a timeline; false where one of this epoch or a newer one is here already. */
+  /** Add a timeline. Return false, and ignore it, if its epoch is not newer. */
   put(state: TimelineState): boolean {
     if (this.latest !== null && state.epoch <= this.latest.epoch) return false;
     this.previous = this.latest;
@@ -30,14 +30,14 @@ export class TimelineHistory {
     return true;
   }
 
-  /** The timeline that holds at `clock`, null where none was put yet. */
+  /** Return the timeline that applies at `clock`, or null before the first `put`. */
   at(clock: number): TimelineState | null {
-    const { previous: before, latest } = this;
-    if (latest !== null && before !== null && clock < latest.clock && before.motion === latest.motion) return before;
-    return latest;
+    const { previous, latest } = this;
+    const isPending = latest !== null && clock < latest.clock;
+    return isPending && previous !== null && previous.motion === latest.motion ? previous : latest;
   }
 
-  /** Forgets the epochs: a new connection counts its own. What holds now holds until its first timeline comes. */
+  /** Accept the first timeline of a new connection, whatever its epoch. */
   restart(): void {
     if (this.latest !== null) this.latest = { ...this.latest, epoch: -1 };
   }

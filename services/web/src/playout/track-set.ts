@@ -1,4 +1,4 @@
-/** The tracks of a stream that are known here: the dance, and the other performers, the sound, the cameras and the lights beside it. */
+/** Tracks of a stream that a viewer can play: performers, audio, cameras and lights. */
 
 import { AudioTrack } from "../codec/audio";
 import { DamagedBlock } from "../codec/errors";
@@ -11,68 +11,83 @@ import { MotionBlockStore, SceneBlockStore } from "./block-store";
 
 type AnyBlockStore = MotionBlockStore | SceneBlockStore | AudioBlockStore;
 
+/** Block stores of one motion's tracks. */
 export class TrackSet {
-  /** The first performer's: its length is the motion's. */
+  /** Store of the first performer, whose duration is that of the motion. */
   readonly firstPerformer: MotionBlockStore;
-  /** By number, null of one that cannot be read: it keeps its number, by which limbs are told apart. */
+  /** Stores of the performers, in the Description's order; null for one that cannot be played: it keeps its number. */
   readonly performers: (MotionBlockStore | null)[] = [];
   /** Cameras and lights, in the Description's order. */
   readonly scenes: SceneBlockStore[] = [];
-  /** The sound, null where there is none: the first of the Description. */
+  /** Store of the first audio track that can be played, if any. */
   audio: AudioBlockStore | null = null;
-  /** How many tracks were told of. */
+  /** Number of tracks that were described. */
   describedCount = 0;
-  /** By index in the Description; tracks that are not known here are missing. */
+  /** Stores by the track's index in the Description. */
   private readonly stores = new Map<number, AnyBlockStore>();
 
   /**
-   * @param described the `tracks` of a Description; those of a type or codec that is not known here are skipped
-   * @throws DamagedBlock where there is no motion among them, or the first cannot be played here
+   * @param descriptions `tracks` of a Description; those of an unknown type or codec are skipped
+   * @throws DamagedBlock if there is no motion track, or the first one cannot be played
    */
-  constructor(described: readonly Track[]) {
-    const index = described.findIndex(({ type }) => type === "motion");
-    if (index < 0) throw new DamagedBlock("the stream has no motion in it");
-    this.firstPerformer = new MotionBlockStore(MotionTrack.fromDescription(described[index]));
-    this.add(0, described);
+  constructor(descriptions: readonly Track[]) {
+    const index = descriptions.findIndex(({ type }) => type === "motion");
+    if (index < 0) {
+      const types = descriptions.map(({ type }) => type).join(", ") || "none";
+      throw new DamagedBlock(`The stream has no motion track (types of its tracks: ${types}).`);
+    }
+    this.firstPerformer = new MotionBlockStore(MotionTrack.fromDescription(descriptions[index]));
+    this.add(0, descriptions);
   }
 
-  /** Takes in the tracks from index `first` on that were not told of yet: a narrow line may bring them after the first blocks. */
+  /**
+   * Add the tracks from index `first` on that were not described yet. On a constrained link they are described after
+   * the first blocks.
+   */
   add(first: number, descriptions: readonly Track[]): void {
-    descriptions.forEach((map, nth) => {
-      const number = first + nth;
-      if (number < this.describedCount) return;
+    descriptions.forEach((description, nth) => {
+      const index = first + nth;
+      if (index < this.describedCount) return;
       try {
-        const store = this.createStore(map);
-        if (store) this.stores.set(number, store);
+        const store = this.createStore(description);
+        if (store) this.stores.set(index, store);
       } catch (error) {
         if (!(error instanceof DamagedBlock)) throw error;
-        if (map.type === "motion") this.performers.push(null);
-        console.warn(`the ${map.type} at ${number} of this stream is left out: ${error.message}`);
+        if (description.type === "motion") this.performers.push(null);
+        console.warn(`Skipped track ${index} (${description.type}) of the stream: ${error.message}`);
       }
     });
     this.describedCount = Math.max(this.describedCount, first + descriptions.length);
   }
 
-  /** What the next track told of is kept in, null where it is of no use here. */
-  private createStore(map: Track): AnyBlockStore | null {
-    if (map.type === "motion" && this.performers.length < MAX_PERFORMERS) {
-      const store =
-        this.performers.length === 0 ? this.firstPerformer : new MotionBlockStore(MotionTrack.fromDescription(map));
-      this.performers.push(store);
-      return store;
-    }
-    if (map.type === "camera" || map.type === "light") {
-      const store = new SceneBlockStore(SceneTrack.fromDescription(map));
-      this.scenes.push(store);
-      return store;
-    }
-    if (map.type === "audio" && !this.audio)
-      return (this.audio = new AudioBlockStore(AudioTrack.fromDescription(map, this.firstPerformer.track)));
-    return null;
+  /** Return the store of the track with this index, or null if it cannot be played. */
+  store(index: number): AnyBlockStore | null {
+    return this.stores.get(index) ?? null;
   }
 
-  /** What keeps the blocks of the track of this index, null where it is not known here. */
-  store(track: number): AnyBlockStore | null {
-    return this.stores.get(track) ?? null;
+  /** Create and register the store of the next track, or return null if the track is not used. */
+  private createStore(description: Track): AnyBlockStore | null {
+    switch (description.type) {
+      case "motion": {
+        if (this.performers.length >= MAX_PERFORMERS) return null;
+        const store =
+          this.performers.length === 0
+            ? this.firstPerformer
+            : new MotionBlockStore(MotionTrack.fromDescription(description));
+        this.performers.push(store);
+        return store;
+      }
+      case "camera":
+      case "light": {
+        const store = new SceneBlockStore(SceneTrack.fromDescription(description));
+        this.scenes.push(store);
+        return store;
+      }
+      case "audio":
+        if (this.audio) return null;
+        return (this.audio = new AudioBlockStore(AudioTrack.fromDescription(description, this.firstPerformer.track)));
+      default:
+        return null;
+    }
   }
 }

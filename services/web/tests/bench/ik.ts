@@ -1,6 +1,6 @@
 /**
- * One round of `make bench-ik` in Node: JSON on standard input. Ours, three.js's `CCDIKSolver` and `closed-chain-ik` take turns on the
- * same targets, all warm. The last line printed is one JSON object.
+ * One run of `make bench-ik` in Node: Bunraku's solver, three.js's `CCDIKSolver` and `closed-chain-ik` solve the same
+ * targets alternately, after a warm-up. Reads JSON from standard input and prints a JSON object as its last line.
  */
 
 import { readFileSync } from "node:fs";
@@ -11,35 +11,38 @@ import { Arm, NUMBERS_PER_ARM, parseBendTable } from "../../src/marionette/arm";
 import { MAX_ELBOW_BEND_RAD, MAX_WRIST_BEND_RAD } from "../../src/marionette/constants";
 import { type Proportions, parseProportions } from "../../src/marionette/proportions";
 
-interface Asked {
-  /** Arms, and hand tips (x y z each) for which the other language solves too. */
+interface BenchInput {
+  /** Arms, and hand tips (x, y, z each) for which the Python solver's results are compared. */
   bodies: { proportions: string; table: string; checked: number[] }[];
-  /** Hand tips for the last body, by the order they come in; arm lengths from the shoulder, y up. A multiple of `BATCH`. */
+  /**
+   * Hand tips for the last body by name of their order, in arm lengths from the shoulder, y up. Their number is a
+   * multiple of `BATCH_SIZE`.
+   */
   orders: Record<string, number[]>;
 }
 
-/** How many targets are handed over at once. */
-const BATCH = 500;
-const TURNS = 5;
+/** Targets per call of `solve`. */
+const BATCH_SIZE = 500;
+const ROUNDS = 5;
 
 interface Contender {
-  /** Solves for `count` targets, from the `from`th number of `targets` on. */
+  /** Solve for `count` targets, starting at index `from` of `targets` (x, y, z each). */
   solve(targets: Float64Array, from: number, count: number): void;
-  /** Where the tip is now. */
+  /** Return the position of the hand tip. */
   tip(): ArrayLike<number>;
 }
 
-function ours(proportions: Proportions, table: Float64Array): Contender {
+function createOwnSolver(proportions: Proportions, table: Float64Array): Contender {
   const arm = new Arm(proportions, table),
-    out = new Float64Array(BATCH * NUMBERS_PER_ARM);
+    out = new Float64Array(BATCH_SIZE * NUMBERS_PER_ARM);
   return {
     solve: (targets, from, count) => arm.solveArms(out, 0, targets, from, count),
     tip: () => out.subarray(8, 11),
   };
 }
 
-/** One that solves for a target at a time. */
-function oneByOne(solve: (x: number, y: number, z: number) => void, tip: () => ArrayLike<number>): Contender {
+/** Create a contender from a solver that takes one target per call. */
+function solveOneByOne(solve: (x: number, y: number, z: number) => void, tip: () => ArrayLike<number>): Contender {
   return {
     solve: (targets, from, count) => {
       for (let at = from; at < from + 3 * count; at += 3) solve(targets[at], targets[at + 1], targets[at + 2]);
@@ -48,8 +51,11 @@ function oneByOne(solve: (x: number, y: number, z: number) => void, tip: () => A
   };
 }
 
-/** A skinned mesh of three links hanging from the shoulder, and a bone for the target; it goes on from the pose before. */
-function ccdik({ upper, forearm: fore, hand }: Proportions, limited: boolean): Contender {
+/**
+ * Create three.js's solver: three links that hang from the shoulder, and a bone as the target. It starts from the last
+ * pose.
+ */
+function createCcdIk({ upper, forearm: fore, hand }: Proportions, limited: boolean): Contender {
   const [root, shoulder, elbow, wrist, tip, target] = Array.from({ length: 6 }, () => new Bone());
   root.add(shoulder, target);
   shoulder.add(elbow);
@@ -66,7 +72,7 @@ function ccdik({ upper, forearm: fore, hand }: Proportions, limited: boolean): C
     limited ? { rotationMin: new Vector3(-limit, 0, 0), rotationMax: new Vector3(0, 0, 0) } : {};
   const links = [{ index: 3, ...hinge(MAX_WRIST_BEND_RAD) }, { index: 2, ...hinge(MAX_ELBOW_BEND_RAD) }, { index: 1 }];
   const solver = new CCDIKSolver(mesh, [{ target: 5, effector: 4, links, iteration: 10 }]);
-  return oneByOne(
+  return solveOneByOne(
     (x, y, z) => {
       target.position.set(x, y, z);
       target.updateMatrixWorld();
@@ -76,14 +82,15 @@ function ccdik({ upper, forearm: fore, hand }: Proportions, limited: boolean): C
   );
 }
 
-/** Freedoms as closed-chain-ik numbers them: places, then turns. */
+/** Degrees of freedom by their closed-chain-ik index: translations, then rotations. */
 const [X, Y, Z, EX, EY, EZ] = [0, 1, 2, 3, 4, 5];
 
 /**
- * A shoulder that turns freely, elbow and wrist that bend without limits, as it hardly ever gets past those. As it comes it stops
- * after five iterations, and wherever the way is not straight; here it may go on until it is within its thousandth.
+ * Create closed-chain-ik's solver: a free shoulder, and hinges without limits at elbow and wrist, because poses rarely
+ * reach the limits. By default it stops after five iterations and when progress stalls; here it may continue until its
+ * error is below 0.001.
  */
-function closedChain({ upper, forearm: fore, hand }: Proportions): Contender {
+function createClosedChainIk({ upper, forearm: fore, hand }: Proportions): Contender {
   const base = new Link(),
     end = new Link(),
     goal = new Goal();
@@ -92,11 +99,11 @@ function closedChain({ upper, forearm: fore, hand }: Proportions): Contender {
     [0, EX, EY, EZ],
     [upper, EX],
     [fore, EX],
-  ].forEach(([at, ...freedoms], nth) => {
+  ].forEach(([offset, ...degreesOfFreedom], nth) => {
     const joint = new Joint(),
       link = nth === 2 ? end : new Link();
-    joint.setDoF(...freedoms);
-    joint.setPosition(0, -at, 0);
+    joint.setDoF(...degreesOfFreedom);
+    joint.setPosition(0, -offset, 0);
     if (nth > 0) joint.setDoFValues(-0.5);
     last.addChild(joint);
     joint.addChild(link);
@@ -106,36 +113,39 @@ function closedChain({ upper, forearm: fore, hand }: Proportions): Contender {
   goal.setGoalDoF(X, Y, Z);
   goal.makeClosure(end);
   const solver = new Solver(base),
-    place: number[] = [0, 0, 0];
+    position: number[] = [0, 0, 0];
   solver.maxIterations = 50;
   solver.stallThreshold = 1e-6;
   solver.divergeThreshold = 1;
-  return oneByOne(
+  return solveOneByOne(
     (x, y, z) => {
       goal.setPosition(x, y, z);
       solver.solve();
     },
     () => {
       end.updateMatrixWorld();
-      end.getWorldPosition(place);
-      return place;
+      end.getWorldPosition(position);
+      return position;
     },
   );
 }
 
-const asked = JSON.parse(readFileSync(0, "utf8")) as Asked;
+const input = JSON.parse(readFileSync(0, "utf8")) as BenchInput;
 
-/** Solves for so many targets, a batch after the other; milliseconds of the processor, as others share the machine. */
+/**
+ * Solve for `count` targets in batches. Returns processor time in milliseconds, because other processes share the
+ * machine.
+ */
 function run(contender: Contender, targets: Float64Array, count: number): number {
   const began = process.cpuUsage();
-  for (let done = 0, from = 0; done < count; done += BATCH, from = (from + 3 * BATCH) % targets.length) {
-    contender.solve(targets, from, BATCH);
+  for (let done = 0, from = 0; done < count; done += BATCH_SIZE, from = (from + 3 * BATCH_SIZE) % targets.length) {
+    contender.solve(targets, from, BATCH_SIZE);
   }
   const { user, system } = process.cpuUsage(began);
   return (user + system) / 1e3;
 }
 
-/** How far the tip is from its target on average, over the first targets, in arm lengths. */
+/** Return the mean distance of the tip from its target over the first `count` targets, in arm lengths. */
 function tipError(contender: Contender, targets: Float64Array, count: number): number {
   let sum = 0;
   for (let at = 0; at < 3 * count; at += 3) {
@@ -146,17 +156,17 @@ function tipError(contender: Contender, targets: Float64Array, count: number): n
   return sum / count;
 }
 
-const body = asked.bodies[asked.bodies.length - 1];
+const body = input.bodies[input.bodies.length - 1];
 const shape = parseProportions(body.proportions),
   table = parseBendTable(Buffer.from(body.table, "base64"));
-// how many solves a turn has: a few hundredths of a second of each
+// `count` is the number of solves per round: some hundredths of a second for each solver.
 const contenders: Record<string, { contender: Contender; count: number }> = {
-  ours: { contender: ours(shape, table), count: 500_000 },
-  ccdik_10: { contender: ccdik(shape, false), count: 2_500 },
-  ccdik_10_with_limits: { contender: ccdik(shape, true), count: 2_500 },
-  closed_chain_ik: { contender: closedChain(shape), count: 500 },
+  ours: { contender: createOwnSolver(shape, table), count: 500_000 },
+  ccdik_10: { contender: createCcdIk(shape, false), count: 2_500 },
+  ccdik_10_with_limits: { contender: createCcdIk(shape, true), count: 2_500 },
+  closed_chain_ik: { contender: createClosedChainIk(shape), count: 500 },
 };
-const measured = Object.entries(asked.orders).map(([order, list]) => {
+const measured = Object.entries(input.orders).map(([order, list]) => {
   const targets = Float64Array.from(list);
   const errors: Record<string, number> = {},
     rates: Record<string, number[]> = {};
@@ -165,7 +175,7 @@ const measured = Object.entries(asked.orders).map(([order, list]) => {
     run(contender, targets, 2 * count);
     rates[name] = [];
   }
-  for (let turn = 0; turn < TURNS; turn++) {
+  for (let round = 0; round < ROUNDS; round++) {
     for (const [name, { contender, count }] of Object.entries(contenders)) {
       rates[name].push((count / run(contender, targets, count)) * 1e3);
     }
@@ -173,8 +183,8 @@ const measured = Object.entries(asked.orders).map(([order, list]) => {
   return [order, { rates, errors }];
 });
 
-// what we make of the targets that the other language solves too
-const solved = asked.bodies.map(({ proportions, table, checked }) => {
+// Results for the targets that the Python solver checks.
+const solved = input.bodies.map(({ proportions, table, checked }) => {
   const arm = new Arm(parseProportions(proportions), parseBendTable(Buffer.from(table, "base64")));
   const out = new Float64Array(NUMBERS_PER_ARM),
     angles = new Float64Array(3),

@@ -1,24 +1,25 @@
 /**
- * How the page does in real Chromium over the real server: `make bench-page`, or `make bench-page ARGUMENTS="--only memory
- * --minutes 3"`. It prints a table with the bound of each figure, and as its last line one JSON object.
+ * Benchmark of the page in Chromium against a running server: `make bench-page`, or `make bench-page ARGUMENTS="--only
+ * memory --minutes 3"`. It prints a table of figures with their bounds, and a JSON object as its last line. Cases:
  *
- *     arrival  `first_paint_s`: from the navigation's beginning until the graphics are done with the first frame that has the
- *              puppet in it, asked of a fence behind its commands; the median of five browsers started for it, with nothing cached. `js_gzip_kb`
- *              and `fonts_kb`: all scripts and fonts that came until a hand had been taken
- *     line     `first_paint_1mbit_s`: the same on a line of 1 Mbit/s and 100 ms, emulated by Chromium itself, sockets too
- *     frames   `frame_ms_p95`: what one call of the page's animation frame takes of the main thread, slowed down four times,
- *              with three limbs pulled and at full quality; of frames that drew. It is the thread's own time out
- *              of Chromium's trace, so that waiting for a processor that others have does not count; what draws the picture is
- *              another process, and Chromium's layout and painting after it are not the page's
- *     drawing  `draw_calls` and `triangles` of a frame at full quality, by night, three limbs held: shadows and mirror too
- *     memory   `heap_growth_mb`: of the script's heap after garbage was collected, over `--minutes` (30) of playing, pulling,
- *              uploading and opening everything, after a warm-up of the same; nodes and listeners beside it. Of it
- *              `heap_growth_objects_mb` is what the page made and holds, `heap_growth_code_mb` what V8 makes of the script,
- *              ever better as it runs
- *     audio    `audio_ms_p95`: what is heard against what is shown, the worst of its lines (`make bench-audio`)
- *     axe      `axe_violations`: axe-core's, in both themes with every panel open, on a desktop and on a phone
+ * - `arrival`: `first_paint_s` is the time from the start of the navigation until the GPU has completed the first frame
+ *   with the puppet; median of five newly started browsers with empty caches. `js_gzip_kb` and `fonts_kb` are all
+ *   scripts and fonts loaded until a hand is held.
+ * - `line`: `first_paint_1mbit_s` is the same at 1 Mbit/s and 100 ms RTT, emulated by Chromium, WebSockets included.
+ * - `frames`: `frame_ms_p95` is the main thread's time for an animation frame callback that draws, with 4x CPU
+ *   slowdown, full quality and three controlled limbs. It is thread time from Chromium's trace: it excludes waits for
+ *   a processor, the GPU process, and Chromium's own layout and painting.
+ * - `drawing`: `draw_calls` and `triangles` of a frame at full quality in the dark theme with three held limbs, shadow
+ *   and mirror passes included.
+ * - `memory`: `heap_growth_mb` is the growth of the script heap after a garbage collection, over `--minutes` (30) of
+ *   playing, controlling, uploading and opening panels, after a warm-up. `heap_growth_objects_mb` is its share of
+ *   objects, `heap_growth_code_mb` that of V8's compiled code. The growth of DOM nodes and listeners is reported too.
+ * - `audio`: `audio_ms_p95` is the time difference of sound and stage in the worst tested condition
+ *   (`make bench-audio`).
+ * - `axe`: `axe_violations` is the number of axe-core's findings in both themes with each panel open, on a desktop and
+ *   on a phone.
  *
- * Where there is no graphics processor the picture is drawn in software, which takes most of a first paint.
+ * Without a graphics processor Chromium renders in software, which takes most of the first paint time.
  */
 import { parseArgs } from "node:util";
 import { chromiumPath } from "../browser/chromium";
@@ -40,7 +41,7 @@ const CASES: Readonly<Record<string, (bench: BenchContext) => Promise<BenchFigur
   axe: benchAccessibility,
 };
 
-/** What each figure may be at most. */
+/** Upper bounds of the figures. */
 const BOUNDS: Readonly<Record<string, number>> = {
   first_paint_s: 1,
   js_gzip_kb: 260,
@@ -59,25 +60,26 @@ const { values } = parseArgs({
 });
 const only = values.only.split(",");
 const unknown = only.filter((name) => !(name in CASES));
-if (unknown.length > 0) throw new Error(`there is no case ${unknown.join()}; there are ${Object.keys(CASES).join()}`);
+if (unknown.length > 0)
+  throw new Error(`Unknown case in --only: ${unknown.join()}. Cases: ${Object.keys(CASES).join()}`);
 const minutes = Number(values.minutes);
-if (!(minutes > 0)) throw new Error(`--minutes ${values.minutes} is no time to play`);
-const place = chromiumPath();
-if (!place) throw new Error("Chromium is not installed; its place may be given in CHROMIUM");
+if (!(minutes > 0)) throw new Error(`Invalid --minutes ${values.minutes}: expected a positive number`);
+const chromium = chromiumPath();
+if (!chromium) throw new Error("Chromium not found. Install it, or set CHROMIUM to its path");
 
 const figures: BenchFigures = {};
 const notes: string[] = [];
 const server = await startServer({ demo: true });
 try {
-  const bench: BenchContext = { url: server.url, chromium: place, minutes, note: (text) => void notes.push(text) };
+  const bench: BenchContext = { url: server.url, chromium, minutes, note: (text) => void notes.push(text) };
   for (const name of only) Object.assign(figures, await CASES[name](bench));
 } finally {
   await server.stop();
 }
 for (const [name, value] of Object.entries(figures)) {
   const bound = BOUNDS[name];
-  const judged = bound === undefined ? "" : `at most ${bound}${value <= bound ? "" : "  MISSED"}`;
-  console.log(`${name.padEnd(22)}${String(value).padStart(10)}  ${judged}`.trimEnd());
+  const verdict = bound === undefined ? "" : `at most ${bound}${value <= bound ? "" : "  MISSED"}`;
+  console.log(`${name.padEnd(22)}${String(value).padStart(10)}  ${verdict}`.trimEnd());
 }
 for (const note of notes) console.log(`  ${note}`);
 console.log(JSON.stringify({ bench: "page", ...figures }));

@@ -1,4 +1,4 @@
-/** Links in a real browser, at a real server with a secret: who may watch watches and no more, and is told when that is over. */
+/** Share links on a server that requires tokens: viewers get no controls and are notified when the link is revoked. */
 import { beforeAll, expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { waitForFirstPose, waitForWelcome } from "./page-probe";
@@ -6,27 +6,27 @@ import { makeToken } from "./server";
 
 const SECRET = "the secret of a server that a browser test started";
 
-describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
+describeInBrowser("access with links", { demo: true, secret: SECRET }, (fixture) => {
   let admin: string;
 
   beforeAll(() => void (admin = makeToken(SECRET, "admin")));
 
-  async function asAdmin(method: string, address: string, body?: unknown): Promise<Response> {
+  async function requestAsAdmin(method: string, address: string, body?: unknown): Promise<Response> {
     const headers = { Authorization: `Bearer ${admin}`, "Content-Type": "application/json" };
-    return fetch(`${own.url}${address}`, { method, headers, ...(body ? { body: JSON.stringify(body) } : {}) });
+    return fetch(`${fixture.url}${address}`, { method, headers, ...(body ? { body: JSON.stringify(body) } : {}) });
   }
 
-  async function share(): Promise<{ id: string; link: string }> {
-    const { items } = (await (await asAdmin("GET", "/v1/sessions")).json()) as { items: { id: string }[] };
-    return (await (await asAdmin("POST", "/v1/shares", { session: items[0]?.id })).json()) as {
+  async function shareSession(): Promise<{ id: string; link: string }> {
+    const { items } = (await (await requestAsAdmin("GET", "/v1/sessions")).json()) as { items: { id: string }[] };
+    return (await (await requestAsAdmin("POST", "/v1/shares", { session: items[0]?.id })).json()) as {
       id: string;
       link: string;
     };
   }
 
-  test("one for viewers shows the dance without controls, and says when it is revoked", async () => {
-    const { id, link } = await share();
-    const page = await own.open(link);
+  test("a viewer link shows no controls, and a notice once it is revoked", async () => {
+    const { id, link } = await shareSession();
+    const page = await fixture.open(link);
     await waitForFirstPose(page);
     expect(page.url()).not.toContain("#");
     expect(page.url()).not.toContain("share");
@@ -37,29 +37,31 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
     expect(await page.getByRole("navigation", { name: "Take a string" }).isVisible()).toBe(false);
     expect(await page.getByRole("button", { name: "Connection" }).isVisible()).toBe(true);
     await expect.poll(() => page.locator(".brand-piece").innerText()).not.toBe("");
-    // neither key nor hand takes a string
+    // Keys neither claim a limb nor pause.
     await page.keyboard.press("Digit2");
     await page.keyboard.press("Space");
-    const told = await page.evaluate(() => {
+    const state = await page.evaluate(() => {
       const { viewer, puppeteer } = window.bunraku;
       return { id: puppeteer.id, playing: viewer.timeline?.playing };
     });
-    expect(told).toEqual({ id: null, playing: true });
-    // the tab keeps it
+    expect(state).toEqual({ id: null, playing: true });
+    // The tab keeps the token.
     await page.reload();
     await waitForFirstPose(page);
-    expect((await asAdmin("DELETE", `/v1/shares/${id}`)).status).toBe(204);
+    expect((await requestAsAdmin("DELETE", `/v1/shares/${id}`)).status).toBe(204);
     const notice = page.locator(".notice");
     await notice.getByText("Link revoked").waitFor();
     expect(await notice.innerText()).toContain("ask for a new link");
-    const late = await own.open(link);
-    await late.locator(".notice").getByText("Link revoked").waitFor();
+    const secondPage = await fixture.open(link);
+    await secondPage.locator(".notice").getByText("Link revoked").waitFor();
   });
 
-  test("one to a dance alone shows that on a timeline of one's own", async () => {
-    const { items } = (await (await asAdmin("GET", "/v1/motions")).json()) as { items: { id: string }[] };
-    const { link } = (await (await asAdmin("POST", "/v1/shares", { motion: items[0]?.id })).json()) as { link: string };
-    const page = await own.open(link);
+  test("a link to a motion plays it on a private timeline", async () => {
+    const { items } = (await (await requestAsAdmin("GET", "/v1/motions")).json()) as { items: { id: string }[] };
+    const { link } = (await (await requestAsAdmin("POST", "/v1/shares", { motion: items[0]?.id })).json()) as {
+      link: string;
+    };
+    const page = await fixture.open(link);
     await waitForFirstPose(page);
     expect(page.url()).not.toContain("#");
     await page.getByRole("button", { name: "Pause" }).click();
@@ -69,8 +71,8 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
     await waitForFirstPose(page);
   });
 
-  test("the operator's has everything, and its page makes one for viewers", async () => {
-    const page = await own.open(`/#token=${admin}`);
+  test("an admin link gives all controls and can create a viewer link", async () => {
+    const page = await fixture.open(`/#token=${admin}`);
     await waitForFirstPose(page);
     expect(page.url()).not.toContain("token");
     await waitForWelcome(page);
@@ -78,21 +80,21 @@ describeInBrowser("links", { demo: true, secret: SECRET }, (own) => {
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await page.getByRole("button", { name: "Play", exact: true }).click();
     await page.getByRole("button", { name: "Share link" }).click();
-    // looked at as soon as it is there, as it does not stay
-    const [copied] = /http\S+/.exec(await page.locator(".toast").innerText()) ?? [
+    // Read at once, because the toast disappears.
+    const [viewerLink] = /http\S+/.exec(await page.locator(".toast").innerText()) ?? [
       await page.evaluate(() => navigator.clipboard.readText().catch(() => "")),
     ];
-    const shares = (await (await asAdmin("GET", "/v1/shares")).json()) as { items: { by: string }[] };
+    const shares = (await (await requestAsAdmin("GET", "/v1/shares")).json()) as { items: { by: string }[] };
     expect(shares.items[0]?.by).toBe("operator");
-    if (copied) {
-      const guest = await own.open(copied);
-      await waitForFirstPose(guest);
-      expect(await guest.getByRole("button", { name: "Pause" }).isVisible()).toBe(false);
+    if (viewerLink) {
+      const viewer = await fixture.open(viewerLink);
+      await waitForFirstPose(viewer);
+      expect(await viewer.getByRole("button", { name: "Pause" }).isVisible()).toBe(false);
     }
   });
 
-  test("without one the page says calmly what to do", async () => {
-    const page = await own.open();
+  test("without a token the page asks for a link", async () => {
+    const page = await fixture.open();
     const notice = page.locator(".notice");
     await notice.getByText("A link is needed").waitFor();
     expect(await notice.innerText()).toContain("ask its host for a link");

@@ -1,4 +1,4 @@
-/** Sound and stage in a real browser: when clicks at known motion times are heard, and what the stage shows then. */
+/** Audio playback: clicks at known motion times must be heard when the stage shows that time. */
 import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
 import { describeInBrowser, PAGE_TIMEOUT_MS } from "./browser-suite";
@@ -9,187 +9,196 @@ import { encodeWav } from "./wav-file";
 
 declare global {
   interface Window {
-    /** What `listen` notes. */
+    /** Filled by `recordClicks`. */
     clicks: Clicks;
   }
 }
 
-/** Frames of the device in which a click began, when it was heard, and what the stage drew. */
+/** First audio frame and page time (ms) of each click, and page time and motion position (s) of each drawn frame. */
 interface Clicks {
   heard: { frame: number; pageMs: number }[];
   drawn: { pageMs: number; position: number }[];
 }
 
-/** What a page is opened in: how late messages may be, milliseconds, in order; whether the browser decodes Opus. */
-interface Surroundings {
-  jitter?: number;
-  decodes?: boolean;
-  /** A script of the test runs in the page, which lets none but its own. */
-  tapped?: boolean;
+interface Conditions {
+  /** Maximum delay of each message, in milliseconds. The order is kept. */
+  jitterMs?: number;
+  /** False removes the browser's Opus decoder. */
+  hasDecoder?: boolean;
+  /** Bypass the page's security policy, so that the test can load an audio worklet. */
+  bypassPolicy?: boolean;
 }
 
-const RATE = 48_000;
-const SECONDS = 13;
-/** Seconds between clicks: as none of the motion's own periods. */
-const EVERY = 0.37;
-/** Milliseconds between what is heard and what is shown. */
-const GOAL = 20;
-/** Whether it is measured, and not only tested: `make bench-audio`. */
-const BENCH = Boolean(process.env["BUNRAKU_BENCH"]);
-const CLICKS = BENCH ? 80 : 30;
+const SAMPLE_RATE_HZ = 48_000;
+const MOTION_DURATION_S = 13;
+/** Differs from all periods of the motion. */
+const CLICK_INTERVAL_S = 0.37;
+/** Largest time difference between sound and stage, in milliseconds. */
+const MAX_SYNC_ERROR_MS = 20;
+/** Measure more clicks and judge p95 instead of the median (`make bench-audio`). */
+const IS_BENCH = Boolean(process.env["BUNRAKU_BENCH"]);
+const CLICK_COUNT = IS_BENCH ? 80 : 30;
 
 const FLAGS = ["--autoplay-policy=no-user-gesture-required"];
 
-describeInBrowser("the sound", { browser: FLAGS, timeout: 3 * PAGE_TIMEOUT_MS }, (own) => {
+describeInBrowser("sound", { browser: FLAGS, timeout: 3 * PAGE_TIMEOUT_MS }, (fixture) => {
   let silent: { id: string; duration: number };
   let motion: { id: string; duration: number };
 
   beforeAll(async () => {
-    silent = await json("/v1/motions?filename=bows.bvh", { method: "POST", body: createBowingBvh(SECONDS * 30) });
-    motion = await json(`/v1/motions/${silent.id}/audio?filename=clicks.wav`, {
+    silent = await requestJson("/v1/motions?filename=bows.bvh", {
       method: "POST",
-      body: clicks(silent.duration),
+      body: createBowingBvh(MOTION_DURATION_S * 30),
+    });
+    motion = await requestJson(`/v1/motions/${silent.id}/audio?filename=clicks.wav`, {
+      method: "POST",
+      body: createClicks(silent.duration),
     });
   }, PAGE_TIMEOUT_MS);
 
-  async function json<T>(path: string, init: RequestInit = {}): Promise<T> {
-    const answer = await fetch(own.url + path, init);
-    if (!answer.ok) throw new Error(`${path}: ${answer.status} ${await answer.text()}`);
-    return (await answer.json()) as T;
+  async function requestJson<T>(path: string, init: RequestInit = {}): Promise<T> {
+    const response = await fetch(fixture.url + path, init);
+    if (!response.ok) throw new Error(`${path}: ${response.status} ${await response.text()}`);
+    return (await response.json()) as T;
   }
 
-  /** A page over a session of a motion. */
-  async function open(id: string, { jitter = 0, decodes = true, tapped = false }: Surroundings = {}): Promise<Page> {
-    const session = await json<{ id: string }>("/v1/sessions", {
+  /** Open a page with a new session that plays a motion. */
+  async function open(
+    id: string,
+    { jitterMs = 0, hasDecoder = true, bypassPolicy = false }: Conditions = {},
+  ): Promise<Page> {
+    const session = await requestJson<{ id: string }>("/v1/sessions", {
       method: "POST",
       headers: { "content-type": "application/json" },
       body: JSON.stringify({ motion: id, loop: true, playing: true }),
     });
-    const page = await own.open(`/?session=${session.id}`, {
+    const page = await fixture.open(`/?session=${session.id}`, {
       viewport: { width: 420, height: 320 },
       colorScheme: "dark",
-      bypassCSP: tapped,
+      bypassCSP: bypassPolicy,
       before: async (page) => {
-        if (jitter > 0) await delay(page, jitter);
-        if (!decodes) await page.addInitScript(() => void Reflect.deleteProperty(window, "AudioDecoder"));
+        if (jitterMs > 0) await delayMessages(page, jitterMs);
+        if (!hasDecoder) await page.addInitScript(() => void Reflect.deleteProperty(window, "AudioDecoder"));
       },
     });
     await waitForFirstPose(page);
     return page;
   }
 
-  test("of a motion without any is not fetched, and has no button", async () => {
+  test("a motion without audio has no sound button and loads no player", async () => {
     const page = await open(silent.id);
     expect(await page.locator(".sound").isHidden()).toBe(true);
     expect(await countLoadedScripts(page, /sound|decoder/)).toBe(0);
   });
 
-  test.each<[string, Surroundings]>([
-    ["on an even line", {}],
-    ["with every message up to 300 ms late", { jitter: 300 }],
-    ["in a browser that decodes no Opus", { decodes: false }],
-  ])("is heard where the stage is, %s", async (line, surroundings) => {
-    const page = await open(motion.id, { ...surroundings, tapped: true });
-    await heard(page, true);
-    const errors = await errorsOf(page);
-    expect(await countLoadedScripts(page, /wasm-decoder/)).toBe(surroundings.decodes === false ? 1 : 0);
-    expect(errors.length).toBeGreaterThanOrEqual(CLICKS);
-    const sizes = errors.map(Math.abs).sort((a, b) => a - b);
-    const share = (part: number) => Math.round(sizes[Math.ceil(part * sizes.length) - 1] * 10) / 10;
+  test.each<[string, Conditions]>([
+    ["without jitter", {}],
+    ["with 300 ms of jitter", { jitterMs: 300 }],
+    ["without an Opus decoder in the browser", { hasDecoder: false }],
+  ])("clicks are heard in time with the stage %s", async (line, conditions) => {
+    const page = await open(motion.id, { ...conditions, bypassPolicy: true });
+    await waitForSound(page, true);
+    const errors = await measureSyncErrors(page);
+    expect(await countLoadedScripts(page, /wasm-decoder/)).toBe(conditions.hasDecoder === false ? 1 : 0);
+    expect(errors.length).toBeGreaterThanOrEqual(CLICK_COUNT);
+    const magnitudes = errors.map(Math.abs).sort((a, b) => a - b);
+    const percentile = (fraction: number) =>
+      Math.round(magnitudes[Math.ceil(fraction * magnitudes.length) - 1] * 10) / 10;
     console.log(
       JSON.stringify({
         bench: "audio",
         line,
         clicks: errors.length,
-        audio_median_ms: share(0.5),
-        audio_p95_ms: share(0.95),
-        audio_max_ms: share(1),
+        audio_median_ms: percentile(0.5),
+        audio_p95_ms: percentile(0.95),
+        audio_max_ms: percentile(1),
       }),
     );
-    expect(share(BENCH ? 0.95 : 0.5)).toBeLessThanOrEqual(GOAL);
+    expect(percentile(IS_BENCH ? 0.95 : 0.5)).toBeLessThanOrEqual(MAX_SYNC_ERROR_MS);
   });
 
-  test("is heard by a script of our own where the browser decodes no Opus and the page lets no other run", async () => {
-    const page = await open(motion.id, { decodes: false });
-    await heard(page, true);
-    // there is a player, and by it the stage goes
+  test("the fallback decoder runs under the page's security policy", async () => {
+    const page = await open(motion.id, { hasDecoder: false });
+    await waitForSound(page, true);
+    // The audio player drives the stage's clock.
     await page.waitForFunction(() => window.bunraku.viewer.leader !== null);
     expect(await countLoadedScripts(page, /wasm-decoder/)).toBe(1);
   });
 
-  test("is switched by its button and by key, and how loud it is remembered", async () => {
+  test("button and key toggle the sound, and the volume is stored", async () => {
     const page = await open(motion.id);
     const button = page.getByRole("button", { name: "Sound" });
-    await heard(page, true);
+    await waitForSound(page, true);
     await button.click();
-    await heard(page, false);
+    await waitForSound(page, false);
     expect(await button.getAttribute("aria-pressed")).toBe("false");
-    // the stage goes on by its own clock
+    // Without sound the stage follows the viewer's clock.
     expect(await page.evaluate(() => window.bunraku.viewer.leader?.(performance.now()))).toBeNull();
     await page.keyboard.press("KeyM");
-    await heard(page, true);
+    await waitForSound(page, true);
     expect(await button.getAttribute("aria-pressed")).toBe("true");
     await button.click();
-    await heard(page, false);
-    // who moves the slider wants to hear
+    await waitForSound(page, false);
+    // Moving the slider turns the sound on.
     await page.setViewportSize({ width: 1280, height: 480 });
     await page.getByRole("slider", { name: "Volume" }).fill("5");
-    await heard(page, true);
+    await waitForSound(page, true);
     await page.waitForFunction(() => Math.abs(window.bunraku.listening.speaker!.output.gain.value - 0.25 ** 2) < 1e-3);
     await button.click();
-    await heard(page, false);
+    await waitForSound(page, false);
     await page.reload();
     await waitForFirstPose(page);
     await button.waitFor();
-    // what is not wanted is not even fetched
+    // The player is not loaded while the sound is off.
     expect(await countLoadedScripts(page, /sound|decoder/)).toBe(0);
     expect(await page.evaluate(() => window.bunraku.listening.speaker)).toBeNull();
     expect(await page.getByRole("slider", { name: "Volume" }).inputValue()).toBe("5");
     await button.click();
-    await heard(page, true);
+    await waitForSound(page, true);
   });
 
-  /** How much further in the motion the stage is than the sound, milliseconds, for each click. */
-  async function errorsOf(page: Page): Promise<number[]> {
-    await page.evaluate(listen);
-    await page.waitForFunction((many) => {
+  /** Return by how much the stage leads the sound at each click, in milliseconds. */
+  async function measureSyncErrors(page: Page): Promise<number[]> {
+    await page.evaluate(recordClicks);
+    await page.waitForFunction((count) => {
       const { heard, drawn } = window.clicks;
       return (
-        heard.filter(({ pageMs }) => pageMs > drawn[0]?.pageMs).length >= many &&
+        heard.filter(({ pageMs }) => pageMs > drawn[0]?.pageMs).length >= count &&
         (drawn.at(-1)?.pageMs ?? 0) > heard[heard.length - 1].pageMs
       );
-    }, CLICKS);
+    }, CLICK_COUNT);
     const { heard, drawn } = await page.evaluate(() => window.clicks);
     return heard.flatMap(({ pageMs }) => {
       const after = drawn.findIndex((frame) => frame.pageMs >= pageMs);
       if (after < 1) return [];
-      const [one, other] = [drawn[after - 1], drawn[after]];
-      const share = (pageMs - one.pageMs) / (other.pageMs - one.pageMs);
-      const moved = other.position - one.position;
-      // a loop that began anew between two frames
+      const [previous, next] = [drawn[after - 1], drawn[after]];
+      const fraction = (pageMs - previous.pageMs) / (next.pageMs - previous.pageMs);
+      const moved = next.position - previous.position;
+      // The loop restarted between the two frames.
       const position =
-        (one.position + share * (moved < -motion.duration / 2 ? moved + motion.duration : moved)) % motion.duration;
-      return [1000 * (position - EVERY * Math.round(position / EVERY))];
+        (previous.position + fraction * (moved < -motion.duration / 2 ? moved + motion.duration : moved)) %
+        motion.duration;
+      return [1000 * (position - CLICK_INTERVAL_S * Math.round(position / CLICK_INTERVAL_S))];
     });
   }
 });
 
-/** Waits until the device runs, or stands. */
-async function heard(page: Page, on: boolean): Promise<void> {
-  await page.waitForFunction((wanted) => window.bunraku.listening.speaker?.heard === wanted, on);
+/** Wait until the speaker plays sound, or is silent. */
+async function waitForSound(page: Page, on: boolean): Promise<void> {
+  await page.waitForFunction((on) => window.bunraku.listening.speaker?.heard === on, on);
 }
 
-/** Clicks of a millisecond, `EVERY` seconds apart from zero on, over a quiet tone, in two channels. */
-function clicks(seconds: number): Uint8Array<ArrayBuffer> {
-  const sound = Float32Array.from({ length: Math.floor(seconds * RATE) }, (_, frame) => {
-    const since = (frame / RATE) % EVERY;
-    return since < 0.001 ? 0.9 : 0.03 * Math.sin((2 * Math.PI * 330 * frame) / RATE);
+/** Return a stereo WAV file with 1 ms clicks every `CLICK_INTERVAL_S` from time 0, over a quiet tone. */
+function createClicks(seconds: number): Uint8Array<ArrayBuffer> {
+  const sound = Float32Array.from({ length: Math.floor(seconds * SAMPLE_RATE_HZ) }, (_, frame) => {
+    const since = (frame / SAMPLE_RATE_HZ) % CLICK_INTERVAL_S;
+    return since < 0.001 ? 0.9 : 0.03 * Math.sin((2 * Math.PI * 330 * frame) / SAMPLE_RATE_HZ);
   });
-  return encodeWav([sound, sound], RATE);
+  return encodeWav([sound, sound], SAMPLE_RATE_HZ);
 }
 
-/** In the page: notes what is put out, and what is drawn. */
-async function listen(): Promise<void> {
+/** In the page: record the clicks in the audio output and the position of each drawn frame. */
+async function recordClicks(): Promise<void> {
   const { viewer, listening } = window.bunraku;
   const { context, output } = listening.speaker!;
   const clicks: Clicks = { heard: [], drawn: [] };
@@ -216,28 +225,28 @@ async function listen(): Promise<void> {
   output.connect(node);
   node.connect(context.destination);
   node.port.onmessage = ({ data: frame }: MessageEvent<number>) => {
-    const tell = () => {
+    const report = () => {
       const { contextTime = 0, performanceTime = 0 } = context.getOutputTimestamp();
-      // told once it has been put out, by the device's own word
-      if (contextTime < frame / context.sampleRate) requestAnimationFrame(tell);
+      // Report the click only after the device has played it.
+      if (contextTime < frame / context.sampleRate) requestAnimationFrame(report);
       else clicks.heard.push({ frame, pageMs: performanceTime + (frame / context.sampleRate - contextTime) * 1000 });
     };
-    tell();
+    report();
   };
 }
 
-/** Every message over the page's lines comes 0..`most` ms late, and in order. */
-async function delay(page: Page, most: number): Promise<void> {
-  await page.routeWebSocket(/\/v1\//, (line) => {
-    const far = line.connectToServer();
-    const late = (send: (message: string | Buffer) => void) => {
+/** Delay each WebSocket message by 0 to `maxDelayMs` milliseconds, in order. */
+async function delayMessages(page: Page, maxDelayMs: number): Promise<void> {
+  await page.routeWebSocket(/\/v1\//, (client) => {
+    const server = client.connectToServer();
+    const delayed = (send: (message: string | Buffer) => void) => {
       let due = 0;
       return (message: string | Buffer) => {
-        due = Math.max(due, performance.now() + Math.random() * most);
+        due = Math.max(due, performance.now() + Math.random() * maxDelayMs);
         setTimeout(() => send(message), due - performance.now());
       };
     };
-    line.onMessage(late((message) => far.send(message)));
-    far.onMessage(late((message) => line.send(message)));
+    client.onMessage(delayed((message) => server.send(message)));
+    server.onMessage(delayed((message) => client.send(message)));
   });
 }

@@ -1,4 +1,7 @@
-/** One's own avatar on the page in a real browser: dropped it dances, is pulled, stays for the next visit, and leaves the browser never. */
+/**
+ * Avatars loaded by the viewer: they replace the puppet, can be controlled, are stored in the browser and are never
+ * uploaded.
+ */
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { createFigureFile, type FigureOptions, mixamoName } from "../avatar/figure-files";
@@ -18,67 +21,79 @@ import {
 } from "./page-probe";
 
 const SMALL = { viewport: { width: 640, height: 560 }, reducedMotion: "reduce" } as const;
-/** The first limb of the second performer: its left hand. */
-const SECOND = 4;
-/** The same figure in three kinds of file, each of other proportions than the dancer's. */
-const OWN: FigureOptions = { name: mixamoName, unit: 0.01, askew: true, arms: 40, forearm: 0.8, legLength: 0.85 };
+/** Index of the first limb of the second performer. */
+const SECOND_PERFORMER = 4;
+/** A figure with Mixamo bone names and proportions that differ from the performer's. */
+const MIXAMO_FIGURE: FigureOptions = {
+  name: mixamoName,
+  unit: 0.01,
+  askew: true,
+  arms: 40,
+  forearm: 0.8,
+  legLength: 0.85,
+};
 
-describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
-  test("dropped it dances in the puppet's place, is pulled by the hand, and nothing of it is sent", async () => {
-    const sent: string[] = [];
+describeInBrowser("avatars", { demo: true }, ({ open }) => {
+  test("a dropped avatar replaces the puppet and is not uploaded", async () => {
+    const uploads: string[] = [];
     const before = async (page: Page) => {
-      page.on("request", (request) => request.method() !== "GET" && sent.push(`${request.method()} ${request.url()}`));
+      page.on(
+        "request",
+        (request) => request.method() !== "GET" && uploads.push(`${request.method()} ${request.url()}`),
+      );
     };
     const page = await open("", { ...SMALL, before });
     await waitForFirstPose(page);
     await waitForWelcome(page);
     await pauseAtStart(page);
-    sent.length = 0;
-    await waitForToast(page, "mine dances here; everyone else sees the puppet", () => drop(page, "mine.glb", OWN));
+    uploads.length = 0;
+    await waitForToast(page, "mine dances here; everyone else sees the puppet", () =>
+      drop(page, "mine.glb", MIXAMO_FIGURE),
+    );
     expect(await page.getByRole("radio", { name: "mine" }).isChecked()).toBe(true);
     await waitForFirstPose(page);
     expect(await page.evaluate(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") === undefined)).toBe(
       true,
     );
-    expect(await limbsApart(page)).toBeLessThan(1);
+    expect(await limbAngleError(page)).toBeLessThan(1);
     await page.keyboard.press("Escape");
 
-    await pulled(page, LEFT_HAND);
+    await dragHand(page, LEFT_HAND);
     await page.mouse.up();
     await waitForRelease(page, LEFT_HAND);
-    expect(sent).toEqual([]);
+    expect(uploads).toEqual([]);
   });
 
-  test("kept for the next visit; the puppet dances when it is chosen, and again when the avatar is removed", async () => {
+  test("an avatar is restored after a reload until it is removed", async () => {
     const page = await open("", SMALL);
     await waitForFirstPose(page);
-    // said once it is kept
+    // The toast appears once the file is stored.
     await waitForToast(page, "Boxes dances here", () => drop(page, "boxes.vrm", { vrm: 1, tail: true, dressed: true }));
-    expect(await pictures(page)).toEqual([2]);
+    expect(await textureWidths(page)).toEqual([2]);
     await page.reload();
-    // keys are heard once the stage is there
+    // Keys work only once the stage has loaded.
     await waitForFirstPose(page);
     await page.keyboard.press("KeyL");
     await page.getByRole("radio", { name: "Boxes" }).waitFor();
     await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("leftHand") !== undefined);
-    expect(await limbsApart(page)).toBeLessThan(1);
+    expect(await limbAngleError(page)).toBeLessThan(1);
     await page.getByRole("radio", { name: "The puppet" }).check();
     await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
     await waitForToast(page, "Old boxes dances here", () => drop(page, "old.vrm", { vrm: 0, dressed: true }));
-    expect(await pictures(page)).toEqual([2]);
-    expect(await limbsApart(page)).toBeLessThan(1);
+    expect(await textureWidths(page)).toEqual([2]);
+    expect(await limbAngleError(page)).toBeLessThan(1);
     await page.getByRole("button", { name: "Remove the avatar Old boxes" }).click();
     await page.getByRole("radio", { name: "The puppet" }).waitFor({ state: "hidden" });
     await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
-    await expect.poll(() => kept(page)).toBe(0);
+    await expect.poll(() => storedFileCount(page)).toBe(0);
     expect(await page.evaluate(() => localStorage.getItem("bunraku.avatar"))).toBe(null);
   });
 
-  test("what cannot dance says why", async () => {
+  test("an unusable avatar file is rejected with the reason", async () => {
     const page = await open("", SMALL);
     await waitForFirstPose(page);
     await drop(page, "armless.glb", { without: ["leftLowerArm", "leftHand", "leftMiddleProximal"] });
-    await page.getByRole("alert").getByText("these bones were not found: left lower arm, left hand").waitFor();
+    await page.getByRole("alert").getByText("missing bones: left lower arm, left hand").waitFor();
     await dropBytes(page, "cube.glb", [1, 2, 3]);
     await page.getByRole("alert").getByText("cube.glb: Not a GLB file").waitFor();
     expect(await page.evaluate(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined)).toBe(
@@ -86,7 +101,7 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     );
   });
 
-  test("of several dancers it takes the chosen one's place, is pulled there, and each may have one", async () => {
+  test("each performer can have its own avatar", async () => {
     const page = await open("", { ...SMALL, viewport: { width: 760, height: 560 } });
     await waitForFirstPose(page);
     await waitForWelcome(page);
@@ -97,39 +112,39 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     await page.getByRole("button", { name: "Add Sanbasō, First Steps to the stage", exact: true }).click();
     await waitForPerformers(page, 2);
     await section.getByRole("button", { name: /^Dancer 2/ }).press("Enter");
-    await waitForToast(page, "mine dances here", () => drop(page, "mine.glb", OWN));
+    await waitForToast(page, "mine dances here", () => drop(page, "mine.glb", MIXAMO_FIGURE));
     await waitForPerformers(page, 2);
     await pauseAtStart(page);
-    expect(await puppets(page)).toEqual([true, false]);
-    expect(await limbsApart(page, 1)).toBeLessThan(1);
+    expect(await puppetFlags(page)).toEqual([true, false]);
+    expect(await limbAngleError(page, 1)).toBeLessThan(1);
     expect(await section.getByRole("radio", { name: "mine" }).isChecked()).toBe(true);
     expect(await findViolations(page)).toEqual([]);
     await page.keyboard.press("Escape");
 
-    const before = await wristOf(page, 0);
-    await pulled(page, SECOND + LEFT_HAND);
-    // the tag hangs over that dancer
+    const before = await leftWrist(page, 0);
+    await dragHand(page, SECOND_PERFORMER + LEFT_HAND);
+    // The tag is above the controlled performer.
     const { x, width } = (await page.locator(".tag:visible", { hasText: "left hand" }).boundingBox()) ?? {
       x: NaN,
       width: NaN,
     };
-    const [first, second] = await heads(page);
+    const [first, second] = await headPositions(page);
     expect(Math.abs(x + width / 2 - second)).toBeLessThan(Math.abs(x + width / 2 - first));
-    // which stands still, but for a better block that comes
-    expect(Math.hypot(...(await wristOf(page, 0)).map((at, axis) => at - before[axis]))).toBeLessThan(0.06);
+    // The other performer does not move, except for the correction by an upgraded block.
+    expect(Math.hypot(...(await leftWrist(page, 0)).map((at, axis) => at - before[axis]))).toBeLessThan(0.06);
     await page.mouse.up();
-    await waitForRelease(page, SECOND + LEFT_HAND);
+    await waitForRelease(page, SECOND_PERFORMER + LEFT_HAND);
 
-    // by keyboard alone the first one's turn
+    // Select the first performer by key.
     await waitForToast(page, "Dancer 1 of 2", () => page.keyboard.press("KeyT"));
     await page.keyboard.press("KeyL");
     await section.getByRole("radio", { name: "mine" }).waitFor({ state: "hidden" });
     await waitForToast(page, "Boxes dances here", () => drop(page, "boxes.vrm", { vrm: 1, tail: true, dressed: true }));
     await waitForPerformers(page, 2);
-    expect(await puppets(page)).toEqual([false, false]);
+    expect(await puppetFlags(page)).toEqual([false, false]);
     await section.getByRole("radio", { name: "The puppet" }).check();
     await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
-    expect(await puppets(page)).toEqual([true, false]);
+    expect(await puppetFlags(page)).toEqual([true, false]);
 
     await page.reload();
     await waitForFirstPose(page);
@@ -140,43 +155,44 @@ describeInBrowser("one's own avatar", { demo: true }, ({ open }) => {
     expect(await section.getByRole("radio", { name: "Boxes" }).isChecked()).toBe(false);
     await section.getByRole("button", { name: /^Dancer 2/ }).click();
     await section.getByRole("button", { name: "Remove the avatar mine" }).click();
-    await expect.poll(() => puppets(page)).toEqual([true, true]);
-    await expect.poll(() => kept(page)).toBe(1);
+    await expect.poll(() => puppetFlags(page)).toEqual([true, true]);
+    await expect.poll(() => storedFileCount(page)).toBe(1);
   });
 });
 
-/** Of each dancer, whether the puppet dances. */
-function puppets(page: Page): Promise<boolean[]> {
+/** Return for each performer whether it is drawn as the puppet. */
+function puppetFlags(page: Page): Promise<boolean[]> {
   return page.evaluate(() =>
     window.bunraku.stage.performers.map(({ group }) => group.getObjectByName("figure") !== undefined),
   );
 }
 
-/** How far from the left the dancers' heads are on the screen, pixels. */
-function heads(page: Page): Promise<number[]> {
+/** Return the horizontal screen positions of the performers' heads, in CSS pixels. */
+function headPositions(page: Page): Promise<number[]> {
   return page.evaluate(() => window.bunraku.stage.faceBoxes.map(({ left, right }) => (left + right) / 2));
 }
 
-/** Drags a left hand beside and below its shoulder, where an arm has room, and waits until it is there. */
-async function pulled(page: Page, hand: number): Promise<void> {
+/** Drag a left hand to a reachable point beside and below its shoulder, and wait until it arrives. */
+async function dragHand(page: Page, hand: number): Promise<void> {
   const performer = hand >> 2;
   const ring = await waitUntilSettled(page, () => ringPosition(page, hand), 0.5);
   await page.mouse.move(ring.x, ring.y);
   await page.mouse.down();
-  const shoulder = await screenOf(page, "mixamorigLeftArm", performer);
+  const shoulder = await nodePosition(page, "mixamorigLeftArm", performer);
   const scale =
     Math.abs(
-      (await screenOf(page, "mixamorigHead", performer)).y - (await screenOf(page, "mixamorigHips", performer)).y,
+      (await nodePosition(page, "mixamorigHead", performer)).y -
+        (await nodePosition(page, "mixamorigHips", performer)).y,
     ) / 0.6;
   const to = { x: shoulder.x + 0.38 * scale, y: shoulder.y + 0.1 * scale };
   await page.mouse.move(to.x, to.y, { steps: 8 });
   await page.waitForFunction((limb) => window.bunraku.hands.source(limb) === "pointer", hand);
   await waitUntilSettled(page, () => ringPosition(page, hand), 0.3);
-  await expect.poll(() => away(page, hand)).toBeLessThan(0.03);
+  await expect.poll(() => targetDistance(page, hand)).toBeLessThan(0.03);
 }
 
-/** World place of a dancer's left wrist. */
-function wristOf(page: Page, performer: number): Promise<number[]> {
+/** Return the position of a performer's left wrist in world coordinates, in metres. */
+function leftWrist(page: Page, performer: number): Promise<number[]> {
   return page.evaluate(
     (performer) => window.bunraku.stage.performers[performer].joint("l_wrist").elements.slice(12, 15),
     performer,
@@ -187,7 +203,7 @@ async function drop(page: Page, name: string, options: FigureOptions): Promise<v
   await dropBytes(page, name, [...createFigureFile(options)]);
 }
 
-/** Drops a file of these bytes on the stage. */
+/** Drop a file with these bytes on the stage. */
 async function dropBytes(page: Page, name: string, bytes: number[]): Promise<void> {
   await page.evaluate(
     ({ name, bytes }) => {
@@ -201,21 +217,21 @@ async function dropBytes(page: Page, name: string, bytes: number[]): Promise<voi
   );
 }
 
-/** The most that a limb of an avatar points elsewhere than the dancer's of the stream, degrees. */
-async function limbsApart(page: Page, performer = 0): Promise<number> {
+/** Return the largest angle between a limb of an avatar and the same limb of the streamed motion, in degrees. */
+async function limbAngleError(page: Page, performer = 0): Promise<number> {
   await waitForDraw(page);
   return page.evaluate((performer) => {
     const { performers, rig } = window.bunraku.stage;
     const puppet = performers[performer];
-    if (!puppet) throw new Error("nobody dances");
-    const place = (matrix: { elements: number[] }) => rig.group.position.clone().fromArray(matrix.elements, 12);
-    const own = (...names: string[]) => {
+    if (!puppet) throw new Error(`No performer ${performer} on the stage`);
+    const positionOf = (matrix: { elements: number[] }) => rig.group.position.clone().fromArray(matrix.elements, 12);
+    const avatarNode = (...names: string[]) => {
       const found = names.map((name) => puppet.group.getObjectByName(name)).find((node) => node);
-      if (!found) throw new Error(`no ${names.join(" or ")}`);
-      return place(found.matrixWorld);
+      if (!found) throw new Error(`Avatar has no node ${names.join(" or ")}`);
+      return positionOf(found.matrixWorld);
     };
-    const apart = (["left", "right"] as const).flatMap((side) => {
-      const [tool, s] = [`mixamorig${side === "left" ? "Left" : "Right"}`, side[0]];
+    const angles = (["left", "right"] as const).flatMap((side) => {
+      const [mixamoPrefix, s] = [`mixamorig${side === "left" ? "Left" : "Right"}`, side[0]];
       const limbs = [
         ["UpperArm", "Arm", "shoulder"],
         ["LowerArm", "ForeArm", "elbow"],
@@ -227,66 +243,66 @@ async function limbsApart(page: Page, performer = 0): Promise<number> {
       ]);
       return [0, 1, 3, 4].map((k) => {
         const [a, b] = [limbs[k], limbs[k + 1]];
-        const mine = own(`${side}${b[0]}`, `${tool}${b[1]}`)
-          .sub(own(`${side}${a[0]}`, `${tool}${a[1]}`))
+        const actual = avatarNode(`${side}${b[0]}`, `${mixamoPrefix}${b[1]}`)
+          .sub(avatarNode(`${side}${a[0]}`, `${mixamoPrefix}${a[1]}`))
           .normalize();
-        const told = place(puppet.joint(`${s}_${b[2]}`))
-          .sub(place(puppet.joint(`${s}_${a[2]}`)))
+        const expected = positionOf(puppet.joint(`${s}_${b[2]}`))
+          .sub(positionOf(puppet.joint(`${s}_${a[2]}`)))
           .normalize();
-        return Math.acos(Math.min(1, mine.dot(told)));
+        return Math.acos(Math.min(1, actual.dot(expected)));
       });
     });
-    return (Math.max(...apart) * 180) / Math.PI;
+    return (Math.max(...angles) * 180) / Math.PI;
   }, performer);
 }
 
-/** How many files the browser keeps for the page. */
-function kept(page: Page): Promise<number> {
+/** Return the number of files in the page's IndexedDB. */
+function storedFileCount(page: Page): Promise<number> {
   return page.evaluate(
     () =>
-      new Promise<number>((done, failed) => {
+      new Promise<number>((resolve, reject) => {
         const opened = indexedDB.open("bunraku");
-        opened.onerror = () => failed(opened.error);
+        opened.onerror = () => reject(opened.error);
         opened.onsuccess = () => {
           const count = opened.result.transaction("files").objectStore("files").count();
-          count.onsuccess = () => done(count.result);
+          count.onsuccess = () => resolve(count.result);
         };
       }),
   );
 }
 
-/** Widths of the pictures on the avatar, pixels. */
-function pictures(page: Page): Promise<number[]> {
+/** Return the widths of the avatar's textures, in pixels. */
+function textureWidths(page: Page): Promise<number[]> {
   return page.evaluate(() => {
     const found = new Set<{ width: number }>();
     window.bunraku.stage.puppet?.group.traverse((object) => {
       const { material = [] } = object as unknown as { material?: object | object[] };
-      for (const one of [material].flat() as { map?: { image: { width: number } } | null }[])
-        if (one.map) found.add(one.map.image);
+      for (const { map } of [material].flat() as { map?: { image: { width: number } } | null }[])
+        if (map) found.add(map.image);
     });
     return [...found].map(({ width }) => width);
   });
 }
 
-/** Where a node of an avatar is on the screen, pixels. */
-function screenOf(page: Page, name: string, performer: number): Promise<{ x: number; y: number }> {
+/** Return the screen position of an avatar's node, in CSS pixels. */
+function nodePosition(page: Page, name: string, performer: number): Promise<{ x: number; y: number }> {
   return page.evaluate(
     ({ name, performer }) => {
       const { stage } = window.bunraku;
       const node = stage.performers[performer]?.group.getObjectByName(name);
-      if (!node) throw new Error(`no ${name}`);
+      if (!node) throw new Error(`Avatar has no node ${name}`);
       return stage.toScreen(stage.rig.group.position.clone().fromArray(node.matrixWorld.elements, 12));
     },
     { name, performer },
   );
 }
 
-/** How far a hand is from where it is pulled to, metres, by the limb's number. */
-function away(page: Page, hand: number): Promise<number> {
+/** Return the distance of a hand from its target, in metres. */
+function targetDistance(page: Page, hand: number): Promise<number> {
   return page.evaluate((hand) => {
     const { stage, hands } = window.bunraku;
     const to = hands.pullTarget(hand);
-    if (!to) throw new Error("nothing is pulled");
+    if (!to) throw new Error("The limb has no target");
     return stage.performers[hand >> 2].handle(hand & 3, to.clone()).distanceTo(to);
   }, hand);
 }

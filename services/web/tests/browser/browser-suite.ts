@@ -1,39 +1,43 @@
-/** Tests in a real browser over a real server, both of which a test file has to itself. */
+/** Test suites that run in Chromium against a server. Each suite has a browser and a server to itself. */
 import type { Browser, BrowserContextOptions, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, onTestFinished } from "vitest";
 import { chromiumPath, launchChromium } from "./chromium";
 import { type RunningServer, type ServerOptions, startServer } from "./server";
 
-/** Milliseconds in which whatever is waited for must come: pictures are drawn in software. */
+/** Time limit of every wait on a page, in milliseconds. It is generous because Chromium renders in software. */
 export const PAGE_TIMEOUT_MS = 90_000;
 
-/** What a page is opened in: `before` is called with it before it goes to its address. */
 export interface OpenOptions extends BrowserContextOptions {
+  /** Called with the page before it navigates. */
   before?: (page: Page) => Promise<unknown>;
 }
 
 export interface BrowserFixture {
-  /** The server's, without a slash at its end. */
+  /** Base URL of the server, without a trailing slash. */
   readonly url: string;
-  /** A page of its own storage, at an address from the server's on, until the test is over. What fails in it fails the tests. */
-  open(address?: string, opening?: OpenOptions): Promise<Page>;
+  /**
+   * Open a page with separate storage at `address`, relative to the server's URL. It is closed when the test ends. An
+   * uncaught error in the page fails the test.
+   */
+  open(address?: string, options?: OpenOptions): Promise<Page>;
 }
 
 interface SuiteOptions extends ServerOptions {
-  /** Options of the browser's command line. */
+  /** Command line options of the browser. */
   browser?: string[];
-  /** Milliseconds that a test may take. */
+  /** Time limit of each test, in milliseconds. */
   timeout?: number;
 }
 
 const executablePath = chromiumPath();
-if (!executablePath && process.env["CI"]) throw new Error("the browser tests must run in CI: install Chromium");
+if (!executablePath && process.env["CI"])
+  throw new Error("Chromium not found. The browser tests must run in CI: install Chromium.");
 
-/** A suite of `tests`, which is left out, and says so, where there is no Chromium. */
+/** Define a suite of browser tests. Where Chromium is not installed, it is skipped with a warning. */
 export function describeInBrowser(
   name: string,
   { browser: flags = [], timeout = 2 * PAGE_TIMEOUT_MS, ...options }: SuiteOptions,
-  tests: (own: BrowserFixture) => void,
+  defineTests: (fixture: BrowserFixture) => void,
 ): void {
   if (!executablePath) console.warn(`browser tests of ${name} skipped: Chromium is not installed`);
   describe.skipIf(!executablePath)(name, { timeout }, () => {
@@ -42,20 +46,20 @@ export function describeInBrowser(
 
     beforeAll(async () => {
       [server, browser] = await Promise.all([startServer(options), launchChromium(executablePath ?? "", ...flags)]);
-      // it makes our dance and its music first
+      // The first server of a run encodes the demo.
     }, 2 * PAGE_TIMEOUT_MS);
     afterAll(async () => {
       await browser?.close();
       await server?.stop();
     }, PAGE_TIMEOUT_MS);
 
-    tests({
+    defineTests({
       get url() {
         return server.url;
       },
-      async open(address = "", { before, ...opening } = {}) {
-        // small, as the picture is drawn in software
-        const page = await browser.newPage({ viewport: { width: 760, height: 480 }, ...opening });
+      async open(address = "", { before, ...contextOptions } = {}) {
+        // A small viewport, because Chromium renders in software.
+        const page = await browser.newPage({ viewport: { width: 760, height: 480 }, ...contextOptions });
         onTestFinished(() => page.close());
         page.setDefaultTimeout(PAGE_TIMEOUT_MS);
         page.on("pageerror", (error) => {

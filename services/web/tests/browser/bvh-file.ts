@@ -1,4 +1,4 @@
-/** A BVH file of so many frames, 30 a second, of a figure that bows; centimetres and degrees. */
+/** Return a BVH file of a figure that bows: `count` frames at 30 fps, in centimetres and degrees. */
 export function createBowingBvh(count: number): string {
   const rotations = "CHANNELS 3 Zrotation Xrotation Yrotation";
   const bone = (name: string, offset: string, inside: string): string =>
@@ -23,7 +23,8 @@ export function createBowingBvh(count: number): string {
     bone("Spine1", "0 20 0", bone("Neck", "0 20 0", bone("Head", "0 10 0", end("0 18 0"))) + left.arm + right.arm),
   );
   const joints = 1 + 6 + 4 + 6;
-  const root = `ROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n${left.leg}${right.leg}${spine}}\n`;
+  const rootChannels = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation";
+  const root = `ROOT Hips\n{\nOFFSET 0 0 0\n${rootChannels}\n${left.leg}${right.leg}${spine}}\n`;
   const frames = Array.from({ length: count }, (_, i) => {
     const values = new Array<number>(3 + 3 * joints).fill(0);
     values[1] = 95;

@@ -1,14 +1,14 @@
-/** Chromium drawing in software, so that it runs where there is no graphics processor. */
+/** Chromium with software rendering, so that the tests run on machines without a graphics processor. */
 import { existsSync } from "node:fs";
 import { type Browser, chromium as playwright } from "playwright-core";
 
-/** The Chromium of this machine, if it has one. */
+/** Return the path of the installed Chromium (or `CHROMIUM`), or null if there is none. */
 export function chromiumPath(): string | null {
-  const places = [process.env["CHROMIUM"], "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
-  return places.find((place): place is string => place !== undefined && existsSync(place)) ?? null;
+  const paths = [process.env["CHROMIUM"], "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+  return paths.find((path): path is string => path !== undefined && existsSync(path)) ?? null;
 }
 
-export function launchChromium(executablePath: string, ...more: string[]): Promise<Browser> {
+export function launchChromium(executablePath: string, ...flags: string[]): Promise<Browser> {
   return playwright.launch({
     executablePath,
     args: [
@@ -21,11 +21,11 @@ export function launchChromium(executablePath: string, ...more: string[]): Promi
       "--disable-background-networking",
       "--disable-component-update",
       "--disable-sync",
-      // Two pages are watched at once; neither may be put to sleep for standing behind the other.
+      // Some tests use two pages at once: neither may be throttled as a background page.
       "--disable-backgrounding-occluded-windows",
       "--disable-renderer-backgrounding",
       "--disable-background-timer-throttling",
-      ...more,
+      ...flags,
     ],
   });
 }

@@ -1,4 +1,4 @@
-/** Dances downloaded from the page and pictures of the stage, in a real browser. */
+/** Downloads of motions and pictures of the stage. */
 import { readFile } from "node:fs/promises";
 import type { Page } from "playwright-core";
 import { type AnimationClip, AnimationMixer, type Bone, Vector3 } from "three";
@@ -21,19 +21,19 @@ import {
 
 const CALM: OpenOptions = { viewport: { width: 760, height: 560 }, reducedMotion: "reduce", colorScheme: "dark" };
 
-interface Saved {
+interface DownloadedFile {
   name: string;
   bytes: Buffer;
 }
 
-/** The file that the page saves once `act` is done. */
-async function saved(page: Page, act: () => Promise<unknown>): Promise<Saved> {
-  const [download] = await Promise.all([page.waitForEvent("download"), act()]);
+/** Run `action` and return the file that the page downloads. */
+async function captureDownload(page: Page, action: () => Promise<unknown>): Promise<DownloadedFile> {
+  const [download] = await Promise.all([page.waitForEvent("download"), action()]);
   return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
 }
 
-/** Uploads a file, and waits until it is danced. */
-async function dances(page: Page, name: string, text: string): Promise<void> {
+/** Upload a file and wait for its first pose. */
+async function uploadMotion(page: Page, name: string, text: string): Promise<void> {
   await page
     .locator('input[type=file][accept*=".bvh"]')
     .setInputFiles({ name: `${name}.bvh`, mimeType: "text/plain", buffer: Buffer.from(text) });
@@ -41,20 +41,25 @@ async function dances(page: Page, name: string, text: string): Promise<void> {
   await waitForFirstPose(page);
 }
 
-/** Downloads a dance from the open library by keyboard alone; of several dancers one's own, by number from 1, or all. */
-async function downloaded(page: Page, name: string, kind: string, dancer: number | null = null): Promise<Saved> {
-  const disclosing = page.getByRole("button", { name: `Download ${name}`, exact: true });
-  await disclosing.focus();
-  if ((await disclosing.getAttribute("aria-expanded")) === "false") await page.keyboard.press("Enter");
+/** Download a motion from the open library by keyboard: all performers, or one of them (from 1). */
+async function downloadMotion(
+  page: Page,
+  name: string,
+  kind: string,
+  performer: number | null = null,
+): Promise<DownloadedFile> {
+  const disclosure = page.getByRole("button", { name: `Download ${name}`, exact: true });
+  await disclosure.focus();
+  if ((await disclosure.getAttribute("aria-expanded")) === "false") await page.keyboard.press("Enter");
   const choices = page.getByRole("group", { name: `Download ${name} as`, exact: true });
-  const offered = dancer === null ? choices : choices.getByRole("group", { name: `Dancer ${dancer}` });
-  const choice = offered.getByRole("button", { name: new RegExp(`^${kind},`) });
+  const options = performer === null ? choices : choices.getByRole("group", { name: `Dancer ${performer}` });
+  const choice = options.getByRole("button", { name: new RegExp(`^${kind},`) });
   await choice.focus();
-  return saved(page, () => page.keyboard.press("Enter"));
+  return captureDownload(page, () => page.keyboard.press("Enter"));
 }
 
-/** World places of all joints, metres, frame by frame. */
-function placesIn(file: Saved): Vector3[][] {
+/** Return the joint positions of a BVH file in world coordinates, in metres: one row per frame. */
+function jointPositionsIn(file: DownloadedFile): Vector3[][] {
   const { skeleton, clip }: { skeleton: { bones: Bone[] }; clip: AnimationClip } = new BVHLoader().parse(
     file.bytes.toString(),
   );
@@ -65,74 +70,78 @@ function placesIn(file: Saved): Vector3[][] {
     skeleton.bones[0].updateMatrixWorld(true);
     return JOINTS.map((joint) => {
       const bone = skeleton.bones.find(({ name }) => name === joint);
-      if (!bone) throw new Error(`no ${joint} in the file`);
+      if (!bone) throw new Error(`The file has no joint ${joint}`);
       return new Vector3().setFromMatrixPosition(bone.matrixWorld).multiplyScalar(0.01);
     });
   });
 }
 
-function jsonOf({ bytes }: Saved): Record<string, unknown> {
+function parseGlbJson({ bytes }: DownloadedFile): Record<string, unknown> {
   expect(bytes.subarray(0, 4).toString()).toBe("glTF");
   return JSON.parse(bytes.subarray(20, 20 + bytes.readUInt32LE(12)).toString()) as Record<string, unknown>;
 }
 
-describeInBrowser("what is taken from the page", {}, ({ open }) => {
-  test("a dance is downloaded as each kind of file; a second generation is as near to the first as its rate says", async () => {
+describeInBrowser("exports", {}, ({ open }) => {
+  test("BVH, GLB and VRMA downloads match the stated codec error", async () => {
     const page = await open("", CALM);
-    await dances(page, "bowing", createBowingBvh(60));
-    const first = await downloaded(page, "bowing", "BVH");
+    await uploadMotion(page, "bowing", createBowingBvh(60));
+    const first = await downloadMotion(page, "bowing", "BVH");
     expect(first.name).toBe("bowing.bvh");
-    await dances(page, "again", first.bytes.toString());
-    const second = await downloaded(page, "again", "BVH");
+    await uploadMotion(page, "again", first.bytes.toString());
+    const second = await downloadMotion(page, "again", "BVH");
 
-    const [source, copy] = [placesIn(first), placesIn(second)];
+    const [source, copy] = [jointPositionsIn(first), jointPositionsIn(second)];
     expect(copy).toHaveLength(60);
-    const most = Math.max(
-      ...source.flatMap((places, frame) => places.map((place, joint) => place.distanceTo(copy[frame][joint]))),
+    const maxError = Math.max(
+      ...source.flatMap((positions, frame) =>
+        positions.map((position, joint) => position.distanceTo(copy[frame][joint])),
+      ),
     );
-    const stated = await page.evaluate(
+    const statedError = await page.evaluate(
       () => Math.max(0, ...window.bunraku.viewer.ladder.slice(-1).map(({ max }) => max)) / 1000,
     );
-    expect(stated).toBeGreaterThan(0);
-    expect(stated).toBeLessThan(0.001);
-    // and what is rounded in the two files
-    expect(most).toBeLessThan(stated + 1e-4);
+    expect(statedError).toBeGreaterThan(0);
+    expect(statedError).toBeLessThan(0.001);
+    // The values in both files are rounded.
+    expect(maxError).toBeLessThan(statedError + 1e-4);
 
-    const glb = await downloaded(page, "again", "GLB");
+    const glb = await downloadMotion(page, "again", "GLB");
     expect(glb.name).toBe("again.glb");
-    const { images, nodes } = jsonOf(glb) as { images: { mimeType: string }[]; nodes: unknown[] };
+    const { images, nodes } = parseGlbJson(glb) as { images: { mimeType: string }[]; nodes: unknown[] };
     expect([images[0].mimeType, nodes.length]).toEqual(["image/png", 21]);
-    const vrma = await waitForToast(page, "Saved again.vrma", () => downloaded(page, "again", "VRMA"));
+    const vrma = await waitForToast(page, "Saved again.vrma", () => downloadMotion(page, "again", "VRMA"));
     expect(vrma.name).toBe("again.vrma");
-    expect(jsonOf(vrma)).toHaveProperty(["extensions", "VRMC_vrm_animation", "specVersion"], "1.0");
+    expect(parseGlbJson(vrma)).toHaveProperty(["extensions", "VRMC_vrm_animation", "specVersion"], "1.0");
     await page.locator(".upload").waitFor({ state: "detached" });
     expect(await page.locator(".problem").count()).toBe(0);
 
-    // Escape shuts what was disclosed, then the library
+    // Escape closes the disclosure, then the library.
     await page.keyboard.press("Escape");
     expect(await page.getByRole("group", { name: "Download again as" }).count()).toBe(0);
-    const disclosing = page.getByRole("button", { name: "Download again", exact: true });
-    expect(await disclosing.evaluate((one) => one === document.activeElement)).toBe(true);
+    const disclosure = page.getByRole("button", { name: "Download again", exact: true });
+    expect(await disclosure.evaluate((element) => element === document.activeElement)).toBe(true);
     await page.keyboard.press("Escape");
     await page.getByRole("complementary", { name: "Library" }).waitFor({ state: "hidden" });
   });
 
-  test("of several dancers all are in one GLB; motion is downloaded of each, as it stands on the stage", async () => {
+  test("a GLB has all performers; BVH and VRMA have one, as placed", async () => {
     const page = await open("", CALM);
-    await dances(page, "pair", createBowingBvh(45));
-    const alone = placesIn(await downloaded(page, "pair", "BVH"));
+    await uploadMotion(page, "pair", createBowingBvh(45));
+    const alone = jointPositionsIn(await downloadMotion(page, "pair", "BVH"));
     await page.getByRole("button", { name: "Add pair to the stage" }).click();
     await page.waitForFunction(() => window.bunraku.stage.performers.length === 2);
-    const glb = await downloaded(page, "pair × 2", "GLB");
+    const glb = await downloadMotion(page, "pair × 2", "GLB");
     expect(glb.name).toBe("pair × 2.glb");
-    const { nodes, skins } = jsonOf(glb) as { nodes: { name: string }[]; skins: unknown[] };
+    const { nodes, skins } = parseGlbJson(glb) as { nodes: { name: string }[]; skins: unknown[] };
     expect([nodes.filter(({ name }) => name.startsWith("dancer")).length, skins.length]).toEqual([2, 2]);
-    const vrma = await downloaded(page, "pair × 2", "VRMA", 1);
+    const vrma = await downloadMotion(page, "pair × 2", "VRMA", 1);
     expect(vrma.name).toBe("pair × 2, Dancer 1.vrma");
-    const bvh = await waitForToast(page, "Saved pair × 2, Dancer 2.bvh", () => downloaded(page, "pair × 2", "BVH", 2));
+    const bvh = await waitForToast(page, "Saved pair × 2, Dancer 2.bvh", () =>
+      downloadMotion(page, "pair × 2", "BVH", 2),
+    );
     expect(bvh.name).toBe("pair × 2, Dancer 2.bvh");
 
-    // the same dance, brought to the second one's place
+    // The same motion at the placement of the second performer.
     const { x, z, turn } = await page.evaluate(() => ({
       x: 0,
       z: 0,
@@ -140,34 +149,34 @@ describeInBrowser("what is taken from the page", {}, ({ open }) => {
       ...window.bunraku.viewer.performers[1]?.placement,
     }));
     expect(Math.hypot(x, z)).toBeGreaterThan(0.3);
-    const placed = placesIn(bvh);
+    const placed = jointPositionsIn(bvh);
     expect(placed).toHaveLength(45);
     const up = new Vector3(0, 1, 0),
       at = new Vector3(x, 0, z);
-    const most = Math.max(
-      ...alone.flatMap((places, frame) =>
-        places.map((place, joint) => place.applyAxisAngle(up, turn).add(at).distanceTo(placed[frame][joint])),
+    const maxError = Math.max(
+      ...alone.flatMap((positions, frame) =>
+        positions.map((position, joint) => position.applyAxisAngle(up, turn).add(at).distanceTo(placed[frame][joint])),
       ),
     );
-    expect(most).toBeLessThan(1e-4);
-    // and where it is seen, at whatever rate it came
+    expect(maxError).toBeLessThan(1e-4);
+    // It matches the drawn pose, within the error of any bitrate level.
     await pauseAtStart(page);
-    const [root, worst] = await page.evaluate(() => {
+    const [root, levelError] = await page.evaluate(() => {
       const { stage, viewer } = window.bunraku;
       return [
         stage.performers[1].joint("humanoid_root").elements.slice(12, 15),
         Math.max(...viewer.ladder.map(({ max }) => max)) / 1000,
       ] as const;
     });
-    expect(placed[0][0].distanceTo(new Vector3(...root))).toBeLessThan(worst + 1e-4);
+    expect(placed[0][0].distanceTo(new Vector3(...root))).toBeLessThan(levelError + 1e-4);
   });
 
-  test("a download that is given up saves nothing; one whose blocks are gone says so", async () => {
+  test("a cancelled download saves nothing; a failed one shows the problem", async () => {
     const page = await open("", CALM);
-    await dances(page, "stopped", createBowingBvh(90));
+    await uploadMotion(page, "stopped", createBowingBvh(90));
     await page.route("**/description", () => undefined);
-    const disclosing = page.getByRole("button", { name: "Download stopped", exact: true });
-    await disclosing.click();
+    const disclosure = page.getByRole("button", { name: "Download stopped", exact: true });
+    await disclosure.click();
     await page.getByRole("button", { name: /^GLB,/ }).click();
     await page.getByRole("button", { name: "Cancel the download of stopped, GLB" }).click();
     await page.locator(".upload").waitFor({ state: "detached" });
@@ -178,9 +187,9 @@ describeInBrowser("what is taken from the page", {}, ({ open }) => {
     await page.locator(".problem", { hasText: "No answer" }).waitFor();
   });
 
-  test("a picture shows the stage with the pulled pose, in full quality, and leaves the stage as it was", async () => {
+  test("a picture shows the controlled pose and does not change the stage", async () => {
     const page = await open("", CALM);
-    await dances(page, "posing", createBowingBvh(75));
+    await uploadMotion(page, "posing", createBowingBvh(75));
     await pauseAtStart(page);
     await page.keyboard.press("Escape");
     await tapKey(page, "Digit2");
@@ -194,22 +203,24 @@ describeInBrowser("what is taken from the page", {}, ({ open }) => {
     );
     await page.keyboard.up("KeyW");
     const ring = await waitUntilSettled(page, () => ringPosition(page, LEFT_HAND), 1);
-    const before = await look(page);
-    const picture = await waitForToast(page, "Saved posing.png", () => saved(page, () => page.keyboard.press("KeyP")));
+    const before = await drawSettings(page);
+    const picture = await waitForToast(page, "Saved posing.png", () =>
+      captureDownload(page, () => page.keyboard.press("KeyP")),
+    );
     expect(picture.name).toBe("posing.png");
-    expect(await look(page)).toEqual(before);
+    expect(await drawSettings(page)).toEqual(before);
 
-    // the pulled hand is where it is on the page; the other hangs lower, and where it would mirror this one is the dark
-    const found = await page.evaluate(seen, {
+    // The controlled hand is where the page shows it. The mirrored place is dark, because the other hand hangs lower.
+    const found = await page.evaluate(inspectPicture, {
       base64: picture.bytes.toString("base64"),
-      places: [ring, { x: 760 - ring.x, y: ring.y }],
+      points: [ring, { x: 760 - ring.x, y: ring.y }],
     });
     expect([found.width, found.height]).toEqual([1600, 1179]);
     expect(found.colours).toBeGreaterThan(2000);
     expect(found.brightest[0]).toBeGreaterThan(170);
     expect(found.brightest[1]).toBeLessThan(100);
 
-    // what is kept may be taken along at once
+    // A recording can be downloaded from its toast.
     await page.keyboard.press("KeyK");
     await page.locator(".toast", { hasText: "Kept: posing" }).getByRole("button", { name: "Download" }).click();
     await page.getByRole("group", { name: /^Download posing, as .+ pulled it as$/ }).waitFor();
@@ -219,21 +230,24 @@ describeInBrowser("what is taken from the page", {}, ({ open }) => {
   });
 });
 
-/** What the stage draws with, as far as a picture changes it for a moment. */
-function look(page: Page) {
+/** Return the stage's materials, shadows and environment, which taking a picture changes temporarily. */
+function drawSettings(page: Page) {
   return page.evaluate(() => {
     const { scene } = window.bunraku.stage;
     const kinds: string[] = [];
-    scene.traverse((one) => {
-      const { material, castShadow } = one as { material?: { type: string } } & typeof one;
-      kinds.push(`${one.name} ${material?.type ?? one.type} ${castShadow}`);
+    scene.traverse((object) => {
+      const { material, castShadow } = object as { material?: { type: string } } & typeof object;
+      kinds.push(`${object.name} ${material?.type ?? object.type} ${castShadow}`);
     });
     return { kinds: kinds.sort(), environment: scene.environment?.uuid ?? null };
   });
 }
 
-/** In the page: a picture's size, how many colours are in it, and the brightest about places of the page, CSS pixels. */
-async function seen({ base64, places }: { base64: string; places: { x: number; y: number }[] }) {
+/**
+ * In the page: return a picture's size, its number of colours and the brightest value near points of the page (CSS
+ * pixels).
+ */
+async function inspectPicture({ base64, points }: { base64: string; points: { x: number; y: number }[] }) {
   const bitmap = await createImageBitmap(
     new Blob([Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))], { type: "image/png" }),
   );
@@ -242,7 +256,7 @@ async function seen({ base64, places }: { base64: string; places: { x: number; y
   context.drawImage(bitmap, 0, 0);
   const colours = new Set(new Uint32Array(context.getImageData(0, 0, width, height).data.buffer)).size;
   const scale = width / innerWidth;
-  const brightest = places.map(({ x, y }) => {
+  const brightest = points.map(({ x, y }) => {
     const { data } = context.getImageData(Math.round(x * scale) - 16, Math.round(y * scale) - 16, 32, 32);
     return Math.max(
       ...Array.from({ length: data.length / 4 }, (_, at) => (data[at * 4] + data[at * 4 + 1] + data[at * 4 + 2]) / 3),

@@ -1,18 +1,18 @@
-/** A file dropped on the page in a real browser. */
+/** Files dropped on the page. */
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
 
-/** Two seconds. */
-const DANCE = createBowingBvh(60);
+/** A motion of two seconds. */
+const MOTION = createBowingBvh(60);
 
-describeInBrowser("a drop on the page", {}, ({ open }) => {
-  test("a file dropped anywhere on the page is uploaded and danced", async () => {
+describeInBrowser("file drop", {}, ({ open }) => {
+  test("a file dropped on the page is uploaded and played", async () => {
     const page = await open("", { viewport: { width: 500, height: 400 }, reducedMotion: "reduce" });
     await page.getByRole("complementary", { name: "Library" }).waitFor();
-    await page.evaluate(drag, { type: "dragover", name: "dropped.bvh", text: DANCE });
+    await page.evaluate(dispatchDrag, { type: "dragover", name: "dropped.bvh", text: MOTION });
     await page.locator(".drop-frame").waitFor();
-    await page.evaluate(drag, { type: "drop", name: "dropped.bvh", text: DANCE });
+    await page.evaluate(dispatchDrag, { type: "drop", name: "dropped.bvh", text: MOTION });
     await page.locator(".drop-frame").waitFor({ state: "hidden" });
     await page.locator(".brand-piece", { hasText: "dropped" }).waitFor({ state: "attached" });
     expect(await page.locator(".problem").count()).toBe(0);
@@ -23,11 +23,11 @@ describeInBrowser("a drop on the page", {}, ({ open }) => {
   });
 });
 
-/** In the page: a file over the stage or dropped on it, as the browser tells of it. */
-function drag({ type, name, text }: { type: string; name: string; text: string }): void {
+/** In the page: dispatch a drag event with a file on the stage. */
+function dispatchDrag({ type, name, text }: { type: string; name: string; text: string }): void {
   const dataTransfer = new DataTransfer();
   dataTransfer.items.add(new File([text], name));
   const event = new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true });
   document.querySelector("#stage")?.dispatchEvent(event);
-  if (!event.defaultPrevented) throw new Error(`the browser would have opened the file: ${type} was not taken`);
+  if (!event.defaultPrevented) throw new Error(`The page did not handle ${type}: the browser would open the file`);
 }

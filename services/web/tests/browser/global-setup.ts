@@ -1,4 +1,7 @@
-/** What the browser tests of one run share: a folder for our own dance, made by the first that needs it (`server.ts`). */
+/**
+ * Set-up of a run of browser tests: a folder for the encoded demo, filled by the first test that needs it
+ * (`server.ts`).
+ */
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";

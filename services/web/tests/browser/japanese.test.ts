@@ -1,12 +1,12 @@
-/** The page in Japanese in a real browser: its names for screen readers, what the server's problems become, and the way back. */
+/** The page in Japanese: texts, accessible names, translated server errors, and the switch to English. */
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { LEFT_HAND, waitForFirstPose, waitForHold, waitForWelcome } from "./page-probe";
 
 const KANA = /[\p{Script=Hiragana}\p{Script=Katakana}\p{Script=Han}]/u;
 
-describeInBrowser("Japanese", { demo: true }, ({ open }) => {
-  test("is what a Japanese browser is shown: panels, tags and what screen readers say", async () => {
+describeInBrowser("Japanese page", { demo: true }, ({ open }) => {
+  test("a Japanese browser gets Japanese texts and accessible names", async () => {
     const page = await open("", { locale: "ja-JP", viewport: { width: 1280, height: 800 } });
     await waitForFirstPose(page);
     await waitForWelcome(page);
@@ -30,7 +30,7 @@ describeInBrowser("Japanese", { demo: true }, ({ open }) => {
     await waitForHold(page, LEFT_HAND);
     await page.getByRole("button", { name: "キーとゲームパッド" }).click();
     await page.getByRole("dialog", { name: "キーとゲームパッド" }).getByText("1ブロック戻る").waitFor();
-    // no name for screen readers was left in English
+    // Every accessible name is translated, except the button to English.
     const names = await page.evaluate(() =>
       [...document.querySelectorAll("[aria-label]")].map((element) => element.getAttribute("aria-label") ?? ""),
     );
@@ -38,7 +38,7 @@ describeInBrowser("Japanese", { demo: true }, ({ open }) => {
     expect(names.filter((name) => !KANA.test(name))).toEqual(["English"]);
   });
 
-  test("tells what is wrong with a file, and gives way to English for good", async () => {
+  test("server errors are translated, and the choice of English is stored", async () => {
     const page = await open("?lang=ja", { locale: "en-GB" });
     await waitForFirstPose(page);
     await page
@@ -56,12 +56,12 @@ describeInBrowser("Japanese", { demo: true }, ({ open }) => {
     ]);
     await page.reload();
     await page.getByRole("button", { name: "Library", exact: true }).waitFor();
-    // by the keyboard, and kept
+    // Back to Japanese by keyboard.
     await page.getByRole("button", { name: "日本語" }).press("Enter");
     await page.getByRole("button", { name: "演目", exact: true }).waitFor();
   });
 
-  test("is English where the words cannot be fetched", async () => {
+  test("the page is in English if the translations fail to load", async () => {
     const page = await open("?lang=ja", {
       before: (page) => page.route(/\/japanese-[^/]*\.js$/, (route) => route.abort()),
     });

@@ -1,4 +1,4 @@
-/** What a puppeteer has in the hand, in a real browser: keys bound anew and remembered, arrows pressed and held, a held limb asked for and given, a performance kept. */
+/** Control of limbs: key bindings, arrow buttons, gamepads, hand-over between puppeteers, and recording. */
 import type { Page, WebSocketRoute } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
@@ -18,32 +18,32 @@ import {
   waitUntilSettled,
 } from "./page-probe";
 
-/** Paused on entering, as less motion is asked for. */
-const CALM: OpenOptions = { viewport: { width: 760, height: 560 }, reducedMotion: "reduce" };
+/** With reduced motion, the session is paused when the page opens. */
+const REDUCED_MOTION: OpenOptions = { viewport: { width: 760, height: 560 }, reducedMotion: "reduce" };
 
-describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
-  /** A page of somebody, with storage of its own; `lines` are the lines it opens to see the stage. */
-  async function open(name: string, lines: WebSocketRoute[] = []): Promise<Page> {
+describeInBrowser("limb control", { demo: true }, (fixture) => {
+  /** Open a page of a puppeteer with this name. Its stream connections are added to `sockets`. */
+  async function open(name: string, sockets: WebSocketRoute[] = []): Promise<Page> {
     const before = (page: Page) =>
-      page.routeWebSocket(/\/stream/, (line) => {
-        line.connectToServer();
-        lines.push(line);
+      page.routeWebSocket(/\/stream/, (socket) => {
+        socket.connectToServer();
+        sockets.push(socket);
       });
-    const page = await own.open(`?name=${name}`, { ...CALM, before });
-    await ready(page);
+    const page = await fixture.open(`?name=${name}`, { ...REDUCED_MOTION, before });
+    await waitUntilReady(page);
     return page;
   }
 
-  test("a key bound anew moves its limb, also after the page is loaded again; what is kept and broken is the default", async () => {
+  test("a changed key binding is stored; a broken one falls back to defaults", async () => {
     const page = await open("Aiko");
     await page.keyboard.press("KeyU");
-    expect(await source(page)).toBe(null);
+    expect(await controlSource(page)).toBe(null);
     await page.keyboard.press("Shift+Slash");
     await page.getByText("The 14 inputs, one by one").click();
     await page.getByRole("button", { name: "Bind a key or button: left hand up" }).click();
     await page.keyboard.press("KeyU");
     await page.getByRole("button", { name: "U: left hand up. Remove" }).waitFor();
-    // A second meaning is shown at both ends.
+    // A key with two commands shows a conflict at both.
     await page.getByRole("button", { name: "Bind a key or button: connection", exact: true }).click();
     await page.keyboard.press("KeyU");
     expect(await page.locator(".clash:not([hidden])").allInnerTexts()).toEqual([
@@ -52,7 +52,7 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
     ]);
     await page.getByRole("button", { name: "U: connection. Remove" }).click();
     expect(await page.locator(".clash:not([hidden])").count()).toBe(0);
-    // Escape ends waiting for a key, and only then the page of keys.
+    // The first Escape cancels the binding, the second closes the dialog.
     await page.getByRole("button", { name: "Bind a key or button: keep" }).click();
     await page.keyboard.press("Escape");
     expect(await page.locator("dialog[open]").count()).toBe(1);
@@ -61,63 +61,63 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
     await page.locator("dialog").waitFor({ state: "hidden" });
 
     await page.reload();
-    await ready(page);
+    await waitUntilReady(page);
     await page.keyboard.down("KeyU");
     await waitForHold(page, LEFT_HAND);
     await page.keyboard.up("KeyU");
-    // Let go by itself after a rest: a push is no hold.
+    // A limb moved by key is released after a pause.
     await waitForRelease(page, LEFT_HAND);
     expect(await deadZone(page)).toBe("0.3");
 
     for (const broken of ["{", JSON.stringify({ version: 1, mapping: { bindings: { KeyU: ["fly"] } } })]) {
       await page.evaluate((content) => localStorage.setItem("bunraku.mapping", content), broken);
       await page.reload();
-      await ready(page);
+      await waitUntilReady(page);
       await page.keyboard.press("KeyU");
-      expect(await source(page)).toBe(null);
+      expect(await controlSource(page)).toBe(null);
       expect(await deadZone(page)).toBe("0.16");
     }
   });
 
-  test("the arrows of a held limb are pressed and held, by keyboard and by pointer, and go on when the line is lost", async () => {
-    const lines: WebSocketRoute[] = [];
-    const page = await open("Aiko", lines);
+  test("a held limb's arrow buttons work by key, pointer and across a reconnect", async () => {
+    const sockets: WebSocketRoute[] = [];
+    const page = await open("Aiko", sockets);
     await pauseAtStart(page);
     await page.keyboard.press("KeyS");
     await page.getByRole("button", { name: "Take left hand" }).click();
     await waitForHold(page, LEFT_HAND);
     const pad = page.getByRole("group", { name: "Move the left hand" });
     expect(
-      await pad.getByRole("button").evaluateAll((all) => all.map((one) => one.getAttribute("aria-label"))),
+      await pad.getByRole("button").evaluateAll((all) => all.map((button) => button.getAttribute("aria-label"))),
     ).toEqual(["Nearer", "Up", "Further", "Left", "Down", "Right"]);
-    const wrist = await height(page, "l_wrist");
+    const wrist = await jointHeight(page, "l_wrist");
     await pad.getByRole("button", { name: "Up" }).focus();
     await page.keyboard.down("Space");
-    // so far up that there is as much room downwards as is looked for next
-    await page.waitForFunction(moved, { from: wrist, least: 0.15 });
+    // High enough to move down again below.
+    await page.waitForFunction(leftWristMoved, { from: wrist, minimum: 0.15 });
     await page.keyboard.up("Space");
-    await still(page);
+    await waitUntilStill(page);
 
-    const between = await height(page, "l_wrist");
-    const back = pad.getByRole("button", { name: "Down" });
-    await back.hover();
+    const raised = await jointHeight(page, "l_wrist");
+    const down = pad.getByRole("button", { name: "Down" });
+    await down.hover();
     await page.mouse.down();
-    await page.waitForFunction(moved, { from: between, least: 0.05 });
-    const before = lines.length;
+    await page.waitForFunction(leftWristMoved, { from: raised, minimum: 0.05 });
+    const before = sockets.length;
     await waitForToast(page, "Connection lost, reconnecting", async () =>
-      lines.at(-1)?.close({ code: 1012, reason: "cut by the test" }),
+      sockets.at(-1)?.close({ code: 1012, reason: "cut by the test" }),
     );
-    await expect.poll(() => lines.length).toBeGreaterThan(before);
+    await expect.poll(() => sockets.length).toBeGreaterThan(before);
     await expect.poll(() => page.getByRole("button", { name: "Release left hand" }).isEnabled()).toBe(true);
-    expect(await back.getAttribute("data-on")).toBe("");
+    expect(await down.getAttribute("data-on")).toBe("");
     await page.mouse.up();
-    await still(page);
+    await waitUntilStill(page);
     expect(await page.getByRole("button", { name: "Play", exact: true }).isVisible()).toBe(true);
     await page.getByRole("button", { name: "Release left hand" }).click();
     await pad.waitFor({ state: "hidden" });
   });
 
-  test("a gamepad's stick takes its hand, and a button that was pressed for it moves a leg", async () => {
+  test("a gamepad stick controls a hand, and a bound button a leg", async () => {
     const before = (page: Page) =>
       page.addInitScript(() => {
         const buttons = Array.from({ length: 17 }, () => ({ pressed: false, touched: false, value: 0 }));
@@ -126,54 +126,54 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
         });
         navigator.getGamepads = () => [(window as unknown as { pad: Gamepad }).pad];
       });
-    const page = await own.open("?name=Kiku", { ...CALM, before });
-    await ready(page);
+    const page = await fixture.open("?name=Kiku", { ...REDUCED_MOTION, before });
+    await waitUntilReady(page);
     await pauseAtStart(page);
-    const wrist = await height(page, "l_wrist");
-    await pad(page, { axis: [1, -0.9] });
+    const wrist = await jointHeight(page, "l_wrist");
+    await setGamepad(page, { axis: [1, -0.9] });
     await waitForHold(page, LEFT_HAND);
-    await page.waitForFunction(moved, { from: wrist, least: 0.05 });
-    await pad(page, { axis: [1, 0] });
+    await page.waitForFunction(leftWristMoved, { from: wrist, minimum: 0.05 });
+    await setGamepad(page, { axis: [1, 0] });
     await waitForRelease(page, LEFT_HAND);
 
     await page.keyboard.press("Shift+Slash");
     await page.getByText("A pad is connected").waitFor();
     await page.getByText("The 14 inputs, one by one").click();
     await page.getByRole("button", { name: "Bind a key or button: right leg up" }).click();
-    await pad(page, {}); // What is down as the listening begins does not count.
-    await pad(page, { button: [1, 1] });
-    await pad(page, { button: [1, 0] });
+    await setGamepad(page, {}); // Buttons that are already pressed are ignored.
+    await setGamepad(page, { button: [1, 1] });
+    await setGamepad(page, { button: [1, 0] });
     await page.getByRole("button", { name: "B: right leg up. Remove" }).waitFor();
     await page.keyboard.press("Escape");
-    await pad(page, { button: [1, 1] });
+    await setGamepad(page, { button: [1, 1] });
     await waitForHold(page, RIGHT_LEG);
   });
 
-  test("a held limb is asked for, shown to its holder, and given; and what was done is kept", async () => {
+  test("a limb is handed over on request, and the performance is recorded", async () => {
     const [aiko, mateo] = [await open("Aiko"), await open("Mateo")];
-    // who is asked for a limb gives it up by silence too
+    // A puppeteer who does not answer loses the limb, so both pages must stay responsive.
     for (const page of [aiko, mateo]) await stopDrawing(page);
     await tapKey(aiko, "Digit2");
     await mateo.getByRole("button", { name: "Left hand, held by Aiko" }).waitFor();
     await waitForToast(mateo, "Aiko holds the left hand", () => tapKey(mateo, "Digit2"));
-    expect(await source(mateo)).toBe(null);
+    expect(await controlSource(mateo)).toBe(null);
     await mateo.keyboard.press("KeyR");
-    const asked = aiko.getByText("Mateo asks for the left hand");
-    await asked.waitFor();
+    const request = aiko.getByText("Mateo asks for the left hand");
+    await request.waitFor();
     await mateo.keyboard.press("KeyS");
-    // Withdrawn and asked again, from the card.
+    // Withdraw the request and ask again, in the panel.
     await mateo.getByRole("button", { name: "Withdraw the request for left hand" }).click();
-    await asked.waitFor({ state: "detached" });
+    await request.waitFor({ state: "detached" });
     await mateo.getByRole("button", { name: "Ask for left hand" }).click();
-    await asked.waitFor();
-    expect(await source(aiko)).toBe("velocity");
+    await request.waitFor();
+    expect(await controlSource(aiko)).toBe("velocity");
     await aiko.keyboard.press("KeyG");
     await mateo.getByRole("button", { name: "Release left hand" }).waitFor();
     await waitForHold(mateo, LEFT_HAND);
     await aiko.getByRole("button", { name: "Left hand, held by Mateo" }).waitFor();
-    expect([await source(aiko), await source(mateo)]).toEqual([null, "velocity"]);
-    await asked.waitFor({ state: "detached" });
-    // What they did is kept by one key, and danced from the toast.
+    expect([await controlSource(aiko), await controlSource(mateo)]).toEqual([null, "velocity"]);
+    await request.waitFor({ state: "detached" });
+    // One key records the performance, and the toast plays it.
     await aiko.keyboard.press("KeyK");
     await aiko.getByRole("button", { name: "Dance it" }).click();
     await aiko.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
@@ -181,29 +181,29 @@ describeInBrowser("a puppeteer's hands", { demo: true }, (own) => {
   });
 });
 
-/** Waits for the first pose on the stage, and the session's welcome. */
-async function ready(page: Page): Promise<void> {
+/** Wait for the first pose, the session's Welcome message and the paused state. */
+async function waitUntilReady(page: Page): Promise<void> {
   await waitForFirstPose(page);
   await waitForWelcome(page);
   await page.getByRole("button", { name: "Play", exact: true }).waitFor();
 }
 
-/** What holds the left hand on a page. */
-function source(page: Page): Promise<string | null> {
+/** Return the input that controls the left hand on a page. */
+function controlSource(page: Page): Promise<string | null> {
   return page.evaluate((limb) => window.bunraku.hands.source(limb), LEFT_HAND);
 }
 
-/** Puts an axis or a button of the page's gamepad, and waits until it was looked at. */
-async function pad(page: Page, to: { axis?: [number, number]; button?: [number, number] }): Promise<void> {
+/** Set an axis or a button of the page's gamepad and wait until it has been polled. */
+async function setGamepad(page: Page, state: { axis?: [number, number]; button?: [number, number] }): Promise<void> {
   await page.evaluate(({ axis, button }) => {
     const { pad } = window as unknown as { pad: { axes: number[]; buttons: { pressed: boolean; value: number }[] } };
     if (axis) pad.axes[axis[0]] = axis[1];
     if (button) Object.assign(pad.buttons[button[0]], { value: button[1], pressed: button[1] > 0.5 });
-  }, to);
+  }, state);
   await waitForDraw(page);
 }
 
-/** What the slider of the dead zone says; it is there once the page of keys is open. */
+/** Open the dialog of keys and return the value of the dead zone's slider. */
 async function deadZone(page: Page): Promise<string> {
   await page.keyboard.press("Shift+Slash");
   const value = await page.getByRole("slider", { name: "Dead zone" }).inputValue();
@@ -211,18 +211,18 @@ async function deadZone(page: Page): Promise<string> {
   return value;
 }
 
-/** Height of a joint, metres. */
-async function height(page: Page, joint: string): Promise<number> {
+/** Return the height of a joint, in metres. */
+async function jointHeight(page: Page, joint: string): Promise<number> {
   return (await jointPosition(page, joint))[1];
 }
 
-/** In the page: the left wrist is so far from a height, metres. */
-function moved({ from, least }: { from: number; least: number }): boolean {
+/** In the page: return whether the left wrist has moved vertically by at least `minimum` metres. */
+function leftWristMoved({ from, minimum }: { from: number; minimum: number }): boolean {
   const at = window.bunraku.stage.scene.getObjectByName("l_wrist")?.matrixWorld.elements[13];
-  return at !== undefined && Math.abs(at - from) >= least;
+  return at !== undefined && Math.abs(at - from) >= minimum;
 }
 
-/** Waits until the left wrist stands still. */
-async function still(page: Page): Promise<void> {
-  await waitUntilSettled(page, async () => [await height(page, "l_wrist")], 1e-3);
+/** Wait until the left wrist does not move. */
+async function waitUntilStill(page: Page): Promise<void> {
+  await waitUntilSettled(page, async () => [await jointHeight(page, "l_wrist")], 1e-3);
 }

@@ -1,61 +1,61 @@
-/** What a page in a real browser holds of dancers that went. */
+/** Memory of the page after changes of the motion. */
 import type { CDPSession, Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
 import { waitForFirstPose, waitForWelcome } from "./page-probe";
 
-/** Times that another dances, after each has danced. */
+/** Changes of the motion after each has been played once. */
 const CHANGES = 6;
 
 declare global {
   interface Window {
-    /** What was on the stage before, as far as anything holds it still. */
-    gone: WeakRef<object>[];
+    /** Puppets and figures that were replaced. */
+    replaced: WeakRef<object>[];
   }
 }
 
-describeInBrowser("a page on which dancers came and went", { demo: true }, (own) => {
-  test("holds none of them, neither they nor their motion, and nothing more of the graphics", async () => {
-    const page = await own.open("", { viewport: { width: 260, height: 220 } });
+describeInBrowser("memory", { demo: true }, (fixture) => {
+  test("replaced performers are freed from the heap and the graphics memory", async () => {
+    const page = await fixture.open("", { viewport: { width: 260, height: 220 } });
     const protocol = await page.context().newCDPSession(page);
     await waitForFirstPose(page);
     await waitForWelcome(page);
-    const [piece, other] = ["Sanba", "bows"];
+    const [demo, uploaded] = ["Sanba", "bows"];
     await page
       .locator('input[type=file][accept*=".bvh"]')
       .setInputFiles({ name: "bows.bvh", mimeType: "text/plain", buffer: Buffer.from(createBowingBvh(60)) });
-    await page.locator(".brand-piece", { hasText: other }).waitFor({ state: "attached" });
+    await page.locator(".brand-piece", { hasText: uploaded }).waitFor({ state: "attached" });
     await waitForFirstPose(page);
-    await choose(page, piece);
-    const before = await graphics(page);
-    await page.evaluate(() => (window.gone = []));
+    await playMotion(page, demo);
+    const before = await graphicsMemory(page);
+    await page.evaluate(() => (window.replaced = []));
     for (let nth = 0; nth < CHANGES; nth++) {
       await page.evaluate(() => {
         const { stage, viewer } = window.bunraku;
-        for (const one of [stage.puppet, viewer.figure]) if (one) window.gone.push(new WeakRef(one));
+        for (const object of [stage.puppet, viewer.figure]) if (object) window.replaced.push(new WeakRef(object));
       });
-      await choose(page, nth % 2 === 0 ? other : piece);
+      await playMotion(page, nth % 2 === 0 ? uploaded : demo);
     }
-    expect(await page.evaluate(() => window.gone.length)).toBe(2 * CHANGES);
-    expect(await graphics(page)).toEqual(before);
-    await expect.poll(() => held(page, protocol)).toBe(0);
+    expect(await page.evaluate(() => window.replaced.length)).toBe(2 * CHANGES);
+    expect(await graphicsMemory(page)).toEqual(before);
+    await expect.poll(() => reachableCount(page, protocol)).toBe(0);
   });
 });
 
-/** Has a dance of the library danced, by a part of its name, and waits for its first pose. */
-async function choose(page: Page, name: string): Promise<void> {
+/** Play a motion of the library, found by a part of its name, and wait for its first pose. */
+async function playMotion(page: Page, name: string): Promise<void> {
   await page.evaluate(
     (name) =>
-      [...document.querySelectorAll<HTMLElement>(".motion")].find((one) => one.textContent?.includes(name))?.click(),
+      [...document.querySelectorAll<HTMLElement>(".motion")].find((item) => item.textContent?.includes(name))?.click(),
     name,
   );
   await page.locator(".brand-piece", { hasText: name }).waitFor({ state: "attached" });
   await waitForFirstPose(page);
 }
 
-/** What three.js has in the graphics' memory once all that is there was drawn. */
-async function graphics(page: Page): Promise<Record<string, number>> {
+/** Return three.js's counts of graphics objects after everything has been drawn. */
+async function graphicsMemory(page: Page): Promise<Record<string, number>> {
   const frame = await page.evaluate(() => window.bunraku.stage.renderer.info.render.frame);
   await page.waitForFunction((frame) => window.bunraku.stage.renderer.info.render.frame > frame + 1, frame);
   return page.evaluate(() => {
@@ -64,8 +64,8 @@ async function graphics(page: Page): Promise<Record<string, number>> {
   });
 }
 
-/** How many of those that went are held by anything once garbage was collected. */
-async function held(page: Page, protocol: CDPSession): Promise<number> {
+/** Return the number of replaced objects that are still reachable after a garbage collection. */
+async function reachableCount(page: Page, protocol: CDPSession): Promise<number> {
   await protocol.send("HeapProfiler.collectGarbage");
-  return page.evaluate(() => window.gone.filter((one) => one.deref()).length);
+  return page.evaluate(() => window.replaced.filter((reference) => reference.deref()).length);
 }

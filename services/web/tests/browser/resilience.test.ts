@@ -1,4 +1,7 @@
-/** The page in a real browser under what it cannot help: eyes and ears of all kinds, no net, graphics that are taken away, names that mean ill. */
+/**
+ * The page under adverse conditions: no network, a lost WebGL context, hostile names, reduced motion and assistive
+ * technology.
+ */
 import type { Page, WebSocketRoute } from "playwright-core";
 import { expect, test } from "vitest";
 import { DESKTOP, findViolations, forEachState, PHONE } from "./accessibility";
@@ -17,69 +20,70 @@ import {
   waitUntilSettled,
 } from "./page-probe";
 
-/** Seconds that the dance may be from where it has to be. */
-const NEAR = 0.1;
+/** Largest error of the motion's position, in seconds. */
+const MAX_POSITION_ERROR_S = 0.1;
 
-describeInBrowser("a page under hardship", { demo: true }, (own) => {
-  /** The session on the stage. */
-  async function session(): Promise<{ id: string; viewers: number }> {
-    const { items } = (await (await fetch(`${own.url}/v1/sessions`)).json()) as {
+describeInBrowser("resilience", { demo: true }, (fixture) => {
+  /** Return the server's first session. */
+  async function firstSession(): Promise<{ id: string; viewers: number }> {
+    const { items } = (await (await fetch(`${fixture.url}/v1/sessions`)).json()) as {
       items: { id: string; viewers: number }[];
     };
     return items[0];
   }
 
-  test("without a net says so and dances on, and with one again is where the dance is", async () => {
-    const lines: WebSocketRoute[] = [];
-    const page = await own.open("", {
+  test("offline, the motion plays on; after reconnecting it is in sync", async () => {
+    const sockets: WebSocketRoute[] = [];
+    const page = await fixture.open("", {
       before: (page) =>
-        page.routeWebSocket(/\/v1\//, (line) => {
-          line.connectToServer();
-          lines.push(line);
+        page.routeWebSocket(/\/v1\//, (socket) => {
+          socket.connectToServer();
+          sockets.push(socket);
         }),
     });
     await waitForFirstPose(page);
     await waitForWelcome(page);
-    // where the dance is, is known as well as the time is: at first that is a guess, and the clock in use goes gently to what is known
-    await page.waitForFunction((near) => {
+    // Wait until the clock's error bound is small and its slew is complete: both limit the precision of the position.
+    await page.waitForFunction((maxError) => {
       const { clock } = window.bunraku.viewer;
       return (
-        Math.max(clock.errorBound, Math.abs(clock.slewedOffset(1000 * performance.now()) - clock.offset)) < 0.2e6 * near
+        Math.max(clock.errorBound, Math.abs(clock.slewedOffset(1000 * performance.now()) - clock.offset)) <
+        0.2e6 * maxError
       );
-    }, NEAR);
-    const begun = await whereabouts(page);
+    }, MAX_POSITION_ERROR_S);
+    const start = await motionPosition(page);
     await page.context().setOffline(true);
     await waitForToast(page, "Connection lost, reconnecting", async () => {
-      for (const line of lines) await line.close({ code: 1012, reason: "cut by the test" });
+      for (const socket of sockets) await socket.close({ code: 1012, reason: "cut by the test" });
     });
     await page.locator('.health[data-state="lost"]').waitFor();
     expect(await page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(false);
-    const cut = await whereabouts(page);
-    // it has some seconds in hand, and may begin anew in them
+    const cut = await motionPosition(page);
+    // The buffer holds some seconds, in which the loop may restart.
     await page.waitForFunction((from) => {
       const { viewer } = window.bunraku;
-      const on = viewer.positionAt(performance.now()) - from;
-      return on - viewer.duration * Math.floor(on / viewer.duration) > 1;
+      const elapsed = viewer.positionAt(performance.now()) - from;
+      return elapsed - viewer.duration * Math.floor(elapsed / viewer.duration) > 1;
     }, cut.position);
-    // what is said for a moment comes and goes beside it
+    // A brief toast appears beside it and disappears.
     await waitForToast(page, "Reach for a string that someone else holds", () => page.keyboard.press("KeyR"));
     await page.getByText("Reach for a string that someone else holds").waitFor({ state: "detached" });
     expect(await page.getByText("Connection lost, reconnecting").isVisible()).toBe(true);
-    const known = lines.length;
+    const socketCount = sockets.length;
     await page.context().setOffline(false);
     await page.locator('.health[data-state="good"]').waitFor();
     await page.getByText("Connection lost, reconnecting").waitFor({ state: "detached" });
-    expect(lines.length).toBeGreaterThan(known);
+    expect(sockets.length).toBeGreaterThan(socketCount);
     await waitForWelcome(page);
     await expect.poll(() => page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(true);
     await page.waitForFunction(
-      ({ begun, near }) => {
+      ({ start, maxError }) => {
         const { viewer } = window.bunraku;
         const now = performance.now();
-        const off = viewer.positionAt(now) - begun.position - (now - begun.now) / 1000;
-        return Math.abs(off - viewer.duration * Math.round(off / viewer.duration)) < near;
+        const error = viewer.positionAt(now) - start.position - (now - start.now) / 1000;
+        return Math.abs(error - viewer.duration * Math.round(error / viewer.duration)) < maxError;
       },
-      { begun, near: NEAR },
+      { start, maxError: MAX_POSITION_ERROR_S },
     );
     await tapKey(page, "Digit2");
     await waitForHold(page, LEFT_HAND);
@@ -87,111 +91,112 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
     await waitForRelease(page, LEFT_HAND);
   });
 
-  test("shows names that mark up, or turn the line round and do not end, as names, and stays whole", async () => {
-    const page = await own.open("", { viewport: DESKTOP });
-    const asked: string[] = [];
+  test("names with markup, bidi controls or 200 letters are shown as text", async () => {
+    const page = await fixture.open("", { viewport: DESKTOP });
+    const dialogs: string[] = [];
     page.on("dialog", (dialog) => {
-      asked.push(dialog.message());
+      dialogs.push(dialog.message());
       void dialog.dismiss();
     });
     await waitForFirstPose(page);
     for (const name of ["<img src=x onerror=alert(1)>", `\u202egnp.${"W".repeat(200)}`]) {
       await page.setViewportSize(DESKTOP);
-      const upload = (called: string, text: string) =>
+      const upload = (fileName: string, text: string) =>
         page
           .locator('input[type=file][accept*=".bvh"]')
-          .setInputFiles({ name: called, mimeType: "text/plain", buffer: Buffer.from(text) });
+          .setInputFiles({ name: fileName, mimeType: "text/plain", buffer: Buffer.from(text) });
       await upload(`${name}.bvh`, createBowingBvh(30 + name.length));
       await page.locator(".brand-piece", { hasText: name }).waitFor();
       expect(await page.locator(".motion[aria-current] b").textContent()).toBe(name);
-      await upload(`${name}.txt.bvh`, "no dance");
+      await upload(`${name}.txt.bvh`, "not a motion");
       await page.locator(".problem bdi", { hasText: `${name}.txt.bvh` }).waitFor();
-      expect(await page.evaluate(sticksOut)).toEqual([]);
+      expect(await page.evaluate(overflowingElements)).toEqual([]);
       await page.getByRole("button", { name: `Remove ${name}` }).focus();
       await page.keyboard.press("Enter");
-      await expect.poll(() => asked.length).toBe(1);
+      await expect.poll(() => dialogs.length).toBe(1);
       const isolated = name.startsWith("\u202e") ? `\u2068${name}\u2069` : name;
-      expect(asked.pop()).toBe(`Remove "${isolated}" from the library?`);
+      expect(dialogs.pop()).toBe(`Remove "${isolated}" from the library?`);
       expect(await page.title()).toBe(`${isolated} - Bunraku`);
       await page.setViewportSize(PHONE);
       await page.getByRole("complementary", { name: "Library" }).waitFor({ state: "hidden" });
       await page.getByRole("button", { name: "Library", exact: true }).click();
       await waitForDraw(page);
-      expect(await page.evaluate(sticksOut)).toEqual([]);
+      expect(await page.evaluate(overflowingElements)).toEqual([]);
     }
     expect(await page.locator("img").count()).toBe(0);
-    expect(asked).toEqual([]);
+    expect(dialogs).toEqual([]);
   });
 
-  test("whose graphics were taken away says so, and has the same picture when they are back", async () => {
-    const wrong: string[] = [];
-    const page = await own.open("?quality=best", {
+  test("a lost WebGL context is reported, and its restored picture is the same", async () => {
+    const consoleErrors: string[] = [];
+    const page = await fixture.open("?quality=best", {
       viewport: { width: 260, height: 220 },
       colorScheme: "dark",
       reducedMotion: "reduce",
-      before: async (page) => void page.on("console", (said) => said.type() === "error" && wrong.push(said.text())),
+      before: async (page) =>
+        void page.on("console", (message) => message.type() === "error" && consoleErrors.push(message.text())),
     });
     await waitForFirstPose(page);
     await pauseAtStart(page);
-    await waitUntilSettled(page, () => seat(page), 1e-3);
-    const before = await picture(page);
+    await waitUntilSettled(page, () => cameraPosition(page), 1e-3);
+    const before = await readFrame(page);
     expect(new Set(before).size).toBeGreaterThan(30);
-    await darken(page);
-    const after = await picture(page);
+    await loseAndRestoreContext(page);
+    const after = await readFrame(page);
     const differing = after.filter((value, at) => Math.abs(value - before[at]) > 4).length;
     expect(differing / before.length).toBeLessThan(0.01);
-    // of shaders that do not compile three.js tells the console alone
-    expect(wrong).toEqual([]);
+    // three.js reports shader errors only on the console.
+    expect(consoleErrors).toEqual([]);
   });
 
-  test("takes back what it said of its graphics when they are back, and nothing that it said of something else", async () => {
-    const page = await own.open("?session=no-such-session", { viewport: { width: 260, height: 220 } });
+  test("a restored WebGL context clears only its own notice", async () => {
+    const page = await fixture.open("?session=no-such-session", { viewport: { width: 260, height: 220 } });
     await page.getByText("The session has ended").waitFor();
     await page.waitForFunction(() => window.bunraku?.stage);
-    await darken(page);
+    await loseAndRestoreContext(page);
     expect(await page.getByText("The session has ended").isVisible()).toBe(true);
   });
 
-  test("asked for less motion starts paused, and nothing glides", async () => {
-    // so it does for who comes first, and not for others
-    await expect.poll(async () => (await session()).viewers).toBe(0);
+  test("with reduced motion the session starts paused without transitions", async () => {
+    // Only the first viewer pauses the session: wait until the other tests' viewers have left.
+    await expect.poll(async () => (await firstSession()).viewers).toBe(0);
     const edit = {
       method: "PATCH",
       headers: { "Content-Type": "application/json" },
       body: JSON.stringify({ playing: true }),
     };
-    expect((await fetch(`${own.url}/v1/sessions/${(await session()).id}`, edit)).status).toBe(200);
-    const page = await own.open("", { reducedMotion: "reduce" });
+    expect((await fetch(`${fixture.url}/v1/sessions/${(await firstSession()).id}`, edit)).status).toBe(200);
+    const page = await fixture.open("", { reducedMotion: "reduce" });
     await waitForFirstPose(page);
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await page.keyboard.press("KeyS");
     await page.getByRole("complementary", { name: "Strings" }).waitFor();
-    const gliding = await page.evaluate(() =>
+    const animated = await page.evaluate(() =>
       [...document.querySelectorAll("*")]
-        .filter((one) => {
-          const { transitionProperty, transitionDuration, animationName } = getComputedStyle(one);
+        .filter((element) => {
+          const { transitionProperty, transitionDuration, animationName } = getComputedStyle(element);
           return (
             (transitionProperty !== "none" && !/^(0s(, )?)*$/.test(transitionDuration)) || animationName !== "none"
           );
         })
-        .map((one) => one.className),
+        .map((element) => element.className),
     );
-    expect(gliding).toEqual([]);
+    expect(animated).toEqual([]);
     expect(await page.evaluate(() => window.bunraku.stage.strings.reducedMotion)).toBe(true);
-    // told of, it takes effect a while later
+    // The timeline takes effect some time after it was received.
     await page.waitForFunction(() => {
       const { viewer } = window.bunraku;
       return viewer.timelineHistory.at(viewer.presentationTime(performance.now()))?.playing === false;
     });
-    const [one, other] = [await whereabouts(page), await waitForDraw(page).then(() => whereabouts(page))];
-    expect(other.position).toBe(one.position);
+    const [first, second] = [await motionPosition(page), await waitForDraw(page).then(() => motionPosition(page))];
+    expect(second.position).toBe(first.position);
   });
 
-  test("has nothing that axe-core objects to, on a desktop and on a phone", async () => {
-    const page = await own.open("", { reducedMotion: "reduce" });
+  test("axe-core finds no violations on a desktop and on a phone", async () => {
+    const page = await fixture.open("", { reducedMotion: "reduce" });
     await waitForFirstPose(page);
     await waitForWelcome(page);
-    // a held string has more to show
+    // A held limb adds controls to the page.
     await tapKey(page, "Digit2");
     await waitForHold(page, LEFT_HAND);
     const found: string[] = [];
@@ -209,42 +214,44 @@ describeInBrowser("a page under hardship", { demo: true }, (own) => {
   });
 });
 
-/** Where in the motion the stage is, seconds, and when, local milliseconds. */
-function whereabouts(page: Page): Promise<{ position: number; now: number }> {
+/** Return the stage's position in the motion, in seconds, and the page time, in milliseconds. */
+function motionPosition(page: Page): Promise<{ position: number; now: number }> {
   return page.evaluate(() => {
     const now = performance.now();
     return { position: window.bunraku.viewer.positionAt(now), now };
   });
 }
 
-/** Where the audience sits, metres: it follows the dancer calmly. */
-function seat(page: Page): Promise<[number, number, number]> {
+/** Return the position of the audience's camera in metres. It follows the performer slowly. */
+function cameraPosition(page: Page): Promise<[number, number, number]> {
   return page.evaluate(() => {
     const { elements } = window.bunraku.stage.audience.camera.matrixWorld;
     return [elements[12], elements[13], elements[14]] as [number, number, number];
   });
 }
 
-/** In the page: what is wider than what it stands in, or out of the window. */
-function sticksOut(): string[] {
-  const seen = [
+/** In the page: return the elements that overflow their container or the window. */
+function overflowingElements(): string[] {
+  const visible = [
     ...document.querySelectorAll<HTMLElement>("header, .header-right, .brand, .transport, .panel, .panel *:not(svg *)"),
-  ].filter((one) => one.getClientRects().length > 0);
-  return seen
-    .filter((one) => {
-      const { left, right } = one.getBoundingClientRect();
+  ].filter((element) => element.getClientRects().length > 0);
+  return visible
+    .filter((element) => {
+      const { left, right } = element.getBoundingClientRect();
       return (
-        left < -1 || right > innerWidth + 1 || (one.matches(".panel, header") && one.scrollWidth > one.clientWidth + 1)
+        left < -1 ||
+        right > innerWidth + 1 ||
+        (element.matches(".panel, header") && element.scrollWidth > element.clientWidth + 1)
       );
     })
-    .map((one) => `${one.tagName} ${one.className}`);
+    .map((element) => `${element.tagName} ${element.className}`);
 }
 
-/** Bytes of the next picture that is drawn once nothing more is made ready: red, green, blue and alpha. */
-function picture(page: Page): Promise<number[]> {
+/** Return the RGBA bytes of the second frame from now: the first may still prepare resources. */
+function readFrame(page: Page): Promise<number[]> {
   return page.evaluate(
     () =>
-      new Promise<number[]>((told) => {
+      new Promise<number[]>((resolve) => {
         const { stage } = window.bunraku;
         const { renderer } = stage;
         const render = renderer.render;
@@ -257,20 +264,20 @@ function picture(page: Page): Promise<number[]> {
           const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
           const pixels = new Uint8Array(4 * width * height);
           gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-          told([...pixels]);
+          resolve([...pixels]);
         };
       }),
   );
 }
 
-/** Takes the page's graphics away and gives them back, each once the page has said so. */
-async function darken(page: Page): Promise<void> {
+/** Lose and restore the WebGL context, and wait for the page's notice to appear and disappear. */
+async function loseAndRestoreContext(page: Page): Promise<void> {
   await page.evaluate(() => {
-    const lost = window.bunraku.stage.renderer.getContext().getExtension("WEBGL_lose_context");
-    Object.assign(window, { lost });
-    lost?.loseContext();
+    const contextLoss = window.bunraku.stage.renderer.getContext().getExtension("WEBGL_lose_context");
+    Object.assign(window, { contextLoss });
+    contextLoss?.loseContext();
   });
   await page.getByText("The stage went dark").waitFor();
-  await page.evaluate(() => (window as unknown as { lost: WEBGL_lose_context }).lost.restoreContext());
+  await page.evaluate(() => (window as unknown as { contextLoss: WEBGL_lose_context }).contextLoss.restoreContext());
   await page.getByText("The stage went dark").waitFor({ state: "hidden" });
 }

@@ -1,10 +1,13 @@
-/** In a real browser: with every string of four dancers held, and with messages, nothing covers a face, a bar or another name, in windows of every kind. */
+/**
+ * Layout in windows of many sizes: tags and toasts cover neither faces nor controls, and touch targets are large
+ * enough.
+ */
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { tapKey, waitForDraw, waitForFirstPose, waitForHold, waitForToast, waitForWelcome } from "./page-probe";
 
-/** A phone, a small one, both on their side, and a low window. */
+/** Two phones in portrait and landscape orientation, and a low window. */
 const WINDOWS = [
   [390, 844],
   [360, 640],
@@ -13,8 +16,8 @@ const WINDOWS = [
   [1024, 600],
 ] as const;
 
-describeInBrowser("the room on the page", { demo: true, timeout: 300_000 }, ({ open }) => {
-  test("names of sixteen held strings, and messages, cover no face, no bar and nothing of the page", async () => {
+describeInBrowser("screen layout", { demo: true, timeout: 300_000 }, ({ open }) => {
+  test("tags of sixteen held limbs and toasts cover no face, bar or control", async () => {
     const page = await open("?name=Aiko", {
       viewport: { width: 390, height: 844 },
       hasTouch: true,
@@ -22,57 +25,57 @@ describeInBrowser("the room on the page", { demo: true, timeout: 300_000 }, ({ o
     });
     await waitForFirstPose(page);
     await waitForWelcome(page);
-    await fourDancers(page);
-    for (let dancer = 0; dancer < 4; dancer++) {
+    await showFourPerformers(page);
+    for (let performer = 0; performer < 4; performer++) {
       for (let limb = 0; limb < 4; limb++) await tapKey(page, `Digit${limb + 1}`);
-      for (let limb = 0; limb < 4; limb++) await waitForHold(page, 4 * dancer + limb);
+      for (let limb = 0; limb < 4; limb++) await waitForHold(page, 4 * performer + limb);
       await page.keyboard.press("KeyT");
     }
     for (const [width, height] of WINDOWS) {
       await page.setViewportSize({ width, height });
       await waitForDraw(page);
-      // once the window is drawn in its new size
+      // Poll, because the new size takes some frames.
       await expect
-        .poll(() => look(page), { message: `${width} x ${height}` })
+        .poll(() => findCoveredElements(page), { message: `${width} x ${height}` })
         .toMatchObject({ shown: true, covered: [] });
       await waitForToast(page, "Dancer", () => page.keyboard.press("KeyT"));
-      // two more stand as long as this is looked at
+      // Add two permanent copies of the toast.
       await page.evaluate(() =>
         document
           .querySelector(".asks")
           ?.append(...[1, 2].map(() => document.querySelector(".toast")?.cloneNode(true) as Node)),
       );
       await expect
-        .poll(async () => (await look(page)).covered, { message: `${width} x ${height}, messages` })
+        .poll(async () => (await findCoveredElements(page)).covered, { message: `${width} x ${height}, with toasts` })
         .toEqual([]);
       await page.evaluate(() => document.querySelector(".asks")?.replaceChildren());
     }
   });
 
-  test("on a phone the picture goes along to the dancer that is chosen, and stands over a sheet", async () => {
+  test("on a phone the camera follows the selected performer above the panel", async () => {
     const page = await open("?name=Aiko", {
       viewport: { width: 390, height: 844 },
       hasTouch: true,
       reducedMotion: "reduce",
     });
     await waitForFirstPose(page);
-    await fourDancers(page);
-    const seen = () =>
+    await showFourPerformers(page);
+    const visibleFaces = () =>
       page.evaluate(() => window.bunraku.stage.faceBoxes.map(({ left, right }) => left > 0 && right < innerWidth));
-    // the one between may be at the edge
-    await expect.poll(seen).toMatchObject({ 0: true, 1: true, 3: false });
-    for (let to = 2; to <= 4; to++) await page.getByRole("button", { name: `Dancer ${to - 1} of 4` }).tap();
-    await expect.poll(seen).toMatchObject({ 0: false, 2: true, 3: true });
+    // The third performer may be at the edge.
+    await expect.poll(visibleFaces).toMatchObject({ 0: true, 1: true, 3: false });
+    for (let number = 1; number <= 3; number++) await page.getByRole("button", { name: `Dancer ${number} of 4` }).tap();
+    await expect.poll(visibleFaces).toMatchObject({ 0: false, 2: true, 3: true });
     await page.setViewportSize({ width: 360, height: 640 });
     await page.getByRole("button", { name: "Strings", exact: true }).tap();
     const sheet = page.getByRole("complementary", { name: "Strings" });
     await page.getByRole("button", { name: "Dancer 4", exact: true }).waitFor();
-    // feet and all
+    // The feet are visible too.
     const floor = () => page.evaluate(() => window.bunraku.stage.toScreen(window.bunraku.stage.rig.group.position).y);
     await expect.poll(async () => (await floor()) < ((await sheet.boundingBox())?.y ?? 0)).toBe(true);
   });
 
-  test("a phone on its side has all within reach of a finger, and its panels beside the puppet", async () => {
+  test("in landscape, targets are large enough and panels beside the puppet", async () => {
     for (const [width, height] of [
       [844, 390],
       [667, 375],
@@ -86,8 +89,12 @@ describeInBrowser("the room on the page", { demo: true, timeout: 300_000 }, ({ o
       });
       await waitForFirstPose(page);
       await waitForWelcome(page);
-      expect(await targets(page), `${width} x ${height}`).toEqual([]);
-      for (const name of ["Library", "Strings", "Connection"]) {
+      expect(await findTargetProblems(page), `${width} x ${height}`).toEqual([]);
+      for (const [name, key] of [
+        ["Library", "library"],
+        ["Strings", "strings"],
+        ["Connection", "line"],
+      ]) {
         await page.getByRole("button", { name, exact: true }).tap();
         const panel = page.getByRole("complementary", { name });
         await expect.poll(async () => (await panel.boundingBox())?.x).toBeLessThan(width - 300);
@@ -97,34 +104,32 @@ describeInBrowser("the room on the page", { demo: true, timeout: 300_000 }, ({ o
           (left) => window.bunraku.stage.faceBoxes.every((face) => face.right < left),
           box?.x ?? 0,
         );
-        expect(await targets(page), `${width} x ${height}, ${name}`).toEqual([]);
+        expect(await findTargetProblems(page), `${width} x ${height}, ${name}`).toEqual([]);
         await page.getByRole("button", { name: `Close ${name.toLowerCase()}` }).tap();
         await panel.waitFor({ state: "hidden" });
-        expect(await page.evaluate(() => (document.activeElement as HTMLElement).dataset.panel)).toBe(
-          name.toLowerCase(),
-        );
+        expect(await page.evaluate(() => (document.activeElement as HTMLElement).dataset.panel)).toBe(key);
       }
       await page.close();
     }
   });
 });
 
-/** Puts our own dance on the stage four times, if a test before has not. */
-async function fourDancers(page: Page): Promise<void> {
+/** Put four performers of the demo's motion on the stage, unless an earlier test has. */
+async function showFourPerformers(page: Page): Promise<void> {
   await page.evaluate(async () => {
-    const ask = async (method: string, path: string, body: object) => {
-      const answer = await fetch(path, {
+    const request = async (method: string, path: string, body: object) => {
+      const response = await fetch(path, {
         method,
         headers: { "Content-Type": "application/json" },
         body: JSON.stringify(body),
       });
-      if (!answer.ok) throw new Error(await answer.text());
-      return answer.json();
+      if (!response.ok) throw new Error(await response.text());
+      return response.json();
     };
     const { motion, performers } = window.bunraku.viewer;
     if (performers.length === 4) return;
-    const { id } = await ask("POST", `/v1/motions/${motion}/performers`, { motions: [motion, motion, motion] });
-    await ask("PATCH", `/v1/sessions/${new URLSearchParams(location.search).get("session")}`, {
+    const { id } = await request("POST", `/v1/motions/${motion}/performers`, { motions: [motion, motion, motion] });
+    await request("PATCH", `/v1/sessions/${new URLSearchParams(location.search).get("session")}`, {
       motion: id,
       playing: false,
       position: 0,
@@ -133,66 +138,66 @@ async function fourDancers(page: Page): Promise<void> {
   await page.waitForFunction(() => window.bunraku.stage.performers.filter(({ group }) => group.visible).length === 4);
 }
 
-/** Whether names are shown, and what of names and messages covers what it must not, in words. */
-function look(page: Page): Promise<{ shown: boolean; covered: string[] }> {
+/** Return whether tags are shown, and descriptions of the tags and toasts that cover something or leave the window. */
+function findCoveredElements(page: Page): Promise<{ shown: boolean; covered: string[] }> {
   return page.evaluate(() => {
     const { stage } = window.bunraku;
     const boxes = (selector: string) =>
       [...document.querySelectorAll(selector)]
-        .map((one) => [selector, one.getBoundingClientRect()] as const)
+        .map((element) => [selector, element.getBoundingClientRect()] as const)
         .filter(([, { width, height }]) => width > 0 && height > 0);
-    const names = boxes(".tag");
-    const messages = boxes(".toast");
+    const tags = boxes(".tag");
+    const toasts = boxes(".toast");
     const faces = stage.faceBoxes.map((face) => ["face", face] as const);
     const bars = Array.from({ length: 16 }, (_, limb) => ["bar", stage.barBox(limb)] as const).filter(
       ([, bar]) => bar !== null,
     );
     const parts = boxes(".brand, .header-right, .transport, .dock, .camera, .picture, .sound");
-    const found: string[] = [];
-    const among = (
-      some: readonly (readonly [string, DOMRect])[],
+    const problems: string[] = [];
+    const check = (
+      subjects: readonly (readonly [string, DOMRect])[],
       others: readonly (readonly [string, { left: number; top: number; right: number; bottom: number } | null])[],
     ) => {
-      for (const [what, a] of some) {
+      for (const [name, a] of subjects) {
         if (a.left < 0 || a.top < 0 || a.right > innerWidth || a.bottom > innerHeight)
-          found.push(`${what} is out of the window`);
+          problems.push(`${name} is out of the window`);
         for (const [other, b] of others) {
           if (!b || a === b) continue;
-          const over =
+          const overlaps =
             Math.min(a.right, b.right) - Math.max(a.left, b.left) > 0.5 &&
             Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 0.5;
-          if (over) found.push(`${what} covers ${other}`);
+          if (overlaps) problems.push(`${name} covers ${other}`);
         }
       }
     };
-    among(names, [...names, ...messages, ...faces, ...bars, ...parts]);
-    among(messages, [...messages, ...faces]);
-    return { shown: names.length > 4, covered: found };
+    check(tags, [...tags, ...toasts, ...faces, ...bars, ...parts]);
+    check(toasts, [...toasts, ...faces]);
+    return { shown: tags.length > 4, covered: problems };
   });
 }
 
-/** What can be pressed and is smaller than a finger, out of the window, or over another, in words. */
-function targets(page: Page): Promise<string[]> {
+/** Return descriptions of the controls that are too small for a finger, outside the window or overlapping. */
+function findTargetProblems(page: Page): Promise<string[]> {
   return page.evaluate(() => {
-    const all = [...document.querySelectorAll<HTMLElement>("button, a, input:not([type=range])")].filter((one) =>
-      one.checkVisibility({ visibilityProperty: true }),
+    const all = [...document.querySelectorAll<HTMLElement>("button, a, input:not([type=range])")].filter((element) =>
+      element.checkVisibility({ visibilityProperty: true }),
     );
     const open = document.querySelector(".panel:not([hidden])");
-    // what scrolls within a panel, and what a panel stands before, is not looked at
+    // Skip controls that scroll within a panel, and those behind an open panel.
     const fixed = all
-      .filter((one) => !one.closest(".panel") || one.closest(".panel-head"))
-      .map((one) => ({
-        name: one.ariaLabel || one.innerText || one.className,
-        box: one.getBoundingClientRect(),
-        panel: one.closest(".panel") !== null,
+      .filter((element) => !element.closest(".panel") || element.closest(".panel-head"))
+      .map((element) => ({
+        name: element.ariaLabel || element.innerText || element.className,
+        box: element.getBoundingClientRect(),
+        panel: element.closest(".panel") !== null,
       }));
-    const seen = fixed.filter(
+    const checked = fixed.filter(
       ({ box, panel }) => box.width > 0 && (!open || panel || box.right <= open.getBoundingClientRect().left),
     );
-    return seen.flatMap(({ name, box }, nth) => {
-      const over = seen.filter(
-        (other, k) =>
-          k > nth &&
+    return checked.flatMap(({ name, box }, nth) => {
+      const overlapping = checked.filter(
+        (other, index) =>
+          index > nth &&
           Math.min(box.right, other.box.right) - Math.max(box.left, other.box.left) > 0.5 &&
           Math.min(box.bottom, other.box.bottom) - Math.max(box.top, other.box.top) > 0.5,
       );
@@ -201,7 +206,7 @@ function targets(page: Page): Promise<string[]> {
         ...(box.left < 0 || box.top < 0 || box.right > innerWidth || box.bottom > innerHeight
           ? [`${name} is out of the window`]
           : []),
-        ...over.map((other) => `${name} and ${other.name} overlap`),
+        ...overlapping.map((other) => `${name} and ${other.name} overlap`),
       ];
     });
   });

@@ -1,4 +1,4 @@
-/** Real servers for browser tests: `bunraku up` on a free port, keeping its things in a folder of its own. */
+/** Servers for browser tests: `bunraku up` on a free port with a temporary data folder. */
 import { spawn, spawnSync } from "node:child_process";
 import { cpSync, existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -7,11 +7,11 @@ import { join, resolve } from "node:path";
 const REPOSITORY = resolve(import.meta.dirname, "../../../..");
 
 export interface ServerOptions {
-  /** Whether our own dance is on its stage. */
+  /** Put the demo's motion on the stage. */
   demo?: boolean;
-  /** What its tokens are signed with; without one it lets everybody in. */
+  /** Key that signs access tokens. Without it, every client has full access. */
   secret?: string;
-  /** Other sites whose pages may use it, with commas between them. */
+  /** Other origins whose pages may use the server, separated by commas. */
   origins?: string;
 }
 
@@ -20,7 +20,7 @@ export interface RunningServer {
   stop(): Promise<void>;
 }
 
-/** Start a server; resolves once it answers. */
+/** Start a server and resolve once it accepts requests. */
 export async function startServer(options: ServerOptions = {}): Promise<RunningServer> {
   const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
   const folder = process.env["BUNRAKU_DEMO_DATA"];
@@ -28,59 +28,62 @@ export async function startServer(options: ServerOptions = {}): Promise<RunningS
   return runServer(data, options, () => rmSync(data, { recursive: true, force: true }));
 }
 
-/** What a server keeps that has made our own dance: made once for all test files, within `folder`, as it takes as long as seven starts of a server. */
+/**
+ * Return a data folder that contains the encoded demo, within `folder`. All test files of a run share it, because
+ * encoding the demo takes as long as seven server starts.
+ */
 async function createDemoData(folder: string): Promise<string> {
-  const made = join(folder, "made");
-  if (!existsSync(made)) {
+  const demoData = join(folder, "made");
+  if (!existsSync(demoData)) {
     const data = mkdtempSync(join(folder, "making-"));
     await (await runServer(data, { demo: true })).stop();
-    cpSync(data, made, { recursive: true });
+    cpSync(data, demoData, { recursive: true });
   }
-  return made;
+  return demoData;
 }
 
-/** A server that keeps its things in `data`; `after` is done once it has ended. */
+/** Run a server that stores its data in `data`, and call `onStopped` once it has exited. */
 async function runServer(
   data: string,
   { demo = false, secret = "", origins = "" }: ServerOptions,
-  after: () => void = () => undefined,
+  onStopped: () => void = () => undefined,
 ): Promise<RunningServer> {
   const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
   const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
     stdio: ["ignore", "pipe", "inherit"],
     env: { ...process.env, COLUMNS: "200", NO_COLOR: "1", BUNRAKU_SECRET: secret, BUNRAKU_ORIGINS: origins },
   });
-  const ended = new Promise<void>((done) => server.once("exit", () => done()));
-  const url = await new Promise<string>((found, failed) => {
-    let said = "";
+  const exited = new Promise<void>((resolve) => server.once("exit", () => resolve()));
+  const url = await new Promise<string>((resolve, reject) => {
+    let output = "";
     server.stdout.on("data", (chunk: Buffer) => {
-      said += chunk.toString();
-      const address = /is at (http:\S+?)\/?\s/.exec(said);
-      if (address?.[1]) found(address[1]);
+      output += chunk.toString();
+      const address = /is at (http:\S+?)\/?\s/.exec(output);
+      if (address?.[1]) resolve(address[1]);
     });
-    void ended.then(() => failed(new Error(`the server ended before it served: ${said}`)));
+    void exited.then(() => reject(new Error(`bunraku up exited before it printed its address. Output: ${output}`)));
   });
   return {
     url,
     async stop() {
       server.kill("SIGINT");
-      await ended;
-      after();
+      await exited;
+      onStopped();
     },
   };
 }
 
-/** A token of a server with this secret, as its operator makes them. */
+/** Create an access token of a server with this secret, as its operator does. */
 export function makeToken(secret: string, role: string): string {
-  const made = spawnSync(join(REPOSITORY, ".venv/bin/bunraku"), ["token", "--role", role], {
+  const result = spawnSync(join(REPOSITORY, ".venv/bin/bunraku"), ["token", "--role", role], {
     env: { ...process.env, BUNRAKU_SECRET: secret },
     encoding: "utf8",
   });
-  if (made.status !== 0) throw new Error(`no token: ${made.stderr}`);
-  return made.stdout.trim();
+  if (result.status !== 0) throw new Error(`bunraku token failed: ${result.stderr}`);
+  return result.stdout.trim();
 }
 
-/** The folder of real clips beside the project, if it is there. */
+/** Return the folder of recorded clips beside the repository (or `BUNRAKU_SHARED`), or null if it does not exist. */
 export function sharedClipFolder(): string | null {
   const folder = process.env["BUNRAKU_SHARED"] ?? resolve(REPOSITORY, "../shared");
   return existsSync(join(folder, "mocap/bvh")) ? folder : null;

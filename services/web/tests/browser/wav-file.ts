@@ -1,4 +1,4 @@
-/** A WAV file of 16 bits a sample, of what is given for each channel. */
+/** Encode channels of samples (-1 to 1) as a WAV file with 16 bits per sample. */
 export function encodeWav(channels: readonly Float32Array[], rate: number): Uint8Array<ArrayBuffer> {
   const frames = channels[0].length;
   const size = frames * channels.length * 2;

@@ -1,58 +1,62 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import * as access from "../../src/client/access";
+import { Access, consumeUrlToken, pageAccess, ROLES } from "../../src/client/access";
 import { ProblemError } from "../../src/client/problem";
 import { ReconnectingConnection } from "../../src/client/reconnecting-connection";
 import { forbidStorage, stubStorage } from "../storage/storage-stub";
 import { FakeWebSocket } from "./fake-websocket";
 
-/** A token as the server makes them, but for its signature. */
-function token(claims: Record<string, unknown>): string {
+/** Return a token with these claims and an invalid signature. */
+function makeToken(claims: Record<string, unknown>): string {
   return ["{}", JSON.stringify(claims), "signed"].map((part) => Buffer.from(part).toString("base64url")).join(".");
 }
 
-const VIEWER = token({ role: "view", session: "s1", sub: "ÿÿÿ>>>???" });
+const VIEWER = makeToken({ role: "view", session: "s1", sub: "ÿÿÿ>>>???" });
 
-let shown: string[];
+/** URLs that replaced that of the page. */
+let replacedUrls: string[];
 
-function arrive(hash: string): void {
+function stubLocation(hash: string): void {
   vi.stubGlobal("location", { hash, pathname: "/", search: "?session=s1" });
 }
 
 beforeEach(() => {
-  shown = [];
-  vi.stubGlobal("history", { state: null, replaceState: (_: unknown, __: string, url: string) => shown.push(url) });
+  replacedUrls = [];
+  vi.stubGlobal("history", {
+    state: null,
+    replaceState: (_: unknown, __: string, url: string) => replacedUrls.push(url),
+  });
   stubStorage("sessionStorage");
 });
 afterEach(() => {
-  access.hold(null);
+  pageAccess.setToken(null);
   vi.unstubAllGlobals();
 });
 
-test.each(["token", "share"])("a %s leaves the address at once and stays with the tab", (name) => {
-  arrive(`#${name}=${VIEWER}`);
-  expect(access.consumeUrlToken()).toBe(true);
-  expect(shown).toEqual(["/?session=s1"]);
-  expect(access.authorization()).toEqual({ Authorization: `Bearer ${VIEWER}` });
-  access.hold(null);
-  arrive("");
-  expect(access.consumeUrlToken()).toBe(false);
-  expect(access.guarded()).toBe(true);
+test.each(["token", "share"])("%s is removed from the URL and stored for the tab", (name) => {
+  stubLocation(`#${name}=${VIEWER}`);
+  expect(consumeUrlToken()).toBe(true);
+  expect(replacedUrls).toEqual(["/?session=s1"]);
+  expect(pageAccess.authorization()).toEqual({ Authorization: `Bearer ${VIEWER}` });
+  pageAccess.setToken(null);
+  stubLocation("");
+  expect(consumeUrlToken()).toBe(false);
+  expect(pageAccess.hasToken).toBe(true);
 });
 
-test("without one everything is offered and nothing is sent", () => {
-  arrive("#elsewhere");
-  expect(access.consumeUrlToken()).toBe(false);
-  expect(shown).toEqual([]);
-  expect([access.guarded(), access.bound(), access.may("admin")]).toEqual([false, false, true]);
-  expect(access.authorization()).toEqual({});
-  expect(access.ticketed("ws://stage/stream")).toBe("ws://stage/stream");
+test("everything is allowed and nothing is sent without a token", () => {
+  stubLocation("#elsewhere");
+  expect(consumeUrlToken()).toBe(false);
+  expect(replacedUrls).toEqual([]);
+  expect([pageAccess.hasToken, pageAccess.isRestricted, pageAccess.allows("admin")]).toEqual([false, false, true]);
+  expect(pageAccess.authorization()).toEqual({});
+  expect(pageAccess.authorizeSocketUrl("ws://stage/stream")).toBe("ws://stage/stream");
 });
 
-test("storage may be forbidden", () => {
+test("token is used if storage is not available", () => {
   forbidStorage("sessionStorage");
-  arrive(`#token=${VIEWER}`);
-  access.consumeUrlToken();
-  expect(access.guarded()).toBe(true);
+  stubLocation(`#token=${VIEWER}`);
+  consumeUrlToken();
+  expect(pageAccess.hasToken).toBe(true);
 });
 
 test.each([
@@ -61,48 +65,48 @@ test.each([
   [{ role: "ingest" }, [true, true, true, false]],
   [{ role: "admin" }, [true, true, true, true]],
   [{ role: "owner" }, [true, false, false, false]],
-])("what %j may do is told by its token", (claims, may) => {
-  access.hold(token(claims));
-  expect(access.ROLES.map(access.may)).toEqual(may);
-  expect(access.bound()).toBe("session" in claims);
+])("token with the claims %j allows %j", (claims, allowed) => {
+  pageAccess.setToken(makeToken(claims));
+  expect(ROLES.map((role) => pageAccess.allows(role))).toEqual(allowed);
+  expect(pageAccess.isRestricted).toBe("session" in claims);
 });
 
-test("what cannot be read lets see: the server says what is wrong with it", () => {
-  access.hold("no.token");
-  expect(access.currentRole()).toBe("view");
+test("malformed token allows viewing only", () => {
+  pageAccess.setToken("no.token");
+  expect(pageAccess.role).toBe("view");
 });
 
-test("a socket's address gets a ticket for each attempt", async () => {
-  access.hold(VIEWER);
+test("each socket URL gets its own ticket", async () => {
+  pageAccess.setToken(VIEWER);
   let tickets = 0;
-  const asked: [string, RequestInit][] = [];
+  const requests: [string, RequestInit][] = [];
   vi.stubGlobal("fetch", (path: string, options: RequestInit) => {
-    asked.push([path, options]);
+    requests.push([path, options]);
     return Promise.resolve(new Response(JSON.stringify({ ticket: `t${++tickets}` }), { status: 201 }));
   });
-  expect(await access.ticketed("wss://stage/v1/sessions/s1/stream?rate=1")).toBe(
+  expect(await pageAccess.authorizeSocketUrl("wss://stage/v1/sessions/s1/stream?rate=1")).toBe(
     "wss://stage/v1/sessions/s1/stream?rate=1&ticket=t1",
   );
-  expect(await access.ticketed("wss://stage/v1/sessions/s1/stream?ticket=old")).toBe(
+  expect(await pageAccess.authorizeSocketUrl("wss://stage/v1/sessions/s1/stream?ticket=old")).toBe(
     "wss://stage/v1/sessions/s1/stream?ticket=t2",
   );
-  expect(asked[0]).toMatchObject([
+  expect(requests[0]).toMatchObject([
     "https://stage/v1/tickets",
     { method: "POST", headers: { Authorization: `Bearer ${VIEWER}` } },
   ]);
 });
 
-test("one who is not let in is told once more than the request is refused", async () => {
-  access.hold(VIEWER);
+test("listener is called for a rejected token only", async () => {
+  pageAccess.setToken(VIEWER);
   const denied: string[] = [];
-  access.whenDenied(({ title }) => denied.push(title));
-  const answers = [
+  pageAccess.onUnauthorized(({ title }) => denied.push(title));
+  const responses = [
     [401, "Link revoked"],
     [503, "Not now"],
   ] as const;
-  for (const [status, title] of answers) {
+  for (const [status, title] of responses) {
     vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify({ title, detail: "so" }), { status })));
-    await expect(access.ticketed("ws://stage/stream")).rejects.toMatchObject({ status, title });
+    await expect(pageAccess.authorizeSocketUrl("ws://stage/stream")).rejects.toMatchObject({ status, title });
   }
   expect(denied).toEqual(["Link revoked"]);
 });
@@ -119,10 +123,10 @@ function connect(url: () => string | Promise<string>) {
   return { connection, closed };
 }
 
-test("a connection waits for its address, asks anew each time, and after a ticket that was used up", async () => {
+test("connection requests a new URL for each attempt and after a used ticket", async () => {
   FakeWebSocket.install();
-  let asked = 0;
-  const { closed } = connect(() => Promise.resolve(`ws://stage/stream?ticket=${++asked}`));
+  let urlCount = 0;
+  const { closed } = connect(() => Promise.resolve(`ws://stage/stream?ticket=${++urlCount}`));
   expect(FakeWebSocket.opened).toHaveLength(0);
   await vi.advanceTimersByTimeAsync(0);
   expect(FakeWebSocket.last.url).toBe("ws://stage/stream?ticket=1");
@@ -133,30 +137,30 @@ test("a connection waits for its address, asks anew each time, and after a ticke
   FakeWebSocket.remove();
 });
 
-test("a connection that gets no address is over where it never will, and tries again where nobody answers", async () => {
+test("connection without a URL is final if rejected, and retried if unreachable", async () => {
   FakeWebSocket.install();
-  const refused = connect(() => Promise.reject(new ProblemError(401, "Link revoked", "who made it has ended it")));
-  let tries = 0;
-  const away = connect(() =>
-    ++tries < 3 ? Promise.reject(ProblemError.unreachable()) : Promise.resolve("ws://stage/stream"),
+  const rejected = connect(() => Promise.reject(new ProblemError(401, "Link revoked", "who made it has ended it")));
+  let attempts = 0;
+  const unreachable = connect(() =>
+    ++attempts < 3 ? Promise.reject(ProblemError.unreachable()) : Promise.resolve("ws://stage/stream"),
   );
   await vi.advanceTimersByTimeAsync(0);
-  expect(refused.closed).toEqual([["Link revoked: who made it has ended it", true]]);
-  expect(away.closed).toEqual([["the server cannot be reached", false]]);
+  expect(rejected.closed).toEqual([["Link revoked: who made it has ended it", true]]);
+  expect(unreachable.closed).toEqual([["the server cannot be reached", false]]);
   await vi.advanceTimersByTimeAsync(750);
   expect(FakeWebSocket.opened).toHaveLength(1);
   FakeWebSocket.remove();
 });
 
-test("another line is tried with a ticket of its own, unless the silent one speaks meanwhile", async () => {
+test("replacement gets its own ticket and is cancelled by a message", async () => {
   FakeWebSocket.install();
-  let asked = 0;
-  const { connection } = connect(() => Promise.resolve(`ws://stage/stream?ticket=${++asked}`));
+  let urlCount = 0;
+  const { connection } = connect(() => Promise.resolve(`ws://stage/stream?ticket=${++urlCount}`));
   await vi.advanceTimersByTimeAsync(0);
-  const [first] = FakeWebSocket.opened as [FakeWebSocket];
-  first.accept();
+  const [socket] = FakeWebSocket.opened as [FakeWebSocket];
+  socket.accept();
   connection.tryReplacement();
-  first.receive({ name: "Grant", limb: 0, epoch: 1 });
+  socket.receive({ name: "Grant", limb: 0, epoch: 1 });
   await vi.advanceTimersByTimeAsync(0);
   expect(FakeWebSocket.opened).toHaveLength(1);
   connection.tryReplacement();
@@ -166,7 +170,7 @@ test("another line is tried with a ticket of its own, unless the silent one spea
   FakeWebSocket.remove();
 });
 
-test("closed here while it waits for its address it never connects", async () => {
+test("connection closed while waiting for its URL never connects", async () => {
   FakeWebSocket.install();
   const { connection, closed } = connect(() => Promise.resolve("ws://stage/stream"));
   connection.close();
@@ -176,7 +180,7 @@ test("closed here while it waits for its address it never connects", async () =>
   FakeWebSocket.remove();
 });
 
-test("without a ticket, not being let in is final", () => {
+test("rejection without a ticket is final", () => {
   FakeWebSocket.install();
   const { closed } = connect(() => "ws://stage/stream");
   FakeWebSocket.last.endWith(4401);
@@ -186,31 +190,31 @@ test("without a ticket, not being let in is final", () => {
   FakeWebSocket.remove();
 });
 
-test("a page comes in at several servers, each by its own", async () => {
-  const sent: [string, string | undefined][] = [];
+test("each Access uses its own server and token", async () => {
+  const requests: [string, string | undefined][] = [];
   vi.stubGlobal("fetch", async (url: string, { headers }: { headers: Record<string, string> }) => {
-    sent.push([url, headers.Authorization]);
+    requests.push([url, headers.Authorization]);
     return new Response('{"title": "Link revoked", "detail": "it is over"}', { status: 401 });
   });
-  access.hold(VIEWER);
-  const control = token({ role: "control" });
-  const [one, other] = [new access.Access("https://one.example", control), new access.Access("https://other.example")];
+  pageAccess.setToken(VIEWER);
+  const control = makeToken({ role: "control" });
+  const [first, second] = [new Access("https://one.example", control), new Access("https://other.example")];
   const denied: string[] = [];
-  access.whenDenied(() => denied.push("page"));
-  one.onUnauthorized(({ title }) => denied.push(title));
+  pageAccess.onUnauthorized(() => denied.push("page"));
+  first.onUnauthorized(({ title }) => denied.push(title));
   expect([
-    one.allows("control"),
-    one.allows("ingest"),
-    other.allows("admin"),
-    other.hasToken,
-    access.may("control"),
+    first.allows("control"),
+    first.allows("ingest"),
+    second.allows("admin"),
+    second.hasToken,
+    pageAccess.allows("control"),
   ]).toEqual([true, false, true, false, false]);
-  await expect(one.request(`${one.server}/v1/sessions`)).rejects.toThrow("Link revoked");
-  await expect(other.request(`${other.server}/v1/sessions`)).rejects.toThrow(ProblemError);
-  expect(sent).toEqual([
+  await expect(first.request(`${first.server}/v1/sessions`)).rejects.toThrow("Link revoked");
+  await expect(second.request(`${second.server}/v1/sessions`)).rejects.toThrow(ProblemError);
+  expect(requests).toEqual([
     ["https://one.example/v1/sessions", `Bearer ${control}`],
     ["https://other.example/v1/sessions", undefined],
   ]);
   expect(denied).toEqual(["Link revoked"]);
-  expect(other.authorizeSocketUrl("wss://other.example/stream")).toBe("wss://other.example/stream");
+  expect(second.authorizeSocketUrl("wss://other.example/stream")).toBe("wss://other.example/stream");
 });

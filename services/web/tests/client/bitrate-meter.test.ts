@@ -1,18 +1,18 @@
 import { expect, test } from "vitest";
 import { BitrateMeter } from "../../src/client/bitrate-meter";
 
-test("nothing came", () => {
+test("bitrate is zero before the first byte", () => {
   expect(new BitrateMeter().kbps(5_000)).toBe(0);
 });
 
-test("a steady line is measured as it is", () => {
+test("constant bitrate is measured", () => {
   const meter = new BitrateMeter();
   for (let now = 0; now < 10_000; now += 50) meter.add(now, 100);
   expect(meter.kbps(10_000)).toBeGreaterThan(14);
   expect(meter.kbps(10_000)).toBeLessThan(18);
 });
 
-test("what is long past is forgotten", () => {
+test("bytes older than the window are dropped", () => {
   const meter = new BitrateMeter();
   meter.add(0, 1_000_000);
   expect(meter.kbps(2_000)).toBeGreaterThan(0);

@@ -1,4 +1,5 @@
-/** A session under a puppeteer's control, over lines of the test's own. */
+/** Session with a viewer and a puppeteer, over fake WebSockets. */
+
 import { vi } from "vitest";
 import { createMarionetteSolver } from "../../src/client/marionette-solver";
 import { Puppeteer } from "../../src/client/puppeteer";
@@ -22,7 +23,7 @@ export interface ControlSession {
   socket: FakeWebSocket;
 }
 
-/** Begins with a paused dance of performers that these tracks describe, each seen, and a puppeteer who is welcome. */
+/** Start a paused session with the performers of `tracks`, each shown, and a connected puppeteer. */
 export async function startControlSession(tracks: readonly Track[]): Promise<ControlSession> {
   FakeWebSocket.install();
   now = 0;
@@ -31,9 +32,9 @@ export async function startControlSession(tracks: readonly Track[]): Promise<Con
     now: () => now,
     solver: (figure) => createMarionetteSolver(figure, [table, table]),
   });
-  const stream = FakeWebSocket.last;
-  stream.accept();
-  stream.receive(
+  const viewerSocket = FakeWebSocket.last;
+  viewerSocket.accept();
+  viewerSocket.receive(
     {
       name: "ChannelHeader",
       motion: "d",
@@ -56,15 +57,15 @@ export async function startControlSession(tracks: readonly Track[]): Promise<Con
     },
     ...tracks.map((_, track) => ({ name: "Data" as const, track, rate: 1, index: 0, block })),
   );
-  // the solvers are made from the first pose on, in their own time
+  // the solvers are created asynchronously after the first pose
   tracks.forEach((_, performer) => viewer.poseAt(now, performer));
   await vi.advanceTimersByTimeAsync(0);
   const puppeteer = new Puppeteer({ url: "ws://stage/v1/sessions/s/control", viewer, now: () => now });
-  const line = FakeWebSocket.last;
+  const socket = FakeWebSocket.last;
   viewer.attach(puppeteer);
-  line.accept();
-  line.receive({ name: "Welcome", id: "a1", colour: 2, lead: 100_000 });
-  return { viewer, viewerSocket: stream, puppeteer, socket: line };
+  socket.accept();
+  socket.receive({ name: "Welcome", id: "a1", colour: 2, lead: 100_000 });
+  return { viewer, viewerSocket, puppeteer, socket };
 }
 
 export function endControlSession({ puppeteer, viewer }: ControlSession): void {

@@ -1,4 +1,4 @@
-/** A line in a test's hands: it stands where the browser's WebSocket would, and the test is the server at its other end. */
+/** Fake of the browser's WebSocket; the test plays the server. */
 
 import { vi } from "vitest";
 import { pack, unpack } from "../../src/wire/codec";
@@ -19,12 +19,12 @@ export class FakeWebSocket extends EventTarget {
     FakeWebSocket.opened.push(this);
   }
 
-  /** The line opened last. */
+  /** WebSocket that was opened last. */
   static get last(): FakeWebSocket {
     return FakeWebSocket.opened[FakeWebSocket.opened.length - 1];
   }
 
-  /** Puts lines in the place of WebSockets; times are vitest's. */
+  /** Replace the browser's WebSocket, and use fake timers. */
   static install(): void {
     FakeWebSocket.opened = [];
     vi.useFakeTimers();
@@ -45,30 +45,30 @@ export class FakeWebSocket extends EventTarget {
     this.readyState = 3;
   }
 
-  /** The server accepts. */
+  /** Open the connection. */
   accept(): void {
     this.readyState = 1;
     this.dispatchEvent(new Event("open"));
   }
 
-  /** The server says something. */
+  /** Receive messages from the server. */
   receive(...messages: Message[]): void {
     for (const message of messages) this.receiveRaw(pack(message));
   }
 
-  /** The server sends bytes, or text. */
+  /** Receive bytes or text from the server. */
   receiveRaw(data: Uint8Array<ArrayBuffer> | string): void {
-    const sent = typeof data === "string" ? data : data.slice().buffer;
-    this.dispatchEvent(new MessageEvent("message", { data: sent }));
+    const payload = typeof data === "string" ? data : data.slice().buffer;
+    this.dispatchEvent(new MessageEvent("message", { data: payload }));
   }
 
-  /** The line ends. */
+  /** Close the connection from the server's side. */
   endWith(code: number, reason = ""): void {
     this.readyState = 3;
     this.dispatchEvent(Object.assign(new Event("close"), { code, reason }));
   }
 
-  /** What was sent of one kind. */
+  /** Return the sent messages with this name. */
   messagesOf<Name extends Message["name"]>(name: Name): Extract<Message, { name: Name }>[] {
     return this.sent.filter((message): message is Extract<Message, { name: Name }> => message.name === name);
   }

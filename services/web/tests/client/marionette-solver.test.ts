@@ -6,15 +6,15 @@ import { figure, identity, packed } from "../marionette/figure";
 
 afterEach(() => vi.unstubAllGlobals());
 
-describe("the tables", () => {
-  test("are asked for by the arms' proportions, at the stream's own server", async () => {
-    const asked: string[] = [];
+describe("bend tables", () => {
+  test("are requested by the arms' proportions from the stream's server", async () => {
+    const urls: string[] = [];
     vi.stubGlobal("fetch", (url: string) => {
-      asked.push(url);
+      urls.push(url);
       return Promise.resolve(new Response(packed));
     });
     const { limbs } = await fetchMarionetteSolver(figure, "http://stage");
-    expect(new Set(asked)).toEqual(new Set([`http://stage/v1/arms/${identity}/table`]));
+    expect(new Set(urls)).toEqual(new Set([`http://stage/v1/arms/${identity}/table`]));
     expect(limbs.map((limb) => limb.constructor)).toEqual([
       ControlledHand,
       ControlledHand,
@@ -33,7 +33,7 @@ describe("the tables", () => {
     [-0.3, -0.5, 0.3].forEach((value, axis) => expect(hand.position[axis]).toBeCloseTo(value, 9));
   });
 
-  test("that are not there are a problem", async () => {
+  test("that are missing reject with a problem", async () => {
     vi.stubGlobal("fetch", () => Promise.resolve(new Response('{"title": "No such arm"}', { status: 404 })));
     await expect(fetchMarionetteSolver(figure, "http://stage")).rejects.toMatchObject({
       status: 404,

@@ -7,19 +7,19 @@ import { type BlockVectors, goldenDescription, goldenTrack } from "../golden-mot
 import { decodeBase64, loadVectors } from "../golden-vectors";
 
 const { valid } = loadVectors<BlockVectors>("blocks");
-/** The golden motion's blocks at its best rate, which is 1. */
+/** Blocks of the golden motion at its highest level, which is 1. */
 const BEST = [valid[1], valid[2], valid[3]].map(({ block }) => decodeBase64(block));
 
 afterEach(() => vi.unstubAllGlobals());
 
-/** A server that has the golden motion as the second of two tracks; what is asked of it. */
-function stubServer(answer: (path: string) => Uint8Array<ArrayBuffer> | null = () => null): string[] {
-  const asked: string[] = [];
+/** Stub a server with the golden motion as the second of two tracks; return the list of requested paths. */
+function stubServer(respond: (path: string) => Uint8Array<ArrayBuffer> | null = () => null): string[] {
+  const paths: string[] = [];
   vi.stubGlobal("fetch", async (path: string, { signal }: RequestInit) => {
     signal?.throwIfAborted();
-    asked.push(path);
-    const own = answer(path);
-    if (own) return new Response(own);
+    paths.push(path);
+    const response = respond(path);
+    if (response) return new Response(response);
     if (path.endsWith("/description"))
       return new Response(
         pack({ name: "Description", motion: "m", first: null, tracks: [{ type: "smell" }, goldenDescription()] }),
@@ -27,40 +27,40 @@ function stubServer(answer: (path: string) => Uint8Array<ArrayBuffer> | null = (
     const index = Number(/\/blocks\/1\/(\d+)\?track=1$/.exec(path)?.[1]);
     return new Response(pack({ name: "Data", track: 1, rate: 1, index, block: BEST[index] }));
   });
-  return asked;
+  return paths;
 }
 
-test("every block comes at the best rate, and it is told how far it is", async () => {
-  const asked = stubServer();
+test("downloads every block at the highest level and reports progress", async () => {
+  const paths = stubServer();
   const shares: number[] = [];
   const { store, frames } = await downloadMotion("m/1", { onProgress: (share) => shares.push(share) });
   expect([...store.levels]).toEqual([1, 1, 1]);
   expect(frames).toBe(78);
-  expect(asked[0]).toBe("/v1/motions/m%2F1/description");
-  expect(asked).toHaveLength(4);
+  expect(paths[0]).toBe("/v1/motions/m%2F1/description");
+  expect(paths).toHaveLength(4);
   expect(shares.at(-1)).toBe(1);
 });
 
-test("what is held at the best rate is not asked for again, and what is held stays as it is", async () => {
-  const asked = stubServer();
-  const held = new MotionBlockStore(goldenTrack());
-  held.put(0, 0, decodeBase64(valid[0].block));
-  held.put(1, 1, BEST[1]);
-  const { store } = await downloadMotion("m", { existing: held });
+test("blocks held at the highest level are not requested again", async () => {
+  const paths = stubServer();
+  const existing = new MotionBlockStore(goldenTrack());
+  existing.put(0, 0, decodeBase64(valid[0].block));
+  existing.put(1, 1, BEST[1]);
+  const { store } = await downloadMotion("m", { existing });
   expect([...store.levels]).toEqual([1, 1, 1]);
-  expect(asked.filter((path) => path.includes("/blocks/")).map((path) => path.split("/").at(-1))).toEqual([
+  expect(paths.filter((path) => path.includes("/blocks/")).map((path) => path.split("/").at(-1))).toEqual([
     "0?track=1",
     "2?track=1",
   ]);
-  expect([...held.levels]).toEqual([0, 1, -1]);
+  expect([...existing.levels]).toEqual([0, 1, -1]);
 });
 
-test("of another performer the blocks are those of its own track", async () => {
+test("blocks of another performer are those of its track", async () => {
   const other = valid
     .filter(({ track }) => track === 1)
     .slice(0, 3)
     .map(({ block }) => decodeBase64(block));
-  const asked = stubServer((path) => {
+  const paths = stubServer((path) => {
     if (path.endsWith("/description"))
       return pack({
         name: "Description",
@@ -72,13 +72,13 @@ test("of another performer the blocks are those of its own track", async () => {
     return pack({ name: "Data", track: 2, rate: 1, index, block: other[index] });
   });
   const { store } = await downloadMotion("m", { performer: 1 });
-  expect([[...store.levels], store.track.frames, asked.length]).toEqual([[1, 1, 1], 66, 4]);
-  await expect(downloadMotion("m", { performer: 2 })).rejects.toThrow("This dance cannot be read");
+  expect([[...store.levels], store.track.frames, paths.length]).toEqual([[1, 1, 1], 66, 4]);
+  await expect(downloadMotion("m", { performer: 2 })).rejects.toThrow("This motion cannot be read");
 });
 
-test("of a performer whose dance is longer than the first's come the blocks of what is danced", async () => {
-  const asked = stubServer((path) => {
-    // the first lasts 1.1 s, the second 2.6
+test("track longer than the first performer's is cut", async () => {
+  const paths = stubServer((path) => {
+    // durations: 1.1 s and 2.6 s
     if (path.endsWith("/description"))
       return pack({
         name: "Description",
@@ -90,11 +90,11 @@ test("of a performer whose dance is longer than the first's come the blocks of w
   });
   const shares: number[] = [];
   const { store, frames } = await downloadMotion("m", { performer: 1, onProgress: (share) => shares.push(share) });
-  expect([frames, [...store.levels], asked.length]).toEqual([33, [1, 1, -1], 3]);
+  expect([frames, [...store.levels], paths.length]).toEqual([33, [1, 1, -1], 3]);
   expect(shares.at(-1)).toBe(1);
 });
 
-test("a damaged block, and what is no block, are a problem told in words", async () => {
+test("damaged block or missing motion is a problem", async () => {
   stubServer((path) =>
     path.includes("/blocks/1/1?")
       ? pack({
@@ -108,13 +108,13 @@ test("a damaged block, and what is no block, are a problem told in words", async
   );
   await expect(downloadMotion("m")).rejects.toThrow(ProblemError);
   stubServer(() => pack({ name: "Description", motion: "m", first: null, tracks: [] }));
-  await expect(downloadMotion("m")).rejects.toThrow("This dance cannot be read");
+  await expect(downloadMotion("m")).rejects.toThrow("This motion cannot be read");
 });
 
-test("given up, it rejects with the reason", async () => {
+test("abort rejects with its reason", async () => {
   stubServer();
   const abort = new AbortController();
-  const reason = new Error("given up");
+  const reason = new Error("aborted");
   await expect(downloadMotion("m", { signal: abort.signal, onProgress: () => abort.abort(reason) })).rejects.toBe(
     reason,
   );

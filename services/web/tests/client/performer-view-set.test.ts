@@ -1,4 +1,4 @@
-/** Several performers as a viewer has them from its line. */
+/** Several performers of a stream. */
 
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 import { Viewer } from "../../src/client/viewer";
@@ -10,21 +10,22 @@ import { goldenScene } from "../golden-scenes";
 import { decodeBase64, loadVectors } from "../golden-vectors";
 import { FakeWebSocket } from "./fake-websocket";
 
-const UNIX = 1_774_000_000_000_000;
+const EPOCH_US = 1_774_000_000_000_000;
 const golden = loadVectors<BlockVectors>("blocks").valid;
 const [first, lowest] = golden.map((vector) => decodeBase64(vector.block));
-/** Blocks of the second golden track, which lasts 1.1 s of the first's 2.6. */
+/** Blocks of the second golden track; its duration is 1.1 s, that of the first 2.6 s. */
 const short = golden
   .filter(({ track }) => track === 1)
   .slice(0, 3)
   .map((vector) => decodeBase64(vector.block));
+/** Turn of the second performer, radians. */
 const TURN = -2.25;
 
 let now = 0;
 let viewer: Viewer;
-let told: string[];
+let events: string[];
 
-/** Three motions, of which the second is placed and shorter, with a camera between. */
+/** Return three motion tracks with a camera between; the second one is placed, and shorter. */
 const tracks = () => [
   goldenDescription(),
   goldenScene(),
@@ -47,13 +48,13 @@ const data = (track: number, index: number, block: Uint8Array, rate = 1): Messag
 
 function start(...messages: Message[]): void {
   FakeWebSocket.last.receive(
-    { name: "ChannelHeader", motion: "dance", now: UNIX, channels: 60, software: "0", version: 1, clock: "unix" },
+    { name: "ChannelHeader", motion: "dance", now: EPOCH_US, channels: 60, software: "0", version: 1, clock: "unix" },
     ...messages,
     {
       name: "TimelineState",
       epoch: 1,
       motion: "dance",
-      clock: UNIX,
+      clock: EPOCH_US,
       position: 0,
       playing: true,
       loop: true,
@@ -69,9 +70,9 @@ function copyAt(performer?: number) {
 beforeEach(() => {
   FakeWebSocket.install();
   now = 0;
-  told = [];
+  events = [];
   viewer = new Viewer({ url: "ws://stage/v1/sessions/s1/stream", now: () => now, solver: null });
-  for (const event of ["figure", "tracks", "blocks"]) viewer.addEventListener(event, () => told.push(event));
+  for (const event of ["figure", "tracks", "blocks"]) viewer.addEventListener(event, () => events.push(event));
   FakeWebSocket.last.accept();
 });
 afterEach(() => {
@@ -80,27 +81,29 @@ afterEach(() => {
   vi.restoreAllMocks();
 });
 
-test("before the first Description there are none", () => {
+test("there are no performers before the first Description", () => {
   expect([viewer.performers, viewer.poseAt(0), viewer.poseAt(0, 1)]).toEqual([[], null, null]);
 });
 
-test("each is known by its figure, where it faces and where it stands", () => {
+test("performers have figure, facing and placement", () => {
   start(description());
-  expect(viewer.performers.map((one) => one!.figure)).toEqual([0, 1, 0].map((which) => goldenTrack(which).figure));
-  expect(viewer.performers.map((one) => one!.front)).toEqual([0, 0.5 + TURN, 0]);
+  expect(viewer.performers.map((performer) => performer!.figure)).toEqual(
+    [0, 1, 0].map((which) => goldenTrack(which).figure),
+  );
+  expect(viewer.performers.map((performer) => performer!.front)).toEqual([0, 0.5 + TURN, 0]);
   expect(viewer.performers[1]!.placement).toEqual({ x: 3, z: -1, turn: TURN });
   expect([viewer.figure, viewer.front]).toEqual([viewer.performers[0]!.figure, 0]);
   expect(viewer.duration).toBe(2.6);
 });
 
-test("each is drawn by its own blocks in its place, and in storage of its own", () => {
+test("performers are drawn from their blocks at their placements", () => {
   start(description());
   FakeWebSocket.last.receive(data(0, 0, first));
   now = 50;
   expect([viewer.poseAt(now, 1), viewer.poseAt(now, 2), viewer.poseAt(now, 3)]).toEqual([null, null, null]);
   FakeWebSocket.last.receive(data(2, 0, short[0]), data(3, 0, lowest, 0));
   const poses = [0, 1, 2].map((performer) => viewer.poseAt(now, performer)!);
-  const dances = [
+  const expectedPoses = [
     [0, first, 1.5],
     [1, short[0], 0.05 * 59.94],
     [0, lowest, 1.5],
@@ -109,9 +112,13 @@ test("each is drawn by its own blocks in its place, and in storage of its own", 
     decodeMotionBlock(goldenTrack(which as number), block as Uint8Array).poseAt(instant as number, pose);
     return pose;
   });
-  const [x, y, z] = dances[1].root;
-  dances[1].root.set([3 + Math.cos(TURN) * x + Math.sin(TURN) * z, y, -1 + Math.cos(TURN) * z - Math.sin(TURN) * x]);
-  dances.forEach(({ root, rotations }, performer) => {
+  const [x, y, z] = expectedPoses[1].root;
+  expectedPoses[1].root.set([
+    3 + Math.cos(TURN) * x + Math.sin(TURN) * z,
+    y,
+    -1 + Math.cos(TURN) * z - Math.sin(TURN) * x,
+  ]);
+  expectedPoses.forEach(({ root, rotations }, performer) => {
     root.forEach((value, i) => expect(poses[performer].root[i]).toBeCloseTo(value, 9));
     rotations.subarray(4).forEach((value, i) => expect(poses[performer].rotations[4 + i]).toBeCloseTo(value, 9));
   });
@@ -119,7 +126,7 @@ test("each is drawn by its own blocks in its place, and in storage of its own", 
   expect([viewer.blocksOf("dance", 9), viewer.blocksOf("other", 1)]).toEqual([null, null]);
 });
 
-test("one whose dance is shorter stands still past its end, and begins anew with the first", () => {
+test("shorter track stands still past its end and restarts with the loop", () => {
   start(description());
   FakeWebSocket.last.receive(
     ...short.map((block, index) => data(2, index, block)),
@@ -128,21 +135,21 @@ test("one whose dance is shorter stands still past its end, and begins anew with
   );
   const start1 = copyAt(1);
   now = 1_200;
-  const still = copyAt(1);
-  expect(still).not.toEqual(start1);
+  const lastPose = copyAt(1);
+  expect(lastPose).not.toEqual(start1);
   now = 2_500;
-  expect(copyAt(1)).toEqual(still);
+  expect(copyAt(1)).toEqual(lastPose);
   now = 2_600;
   expect(copyAt(1)).toEqual(start1);
 });
 
-test("of one who stands still a better block is shown when it comes", () => {
+test("higher level is shown while paused", () => {
   start(description());
   FakeWebSocket.last.receive({
     name: "TimelineState",
     epoch: 2,
     motion: "dance",
-    clock: UNIX,
+    clock: EPOCH_US,
     position: 500_000,
     playing: false,
     loop: true,
@@ -150,40 +157,40 @@ test("of one who stands still a better block is shown when it comes", () => {
   });
   FakeWebSocket.last.receive(data(0, 0, lowest, 0), data(3, 0, lowest, 0));
   now = 4_000;
-  const [one, third] = [copyAt(0), copyAt(2)];
-  expect(third).toEqual(one);
+  const firstPose = copyAt(0);
+  expect(copyAt(2)).toEqual(firstPose);
   FakeWebSocket.last.receive(data(3, 0, first));
-  expect(copyAt(0)).toEqual(one);
-  const wanted = restPose();
-  decodeMotionBlock(goldenTrack(), first).poseAt(15, wanted);
-  copyAt(2)!.rotations.forEach((value, i) => expect(value).toBeCloseTo(wanted.rotations[i], 9));
+  expect(copyAt(0)).toEqual(firstPose);
+  const expected = restPose();
+  decodeMotionBlock(goldenTrack(), first).poseAt(15, expected);
+  copyAt(2)!.rotations.forEach((value, i) => expect(value).toBeCloseTo(expected.rotations[i], 9));
 });
 
-test("the line is judged by the first's blocks", () => {
+test("statistics are those of the first performer", () => {
   start(description());
   FakeWebSocket.last.receive(data(0, 0, first), data(2, 0, short[0]), data(3, 0, lowest, 0));
   for (const performer of [0, 1, 2]) viewer.poseAt(now, performer);
-  expect(told).toEqual(["figure", "blocks", "blocks"]);
+  expect(events).toEqual(["figure", "blocks", "blocks"]);
   expect([...viewer.blocks]).toEqual([1, -1, -1]);
   now = 500;
-  // of the second a block is missing by now
+  // a block of the second performer is missing
   for (const performer of [0, 1, 2]) viewer.poseAt(now, performer);
-  let line = viewer.statistics();
-  expect([line.rate, line.gaps, line.bufferSeconds]).toEqual([1, 0, 0.5]);
+  let statistics = viewer.statistics();
+  expect([statistics.rate, statistics.gaps, statistics.bufferSeconds]).toEqual([1, 0, 0.5]);
   now = 1_100;
   for (const performer of [0, 1, 2]) viewer.poseAt(now, performer);
-  line = viewer.statistics();
-  expect([line.gaps, line.reason]).toEqual([1, "waiting for a block"]);
+  statistics = viewer.statistics();
+  expect([statistics.gaps, statistics.reason]).toEqual([1, "waiting for a block"]);
 });
 
-test("a limb of the second that is pulled moves the second alone, bit for bit", () => {
+test("overlay of the second performer leaves the others unchanged", () => {
   start(description());
   FakeWebSocket.last.receive(data(0, 0, first), data(2, 0, short[0]), data(3, 0, first));
   now = 50;
   const before = [0, 1, 2].map(copyAt);
   const limbs = new Map([[5, Int16Array.of(9_000, 0, 0, 0, 9_000, 0, 0, 0, 9_000)]]);
   for (const due of [40_000, 56_667])
-    FakeWebSocket.last.receive({ name: "Overlay", sequence: 0, due: UNIX + due, limbs, earlier: [] });
+    FakeWebSocket.last.receive({ name: "Overlay", sequence: 0, due: EPOCH_US + due, limbs, earlier: [] });
   const after = [0, 1, 2].map(copyAt);
   expect([after[0], after[2]]).toEqual([before[0], before[2]]);
   expect(after[1]!.rotations.subarray(60)).not.toEqual(before[1]!.rotations.subarray(60));
@@ -191,23 +198,23 @@ test("a limb of the second that is pulled moves the second alone, bit for bit", 
   expect(after[1]!.root).toEqual(before[1]!.root);
 });
 
-describe("on a narrow line", () => {
-  test("those behind the first come on when they are told of, and the first dances on", () => {
+describe("constrained link", () => {
+  test("performers that are described later are added", () => {
     start(description(tracks().slice(0, 1)));
     FakeWebSocket.last.receive(data(0, 0, first));
     expect(viewer.performers).toHaveLength(1);
-    const [one] = viewer.performers,
+    const [firstView] = viewer.performers,
       pose = copyAt(0);
     FakeWebSocket.last.receive(description(tracks().slice(1, 3), 1));
     expect(viewer.performers).toHaveLength(2);
     FakeWebSocket.last.receive(description(tracks().slice(3), 3), data(3, 0, first));
     expect(viewer.performers).toHaveLength(3);
-    expect(viewer.performers[0]).toBe(one);
-    expect(told).toEqual(["figure", "blocks", "blocks", "tracks", "tracks"]);
+    expect(viewer.performers[0]).toBe(firstView);
+    expect(events).toEqual(["figure", "blocks", "blocks", "tracks", "tracks"]);
     expect([copyAt(0), copyAt(1), copyAt(2)]).toEqual([pose, null, pose]);
   });
 
-  test("what comes back tells of all performers' blocks", () => {
+  test("reconnecting viewer lists the blocks of all performers", () => {
     start(description());
     FakeWebSocket.last.receive(data(0, 0, first), data(2, 1, short[1]));
     FakeWebSocket.last.endWith(1006);
@@ -221,27 +228,27 @@ describe("on a narrow line", () => {
   });
 });
 
-test("one that cannot be read is none, and the next keeps its number", () => {
+test("performer that cannot be played is null, and the next keeps its number", () => {
   vi.spyOn(console, "warn").mockReturnValue();
-  const [one, camera, other, third] = tracks();
-  start(description([one, camera, { ...other, codec: "bunraku.motion/9" }, third]));
+  const [firstTrack, camera, secondTrack, thirdTrack] = tracks();
+  start(description([firstTrack, camera, { ...secondTrack, codec: "bunraku.motion/9" }, thirdTrack]));
   FakeWebSocket.last.receive(data(0, 0, first), data(2, 0, short[0]), data(3, 0, first));
   expect(viewer.performers.map((performer) => performer !== null)).toEqual([true, false, true]);
   expect([viewer.poseAt(now, 1), viewer.damagedCount]).toEqual([null, 0]);
-  const alone = copyAt(0);
-  expect(copyAt(2)).toEqual(alone);
+  const firstPose = copyAt(0);
+  expect(copyAt(2)).toEqual(firstPose);
   FakeWebSocket.last.receive({
     name: "Overlay",
     sequence: 0,
-    due: UNIX,
+    due: EPOCH_US,
     limbs: new Map([[8, new Int16Array(9)]]),
     earlier: [],
   });
-  expect(copyAt(0)).toEqual(alone);
+  expect(copyAt(0)).toEqual(firstPose);
   expect([...copyAt(2)!.rotations.subarray(48, 52)]).toEqual([1, 0, 0, 0]);
 });
 
-test("with another motion others come on, and nothing of the first ones is left", () => {
+test("another motion replaces the performers", () => {
   start(description());
   FakeWebSocket.last.receive(data(0, 0, first), data(2, 0, short[0]));
   viewer.poseAt(now, 1);
@@ -251,12 +258,14 @@ test("with another motion others come on, and nothing of the first ones is left"
     first: null,
     tracks: [goldenDescription(1), goldenDescription()],
   });
-  expect(viewer.performers.map((one) => one!.figure)).toEqual([1, 0].map((which) => goldenTrack(which).figure));
+  expect(viewer.performers.map((performer) => performer!.figure)).toEqual(
+    [1, 0].map((which) => goldenTrack(which).figure),
+  );
   FakeWebSocket.last.receive({
     name: "TimelineState",
     epoch: 2,
     motion: "other",
-    clock: UNIX,
+    clock: EPOCH_US,
     position: 0,
     playing: true,
     loop: true,

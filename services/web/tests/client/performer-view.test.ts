@@ -1,6 +1,6 @@
 import { expect, test, vi } from "vitest";
-import { PerformerView } from "../../src/client/performer-view";
-import type { LimbSolver } from "../../src/client/solver";
+import type { LimbSolver } from "../../src/client/marionette-solver";
+import { type FrameContext, PerformerView } from "../../src/client/performer-view";
 import { SolverLoader } from "../../src/client/solver-loader";
 import { decodeMotionBlock } from "../../src/codec/motion-decoder";
 import { MotionTrack } from "../../src/codec/motion-track";
@@ -13,77 +13,82 @@ import { decodeBase64, loadVectors } from "../golden-vectors";
 const [block, , , last] = loadVectors<BlockVectors>("blocks").valid.map((vector) => decodeBase64(vector.block));
 const track = MotionTrack.fromDescription({ ...goldenDescription(), front: 0.25, place: [2, -3, Math.PI / 2] });
 
-/** Performer `number` of the golden motion in a place of its own, how often its solver was made, and its blocks. */
-function performing(number: number) {
+/** Return the context of a frame without a predictor. */
+function frame(clock: number, overlays = new OverlayBuffer()): FrameContext {
+  return { clock, nowMs: 0, overlays, predictor: null };
+}
+
+/** Create performer `number` of the golden motion at another placement. */
+function createView(number: number) {
   const store = new MotionBlockStore(track),
-    made = vi.fn(() => ({ limbs: [] }) as LimbSolver);
+    createSolver = vi.fn(() => ({ limbs: [] }) as LimbSolver);
   return {
     store,
-    made,
-    performance: new PerformerView(number, store, new SolverLoader(track.figure, "http://stage", made)),
+    createSolver,
+    view: new PerformerView(number, store, new SolverLoader(track.figure, "http://stage", createSolver)),
   };
 }
 
-test("faces where its dance does, and then as it is turned", () => {
-  const { performance } = performing(0);
-  expect(performance.front).toBe(0.25 + Math.PI / 2);
-  expect([performance.figure, performance.placement]).toEqual([track.figure, { x: 2, z: -3, turn: Math.PI / 2 }]);
+test("facing is that of the motion, turned by the placement", () => {
+  const { view } = createView(0);
+  expect(view.front).toBe(0.25 + Math.PI / 2);
+  expect([view.figure, view.placement]).toEqual([track.figure, { x: 2, z: -3, turn: Math.PI / 2 }]);
 });
 
-test("is seen once a block is here, in its place, and holds still where the next is missing", () => {
-  const { store, performance } = performing(0);
+test("pose is placed, and kept while the next block is missing", () => {
+  const { store, view } = createView(0);
   const overlays = new OverlayBuffer(),
-    wanted = restPose();
-  expect([performance.seek(0, true, 2_600_000), performance.pose(0, overlays, null, 0)]).toEqual([false, null]);
+    expected = restPose();
+  expect([view.seek(0, true, 2_600_000), view.pose(frame(0, overlays))]).toEqual([false, null]);
   store.put(0, 1, block);
-  expect(performance.seek(500_000, true, 2_600_000)).toBe(true);
-  decodeMotionBlock(track, block).poseAt(15, wanted);
-  const pose = performance.pose(0, overlays, null, 0)!;
-  // turned by a quarter from z towards x, and moved
-  const [x, y, z] = wanted.root;
+  expect(view.seek(500_000, true, 2_600_000)).toBe(true);
+  decodeMotionBlock(track, block).poseAt(15, expected);
+  const pose = view.pose(frame(0, overlays))!;
+  // turned by 90 degrees from z towards x, and moved
+  const [x, y, z] = expected.root;
   [2 + z, y, -3 - x].forEach((value, i) => expect(pose.root[i]).toBeCloseTo(value, 12));
-  expect(pose.rotations.subarray(4)).toEqual(wanted.rotations.subarray(4));
-  const held = structuredClone(pose);
-  expect(performance.seek(1_500_000, true, 2_600_000)).toBe(false);
-  expect(performance.pose(0, overlays, null, 0)).toEqual(held);
-  expect(performance.pose(0, overlays, null, 0)).toEqual(held);
+  expect(pose.rotations.subarray(4)).toEqual(expected.rotations.subarray(4));
+  const last = structuredClone(pose);
+  expect(view.seek(1_500_000, true, 2_600_000)).toBe(false);
+  expect(view.pose(frame(0, overlays))).toEqual(last);
+  expect(view.pose(frame(0, overlays))).toEqual(last);
 });
 
-test("of a dance that is shorter than the motion stands still at its end", () => {
-  const { store, performance } = performing(0);
+test("shorter track stands still at its end", () => {
+  const { store, view } = createView(0);
   store.put(0, 1, block);
   store.put(2, 1, last);
-  performance.seek(2_600_000, false, 5_000_000);
-  const still = structuredClone(performance.pose(0, new OverlayBuffer(), null, 0)!);
-  performance.seek(4_999_999, true, 5_000_000);
-  expect(performance.pose(0, new OverlayBuffer(), null, 0)).toEqual(still);
+  view.seek(2_600_000, false, 5_000_000);
+  const still = structuredClone(view.pose(frame(0))!);
+  view.seek(4_999_999, true, 5_000_000);
+  expect(view.pose(frame(0))).toEqual(still);
 });
 
-test("has laid over it what is pulled of its own limbs, and no other's", () => {
+test("overlay replaces the limbs of one performer only", () => {
   const overlays = new OverlayBuffer();
   overlays.put({ name: "Overlay", sequence: 0, due: 1_000_000, limbs: new Map([[5, new Int16Array(9)]]), earlier: [] });
-  const [alone, pulled] = [0, 1].map((number) => {
-    const { store, performance } = performing(number);
+  const [other, overlaid] = [0, 1].map((number) => {
+    const { store, view } = createView(number);
     store.put(0, 1, block);
-    performance.seek(500_000, true, 2_600_000);
-    return performance.pose(1_000_000, overlays, null, 0)!;
+    view.seek(500_000, true, 2_600_000);
+    return view.pose(frame(1_000_000, overlays))!;
   });
   // the right arm: shoulder, elbow and wrist at rest
-  expect([...pulled.rotations.subarray(60, 72)]).toEqual([1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
-  expect(alone.rotations.subarray(0, 60)).toEqual(pulled.rotations.subarray(0, 60));
-  expect(alone.rotations[60]).toBeLessThan(1);
+  expect([...overlaid.rotations.subarray(60, 72)]).toEqual([1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+  expect(other.rotations.subarray(0, 60)).toEqual(overlaid.rotations.subarray(0, 60));
+  expect(other.rotations[60]).toBeLessThan(1);
 });
 
-test("what one's own limbs are solved with is made once it is seen", async () => {
-  const { store, made, performance } = performing(1);
-  performance.seek(0, true, 2_600_000);
+test("solver is created once, at the first pose", async () => {
+  const { store, createSolver, view } = createView(1);
+  view.seek(0, true, 2_600_000);
   await Promise.resolve();
-  expect(made).not.toHaveBeenCalled();
+  expect(createSolver).not.toHaveBeenCalled();
   store.put(0, 1, block);
-  performance.seek(0, true, 2_600_000);
-  performance.seek(1_000, true, 2_600_000);
-  await vi.waitFor(() => expect(made).toHaveBeenCalledWith(track.figure, "http://stage"));
-  performance.loadSolver();
+  view.seek(0, true, 2_600_000);
+  view.seek(1_000, true, 2_600_000);
+  await vi.waitFor(() => expect(createSolver).toHaveBeenCalledWith(track.figure, "http://stage"));
+  view.loadSolver();
   await Promise.resolve();
-  expect(made).toHaveBeenCalledTimes(1);
+  expect(createSolver).toHaveBeenCalledTimes(1);
 });

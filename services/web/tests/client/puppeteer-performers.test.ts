@@ -1,4 +1,4 @@
-/** A puppeteer with the limbs of several performers in hand. */
+/** Puppeteer with limbs of several performers. */
 
 import { afterEach, beforeEach, describe, expect, test } from "vitest";
 import { createMarionetteSolver } from "../../src/client/marionette-solver";
@@ -10,31 +10,29 @@ import { table } from "../marionette/figure";
 import { advanceTime, endControlSession, now, startControlSession } from "./control-session";
 import type { FakeWebSocket } from "./fake-websocket";
 
-const free = (limbs: number) => Array.from({ length: limbs }, () => null);
-const nobody = (limbs: number): string[][] => Array.from({ length: limbs }, () => []);
+const unheld = (limbs: number) => Array.from({ length: limbs }, () => null);
+const noAsks = (limbs: number): string[][] => Array.from({ length: limbs }, () => []);
 
 let viewer: Viewer;
-let stream: FakeWebSocket;
+let viewerSocket: FakeWebSocket;
 let puppeteer: Puppeteer;
-let line: FakeWebSocket;
-let told: unknown[];
+let socket: FakeWebSocket;
+let events: unknown[];
 
 beforeEach(async () => {
-  ({
-    viewer,
-    viewerSocket: stream,
-    puppeteer,
-    socket: line,
-  } = await startControlSession([goldenDescription(), { ...goldenDescription(), place: [1, -2, 2.5] }]));
-  told = [];
+  ({ viewer, viewerSocket, puppeteer, socket } = await startControlSession([
+    goldenDescription(),
+    { ...goldenDescription(), place: [1, -2, 2.5] },
+  ]));
+  events = [];
   for (const name of ["grant", "lapsed", "refusal"])
-    puppeteer.addEventListener(name, (event) => told.push([name, (event as CustomEvent).detail]));
+    puppeteer.addEventListener(name, (event) => events.push([name, (event as CustomEvent).detail]));
 });
 
-afterEach(() => endControlSession({ viewer, viewerSocket: stream, puppeteer, socket: line }));
+afterEach(() => endControlSession({ viewer, viewerSocket, puppeteer, socket }));
 
-/** Both poses as drawn now. */
-function poses(): Pose[] {
+/** Return the current poses of both performers. */
+function currentPoses(): Pose[] {
   return [0, 1].map((performer) => {
     const pose = restPose();
     copyPose(viewer.poseAt(now, performer)!, pose);
@@ -42,133 +40,133 @@ function poses(): Pose[] {
   });
 }
 
-/** Draws `ms` milliseconds, 60 frames a second. */
+/** Draw for `ms` milliseconds at 60 frames per second; return the last poses. */
 function draw(ms: number): Pose[] {
   for (let passed = 0; passed < ms; passed += 1000 / 60) {
     advanceTime(1000 / 60);
-    poses();
+    currentPoses();
   }
-  return poses();
+  return currentPoses();
 }
 
-/** Where the limb of its performer's pose is as drawn now. */
-function drawn(limb: number): number[] {
-  const one = createMarionetteSolver(viewer.performers[limb >> 2]!.figure, [table, table]).limbs[limb & 3];
-  one.observePose(viewer.poseAt(now, limb >> 2)!.rotations, 0);
-  return [...one.position];
+/** Return the position of a limb in its performer's current pose. */
+function tipPosition(limb: number): number[] {
+  const controlled = createMarionetteSolver(viewer.performers[limb >> 2]!.figure, [table, table]).limbs[limb & 3];
+  controlled.observePose(viewer.poseAt(now, limb >> 2)!.rotations, 0);
+  return [...controlled.position];
 }
 
-test("every limb is known from the start, and none is held or asked for", () => {
+test("limbs are neither held nor requested at the start", () => {
   for (let limb = 0; limb < 16; limb++)
     expect([puppeteer.holds(limb), puppeteer.isAsking(limb)]).toEqual([false, false]);
   advanceTime(1_000);
-  expect(line.sent).toEqual([]);
+  expect(socket.sent).toEqual([]);
 });
 
-test("a limb of another performer is claimed, moved, kept alive and let go by its number", () => {
+test("limb of another performer is claimed, moved, kept alive and released", () => {
   puppeteer.claim(6);
-  line.receive({ name: "Grant", limb: 6, epoch: 4 });
+  socket.receive({ name: "Grant", limb: 6, epoch: 4 });
   expect([puppeteer.holds(6), puppeteer.holds(2)]).toEqual([true, false]);
   puppeteer.target(6, 0.75, 0, 0);
-  expect(line.messagesOf("Input")).toMatchObject([{ limb: 6, kind: 1, epoch: 4, sequence: 0, values: [0.75, 0, 0] }]);
+  expect(socket.messagesOf("Input")).toMatchObject([{ limb: 6, kind: 1, epoch: 4, sequence: 0, values: [0.75, 0, 0] }]);
   advanceTime(120);
-  expect(line.messagesOf("Alive").at(-1)).toEqual({ name: "Alive", limbs: [6] });
-  // a leg goes by its first number alone, and at its own speed
+  expect(socket.messagesOf("Alive").at(-1)).toEqual({ name: "Alive", limbs: [6] });
+  // a leg uses the first value only, and its own full speed
   puppeteer.velocity(6, 0.5, 0, 0);
   advanceTime(100);
   puppeteer.velocity(6, 0, 0, 0);
-  expect(line.messagesOf("Input").at(-1)!.values[0]).toBeCloseTo(0.75 + 0.1, 6);
+  expect(socket.messagesOf("Input").at(-1)!.values[0]).toBeCloseTo(0.75 + 0.1, 6);
   puppeteer.release(6);
-  expect([line.messagesOf("Claim"), line.messagesOf("Release")]).toEqual([
+  expect([socket.messagesOf("Claim"), socket.messagesOf("Release")]).toEqual([
     [{ name: "Claim", limb: 6 }],
     [{ name: "Release", limb: 6, epoch: 4 }],
   ]);
 });
 
-describe("one's own limb of another performer", () => {
-  test("is shown at once, where the dancer stands, and the first dances on bit for bit", () => {
-    const [first, second] = poses();
+describe("own limb of another performer", () => {
+  test("is predicted, and the first performer is unchanged bit for bit", () => {
+    const [first, second] = currentPoses();
     puppeteer.claim(4);
     puppeteer.target(4, 0.5, -0.3, 0.4);
     const after = draw(600);
-    [0.5, -0.3, 0.4].forEach((value, axis) => expect(drawn(4)[axis]).toBeCloseTo(value, 6));
+    [0.5, -0.3, 0.4].forEach((value, axis) => expect(tipPosition(4)[axis]).toBeCloseTo(value, 6));
     expect(after[0]).toEqual(first);
     expect(after[1].root).toEqual(second.root);
     expect(after[1].rotations.subarray(0, 48)).toEqual(second.rotations.subarray(0, 48));
     expect(after[1].rotations.subarray(60)).toEqual(second.rotations.subarray(60));
   });
 
-  test("and the same one of the first go each their own way", () => {
+  test("and the same limb of the first move independently", () => {
     puppeteer.claim(0);
     puppeteer.claim(4);
     puppeteer.target(0, 0.2, -0.6, 0.3);
     puppeteer.target(4, 0.5, -0.3, 0.4);
     draw(600);
-    [0.2, -0.6, 0.3].forEach((value, axis) => expect(drawn(0)[axis]).toBeCloseTo(value, 6));
-    [0.5, -0.3, 0.4].forEach((value, axis) => expect(drawn(4)[axis]).toBeCloseTo(value, 6));
+    [0.2, -0.6, 0.3].forEach((value, axis) => expect(tipPosition(0)[axis]).toBeCloseTo(value, 6));
+    [0.5, -0.3, 0.4].forEach((value, axis) => expect(tipPosition(4)[axis]).toBeCloseTo(value, 6));
   });
 
-  test("is what everyone sees while Presence has it in another's hands", () => {
-    const before = poses();
-    line.receive({
+  test("is shown as the session sends it while another puppeteer holds it", () => {
+    const before = currentPoses();
+    socket.receive({
       name: "Presence",
       viewers: 2,
       puppeteers: [],
       limbs: [null, null, null, null, "b2", null, null, null],
-      asks: nobody(8),
+      asks: noAsks(8),
     });
     puppeteer.claim(4);
     puppeteer.target(4, 0.5, -0.3, 0.4);
     expect(draw(200)).toEqual(before);
-    line.receive({ name: "Grant", limb: 4, epoch: 3 });
+    socket.receive({ name: "Grant", limb: 4, epoch: 3 });
     draw(600);
-    expect(drawn(4)[0]).toBeCloseTo(0.5, 6);
+    expect(tipPosition(4)[0]).toBeCloseTo(0.5, 6);
   });
 });
 
-describe("as the motion changes to one of fewer performers", () => {
-  test("what is not there any more is refused, and dropped", () => {
+describe("change to a motion with fewer performers", () => {
+  test("releases a limb that is refused as unknown", () => {
     puppeteer.claim(7);
-    line.receive({ name: "Grant", limb: 7, epoch: 1 }, { name: "Refusal", limb: 7, reason: "lost", holder: null });
-    expect(line.messagesOf("Claim")).toHaveLength(2);
-    line.receive({ name: "Refusal", limb: 7, reason: "unknown", holder: null });
+    socket.receive({ name: "Grant", limb: 7, epoch: 1 }, { name: "Refusal", limb: 7, reason: "lost", holder: null });
+    expect(socket.messagesOf("Claim")).toHaveLength(2);
+    socket.receive({ name: "Refusal", limb: 7, reason: "unknown", holder: null });
     puppeteer.target(7, 0.5, 0, 0);
     advanceTime(200);
-    expect([puppeteer.holds(7), line.messagesOf("Input"), line.messagesOf("Claim").length]).toEqual([false, [], 2]);
-    expect(told).toEqual([
+    expect([puppeteer.holds(7), socket.messagesOf("Input"), socket.messagesOf("Claim").length]).toEqual([false, [], 2]);
+    expect(events).toEqual([
       ["grant", { limb: 7, asked: false }],
       ["refusal", { limb: 7, reason: "unknown", holder: null }],
     ]);
   });
 
-  test("Presence has fewer limbs: what was asked for lapses, and is not free", () => {
-    line.receive({
+  test("ends requests for removed limbs, not as free", () => {
+    socket.receive({
       name: "Presence",
       viewers: 2,
       puppeteers: [],
-      limbs: [...free(4), "b2", ...free(3)],
-      asks: nobody(8),
+      limbs: [...unheld(4), "b2", ...unheld(3)],
+      asks: noAsks(8),
     });
     puppeteer.ask(4);
-    line.receive({
+    socket.receive({
       name: "Presence",
       viewers: 2,
       puppeteers: [],
-      limbs: [...free(4), "b2", ...free(3)],
-      asks: [...nobody(4), ["a1"], ...nobody(3)],
+      limbs: [...unheld(4), "b2", ...unheld(3)],
+      asks: [...noAsks(4), ["a1"], ...noAsks(3)],
     });
     expect(puppeteer.isAsking(4)).toBe(true);
-    line.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs: free(4), asks: nobody(4) });
-    expect([puppeteer.isAsking(4), told]).toEqual([false, [["lapsed", { limb: 4, free: false }]]]);
-    // one that Presence never told of lapses as soon
+    socket.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs: unheld(4), asks: noAsks(4) });
+    expect([puppeteer.isAsking(4), events]).toEqual([false, [["lapsed", { limb: 4, free: false }]]]);
+    // a request that Presence never listed lapses, too
     puppeteer.ask(5);
-    line.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs: free(4), asks: nobody(4) });
-    expect([puppeteer.isAsking(5), told[1]]).toEqual([false, ["lapsed", { limb: 5, free: false }]]);
-    // nobody has it any more
-    const before = drawn(4);
+    socket.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs: unheld(4), asks: noAsks(4) });
+    expect([puppeteer.isAsking(5), events[1]]).toEqual([false, ["lapsed", { limb: 5, free: false }]]);
+    // no puppeteer holds it any more
+    const before = tipPosition(4);
     puppeteer.claim(4);
     puppeteer.target(4, 0.5, -0.3, 0.4);
     draw(100);
-    expect(drawn(4)).not.toEqual(before);
+    expect(tipPosition(4)).not.toEqual(before);
   });
 });

@@ -8,24 +8,24 @@ import { advanceTime, EPOCH_US, endControlSession, now, startControlSession } fr
 import { FakeWebSocket } from "./fake-websocket";
 
 let viewer: Viewer;
-let stream: FakeWebSocket;
+let viewerSocket: FakeWebSocket;
 let puppeteer: Puppeteer;
-let line: FakeWebSocket;
+let socket: FakeWebSocket;
 
 beforeEach(async () => {
-  ({ viewer, viewerSocket: stream, puppeteer, socket: line } = await startControlSession([goldenDescription()]));
+  ({ viewer, viewerSocket, puppeteer, socket } = await startControlSession([goldenDescription()]));
 });
 
-afterEach(() => endControlSession({ viewer, viewerSocket: stream, puppeteer, socket: line }));
+afterEach(() => endControlSession({ viewer, viewerSocket, puppeteer, socket }));
 
-/** Where the left hand is as drawn now. */
-function drawn(): number[] {
+/** Return the position of the left hand in the current pose. */
+function tipPosition(): number[] {
   const [hand] = createMarionetteSolver(viewer.figure!, [table, table]).limbs;
   hand.observePose(viewer.poseAt(now)!.rotations, 0);
   return [...hand.position];
 }
 
-/** Draws `ms` milliseconds, 60 frames a second. */
+/** Draw for `ms` milliseconds at 60 frames per second. */
 function draw(ms: number): void {
   for (let passed = 0; passed < ms; passed += 1000 / 60) {
     advanceTime(1000 / 60);
@@ -33,159 +33,159 @@ function draw(ms: number): void {
   }
 }
 
-function far(a: number[], b: number[]): number {
+function distance(a: number[], b: number[]): number {
   return Math.hypot(...a.map((value, axis) => value - b[axis]));
 }
 
-test("is welcomed", () => {
+test("welcome sets id and colour", () => {
   expect([puppeteer.id, puppeteer.colour]).toEqual(["a1", 2]);
   expect(puppeteer.limits).toMatchObject({ reach: 1, handSpeed: 1, legSpeed: 2 });
 });
 
-test("where the viewer's silent line is replaced it tries another too, and asks again for what it holds", () => {
+test("replacement of the viewer's connection starts one here and reclaims limbs", () => {
   puppeteer.claim(0);
-  line.receive({ name: "Grant", limb: 0, epoch: 3 });
+  socket.receive({ name: "Grant", limb: 0, epoch: 3 });
   viewer.dispatchEvent(new Event("replaced"));
-  const other = FakeWebSocket.last;
-  expect(other).not.toBe(line);
-  other.accept();
+  const replacement = FakeWebSocket.last;
+  expect(replacement).not.toBe(socket);
+  replacement.accept();
   expect(puppeteer.id).toBe("a1");
-  other.receive({ name: "Welcome", id: "b2", colour: 3, lead: 100_000 });
-  expect([puppeteer.id, line.readyState]).toEqual(["b2", 3]);
-  expect(other.messagesOf("Claim")).toEqual([{ name: "Claim", limb: 0 }]);
+  replacement.receive({ name: "Welcome", id: "b2", colour: 3, lead: 100_000 });
+  expect([puppeteer.id, socket.readyState]).toEqual(["b2", 3]);
+  expect(replacement.messagesOf("Claim")).toEqual([{ name: "Claim", limb: 0 }]);
   puppeteer.close();
   const count = FakeWebSocket.opened.length;
   viewer.dispatchEvent(new Event("replaced"));
   expect(FakeWebSocket.opened).toHaveLength(count);
 });
 
-describe("a limb", () => {
-  test("is claimed, granted and let go with its epoch", () => {
+describe("limb", () => {
+  test("is claimed, granted and released with its epoch", () => {
     const granted: unknown[] = [];
     puppeteer.addEventListener("grant", (event) => granted.push((event as CustomEvent).detail));
     puppeteer.claim(1);
     puppeteer.claim(1);
-    expect(line.messagesOf("Claim")).toEqual([{ name: "Claim", limb: 1 }]);
+    expect(socket.messagesOf("Claim")).toEqual([{ name: "Claim", limb: 1 }]);
     expect(puppeteer.holds(1)).toBe(false);
-    line.receive({ name: "Grant", limb: 1, epoch: 7 });
+    socket.receive({ name: "Grant", limb: 1, epoch: 7 });
     expect(granted).toEqual([{ limb: 1, asked: false }]);
     expect(puppeteer.holds(1)).toBe(true);
     puppeteer.release(1);
-    expect(line.messagesOf("Release")).toEqual([{ name: "Release", limb: 1, epoch: 7 }]);
+    expect(socket.messagesOf("Release")).toEqual([{ name: "Release", limb: 1, epoch: 7 }]);
     expect(puppeteer.holds(1)).toBe(false);
   });
 
-  test("let go before the answer came is let go when it comes", () => {
+  test("released before the grant is released again on the grant", () => {
     puppeteer.claim(0);
     puppeteer.release(0);
-    expect(line.messagesOf("Release")).toEqual([]);
-    line.receive({ name: "Grant", limb: 0, epoch: 3 });
-    expect(line.messagesOf("Release")).toEqual([{ name: "Release", limb: 0, epoch: 3 }]);
+    expect(socket.messagesOf("Release")).toEqual([]);
+    socket.receive({ name: "Grant", limb: 0, epoch: 3 });
+    expect(socket.messagesOf("Release")).toEqual([{ name: "Release", limb: 0, epoch: 3 }]);
     expect(puppeteer.holds(0)).toBe(false);
   });
 
-  test("refused goes back, and says why", () => {
+  test("that is refused sends no input and reports the reason", () => {
     const refused: unknown[] = [];
     puppeteer.addEventListener("refusal", (event) => refused.push((event as CustomEvent).detail));
     puppeteer.claim(0);
-    line.receive({ name: "Refusal", limb: 0, reason: "held", holder: "b2" });
+    socket.receive({ name: "Refusal", limb: 0, reason: "held", holder: "b2" });
     puppeteer.target(0, 1, 0, 0);
     advanceTime(100);
     expect(refused).toEqual([{ limb: 0, reason: "held", holder: "b2" }]);
-    expect(line.messagesOf("Input")).toEqual([]);
+    expect(socket.messagesOf("Input")).toEqual([]);
   });
 
-  test("lost for want of a word while it is still held is asked for again, unless another took it meanwhile", () => {
+  test("lost while held is claimed again unless another puppeteer has it", () => {
     const refused: unknown[] = [];
     puppeteer.addEventListener("refusal", (event) => refused.push((event as CustomEvent).detail));
     puppeteer.claim(0);
-    line.receive({ name: "Grant", limb: 0, epoch: 3 });
+    socket.receive({ name: "Grant", limb: 0, epoch: 3 });
     puppeteer.target(0, 0.5, 0, 0);
-    line.receive({ name: "Refusal", limb: 0, reason: "lost", holder: null });
-    expect(line.messagesOf("Claim")).toHaveLength(2);
+    socket.receive({ name: "Refusal", limb: 0, reason: "lost", holder: null });
+    expect(socket.messagesOf("Claim")).toHaveLength(2);
     expect([puppeteer.holds(0), refused]).toEqual([false, []]);
-    line.receive({ name: "Grant", limb: 0, epoch: 4 });
+    socket.receive({ name: "Grant", limb: 0, epoch: 4 });
     expect(puppeteer.holds(0)).toBe(true);
-    // The session is told anew where the hand is.
-    expect(line.messagesOf("Input").at(-1)).toMatchObject({ epoch: 4, values: [0.5, 0, 0] });
-    line.receive(
+    // the session receives the position again
+    expect(socket.messagesOf("Input").at(-1)).toMatchObject({ epoch: 4, values: [0.5, 0, 0] });
+    socket.receive(
       { name: "Refusal", limb: 0, reason: "lost", holder: null },
       { name: "Refusal", limb: 0, reason: "held", holder: "b2" },
     );
     expect(refused).toEqual([{ limb: 0, reason: "held", holder: "b2" }]);
   });
 
-  test("lost after it was let go is not asked for", () => {
+  test("lost after the release is not claimed again", () => {
     puppeteer.claim(0);
-    line.receive({ name: "Grant", limb: 0, epoch: 3 });
+    socket.receive({ name: "Grant", limb: 0, epoch: 3 });
     puppeteer.release(0);
-    line.receive({ name: "Refusal", limb: 0, reason: "lost", holder: null });
-    expect(line.messagesOf("Claim")).toHaveLength(1);
+    socket.receive({ name: "Refusal", limb: 0, reason: "lost", holder: null });
+    expect(socket.messagesOf("Claim")).toHaveLength(1);
   });
 
-  test("is asked for again when the line comes back", () => {
+  test("is claimed again after a reconnect", () => {
     puppeteer.claim(0);
-    line.receive({ name: "Grant", limb: 0, epoch: 3 });
-    line.endWith(1006);
+    socket.receive({ name: "Grant", limb: 0, epoch: 3 });
+    socket.endWith(1006);
     expect(puppeteer.holds(0)).toBe(false);
     advanceTime(250);
-    line = FakeWebSocket.last;
-    line.accept();
-    line.receive({ name: "Welcome", id: "a9", colour: 0, lead: 100_000 });
-    expect(line.messagesOf("Claim")).toEqual([{ name: "Claim", limb: 0 }]);
+    socket = FakeWebSocket.last;
+    socket.accept();
+    socket.receive({ name: "Welcome", id: "a9", colour: 0, lead: 100_000 });
+    expect(socket.messagesOf("Claim")).toEqual([{ name: "Claim", limb: 0 }]);
   });
 });
 
-describe("asking for a limb that another holds", () => {
+describe("request for a limb that another puppeteer holds", () => {
   const presence = (limbs: (string | null)[], asks: string[][]) =>
-    line.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs, asks });
+    socket.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs, asks });
   const held = ["b2", null, null, null];
-  let told: unknown[];
+  let events: unknown[];
 
   beforeEach(() => {
-    told = [];
+    events = [];
     for (const name of ["grant", "lapsed", "refusal"])
-      puppeteer.addEventListener(name, (event) => told.push([name, (event as CustomEvent).detail]));
+      puppeteer.addEventListener(name, (event) => events.push([name, (event as CustomEvent).detail]));
     puppeteer.ask(0);
     puppeteer.ask(0);
   });
 
-  test("is said once, and brings it by a grant, unclaimed", () => {
-    expect(line.messagesOf("Ask")).toEqual([{ name: "Ask", limb: 0, wanted: true }]);
+  test("is sent once, and ends with a grant without a claim", () => {
+    expect(socket.messagesOf("Ask")).toEqual([{ name: "Ask", limb: 0, wanted: true }]);
     presence(held, [["c3", "a1"], [], [], []]);
     presence(held, [["a1"], [], [], []]);
-    expect([puppeteer.isAsking(0), puppeteer.holds(0), told]).toEqual([true, false, []]);
-    line.receive({ name: "Grant", limb: 0, epoch: 9 });
+    expect([puppeteer.isAsking(0), puppeteer.holds(0), events]).toEqual([true, false, []]);
+    socket.receive({ name: "Grant", limb: 0, epoch: 9 });
     presence(["a1", null, null, null], [[], [], [], []]);
     expect([puppeteer.isAsking(0), puppeteer.holds(0)]).toEqual([false, true]);
-    expect(told).toEqual([["grant", { limb: 0, asked: true }]]);
+    expect(events).toEqual([["grant", { limb: 0, asked: true }]]);
     puppeteer.target(0, 0.5, 0, 0);
-    expect([line.messagesOf("Claim"), line.messagesOf("Release"), line.messagesOf("Input").at(-1)?.epoch]).toEqual([
-      [],
-      [],
-      9,
-    ]);
+    expect([
+      socket.messagesOf("Claim"),
+      socket.messagesOf("Release"),
+      socket.messagesOf("Input").at(-1)?.epoch,
+    ]).toEqual([[], [], 9]);
   });
 
-  test("is not over when Presence tells of the grant before the grant", () => {
+  test("stays if Presence shows the grant before the grant arrives", () => {
     presence(held, [["a1"], [], [], []]);
     presence(["a1", null, null, null], [[], [], [], []]);
-    line.receive({ name: "Grant", limb: 0, epoch: 9 });
-    expect(told).toEqual([["grant", { limb: 0, asked: true }]]);
+    socket.receive({ name: "Grant", limb: 0, epoch: 9 });
+    expect(events).toEqual([["grant", { limb: 0, asked: true }]]);
   });
 
-  test("can be withdrawn; a grant that crosses that is given back", () => {
+  test("can be withdrawn, and a late grant is released", () => {
     puppeteer.cancelAsk(0);
     puppeteer.cancelAsk(0);
-    expect(line.messagesOf("Ask")).toEqual([
+    expect(socket.messagesOf("Ask")).toEqual([
       { name: "Ask", limb: 0, wanted: true },
       { name: "Ask", limb: 0, wanted: false },
     ]);
     presence(held, [["a1"], [], [], []]);
     expect(puppeteer.isAsking(0)).toBe(false);
-    line.receive({ name: "Grant", limb: 0, epoch: 9 });
-    expect(line.messagesOf("Release")).toEqual([{ name: "Release", limb: 0, epoch: 9 }]);
-    expect(told).toEqual([]);
+    socket.receive({ name: "Grant", limb: 0, epoch: 9 });
+    expect(socket.messagesOf("Release")).toEqual([{ name: "Release", limb: 0, epoch: 9 }]);
+    expect(events).toEqual([]);
   });
 
   test("lapses when Presence no longer lists it", () => {
@@ -193,52 +193,52 @@ describe("asking for a limb that another holds", () => {
     expect(puppeteer.isAsking(0)).toBe(true);
     presence(held, [["a1"], [], [], []]);
     presence(held, [[], [], [], []]);
-    expect([puppeteer.isAsking(0), told]).toEqual([false, [["lapsed", { limb: 0, free: false }]]]);
+    expect([puppeteer.isAsking(0), events]).toEqual([false, [["lapsed", { limb: 0, free: false }]]]);
   });
 
-  test("lapses when its holder let go before the session heard of it", () => {
+  test("lapses if the limb was free when it arrived", () => {
     presence([null, null, null, null], [[], [], [], []]);
-    expect([puppeteer.isAsking(0), told]).toEqual([false, [["lapsed", { limb: 0, free: true }]]]);
+    expect([puppeteer.isAsking(0), events]).toEqual([false, [["lapsed", { limb: 0, free: true }]]]);
   });
 
-  test("lapses after 20 seconds in a session that knows of no asking, and with the line", () => {
+  test("lapses after 20 s without Presence, and with the connection", () => {
     advanceTime(19_000);
     expect(puppeteer.isAsking(0)).toBe(true);
     advanceTime(1_100);
-    expect([puppeteer.isAsking(0), told]).toEqual([false, [["lapsed", { limb: 0, free: false }]]]);
+    expect([puppeteer.isAsking(0), events]).toEqual([false, [["lapsed", { limb: 0, free: false }]]]);
     puppeteer.ask(0);
-    line.endWith(1006);
+    socket.endWith(1006);
     expect(puppeteer.isAsking(0)).toBe(false);
     puppeteer.ask(0);
     expect(puppeteer.isAsking(0)).toBe(false);
   });
 
-  test("is not for a limb that is held here", () => {
+  test("is not sent for a claimed limb", () => {
     puppeteer.claim(1);
     puppeteer.ask(1);
-    expect(line.messagesOf("Ask")).toHaveLength(1);
+    expect(socket.messagesOf("Ask")).toHaveLength(1);
   });
 });
 
-test("a notice is passed on", () => {
-  const told: unknown[] = [];
-  puppeteer.addEventListener("notice", (event) => told.push((event as CustomEvent).detail));
-  line.receive({ name: "Notice", limb: 1, reason: "reach", detail: "too far" });
-  expect(told).toEqual([{ limb: 1, reason: "reach", detail: "too far" }]);
+test("notice is dispatched", () => {
+  const events: unknown[] = [];
+  puppeteer.addEventListener("notice", (event) => events.push((event as CustomEvent).detail));
+  socket.receive({ name: "Notice", limb: 1, reason: "reach", detail: "too far" });
+  expect(events).toEqual([{ limb: 1, reason: "reach", detail: "too far" }]);
 });
 
 describe("inputs", () => {
   beforeEach(() => {
     puppeteer.claim(0);
-    line.receive({ name: "Grant", limb: 0, epoch: 5 });
+    socket.receive({ name: "Grant", limb: 0, epoch: 5 });
   });
 
-  test("carry epoch, rising sequence and the clock time of the sample", () => {
+  test("carry epoch, increasing sequence and sample time", () => {
     advanceTime(40);
     puppeteer.target(0, 0.5, -0.25, 0.125);
     advanceTime(40);
     puppeteer.target(0, 0.25, -0.25, 0.125);
-    const inputs = line.messagesOf("Input");
+    const inputs = socket.messagesOf("Input");
     expect(inputs).toHaveLength(2);
     expect(inputs[0]).toEqual({
       name: "Input",
@@ -252,32 +252,32 @@ describe("inputs", () => {
     expect([inputs[1].sequence, inputs[1].sampled]).toEqual([1, EPOCH_US + 80_000]);
   });
 
-  test("of a mouse that moves a thousand times a second are thinned, and the last always goes", () => {
+  test("at 1000 Hz are thinned, and the last one is always sent", () => {
     for (let moved = 0; moved < 500; moved++) {
       advanceTime(1);
       puppeteer.target(0, moved / 1000, 0, 0);
     }
     advanceTime(100);
-    const inputs = line.messagesOf("Input");
+    const inputs = socket.messagesOf("Input");
     expect(inputs.length).toBeGreaterThan(25);
     expect(inputs.length).toBeLessThan(40);
     expect(inputs[inputs.length - 1].values[0]).toBeCloseTo(0.499, 6);
   });
 
-  test("wait while the line is crowded, and then the newest goes", () => {
-    line.bufferedAmount = 5_000;
+  test("wait while the connection is congested, then the newest is sent", () => {
+    socket.bufferedAmount = 5_000;
     advanceTime(40);
     puppeteer.target(0, 0.1, 0, 0);
     advanceTime(200);
     puppeteer.target(0, 0.9, 0, 0);
     advanceTime(200);
-    expect(line.messagesOf("Input")).toEqual([]);
-    line.bufferedAmount = 0;
+    expect(socket.messagesOf("Input")).toEqual([]);
+    socket.bufferedAmount = 0;
     advanceTime(40);
-    expect(line.messagesOf("Input").map((input) => input.values[0])).toEqual([Math.fround(0.9)]);
+    expect(socket.messagesOf("Input").map((input) => input.values[0])).toEqual([Math.fround(0.9)]);
   });
 
-  test("of a speed say where it starts, how it goes, and where it stops", () => {
+  test("with velocity send start, velocity and end position", () => {
     viewer.poseAt(now);
     puppeteer.target(0, 0, 0, 0);
     advanceTime(100);
@@ -286,82 +286,82 @@ describe("inputs", () => {
     advanceTime(200);
     puppeteer.velocity(0, 0, 0, 0);
     advanceTime(100);
-    const said = line.messagesOf("Input").map(({ kind, values }) => [kind, values[0]]);
-    expect(said).toEqual([
+    const sent = socket.messagesOf("Input").map(({ kind, values }) => [kind, values[0]]);
+    expect(sent).toEqual([
       [1, 0],
       [0, 1],
       [1, Math.fround(0.2)],
     ]);
   });
 
-  test("of a limb never placed start from where the session has it", () => {
+  test("with velocity before any target start at the session's position", () => {
     advanceTime(40);
     puppeteer.velocity(0, 0.5, 0, 0);
-    expect(line.messagesOf("Input").map(({ kind, values }) => [kind, ...values])).toEqual([[0, 0.5, 0, 0]]);
+    expect(socket.messagesOf("Input").map(({ kind, values }) => [kind, ...values])).toEqual([[0, 0.5, 0, 0]]);
   });
 
-  test("are finite and within -1..1 whatever the controller says", () => {
+  test("are finite and clamped", () => {
     advanceTime(40);
     puppeteer.velocity(0, NaN, 7, -Infinity);
     advanceTime(40);
     puppeteer.target(0, NaN, Infinity, 0.5);
-    expect(line.messagesOf("Input").map(({ values }) => values)).toEqual([
+    expect(socket.messagesOf("Input").map(({ values }) => values)).toEqual([
       [0, 1, 0],
       [0, 0, 0.5],
     ]);
   });
 
-  test("of limbs that are not claimed go nowhere", () => {
+  test("for unclaimed limbs are not sent", () => {
     puppeteer.target(3, 1, 0, 0);
     puppeteer.velocity(3, 1, 0, 0);
     advanceTime(100);
-    expect(line.messagesOf("Input")).toEqual([]);
+    expect(socket.messagesOf("Input")).toEqual([]);
   });
 });
 
-test("a limb held still is kept alive at 10 Hz, one that moves is not mentioned", () => {
+test("keep-alive at 10 Hz lists only limbs that are held still", () => {
   puppeteer.claim(0);
   puppeteer.claim(2);
-  line.receive({ name: "Grant", limb: 0, epoch: 1 }, { name: "Grant", limb: 2, epoch: 1 });
+  socket.receive({ name: "Grant", limb: 0, epoch: 1 }, { name: "Grant", limb: 2, epoch: 1 });
   for (let moved = 0; moved < 50; moved++) {
     advanceTime(20);
     puppeteer.target(0, moved / 100, 0, 0);
   }
-  const alive = line.messagesOf("Alive");
+  const alive = socket.messagesOf("Alive");
   expect(alive.length).toBeGreaterThanOrEqual(7);
   expect(alive.length).toBeLessThanOrEqual(11);
   for (const { limbs } of alive.slice(1)) expect(limbs).toEqual([2]);
 });
 
-describe("one's own limb", () => {
-  test("is shown at once, before the session has answered", () => {
-    const before = drawn();
+describe("own limb", () => {
+  test("is shown before the session answers", () => {
+    const before = tipPosition();
     puppeteer.claim(0);
     puppeteer.target(0, 0.5, -0.3, 0.4);
-    expect(far(drawn(), before)).toBeLessThan(1e-9);
+    expect(distance(tipPosition(), before)).toBeLessThan(1e-9);
     draw(50);
-    expect(far(drawn(), before)).toBeGreaterThan(0.02);
+    expect(distance(tipPosition(), before)).toBeGreaterThan(0.02);
     draw(500);
-    expect(far(drawn(), [0.5, -0.3, 0.4])).toBeLessThan(1e-6);
+    expect(distance(tipPosition(), [0.5, -0.3, 0.4])).toBeLessThan(1e-6);
   });
 
-  test("goes back to the dance when it is refused", () => {
-    const before = drawn();
+  test("returns to the motion when it is refused", () => {
+    const before = tipPosition();
     puppeteer.claim(0);
     puppeteer.target(0, 0.5, -0.3, 0.4);
     draw(200);
-    const held = drawn();
-    line.receive({ name: "Refusal", limb: 0, reason: "held", holder: "b2" });
-    expect(far(drawn(), held)).toBeLessThan(1e-9);
+    const last = tipPosition();
+    socket.receive({ name: "Refusal", limb: 0, reason: "held", holder: "b2" });
+    expect(distance(tipPosition(), last)).toBeLessThan(1e-9);
     draw(50);
-    expect(far(drawn(), held)).toBeLessThan(0.3);
+    expect(distance(tipPosition(), last)).toBeLessThan(0.3);
     draw(600);
-    expect(far(drawn(), before)).toBeLessThan(1e-9);
+    expect(distance(tipPosition(), before)).toBeLessThan(1e-9);
   });
 
-  test("is what everyone sees while Presence has it in another's hands", () => {
-    const before = drawn();
-    line.receive({
+  test("is shown as the session sends it while another puppeteer holds it", () => {
+    const before = tipPosition();
+    socket.receive({
       name: "Presence",
       viewers: 2,
       puppeteers: [],
@@ -371,19 +371,19 @@ describe("one's own limb", () => {
     puppeteer.claim(0);
     puppeteer.target(0, 0.5, -0.3, 0.4);
     draw(200);
-    expect(far(drawn(), before)).toBeLessThan(1e-9);
-    line.receive({ name: "Grant", limb: 0, epoch: 3 });
+    expect(distance(tipPosition(), before)).toBeLessThan(1e-9);
+    socket.receive({ name: "Grant", limb: 0, epoch: 3 });
     draw(600);
-    expect(far(drawn(), [0.5, -0.3, 0.4])).toBeLessThan(1e-6);
+    expect(distance(tipPosition(), [0.5, -0.3, 0.4])).toBeLessThan(1e-6);
   });
 });
 
-test("leaving lets all go", () => {
+test("close releases all limbs", () => {
   puppeteer.claim(0);
-  line.receive({ name: "Grant", limb: 0, epoch: 2 });
+  socket.receive({ name: "Grant", limb: 0, epoch: 2 });
   const reasons: string[] = [];
   puppeteer.addEventListener("closed", (event) => reasons.push((event as CustomEvent<string>).detail));
   puppeteer.close();
-  expect(line.messagesOf("Release")).toHaveLength(1);
+  expect(socket.messagesOf("Release")).toHaveLength(1);
   expect(reasons).toEqual(["closed here"]);
 });

@@ -5,66 +5,66 @@ import type { ClientMessage } from "../../src/wire/messages";
 beforeEach(() => void vi.useFakeTimers());
 afterEach(() => void vi.useRealTimers());
 
-function asking() {
-  const said: ClientMessage[] = [];
-  const line = { there: true };
-  const made = new ViewerReporter(
-    (message) => line.there && said.push(message) > 0,
+function startReporter() {
+  const sent: ClientMessage[] = [];
+  const link = { isUp: true };
+  const reporter = new ViewerReporter(
+    (message) => link.isUp && sent.push(message) > 0,
     () => performance.now(),
     () => ({ buffer: 1, decode: 2, frame: 3, hidden: false }),
   );
-  const sequences = () => said.flatMap((one) => (one.name === "Ping" ? [one.sequence] : []));
-  return { made, line, said, sequences };
+  const sequences = () => sent.flatMap((message) => (message.name === "Ping" ? [message.sequence] : []));
+  return { reporter, link, sent, sequences };
 }
 
-test("the time is asked eight times quickly, then every other second, and how it fares is told every second", () => {
-  const { made, said, sequences } = asking();
-  made.restart();
+test("sends 8 pings quickly, then one every 2 s, and a report every second", () => {
+  const { reporter, sent, sequences } = startReporter();
+  reporter.restart();
   for (let sequence = 0; sequence < 7; sequence++) {
-    made.onPong(sequence);
+    reporter.onPong(sequence);
     vi.advanceTimersByTime(60);
   }
   expect(sequences()).toEqual([0, 1, 2, 3, 4, 5, 6, 7]);
-  made.onPong(7);
+  reporter.onPong(7);
   vi.advanceTimersByTime(1_999);
   expect(sequences()).toHaveLength(8);
   vi.advanceTimersByTime(1);
   expect(sequences()).toHaveLength(9);
-  const reports = said.filter(({ name }) => name === "Report");
+  const reports = sent.filter(({ name }) => name === "Report");
   expect(reports).toEqual(
     Array.from({ length: 2 }, () => ({ name: "Report", buffer: 1, decode: 2, frame: 3, hidden: false })),
   );
 });
 
-test("while two questions are not answered nothing is said; an answer lets the next go at once", () => {
-  const { made, said, sequences } = asking();
-  made.restart();
+test("sends nothing while two pings are unanswered, then a ping at once", () => {
+  const { reporter, sent, sequences } = startReporter();
+  reporter.restart();
   vi.advanceTimersByTime(60);
   expect(sequences()).toEqual([0, 1]);
   vi.advanceTimersByTime(30_000);
-  expect(said).toHaveLength(2);
-  made.onPong(1);
+  expect(sent).toHaveLength(2);
+  reporter.onPong(1);
   expect(sequences()).toEqual([0, 1, 2]);
-  made.onPong(1);
+  reporter.onPong(1);
   vi.advanceTimersByTime(60);
   expect(sequences()).toEqual([0, 1, 2, 3]);
 });
 
-test("without a line nothing is asked; a new one is asked quickly again, and once it is over there is nothing more", () => {
-  const { made, line, said, sequences } = asking();
-  made.restart();
-  line.there = false;
+test("sends nothing while disconnected or closed, and starts anew on restart", () => {
+  const { reporter, link, sent, sequences } = startReporter();
+  reporter.restart();
+  link.isUp = false;
   vi.advanceTimersByTime(10_000);
   expect(sequences()).toEqual([0]);
-  line.there = true;
-  made.restart();
+  link.isUp = true;
+  reporter.restart();
   vi.advanceTimersByTime(60);
   expect(sequences()).toEqual([0, 0, 1]);
-  made.pause();
+  reporter.pause();
   vi.advanceTimersByTime(500);
   expect(sequences()).toEqual([0, 0, 1]);
-  made.close();
-  const all = said.length;
+  reporter.close();
+  const count = sent.length;
   vi.advanceTimersByTime(60_000);
-  expect(said).toHaveLength(all);
+  expect(sent).toHaveLength(count);
 });

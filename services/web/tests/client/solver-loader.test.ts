@@ -1,50 +1,50 @@
 import { expect, test, vi } from "vitest";
-import type { LimbSolver } from "../../src/client/solver";
+import type { LimbSolver } from "../../src/client/marionette-solver";
 import { SolverLoader } from "../../src/client/solver-loader";
 import { goldenTrack } from "../golden-motion";
 
 const { figure } = goldenTrack();
-const settled = () => new Promise((done) => setTimeout(done));
+const settle = () => new Promise((done) => setTimeout(done));
 
-test("it is made once, and is there when it is made", async () => {
-  let made: (solver: LimbSolver) => void = () => undefined;
-  const maker = vi.fn(() => new Promise<LimbSolver>((done) => (made = done)));
-  const own = new SolverLoader(figure, "http://stage", maker);
-  await settled();
-  expect(maker).not.toHaveBeenCalled();
-  own.load();
-  own.load();
-  await settled();
-  own.load();
-  expect(own.solver).toBeNull();
+test("solver is created once", async () => {
+  let resolve: (solver: LimbSolver) => void = () => undefined;
+  const factory = vi.fn(() => new Promise<LimbSolver>((done) => (resolve = done)));
+  const loader = new SolverLoader(figure, "http://stage", factory);
+  await settle();
+  expect(factory).not.toHaveBeenCalled();
+  loader.load();
+  loader.load();
+  await settle();
+  loader.load();
+  expect(loader.solver).toBeNull();
   const solver = {} as LimbSolver;
-  made(solver);
-  await settled();
-  own.load();
-  await settled();
-  expect(maker.mock.calls).toEqual([[figure, "http://stage"]]);
-  expect(own.solver).toBe(solver);
+  resolve(solver);
+  await settle();
+  loader.load();
+  await settle();
+  expect(factory.mock.calls).toEqual([[figure, "http://stage"]]);
+  expect(loader.solver).toBe(solver);
 });
 
-test("one that could not be made is tried again, and told", async () => {
-  const warned = vi.spyOn(console, "warn").mockReturnValue();
-  const made = vi
+test("failure is logged, and the next load tries again", async () => {
+  const warn = vi.spyOn(console, "warn").mockReturnValue();
+  const factory = vi
     .fn<() => Promise<LimbSolver>>()
-    .mockRejectedValueOnce(new Error("no line"))
+    .mockRejectedValueOnce(new Error("unreachable"))
     .mockResolvedValue({} as LimbSolver);
-  const own = new SolverLoader(figure, "http://stage", made);
-  own.load();
-  await settled();
-  expect([own.solver, warned.mock.calls.length]).toEqual([null, 1]);
-  own.load();
-  await settled();
-  expect(own.solver).not.toBeNull();
-  warned.mockRestore();
+  const loader = new SolverLoader(figure, "http://stage", factory);
+  loader.load();
+  await settle();
+  expect([loader.solver, warn.mock.calls.length]).toEqual([null, 1]);
+  loader.load();
+  await settle();
+  expect(loader.solver).not.toBeNull();
+  warn.mockRestore();
 });
 
-test("with none wanted there is none", async () => {
-  const own = new SolverLoader(figure, "http://stage", null);
-  own.load();
-  await settled();
-  expect(own.solver).toBeNull();
+test("null factory loads nothing", async () => {
+  const loader = new SolverLoader(figure, "http://stage", null);
+  loader.load();
+  await settle();
+  expect(loader.solver).toBeNull();
 });

@@ -1,4 +1,4 @@
-/** For `make pictures`: these draw pictures of the running page, and test nothing. */
+/** Configuration of `make pictures`, which takes screenshots and tests nothing. */
 import { defineConfig } from "vitest/config";
 
 export default defineConfig({

@@ -9,11 +9,11 @@ import { goldenCameraBlocks, goldenCameraNumbers, goldenScene } from "../golden-
 import { decodeBase64, loadVectors } from "../golden-vectors";
 
 const golden = loadVectors<BlockVectors>("blocks").valid;
-// three blocks: the golden ones of 30, 30 and 18 frames at 30 fps
+// three blocks of 30, 30 and 18 frames at 30 fps
 const track = goldenTrack();
 const [best, lowest, middle, last] = golden.map((vector) => decodeBase64(vector.block));
 
-function filled(): MotionBlockStore {
+function createFullStore(): MotionBlockStore {
   const store = new MotionBlockStore(track);
   store.put(0, 1, best);
   store.put(1, 0, lowest);
@@ -21,36 +21,36 @@ function filled(): MotionBlockStore {
   return store;
 }
 
-test("the golden track has three blocks", () => {
+test("golden track has three blocks", () => {
   expect([track.blockCount, track.framesIn(0), track.framesIn(2), track.durationUs]).toEqual([3, 30, 18, 2_600_000]);
 });
 
-describe("what is kept", () => {
-  test("the best rate of each block", () => {
+describe("put", () => {
+  test("stores the highest level of each block", () => {
     const store = new MotionBlockStore(track);
     expect([...store.levels]).toEqual([-1, -1, -1]);
     expect(store.put(1, 1, middle)).toBe(true);
     expect(store.put(1, 0, lowest)).toBe(false);
     expect(store.put(1, 3, best)).toBe(true);
     expect([...store.levels]).toEqual([-1, 3, -1]);
-    const kept = restPose(),
-      wanted = restPose();
-    store.poseAt(1_000_000, false, kept);
-    decodeMotionBlock(track, best).poseAt(0, wanted);
-    expect(kept).toEqual(wanted);
+    const actual = restPose(),
+      expected = restPose();
+    store.poseAt(1_000_000, false, actual);
+    decodeMotionBlock(track, best).poseAt(0, expected);
+    expect(actual).toEqual(expected);
   });
 
-  test("nothing that is damaged or of another motion", () => {
+  test("rejects blocks that are damaged or of another track", () => {
     const store = new MotionBlockStore(track);
     expect(() => store.put(3, 0, last)).toThrow(DamagedBlock);
-    expect(() => store.put(0, 0, last)).toThrow("block 0 has 30 frames, not 18");
+    expect(() => store.put(0, 0, last)).toThrow("Block 0 has 18 frames, expected 30");
     expect(() => store.put(0, 0, best.subarray(0, 0))).toThrow(DamagedBlock);
     expect([...store.levels]).toEqual([-1, -1, -1]);
   });
 });
 
-describe("how much is ahead", () => {
-  test("up to the first gap", () => {
+describe("buffered duration", () => {
+  test("ends at the first gap", () => {
     const store = new MotionBlockStore(track);
     expect(store.bufferedUs(0, true)).toBe(0);
     store.put(0, 0, best);
@@ -61,29 +61,29 @@ describe("how much is ahead", () => {
     expect(store.bufferedUs(2_100_000, true)).toBe(1_500_000);
   });
 
-  test("once around at most", () => {
-    expect(filled().bufferedUs(700_000, true)).toBe(2_600_000);
-    expect(filled().bufferedUs(700_000, false)).toBe(1_900_000);
+  test("is at most one loop", () => {
+    expect(createFullStore().bufferedUs(700_000, true)).toBe(2_600_000);
+    expect(createFullStore().bufferedUs(700_000, false)).toBe(1_900_000);
   });
 });
 
-describe("the pose", () => {
-  test("is missing with its block, and leaves what was there", () => {
+describe("pose", () => {
+  test("is unchanged if its block is missing", () => {
     const store = new MotionBlockStore(track);
     const pose = restPose();
     expect(store.poseAt(0, true, pose)).toBe(false);
     expect(pose).toEqual(restPose());
   });
 
-  test("is the block's at a frame", () => {
+  test("equals the block's at a frame", () => {
     const pose = restPose(),
-      wanted = restPose();
-    filled().poseAt(9.5e6 / 30, true, pose);
-    decodeMotionBlock(track, best).poseAt(9.5, wanted);
-    pose.rotations.forEach((value, i) => expect(value).toBeCloseTo(wanted.rotations[i], 12));
+      expected = restPose();
+    createFullStore().poseAt(9.5e6 / 30, true, pose);
+    decodeMotionBlock(track, best).poseAt(9.5, expected);
+    pose.rotations.forEach((value, i) => expect(value).toBeCloseTo(expected.rotations[i], 12));
   });
 
-  test("is the block's where the first is shorter than the others", () => {
+  test("equals the block's if the first block is shorter", () => {
     const short = goldenTrack(1);
     const blocks = loadVectors<BlockVectors>("blocks")
       .valid.filter((vector) => vector.track === 1)
@@ -99,16 +99,16 @@ describe("the pose", () => {
       [40, 2, 4],
     ]) {
       const pose = restPose(),
-        wanted = restPose();
+        expected = restPose();
       store.poseAt((frame * 1e6) / short.fps, false, pose);
-      decodeMotionBlock(short, decodeBase64(blocks[index].block)).poseAt(instant, wanted);
-      pose.rotations.forEach((value, i) => expect(value).toBeCloseTo(wanted.rotations[i], 6));
-      pose.root.forEach((value, i) => expect(value).toBeCloseTo(wanted.root[i], 6));
+      decodeMotionBlock(short, decodeBase64(blocks[index].block)).poseAt(instant, expected);
+      pose.rotations.forEach((value, i) => expect(value).toBeCloseTo(expected.rotations[i], 6));
+      pose.root.forEach((value, i) => expect(value).toBeCloseTo(expected.root[i], 6));
     }
   });
 
-  test("between two blocks lies between their poses, and passes to each without a step", () => {
-    const store = filled();
+  test("is interpolated between blocks without a step", () => {
+    const store = createFullStore();
     const poses = [0, 1e-6, 0.5, 1 - 1e-6, 1].map((mix) => {
       const pose = restPose();
       store.poseAt(((29 + mix) * 1e6) / 30, true, pose);
@@ -125,51 +125,51 @@ describe("the pose", () => {
     }
   });
 
-  test("at the end of a loop goes over into the start, and without a loop stays", () => {
-    const store = filled();
+  test("is interpolated at the end of a loop, and stays without one", () => {
+    const store = createFullStore();
     const first = restPose(),
       looped = restPose(),
-      stayed = restPose();
+      unlooped = restPose();
     store.poseAt(0, true, first);
     store.poseAt(2_600_000 - 0.01, true, looped);
     looped.root.forEach((value, i) => expect(Math.abs(value - first.root[i])).toBeLessThan(1e-5));
-    store.poseAt(2_600_000, false, stayed);
-    const wanted = restPose();
-    decodeMotionBlock(track, last).poseAt(17.5, wanted);
-    expect(stayed).toEqual(wanted);
+    store.poseAt(2_600_000, false, unlooped);
+    const expected = restPose();
+    decodeMotionBlock(track, last).poseAt(17.5, expected);
+    expect(unlooped).toEqual(expected);
   });
 
-  test("past the end of a track that is shorter than the motion stands still, in a loop too", () => {
-    const store = filled();
-    const still = restPose(),
+  test("is constant past the end of a shorter track", () => {
+    const store = createFullStore();
+    const endPose = restPose(),
       pose = restPose(),
       looped = restPose();
-    store.poseAt(2_600_000, false, still, 4_000_000);
+    store.poseAt(2_600_000, false, endPose, 4_000_000);
     for (const position of [2_600_001, 3_000_000, 3_999_999]) {
       for (const loop of [true, false]) {
         expect(store.poseAt(position, loop, pose, 4_000_000)).toBe(true);
-        expect(pose).toEqual(still);
+        expect(pose).toEqual(endPose);
       }
     }
-    // one that is shorter by less than a frame goes over into the start all the same
+    // a track that is shorter by less than a frame is interpolated at the end of a loop
     store.poseAt(2_600_000 - 0.01, true, looped);
     store.poseAt(2_600_000 - 0.01, true, pose, 2_633_000);
     expect(pose).toEqual(looped);
-    expect(pose).not.toEqual(still);
+    expect(pose).not.toEqual(endPose);
   });
 
-  test("of a track that is longer than the motion is what it is at that instant", () => {
+  test("of a longer track is not affected by the motion's duration", () => {
     const short = restPose(),
       whole = restPose();
     for (const position of [0, 500_000, 1_099_999, 1_100_000]) {
-      filled().poseAt(position, true, short, 1_100_000);
-      filled().poseAt(position, true, whole);
+      createFullStore().poseAt(position, true, short, 1_100_000);
+      createFullStore().poseAt(position, true, whole);
       expect(short).toEqual(whole);
     }
   });
 });
 
-describe("a camera", () => {
+describe("camera", () => {
   const DURATION = 2_600_000;
 
   function camera(...missing: number[]): SceneBlockStore {
@@ -178,12 +178,12 @@ describe("a camera", () => {
     return store;
   }
 
-  function expectNear(got: Float64Array | null, wanted: readonly number[]): void {
-    expect(got).not.toBeNull();
-    wanted.forEach((value, i) => expect(Math.abs(got![i] - value)).toBeLessThan(1e-6));
+  function expectNear(actual: Float64Array | null, expected: readonly number[]): void {
+    expect(actual).not.toBeNull();
+    expected.forEach((value, i) => expect(Math.abs(actual![i] - value)).toBeLessThan(1e-6));
   }
 
-  test("is the block's at a frame, and its blocks are kept as a motion's", () => {
+  test("equals the block's at a frame, and stores blocks like a motion", () => {
     const store = camera();
     for (const index of [0, 1, 2]) {
       const [first, last] = goldenCameraNumbers(index);
@@ -196,7 +196,7 @@ describe("a camera", () => {
     expect(() => store.put(3, 1, goldenCameraBlocks[1][0])).toThrow(DamagedBlock);
   });
 
-  test("goes over borders and round a loop in a line", () => {
+  test("is interpolated linearly between blocks and at the end of a loop", () => {
     const store = camera();
     for (const [before, after] of [
       [0, 1],
@@ -208,31 +208,31 @@ describe("a camera", () => {
     }
   });
 
-  test("stands still past its end in a loop too, where the motion is longer", () => {
+  test("is constant past the end of a shorter track", () => {
     const store = camera();
     const end = Float64Array.from(store.sceneAt(DURATION, true, 2 * DURATION)!);
     goldenCameraNumbers(2)[1].forEach((value, i) => expect(Math.abs(end[i] - value)).toBeLessThan(0.02));
     expect(store.sceneAt(1.9 * DURATION, true, 2 * DURATION)).toEqual(end);
   });
 
-  test("stands still where its block is missing, and is nothing before there is any", () => {
+  test("is constant while a block is missing, and null before the first", () => {
     const store = camera(0);
     expect(store.sceneAt(0, true, DURATION)).toBeNull();
-    const seen = Float64Array.from(store.sceneAt(1_000_000, true, DURATION)!);
-    expect(store.sceneAt(0, true, DURATION)).toEqual(seen);
+    const previous = Float64Array.from(store.sceneAt(1_000_000, true, DURATION)!);
+    expect(store.sceneAt(0, true, DURATION)).toEqual(previous);
   });
 });
 
-test("a store adopts what another holds better, and leaves it as it is", () => {
-  const [one, other] = [new MotionBlockStore(track), new MotionBlockStore(track)];
-  one.put(0, 1, best);
-  other.put(0, 0, lowest);
-  other.put(1, 0, middle);
-  one.mergeFrom(other);
-  expect([[...one.levels], [...other.levels]]).toEqual([
+test("mergeFrom copies higher levels and leaves the source unchanged", () => {
+  const [store, source] = [new MotionBlockStore(track), new MotionBlockStore(track)];
+  store.put(0, 1, best);
+  source.put(0, 0, lowest);
+  source.put(1, 0, middle);
+  store.mergeFrom(source);
+  expect([[...store.levels], [...source.levels]]).toEqual([
     [1, 0, -1],
     [0, 0, -1],
   ]);
   const pose = restPose();
-  expect([0, 40e6 / 30, 70e6 / 30].map((position) => one.poseAt(position, false, pose))).toEqual([true, true, false]);
+  expect([0, 40e6 / 30, 70e6 / 30].map((position) => store.poseAt(position, false, pose))).toEqual([true, true, false]);
 });

@@ -6,21 +6,21 @@ import type { Overlay } from "../../src/wire/overlay";
 
 const QUARTER = Math.round(32767 / 4);
 
-/** An overlay that turns the first joint of each of `limbs` about x by `units`. */
+/** Return an overlay that turns the first joint of each of `limbs` about x by `units`. */
 function overlay(due: number, units: number, ...limbs: number[]): Overlay {
   const numbers = () => Int16Array.of(units, 0, 0, 0, 0, 0, 0, 0, 0);
   return { name: "Overlay", sequence: 0, due, limbs: new Map(limbs.map((limb) => [limb, numbers()])), earlier: [] };
 }
 
-/** The angle about x of `joint` at `clock`. */
+/** Return the angle about x of `joint` at `clock`. */
 function angle(overlays: OverlayBuffer, clock: number, joint = 12): number {
   const pose = restPose();
   overlays.apply(clock, pose);
   return 2 * Math.atan2(pose.rotations[joint * 4 + 1], pose.rotations[joint * 4]);
 }
 
-describe("a pulled limb", () => {
-  test("goes evenly from each overlay to the next", () => {
+describe("controlled limb", () => {
+  test("is interpolated between overlays", () => {
     const overlays = new OverlayBuffer();
     overlays.put(overlay(1_000_000, 0, 0));
     overlays.put(overlay(1_100_000, QUARTER, 0));
@@ -29,7 +29,7 @@ describe("a pulled limb", () => {
     expect(angle(overlays, 1_100_000)).toBeCloseTo(Math.PI / 4, 3);
   });
 
-  test("starts from the dance where the overlay before left it to the dance", () => {
+  test("is blended in from the motion if it is new in an overlay", () => {
     const overlays = new OverlayBuffer();
     overlays.put(overlay(1_000_000, QUARTER, 1));
     overlays.put(overlay(1_100_000, QUARTER, 0, 1));
@@ -37,7 +37,7 @@ describe("a pulled limb", () => {
     expect(angle(overlays, 1_050_000, 15)).toBeCloseTo(Math.PI / 4, 3);
   });
 
-  test("is the dance's again after the last overlay, an empty one or silence", () => {
+  test("returns to the motion after an empty overlay or the hold time", () => {
     const overlays = new OverlayBuffer();
     overlays.put(overlay(1_000_000, QUARTER, 0));
     expect(overlays.apply(1_000_000 + OVERLAY_HOLD_US - 1, restPose())).toBe(1);
@@ -46,7 +46,7 @@ describe("a pulled limb", () => {
     expect(overlays.apply(1_050_000, restPose())).toBe(0);
   });
 
-  test("is not laid before the first overlay is due", () => {
+  test("is not replaced before the first overlay is due", () => {
     const overlays = new OverlayBuffer();
     overlays.put(overlay(1_000_000, QUARTER, 0));
     overlays.put(overlay(1_000_000 + 2 * OVERLAY_HOLD_US, QUARTER, 0));
@@ -56,7 +56,7 @@ describe("a pulled limb", () => {
   });
 });
 
-test("late and doubled overlays are put in their places", () => {
+test("late and duplicate overlays are inserted by due time", () => {
   const overlays = new OverlayBuffer();
   overlays.put(overlay(1_200_000, 0, 0));
   overlays.put(overlay(1_000_000, 0, 0));
@@ -66,7 +66,7 @@ test("late and doubled overlays are put in their places", () => {
   expect(angle(overlays, 1_150_000)).toBeCloseTo(Math.PI / 8, 3);
 });
 
-test("an overlay of several frames is each of them at its time", () => {
+test("frames of an overlay apply at their own times", () => {
   const overlays = new OverlayBuffer();
   const [first, second, third] = [0, 4_000, 10_000].map((units) => overlay(0, units, 0).limbs);
   overlays.put({ name: "Overlay", sequence: 0, due: 1_033_334, limbs: third, earlier: [first, second] });
@@ -81,7 +81,7 @@ test("an overlay of several frames is each of them at its time", () => {
   ].forEach(([clock, units]) => expect(angle(overlays, clock)).toBeCloseTo(units * unit, 9));
 });
 
-test("only the pulled limbs change, and rotations stay of unit length", () => {
+test("only controlled limbs change, and rotations have unit length", () => {
   const number = fc.integer({ min: -32767, max: 32767 });
   const limbs = fc.uniqueArray(fc.nat(3));
   const one = fc.tuple(fc.integer({ min: 0, max: 600_000 }), limbs, fc.array(number, { minLength: 9, maxLength: 9 }));
@@ -106,8 +106,8 @@ test("only the pulled limbs change, and rotations stay of unit length", () => {
   );
 });
 
-describe("of several performers", () => {
-  test("each limb is laid over its own, and the others stay as they are", () => {
+describe("several performers", () => {
+  test("overlay changes only the performer of the limb", () => {
     const overlays = new OverlayBuffer();
     overlays.put(overlay(1_000_000, QUARTER, 5, 14));
     overlays.put(overlay(1_100_000, QUARTER, 5, 14));
@@ -116,7 +116,7 @@ describe("of several performers", () => {
     const joints = poses.map(({ rotations }) =>
       [...rotations.keys()].filter((at) => rotations[at] !== restPose().rotations[at]).map((at) => Math.floor(at / 4)),
     );
-    // the right shoulder of the second, the left hip of the fourth
+    // right shoulder of the second performer, left hip of the fourth
     expect(joints.map((changed) => [...new Set(changed)])).toEqual([[], [15], [], [2]]);
     for (const [performer, joint] of [
       [1, 15],
@@ -127,7 +127,7 @@ describe("of several performers", () => {
     }
   });
 
-  test("the limb of one goes over from its own dance while another's is held", () => {
+  test("limb is blended in while another performer's is held", () => {
     const overlays = new OverlayBuffer();
     overlays.put(overlay(1_000_000, QUARTER, 0));
     overlays.put(overlay(1_100_000, QUARTER, 0, 4));
@@ -135,13 +135,13 @@ describe("of several performers", () => {
     expect(overlays.apply(1_050_000, pose, 1)).toBe(1);
     expect(2 * Math.atan2(pose.rotations[49], pose.rotations[48])).toBeCloseTo(Math.PI / 8, 3);
     expect(angle(overlays, 1_050_000)).toBeCloseTo(Math.PI / 4, 3);
-    // let go in the next, it is the dance's at once
+    // not in the next overlay: it returns to the motion at once
     overlays.put(overlay(1_150_000, QUARTER, 0));
     expect(overlays.apply(1_120_000, restPose(), 1)).toBe(0);
   });
 });
 
-test("another motion starts without the old overlays", () => {
+test("clear removes all overlays", () => {
   const overlays = new OverlayBuffer();
   overlays.put(overlay(1_000_000, QUARTER, 0));
   overlays.clear();

@@ -4,7 +4,7 @@ import { Slew } from "../../src/playout/slew";
 
 const numbers = fc.double({ min: -5e6, max: 5e6, noNaN: true });
 
-test("it starts where it is told to, and comes to its goal", () => {
+test("starts at the initial offset and reaches the target", () => {
   const slew = new Slew();
   slew.start(1000, 5000, 100);
   expect(slew.at(50)).toBe(1000);
@@ -12,24 +12,24 @@ test("it starts where it is told to, and comes to its goal", () => {
   expect(slew.at(1e9)).toBeCloseTo(5000);
 });
 
-test("a new goal is gone to from where it is, and time that it is added to never runs backwards", () => {
-  const change = fc.record({ goal: numbers, after: fc.double({ min: 0, max: 1e6, noNaN: true }) });
+test("new target is approached without a step, and time never runs backwards", () => {
+  const change = fc.record({ target: numbers, after: fc.double({ min: 0, max: 1e6, noNaN: true }) });
   fc.assert(
     fc.property(numbers, fc.array(change, { minLength: 1, maxLength: 12 }), (from, changes) => {
       const slew = new Slew();
       slew.start(from, from, 0);
       let local = 0,
-        shown = from;
-      for (const { goal, after } of changes) {
+        presented = from;
+      for (const { target, after } of changes) {
         for (let step = 1; step <= 20; step++) {
           const at = local + (after * step) / 20;
           const now = at + slew.at(at);
-          expect(now).toBeGreaterThanOrEqual(shown - 1e-3);
-          shown = now;
+          expect(now).toBeGreaterThanOrEqual(presented - 1e-3);
+          presented = now;
         }
         local += after;
         const before = slew.at(local);
-        slew.slewTo(goal, local);
+        slew.slewTo(target, local);
         expect(slew.at(local)).toBeCloseTo(before, 3);
       }
     }),

@@ -4,14 +4,14 @@ import { positionAt, TimelineHistory } from "../../src/playout/timeline";
 import { spansBetween } from "../../src/playout/timeline-span";
 import type { TimelineState } from "../../src/wire/messages";
 
-const UNIX = 1_774_000_000_000_000;
+const EPOCH_US = 1_774_000_000_000_000;
 
 function state(change: Partial<TimelineState> = {}): TimelineState {
   return {
     name: "TimelineState",
     epoch: 1,
     motion: "dance",
-    clock: UNIX,
+    clock: EPOCH_US,
     position: 0,
     playing: true,
     loop: true,
@@ -22,26 +22,26 @@ function state(change: Partial<TimelineState> = {}): TimelineState {
 
 function timelines(...states: TimelineState[]): TimelineHistory {
   const all = new TimelineHistory();
-  for (const one of states) all.put(one);
+  for (const state of states) all.put(state);
   return all;
 }
 
-/** Spans told from `UNIX` on. */
+/** Return the spans with clock times relative to `EPOCH_US`. */
 function spans(all: TimelineHistory, from: number, to: number): unknown[] {
-  return spansBetween(all, UNIX + from, UNIX + to).map((span) => [
-    span.start - UNIX,
-    span.end - UNIX,
+  return spansBetween(all, EPOCH_US + from, EPOCH_US + to).map((span) => [
+    span.start - EPOCH_US,
+    span.end - EPOCH_US,
     span.position,
     span.isMoving,
   ]);
 }
 
-test("before there is a timeline there is nothing", () => {
+test("there are no spans before the first timeline", () => {
   expect(spansBetween(new TimelineHistory(), 0, 1e6)).toEqual([]);
 });
 
-describe("a stretch is", () => {
-  test("one span where the motion goes on, stands, or waits to begin", () => {
+describe("interval", () => {
+  test("is one span if the motion plays, stands, or has not begun", () => {
     expect(spans(timelines(state()), 100_000, 200_000)).toEqual([[100_000, 200_000, 100_000, true]]);
     expect(spans(timelines(state({ playing: false, position: 7 })), 100_000, 200_000)).toEqual([
       [100_000, 200_000, 7, false],
@@ -49,7 +49,7 @@ describe("a stretch is", () => {
     expect(spans(timelines(state({ position: 7 })), -200_000, -100_000)).toEqual([[-200_000, -100_000, 7, false]]);
   });
 
-  test("cut where it begins, where a loop begins anew and where the motion ends", () => {
+  test("is cut at the begin, at a loop's restart, and at the end", () => {
     expect(spans(timelines(state({ position: 7 })), -100, 100)).toEqual([
       [-100, 0, 7, false],
       [0, 100, 7, true],
@@ -64,23 +64,26 @@ describe("a stretch is", () => {
     ]);
   });
 
-  test("cut where an edit takes effect", () => {
+  test("is cut where an edit takes effect", () => {
     const twice = timelines(
       state(),
-      state({ epoch: 2, clock: UNIX + 120_000, position: 0 }),
-      state({ epoch: 3, clock: UNIX + 150_000, position: 2_000_000 }),
+      state({ epoch: 2, clock: EPOCH_US + 120_000, position: 0 }),
+      state({ epoch: 3, clock: EPOCH_US + 150_000, position: 2_000_000 }),
     );
     expect(spans(twice, 100_000, 200_000)).toEqual([
       [100_000, 120_000, 0, false],
       [120_000, 150_000, 0, true],
       [150_000, 200_000, 2_000_000, true],
     ]);
-    const sought = timelines(state(), state({ epoch: 2, clock: UNIX + 150_000, position: 2_000_000 }));
-    expect(spans(sought, 100_000, 200_000)).toEqual([
+    const afterSeek = timelines(state(), state({ epoch: 2, clock: EPOCH_US + 150_000, position: 2_000_000 }));
+    expect(spans(afterSeek, 100_000, 200_000)).toEqual([
       [100_000, 150_000, 100_000, true],
       [150_000, 200_000, 2_000_000, true],
     ]);
-    const paused = timelines(state(), state({ epoch: 2, clock: UNIX + 150_000, position: 150_000, playing: false }));
+    const paused = timelines(
+      state(),
+      state({ epoch: 2, clock: EPOCH_US + 150_000, position: 150_000, playing: false }),
+    );
     expect(spans(paused, 100_000, 200_000)).toEqual([
       [100_000, 150_000, 100_000, true],
       [150_000, 200_000, 150_000, false],
@@ -88,8 +91,8 @@ describe("a stretch is", () => {
   });
 });
 
-test("spans have no gaps, and are where the timelines are", () => {
-  const one = fc.record({
+test("spans have no gaps and match the timelines", () => {
+  const editValues = fc.record({
     clock: fc.integer({ min: -300_000, max: 300_000 }),
     position: fc.integer({ min: 0, max: 90_000 }),
     playing: fc.boolean(),
@@ -97,7 +100,7 @@ test("spans have no gaps, and are where the timelines are", () => {
   });
   fc.assert(
     fc.property(
-      fc.array(one, { minLength: 1, maxLength: 3 }),
+      fc.array(editValues, { minLength: 1, maxLength: 3 }),
       fc.integer({ min: 1, max: 90_000 }),
       fc.integer({ min: -400_000, max: 400_000 }),
       (edits, duration, from) => {
@@ -107,12 +110,12 @@ test("spans have no gaps, and are where the timelines are", () => {
               ...edit,
               duration,
               epoch: nth + 1,
-              clock: UNIX + edit.clock,
+              clock: EPOCH_US + edit.clock,
               position: Math.min(edit.position, duration),
             }),
           ),
         );
-        const [begin, end] = [UNIX + from, UNIX + from + 62_500];
+        const [begin, end] = [EPOCH_US + from, EPOCH_US + from + 62_500];
         const found = spansBetween(all, begin, end);
         expect([found[0].start, found.at(-1)!.end]).toEqual([begin, end]);
         found.forEach((span, nth) => {

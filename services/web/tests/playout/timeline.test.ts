@@ -17,18 +17,18 @@ function state(change: Partial<TimelineState> = {}): TimelineState {
   };
 }
 
-test("plays from its position, waits before its clock, stands when paused", () => {
+test("position advances from the clock time on, unless paused", () => {
   expect(positionAt(state(), 2_000)).toBe(1_500);
   expect(positionAt(state(), 10)).toBe(500);
   expect(positionAt(state({ playing: false }), 9_000)).toBe(500);
 });
 
-test("a loop goes round, and without one the end holds", () => {
+test("position wraps in a loop, and stays at the end without one", () => {
   expect(positionAt(state(), 1_000 + 3_500)).toBe(0);
   expect(positionAt(state({ loop: false }), 1_000_000)).toBe(4_000);
 });
 
-test("is always within the motion", () => {
+test("position is always within the motion", () => {
   fc.assert(
     fc.property(fc.nat(1e9), fc.nat(4_000), fc.boolean(), fc.boolean(), (clock, position, playing, loop) => {
       const at = positionAt(state({ position, playing, loop }), clock);
@@ -38,7 +38,7 @@ test("is always within the motion", () => {
   );
 });
 
-test("a higher epoch replaces a lower one, once its clock has come", () => {
+test("higher epoch applies from its clock time on", () => {
   const timelines = new TimelineHistory();
   expect(timelines.at(0)).toBeNull();
   const first = state(),
@@ -51,7 +51,7 @@ test("a higher epoch replaces a lower one, once its clock has come", () => {
   expect(timelines.at(5_000)).toBe(second);
 });
 
-test("a timeline of another motion holds at once: the blocks of the one before are gone", () => {
+test("timeline of another motion applies at once", () => {
   const timelines = new TimelineHistory();
   timelines.put(state());
   const other = state({ epoch: 2, motion: "b", clock: 9_000 });
@@ -59,7 +59,7 @@ test("a timeline of another motion holds at once: the blocks of the one before a
   expect(timelines.at(2_000)).toBe(other);
 });
 
-test("a new connection counts its epochs anew", () => {
+test("restart accepts any epoch", () => {
   const timelines = new TimelineHistory();
   timelines.put(state({ epoch: 9 }));
   timelines.restart();

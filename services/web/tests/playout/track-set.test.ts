@@ -8,7 +8,7 @@ import { loadVectors } from "../golden-vectors";
 
 afterEach(() => void vi.restoreAllMocks());
 
-test("each track is found by its index, the dance and the scenes beside it", () => {
+test("stores are found by track index", () => {
   const tracks = new TrackSet([goldenScene(1), { type: "song" }, goldenDescription(), goldenScene(0)]);
   expect(tracks.store(2)).toBe(tracks.firstPerformer);
   expect(tracks.firstPerformer.track.durationUs).toBe(2_600_000);
@@ -18,7 +18,7 @@ test("each track is found by its index, the dance and the scenes beside it", () 
 });
 
 describe("several performers", () => {
-  test("are one for each motion, in the Description's order, the first the show's", () => {
+  test("are the motion tracks in the Description's order", () => {
     const tracks = new TrackSet([
       goldenDescription(1),
       goldenScene(),
@@ -31,26 +31,26 @@ describe("several performers", () => {
     expect(tracks.performers[0]).toBe(tracks.firstPerformer);
   });
 
-  test("of whom one cannot be read keep their numbers", () => {
-    const warned = vi.spyOn(console, "warn").mockReturnValue();
+  test("keep their numbers if one cannot be played", () => {
+    const warn = vi.spyOn(console, "warn").mockReturnValue();
     const far = { ...goldenDescription(), place: [0, 101, 0] };
     const tracks = new TrackSet([goldenDescription(), far, goldenDescription(1)]);
     expect(tracks.performers.map((store) => store?.track.frames)).toEqual([78, undefined, 66]);
     expect(tracks.performers[1]).toBeNull();
     expect([1, 2].map((track) => tracks.store(track))).toEqual([null, tracks.performers[2]]);
-    expect(warned.mock.calls[0][0]).toContain(
-      "the motion at 1 of this stream is left out: Invalid motion track: place must be within 100 metres",
+    expect(warn.mock.calls[0][0]).toContain(
+      "Skipped track 1 (motion) of the stream: Invalid motion track: place must be within 100 metres",
     );
   });
 
-  test("of whom the first cannot be read are no show", () => {
+  test("are rejected if the first one cannot be played", () => {
     expect(() => new TrackSet([{ ...goldenDescription(), place: [0] }, goldenDescription(1)])).toThrow(
       "motion track: place must",
     );
   });
 
-  test("are four at most, those that cannot be read among them", () => {
-    const warned = vi.spyOn(console, "warn").mockReturnValue();
+  test("are at most four, including those that cannot be played", () => {
+    const warn = vi.spyOn(console, "warn").mockReturnValue();
     const tracks = new TrackSet([
       goldenDescription(),
       { ...goldenDescription(), codec: "?" },
@@ -60,10 +60,10 @@ describe("several performers", () => {
       { ...goldenDescription(), codec: "?" },
     ]);
     expect(tracks.performers.map((store) => store !== null)).toEqual([true, false, true, true]);
-    expect([tracks.store(4), tracks.store(5), warned.mock.calls.length]).toEqual([null, null, 1]);
+    expect([tracks.store(4), tracks.store(5), warn.mock.calls.length]).toEqual([null, null, 1]);
   });
 
-  test("may be told of later, one by one, and none is counted twice", () => {
+  test("may be described later, and none is added twice", () => {
     const tracks = new TrackSet([goldenDescription()]);
     const others = [goldenScene(), goldenDescription(1), goldenDescription(2)];
     tracks.add(1, others.slice(0, 2));
@@ -75,38 +75,38 @@ describe("several performers", () => {
   });
 });
 
-test("tracks that are told of later are found by their index too, and none is told of twice", () => {
-  const [sound] = loadVectors<{ tracks: Track[] }>("audio").tracks;
+test("tracks that are described later are found, and none is added twice", () => {
+  const [audio] = loadVectors<{ tracks: Track[] }>("audio").tracks;
   const tracks = new TrackSet([goldenDescription()]);
   expect([tracks.describedCount, tracks.scenes.length, tracks.audio]).toEqual([1, 0, null]);
-  tracks.add(1, [sound, goldenScene(1)]);
-  const { firstPerformer: dance } = tracks;
-  tracks.add(0, [goldenDescription(), sound, goldenScene(1), goldenScene(0)]);
+  tracks.add(1, [audio, goldenScene(1)]);
+  const { firstPerformer } = tracks;
+  tracks.add(0, [goldenDescription(), audio, goldenScene(1), goldenScene(0)]);
   expect(tracks.scenes.map((store) => store.track.kind)).toEqual(["light", "camera"]);
-  expect([0, 1, 2, 3].map((track) => tracks.store(track))).toEqual([dance, tracks.audio, ...tracks.scenes]);
+  expect([0, 1, 2, 3].map((track) => tracks.store(track))).toEqual([firstPerformer, tracks.audio, ...tracks.scenes]);
   expect(tracks.describedCount).toBe(4);
 });
 
-test("a camera that cannot be read is left out, and the dance goes on", () => {
-  const warned = vi.spyOn(console, "warn").mockReturnValue();
+test("camera that cannot be decoded is skipped", () => {
+  const warn = vi.spyOn(console, "warn").mockReturnValue();
   const tracks = new TrackSet([goldenDescription(), { ...goldenScene(), codec: "bunraku.scene/9" }, goldenScene(1)]);
   expect(tracks.scenes.map((store) => store.track.kind)).toEqual(["light"]);
   expect(tracks.store(1)).toBeNull();
-  expect(warned.mock.calls[0][0]).toContain("bunraku.scene/9");
+  expect(warn.mock.calls[0][0]).toContain("bunraku.scene/9");
 });
 
-test("the first sound is the show's, timed as the dance; one that cannot be read is left out", () => {
-  const [sound] = loadVectors<{ tracks: Track[] }>("audio").tracks;
-  const tracks = new TrackSet([sound, goldenDescription(), { ...sound, channels: 1 }]);
+test("first audio track is used; one that cannot be decoded is skipped", () => {
+  const [audio] = loadVectors<{ tracks: Track[] }>("audio").tracks;
+  const tracks = new TrackSet([audio, goldenDescription(), { ...audio, channels: 1 }]);
   expect(tracks.audio?.track.channels).toBe(2);
   expect(tracks.audio?.track.blockCount).toBe(tracks.firstPerformer.track.blockCount);
   expect([tracks.store(0), tracks.store(2)]).toEqual([tracks.audio, null]);
-  const warned = vi.spyOn(console, "warn").mockReturnValue();
-  expect(new TrackSet([goldenDescription(), { ...sound, codec: "bunraku.audio/9" }]).audio).toBeNull();
-  expect(warned.mock.calls[0][0]).toContain("bunraku.audio/9");
+  const warn = vi.spyOn(console, "warn").mockReturnValue();
+  expect(new TrackSet([goldenDescription(), { ...audio, codec: "bunraku.audio/9" }]).audio).toBeNull();
+  expect(warn.mock.calls[0][0]).toContain("bunraku.audio/9");
 });
 
-test("without a dance there is nothing to show", () => {
+test("stream without a motion track is rejected", () => {
   expect(() => new TrackSet([goldenScene()])).toThrow(DamagedBlock);
-  expect(() => new TrackSet([])).toThrow("the stream has no motion in it");
+  expect(() => new TrackSet([])).toThrow("The stream has no motion track");
 });

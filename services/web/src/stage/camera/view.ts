@@ -18,7 +18,7 @@ export function createView(): CameraView {
   return { position: new Vector3(0, 1, 4), gaze: new Vector3(0, 1, 0), fov: 0.5 };
 }
 
-/** Write the seven numbers of a camera (`proto/SPEC.md`, Scene block) into a view. */
+/** Write the seven numbers of a camera (`proto/codec.md`, 2.14) into a view. */
 export function viewFromNumbers(numbers: ArrayLike<number>, out: CameraView): void {
   out.position.set(numbers[0], numbers[1], numbers[2]);
   out.gaze.set(numbers[3], numbers[4], numbers[5]);

@@ -1,13 +1,13 @@
-/** How far what is heard is from what is shown: case `audio`, which the browser's own test measures. */
+/** Case `audio`: time difference of sound and stage, measured by `tests/browser/audio.test.ts`. */
 import { execFileSync } from "node:child_process";
 import { resolve } from "node:path";
 import type { BenchContext, BenchFigures } from "./bench";
 
 export function benchAudioSync({ note }: BenchContext): Promise<BenchFigures> {
   const web = resolve(import.meta.dirname, "../../..");
-  const said = execFileSync(
+  const output = execFileSync(
     "npx",
-    ["vitest", "run", "tests/browser/audio.test.ts", "-t", "is heard where the stage is"],
+    ["vitest", "run", "tests/browser/audio.test.ts", "-t", "clicks are heard in time with the stage"],
     {
       cwd: web,
       env: { ...process.env, BUNRAKU_BENCH: "1" },
@@ -15,10 +15,10 @@ export function benchAudioSync({ note }: BenchContext): Promise<BenchFigures> {
       maxBuffer: 1 << 24,
     },
   );
-  const lines = [...said.matchAll(/\{"bench":"audio".*\}/g)].map(
-    ([line]) => JSON.parse(line) as { line: string; audio_p95_ms: number },
+  const results = [...output.matchAll(/\{"bench":"audio".*\}/g)].map(
+    ([json]) => JSON.parse(json) as { line: string; audio_p95_ms: number },
   );
-  if (lines.length === 0) throw new Error(`nothing was measured:\n${said}`);
-  for (const { line, audio_p95_ms } of lines) note(`audio: ${line} ${audio_p95_ms} ms`);
-  return Promise.resolve({ audio_ms_p95: Math.max(...lines.map(({ audio_p95_ms }) => audio_p95_ms)) });
+  if (results.length === 0) throw new Error(`The audio test printed no results. Output:\n${output}`);
+  for (const { line, audio_p95_ms } of results) note(`audio: ${line} ${audio_p95_ms} ms`);
+  return Promise.resolve({ audio_ms_p95: Math.max(...results.map(({ audio_p95_ms }) => audio_p95_ms)) });
 }

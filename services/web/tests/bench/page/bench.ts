@@ -1,19 +1,19 @@
-/** What every case of `make bench-page` has: the server, Chromium, and pages that nothing was kept for. */
+/** Common parts of the cases of `make bench-page`. */
 import type { Browser, BrowserContextOptions, CDPSession, Page } from "playwright-core";
 import { launchChromium } from "../../browser/chromium";
 
-/** By name; whole lists go to the table alone. */
+/** Figures by name. Lists are reported as notes instead. */
 export type BenchFigures = Record<string, number>;
 
 export interface BenchContext {
-  /** The server's, with our own dance on its stage. */
+  /** Base URL of a server with the demo's motion on the stage. */
   readonly url: string;
-  /** Where Chromium is. */
+  /** Path of Chromium. */
   readonly chromium: string;
-  /** How long `memory` plays, minutes. */
+  /** Duration of the case `memory`, in minutes. */
   readonly minutes: number;
-  /** Puts a line under the table. */
-  note(line: string): void;
+  /** Print a line of text below the table. */
+  note(text: string): void;
 }
 
 export interface Visit {
@@ -21,16 +21,16 @@ export interface Visit {
   protocol: CDPSession;
 }
 
-/** How long a page may take for anything, milliseconds: it is drawn in software. */
+/** Time limit of every wait on a page, in milliseconds. It is generous because Chromium renders in software. */
 const PAGE_TIMEOUT_MS = 120_000;
 
-/** A browser at rest takes less of a processor than this, over so many seconds. */
+/** An idle browser uses less than this share of a processor over `IDLE_WINDOW_S` seconds. */
 const MAX_IDLE_LOAD = 0.05;
 const IDLE_WINDOW_S = 0.5;
 
 /**
- * Calls `use` with a page of a browser started for it: nothing of ours was ever there, whether fetched or compiled. That it can
- * draw has been tried, as a browser that people have open has its graphics process.
+ * Call `use` with a page of a newly started browser without caches. WebGL is initialised first, because the browser of
+ * a user already runs its GPU process.
  */
 export async function withPage<T>(
   { chromium }: BenchContext,
@@ -51,26 +51,26 @@ export async function withPage<T>(
 }
 
 /**
- * Waits until the browser is done with its own start: for each window it loads pages of its own for its address bar, which take a
- * processor for half a second, and which a browser that people have open loaded long ago.
+ * Wait until the browser is idle. At its start Chromium loads internal pages for its address bar, which uses a
+ * processor for half a second. The browser of a user has done this long before.
  */
 async function waitForIdleBrowser(browser: Browser): Promise<void> {
   const protocol = await browser.newBrowserCDPSession();
   let before = -Infinity;
   for (;;) {
     const { processInfo } = await protocol.send("SystemInfo.getProcessInfo");
-    const taken = processInfo.reduce((sum, { cpuTime }) => sum + cpuTime, 0);
-    if (taken - before < MAX_IDLE_LOAD * IDLE_WINDOW_S) break;
-    before = taken;
+    const cpuTimeS = processInfo.reduce((sum, { cpuTime }) => sum + cpuTime, 0);
+    if (cpuTimeS - before < MAX_IDLE_LOAD * IDLE_WINDOW_S) break;
+    before = cpuTimeS;
     await new Promise((done) => setTimeout(done, IDLE_WINDOW_S * 1000));
   }
   await protocol.detach();
 }
 
-/** The least value that so many of a hundred are not above. */
-export function percentile(values: readonly number[], hundredths: number): number {
-  const sorted = [...values].sort((one, other) => one - other);
-  return sorted[Math.max(0, Math.ceil((hundredths / 100) * sorted.length) - 1)] ?? NaN;
+/** Return the smallest value that at least `percent` % of the values do not exceed. */
+export function percentile(values: readonly number[], percent: number): number {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.max(0, Math.ceil((percent / 100) * sorted.length) - 1)] ?? NaN;
 }
 
 export function roundTo(value: number, digits = 1): number {

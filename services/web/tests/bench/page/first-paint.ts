@@ -1,4 +1,4 @@
-/** When the puppet is there, and what was loaded until it can be pulled: cases `arrival` and `line`. */
+/** Cases `arrival` and `line`: time to the first paint of the puppet, and size of the scripts and fonts. */
 import { gzipSync } from "node:zlib";
 import type { Page } from "playwright-core";
 import { LEFT_HAND, waitForFirstPose, waitForHold, waitForWelcome } from "../../browser/page-probe";
@@ -6,16 +6,16 @@ import { type BenchContext, type BenchFigures, percentile, roundTo, withPage } f
 
 declare global {
   interface Window {
-    /** When the graphics had drawn the puppet's first pose, milliseconds since the navigation began; noted by `watch`. */
+    /** Time of the puppet's first paint in milliseconds since the start of the navigation. Set by `watchFirstPaint`. */
     firstPaint?: number;
   }
 }
 
 const VISIT_COUNT = 5;
-/** The emulated line, both ways; its round trip is 100 ms. */
+/** 1 Mbit/s in both directions with an RTT of 100 ms. */
 const EMULATED_NETWORK = { offline: false, latency: 100, downloadThroughput: 125_000, uploadThroughput: 125_000 };
 
-/** Case arrival. */
+/** Run the case `arrival`. */
 export async function benchFirstPaint(bench: BenchContext): Promise<BenchFigures> {
   const paints: number[] = [];
   for (let nth = 0; nth < VISIT_COUNT; nth++)
@@ -24,7 +24,7 @@ export async function benchFirstPaint(bench: BenchContext): Promise<BenchFigures
   return { first_paint_s: roundTo(percentile(paints, 50), 2), ...(await measureDownloads(bench)) };
 }
 
-/** Case line. */
+/** Run the case `line`. */
 export async function benchConstrainedFirstPaint(bench: BenchContext): Promise<BenchFigures> {
   const paints: number[] = [];
   for (let nth = 0; nth < 3; nth++) {
@@ -39,7 +39,7 @@ export async function benchConstrainedFirstPaint(bench: BenchContext): Promise<B
   return { first_paint_1mbit_s: roundTo(percentile(paints, 50), 2) };
 }
 
-/** Seconds until a page has drawn the puppet. */
+/** Return the time until a page has drawn the puppet, in seconds. */
 async function measureFirstPaint(page: Page, url: string): Promise<number> {
   await page.addInitScript(watchFirstPaint);
   await page.goto(url, { waitUntil: "commit" });
@@ -47,16 +47,16 @@ async function measureFirstPaint(page: Page, url: string): Promise<number> {
   return (await page.evaluate(() => window.firstPaint ?? NaN)) / 1000;
 }
 
-/** In the page: notes when the graphics are done with the first frame that has the puppet in it. */
+/** In the page: record when the GPU has completed the first frame with the puppet. */
 function watchFirstPaint(): void {
-  let drawn: (() => boolean) | null = null;
-  const look = () => {
+  let isDrawn: (() => boolean) | null = null;
+  const check = () => {
     const { stage } = window.bunraku ?? {};
-    if (drawn?.()) window.firstPaint ??= performance.now();
-    if (!stage || drawn) return;
+    if (isDrawn?.()) window.firstPaint ??= performance.now();
+    if (!stage || isDrawn) return;
     const { renderer } = stage;
     const render = renderer.render;
-    drawn = () => false;
+    isDrawn = () => false;
     renderer.render = (scene, camera) => {
       render.call(renderer, scene, camera);
       if (scene !== stage.scene || !stage.puppet?.group.visible) return;
@@ -64,26 +64,26 @@ function watchFirstPaint(): void {
       const gl = renderer.getContext() as WebGL2RenderingContext;
       const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) as WebGLSync;
       gl.flush();
-      drawn = () => gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED;
+      isDrawn = () => gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED;
     };
   };
-  // before each frame too: it may take long, and a timer's turn comes after it
+  // Check before each frame too: a long frame delays the timer.
   const request = window.requestAnimationFrame.bind(window);
   window.requestAnimationFrame = (callback) =>
     request((time) => {
-      look();
+      check();
       callback(time);
     });
-  const keepLooking = () => {
-    look();
-    if (window.firstPaint === undefined) setTimeout(keepLooking);
+  const poll = () => {
+    check();
+    if (window.firstPaint === undefined) setTimeout(poll);
   };
-  keepLooking();
+  poll();
 }
 
-/** Scripts and fonts that a page has fetched by the time that a hand was taken, each as it comes over a line. */
+/** Return the transfer sizes of the scripts (gzip) and fonts that a page loads until a hand is held. */
 async function measureDownloads(bench: BenchContext): Promise<BenchFigures> {
-  const loaded = await withPage(bench, {}, async ({ page }) => {
+  const urls = await withPage(bench, {}, async ({ page }) => {
     await page.goto(bench.url);
     await waitForFirstPose(page);
     await waitForWelcome(page);
@@ -93,13 +93,13 @@ async function measureDownloads(bench: BenchContext): Promise<BenchFigures> {
     return page.evaluate(() => performance.getEntriesByType("resource").map(({ name }) => name));
   });
   const sizes = { js: 0, woff2: 0 };
-  for (const address of new Set(loaded)) {
-    const [, kind] = /\.(js|woff2)$/.exec(new URL(address).pathname) ?? [];
+  for (const url of new Set(urls)) {
+    const [, kind] = /\.(js|woff2)$/.exec(new URL(url).pathname) ?? [];
     if (kind !== "js" && kind !== "woff2") continue;
-    const body = Buffer.from(await (await fetch(address)).arrayBuffer());
+    const body = Buffer.from(await (await fetch(url)).arrayBuffer());
     const size = (kind === "js" ? gzipSync(body, { level: 9 }) : body).length;
     sizes[kind] += size;
-    bench.note(`loaded: ${new URL(address).pathname.slice(8)} ${roundTo(size / 1000)} kB`);
+    bench.note(`loaded: ${new URL(url).pathname.slice(8)} ${roundTo(size / 1000)} kB`);
   }
   return { js_gzip_kb: roundTo(sizes.js / 1000), fonts_kb: roundTo(sizes.woff2 / 1000) };
 }

@@ -1,20 +1,20 @@
-/** What a page's heap is made of, out of a snapshot of it. */
+/** Composition of a page's heap, from a heap snapshot. */
 import type { CDPSession } from "playwright-core";
 
 export interface HeapUsage {
-  /** What the page's script made and holds: objects, arrays, closures, strings and numbers. Bytes. */
+  /** Objects, arrays, closures, strings and numbers of the page's script, in bytes. */
   objects: number;
-  /** What V8 made of the script, and goes on making better for long: byte code, machine code and what it noted for them. Bytes. */
+  /** Byte code, machine code and type feedback, in bytes. V8 keeps optimising for a long time. */
   code: number;
 }
 
-/** As far as it is read: `nodes` has a row of numbers for each, of which `node_fields` names the columns. */
+/** The parts of a heap snapshot that are used: `nodes` has one row per node, with the columns `node_fields`. */
 interface Snapshot {
   snapshot: { meta: { node_fields: string[]; node_types: [string[], ...unknown[]] } };
   nodes: number[];
 }
 
-/** Types of V8's that are code; the browser's own, outside of the heap, are counted nowhere. */
+/** Node types of code. Memory outside the heap (`EXTERNAL_TYPES`) is not counted. */
 const CODE_TYPES = new Set(["code", "object shape"]);
 const EXTERNAL_TYPES = new Set(["native", "synthetic", "hidden"]);
 

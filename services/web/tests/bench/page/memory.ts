@@ -1,4 +1,4 @@
-/** What half an hour of play leaves behind: case `memory`. */
+/** Case `memory`: growth of the heap over half an hour of use. */
 import { execFileSync } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -18,9 +18,9 @@ import { type BenchContext, type BenchFigures, roundTo, withPage } from "./bench
 import { type HeapUsage, measureHeap } from "./heap";
 
 const REPOSITORY = resolve(import.meta.dirname, "../../../../..");
-/** Rounds before anything is compared: what is made once is made in them. */
+/** Rounds before the first measurement, in which one-time allocations happen. */
 const WARM_UP_ROUNDS = 3;
-/** Rounds between notes of how large the heap is: whether it goes on growing. */
+/** Rounds between samples of the heap's size, which show whether it keeps growing. */
 const NOTE_EVERY_ROUNDS = 5;
 
 interface MemoryUsage extends HeapUsage {
@@ -29,7 +29,7 @@ interface MemoryUsage extends HeapUsage {
   listeners: number;
 }
 
-/** After a warm-up of the same. */
+/** Run the case `memory`. */
 export async function benchMemory(bench: BenchContext): Promise<BenchFigures> {
   const folder = mkdtempSync(join(tmpdir(), "bunraku-bench-"));
   try {
@@ -50,7 +50,9 @@ export async function benchMemory(bench: BenchContext): Promise<BenchFigures> {
       }
       const after = await measureMemory(protocol);
       bench.note(
-        `memory: ${rounds} rounds in ${bench.minutes} minutes, heap ${roundTo(before.bytes / 1e6, 2)} to ${roundTo(after.bytes / 1e6, 2)} MB, nodes ${before.nodes} to ${after.nodes}, listeners ${before.listeners} to ${after.listeners}`,
+        `memory: ${rounds} rounds in ${bench.minutes} minutes, ` +
+          `heap ${roundTo(before.bytes / 1e6, 2)} to ${roundTo(after.bytes / 1e6, 2)} MB, ` +
+          `nodes ${before.nodes} to ${after.nodes}, listeners ${before.listeners} to ${after.listeners}`,
       );
       bench.note(`memory: heap after every ${NOTE_EVERY_ROUNDS} rounds, MB: ${heaps.join(", ")}`);
       return {
@@ -67,32 +69,36 @@ export async function benchMemory(bench: BenchContext): Promise<BenchFigures> {
   }
 }
 
-/** A real clip where there is one, else our own dance as our own writer writes it. */
+/** Return the path of a recorded clip if there is one, or else of the demo's motion as a BVH file. */
 function findClip(folder: string): string {
   const shared = join(sharedClipFolder() ?? folder, "mocap/bvh/mass_walk.bvh");
   if (existsSync(shared)) return shared;
-  const own = join(folder, "own.bvh");
-  const script =
-    "import sys; from bunraku.motion import choreography, writers; sys.stdout.buffer.write(writers.write_bvh(choreography.dance()))";
-  writeFileSync(own, execFileSync(join(REPOSITORY, ".venv/bin/python"), ["-c", script], { maxBuffer: 1 << 26 }));
-  return own;
+  const demoClip = join(folder, "own.bvh");
+  const script = [
+    "import sys",
+    "from bunraku.demo.choreography import animate_dance",
+    "from bunraku.motion.bvh_writer import write_bvh",
+    "sys.stdout.buffer.write(write_bvh(animate_dance()))",
+  ].join("; ");
+  writeFileSync(demoClip, execFileSync(join(REPOSITORY, ".venv/bin/python"), ["-c", script], { maxBuffer: 1 << 26 }));
+  return demoClip;
 }
 
-/** Bytes of the heap once all that can be freed is. */
+/** Return the size of the heap after a garbage collection, in bytes. */
 async function usedHeapBytes(protocol: CDPSession): Promise<number> {
   await protocol.send("HeapProfiler.enable");
   for (let nth = 0; nth < 3; nth++) await protocol.send("HeapProfiler.collectGarbage");
   return (await protocol.send("Runtime.getHeapUsage")).usedSize;
 }
 
-/** What is left then. */
+/** Measure the memory in use after a garbage collection. */
 async function measureMemory(protocol: CDPSession): Promise<MemoryUsage> {
   const bytes = await usedHeapBytes(protocol);
   const { nodes, jsEventListeners: listeners } = await protocol.send("Memory.getDOMCounters");
   return { bytes, nodes, listeners, ...(await measureHeap(protocol)) };
 }
 
-/** Everything that people do on a page, once; it is left as it was. */
+/** Use every function of the page once and restore its initial state. */
 async function playRound(page: Page, clip: string): Promise<void> {
   const press = (name: string) => page.getByRole("button", { name, exact: true }).click();
   await press("Pause");
@@ -110,7 +116,7 @@ async function playRound(page: Page, clip: string): Promise<void> {
   await page.keyboard.press("KeyW", { delay: 300 });
   await page.keyboard.press("Escape");
   await waitForRelease(page, LEFT_HAND);
-  for (const panel of ["Strings", "Line"]) {
+  for (const panel of ["Strings", "Connection"]) {
     await press(panel);
     await page.getByRole("complementary", { name: panel }).waitFor();
     await press(`Close ${panel.toLowerCase()}`);
@@ -120,7 +126,7 @@ async function playRound(page: Page, clip: string): Promise<void> {
   await page.keyboard.press("Escape");
   await page.getByRole("slider", { name: "Seek" }).press("Home");
   for (const theme of ["Light theme", "Dark theme"]) await press(theme);
-  // a dance comes, is danced, and goes
+  // Upload a motion, play it and remove it.
   const before = await page.locator(".brand-piece").innerText();
   await page.locator('input[type=file][accept*=".bvh"]').setInputFiles(clip);
   await page.waitForFunction((before) => document.querySelector(".brand-piece")?.textContent !== before, before);
