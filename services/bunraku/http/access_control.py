@@ -13,7 +13,7 @@ ACCESS_SCOPE_KEY = "bunraku.access"
 """Key of the ASGI scope under which `AuthorizationMiddleware` stores the `Access` of a request or WebSocket."""
 DEFAULT_MAX_BODY_BYTES = 64 << 10
 """Maximum size of a request body for routes that declare none."""
-_REQUIREMENT_ATTRIBUTE = "__needs__"
+_REQUIREMENT_ATTRIBUTE = "__requirement__"
 
 Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])
 

@@ -39,10 +39,10 @@ class TokenSigner:
 
     def __init__(self, secret: str, *previous_secrets: str) -> None:
         """Raise ValueError for a secret that is too short."""
-        for one in (secret, *previous_secrets):
-            if len(one.encode()) < MIN_SECRET_BYTES:
+        for key in (secret, *previous_secrets):
+            if len(key.encode()) < MIN_SECRET_BYTES:
                 raise ValueError(
-                    f"the secret has {len(one.encode())} bytes, but at least {MIN_SECRET_BYTES} bytes are required"
+                    f"the secret has {len(key.encode())} bytes, but at least {MIN_SECRET_BYTES} bytes are required"
                 )
         self._secrets = (secret, *previous_secrets)
 

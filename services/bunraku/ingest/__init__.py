@@ -1,1 +1,1 @@
-"""The service that takes files and makes motions of them."""
+"""Ingest service: uploads, encoding jobs, derived motions and recordings."""
