@@ -1,1 +1,1 @@
-"""Pure: what to show and what to send, and when."""
+"""Receiver of a stream: clock estimation, timeline, play-out delay, stores of blocks and overlays. Pure."""

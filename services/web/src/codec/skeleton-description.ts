@@ -57,7 +57,8 @@ export function unpackSkeletonDescription(data: Uint8Array): SkeletonDescription
     bits = data[0] & 15;
   if (grid > MAX_GRID || bits > MAX_REFERENCE_BITS) {
     throw new DamagedBlock(
-      `Invalid skeleton description: grid ${grid} and ${bits} reference bits, at most ${MAX_GRID} and ${MAX_REFERENCE_BITS}.`,
+      `Invalid skeleton description: grid ${grid}, at most ${MAX_GRID}; ` +
+        `${bits} reference bits, at most ${MAX_REFERENCE_BITS}.`,
     );
   }
   const integers = decodeIntegers(data.subarray(1));
