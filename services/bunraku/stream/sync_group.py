@@ -152,7 +152,9 @@ class SyncGroup:
                 self._multicast = multicast
         if batch.framed:
             counters = context.counters
-            counters.bytes += multicast.write(batch.framed)
+            # before the addition reads the counter, as writes to single connections increment it too
+            sent_bytes = multicast.write(batch.framed)
+            counters.bytes += sent_bytes
             counters.blocks += len(batch.blocks) * len(multicast)
 
 

@@ -220,7 +220,9 @@ class WatchedSession:
             self._unwritable = [viewer for viewer in self._viewers if not viewer.accepts_direct_writes]
         for viewer in self._unwritable:
             viewer.send_overlay(framed)
-        self._context.counters.bytes += writable.write(framed)
+        # before the addition reads the counter, as writes to single connections increment it too
+        sent_bytes = writable.write(framed)
+        self._context.counters.bytes += sent_bytes
         self._context.counters.overlays += len(writable)
 
 
