@@ -81,7 +81,7 @@ class NonReconnectingViewer(MeasuringViewer):
     """Viewer that never gives up a silent connection and waits for late messages."""
 
     def __init__(self, url: str, far: FarEnd | None = None, truth: float = 0.0) -> None:
-        super().__init__(url, far, truth, silent=float("inf"))
+        super().__init__(url, far, truth, silence_timeout=float("inf"))
 
 
 class BenchContext:
