@@ -165,7 +165,7 @@ async def test_body_in_tiny_chunks_does_not_delay_others(url: str) -> None:
 
 
 async def test_oldest_waiting_connection_makes_room_for_a_new_one(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(protocol, "MAX_PENDING_CONNECTIONS", 5)
+    monkeypatch.setattr(protocol, "MAX_WAITING_CONNECTIONS", 5)
     monkeypatch.setattr(protocol, "HEADER_TIMEOUT_S", 60.0)
     waiting = [await open_connection(url) for _ in range(5)]
     for _ in range(5):
