@@ -80,3 +80,29 @@ def test_second_request_in_one_segment_is_checked_as_well() -> None:
     connection.start_next_cycle()
     with pytest.raises(h11.RemoteProtocolError, match="at most"):
         connection.next_event()
+
+
+@pytest.mark.parametrize(
+    "data", [b"1;" + b"e" * 1_000 + b"\r\nx\r\n", b"0\r\n" + b"trailer: 1\r\n" * 2_000], ids=["extensions", "trailers"]
+)
+def test_endless_framing_of_a_body_is_rejected(data: bytes) -> None:
+    connection = BoundedConnection()
+    connection.receive_data(head("Transfer-Encoding: chunked\r\n", method="POST"))
+    assert isinstance(connection.next_event(), h11.Request)
+    with pytest.raises(h11.RemoteProtocolError):  # noqa: PT012
+        for _ in range(1_000):
+            connection.receive_data(data)
+            while connection.next_event() is not h11.NEED_DATA:
+                continue
+
+
+@pytest.mark.parametrize(("chunk", "count"), [(1, 100_000), (100, 10_000), (60_000, 100)])
+def test_chunks_of_any_size_are_accepted(chunk: int, count: int) -> None:
+    connection, size = BoundedConnection(), 0
+    connection.receive_data(head("Transfer-Encoding: chunked\r\n", method="POST"))
+    data = f"{chunk:x}\r\n".encode() + b"x" * chunk + b"\r\n"
+    for _ in range(count):
+        connection.receive_data(data)
+        while (event := connection.next_event()) is not h11.NEED_DATA:
+            size += len(event.data) if isinstance(event, h11.Data) else 0
+    assert size == chunk * count

@@ -123,6 +123,10 @@ class HttpProtocol(H11Protocol):
         self._cancel_timeout()
         self._unparsed.clear()
         self.transport.write(self._error_response(msg))
+        if self.cycle is not None:
+            # the application reads the rest of the body as a disconnect, and its response is discarded
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
         LingeringClose(self.transport, self.connection_lost)
 
     def pause_writing(self) -> None:
