@@ -115,6 +115,7 @@ UPGRADE = (
         (UPGRADE + b"Content-Length: 10\r\n\r\n", 400),
         (UPGRADE + b"Transfer-Encoding: chunked\r\n\r\n", 400),
         (UPGRADE + b"a: b\r\n" * 129 + b"\r\n", 431),
+        (UPGRADE + b"Sec-WebSocket-Protocol: ,,\x7f\r\n\r\n", 400),
         (UPGRADE + b"a: " + b"b" * 9_000 + b"\r\n\r\n", 431),
         (UPGRADE.replace(b"none", b"n" * 9_000) + b"\r\n", 414),
         (UPGRADE + b"\r\n" + b"\x89\x80\0\0\0\0" * 1_000, 400),
