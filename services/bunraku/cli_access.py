@@ -39,9 +39,10 @@ def token(
 ) -> None:
     """Create a token, signed with BUNRAKU_SECRET or with the secret in the server's data folder."""
     from bunraku.http.access_control import Access, Role
-    from bunraku.http.access_token import TokenSigner
+    from bunraku.http.access_token import MAX_SUBJECT_CHARACTERS, TokenSigner
     from bunraku.http.secret import load_secret
     from bunraku.http.timestamp import format_timestamp
+    from bunraku.runtime.display_text import clean_text
     from bunraku.runtime.settings import Settings
 
     try:
@@ -54,7 +55,8 @@ def token(
             )
             raise typer.Exit(1)
         now = time.time()
-        access = Access(Role.parse(role), name[:64] or "operator", session, motion, int(now + hours * 3600))
+        subject = clean_text(name, MAX_SUBJECT_CHARACTERS) or "operator"
+        access = Access(Role.parse(role), subject, session, motion, int(now + hours * 3600))
         signed = TokenSigner(secret).mint(access, now)
     except ValueError as error:
         err.print(describe_setting_error(error), markup=False)

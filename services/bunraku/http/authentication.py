@@ -9,6 +9,7 @@ import asyncio
 import logging
 import secrets
 import time
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 
 import msgpack
@@ -21,12 +22,14 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.storage.catalogue import Catalogue
-from bunraku.storage.record import Share
+from bunraku.storage.record import QuotaExceeded, Share
 from bunraku.websocket.subprotocol import UNAUTHORIZED, CloseConnection
 
 SHARE_REVOKED_SUBJECT = "shares.revoked"
 """Bus subject of revoked links. A message is the id of a link."""
 NEW_LINK_HINT = "ask for a new link"
+MAX_REMEMBERED_REVOCATIONS = 10_000
+"""Number of revoked links that a replica remembers beside the catalogue."""
 _LINK_EXPIRED = ("Link expired", "this link or token has expired")
 _LINK_REVOKED = ("Link revoked", "this link was revoked")
 
@@ -51,7 +54,10 @@ class Authenticator:
         self._catalogue = catalogue
         self._bus = bus
         self._clock = clock
+        self._max_shares = settings.quota_links
         self._close_callbacks: dict[str, set[CloseCallback]] = {}
+        # ids, oldest first: effective at once, even if the catalogue cannot remove the row
+        self._revoked_shares: OrderedDict[str, None] = OrderedDict()
         self._recheck_tasks: set[asyncio.Task[None]] = set()
         self.tickets = TicketStore(bus)
         self._subscriptions = [
@@ -96,7 +102,8 @@ class Authenticator:
     ) -> tuple[Share, str]:
         """Create a link for viewers and return it with its token.
 
-        Raises `ProblemError` 409 at a server without a secret.
+        It ends with the access of `issuer` at the latest, unless that has the role admin. Raises `ProblemError`: 409 at
+        a server without a secret, 403 if the subject has as many valid links as `quota_links` permits.
         """
         if self._tokens is None:
             raise ProblemError(
@@ -107,18 +114,28 @@ class Authenticator:
             )
         now = int(self._clock())
         expires = now + lifetime_s
+        if issuer.role is not Role.ADMIN and issuer.expires is not None:
+            expires = min(expires, issuer.expires)
         share = Share(secrets.token_hex(9), now, expires, issuer.subject, session, motion)
         token = self._tokens.mint(Access(Role.VIEW, f"share {share.id}", session, motion, expires, share.id), now)
-        await self._catalogue.add_share(share)
+        try:
+            await self._catalogue.add_share(share, self._max_shares)
+        except QuotaExceeded as error:
+            raise ProblemError(
+                403, "Quota used up", str(error), hint="revoke links that are not needed, or wait until one expires"
+            ) from None
         _log.info("%s created link %s", issuer.subject or "an unnamed client", share.id)
         return share, token
 
     async def revoke_share(self, share_id: str) -> bool:
-        """Revoke a link and close its connections at all replicas. Return whether the link existed."""
-        existed = await self._catalogue.remove_share(share_id)
+        """Revoke a link and close its connections at all replicas. Return whether the link existed.
+
+        The running replicas reject the link from now on, even if the catalogue raises an error.
+        """
+        self._on_share_revoked(share_id.encode())
         self._bus.publish(SHARE_REVOKED_SUBJECT, share_id.encode())
         _log.info("link %s was revoked", share_id)
-        return existed
+        return await self._catalogue.remove_share(share_id)
 
     async def can_view(self, access: Access, kind: str, resource_id: str) -> bool:
         """Return whether a client may see a resource of `kind` `motion` or `session`.
@@ -145,7 +162,8 @@ class Authenticator:
     def register_connection(self, access: Access, close: CloseCallback) -> Callable[[], None]:
         """Arrange that `close` is called when the access of an open connection expires or is revoked.
 
-        Return a function to call when the connection has ended by itself.
+        It is called at once if the link was revoked since the access was authenticated. Return a function to call when
+        the connection has ended by itself.
         """
         if access.expires is None:
             return _noop
@@ -156,6 +174,10 @@ class Authenticator:
         share = access.share
         if share is None:
             return timer.cancel
+        if share in self._revoked_shares:
+            timer.cancel()
+            close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
+            return _noop
         self._close_callbacks.setdefault(share, set()).add(close)
 
         def unregister() -> None:
@@ -176,11 +198,23 @@ class Authenticator:
         self.tickets.close()
 
     async def _check_share(self, access: Access) -> None:
-        if access.share is not None and await self._catalogue.get_share(access.share) is None:
+        """Raise `ProblemError` 401 unless the link of `access` exists and grants as much."""
+        if access.share is None:
+            return
+        share = None if access.share in self._revoked_shares else await self._catalogue.get_share(access.share)
+        # revoked meanwhile
+        if share is None or share.id in self._revoked_shares:
             raise unauthorized(*_LINK_REVOKED)
+        is_same = (share.session, share.motion) == (access.session, access.motion)
+        if not is_same or access.expires is None or access.expires > share.expires:
+            raise unauthorized("Link not valid", "this link grants more than was shared")
 
     def _on_share_revoked(self, message: bytes) -> None:
-        for close in self._close_callbacks.pop(message.decode("ascii", "replace"), set()):
+        share_id = message.decode("ascii", "replace")
+        self._revoked_shares[share_id] = None
+        if len(self._revoked_shares) > MAX_REMEMBERED_REVOCATIONS:
+            self._revoked_shares.popitem(last=False)
+        for close in self._close_callbacks.pop(share_id, set()):
             close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
 
     def _recheck_shares(self) -> None:

@@ -78,9 +78,12 @@ class Catalogue:
         """Remove a job that is complete or given up."""
         await (await self.open()).jobs.remove(job_id)
 
-    async def add_share(self, share: Share) -> None:
-        """Add a viewer link and remove those that expired before it was created."""
-        await (await self.open()).shares.add(share)
+    async def add_share(self, share: Share, max_per_subject: int = 0) -> None:
+        """Add a viewer link and remove those that expired before it was created.
+
+        Raise `QuotaExceeded`, with nothing added, if its subject has `max_per_subject` links; 0 is unlimited.
+        """
+        await (await self.open()).shares.add(share, max_per_subject)
 
     async def get_share(self, share_id: str) -> Share | None:
         """Return a viewer link, None if it was revoked."""
