@@ -43,7 +43,7 @@ class NewShare(BaseModel):
 
 def create_app(context: ServiceContext) -> FastAPI:
     """Create the access service."""
-    app = FastAPI(title="Bunraku access")
+    app = FastAPI(title="Bunraku access", openapi_url=None)
     install_problem_handlers(app)
     authenticator, catalogue = context.authenticator, context.catalogue
 

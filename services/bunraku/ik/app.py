@@ -60,7 +60,7 @@ def parse_proportions(identity: str) -> Proportions:
 
 def create_app() -> FastAPI:
     """Create the service, which has no state but its caches."""
-    app = FastAPI(title="Bunraku inverse kinematics", version=__version__)
+    app = FastAPI(title="Bunraku inverse kinematics", version=__version__, openapi_url=None)
     problem_details.install_problem_handlers(app)
     # one table or figure at a time, in a thread, so that the event loop stays free
     building = asyncio.Semaphore(1)

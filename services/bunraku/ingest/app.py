@@ -64,7 +64,7 @@ def create_app(context: ServiceContext) -> FastAPI:
             await asyncio.wait((queue_task,))
             await job_queue.release_jobs()
 
-    app = FastAPI(title="Bunraku ingest", lifespan=lifespan)
+    app = FastAPI(title="Bunraku ingest", lifespan=lifespan, openapi_url=None)
     problem_details.install_problem_handlers(app)
 
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
