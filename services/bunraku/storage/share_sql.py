@@ -9,15 +9,16 @@ from sqlalchemy import Row, delete, select
 from sqlalchemy.ext.asyncio import AsyncEngine
 
 from bunraku.storage.record import Share
-from bunraku.storage.table import SHARES, QueryRunner
+from bunraku.storage.table import SHARES, QueryRunner, RemovalRunner
 
 
 class SqlShareTable:
     """Table of viewer links; `Catalogue` documents the methods."""
 
-    def __init__(self, engine: AsyncEngine, run_query: QueryRunner) -> None:
+    def __init__(self, engine: AsyncEngine, run_query: QueryRunner, run_removal: RemovalRunner) -> None:
         self._engine = engine
         self._run_query = run_query
+        self._run_removal = run_removal
 
     async def add(self, share: Share) -> None:
         """Add a link and remove expired ones."""
@@ -37,7 +38,7 @@ class SqlShareTable:
 
     async def remove(self, share_id: str) -> bool:
         """Remove a link and return whether it existed."""
-        return await self._run_query(self._remove(share_id))
+        return await self._run_removal(lambda: self._remove(share_id))
 
     async def _add(self, share: Share) -> None:
         row = {column.name: getattr(share, column.name) for column in SHARES.columns}
