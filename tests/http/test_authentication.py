@@ -74,8 +74,8 @@ async def test_link_grants_one_resource_until_revoked(tmp_path: Path) -> None:
         assert not await authenticator.can_view(access, "session", "s2")
         assert not await authenticator.can_view(access, "motion", "m")
         ticket = authenticator.tickets.issue(access)
-        assert await authenticator.revoke_share(share.id)
-        assert not await authenticator.revoke_share(share.id)
+        assert await authenticator.revocations.revoke(share.id)
+        assert not await authenticator.revocations.revoke(share.id)
         assert await rejection_title(authenticator, token) == "Link revoked"
         with pytest.raises(ProblemError, match="was revoked"):
             await authenticator.authenticate_ticket(ticket)
@@ -123,10 +123,10 @@ async def test_revocation_reaches_all_replicas_even_after_a_bus_outage(tmp_path:
                     Access(Role.VIEW, expires=share.expires, share=share.id), reasons[-1].set_result
                 )
             async with asyncio.timeout(20):
-                await first.revoke_share(shares[0].id)
+                await first.revocations.revoke(shares[0].id)
                 assert (await reasons[0]).title == "Link revoked"
                 # a message published during the outage is lost; links are checked after reconnecting
                 await asyncio.to_thread(server.kill)
-                await first.revoke_share(shares[1].id)
+                await first.revocations.revoke(shares[1].id)
                 await asyncio.to_thread(server.start)
                 assert (await reasons[1]).title == "Link revoked"

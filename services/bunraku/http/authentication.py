@@ -15,6 +15,7 @@ import msgpack
 
 from bunraku.http.access_control import FULL_ACCESS, Access, Role
 from bunraku.http.access_token import InvalidToken, TokenSigner
+from bunraku.http.share_revocation import ShareRevocations
 from bunraku.http.ticket_store import TicketStore
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.runtime.availability import BackendUnavailable
@@ -24,8 +25,6 @@ from bunraku.storage.catalogue import Catalogue
 from bunraku.storage.record import Share
 from bunraku.websocket.subprotocol import UNAUTHORIZED, CloseConnection
 
-SHARE_REVOKED_SUBJECT = "shares.revoked"
-"""Bus subject of revoked links. A message is the id of a link."""
 NEW_LINK_HINT = "ask for a new link"
 _LINK_EXPIRED = ("Link expired", "this link or token has expired")
 _LINK_REVOKED = ("Link revoked", "this link was revoked")
@@ -54,10 +53,8 @@ class Authenticator:
         self._close_callbacks: dict[str, set[CloseCallback]] = {}
         self._recheck_tasks: set[asyncio.Task[None]] = set()
         self.tickets = TicketStore(bus)
-        self._subscriptions = [
-            bus.subscribe(SHARE_REVOKED_SUBJECT, self._on_share_revoked),
-            bus.on_reconnect(self._recheck_shares),
-        ]
+        self.revocations = ShareRevocations(catalogue, bus, self._close_connections)
+        self._reconnect_subscription = bus.on_reconnect(self._recheck_shares)
 
     @property
     def requires_token(self) -> bool:
@@ -113,13 +110,6 @@ class Authenticator:
         _log.info("%s created link %s", issuer.subject or "an unnamed client", share.id)
         return share, token
 
-    async def revoke_share(self, share_id: str) -> bool:
-        """Revoke a link and close its connections at all replicas. Return whether the link existed."""
-        existed = await self._catalogue.remove_share(share_id)
-        self._bus.publish(SHARE_REVOKED_SUBJECT, share_id.encode())
-        _log.info("link %s was revoked", share_id)
-        return existed
-
     async def can_view(self, access: Access, kind: str, resource_id: str) -> bool:
         """Return whether a client may see a resource of `kind` `motion` or `session`.
 
@@ -156,6 +146,10 @@ class Authenticator:
         share = access.share
         if share is None:
             return timer.cancel
+        if self.revocations.is_refused(share):
+            timer.cancel()
+            close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
+            return _noop
         self._close_callbacks.setdefault(share, set()).add(close)
 
         def unregister() -> None:
@@ -169,18 +163,25 @@ class Authenticator:
 
     def close(self) -> None:
         """Release the bus subscriptions and discard all tickets."""
-        for subscription in self._subscriptions:
-            subscription.unsubscribe()
+        self._reconnect_subscription.unsubscribe()
+        self.revocations.close()
         for task in self._recheck_tasks:
             task.cancel()
         self.tickets.close()
 
     async def _check_share(self, access: Access) -> None:
-        if access.share is not None and await self._catalogue.get_share(access.share) is None:
+        if access.share is None:
+            return
+        # a link may be revoked while it is looked up
+        if (
+            self.revocations.is_refused(access.share)
+            or await self._catalogue.get_share(access.share) is None
+            or self.revocations.is_refused(access.share)
+        ):
             raise unauthorized(*_LINK_REVOKED)
 
-    def _on_share_revoked(self, message: bytes) -> None:
-        for close in self._close_callbacks.pop(message.decode("ascii", "replace"), set()):
+    def _close_connections(self, share_id: str) -> None:
+        for close in self._close_callbacks.pop(share_id, set()):
             close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
 
     def _recheck_shares(self) -> None:
@@ -190,7 +191,7 @@ class Authenticator:
             for share in tuple(self._close_callbacks):
                 try:
                     if await self._catalogue.get_share(share) is None:
-                        self._on_share_revoked(share.encode())
+                        self._close_connections(share)
                 except BackendUnavailable as error:
                     _log.warning("cannot check for revoked links: %s", error)
 
