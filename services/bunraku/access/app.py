@@ -14,6 +14,7 @@ from bunraku.http.problem_details import install_problem_handlers, motion_not_fo
 from bunraku.http.ticket_store import TICKET_LIFETIME_S, TooManyTickets
 from bunraku.http.timestamp import format_timestamp
 from bunraku.http.token_bucket import client_network
+from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import Share
@@ -116,11 +117,19 @@ def create_app(context: ServiceContext) -> FastAPI:
     @app.delete("/v1/shares/{share}", status_code=204, tags=["access"])
     @requires(Role.CONTROL, allow_bound=True)
     async def revoke(share: Annotated[str, Path(pattern=r"^[0-9a-f]{18}$")], request: Request) -> None:
-        """Revoke a link. Connections that were opened with it are closed."""
-        access, existing = access_of(request), await catalogue.get_share(share)
+        """Revoke a link. Connections that were opened with it are closed.
+
+        With 503 and 507 the link grants nothing any more, but its removal is not stored yet.
+        """
+        access = access_of(request)
+        try:
+            existing = await catalogue.get_share(share)
+        except BackendUnavailable as error:
+            subject = None if access.role is Role.ADMIN else access.subject
+            raise authenticator.revocations.revoke_unverified(share, subject, error) from error
         if existing is None or (access.role is not Role.ADMIN and existing.subject != access.subject):
             raise ProblemError(404, "No such link", f"there is no link {share!r}")
-        await authenticator.revoke_share(share)
+        await authenticator.revocations.revoke(share)
 
     return app
 

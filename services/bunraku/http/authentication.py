@@ -9,13 +9,13 @@ import asyncio
 import logging
 import secrets
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 
 import msgpack
 
 from bunraku.http.access_control import FULL_ACCESS, Access, Role
 from bunraku.http.access_token import InvalidToken, TokenSigner
+from bunraku.http.share_revocation import ShareRevocations
 from bunraku.http.ticket_store import TicketStore
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.runtime.availability import BackendUnavailable
@@ -25,11 +25,7 @@ from bunraku.storage.catalogue import Catalogue
 from bunraku.storage.record import QuotaExceeded, Share
 from bunraku.websocket.subprotocol import UNAUTHORIZED, CloseConnection
 
-SHARE_REVOKED_SUBJECT = "shares.revoked"
-"""Bus subject of revoked links. A message is the id of a link."""
 NEW_LINK_HINT = "ask for a new link"
-MAX_REMEMBERED_REVOCATIONS = 10_000
-"""Number of revoked links that a replica remembers beside the catalogue."""
 _LINK_EXPIRED = ("Link expired", "this link or token has expired")
 _LINK_REVOKED = ("Link revoked", "this link was revoked")
 
@@ -56,14 +52,10 @@ class Authenticator:
         self._clock = clock
         self._max_shares = settings.quota_links
         self._close_callbacks: dict[str, set[CloseCallback]] = {}
-        # ids, oldest first: effective at once, even if the catalogue cannot remove the row
-        self._revoked_shares: OrderedDict[str, None] = OrderedDict()
         self._recheck_tasks: set[asyncio.Task[None]] = set()
         self.tickets = TicketStore(bus)
-        self._subscriptions = [
-            bus.subscribe(SHARE_REVOKED_SUBJECT, self._on_share_revoked),
-            bus.on_reconnect(self._recheck_shares),
-        ]
+        self.revocations = ShareRevocations(catalogue, bus, self._close_connections)
+        self._reconnect_subscription = bus.on_reconnect(self._recheck_shares)
 
     @property
     def requires_token(self) -> bool:
@@ -127,16 +119,6 @@ class Authenticator:
         _log.info("%s created link %s", issuer.subject or "an unnamed client", share.id)
         return share, token
 
-    async def revoke_share(self, share_id: str) -> bool:
-        """Revoke a link and close its connections at all replicas. Return whether the link existed.
-
-        The running replicas reject the link from now on, even if the catalogue raises an error.
-        """
-        self._on_share_revoked(share_id.encode())
-        self._bus.publish(SHARE_REVOKED_SUBJECT, share_id.encode())
-        _log.info("link %s was revoked", share_id)
-        return await self._catalogue.remove_share(share_id)
-
     async def can_view(self, access: Access, kind: str, resource_id: str) -> bool:
         """Return whether a client may see a resource of `kind` `motion` or `session`.
 
@@ -174,7 +156,7 @@ class Authenticator:
         share = access.share
         if share is None:
             return timer.cancel
-        if share in self._revoked_shares:
+        if self.revocations.is_refused(share):
             timer.cancel()
             close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
             return _noop
@@ -191,8 +173,8 @@ class Authenticator:
 
     def close(self) -> None:
         """Release the bus subscriptions and discard all tickets."""
-        for subscription in self._subscriptions:
-            subscription.unsubscribe()
+        self._reconnect_subscription.unsubscribe()
+        self.revocations.close()
         for task in self._recheck_tasks:
             task.cancel()
         self.tickets.close()
@@ -201,19 +183,15 @@ class Authenticator:
         """Raise `ProblemError` 401 unless the link of `access` exists and grants as much."""
         if access.share is None:
             return
-        share = None if access.share in self._revoked_shares else await self._catalogue.get_share(access.share)
-        # revoked meanwhile
-        if share is None or share.id in self._revoked_shares:
+        share = None if self.revocations.is_refused(access.share) else await self._catalogue.get_share(access.share)
+        # a link may be revoked while it is looked up
+        if share is None or self.revocations.is_refused(share.id):
             raise unauthorized(*_LINK_REVOKED)
         is_same = (share.session, share.motion) == (access.session, access.motion)
         if not is_same or access.expires is None or access.expires > share.expires:
             raise unauthorized("Link not valid", "this link grants more than was shared")
 
-    def _on_share_revoked(self, message: bytes) -> None:
-        share_id = message.decode("ascii", "replace")
-        self._revoked_shares[share_id] = None
-        if len(self._revoked_shares) > MAX_REMEMBERED_REVOCATIONS:
-            self._revoked_shares.popitem(last=False)
+    def _close_connections(self, share_id: str) -> None:
         for close in self._close_callbacks.pop(share_id, set()):
             close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
 
@@ -224,7 +202,7 @@ class Authenticator:
             for share in tuple(self._close_callbacks):
                 try:
                     if await self._catalogue.get_share(share) is None:
-                        self._on_share_revoked(share.encode())
+                        self._close_connections(share)
                 except BackendUnavailable as error:
                     _log.warning("cannot check for revoked links: %s", error)
 

@@ -9,7 +9,7 @@ from sqlalchemy import Row, delete, func, select, text
 from sqlalchemy.ext.asyncio import AsyncEngine
 
 from bunraku.storage.record import QuotaExceeded, Share
-from bunraku.storage.table import SHARES, QueryRunner
+from bunraku.storage.table import SHARES, QueryRunner, RemovalRunner
 
 _QUOTA_LOCK_ID = 0x6C696E6B73
 """Key of the advisory lock in PostgreSQL under which links are counted and added."""
@@ -18,9 +18,10 @@ _QUOTA_LOCK_ID = 0x6C696E6B73
 class SqlShareTable:
     """Table of viewer links; `Catalogue` documents the methods."""
 
-    def __init__(self, engine: AsyncEngine, run_query: QueryRunner) -> None:
+    def __init__(self, engine: AsyncEngine, run_query: QueryRunner, run_removal: RemovalRunner) -> None:
         self._engine = engine
         self._run_query = run_query
+        self._run_removal = run_removal
 
     async def add(self, share: Share, max_per_subject: int = 0) -> None:
         """Add a link and remove expired ones; raise `QuotaExceeded` beyond `max_per_subject` links of its subject."""
@@ -40,7 +41,7 @@ class SqlShareTable:
 
     async def remove(self, share_id: str) -> bool:
         """Remove a link and return whether it existed."""
-        return await self._run_query(self._remove(share_id))
+        return await self._run_removal(lambda: self._remove(share_id))
 
     async def _add(self, share: Share, max_per_subject: int) -> None:
         row = {column.name: getattr(share, column.name) for column in SHARES.columns}
