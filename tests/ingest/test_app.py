@@ -47,6 +47,8 @@ async def test_names_are_cleaned_where_they_enter(server: str) -> None:
     motion = (await post(server, data, f"{HOSTILE}人形\u3000👍🏽 か\u3099.bvh")).json()
     assert (motion["name"], motion["filename"]) == ("人形\u3000👍🏽 が", "人形\u3000👍🏽 が.bvh")
     assert motion["joints"]["skullbase"] == "skullbase"
+    long = (await post(server, make_bvh_clip(seed=44), f"v1.{'踊' * 248}.bvh")).json()
+    assert (long["name"], len(long["filename"])) == (f"v1.{'踊' * 197}", 255)
     unnamed = (await post(server, make_bvh_clip(seed=43), HOSTILE)).json()
     assert (unnamed["name"], unnamed["filename"]) == ("unnamed", "unnamed")
 

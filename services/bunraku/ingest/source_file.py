@@ -7,6 +7,7 @@ from pathlib import Path
 
 from bunraku.runtime.display_text import clean_text
 
+MAX_FILENAME_CHARACTERS = 255
 UNNAMED_FILE = "unnamed"
 """Name of a file whose own has no visible character."""
 
@@ -24,4 +25,4 @@ class SourceFile:
 
 def clean_filename(filename: str) -> str:
     """Return the name that a client gives to its file, safe to display."""
-    return clean_text(filename) or UNNAMED_FILE
+    return clean_text(filename, MAX_FILENAME_CHARACTERS) or UNNAMED_FILE
