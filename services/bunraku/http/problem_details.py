@@ -53,7 +53,8 @@ def problem_response(problem: ProblemError, headers: dict[str, str] | None = Non
     body = {"type": "about:blank", **clean_document(problem.to_dict(), MAX_TEXT_CHARACTERS)}
     if request := request_id.current():
         body["request_id"] = request
-    return JSONResponse(body, problem.status, {"Cache-Control": "no-store", **(headers or {})}, MEDIA_TYPE)
+    retry = {"Retry-After": "1"} if problem.status == HTTPStatus.TOO_MANY_REQUESTS else {}
+    return JSONResponse(body, problem.status, {"Cache-Control": "no-store", **retry, **(headers or {})}, MEDIA_TYPE)
 
 
 def unavailable_response(error: BackendUnavailable) -> JSONResponse:
