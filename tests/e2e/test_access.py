@@ -329,14 +329,22 @@ async def test_revoking_a_link_closes_its_connections(guarded: GuardedServer) ->
 
 
 async def test_websocket_closes_when_its_token_expires(guarded: GuardedServer) -> None:
-    for path in ("stream", "control"):
-        address = guarded.url.replace("http", "ws") + f"/v1/sessions/{guarded.session}/{path}"
-        token = bearer_headers(make_token(Role.CONTROL, lifetime_s=2))
-        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=token) as socket:
+    token = bearer_headers(make_token(Role.CONTROL, lifetime_s=5))
+
+    async def watch_until_closed(address: str, headers: dict[str, str]) -> int:
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=headers) as socket:
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
             assert closed.value.rcvd is not None
-            assert closed.value.rcvd.code == 4401
+            return closed.value.rcvd.code
+
+    connections = []
+    async with httpx2.AsyncClient(base_url=guarded.url, headers=token) as http:
+        for path in ("stream", "control"):
+            address = guarded.url.replace("http", "ws") + f"/v1/sessions/{guarded.session}/{path}"
+            ticket = (await http.post("/v1/tickets")).json()["ticket"]
+            connections += [watch_until_closed(address, token), watch_until_closed(f"{address}?ticket={ticket}", {})]
+    assert await asyncio.gather(*connections) == [4401] * 4
 
 
 @pytest.mark.parametrize("token", [make_token(), make_token(Role.VIEW), None, "malformed"])
