@@ -168,8 +168,8 @@ def test_batch_of_100_000_arms_is_solved(client: TestClient) -> None:
     assert len(msgpack.unpackb(response.content)["arms"]["tip"]) == 100_000
 
 
-def test_openapi_document_lists_the_paths(client: TestClient) -> None:
-    document = client.get("/openapi.json").json()
+def test_openapi_document_lists_the_paths() -> None:
+    document = create_app().openapi()
     assert set(document["paths"]) == {
         "/v1/arms/{proportions}/table",
         "/v1/arms/{proportions}/figures/{name}",

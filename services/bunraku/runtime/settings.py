@@ -62,6 +62,9 @@ class Settings(BaseSettings):
     total_bytes: int = 0
     """Maximum bytes of motions of all subjects; 0: unlimited."""
 
+    quota_links: int = 200
+    """Maximum number of links of one subject that have not expired; 0: unlimited."""
+
     metrics: str = ""
     """`host:port` of a listener that serves only `/metrics`; empty: none."""
     logs: Literal["plain", "json"] = "plain"
