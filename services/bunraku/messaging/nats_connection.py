@@ -139,7 +139,7 @@ class NatsConnection(asyncio.Protocol):
             raise ConnectionError(describe_tls_error(error, self._host)) from None
         if transport is None:
             raise ConnectionError(f"{self._host} closed the connection during the TLS handshake")
-        self._transport = cast(asyncio.Transport, transport)
+        self._transport = transport
 
     async def _wait_or_raise(self, awaited: asyncio.Future[None]) -> None:
         await asyncio.wait((awaited, self.closed), return_when=asyncio.FIRST_COMPLETED)

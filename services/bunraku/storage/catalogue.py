@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
+from bunraku.storage.postgres_url import split_tls_options
 from bunraku.storage.record import CatalogueEntry, Job, Quota, Share
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ class Catalogue:
     def __init__(self, url: str) -> None:
         if url.split(":", 1)[0] not in URL_SCHEMES:
             raise ValueError(f"invalid catalogue URL {url!r}, expected sqlite:///path or postgresql://host/name")
+        if url.startswith("postgresql:"):
+            split_tls_options(url)
         self._url = url
         self._open_task: asyncio.Task[SqlCatalogue] | None = None
 
