@@ -29,6 +29,7 @@ from bunraku.demo.bootstrap import open_demo_stage
 from bunraku.http.access_control import requires
 from bunraku.http.access_log import AccessLogMiddleware
 from bunraku.http.authorization import AuthorizationMiddleware, add_security_scheme, collect_route_rules
+from bunraku.http.client_address import ClientAddressMiddleware, TrustedProxies
 from bunraku.http.cors import CorsMiddleware
 from bunraku.http.header_timeout import MAX_HEADER_BYTES, HeaderTimeoutProtocol
 from bunraku.http.origin import parse_origins
@@ -135,6 +136,7 @@ def _add_middleware(app: FastAPI, context: ServiceContext, routes: list[BaseRout
     if origins := parse_origins(context.settings.origins):
         app.add_middleware(CorsMiddleware, origins=origins)
     app.add_middleware(AccessLogMiddleware, metrics=context.metrics, clock=context.clock)
+    app.add_middleware(ClientAddressMiddleware, proxies=TrustedProxies.parse(context.settings.trusted_proxies))
 
 
 def _describe_all_services(app: FastAPI, other_services: list[ServiceFactory]) -> None:
@@ -202,6 +204,8 @@ async def serve(
                 app,
                 **uvicorn_protocol_options(),
                 lifespan="off",
+                # ClientAddressMiddleware takes the client's address from the header
+                proxy_headers=False,
                 # the command configures logging; at level INFO uvicorn would log queries, which may contain tickets
                 log_config=None,
                 log_level="warning",

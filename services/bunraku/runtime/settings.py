@@ -12,6 +12,7 @@ from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from bunraku.http.access_token import TokenSigner
+from bunraku.http.client_address import TrustedProxies
 from bunraku.http.origin import OPAQUE_ORIGIN, parse_origins
 from bunraku.runtime import metrics
 from bunraku.storage.record import Quota
@@ -49,6 +50,9 @@ class Settings(BaseSettings):
 
     `null` stands for pages from files and sandboxed frames of any site; it requires a secret.
     """
+    trusted_proxies: str = ""
+    """Addresses and networks of reverse proxies whose `X-Forwarded-For` names the client, separated by commas or
+    spaces; `*` stands for whoever connects directly."""
     connects: float = 50.0
     """WebSocket connections that one address may open per second, with bursts of ten times as many; 0: unlimited."""
     body_seconds: float = 30.0
@@ -88,6 +92,12 @@ class Settings(BaseSettings):
         if secret.get_secret_value():
             TokenSigner(secret.get_secret_value())
         return secret
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _validate_trusted_proxies(cls, proxies: str) -> str:
+        TrustedProxies.parse(proxies)
+        return proxies
 
     @field_validator("origins")
     @classmethod

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ssl
 from typing import Any
 
-import asyncpg
 from sqlalchemy.engine import make_url
 from sqlalchemy.ext.asyncio import AsyncEngine, create_async_engine
 
@@ -28,6 +27,9 @@ def create_engine(url: str, connect_args: dict[str, Any] | None = None, **option
 
 
 def _tls_connector(url: PostgresUrl, host: str) -> Any:
+    # imported here, as SQLite does not need it
+    import asyncpg
+
     async def connect(*arguments: Any, **options: Any) -> Any:
         for path in url.files:
             require_readable(path)
