@@ -5,17 +5,21 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SecretsSettingsSource, SettingsConfigDict
 
 from bunraku.http.access_token import TokenSigner
 from bunraku.http.client_address import TrustedProxies
 from bunraku.http.origin import OPAQUE_ORIGIN, parse_origins
 from bunraku.runtime import metrics
 from bunraku.storage.record import Quota
+
+SECRETS_VARIABLE = "BUNRAKU_SECRETS"
+"""Environment variable with the folder of settings that are files."""
 
 
 class Settings(BaseSettings):
@@ -72,6 +76,23 @@ class Settings(BaseSettings):
     """Format of the log."""
     log_level: Literal["", "debug", "info", "warning", "error"] = ""
     """Minimum level of log messages; empty: INFO for JSON, else WARNING."""
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,  # noqa: ARG003
+        file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        folder = os.environ.get(SECRETS_VARIABLE)
+        if not folder:
+            return init_settings, env_settings
+        if not Path(folder).is_dir():
+            raise ValueError(f"{SECRETS_VARIABLE} is {folder}, which is not a folder")
+        # a file wins over a variable, which Compose may have set to the empty string
+        return init_settings, SecretsSettingsSource(settings_cls, folder), env_settings
 
     @field_validator("metrics")
     @classmethod
