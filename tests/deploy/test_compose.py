@@ -184,7 +184,7 @@ def test_created_certificate_is_accepted_by_clients(tmp_path: Path) -> None:
         own.mkdir(parents=True)
         script = script.replace(folder, str(own))
     (tmp_path / "certify").write_text(script)
-    command = ["sh", tmp_path / "certify", "cat", tmp_path / "run" / "tls" / "tls.key"]
+    command: list[str | Path] = ["sh", tmp_path / "certify", "cat", tmp_path / "run" / "tls" / "tls.key"]
     environment = {**os.environ, "CERTIFICATE_HOST": "nats"}
     key = subprocess.run(command, env=environment, capture_output=True, check=True).stdout
     assert key.startswith(b"-----BEGIN PRIVATE KEY")

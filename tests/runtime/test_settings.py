@@ -81,6 +81,21 @@ def test_invalid_value_is_rejected_with_the_valid_ones(
     assert name in describe_setting_error(raised.value)
 
 
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"bus": "tls://me:password@a,nats://b"},
+        {"bus": "nats://me:password@a?ca=/ca.crt"},
+        {"catalogue": "postgres://me:password@a/b"},
+        {"catalogue": "postgresql://me:password@a/b?sslmode=verify"},
+    ],
+)
+def test_invalid_address_is_rejected_without_its_password(setting: dict[str, str]) -> None:
+    with pytest.raises(ValidationError, match="invalid (bus address|catalogue URL)") as raised:
+        Settings.model_validate(setting)
+    assert "password" not in str(raised.value) + describe_setting_error(raised.value)
+
+
 def test_secrets_are_read_from_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BUNRAKU_SECRETS", str(tmp_path))
     monkeypatch.setenv("BUNRAKU_SECRET", "")

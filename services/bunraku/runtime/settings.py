@@ -15,9 +15,13 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SecretsS
 from bunraku.http.access_token import TokenSigner
 from bunraku.http.client_address import TrustedProxies
 from bunraku.http.origin import OPAQUE_ORIGIN, parse_origins
+from bunraku.messaging.nats_address import parse_servers
 from bunraku.runtime import metrics
+from bunraku.storage.catalogue import Catalogue
 from bunraku.storage.record import Quota
 
+MEMORY_BUS = "memory:"
+"""URL of the bus within one process."""
 SECRETS_VARIABLE = "BUNRAKU_SECRETS"
 """Environment variable with the folder of settings that are files."""
 
@@ -25,7 +29,7 @@ SECRETS_VARIABLE = "BUNRAKU_SECRETS"
 class Settings(BaseSettings):
     """Addresses and limits of one process."""
 
-    model_config = SettingsConfigDict(env_prefix="BUNRAKU_")
+    model_config = SettingsConfigDict(env_prefix="BUNRAKU_", hide_input_in_errors=True)
 
     data: Path = Path(".bunraku")
     """Folder of the embedded defaults."""
@@ -34,7 +38,7 @@ class Settings(BaseSettings):
     library: str = ""
     """URL of the object store for motions, `file:///...`, `s3://...` or another that obstore supports; empty: a
     folder in `data`."""
-    bus: str = "memory:"
+    bus: str = MEMORY_BUS
     """URL of the bus: `memory:` for one process, or `nats://...` with further servers after commas."""
     register_replicas: int = Field(default=1, ge=1, le=5)
     """Number of NATS servers that store the key-value bucket when it is created: 1, or 3 or 5 in a cluster."""
@@ -113,6 +117,20 @@ class Settings(BaseSettings):
         if secret.get_secret_value():
             TokenSigner(secret.get_secret_value())
         return secret
+
+    @field_validator("bus")
+    @classmethod
+    def _validate_bus(cls, url: str) -> str:
+        if url != MEMORY_BUS:
+            parse_servers(url)
+        return url
+
+    @field_validator("catalogue")
+    @classmethod
+    def _validate_catalogue(cls, url: str) -> str:
+        if url:
+            Catalogue(url)
+        return url
 
     @field_validator("trusted_proxies")
     @classmethod

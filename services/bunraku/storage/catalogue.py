@@ -23,7 +23,8 @@ class Catalogue:
 
     def __init__(self, url: str) -> None:
         if url.split(":", 1)[0] not in URL_SCHEMES:
-            raise ValueError(f"invalid catalogue URL {url!r}, expected sqlite:///path or postgresql://host/name")
+            # without the URL, which may contain a password
+            raise ValueError("invalid catalogue URL, expected sqlite:///path or postgresql://host/name")
         if url.startswith("postgresql:"):
             split_tls_options(url)
         self._url = url
