@@ -68,6 +68,12 @@ def test_only_the_gateway_publishes_a_port_on_loopback() -> None:
     assert SERVICES["gateway"]["networks"] == ["gateway"]
 
 
+def test_buffers_of_the_gateway_are_bounded() -> None:
+    limits = {name: int(value.split()[-1]) for name, value in SERVICES["gateway"]["sysctls"].items()}
+    # by default a client that does not read holds 4 MB of the container's memory
+    assert limits == {"net.ipv4.tcp_wmem": 256 << 10, "net.ipv4.tcp_rmem": 1 << 20}
+
+
 def test_monitoring_has_least_network_access() -> None:
     address, port = "${BUNRAKU_GRAFANA_ADDRESS:-127.0.0.1}", "${BUNRAKU_GRAFANA_PORT:-3000}"
     assert SERVICES["grafana"]["ports"] == [f"{address}:{port}:3000"]
