@@ -11,7 +11,7 @@ _TLS_OPTIONS = ("ca", "cert", "key", "handshake")
 
 @dataclass(frozen=True, slots=True)
 class TlsOptions:
-    """How a connection is encrypted. Paths are PEM files; without `ca` the authorities of the system are trusted."""
+    """Encryption of a connection. Paths are PEM files; without `ca` the authorities of the system are trusted."""
 
     ca: str = ""
     certificate: str = ""
