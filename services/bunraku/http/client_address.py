@@ -1,7 +1,7 @@
 """Address of the client behind reverse proxies, which limits per address count by.
 
 A proxy appends the address of its peer to `X-Forwarded-For`. Only entries that a trusted proxy has appended are
-believed: the header is read from its end, and what stands before the first address that is not a proxy's may be forged.
+believed: the header is read from its end, and entries before the first address that is not a proxy's may be forged.
 """
 
 from __future__ import annotations

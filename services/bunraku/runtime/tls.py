@@ -1,4 +1,4 @@
-"""TLS of connections to backends: verified contexts, and errors that say what to do."""
+"""TLS of connections to backends: verified contexts, and errors with a remedy."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def require_readable(path: str) -> None:
 
 
 def describe_tls_error(error: OSError, host: str) -> str:
-    """Return what is wrong with the TLS of the server at `host` and what to do about it."""
+    """Return the cause of a failed TLS handshake with the server at `host`, and the remedy."""
     if isinstance(error, ssl.SSLCertVerificationError):
         return _describe_verification_error(error, host)
     reason = getattr(error, "reason", None) or ""
