@@ -91,7 +91,7 @@ def test_invalid_value_is_rejected_with_the_valid_ones(
     ],
 )
 def test_invalid_address_is_rejected_without_its_password(setting: dict[str, str]) -> None:
-    with pytest.raises(ValidationError, match="invalid (bus address|catalogue URL)") as raised:
+    with pytest.raises(ValidationError, match=r"invalid (bus address|catalogue URL)") as raised:
         Settings.model_validate(setting)
     assert "password" not in str(raised.value) + describe_setting_error(raised.value)
 
