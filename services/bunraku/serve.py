@@ -31,6 +31,7 @@ from bunraku.demo.bootstrap import open_demo_stage
 from bunraku.http.access_control import requires
 from bunraku.http.access_log import AccessLogMiddleware
 from bunraku.http.authorization import AuthorizationMiddleware, add_security_scheme, collect_route_rules
+from bunraku.http.client_address import ClientAddressMiddleware, TrustedProxies
 from bunraku.http.cors import CorsMiddleware
 from bunraku.http.origin import parse_origins
 from bunraku.http.problem_details import install_problem_handlers
@@ -152,6 +153,7 @@ def _add_middleware(app: FastAPI, context: ServiceContext, routes: list[BaseRout
         app.add_middleware(CorsMiddleware, origins=origins)
     app.add_middleware(ContentSecurityMiddleware)
     app.add_middleware(AccessLogMiddleware, metrics=context.metrics, clock=context.clock)
+    app.add_middleware(ClientAddressMiddleware, proxies=TrustedProxies.parse(context.settings.trusted_proxies))
 
 
 def _describe_all_services(app: FastAPI, other_services: list[ServiceFactory]) -> None:
@@ -218,6 +220,8 @@ async def serve(
                 app,
                 **uvicorn_protocol_options(),
                 lifespan="off",
+                # ClientAddressMiddleware takes the client's address from the header
+                proxy_headers=False,
                 # the command configures logging; at level INFO uvicorn would log queries, which may contain tickets
                 log_config=None,
                 log_level="warning",

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
+from bunraku.storage.postgres_url import split_tls_options
 from bunraku.storage.record import CatalogueEntry, Job, Quota, Share
 
 if TYPE_CHECKING:
@@ -23,7 +24,10 @@ class Catalogue:
 
     def __init__(self, url: str) -> None:
         if url.split(":", 1)[0] not in URL_SCHEMES:
-            raise ValueError(f"invalid catalogue URL {url!r}, expected sqlite:///path or postgresql://host/name")
+            # without the URL, which may contain a password
+            raise ValueError("invalid catalogue URL, expected sqlite:///path or postgresql://host/name")
+        if url.startswith("postgresql:"):
+            split_tls_options(url)
         self._url = url
         self._open_task: asyncio.Task[SqlCatalogue] | None = None
         self._incomplete_motions: frozenset[tuple[str, int]] = frozenset()

@@ -14,11 +14,12 @@ from typing import Any, NamedTuple, TypeVar
 from sqlalchemy import Column, Row, delete, event, func, select, text, tuple_
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnection
-from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendTimeout, BackendUnavailable
 from bunraku.runtime.insufficient_storage import insufficient_storage
 from bunraku.runtime.problem import ProblemError
+from bunraku.storage.engine import create_engine
 from bunraku.storage.job_sql import SqlJobTable
 from bunraku.storage.migration import HEAD_REVISION, migrate, read_schema_version
 from bunraku.storage.record import CatalogueEntry, InvalidCursor, Quota, QuotaExceeded
@@ -65,12 +66,12 @@ class SqlCatalogue:
         self._url = url
         self._postgres = url.startswith("postgresql")
         self._timeout = BackendTimeout("the catalogue")
-        pool_options = {
+        pool_options: dict[str, Any] = {
             "pool_pre_ping": True,
             "pool_timeout": BACKEND_TIMEOUT_S,
             "connect_args": {"timeout": BACKEND_TIMEOUT_S, "command_timeout": BACKEND_TIMEOUT_S},
         }
-        self._engine: AsyncEngine = create_async_engine(url, **(pool_options if self._postgres else {}))
+        self._engine: AsyncEngine = create_engine(url, **(pool_options if self._postgres else {}))
         self.reserve: SpaceReserve | None = None
         """Reserved space on the disk of an SQLite database."""
         if not self._postgres:
