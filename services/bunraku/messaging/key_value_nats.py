@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 
 from bunraku.messaging.bus import NoResponse
 from bunraku.messaging.bus_nats import NatsBus
-from bunraku.messaging.key_value import KeyValueEntry, RevisionConflict
+from bunraku.messaging.key_value import KeyValueEntry, KeyValueView, RevisionConflict
+from bunraku.messaging.key_value_watch_nats import OPERATION_HEADER, Bucket, NatsKeyValueWatch
 from bunraku.runtime.availability import BackendUnavailable
 
 BUCKET_NAME = "bunraku"
 _STREAM_NAME = f"KV_{BUCKET_NAME}"
 _API_PREFIX = "$JS.API.STREAM"
 _EXPECTED_SEQUENCE_HEADER = "Nats-Expected-Last-Subject-Sequence"
-_OPERATION_HEADER = "KV-Operation"
 _STREAM_CONFIG = {
     "name": _STREAM_NAME,
     "subjects": [f"$KV.{BUCKET_NAME}.>"],
@@ -58,6 +58,7 @@ class NatsKeyValueStore:
         self._bus = bus
         self._replicas = replicas
         self._stream_created = False
+        self._watch: NatsKeyValueWatch | None = None
 
     async def get(self, key: str) -> KeyValueEntry | None:
         last = await self._get_last_message(_subject(key))
@@ -65,10 +66,7 @@ class NatsKeyValueStore:
 
     async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
         query = {"subjects_filter": _subject(f"{prefix}.>")}
-        try:
-            info = await self._request(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", json.dumps(query).encode())
-        except _JetStreamError as error:
-            raise BackendUnavailable("the register", str(error)) from None
+        info = await self._request_or_unavailable(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", json.dumps(query).encode())
         subjects = list(info["state"].get("subjects") or ())
         messages = await asyncio.gather(*map(self._get_last_message, subjects))
         return {
@@ -88,10 +86,21 @@ class NatsKeyValueStore:
             return await self._put(key, value, last.entry.revision)
 
     async def remove(self, key: str, revision: int | None = None) -> None:
-        await self._put(key, b"", revision, {_OPERATION_HEADER: "DEL"})
+        await self._put(key, b"", revision, {OPERATION_HEADER: "DEL"})
+
+    def watch(self) -> KeyValueView:
+        if self._watch is None:
+            self._watch = NatsKeyValueWatch(self._bus, Bucket(_STREAM_NAME, _subject(""), self._request_or_unavailable))
+        return self._watch.view
+
+    async def synchronise(self) -> None:
+        info = await self._request_or_unavailable(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", b"")
+        await self.watch().wait_for(int(info["state"]["last_seq"]))
 
     async def close(self) -> None:
-        """Do nothing: the owner of the bus closes it."""
+        """End the watch; the owner of the bus closes it."""
+        if self._watch is not None:
+            await self._watch.close()
 
     async def _put(self, key: str, value: bytes, revision: int | None, headers: Mapping[str, str] | None = None) -> int:
         expected = {} if revision is None else {_EXPECTED_SEQUENCE_HEADER: str(revision)}
@@ -111,8 +120,15 @@ class NatsKeyValueStore:
             if error.code != _NO_MESSAGE_ERROR:
                 raise BackendUnavailable("the register", str(error)) from None
             return None
-        removed = f"{_OPERATION_HEADER}:".encode() in base64.b64decode(message.get("hdrs", ""))
+        removed = f"{OPERATION_HEADER}:".encode() in base64.b64decode(message.get("hdrs", ""))
         return _LastMessage(KeyValueEntry(base64.b64decode(message.get("data", "")), int(message["seq"])), removed)
+
+    async def _request_or_unavailable(self, subject: str, data: bytes) -> dict[str, Any]:
+        """Return a response of JetStream; raise `BackendUnavailable` also for an error response."""
+        try:
+            return await self._request(subject, data)
+        except _JetStreamError as error:
+            raise BackendUnavailable("the register", str(error)) from None
 
     async def _request(self, subject: str, data: bytes, headers: Mapping[str, str] | None = None) -> dict[str, Any]:
         """Return a response of JetStream, creating the bucket if needed; raise `_JetStreamError`."""

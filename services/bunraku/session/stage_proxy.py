@@ -19,10 +19,12 @@ LOG_TIMEOUT_S = 10.0
 class StageProxy:
     """Proxy of one session. Requests raise `ProblemError`: 404 without a session, 503 without a response."""
 
-    def __init__(self, session: str, bus: Bus, key_values: KeyValueStore) -> None:
+    def __init__(self, session: str, bus: Bus, key_values: KeyValueStore, subject: str = "") -> None:
+        """`subject` is that of the client's token, empty without one."""
         self._session = session
         self._bus = bus
         self._key_values = key_values
+        self._client_subject = subject
         self._subject = f"session.{session}"
 
     async def describe(self) -> dict[str, Any]:
@@ -50,7 +52,7 @@ class StageProxy:
 
     async def join(self, connection: PuppeteerConnection, name: str) -> None:
         """Add a puppeteer. Subscribe to `outgoing_subject` first: messages follow at once."""
-        await self._request("join", [connection.id, name])
+        await self._request("join", [connection.id, name, self._client_subject])
 
     def outgoing_subject(self, connection: PuppeteerConnection) -> str:
         """Return the subject of the messages to a puppeteer."""
