@@ -52,6 +52,7 @@ class KeyValueView:
         self._waiters: dict[asyncio.Future[None], int] = {}
         self.revision = 0
         """Revision of the last write that is contained; 0 before the first snapshot."""
+        self._is_suspended = False
 
     @property
     def entries(self) -> Mapping[str, KeyValueEntry]:
@@ -80,6 +81,7 @@ class KeyValueView:
     def replace(self, entries: Mapping[str, KeyValueEntry], revision: int) -> None:
         """Replace everything by a snapshot that contains all writes up to `revision`; the watch calls this."""
         self.revision = revision
+        self._is_suspended = False
         for key in self._entries.keys() - entries.keys():
             self._set(key, None)
         for key, entry in entries.items():
@@ -87,9 +89,13 @@ class KeyValueView:
                 self._set(key, entry)
         self._wake_waiters()
 
+    def suspend(self) -> None:
+        """Let `wait_for` wait for the next snapshot: changes may be missing; the watch calls this."""
+        self._is_suspended = True
+
     async def wait_for(self, revision: int, timeout_s: float = BACKEND_TIMEOUT_S) -> None:
         """Wait until every write up to `revision` is contained; raise `BackendUnavailable` after `timeout_s`."""
-        if self.revision >= revision:
+        if self.revision >= revision and not self._is_suspended:
             return
         reached: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._waiters[reached] = revision

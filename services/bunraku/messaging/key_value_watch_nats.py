@@ -120,6 +120,7 @@ class _Consumer:
         """Set when messages were lost: the consumer must be replaced."""
         self._inbox = bus.new_inbox()
         self._subscription = bus.subscribe_messages(self._inbox, self._on_message)
+        view.suspend()
 
     async def start(self) -> None:
         """Create the consumer; raise `BackendUnavailable`."""
@@ -144,6 +145,7 @@ class _Consumer:
 
     def stop(self) -> None:
         """Request another consumer."""
+        self._view.suspend()
         self.stopped.set()
 
     def close(self) -> None:

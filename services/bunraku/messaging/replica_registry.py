@@ -1,9 +1,8 @@
-"""Registry of live replicas: the one lease mechanism of the deployment.
+"""Registry of live replicas in the key-value store.
 
-Each replica writes a counter under its own key every second. What belongs to a replica (a session, a job, a lease)
-names it, and may be taken over, by a compare-and-set, once the replica is no longer alive. Staleness is judged by the
-observer's own monotonic clock and by its own heartbeats, never by a time that another machine has written: a replica
-that cannot reach the store declares no other replica dead.
+Each replica writes a counter under its own key every second. What belongs to a replica (a session, a lease) names it,
+and may be taken over, by a compare-and-set, once its heartbeats have stopped (`bunraku.messaging.heartbeat_observer`).
+A replica that cannot reach the store declares no other replica dead.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from bunraku.messaging.heartbeat_observer import HeartbeatObserver
 from bunraku.messaging.key_value import KeyValueEntry, KeyValueStore, RevisionConflict
 from bunraku.runtime.availability import BackendUnavailable
 
@@ -53,9 +53,7 @@ class ReplicaRegistry:
         self._timing = timing
         self._heartbeat_count = 0
         self._heartbeat_lock = asyncio.Lock()
-        # by replica: the newest revision of its counter, and the time of the own heartbeat that first saw it
-        self._observed: dict[str, tuple[int, float]] = {}
-        self._observed_at_s: float | None = None
+        self._observer = HeartbeatObserver(timing.timeout_s)
         self._handlers: list[Callable[[], None]] = []
 
     @property
@@ -63,23 +61,26 @@ class ReplicaRegistry:
         """Key of this replica's counter."""
         return f"{REPLICA_KEY_PREFIX}.{self.id}"
 
+    @property
+    def _has_observed(self) -> bool:
+        return self._observer.last_observation_s is not None
+
     def on_heartbeat(self, handler: Callable[[], None]) -> None:
         """Call `handler` after each heartbeat, when the liveness of all replicas is known again."""
         self._handlers.append(handler)
 
     def is_alive(self, replica: str) -> bool:
         """Return whether a replica was alive at the last heartbeat; True before the first, as nothing is known yet."""
-        if replica in (self.id, NO_REPLICA) or self._observed_at_s is None:
+        if replica in (self.id, NO_REPLICA) or not self._has_observed:
             return replica != NO_REPLICA
-        observed = self._observed.get(replica)
-        if observed is None:
-            # it may have registered since the last heartbeat
-            return f"{REPLICA_KEY_PREFIX}.{replica}" in self._key_values.watch().entries
-        return self._observed_at_s - observed[1] <= self._timing.timeout_s
+        if self._observer.is_known(replica):
+            return not self._observer.has_stopped(replica)
+        # it may have registered since the last heartbeat
+        return f"{REPLICA_KEY_PREFIX}.{replica}" in self._key_values.watch().entries
 
     def list_alive(self) -> set[str]:
         """Return the ids of all live replicas; raise `BackendUnavailable` before the first heartbeat."""
-        if self._observed_at_s is None:
+        if not self._has_observed:
             raise BackendUnavailable("the register", "no heartbeat has succeeded yet")
         return {self.id, *filter(self.is_alive, self._list_counters())}
 
@@ -88,7 +89,7 @@ class ReplicaRegistry:
 
         Register before writing the id anywhere: an unknown owner is not alive.
         """
-        if self._observed_at_s is None:
+        if not self._has_observed:
             await self.send_heartbeat()
         return self.id
 
@@ -119,15 +120,9 @@ class ReplicaRegistry:
             view, now_s = self._key_values.watch(), asyncio.get_running_loop().time()
             revision = await self._key_values.put(self.key, str(self._heartbeat_count).encode())
             await view.wait_for(revision)
-            # after an outage or a stall of this replica, the others get as much time again
-            was_delayed = self._observed_at_s is None or now_s - self._observed_at_s > 2 * self._timing.heartbeat_s
-            self._observed_at_s = now_s
             counters = self._list_counters()
-            self._observed = {
-                replica: self._observe(replica, entry.revision, now_s, was_delayed)
-                for replica, entry in counters.items()
-            }
-            await self._remove_stale_counters(counters, now_s)
+            self._observer.observe({replica: entry.revision for replica, entry in counters.items()}, now_s)
+            await self._remove_stale_counters(counters)
         for handler in self._handlers:
             handler()
 
@@ -144,13 +139,9 @@ class ReplicaRegistry:
             if key.startswith(f"{REPLICA_KEY_PREFIX}.")
         }
 
-    def _observe(self, replica: str, revision: int, now_s: float, was_delayed: bool) -> tuple[int, float]:
-        known_revision, since_s = self._observed.get(replica, (0, now_s))
-        return revision, now_s if was_delayed or revision != known_revision else since_s
-
-    async def _remove_stale_counters(self, counters: dict[str, KeyValueEntry], now_s: float) -> None:
+    async def _remove_stale_counters(self, counters: dict[str, KeyValueEntry]) -> None:
         for replica, entry in counters.items():
-            if now_s - self._observed[replica][1] > self._timing.removal_s:
+            if self._observer.silence_s(replica) > self._timing.removal_s:
                 # another replica may have removed it, or it is back
                 with contextlib.suppress(RevisionConflict):
                     await self._key_values.remove(f"{REPLICA_KEY_PREFIX}.{replica}", entry.revision)
