@@ -99,7 +99,8 @@ def create_app(context: ServiceContext) -> FastAPI:
     @requires(Role.CONTROL)
     async def control(socket: WebSocket, session: str, name: str = "Someone") -> None:
         with contextlib.suppress(WebSocketDisconnect):
-            stage = sessions.stage_proxy(session, access_of(socket).subject)
+            subject = access_of(socket).subject if context.authenticator.requires_token else None
+            stage = sessions.stage_proxy(session, subject)
             await control_endpoint.serve_puppeteer(socket, stage, context, name, sessions.counters)
 
     async def bound_session(access: Access) -> list[dict[str, Any]]:

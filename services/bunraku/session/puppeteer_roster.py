@@ -26,7 +26,7 @@ class Puppeteer:
     """Puppeteer of a stage.
 
     `send` queues one message and returns at once. `last_heard_us` is the clock time of the last message or heartbeat.
-    `subject` is that of the token, empty without one.
+    `subject` is that of the token, None without access control.
     `granted_limbs` are the limbs that the puppeteer was granted and has not released.
     """
 
@@ -35,7 +35,7 @@ class Puppeteer:
     colour: int
     send: Callable[[bytes], None]
     last_heard_us: int
-    subject: str = ""
+    subject: str | None = None
     granted_limbs: set[int] = field(default_factory=set)
     _notice_throttle: NoticeThrottle = field(default_factory=NoticeThrottle)
     _lost_notice_us: dict[int, int] = field(default_factory=dict)
@@ -73,12 +73,12 @@ class PuppeteerRoster:
         return self._by_id.get(puppeteer_id)
 
     def join(
-        self, puppeteer_id: str, name: str, send: Callable[[bytes], None], now: int, subject: str = ""
+        self, puppeteer_id: str, name: str, send: Callable[[bytes], None], now: int, subject: str | None = None
     ) -> Puppeteer:
         """Add a puppeteer with the first free colour; raises `SessionFull`."""
         if len(self._by_id) >= MAX_PUPPETEERS:
             raise SessionFull(f"{MAX_PUPPETEERS} puppeteers are here already")
-        if subject and sum(p.subject == subject for p in self) >= MAX_PUPPETEERS_PER_SUBJECT:
+        if subject is not None and sum(p.subject == subject for p in self) >= MAX_PUPPETEERS_PER_SUBJECT:
             raise SessionFull(f"{MAX_PUPPETEERS_PER_SUBJECT} puppeteers with this link are here already")
         used = [p.colour for p in self]
         colour = min(range(COLOUR_COUNT), key=lambda c: (used.count(c), c))

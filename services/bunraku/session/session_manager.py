@@ -56,8 +56,8 @@ class SessionManager:
         self.counters = SessionCounters()
         self._solver = PYTHON_SOLVER
 
-    def stage_proxy(self, session: str, subject: str = "") -> StageProxy:
-        """Return the proxy of a session on any replica; `subject` is that of the client for which it is used."""
+    def stage_proxy(self, session: str, subject: str | None = None) -> StageProxy:
+        """Return the proxy of a session on any replica, for a client of `subject` (None: without limits)."""
         return StageProxy(session, self._context.bus, self._context.key_values, subject)
 
     async def open_session(

@@ -25,6 +25,7 @@ from bunraku.messaging.bus import Bus, Subscription
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.overlay_buffer import pack_joints
+from bunraku.runtime.token_bucket import TokenBucket
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.pose_cache import PoseCache
@@ -43,6 +44,9 @@ FRAMES_PER_MESSAGE = 2
 """Frames of one message: packets, not bytes, fill a constrained link."""
 MAX_CATCH_UP_FRAMES = 6
 """Frames published late after a stall; earlier ones are skipped."""
+PRESENCES_PER_S, PRESENCE_BURST = 20.0, 40
+"""Rate of Presence messages, each of which goes to every viewer, and their number at once: a puppeteer may cause a
+change with every message."""
 VIEWER_COUNT_INTERVAL_S = 0.5
 """Interval between two publications of the viewer count."""
 
@@ -96,6 +100,8 @@ class Stage:
         self.puppeteers = PuppeteerRoster()
         self._reported_viewers: dict[str, ReportedViewers] = {}
         self._viewer_count_timer: asyncio.TimerHandle | None = None
+        self._presence_rate = TokenBucket(PRESENCES_PER_S, PRESENCE_BURST)
+        self._presence_timer: asyncio.TimerHandle | None = None
         self._has_grants = asyncio.Event()
         self._stall_compensation = EventLoopStallCompensation()
         self._sequence = 0
@@ -116,8 +122,9 @@ class Stage:
 
     async def close(self) -> None:
         """Stop the stage; its puppeteers receive nothing more."""
-        if self._viewer_count_timer is not None:
-            self._viewer_count_timer.cancel()
+        for timer in (self._viewer_count_timer, self._presence_timer):
+            if timer is not None:
+                timer.cancel()
         self._tick_task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._tick_task
@@ -211,10 +218,12 @@ class Stage:
             self._publish_presence()
         return state
 
-    def join(self, puppeteer_id: str, name: str, send: Callable[[bytes], None], subject: str = "") -> Puppeteer:
+    def join(
+        self, puppeteer_id: str, name: str, send: Callable[[bytes], None], subject: str | None = None
+    ) -> Puppeteer:
         """Add a puppeteer, whose messages are passed to `send`; raises `SessionFull`.
 
-        `subject` is that of the puppeteer's token, empty without one.
+        `subject` is that of the puppeteer's token, None without access control.
         """
         puppeteer = self.puppeteers.join(puppeteer_id, name, send, self._clock(), subject)
         puppeteer.send(Welcome(puppeteer.id, puppeteer.colour, OVERLAY_LEAD_US).pack())
@@ -262,7 +271,7 @@ class Stage:
         """Return whether another puppeteer of the same subject asks for a limb: each subject has one place."""
         asks = self._ownership.asks()
         others = map(self.puppeteers.get, asks[limb] if 0 <= limb < len(asks) else ())
-        return bool(puppeteer.subject) and any(
+        return puppeteer.subject is not None and any(
             other is not None and other is not puppeteer and other.subject == puppeteer.subject for other in others
         )
 
@@ -301,7 +310,20 @@ class Stage:
         return state
 
     def _publish_presence(self) -> None:
+        """Publish the presence, or together with later changes if there were many just now."""
         self.last_active_us = self._clock()
+        if self._presence_rate.take(self.last_active_us * 1e-6):
+            self._send_presence()
+        elif self._presence_timer is None:
+            self._presence_timer = asyncio.get_running_loop().call_later(
+                1 / PRESENCES_PER_S, self._publish_late_presence
+            )
+
+    def _publish_late_presence(self) -> None:
+        self._presence_timer = None
+        self._publish_presence()
+
+    def _send_presence(self) -> None:
         packed = self.presence.pack()
         self._bus.publish(f"session.{self.id}.presence", packed)
         for puppeteer in self.puppeteers:

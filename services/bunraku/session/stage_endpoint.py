@@ -132,10 +132,10 @@ class StageEndpoint:
     async def _answer_end(self, _: None) -> None:
         await self._owner.end_session(self.stage.id)
 
-    async def _answer_join(self, values: list[str]) -> dict[str, Any]:
+    async def _answer_join(self, values: list[Any]) -> dict[str, Any]:
         # replicas of earlier releases send no subject
-        puppeteer_id, name, subject = (*values, "")[:3]
-        if subject and not self._join_rate.take(subject, self._clock() * 1e-6):
+        puppeteer_id, name, subject = (*values, None)[:3]
+        if subject is not None and not self._join_rate.take(subject, self._clock() * 1e-6):
             raise ProblemError(429, "Too many joins", "this link joins too often", hint="try again in a second")
         try:
             puppeteer = self.stage.join(

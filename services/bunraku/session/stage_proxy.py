@@ -19,8 +19,8 @@ LOG_TIMEOUT_S = 10.0
 class StageProxy:
     """Proxy of one session. Requests raise `ProblemError`: 404 without a session, 503 without a response."""
 
-    def __init__(self, session: str, bus: Bus, key_values: KeyValueStore, subject: str = "") -> None:
-        """`subject` is that of the client's token, empty without one."""
+    def __init__(self, session: str, bus: Bus, key_values: KeyValueStore, subject: str | None = None) -> None:
+        """`subject` is that of the client's token, None at a server without access control."""
         self._session = session
         self._bus = bus
         self._key_values = key_values
