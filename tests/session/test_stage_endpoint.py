@@ -14,13 +14,13 @@ from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
-from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.stream.watched_session import VIEWER_COUNT_REFRESH_S
 from bunraku.wire.messages import Claim
+from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.vectors.blocks import random_motion
 
 
@@ -67,8 +67,8 @@ async def endpoint(context: ServiceContext, owner: FakeStageOwner) -> AsyncItera
 
 async def join_stage(
     context: ServiceContext, name: str, subject: str | None = None
-) -> tuple[StageProxy, PuppeteerConnection]:
-    stage, connection = StageProxy("s", context.bus, context.key_values, subject), PuppeteerConnection()
+) -> tuple[StageProxy, RecordingPuppeteer]:
+    stage, connection = StageProxy("s", context.bus, context.key_values, subject), RecordingPuppeteer()
     context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
     await stage.join(connection, name)
     return stage, connection
@@ -96,7 +96,7 @@ async def test_join_of_a_full_stage_gives_503(context: ServiceContext, monkeypat
 
 @pytest.mark.usefixtures("endpoint")
 async def test_unknown_puppeteer_is_notified(context: ServiceContext) -> None:
-    stage, connection = StageProxy("s", context.bus, context.key_values), PuppeteerConnection()
+    stage, connection = StageProxy("s", context.bus, context.key_values), RecordingPuppeteer()
     context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
     stage.send(connection, None)
     assert not connection.is_unknown

@@ -28,7 +28,7 @@ PUPPETEER_FRAMES = FrameLimit(2.0 * MAX_MESSAGES_PER_S, 4.0 * MAX_MESSAGES_PER_S
 class PuppeteerStage(Protocol):
     """Stage of a puppeteer, on any replica."""
 
-    def send(self, connection: PuppeteerConnection, message: bytes | None) -> None:
+    def send(self, puppeteer: PuppeteerConnection, message: bytes | None) -> None:
         """Send a puppeteer's message; None means that the puppeteer has left, no bytes are a heartbeat."""
 
 
