@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from bunraku.messaging import key_value_nats
 from bunraku.messaging.bus_nats import NatsBus
 from bunraku.messaging.key_value_nats import NatsKeyValueStore
 from bunraku.messaging.nats_connection import NatsMessage
@@ -173,3 +175,21 @@ async def test_watch_begins_again_after_a_missing_message(tmp_path: Path, monkey
                 await store.watch().wait_for(await store.put("sessions.c", b"3"), 20)
             assert await synchronised_keys(store) == {"sessions.a": b"1", "sessions.b": b"2", "sessions.c": b"3"}
             await store.close()
+
+
+async def test_removed_keys_leave_nothing_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(key_value_nats, "MARKER_LIFETIME_S", 0.0)
+    with run_jetstream(tmp_path) as server:
+        async with open_store(nats_url_of(server)) as (bus, store):
+            for number in range(30):
+                await store.put(f"sessions.{number}", b"1", 0)
+                await store.remove(f"sessions.{number}")
+                # a key that exists again is not purged
+                await store.put("sessions.again", b"%d" % number, 0)
+                if number < 29:
+                    await store.remove("sessions.again")
+            info = json.loads(await bus.request("$JS.API.STREAM.INFO.KV_bunraku"))
+            assert info["state"]["messages"] <= 3
+            assert {key: entry.value for key, entry in (await store.list_prefix("sessions")).items()} == {
+                "sessions.again": b"29"
+            }

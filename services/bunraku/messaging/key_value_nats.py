@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import contextlib
 import json
+from collections import deque
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -19,6 +21,15 @@ from bunraku.messaging.key_value_watch_nats import OPERATION_HEADER, Bucket, Nat
 from bunraku.runtime.availability import BackendUnavailable
 
 BUCKET_NAME = "bunraku"
+MARKER_LIFETIME_S = 60.0
+"""Time after which the message that marks a key as removed is purged, in seconds: every watch has received it or has
+begun again."""
+MAX_MARKERS = 10_000
+"""Number of removed keys that a process remembers for the purge."""
+MAX_PURGES = 2
+"""Number of messages that are purged with each removal."""
+MAX_CREATE_ATTEMPTS = 3
+"""Number of attempts to create a key that was removed before."""
 _STREAM_NAME = f"KV_{BUCKET_NAME}"
 _API_PREFIX = "$JS.API.STREAM"
 _EXPECTED_SEQUENCE_HEADER = "Nats-Expected-Last-Subject-Sequence"
@@ -59,6 +70,8 @@ class NatsKeyValueStore:
         self._replicas = replicas
         self._stream_created = False
         self._watch: NatsKeyValueWatch | None = None
+        # time of the purge, key and revision of messages that mark keys as removed
+        self._markers: deque[tuple[float, str, int]] = deque(maxlen=MAX_MARKERS)
 
     async def get(self, key: str) -> KeyValueEntry | None:
         last = await self._get_last_message(_subject(key))
@@ -76,17 +89,26 @@ class NatsKeyValueStore:
         }
 
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
-        try:
-            return await self._put(key, value, revision)
-        except RevisionConflict:
-            # a removed key has a message that marks the removal
-            last = await self._get_last_message(_subject(key)) if revision == 0 else None
-            if last is None or not last.is_removed:
-                raise
-            return await self._put(key, value, last.entry.revision)
+        expected = revision
+        for _ in range(MAX_CREATE_ATTEMPTS):
+            try:
+                return await self._put(key, value, expected)
+            except RevisionConflict:
+                if revision != 0:
+                    raise
+                # a removed key may have a message that marks the removal, until it is purged
+                last = await self._get_last_message(_subject(key))
+                if last is not None and not last.is_removed:
+                    raise
+                expected = 0 if last is None else last.entry.revision
+        raise RevisionConflict(key)
 
     async def remove(self, key: str, revision: int | None = None) -> None:
-        await self._put(key, b"", revision, {OPERATION_HEADER: "DEL"})
+        marker = await self._put(key, b"", revision, {OPERATION_HEADER: "DEL"})
+        now_s = asyncio.get_running_loop().time()
+        self._markers.append((now_s + MARKER_LIFETIME_S, key, marker))
+        with contextlib.suppress(BackendUnavailable):
+            await self._purge_markers(now_s)
 
     def watch(self) -> KeyValueView:
         if self._watch is None:
@@ -101,6 +123,16 @@ class NatsKeyValueStore:
         """End the watch; the owner of the bus closes it."""
         if self._watch is not None:
             await self._watch.close()
+
+    async def _purge_markers(self, now_s: float) -> None:
+        """Purge the oldest messages of this store that mark keys as removed: the stream would grow for ever."""
+        for _ in range(MAX_PURGES):
+            if not self._markers or self._markers[0][0] > now_s:
+                return
+            _, key, marker = self._markers.popleft()
+            # up to the marker only: the key may exist again
+            query = json.dumps({"filter": _subject(key), "seq": marker + 1}).encode()
+            await self._request_or_unavailable(f"{_API_PREFIX}.PURGE.{_STREAM_NAME}", query)
 
     async def _put(self, key: str, value: bytes, revision: int | None, headers: Mapping[str, str] | None = None) -> int:
         expected = {} if revision is None else {_EXPECTED_SEQUENCE_HEADER: str(revision)}
