@@ -61,9 +61,17 @@ class SessionManager:
         return StageProxy(session, self._context.bus, self._context.key_values, subject)
 
     async def open_session(
-        self, motion: str, *, playing: bool = True, loop: bool = True, session: str | None = None, subject: str = ""
+        self,
+        motion: str,
+        *,
+        playing: bool = True,
+        loop: bool = True,
+        session: str | None = None,
+        subject: str | None = None,
     ) -> dict[str, Any]:
-        """Open a session of `subject` and return it as the API shows it; raises `ProblemError`.
+        """Open a session of `subject` (None: without a quota) and return it as the API shows it.
+
+        Raises `ProblemError`.
 
         With a given id, `session`, raises `RevisionConflict` of the store if any replica has a session with that id.
         """
@@ -72,13 +80,13 @@ class SessionManager:
         self._registry.watch(self._review)
         replica = await self._registry.replicas.register()
         self._require_quota(subject, 1)
-        await self._make_room(subject)
+        await self._make_room(subject or "")
         now, session = self._context.clock(), session or secrets.token_hex(9)
         state = timeline.start(motion, stored.first_track.duration_us, now, playing=playing, loop=loop)
         self._pending[session] = subject
         try:
-            revision = await self._registry.create(session, SessionRecord(replica, now, state.pack(), subject))
-            stage = self._add_stage(SessionStart(session, stored, state, now, subject), revision)
+            revision = await self._registry.create(session, SessionRecord(replica, now, state.pack(), subject or ""))
+            stage = self._add_stage(SessionStart(session, stored, state, now, subject or ""), revision)
         finally:
             self._pending.pop(session, None)
         await self._confirm_quota(session, subject, revision)
@@ -188,12 +196,14 @@ class SessionManager:
 
     # limits
 
-    def _require_quota(self, subject: str, additional: int) -> None:
+    def _require_quota(self, subject: str | None, additional: int) -> None:
         """Raise `ProblemError` if the subject has too many sessions at all replicas, `additional` ones included."""
         limit = self._context.settings.session_quota()
+        if subject is None or not limit:
+            return
         registered = self._registry.sessions
         opening = sum(owner == subject and session not in registered for session, owner in self._pending.items())
-        if limit and self._registry.count_sessions(subject) + opening + additional > limit:
+        if self._registry.count_sessions(subject) + opening + additional > limit:
             raise ProblemError(
                 403,
                 "Quota used up",
@@ -201,9 +211,9 @@ class SessionManager:
                 hint="end a session",
             )
 
-    async def _confirm_quota(self, session: str, subject: str, revision: int) -> None:
+    async def _confirm_quota(self, session: str, subject: str | None, revision: int) -> None:
         """End a new session if others that were opened at the same time, here or elsewhere, have used up the quota."""
-        if not self._context.settings.session_quota():
+        if subject is None or not self._context.settings.session_quota():
             return
         try:
             await self._registry.wait_for(revision)
