@@ -7,9 +7,11 @@ import dataclasses
 from collections.abc import AsyncIterator
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import msgpack
 import pytest
+from pydantic import SecretStr
 
 from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
@@ -21,6 +23,7 @@ from bunraku.runtime.settings import Settings
 from bunraku.session import session_manager
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.session_registry import SessionRecord, session_key
+from bunraku.session.stage import Stage
 from tests.credentials import SECRET
 from tests.session.remote_store import RemoteKeyValueStore
 from tests.vectors.blocks import random_motion
@@ -30,7 +33,7 @@ QUOTA = 3
 
 @pytest.fixture
 async def context(tmp_path: Path) -> AsyncIterator[ServiceContext]:
-    async with open_context(Settings(data=tmp_path, secret=SECRET, quota_sessions=QUOTA)) as opened:
+    async with open_context(Settings(data=tmp_path, secret=SecretStr(SECRET), quota_sessions=QUOTA)) as opened:
         encoded = encode_motion(random_motion(2.0, 30.0, 0), error_bounds_mm=(30.0,), grade="live")
         await opened.motion_store.put("one", pack_motion("one", encoded))
         yield opened
@@ -88,6 +91,45 @@ async def test_unnamed_subject_has_a_quota_too(managers: list[SessionManager]) -
         await open_session(managers[0], "")
     with pytest.raises(ProblemError, match="this client has 3"):
         await open_session(managers[1], "")
+
+
+async def test_openings_of_one_subject_are_limited(context: ServiceContext, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session_manager, "OPENING_BURST", 3)
+    manager = SessionManager(context)
+    for _ in range(3):
+        await manager.end_session(await open_session(manager, "aiko"))
+    with pytest.raises(ProblemError, match="too often") as refused:
+        await open_session(manager, "aiko")
+    assert refused.value.status == 429
+    await open_session(manager, "ben")
+    # without access control there are no subjects
+    for _ in range(6):
+        await manager.open_session("one")
+    await manager.close()
+
+
+async def test_stages_are_created_in_separate_iterations_of_the_event_loop(
+    context: ServiceContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thousand requests at once do not block the overlays of other sessions."""
+    manager, iteration, created_in = SessionManager(context), 0, []
+
+    async def count_iterations() -> None:
+        nonlocal iteration
+        while True:
+            iteration += 1
+            await asyncio.sleep(0)
+
+    def create_stage(*args: Any) -> Stage:
+        created_in.append(iteration)
+        return Stage(*args)
+
+    monkeypatch.setattr(session_manager, "Stage", create_stage)
+    counting = asyncio.create_task(count_iterations())
+    await asyncio.gather(*(manager.open_session("one") for _ in range(20)))
+    counting.cancel()
+    assert len(created_in) == len(set(created_in)) == 20
+    await manager.close()
 
 
 @pytest.fixture

@@ -78,12 +78,6 @@ class ReplicaRegistry:
         # it may have registered since the last heartbeat
         return f"{REPLICA_KEY_PREFIX}.{replica}" in self._key_values.watch().entries
 
-    def list_alive(self) -> set[str]:
-        """Return the ids of all live replicas; raise `BackendUnavailable` before the first heartbeat."""
-        if not self._has_observed:
-            raise BackendUnavailable("the register", "no heartbeat has succeeded yet")
-        return {self.id, *filter(self.is_alive, self._list_counters())}
-
     async def register(self) -> str:
         """Return the id of this replica once the others know it; raise `BackendUnavailable`.
 

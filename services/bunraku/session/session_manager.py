@@ -14,6 +14,7 @@ import secrets
 from typing import Any
 
 from bunraku.codec.container import StoredMotion
+from bunraku.http.token_bucket import KeyedTokenBuckets
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.messaging.replica_registry import DEFAULT_TIMING, NO_REPLICA, ReplicaTiming
 from bunraku.playout import timeline
@@ -33,6 +34,8 @@ IDLE_TIMEOUT_US = 24 * 3_600 * 1_000_000
 """A session without viewers and puppeteers for this long is ended."""
 IDLE_GRACE_US = 10_000_000
 """A session without viewers and puppeteers for this long may be ended to make room at a full replica."""
+OPENINGS_PER_S, OPENING_BURST = 5.0, 50
+"""Rate at which one subject may open sessions at a replica, and the number of openings at once."""
 MAX_CONCURRENT_CLAIMS = 8
 """Number of sessions that a replica takes over at the same time."""
 
@@ -48,6 +51,8 @@ class SessionManager:
         self._endpoints: dict[str, StageEndpoint] = {}
         # sessions that this replica creates or claims now, with the subject for which one is created
         self._pending: dict[str, str | None] = {}
+        self._stage_lock = asyncio.Lock()
+        self._open_rate = KeyedTokenBuckets(OPENINGS_PER_S, OPENING_BURST)
         self._claim_slots = asyncio.Semaphore(MAX_CONCURRENT_CLAIMS)
         self._claim_tasks: set[asyncio.Task[None]] = set()
         self._changed_sessions: set[str] = set()
@@ -75,10 +80,13 @@ class SessionManager:
 
         With a given id, `session`, raises `RevisionConflict` of the store if any replica has a session with that id.
         """
-        stored = await self.load_motion(motion)
-        await asyncio.to_thread(load_bend_tables, stored)
         self._registry.watch(self._review)
         replica = await self._registry.replicas.register()
+        # before the motion is loaded: a refusal is cheap
+        self._require_quota(subject, 1)
+        self._limit_rate(subject)
+        stored = await self.load_motion(motion)
+        await asyncio.to_thread(load_bend_tables, stored)
         self._require_quota(subject, 1)
         await self._make_room(subject or "")
         now, session = self._context.clock(), session or secrets.token_hex(9)
@@ -86,7 +94,7 @@ class SessionManager:
         self._pending[session] = subject
         try:
             revision = await self._registry.create(session, SessionRecord(replica, now, state.pack(), subject or ""))
-            stage = self._add_stage(SessionStart(session, stored, state, now, subject or ""), revision)
+            stage = await self._add_stage(SessionStart(session, stored, state, now, subject or ""), revision)
         finally:
             self._pending.pop(session, None)
         await self._confirm_quota(session, subject, revision)
@@ -195,6 +203,13 @@ class SessionManager:
         await self._registry.replicas.close()
 
     # limits
+
+    def _limit_rate(self, subject: str | None) -> None:
+        """Raise `ProblemError` if the subject opens sessions too often."""
+        if subject is not None and not self._open_rate.take(subject, self._context.clock() * 1e-6):
+            raise ProblemError(
+                429, "Too many sessions", "this link opens sessions too often", hint="try again in a second"
+            )
 
     def _require_quota(self, subject: str | None, additional: int) -> None:
         """Raise `ProblemError` if the subject has too many sessions at all replicas, `additional` ones included."""
@@ -317,17 +332,20 @@ class SessionManager:
         if confirmed is None:
             return
         start = SessionStart(session, stored, state, claimed.record.created_us, claimed.record.subject)
-        self._add_stage(start, confirmed.revision).announce_takeover()
+        (await self._add_stage(start, confirmed.revision)).announce_takeover()
         self.counters.sessions["taken over",] += 1
         _log.warning("session %s taken over from another server", session)
 
     # stages
 
-    def _add_stage(self, start: SessionStart, revision: int) -> Stage:
-        # the stage outlives the request that opens it
-        with request_id.bind(""):
-            stage = Stage(start, self._context.bus, self._context.clock, self.counters, self._solver)
-            self._endpoints[start.id] = StageEndpoint(stage, self._context, self, revision)
+    async def _add_stage(self, start: SessionStart, revision: int) -> Stage:
+        # one in each iteration of the event loop, as it takes milliseconds
+        async with self._stage_lock:
+            # the stage outlives the request that opens it
+            with request_id.bind(""):
+                stage = Stage(start, self._context.bus, self._context.clock, self.counters, self._solver)
+                self._endpoints[start.id] = StageEndpoint(stage, self._context, self, revision)
+            await asyncio.sleep(0)
         # the record may have changed before the answer to its write arrived
         self._review(start.id)
         return stage
