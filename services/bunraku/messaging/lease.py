@@ -8,16 +8,18 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from bunraku.messaging.key_value import KeyValueStore, RevisionConflict
-from bunraku.messaging.replica_registry import DEFAULT_TIMING, ReplicaRegistry, ReplicaTiming
+from bunraku.messaging.replica_registry import ReplicaRegistry, ReplicaTiming
 from bunraku.runtime.availability import BackendUnavailable
 
+LEASE_TIMING = ReplicaTiming(timeout_s=5.0)
+"""Intervals of a lease: its holder may be busy, and nobody is harmed by waiting."""
 POLL_INTERVAL_S = 0.25
 """Interval at which a waiting replica looks at the lease, in seconds."""
 
 
 @asynccontextmanager
 async def hold_lease(
-    key_values: KeyValueStore, key: str, timing: ReplicaTiming = DEFAULT_TIMING, poll_s: float = POLL_INTERVAL_S
+    key_values: KeyValueStore, key: str, timing: ReplicaTiming = LEASE_TIMING, poll_s: float = POLL_INTERVAL_S
 ) -> AsyncIterator[None]:
     """Wait for the lease at `key` and hold it inside the block.
 
