@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from signal import SIGINT, SIGTERM
 from typing import Any
@@ -32,7 +33,7 @@ from bunraku.http.authorization import AuthorizationMiddleware, add_security_sch
 from bunraku.http.cors import CorsMiddleware
 from bunraku.http.origin import parse_origins
 from bunraku.http.problem_details import install_problem_handlers
-from bunraku.http.protocol import HttpProtocol
+from bunraku.http.protocol import HttpLoad, HttpProtocol
 from bunraku.page_files import create_page_app
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
@@ -153,7 +154,7 @@ def _describe_all_services(app: FastAPI, other_services: list[ServiceFactory]) -
 def uvicorn_protocol_options() -> dict[str, Any]:
     """Return uvicorn's options for the HTTP and WebSocket protocols."""
     return {
-        "http": HttpProtocol,
+        "http": partial(HttpProtocol, HttpLoad()),
         "ws": HandoffProtocol,
         "ws_max_size": MAX_CLIENT_MESSAGE_BYTES,
         "ws_per_message_deflate": False,
