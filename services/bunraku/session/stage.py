@@ -31,6 +31,7 @@ from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.pose_cache import PoseCache
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster
 from bunraku.session.stall import EventLoopStallCompensation
+from bunraku.session.viewer_counts import ViewerCounts
 from bunraku.wire import messages
 from bunraku.wire.messages import Alive, Ask, Claim, Grant, Input, Presence, Refusal, Release, TimelineState, Welcome
 from bunraku.wire.overlay import Overlay
@@ -65,14 +66,6 @@ class SessionStart:
     """Subject of the token that opened the session."""
 
 
-@dataclass(slots=True)
-class ReportedViewers:
-    """Number of viewers at one stream replica, and the clock time of its report."""
-
-    count: int
-    last_heard_us: int
-
-
 class Stage:
     """A motion on a shared timeline, and the puppeteers who control its limbs."""
 
@@ -98,7 +91,7 @@ class Stage:
         self._timelines = timeline.TimelineHistory()
         self._timelines.put(start.timeline)
         self.puppeteers = PuppeteerRoster()
-        self._reported_viewers: dict[str, ReportedViewers] = {}
+        self._viewer_counts = ViewerCounts(clock)
         self._viewer_count_timer: asyncio.TimerHandle | None = None
         self._presence_rate = TokenBucket(PRESENCES_PER_S, PRESENCE_BURST)
         self._presence_timer: asyncio.TimerHandle | None = None
@@ -155,32 +148,17 @@ class Stage:
     @property
     def participant_count(self) -> int:
         """Number of viewers and puppeteers."""
-        return self.viewer_count + len(self.puppeteers)
-
-    @property
-    def viewer_count(self) -> int:
-        """Number of viewers at all stream replicas that have reported lately."""
-        return sum(reported.count for reported in self._reported_viewers.values())
+        return self._viewer_counts.total + len(self.puppeteers)
 
     def is_idle(self, now: int, duration_us: int) -> bool:
         """Return whether the session has had neither viewers nor puppeteers for `duration_us`."""
         return self.participant_count == 0 and now - self.last_active_us >= duration_us
 
-    def expire_viewer_counts(self, timeout_us: int, stalled_us: int = 0) -> None:
-        """Forget the viewers of stream replicas that have not reported for `timeout_us`.
-
-        During the last `stalled_us` the event loop was blocked, and no report could be received.
-        """
-        oldest_us = self._clock() - timeout_us
-        for reported in self._reported_viewers.values():
-            reported.last_heard_us += stalled_us
-        kept = {
-            replica: reported
-            for replica, reported in self._reported_viewers.items()
-            if reported.last_heard_us >= oldest_us
-        }
-        if len(kept) != len(self._reported_viewers):
-            self._reported_viewers = kept
+    def expire_viewer_counts(self, timeout_us: int, stalled_us: int) -> None:
+        """Forget the viewers of silent stream replicas, as `ViewerCounts.expire` does."""
+        before = self._viewer_counts.total
+        self._viewer_counts.expire(timeout_us, stalled_us)
+        if self._viewer_counts.total != before:
             self._schedule_presence()
 
     @property
@@ -193,7 +171,7 @@ class Stage:
         """Viewer count, puppeteers, limb holders and requests for limbs."""
         puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
         asks = [list(limb) for limb in self._ownership.asks()]
-        return Presence(self.viewer_count, puppeteers, list(self.holders), asks)
+        return Presence(self._viewer_counts.total, puppeteers, list(self.holders), asks)
 
     def edit_timeline(self, *, playing: bool | None, position: int | None, loop: bool | None) -> TimelineState:
         """Edit the timeline for everyone, `EDIT_LEAD_US` from now."""
@@ -334,11 +312,9 @@ class Stage:
         return packed
 
     def _receive_viewer_count(self, message: bytes) -> None:
-        replica, count = msgpack.unpackb(message)
-        before = self._reported_viewers.pop(replica, None)
-        if count:
-            self._reported_viewers[replica] = ReportedViewers(count, self._clock())
-        if count != (before.count if before else 0):
+        before = self._viewer_counts.total
+        self._viewer_counts.report(*msgpack.unpackb(message))
+        if self._viewer_counts.total != before:
             self._schedule_presence()
 
     def _schedule_presence(self) -> None:
@@ -349,12 +325,12 @@ class Stage:
         if self._viewer_count_timer is None:
             self._publish_presence()
             self._viewer_count_timer = asyncio.get_running_loop().call_later(
-                VIEWER_COUNT_INTERVAL_S, self._publish_changed_count, self.viewer_count
+                VIEWER_COUNT_INTERVAL_S, self._publish_changed_count, self._viewer_counts.total
             )
 
     def _publish_changed_count(self, published_count: int) -> None:
         self._viewer_count_timer = None
-        if published_count != self.viewer_count:
+        if published_count != self._viewer_counts.total:
             self._schedule_presence()
 
     async def _run_ticks(self) -> None:
